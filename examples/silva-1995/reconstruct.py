@@ -1,0 +1,87 @@
+"""Rebuild the points of Silva's tank (1995, table 11) that the dissertation does not print.
+
+Printed are the centre, radius and area of five sections and the magnitude of the residual of each of
+24 generatrices. The points are rebuilt so that the least-squares circles come back: the signs of the
+residuals are searched (seeded) until they are free of a mean and of a shift of the centre, what is
+left is spread over the magnitudes within their rounding, and the radius is taken from the area, which
+is printed with more digits. Run it to write points.csv again:
+
+    python reconstruct.py
+"""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).parent
+SEED = 1995
+SECTION_HEIGHTS_M = (0.95, 2.85, 4.75, 6.65, 8.55)  # invented: the middle of five equal courses
+BOTTOM_Z_M = 10.000  # invented
+COORDINATE_SD_MM = 14.142  # published: coordinate variance 2.0e-4 m2
+ROUNDING_M = 0.0005  # residuals are printed to a millimetre
+
+
+def main():
+    """Write points.csv beside this script."""
+    rng = np.random.default_rng(SEED)
+    circles, residuals = _rows("published/table11_circles.csv"), _rows("published/table11_residuals.csv")
+    lines = []
+    for number, (circle, height) in enumerate(zip(circles, SECTION_HEIGHTS_M, strict=True), 1):
+        seen = [row for row in residuals if row[f"s{number}_m"]]
+        azimuth = np.array([(int(row["generatrix"]) - 1) * 2 * np.pi / 24 for row in seen])
+        size = np.array([float(row[f"s{number}_m"]) for row in seen])
+        residual = signed_residuals(size, azimuth, rng)
+        radius = np.sqrt(float(circle["area_m2"]) / np.pi) + residual
+        x = float(circle["x_m"]) + radius * np.sin(azimuth)
+        y = float(circle["y_m"]) + radius * np.cos(azimuth)
+        for row, px, py in zip(seen, x, y, strict=True):
+            generatrix = row["generatrix"]
+            name = f"{number}-{int(generatrix):02d}"
+            z = BOTTOM_Z_M + height
+            sd = [COORDINATE_SD_MM] * 3
+            lines.append([name, f"{px:.5f}", f"{py:.5f}", f"{z:.5f}", *sd, number, generatrix])
+    with open(HERE / "points.csv", "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow("point x_m y_m z_m sx_mm sy_mm sz_mm section generatrix".split())
+        writer.writerows(lines)
+
+
+def signed_residuals(size, azimuth, rng):
+    """Residuals of the printed sizes that neither change the radius nor move the centre."""
+    design = np.column_stack([np.ones_like(azimuth), np.cos(azimuth), np.sin(azimuth)])
+    rough = _best_signs(size, design, rng) * size
+    residual = rough - design @ np.linalg.lstsq(design, rough, rcond=None)[0]
+    if np.abs(residual - rough).max() > ROUNDING_M:
+        raise SystemExit("no signs found within the rounding of the table: change the seed")
+    return residual
+
+
+def _best_signs(size, design, rng):
+    """Signs with the least change of the circle; simulated annealing with single and double flips."""
+    n = len(size)
+    sign = rng.choice([-1.0, 1.0], size=n)
+
+    def cost(sign):
+        return np.sum((design.T @ (sign * size)) ** 2)
+
+    best, best_cost = sign.copy(), cost(sign)
+    now = best_cost
+    for temperature in np.geomspace(1e-3, 1e-10, 40_000):
+        trial = sign.copy()
+        trial[rng.integers(n, size=rng.integers(1, 3))] *= -1
+        then = cost(trial)
+        if then < now or rng.random() < np.exp((now - then) / temperature):
+            sign, now = trial, then
+            if now < best_cost:
+                best, best_cost = sign.copy(), now
+    return best
+
+
+def _rows(name):
+    with open(HERE / name, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+if __name__ == "__main__":
+    main()

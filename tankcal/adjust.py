@@ -1,0 +1,160 @@
+"""Least squares that knows no geometry: the combined (Gauss-Helmert) model.
+
+Conditions f(x, l + v) = 0 between unknowns x and observations l with covariance Q, linearised in
+each iteration at the adjusted observations:
+
+    B v + A dx + w = 0,   M = B Q B',   dx = -(A' M^-1 A)^-1 A' M^-1 w,   v = -Q B' M^-1 (A dx + w)
+
+A model without B is a Gauss-Markov model, f = F(x) - l and B = -I. Everything is whitened with a
+Cholesky factor, columns are scaled before the rank is judged, and nothing is inverted but the
+covariance. Source: Mikhail & Ackermann 1976, Observations and Least Squares, ch. 9.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+
+from tankcal.errors import SolutionError
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """What an adjustment found; u unknowns, n observations, m conditions.
+
+    unknowns            (u,) estimates
+    cofactor            (u, u) covariance of the unknowns for variance factor 1
+    observations        (n,) adjusted observations l + v
+    residuals           (n,) v, in the units of the observations
+    normalised          (m,) whitened residual of each condition
+    redundancy          (m,) part of each condition's error that shows in its residual, 0 to 1
+    chi2                v' Q^-1 v
+    dof                 m - u
+    iterations          until the last step was below the tolerance
+    """
+
+    unknowns: np.ndarray
+    cofactor: np.ndarray
+    observations: np.ndarray
+    residuals: np.ndarray
+    normalised: np.ndarray
+    redundancy: np.ndarray
+    chi2: float
+    dof: int
+    iterations: int
+
+    @property
+    def variance_factor(self):
+        """A-posteriori variance factor chi2 / dof; nan when nothing is redundant."""
+        return self.chi2 / self.dof if self.dof > 0 else np.nan
+
+    @property
+    def w(self):
+        """(m,) Baarda's test quantity: normalised residual over the root of its redundancy.
+
+        nan where the redundancy is zero: nothing checks that condition.
+        """
+        checked = self.redundancy > 1e-9
+        root = np.sqrt(np.where(checked, self.redundancy, 1.0))
+        return np.where(checked, self.normalised / root, np.nan)
+
+
+def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tolerance=1e-8):
+    """Adjust observations so that the conditions of `model` hold.
+
+    model(x, l) -> (w, A, B): misclosures (m,), Jacobian by unknowns (m, u) and by observations
+        (m, n), the last dense, scipy.sparse, or None for a Gauss-Markov model (w = F(x) - l)
+    unknowns      (u,) start values
+    observations  (n,)
+    covariance    (n,) variances, or (n, n) dense or sparse
+    tolerance     the largest last step, in standard deviations of a unit weight
+
+    Raises SolutionError when the conditions do not determine the unknowns, when there are fewer
+    conditions than unknowns, or when the iteration does not converge.
+    """
+    x = np.array(unknowns, dtype=float)
+    l = np.asarray(observations, dtype=float)
+    v, size = np.zeros_like(l), np.inf
+    q = scipy.sparse.diags_array(covariance) if np.ndim(covariance) == 1 else covariance
+    for iteration in range(1, max_iterations + 1):
+        w, a, b = model(x, l + v)
+        if len(w) < len(x):
+            raise SolutionError(f"{len(w)} conditions for {len(x)} unknowns: too few observations")
+        b = -scipy.sparse.eye_array(len(l)) if b is None else b
+        qb = q @ b.T
+        whiten = _whitener(b @ qb)
+        aw, ww = whiten(a), whiten(w - b @ v)
+        step, cofactor, basis = _solve(aw, ww)
+        x = x + step
+        normalised = ww + aw @ step
+        v = -qb @ whiten(normalised, transposed=True)
+        before, size = size, np.max(np.abs(step) * np.linalg.norm(aw, axis=0), initial=0.0)
+        limit = tolerance * len(w) ** 0.5
+        only_rounding_left = size > before / 2 and size < 1e4 * limit
+        if size < limit or only_rounding_left:
+            return Adjustment(
+                unknowns=x,
+                cofactor=cofactor,
+                observations=l + v,
+                residuals=v,
+                normalised=normalised,
+                redundancy=1.0 - np.sum(basis**2, axis=1),
+                chi2=float(normalised @ normalised),
+                dof=len(w) - len(x),
+                iterations=iteration,
+            )
+    raise SolutionError(f"the adjustment did not converge in {max_iterations} iterations")
+
+
+def _whitener(m):
+    """A function that multiplies by L^-1 (or L^-T), where L L' = m."""
+    diagonal = m.diagonal()
+    if scipy.sparse.issparse(m):
+        m = m.tocsr()
+        m.eliminate_zeros()
+        if m.nnz <= len(diagonal):
+            return _diagonal_whitener(diagonal)
+        m = m.toarray()
+    try:
+        factor = scipy.linalg.cholesky(m, lower=True)
+    except scipy.linalg.LinAlgError as error:
+        raise SolutionError("the observations' covariance is not positive definite") from error
+
+    def whiten(array, transposed=False):
+        return scipy.linalg.solve_triangular(
+            factor, array, lower=True, trans=1 if transposed else 0, check_finite=False
+        )
+
+    return whiten
+
+
+def _diagonal_whitener(diagonal):
+    if not np.all(diagonal > 0):
+        raise SolutionError("an observation has no variance: its sd must be above zero")
+    root = np.sqrt(diagonal)
+
+    def whiten(array, transposed=False):
+        return array / (root if np.ndim(array) == 1 else root[:, None])
+
+    return whiten
+
+
+def _solve(a, w):
+    """Step, cofactor matrix and an orthonormal basis of the columns, by QR with scaled columns."""
+    scale = np.linalg.norm(a, axis=0)
+    if not np.all(np.isfinite(scale)):
+        raise SolutionError("the adjustment left the numbers: a derivative is not finite")
+    scale[scale == 0] = 1.0
+    basis, r, order = scipy.linalg.qr(a / scale, mode="economic", pivoting=True, check_finite=False)
+    pivots = np.abs(np.diag(r))
+    rank = int(np.sum(pivots > pivots[0] * max(a.shape) * np.finfo(float).eps))
+    if rank < a.shape[1]:
+        raise SolutionError(
+            f"rank {rank} of {a.shape[1]}: the observations do not determine unknown(s) "
+            + ", ".join(str(i) for i in sorted(order[rank:]))
+        )
+    inverse = np.empty_like(r)
+    inverse[order] = scipy.linalg.solve_triangular(r, np.eye(len(r)), check_finite=False)
+    inverse /= scale[:, None]
+    return -inverse @ (basis.T @ w), inverse @ inverse.T, basis

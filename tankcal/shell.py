@@ -1,0 +1,261 @@
+"""The shell as one body: its wall told apart from clutter, its axis and its tilt.
+
+A survey hits stairs, pipes and the roof too. A consensus of circles finds the wall, a leaning
+cylinder with one radius a course refines it, and data snooping about the shell's smooth form (dents
+that run up the wall are form, not blunders) rejects what remains, one point at a time.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.adjust import adjust
+from tankcal.errors import SolutionError
+from tankcal.outlines import harmonics, mode_variances
+
+CRITICAL_W = 3.29  # two-sided, 0.1 % of sound points are rejected (Baarda 1968)
+WIDE_BAND, WALL_BAND = 0.03, 0.01  # of the nominal radius: start, and largest believed deviation
+END_TOLERANCE_M = 0.020  # a point this far above or below the shell still belongs to its edge
+SAMPLES = 1000  # three-point circles tried; with half the points clutter one in eight is sound
+MODES = 24  # highest mode of the form that the snooping allows for
+LEAST_NOISE_M = 1e-4  # a sound point is never rejected for less than a third of a millimetre
+
+
+@dataclass(frozen=True)
+class Shell:
+    """Axis, form and accepted points of a shell; n points in the order given.
+
+    axis_m        (x, y) of the axis at height z_m
+    slope         (dx/dz, dy/dz) of the axis; slope_cofactor (2, 2) its covariance
+    reason        (n,) "" for points of the wall, else why the point was rejected
+    residual_m    (n,) distance to the leaning cylinder of the point's course, outwards positive
+    w             (n,) normalised residual of the snooping test, nan where none was made
+    noise_m       standard deviation of a point about the smooth form common to all courses
+    """
+
+    axis_m: tuple[float, float]
+    z_m: float
+    slope: tuple[float, float]
+    slope_cofactor: np.ndarray
+    reason: np.ndarray
+    residual_m: np.ndarray
+    w: np.ndarray
+    noise_m: float
+
+    @property
+    def tilt(self):
+        """Length of the slope, m/m: the tangent of the angle to the vertical."""
+        return float(np.hypot(*self.slope))
+
+    @property
+    def tilt_sd(self):
+        """Standard deviation of the tilt, m/m."""
+        direction = np.array(self.slope) / self.tilt if self.tilt > 0 else np.array([1.0, 0.0])
+        return float(np.sqrt(direction @ self.slope_cofactor @ direction))
+
+    @property
+    def tilt_azimuth_rad(self):
+        """Direction towards which the top leans, clockwise from +y, 0 to 2 pi."""
+        return float(np.arctan2(self.slope[0], self.slope[1]) % (2 * np.pi))
+
+
+def course_of(z_m, joints_m):
+    """Index of the course of each height; the ends belong to the first and the last course."""
+    return np.searchsorted(np.asarray(joints_m)[1:-1], z_m, side="right")
+
+
+def find_shell(xyz_m, joints_m, nominal_radius_m, *, snooping=True):
+    """Tell the wall from the clutter and find the axis of the shell.
+
+    xyz_m (n, 3); joints_m (courses + 1,) heights of the course joints in the same frame.
+    Raises SolutionError when no cylinder near the nominal radius holds a third of the points.
+    """
+    xyz_m = np.asarray(xyz_m, dtype=float)
+    n = len(xyz_m)
+    reason = np.full(n, "", dtype=object)
+    reason[_repeated(xyz_m)] = "same_place"
+    reason[xyz_m[:, 2] > joints_m[-1] + END_TOLERANCE_M] = "above_shell"
+    reason[xyz_m[:, 2] < joints_m[0] - END_TOLERANCE_M] = "below_shell"
+    candidates = reason == ""
+    course = course_of(xyz_m[:, 2], joints_m)
+    origin = np.array([*np.median(xyz_m[:, :2], axis=0), (joints_m[0] + joints_m[-1]) / 2])
+    local = xyz_m - origin
+
+    start = _consensus_circle(local[candidates, :2], nominal_radius_m)
+    wall, axis = _leaning_cylinder(local, course, candidates, start, nominal_radius_m)
+    reason[candidates & ~wall] = "consensus"
+    wall, axis, cofactor, w, noise = _snoop(local, course, wall, axis, snooping)
+    reason[(reason == "") & ~wall] = "snooping"
+
+    distance = _from_axis(local, axis)[1]
+    radii = np.array([
+        distance[wall & (course == c)].mean() if np.any(wall & (course == c)) else nominal_radius_m
+        for c in range(len(joints_m) - 1)
+    ])
+    return Shell(
+        axis_m=(float(axis[0] + origin[0]), float(axis[1] + origin[1])),
+        z_m=float(origin[2]),
+        slope=(float(axis[2]), float(axis[3])),
+        slope_cofactor=cofactor,
+        reason=reason,
+        residual_m=distance - radii[course],
+        w=w,
+        noise_m=noise,
+    )
+
+
+def _repeated(xyz_m):
+    """Mask of points on the very place of an earlier one."""
+    first = np.unique(xyz_m, axis=0, return_index=True)[1]
+    repeated = np.ones(len(xyz_m), dtype=bool)
+    repeated[first] = False
+    return repeated
+
+
+def _consensus_circle(xy, nominal_radius):
+    """(x, y, radius) of the three-point circle near the nominal radius that most points support."""
+    if len(xy) < 5:
+        raise SolutionError(f"{len(xy)} points between bottom and top of the shell: too few")
+    rng = np.random.default_rng(20_11)
+    triples = xy[rng.integers(len(xy), size=(SAMPLES, 3))]
+    circles = _circles_through(triples)
+    near = np.abs(circles[:, 2] / nominal_radius - 1) < WIDE_BAND
+    judges = xy if len(xy) <= 2000 else xy[rng.choice(len(xy), 2000, replace=False)]
+    band = WIDE_BAND * nominal_radius
+    support = [
+        np.mean(np.abs(np.hypot(judges[:, 0] - x, judges[:, 1] - y) - r) < band)
+        for x, y, r in circles[near]
+    ]
+    best = max(support, default=0.0)
+    if best < 1 / 3:
+        raise SolutionError(
+            f"no circle within {WIDE_BAND:.0%} of the nominal radius {nominal_radius:.3f} m holds "
+            f"a third of the points (best {best:.0%}): check nominal_diameter_m, units and axes"
+        )
+    return circles[near][int(np.argmax(support))]
+
+
+def _circles_through(triples):
+    """(k, 3) centre and radius of the circle through each of k triples of points (k, 3, 2)."""
+    a, b, c = (triples[:, i] for i in range(3))
+    ab, ac = b - a, c - a
+    cross = 2 * (ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0])
+    cross = np.where(np.abs(cross) < 1e-12, np.nan, cross)
+    sab, sac = np.sum(ab**2, axis=1), np.sum(ac**2, axis=1)
+    x = (ac[:, 1] * sab - ab[:, 1] * sac) / cross
+    y = (ab[:, 0] * sac - ac[:, 0] * sab) / cross
+    return np.column_stack([a[:, 0] + x, a[:, 1] + y, np.hypot(x, y)])
+
+
+def _leaning_cylinder(local, course, candidates, circle, nominal_radius):
+    """Mask of the wall and axis (x, y, dx/dz, dy/dz), the band narrowing from 3 % to 1 % of R."""
+    axis = np.array([circle[0], circle[1], 0.0, 0.0])
+    distance = _from_axis(local, axis)[1]
+    wall = candidates & (np.abs(distance - circle[2]) < WIDE_BAND * nominal_radius)
+    for band in np.repeat(np.geomspace(WIDE_BAND, WALL_BAND, 5), 3) * nominal_radius:
+        fit = adjust(*_shell_problem(local[wall], course[wall], axis, 1.0, None))
+        axis = fit.unknowns[:4]
+        distance = _from_axis(local, axis)[1]
+        names, first = np.unique(course[wall], return_inverse=True)
+        radii = np.array([np.median(distance[wall][first == i]) for i in range(len(names))])
+        # a course without a point so far is judged by its nearest neighbour
+        nearest = np.abs(names[None, :] - course[:, None]).argmin(axis=1)
+        wall = candidates & (np.abs(distance - radii[nearest]) < band)
+        if wall.sum() < 5 + len(names):
+            raise SolutionError(f"only {wall.sum()} points lie on a cylinder: no wall was found")
+    return wall, axis
+
+
+def _snoop(local, course, wall, axis, snooping):
+    """Reject the worst normalised residual about the smooth form until all are sound."""
+    wall = wall.copy()
+    w = np.full(len(local), np.nan)
+    noise, form = None, None
+    while True:
+        fit, noise, form = _fit_form(local[wall], course[wall], axis, noise, form)
+        axis = fit.unknowns[:4]
+        tested = fit.w[: wall.sum()]
+        w[wall] = tested
+        size = np.nan_to_num(np.abs(tested))
+        if not snooping or size.max() <= CRITICAL_W:
+            return wall, axis, fit.cofactor[2:4, 2:4], w, noise
+        worst = size >= max(CRITICAL_W, 0.9 * size.max())
+        wall[np.flatnonzero(wall)[worst]] = False
+
+
+def _fit_form(xyz, course, axis, noise, form):
+    """Shell with form, its point noise and form amplitude as two variance components.
+
+    Helmert's simple iteration: each standard deviation is scaled by the root of its group's sum of
+    squared normalised residuals over its redundancy (Foerstner 1979). The point noise is kept
+    robust: never above 1.4826 times the median residual.
+    """
+    noise, form = noise or 0.005, form or 0.010
+    for _ in range(30):
+        before = noise, form
+        fit = adjust(*_shell_problem(xyz, course, axis, noise, form))
+        axis = fit.unknowns[:4]
+        points, modes = slice(0, len(xyz)), slice(len(xyz), None)
+        noise *= _component(fit, points)
+        robust = before[0] * 1.4826 * np.median(np.abs(np.nan_to_num(fit.w[points])))
+        noise = max(min(noise, robust), LEAST_NOISE_M)
+        form = max(form * _component(fit, modes), 1e-3 * LEAST_NOISE_M)
+        if np.allclose(before, (noise, form), rtol=0.02):
+            break
+    return fit, noise, form
+
+
+def _component(fit, group):
+    redundancy = np.sum(fit.redundancy[group])
+    return np.sqrt(np.sum(fit.normalised[group] ** 2) / max(redundancy, 1e-9))
+
+
+def _shell_problem(xyz, course, axis, noise, form):
+    """Arguments of `adjust` for radii = R of the course + form(azimuth, height).
+
+    The form is the same at all heights but for a part that grows linearly with height; its modes
+    are unknowns with a prior (an observation of zero). Without `form` the shell is round.
+    """
+    courses, row_of = np.unique(course, return_inverse=True)
+    n, modes = len(xyz), 0 if form is None else 2 * (MODES - 1)
+    first_mode = 4 + len(courses)
+    height = xyz[:, 2] / max(np.abs(xyz[:, 2]).max(), 1e-9)
+    by_radius = np.zeros((n, len(courses)))
+    by_radius[np.arange(n), row_of] = -1.0
+    priors = np.eye(2 * modes)
+
+    def model(x, observations):
+        offset, distance = _from_axis(xyz, x[:4])
+        azimuth = np.arctan2(offset[:, 0], offset[:, 1])
+        sin, cos = offset[:, 0] / distance, offset[:, 1] / distance
+        form_now, turn = np.zeros(n), np.zeros(n)
+        by_form = np.zeros((n, 2 * modes))
+        if modes:
+            waves = harmonics(azimuth, MODES)[:, 3:]
+            by_form = np.hstack([waves, waves * height[:, None]])
+            slopes = harmonics(azimuth, MODES, derivative=1)[:, 3:]
+            form_now = by_form @ x[first_mode:]
+            turn = np.hstack([slopes, slopes * height[:, None]]) @ x[first_mode:] / distance
+        by_xy = -np.column_stack([sin - turn * cos, cos + turn * sin])
+        by_axis = np.hstack([by_xy, by_xy * xyz[:, 2:]])
+        top = np.hstack([by_axis, by_radius, -by_form])
+        bottom = np.hstack([np.zeros((2 * modes, first_mode)), priors])
+        misclosure = distance - x[4:first_mode][row_of] - form_now
+        modelled = np.concatenate([misclosure, x[first_mode:]])
+        return modelled - observations, np.vstack([top, bottom]), None
+
+    distance = _from_axis(xyz, axis)[1]
+    radii = [np.median(distance[row_of == i]) for i in range(len(courses))]
+    start = np.concatenate([axis, radii, np.zeros(2 * modes)])
+    variances = np.full(n, noise**2)
+    if modes:
+        prior = form**2 * mode_variances(MODES)
+        variances = np.concatenate([variances, prior, prior])
+    return model, start, np.zeros(n + 2 * modes), variances
+
+
+def _from_axis(local, axis):
+    """Horizontal offsets (n, 2) and distances (n,) from the axis at each point's own height."""
+    offset = local[:, :2] - axis[:2] - local[:, 2:] * axis[2:4]
+    return offset, np.hypot(offset[:, 0], offset[:, 1])
+

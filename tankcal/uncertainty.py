@@ -1,0 +1,60 @@
+"""Propagation of uncertainty, coverage factors, and how many digits a value deserves.
+
+Sources: JCGM 100:2008 (GUM) 5.1, 5.2, G.4, 7.2.6.
+"""
+
+from math import floor, log10
+
+import numpy as np
+import scipy.stats
+
+
+def factor_of(covariance):
+    """(n, r) factor L of a positive semidefinite covariance, covariance = L L', r its rank.
+
+    Raises ValueError when the matrix has a negative eigenvalue beyond rounding.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    largest = max(values.max(initial=0.0), 0.0)
+    if values.min(initial=0.0) < -1e-9 * largest:
+        raise ValueError(f"not a covariance: eigenvalue {values.min():.3g} against {largest:.3g}")
+    keep = values > 1e-14 * largest
+    return (vectors[:, keep] * np.sqrt(values[keep]))[:, ::-1]
+
+
+def effective_dof(contributions, dof):
+    """Welch-Satterthwaite: u^4 / sum(u_i^4 / dof_i) for each row (GUM G.2b).
+
+    contributions  (rows, inputs) standard uncertainties by input; dof  (inputs,), may be inf.
+    Returns (rows,); inf where no input with finite degrees of freedom contributes.
+    """
+    variance = np.asarray(contributions, dtype=float) ** 2
+    share = np.sum(variance**2 / np.asarray(dof, dtype=float), axis=1)
+    total = np.sum(variance, axis=1) ** 2
+    return np.divide(total, share, out=np.full(len(total), np.inf), where=share > 0)
+
+
+def coverage_factor(probability, dof):
+    """k of a symmetric interval: Student's t for `dof` degrees of freedom, the normal for inf."""
+    if not 0 < probability < 1:
+        raise ValueError(f"coverage probability {probability}: expected between 0 and 1")
+    dof = np.asarray(dof, dtype=float)
+    upper = (1 + probability) / 2
+    finite = np.where(np.isfinite(dof), dof, 1.0)
+    return np.where(
+        np.isfinite(dof), scipy.stats.t.ppf(upper, finite), scipy.stats.norm.ppf(upper)
+    )
+
+
+def decimals_for(u, significant=2):
+    """Number of decimals that shows u with `significant` digits (GUM 7.2.6); never negative.
+
+    Zero and non-finite u give 6: a value without an uncertainty is not rounded to one.
+    """
+    if not np.isfinite(u) or u <= 0:
+        return 6
+    exponent = floor(log10(u))
+    decimals = significant - 1 - exponent
+    if decimals >= 0 and round(u, decimals) >= 10.0 ** (exponent + 1):  # 0.0996 -> 0.10
+        decimals -= 1
+    return max(decimals, 0)

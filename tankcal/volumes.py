@@ -1,0 +1,157 @@
+"""The volume of a shell of courses, from its sections, with the covariance kept to every row.
+
+Within a course the outline is interpolated in height, r(a, z) = sum l_i(z) r_i(a), never the area,
+and never across a joint. With area products G_ij = 1/2 integral r_i r_j da of the inside outlines,
+
+    A(z) = sum l_i(z) l_j(z) G_ij,      V(h) = sum over courses of G_ij integral l_i l_j dz,
+
+so every row is a weighted sum of a few products: that is the whole propagation. Heights in this
+room count from the bottom of the first course, in metres.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.errors import HeightError
+from tankcal.outlines import FULL_TURN
+from tankcal.quadrature import height_basis, height_products, panels, polar_products
+
+DEGREE_BY_SPREAD = ((0.6, 2), (0.4, 1), (0.0, 0))  # share of the course that the sections span
+
+
+@dataclass(frozen=True)
+class CourseShape:
+    """One course: where it stands, the heights of its k sections, and its area products.
+
+    degree        of the polynomial in height: sections - 1, at most 2, less when they lie close
+    products_m2   (k, k) G_ij of the inside outlines
+    girths_m      (k, k) derivative of -G_ij by the inset (plate, paint): mean girths
+    by_parameters (k, k, p) derivative of G_ij by the parameters of the course's outlines
+    """
+
+    bottom_m: float
+    top_m: float
+    levels_m: np.ndarray
+    degree: int
+    products_m2: np.ndarray
+    girths_m: np.ndarray
+    by_parameters: np.ndarray
+
+
+@dataclass(frozen=True)
+class ShellVolume:
+    """The courses of a shell, from the bottom up, and what can be integrated over them.
+
+    The features of a shell are the products G_ij (i <= j) of all its courses, one after another.
+    """
+
+    courses: tuple[CourseShape, ...]
+
+    @property
+    def height_m(self):
+        """Height of the shell, along the vertical."""
+        return self.courses[-1].top_m
+
+    @property
+    def features(self):
+        """(f,) the products that every volume is a sum of, m2."""
+        return np.concatenate([_upper(course.products_m2) for course in self.courses])
+
+    def weights_m(self, heights_m):
+        """(rows, f) derivative of the volume below each height by the features, m.
+
+        Raises HeightError for a height outside the shell.
+        """
+        heights = self._inside(heights_m)
+        blocks = []
+        for course in self.courses:
+            tops = np.clip(heights, course.bottom_m, course.top_m)
+            blocks.append(
+                _folded(height_products(course.levels_m, course.bottom_m, tops, course.degree))
+            )
+        return np.hstack(blocks)
+
+    def volume_m3(self, heights_m):
+        """(rows,) volume between the bottom and each height."""
+        return self.weights_m(heights_m) @ self.features
+
+    def area_m2(self, heights_m):
+        """(rows,) inside area of the horizontal cut at each height; the upper course at a joint."""
+        heights = self._inside(heights_m)
+        joints = [course.bottom_m for course in self.courses[1:]]
+        area = np.empty(len(heights))
+        for index, course in enumerate(self.courses):
+            here = np.searchsorted(joints, heights, side="right") == index
+            basis = height_basis(course.levels_m, heights[here], course.degree)
+            area[here] = np.einsum("ti,ij,tj->t", basis, course.products_m2, basis)
+        return area
+
+    def inset_m2(self, heights_m):
+        """(rows,) loss of volume below each height by metre of plate or paint: the wetted wall."""
+        girths = np.concatenate([_upper(course.girths_m) for course in self.courses])
+        return self.weights_m(heights_m) @ girths
+
+    def _inside(self, heights_m):
+        heights = np.atleast_1d(np.asarray(heights_m, dtype=float))
+        outside = ~((heights >= 0) & (heights <= self.height_m * (1 + 1e-12)))
+        if np.any(outside):
+            raise HeightError(
+                f"height {heights[outside][0]:g} m is outside the shell (0 to {self.height_m:g} m)"
+            )
+        return heights
+
+
+def course_shape(bottom_m, top_m, levels_m, outlines, *, inset_m=0.0, scale=1.0):
+    """One course from the outlines of its sections, as surveyed.
+
+    inset_m  plate and paint to take off the radius (0 when surveyed inside); the difference between
+             radial and normal thickness is its (r'/r)^2/2 part, under 1e-5 of it for a dented tank
+    scale    of horizontal lengths, for the shell's temperature
+    """
+    levels = np.asarray(levels_m, dtype=float)
+    knots = np.unique(np.concatenate([outline.knots_rad % FULL_TURN for outline in outlines]))
+    azimuth, weight = panels(np.append(knots, knots[0] + FULL_TURN), 4)
+    bases = [outline.basis(azimuth) for outline in outlines]
+    radii = np.array([b @ o.parameters for b, o in zip(bases, outlines, strict=True)])
+    inside = scale * (radii - inset_m)
+    sums = (inside * weight).sum(axis=1)
+    count = len(outlines)
+    starts = np.cumsum([0] + [len(outline.parameters) for outline in outlines])
+    by_parameters = np.zeros((count, count, starts[-1]))
+    for i in range(count):
+        gradient = 0.5 * scale * (inside * weight) @ bases[i]  # row j: dG_ij by parameters of i
+        for j in range(count):
+            by_parameters[i, j, starts[i] : starts[i + 1]] += gradient[j]
+            by_parameters[j, i, starts[i] : starts[i + 1]] += gradient[j]
+    return CourseShape(
+        bottom_m=float(bottom_m),
+        top_m=float(top_m),
+        levels_m=levels,
+        degree=_degree(levels, top_m - bottom_m),
+        products_m2=polar_products(inside, weight),
+        girths_m=0.5 * scale * (sums[:, None] + sums[None, :]),
+        by_parameters=by_parameters,
+    )
+
+
+def feature_jacobian(course):
+    """(f, p) derivative of the features of one course by the parameters of its outlines."""
+    rows = np.triu_indices(len(course.levels_m))
+    return course.by_parameters[rows]
+
+
+def _degree(levels, tall):
+    spread = np.ptp(levels) / tall
+    allowed = next(degree for least, degree in DEGREE_BY_SPREAD if spread >= least)
+    return min(len(np.unique(levels)) - 1, allowed)
+
+
+def _upper(matrix):
+    return matrix[np.triu_indices(len(matrix))]
+
+
+def _folded(products):
+    """(rows, f) weights of the upper triangle: what stands below the diagonal is counted there."""
+    rows, columns = np.triu_indices(products.shape[1])
+    return products[:, rows, columns] * np.where(rows == columns, 1.0, 2.0)
