@@ -68,7 +68,7 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
     unknowns      (u,) start values
     observations  (n,)
     covariance    (n,) variances, or (n, n) dense or sparse
-    tolerance     the largest last step, in standard deviations of a unit weight
+    tolerance     the largest last step of an unknown or residual, in standard deviations
 
     Raises SolutionError when the conditions do not determine the unknowns, when there are fewer
     conditions than unknowns, or when the iteration does not converge.
@@ -77,6 +77,7 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
     l = np.asarray(observations, dtype=float)
     v, size = np.zeros_like(l), np.inf
     q = scipy.sparse.diags_array(covariance) if np.ndim(covariance) == 1 else covariance
+    sd = np.sqrt(np.maximum(q.diagonal(), np.finfo(float).tiny))
     for iteration in range(1, max_iterations + 1):
         w, a, b = model(x, l + v)
         if len(w) < len(x):
@@ -88,8 +89,9 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
         step, cofactor, basis = _solve(aw, ww)
         x = x + step
         normalised = ww + aw @ step
-        v = -qb @ whiten(normalised, transposed=True)
-        before, size = size, np.max(np.abs(step) * np.linalg.norm(aw, axis=0), initial=0.0)
+        v_before, v = v, -qb @ whiten(normalised, transposed=True)
+        of_unknowns = np.abs(step) * np.linalg.norm(aw, axis=0)
+        before, size = size, max(of_unknowns.max(initial=0.0), np.max(np.abs(v - v_before) / sd))
         limit = tolerance * len(w) ** 0.5
         only_rounding_left = size > before / 2 and size < 1e4 * limit
         if size < limit or only_rounding_left:

@@ -190,8 +190,9 @@ def _fit_form(xyz, course, axis, noise, form):
     squared normalised residuals over its redundancy (Foerstner 1979). The point noise is kept
     robust: never above 1.4826 times the median residual.
     """
+    first = noise is None
     noise, form = noise or 0.005, form or 0.010
-    for _ in range(30):
+    for _ in range(10 if first else 2):
         before = noise, form
         fit = adjust(*_shell_problem(xyz, course, axis, noise, form))
         axis = fit.unknowns[:4]
@@ -199,8 +200,8 @@ def _fit_form(xyz, course, axis, noise, form):
         noise *= _component(fit, points)
         robust = before[0] * 1.4826 * np.median(np.abs(np.nan_to_num(fit.w[points])))
         noise = max(min(noise, robust), LEAST_NOISE_M)
-        form = max(form * _component(fit, modes), 1e-3 * LEAST_NOISE_M)
-        if np.allclose(before, (noise, form), rtol=0.02):
+        form = max(form * _component(fit, modes), 0.1 * noise)
+        if np.allclose(before, (noise, form), rtol=0.05):
             break
     return fit, noise, form
 

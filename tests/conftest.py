@@ -33,3 +33,22 @@ def example_record(example_result, tmp_path_factory):
     path = tmp_path_factory.mktemp("example") / "record.json"
     save(record_of(example_result), path)
     return path
+
+
+@pytest.fixture
+def figure(record_property):
+    """Call figure("what", value) to show a measured figure in the summary of the test run."""
+    return lambda what, value: record_property("figure", f"{what}: {value}")
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Print the figures that tests measured: what they guard is a number, not only a verdict."""
+    lines = [
+        f"  {text}"
+        for report in terminalreporter.stats.get("passed", [])
+        for name, text in report.user_properties
+        if name == "figure"
+    ]
+    if lines:
+        terminalreporter.section("figures measured")
+        terminalreporter.write_line("\n".join(sorted(lines)))

@@ -1,0 +1,155 @@
+"""Outlines: interpolated and smoothed, their derivatives, their components and their coverage."""
+
+import numpy as np
+import pytest
+from jacobians import assert_derivative
+from shapes import azimuths, modes, ring
+
+from tankcal.errors import SolutionError
+from tankcal.outlines import (
+    HARMONICS,
+    estimate_components,
+    evenly_spread,
+    harmonics,
+    interpolate_outline,
+    mode_variances,
+    polar,
+    smooth_outline,
+)
+
+
+def outlines(seed=1):
+    rng = np.random.default_rng(seed)
+    shape, _ = modes(6.5, 2, rng.normal(0, 0.01, 4), rng.normal(0, 0.01, 4))
+    even = ring(shape, azimuths(24, 0.2, rng))[:, :2]
+    scattered = ring(shape, np.sort(rng.uniform(0, 2 * np.pi, 60)))[:, :2]
+    return {
+        "interpolated": interpolate_outline(even, 0.0, 0.0),
+        "smoothed": smooth_outline(scattered, 0.0, 0.0, np.full(60, 1e-6), 1e-3),
+    }
+
+
+@pytest.mark.parametrize("kind", ["interpolated", "smoothed"])
+def test_the_derivative_by_azimuth(kind):
+    outline = outlines()[kind]
+    for azimuth in (0.3, 3.9, 6.2):
+        slope = outline.radius_m([azimuth], derivative=1)
+        assert_derivative(outline.radius_m, [azimuth], slope[:, None], tolerance=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["interpolated", "smoothed"])
+def test_an_outline_closes(kind):
+    outline = outlines()[kind]
+    for derivative in (0, 1):
+        start, end = outline.radius_m([1e-9, 2 * np.pi - 1e-9], derivative)
+        assert start == pytest.approx(end, abs=1e-7)
+
+
+def test_interpolation_goes_through_every_point():
+    outline = outlines()["interpolated"]
+    assert outline.radius_m(outline.knots_rad) == pytest.approx(outline.parameters, abs=1e-13)
+
+
+def test_smoothing_recovers_low_modes_of_perfect_points():
+    rng = np.random.default_rng(2)
+    cosines, sines = rng.normal(0, 0.01, 4), rng.normal(0, 0.01, 4)
+    shape, area = modes(6.5, 2, cosines, sines)
+    xy = ring(shape, np.sort(rng.uniform(0, 2 * np.pi, 200)))[:, :2]
+    outline = smooth_outline(xy, 0.0, 0.0, np.full(200, 1e-10), 1e-3)
+    assert outline.area_m2() == pytest.approx(area, rel=1e-6)
+    assert outline.modes_m()[2:6] == pytest.approx(np.column_stack([cosines, sines]), abs=1e-5)
+
+
+def test_modes_of_an_oval():
+    shape, _ = modes(6.5, 2, np.array([0.02]), np.array([-0.01]))
+    outline = interpolate_outline(ring(shape, azimuths(24))[:, :2], 0.0, 0.0)
+    assert outline.modes_m()[0, 0] == pytest.approx(6.5, abs=1e-7)
+    assert outline.modes_m()[2] == pytest.approx([0.02, -0.01], abs=1e-5)
+
+
+def test_even_spread_is_recognised():
+    rng = np.random.default_rng(1)
+    assert evenly_spread(azimuths(24))
+    assert evenly_spread(azimuths(24, 0.2, rng))
+    assert evenly_spread(np.delete(azimuths(24), 7))  # one generatrix is missing
+    assert not evenly_spread(np.delete(azimuths(24), [7, 8, 9]))
+    assert not evenly_spread(np.append(azimuths(24), 0.001))
+    assert not evenly_spread(azimuths(4))
+    assert not evenly_spread(azimuths(1000))
+
+
+def test_a_shared_azimuth_cannot_be_interpolated():
+    xy = ring(6.5, np.append(azimuths(8), 0.0))[:, :2]
+    with pytest.raises(SolutionError, match="share an azimuth"):
+        interpolate_outline(xy, 0.0, 0.0)
+
+
+def simulated_sections(rng, noise, form, count=8, n=150):
+    sections = []
+    for _ in range(count):
+        azimuth = rng.uniform(0, 2 * np.pi, n)
+        coefficients = np.concatenate([[6.5, 0, 0], np.sqrt(form**2 * mode_variances(HARMONICS))])
+        coefficients[3:] *= rng.normal(size=len(coefficients) - 3)
+        radius = harmonics(azimuth, HARMONICS) @ coefficients + rng.normal(0, noise, n)
+        sections.append((azimuth, radius, np.ones(n)))
+    return sections
+
+
+def test_noise_and_form_are_found_again():
+    """Simulation: noise 3 mm, form 20 mm; the noise has about 1000 degrees of freedom."""
+    found = estimate_components(simulated_sections(np.random.default_rng(4), 0.003, 0.020))
+    assert np.sqrt(found.noise) == pytest.approx(0.003, rel=3 / np.sqrt(2 * found.dof))
+    assert np.sqrt(found.form_m2) == pytest.approx(0.020, rel=0.25)
+    assert 8 * 150 - 8 * (2 * HARMONICS + 1) < found.dof < 8 * (150 - 3)
+
+
+def test_a_given_noise_is_kept():
+    sections = [
+        (azimuth, radius, 0.003**2 * ones)
+        for azimuth, radius, ones in simulated_sections(np.random.default_rng(4), 0.003, 0.020)
+    ]
+    found = estimate_components(sections, noise=1.0)
+    assert found.noise == 1.0
+    assert np.sqrt(found.form_m2) == pytest.approx(0.020, rel=0.25)
+
+
+def coverage(tanks):
+    """Part of simulated sections whose true area lies within 1.96 u: noise, form and a gap."""
+    rng = np.random.default_rng(6)
+    inside = 0
+    for _ in range(tanks):
+        azimuth = np.sort(rng.uniform(0.6, 2 * np.pi, 60))  # a gap of 34 deg
+        coefficients = np.concatenate([[6.5, 0, 0], np.sqrt(0.02**2 * mode_variances(HARMONICS))])
+        coefficients[3:] *= rng.normal(size=len(coefficients) - 3)
+        area = np.pi * 6.5**2 + np.pi / 2 * np.sum(coefficients[3:] ** 2)
+        radius = harmonics(azimuth, HARMONICS) @ coefficients + rng.normal(0, 0.003, 60)
+        outline = smooth_outline(
+            ring(radius, azimuth)[:, :2], 0.0, 0.0, np.full(60, 0.003**2), 0.02**2
+        )
+        nodes, weight = outline.nodes()
+        gradient = (outline.radius_m(nodes) * weight) @ outline.basis(nodes)
+        variance = 0.003**2 * np.sum((gradient @ outline.from_radii) ** 2)
+        variance += np.sum((gradient @ outline.form_factor_m) ** 2)
+        inside += abs(outline.area_m2() - area) < 1.96 * np.sqrt(variance)
+    return inside / tanks
+
+
+def test_a_smoothed_area_is_covered_by_its_uncertainty(figure):
+    """Simulation, 95 % within 3 binomial standard errors of 200 tanks."""
+    part = coverage(200)
+    figure("coverage of 95 % intervals, smoothed area with a gap, 200 tanks", f"{part:.3f}")
+    assert abs(part - 0.95) < 3 * np.sqrt(0.95 * 0.05 / 200)
+
+
+@pytest.mark.study
+def test_a_smoothed_area_is_covered_by_its_uncertainty_study(figure):
+    """Simulation, 95 % within 3 binomial standard errors of 4000 tanks."""
+    part = coverage(4000)
+    figure("coverage of 95 % intervals, smoothed area with a gap, 4000 tanks", f"{part:.4f}")
+    assert abs(part - 0.95) < 3 * np.sqrt(0.95 * 0.05 / 4000)
+
+
+def test_azimuths_count_clockwise_from_y():
+    azimuth, radius = polar([[0, 2], [3, 0], [0, -4], [-5, 0]], 0.0, 0.0)
+    assert np.degrees(azimuth) == pytest.approx([0, 90, 180, 270])
+    assert radius == pytest.approx([2, 3, 4, 5])

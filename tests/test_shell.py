@@ -1,0 +1,101 @@
+"""The wall told apart from clutter, the axis and the tilt: simulation with known truth."""
+
+import numpy as np
+import pytest
+
+from tankcal.errors import SolutionError
+from tankcal.shell import course_of, find_shell
+
+JOINTS = np.linspace(2.0, 11.5, 6)
+
+
+def wall(rng, n=600, tilt=(0.0, 0.0), noise=0.003, dent=0.0, centre=(30.0, 20.0)):
+    azimuth, z = rng.uniform(0, 2 * np.pi, n), rng.uniform(2.0, 11.5, n)
+    radius = 6.5 + rng.normal(0, noise, n)
+    radius -= dent * np.exp(-(((azimuth - 1.0) / 0.12) ** 2))  # runs up the whole wall
+    x = centre[0] + tilt[0] * (z - 2.0) + radius * np.sin(azimuth)
+    y = centre[1] + tilt[1] * (z - 2.0) + radius * np.cos(azimuth)
+    return np.column_stack([x, y, z])
+
+
+def clutter(rng, n=60):
+    """A stair 0.4 m off the wall, a pipe 0.1 m off it, the roof, and a far station."""
+    azimuth = np.concatenate([rng.uniform(1.5, 2.5, n // 2), rng.normal(4.0, 0.005, n - n // 2)])
+    radius = np.concatenate([np.full(n // 2, 6.9), np.full(n - n // 2, 6.6)])
+    z = np.concatenate([2 + 9 * (azimuth[: n // 2] - 1.5), rng.uniform(2, 11, n - n // 2)])
+    near = np.column_stack([30 + radius * np.sin(azimuth), 20 + radius * np.cos(azimuth), z])
+    return np.vstack([near, [[33.0, 21.0, 12.4], [30.0, 20.0, 12.9], [60.0, 60.0, 1.4]]])
+
+
+@pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.002, -0.001), (0.03, 0.0)])
+def test_clutter_is_told_apart_and_the_tilt_is_found(tilt):
+    rng = np.random.default_rng(7)
+    good = wall(rng, tilt=tilt)
+    bad = clutter(rng) + np.outer(np.zeros(63), [0, 0, 0])
+    bad[:, :2] += np.outer(bad[:, 2] - 2.0, tilt)
+    shell = find_shell(np.vstack([good, bad]), JOINTS, 6.5)
+    assert np.all(shell.reason[600:] != "")
+    assert np.sum(shell.reason[:600] != "") <= 6  # 0.1 % of sound points is what snooping costs
+    assert set(shell.reason[-3:]) == {"above_shell", "below_shell"}
+    assert np.array(shell.slope) == pytest.approx(tilt, abs=5 * shell.tilt_sd)
+    assert shell.tilt == pytest.approx(np.hypot(*tilt), abs=5 * shell.tilt_sd)
+    assert shell.noise_m == pytest.approx(0.003, rel=0.1)
+
+
+def test_a_vertical_dent_is_form_and_not_clutter():
+    rng = np.random.default_rng(8)
+    shell = find_shell(wall(rng, dent=0.035), JOINTS, 6.5)
+    assert np.sum(shell.reason != "") <= 4
+
+
+def test_a_single_blunder_is_found_by_its_normalised_residual():
+    xyz = wall(np.random.default_rng(9))
+    radius = np.hypot(*(xyz[17, :2] - (30, 20)))
+    xyz[17, :2] = np.array([30, 20]) + (xyz[17, :2] - (30, 20)) * (1 + 0.025 / radius)
+    shell = find_shell(xyz, JOINTS, 6.5)
+    assert shell.reason[17] == "snooping"
+    assert shell.w[17] > 3.29
+    assert shell.residual_m[17] == pytest.approx(0.025, abs=0.012)
+    assert find_shell(xyz, JOINTS, 6.5, snooping=False).reason[17] == ""
+
+
+def test_a_repeated_place_counts_once():
+    xyz = wall(np.random.default_rng(10), n=200)
+    shell = find_shell(np.vstack([xyz, xyz[3]]), JOINTS, 6.5)
+    assert shell.reason[-1] == "same_place"
+    assert shell.reason[3] == ""
+
+
+def test_perfect_points_are_all_accepted():
+    shell = find_shell(wall(np.random.default_rng(11), noise=0.0), JOINTS, 6.5)
+    assert np.all(shell.reason == "")
+    assert shell.tilt < 1e-9
+
+
+def test_the_frame_changes_nothing():
+    """Shifted to UTM coordinates and turned by 90 deg: the same points, the same tilt."""
+    rng = np.random.default_rng(12)
+    xyz = np.vstack([wall(rng, tilt=(0.004, 0.001)), clutter(rng)])
+    here = find_shell(xyz, JOINTS, 6.5)
+    turned = np.column_stack([xyz[:, 1] + 5e5, -xyz[:, 0] + 7.5e6, xyz[:, 2]])
+    there = find_shell(turned, JOINTS, 6.5)
+    assert np.array_equal(here.reason, there.reason)
+    assert there.tilt == pytest.approx(here.tilt, rel=1e-6)
+    turn = (there.tilt_azimuth_rad - here.tilt_azimuth_rad) % (2 * np.pi)
+    assert turn == pytest.approx(np.pi / 2, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("xyz", "message"),
+    [
+        (np.random.default_rng(1).uniform(0, 100, (200, 3)) * [1, 1, 0.1], "no circle within"),
+        (np.zeros((3, 3)) + [0, 0, 5], "too few"),
+    ],
+)
+def test_no_wall_is_said(xyz, message):
+    with pytest.raises(SolutionError, match=message):
+        find_shell(xyz, JOINTS, 6.5)
+
+
+def test_heights_belong_to_courses():
+    assert list(course_of([1.99, 2.0, 3.89, 3.91, 11.5, 11.51], JOINTS)) == [0, 0, 0, 1, 4, 4]
