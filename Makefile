@@ -1,0 +1,66 @@
+# One door for developers, the same in CI. Each target does its own set-up.
+VENV := .venv
+BIN := $(VENV)/bin
+export OPENBLAS_NUM_THREADS ?= 1
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test study check format notebooks bench picture wheel clean
+
+help: ## what can be made
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+demo: $(VENV)/base ## run the example, or any job: make demo JOB=path/to/job
+ifdef JOB
+	$(BIN)/tankcal run "$(JOB)"
+else
+	$(BIN)/tankcal demo --out demo-results
+endif
+
+test: $(VENV)/full ## the tests, studies at a twentieth of their size
+	$(BIN)/pytest
+
+study: $(VENV)/full ## the studies at full size (minutes)
+	$(BIN)/pytest -m study
+
+check: $(VENV)/full ## style, floors of the house, notebooks without outputs
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+	$(BIN)/python notebooks/stripped.py notebooks report_templates
+
+format: $(VENV)/full ## bring the code to the house style
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+notebooks: $(VENV)/full ## execute every notebook, top to bottom
+	mkdir -p build/notebooks
+	cd notebooks && for one in *.ipynb; do \
+	  ../$(BIN)/jupyter nbconvert --to notebook --execute --output-dir ../build/notebooks "$$one" || exit 1; \
+	done
+
+bench: $(VENV)/full ## time and memory of the main job
+	$(BIN)/python benchmarks/main_job.py
+
+picture: $(VENV)/full ## the picture in the README, from the example's certificate (needs poppler)
+	$(BIN)/tankcal demo --quiet --out demo-results
+	pdftoppm -r 55 -png -f 1 -l 4 demo-results/certificate.pdf build/page
+	$(BIN)/python docs/picture.py build docs/images/certificate.png
+
+wheel: $(VENV)/full ## build the wheel and run the example from it, away from this checkout
+	rm -rf build/wheel && $(BIN)/pip wheel --quiet --no-deps --wheel-dir build/wheel .
+	$(BIN)/pip install --quiet --no-deps --target build/wheel/installed build/wheel/*.whl
+	cd build/wheel && PYTHONPATH=installed ../../$(BIN)/python -m tankcal demo --out from-wheel-results
+
+$(VENV)/base: pyproject.toml constraints.txt
+	test -x $(BIN)/python || python3 -m venv $(VENV)
+	$(BIN)/pip install --quiet --editable .
+	touch $@
+
+$(VENV)/full: $(VENV)/base
+	$(BIN)/pip install --quiet --editable '.[test,check]'
+	touch $@
+
+clean: ## remove what was made, but not results of yours
+	rm -rf $(VENV) build demo-results .pytest_cache .ruff_cache .hypothesis .import_linter_cache

@@ -1,0 +1,218 @@
+"""What one value of a job may be: a number with its bounds, a name, a date, a choice.
+
+A `Field` describes one key of job.toml or one column of a table; `read_value` turns what stands in
+the file into a Python value, or raises `Refused` with what was found and what was expected.
+"""
+
+import datetime
+import math
+import re
+import unicodedata
+from dataclasses import dataclass
+
+from tankcal.tables import BadCell, nearest, shown
+
+MAX_TEXT = 300
+MAX_NAME = 64
+NAME_RULE = "a letter, digit or underscore first, then letters, digits, spaces or _ - . ( ) / #"
+TANK_ID_RULE = "letters, digits, spaces or _ - . ( ), no .. and no . or - first"
+
+_NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
+_NAME = re.compile(r"\w[\w .()/#-]*")
+_TANK_ID = re.compile(r"(?!.*\.\.)[\w(][\w .()-]*")
+_ISO_DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
+
+
+class Refused(ValueError):
+    """The value is not what the field takes; the text says what was found and expected."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """One key or column.
+
+    name       as written in the file, with its unit
+    kind       "number", "text", "name", "tank id", "choice", "flag" or "date"
+    note       one line for the person who fills it in
+    required   must be there and filled in
+    low, high  bounds of a number, both allowed unless `above_low`: then low itself is not
+    choices    what a choice may be
+    in_full    an optional column that is filled in for every row, or for none
+    start      what the starter job has there
+    """
+
+    name: str
+    kind: str
+    note: str
+    required: bool = False
+    low: float = -math.inf
+    high: float = math.inf
+    above_low: bool = False
+    choices: tuple[str, ...] = ()
+    in_full: bool = False
+    start: str = ""
+
+    def expectation(self):
+        """What is expected, in words: "a number above 0, at most 300"."""
+        if self.kind == "choice":
+            return " or ".join(repr(choice) for choice in self.choices)
+        if self.kind == "number":
+            return "a number" + self._bounds()
+        return {
+            "text": f"text of at most {MAX_TEXT} characters in one line",
+            "name": f"a name of at most {MAX_NAME} characters ({NAME_RULE})",
+            "tank id": f"a name of at most {MAX_NAME} characters ({TANK_ID_RULE})",
+            "flag": "true or false",
+            "date": "a date such as 2024-05-31",
+        }[self.kind]
+
+    def wanted(self):
+        """What is expected where nothing stands: "height of the course (a number above 0)"."""
+        is_plain = self.kind in ("text", "name", "tank id")
+        return self.note if is_plain else f"{self.note} ({self.expectation()})"
+
+    def _bounds(self):
+        if self.low == -self.high:  # bounds that only keep nonsense out
+            return ""
+        if math.isinf(self.high):
+            return f" above {self.low:g}" if self.above_low else f" of {self.low:g} or more"
+        if self.above_low:
+            return f" above {self.low:g}, at most {self.high:g}"
+        return f" from {self.low:g} to {self.high:g}"
+
+
+def is_blank(raw):
+    """Is nothing given? An empty text counts as blank; 0 and false do not."""
+    return raw is None or (isinstance(raw, str) and not raw.strip())
+
+
+def read_value(field, raw, decimal=None):
+    """The value of a field as float, text or bool; `raw` is not blank.
+
+    decimal is the mark of numbers that stand as text (CSV), or None where a number is a number
+    (TOML, workbook). Raises Refused.
+    """
+    if isinstance(raw, BadCell):
+        raise Refused(f"{raw.complaint}; expected {field.expectation()}")
+    reader = {
+        "number": _read_number,
+        "choice": _read_choice,
+        "flag": _read_flag,
+        "date": _read_date,
+    }.get(field.kind, _read_text)
+    return reader(field, raw, decimal)
+
+
+def _read_number(field, raw, decimal):
+    if isinstance(raw, str):
+        value = _number_of_text(field, raw, decimal)
+    elif isinstance(raw, int | float) and not isinstance(raw, bool):
+        value = _float(raw)
+    else:
+        raise Refused(f"found {_kind_of(raw)}{shown(raw)}; expected {field.expectation()}")
+    if not math.isfinite(value):
+        raise Refused(f"found {shown(raw)}; expected {field.expectation()}, not NaN or infinite")
+    if value > field.high or value < field.low or (field.above_low and value == field.low):
+        raise Refused(f"found {shown(raw)}; expected {field.expectation()}{_other_unit(field)}")
+    return value
+
+
+def _number_of_text(field, raw, decimal):
+    wanted = field.expectation()
+    text = raw.strip(" \t")
+    if len(text) > MAX_NAME:
+        raise Refused(f"found {shown(raw)}; expected {wanted}")
+    plain = text.replace(",", ".") if decimal != "." else text
+    is_number = _NUMBER.fullmatch(plain) is not None
+    if decimal is None:
+        hint = ", stored as a number (no quotation marks, no text cell)" if is_number else ""
+        raise Refused(f"found the text {shown(raw)}; expected {wanted}{hint}")
+    if is_number and not (decimal == "," and "." in text):
+        return float(plain)
+    if decimal == "." and _NUMBER.fullmatch(text.replace(",", ".")):
+        hint = " with a decimal point; for decimal commas see [csv] decimal in job.toml"
+    elif decimal == "," and _NUMBER.fullmatch(text):
+        hint = " with a decimal comma, as [csv] decimal in job.toml says"
+    else:
+        hint = ""
+    raise Refused(f"found {shown(raw)}; expected {wanted}{hint}")
+
+
+def _float(raw):
+    try:
+        return float(raw)
+    except OverflowError:
+        return math.inf
+
+
+def _kind_of(raw):
+    if isinstance(raw, bool):
+        return "the truth value "
+    if isinstance(raw, datetime.date):
+        return "the date "
+    if isinstance(raw, datetime.time | datetime.timedelta):
+        return "the time "
+    return ""
+
+
+def _other_unit(field):
+    unit = {"_m": "metres", "_mm": "millimetres"}.get("_" + field.name.rpartition("_")[2])
+    return f" (in {unit}: is it in another unit?)" if unit else ""
+
+
+def _read_text(field, raw, _decimal):
+    if isinstance(raw, str):
+        text = raw.replace("\u00a0", " ").strip()
+    elif isinstance(raw, bool | dict | list):
+        raise Refused(f"found {_kind_of(raw)}{shown(raw)}; expected {field.expectation()}")
+    elif isinstance(raw, float) and raw.is_integer() and abs(raw) < 1e15:
+        text = str(int(raw))
+    elif isinstance(raw, int) and abs(raw) >= 1e15:
+        raise Refused(f"found {shown(raw)}; expected {field.expectation()}")
+    elif isinstance(raw, datetime.datetime) and raw.time() == datetime.time(0):
+        text = raw.date().isoformat()
+    else:
+        text = str(raw)
+    if field.kind == "text":
+        sound = len(text) <= MAX_TEXT and all(_is_writing(char) for char in text)
+    else:
+        pattern = _NAME if field.kind == "name" else _TANK_ID
+        sound = len(text) <= MAX_NAME and pattern.fullmatch(text) is not None
+    if not sound:
+        raise Refused(f"found {shown(text)}; expected {field.expectation()}")
+    return text
+
+
+def _is_writing(char):
+    return char.isprintable() or unicodedata.category(char) == "Zs"
+
+
+def _read_choice(field, raw, _decimal):
+    is_padded = isinstance(raw, str) and raw not in field.choices
+    text = raw.strip() if is_padded else raw
+    if text not in field.choices:
+        hint = nearest(text, field.choices) if isinstance(text, str) else ""
+        raise Refused(f"found {shown(raw)}; expected {field.expectation()}{hint}")
+    return text
+
+
+def _read_flag(field, raw, _decimal):
+    if isinstance(raw, bool):
+        return raw
+    if isinstance(raw, str) and raw.strip().lower() in ("true", "false"):
+        return raw.strip().lower() == "true"
+    raise Refused(f"found {shown(raw)}; expected {field.expectation()}")
+
+
+def _read_date(field, raw, _decimal):
+    if isinstance(raw, datetime.datetime):
+        return raw.date().isoformat()
+    if isinstance(raw, datetime.date):
+        return raw.isoformat()
+    text = raw.strip() if isinstance(raw, str) else ""
+    try:
+        if _ISO_DATE.fullmatch(text):
+            return datetime.date.fromisoformat(text).isoformat()
+    except ValueError:
+        pass
+    raise Refused(f"found {shown(raw)}; expected {field.expectation()}")

@@ -1,0 +1,204 @@
+"""A job as a folder: job.toml for the settings, a CSV file for each table."""
+
+import csv
+import hashlib
+import re
+import tomllib
+
+from tankcal.tables import (
+    COVARIANCE_FILE,
+    LATER_TABLES,
+    MAX_FILE_BYTES,
+    SEPARATORS,
+    SETTINGS_FILE,
+    TABLES,
+    RawJob,
+    Value,
+    make_table,
+    nearest,
+    read_bytes,
+)
+
+LATER_FILES = ("cameras.toml", "instruments.toml")
+MAX_SETTINGS_BYTES = 1_000_000
+MAX_SETTINGS_LINE = 4000  # characters
+DECIMALS = (".", ",")
+
+
+def read_folder(folder, log):
+    """RawJob of a job folder (a Path); what is wrong goes to `log`."""
+    try:
+        names = sorted(item.name for item in folder.iterdir())
+    except OSError as error:
+        log.problem(folder.name, f"the folder cannot be read ({error.strerror})")
+        names = []
+    _refuse_unknown_files(names, log)
+    files = []
+
+    def content(name, limit=MAX_FILE_BYTES):
+        data = read_bytes(folder / name, log, limit)
+        if data is not None:
+            files.append((name, hashlib.sha256(data).hexdigest(), len(data)))
+        return data
+
+    settings, sections = None, {}
+    if SETTINGS_FILE in names:
+        data = content(SETTINGS_FILE, MAX_SETTINGS_BYTES)
+        if data is not None:
+            settings, sections = read_toml(SETTINGS_FILE, data, log)
+    else:
+        log.problem(SETTINGS_FILE, "missing file; every job folder has one" + _hint(names))
+    separator, decimal = _csv_marks(settings or {}, log)
+    tables = {}
+    for table in TABLES:
+        name = f"{table}.csv"
+        if name in names:
+            data = content(name)
+            readable = data is not None
+            tables[table] = read_csv(name, data, separator, decimal, log) if readable else None
+    covariance = content(COVARIANCE_FILE) if COVARIANCE_FILE in names else None
+    return RawJob(
+        folder.resolve().name, SETTINGS_FILE, settings, sections, tables, covariance, tuple(files)
+    )
+
+
+def _hint(names):
+    books = [name for name in names if name.endswith(".xlsx") and name[0] not in ".~"]
+    return f" (or give the workbook itself: {books[0]})" if books else ""
+
+
+def _refuse_unknown_files(names, log):
+    known = [f"{table}.csv" for table in TABLES]
+    for name in names:
+        stem, _, ending = name.lower().rpartition(".")
+        if name.startswith((".", "~")) or name in known:
+            continue
+        if (stem in LATER_TABLES and ending == "csv") or name.lower() in LATER_FILES:
+            log.problem(name, "not available in this version of tankcal: remove the file")
+        elif ending == "csv":
+            listed = ", ".join(known)
+            log.problem(
+                name, f"unknown file; the CSV files of a job are {listed}{nearest(name, known)}"
+            )
+
+
+def decode(file, data, log):
+    """The text of a UTF-8 file (a byte order mark is allowed), or None after telling `log`."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        log.problem(file, "written as UTF-16; save it as 'CSV UTF-8' or plain UTF-8 text", 1)
+        return None
+    if b"\0" in data:
+        row = data[: data.index(b"\0")].count(b"\n") + 1
+        log.problem(file, "a zero byte; expected text (UTF-8): is this really a text file?", row)
+        return None
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        # error.start counts without the byte order mark, which holds no line break
+        row = data[: error.start].count(b"\n") + 1
+        log.problem(file, "a letter that is not UTF-8; save the file as 'CSV UTF-8'", row)
+        return None
+
+
+def _lines(text):
+    return re.split("\r\n|\r|\n", text)
+
+
+def read_toml(file, data, log):
+    """({section: {key: Value}}, {section: row}) of a TOML file, or (None, {}) when unreadable."""
+    text = decode(file, data, log)
+    if text is None:
+        return None, {}
+    for number, line in enumerate(_lines(text), 1):
+        if len(line) > MAX_SETTINGS_LINE:
+            log.problem(file, f"a line of more than {MAX_SETTINGS_LINE} characters", number)
+            return None, {}
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        line = re.search(r"at line (\d+)", str(error))
+        reason = re.sub(r"\s*\(at .*\)$", "", str(error))
+        if isinstance(error, RecursionError):
+            reason = "too deeply nested"
+        place = int(line[1]) if line else None
+        log.problem(file, f'cannot be read: {reason}; expected lines such as key = "text"', place)
+        return None, {}
+    return _flatten(file, data, _toml_rows(text), log)
+
+
+def _toml_rows(text):
+    """Row of each section and 'section.key', for messages only."""
+    rows, section = {}, ""
+    for number, line in enumerate(_lines(text), 1):
+        heading = re.match(r"[ \t]*\[+([^\[\]]+)\]", line)
+        key = re.match(r"[ \t]*([\w.\"'-]+)[ \t]*=", line)
+        if heading:
+            section = re.sub(r"[\s\"']", "", heading[1])
+            rows.setdefault(section, number)
+        elif key:
+            name = re.sub(r"[\"']", "", key[1])
+            rows.setdefault(f"{section}.{name}" if section else name, number)
+    return rows
+
+
+def _flatten(file, data, rows, log):
+    settings, sections = {}, {}
+    todo = [("", data, 0)]
+    while todo:
+        section, entries, depth = todo.pop(0)
+        if section:
+            settings.setdefault(section, {})
+            sections[section] = rows.get(section)
+        for key, value in entries.items():
+            name = f"{section}.{key}" if section else key
+            if isinstance(value, dict) and depth < 3:
+                todo.append((name, value, depth + 1))
+            elif section:
+                settings[section][key] = Value(value, rows.get(name))
+            else:
+                expected = "stands before the first [section]; expected inside one, such as [tank]"
+                log.problem(file, expected, rows.get(name), name)
+    return settings, sections
+
+
+def _csv_marks(settings, log):
+    """Separator and decimal mark; values that are not known are told by the settings' check."""
+    given = {key: value.raw for key, value in settings.get("csv", {}).items()}
+    separator, decimal = given.get("separator") or ",", given.get("decimal") or "."
+    if separator not in SEPARATORS or decimal not in DECIMALS:
+        return ",", "."
+    if separator == decimal:
+        row = next(iter(settings["csv"].values())).row
+        expected = "separator and decimal are both a comma; expected separator = ';'"
+        log.problem(SETTINGS_FILE, expected, row, "csv.separator")
+        return ";", decimal
+    return separator, decimal
+
+
+def read_csv(file, data, separator, decimal, log):
+    """Table of the bytes of a CSV file, or None after telling `log` why it cannot be read."""
+    text = decode(file, data, log)
+    if text is None:
+        return None
+    hint = ""
+    if separator == "," and decimal == ".":
+        hint = "; for decimal commas set [csv] separator = ';' and decimal = ',' in job.toml"
+    return make_table(file, _csv_rows(file, text, separator, log), decimal, log, hint)
+
+
+def _csv_rows(file, text, separator, log):
+    """(row, cells) of each line that is neither blank nor a comment; cells is None when unreadable.
+
+    A cell holds no line break, so that a forgotten quotation mark spoils one row, not the file.
+    """
+    for number, line in enumerate(_lines(text), 1):
+        if not line or line.isspace() or line.lstrip(' \t"').startswith("#"):
+            continue
+        if '"' not in line:
+            yield number, line.split(separator)
+            continue
+        try:
+            yield number, next(csv.reader([line], delimiter=separator, strict=True))
+        except csv.Error:
+            log.problem(file, "quotation marks that do not pair up within the row", number)
+            yield number, None

@@ -1,0 +1,216 @@
+"""The raw tables of a job: text and numbers as they stand, with the file and row of each.
+
+Nothing here knows what a value means. `tankcal.folder` reads job.toml and CSV files,
+`tankcal.sheets` the same from one Excel workbook. Both give a `RawJob`, and tell everything that
+is wrong to a `Log`, so that all problems of a job come in one run.
+"""
+
+import difflib
+from dataclasses import dataclass, field
+
+from tankcal.errors import InputError, Problem
+
+TABLES = ("points", "courses", "uncertainty")
+OPTIONAL_TABLES = ("uncertainty",)
+LATER_TABLES = (
+    *("targets", "bottom", "deadwood", "photos", "image_points", "fiducials", "control", "check"),
+    *("setups", "distances", "slope_distances", "directions", "zenith_angles", "azimuths"),
+    *("horizontal_angles", "vertical_angles", "height_differences", "plumb_lines"),
+)
+SETTINGS_FILE = "job.toml"
+COVARIANCE_FILE = "points_cov.npz"
+
+MAX_FILE_BYTES = 200_000_000
+MAX_PROBLEMS_PER_FILE = 50
+SEPARATORS = (",", ";", "\t")
+
+
+def shown(value):
+    """The value as a message shows it: one printable line of at most 60 characters."""
+    if isinstance(value, dict | list | tuple):
+        return "a list" if isinstance(value, list | tuple) else "a section"
+    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 200:
+        return "a number of very many digits"
+    text = value if isinstance(value, str) else str(value)
+    clipped = text if len(text) <= 60 else text[:57] + "..."
+    return _printable(f"'{clipped}'" if isinstance(value, str) else clipped)
+
+
+def nearest(word, known):
+    """' (did you mean x?)' when one of the known words is close to `word`, else ''."""
+    close = difflib.get_close_matches(str(word)[:80].lower(), [*known], n=1, cutoff=0.6)
+    return f" (did you mean {close[0]}?)" if close else ""
+
+
+def _printable(text):
+    return "".join(char if char.isprintable() else "?" for char in text)
+
+
+class Log:
+    """Collects what is wrong (`problems`) and what only deserves a look (`warnings`)."""
+
+    def __init__(self):
+        self.problems = []
+        self.warnings = []
+
+    def problem(self, file, expected, row=None, column=None):
+        """Note one thing that stops the job; each text becomes one printable line."""
+        self.problems.append(_make_problem(file, expected, row, column))
+
+    def warning(self, file, expected, row=None, column=None):
+        """Note one thing that does not stop the job."""
+        self.warnings.append(_make_problem(file, expected, row, column))
+
+    def stop_if_problems(self):
+        """Raise InputError with every problem, by file and row; the longest lists are cut."""
+        if not self.problems:
+            return
+        by_file = {}
+        for problem in self.problems:
+            by_file.setdefault(problem.file, []).append(problem)
+        listed = []
+        for file, problems in by_file.items():
+            problems.sort(key=lambda problem: problem.row or 0)
+            listed += problems[:MAX_PROBLEMS_PER_FILE]
+            more = len(problems) - MAX_PROBLEMS_PER_FILE
+            if more > 0:
+                listed.append(Problem(file, f"and {more} more problems; mend these first"))
+        raise InputError(listed)
+
+
+def _make_problem(file, expected, row, column):
+    column = None if column is None else _printable(str(column)[:80])
+    return Problem(_printable(str(file)[:120]), _printable(expected), row, column)
+
+
+@dataclass(frozen=True)
+class BadCell:
+    """A workbook cell without a usable value: a formula never calculated, an error such as #N/A."""
+
+    complaint: str
+
+
+@dataclass(frozen=True)
+class Value:
+    """One setting as read, and the row of its file; blank is None or an empty text."""
+
+    raw: object
+    row: int | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table as read: `rows[i]` stands in row `row_numbers[i]` of `file`.
+
+    skipped is the number of rows that could not be read (each told as a problem).
+    decimal is the mark that numbers must use when they are text (CSV), or None in a workbook,
+    where a number cell must hold a number.
+    """
+
+    file: str
+    headings: tuple[str, ...]
+    heading_row: int
+    rows: tuple[tuple, ...]
+    row_numbers: tuple[int, ...]
+    decimal: str | None
+    skipped: int = 0
+
+
+@dataclass(frozen=True)
+class RawJob:
+    """A job as read. A table that is there but cannot be read is None (its problem is told).
+
+    settings    {section: {key: Value}}, or None: unreadable
+    sections    {section: row}
+    covariance  bytes of points_cov.npz, or None
+    files       (name, SHA-256, bytes) of each file read
+    """
+
+    source: str
+    settings_file: str
+    settings: dict | None
+    sections: dict
+    tables: dict
+    covariance: bytes | None = None
+    files: tuple = field(default=())
+
+    def file_of(self, table):
+        """Name of the table's file or sheet in messages, whether it is there or not."""
+        return f"sheet {table}" if self.settings_file.startswith("sheet ") else f"{table}.csv"
+
+
+def read_bytes(path, log, limit=MAX_FILE_BYTES):
+    """The bytes of a file, or None after telling `log` why it cannot be read."""
+    try:
+        if not path.is_file():
+            log.problem(path.name, "expected a file, found something else")
+            return None
+        size = path.stat().st_size
+        if size <= limit:
+            return path.read_bytes()
+        log.problem(path.name, f"{size / 1e6:.0f} MB, expected at most {limit / 1e6:.0f} MB")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "impossible name"
+        log.problem(path.name, f"the file cannot be read ({reason})")
+    return None
+
+
+def make_table(file, numbered_rows, decimal, log, hint=""):
+    """Table of (row, cells) pairs, or None; blank rows and rows that start with # are left out.
+
+    The first row that remains is the heading. Cells that are None stand for a row that cannot be
+    read, told already. `hint` ends the message about a row of too many cells.
+    """
+    headings, heading_row, rows, numbers, skipped = None, 0, [], [], 0
+    for number, raw_cells in numbered_rows:
+        if raw_cells is None:
+            skipped += 1
+            continue
+        cells = [cell.strip() if isinstance(cell, str) else cell for cell in raw_cells]
+        width = len(cells)
+        while cells and (cells[-1] is None or cells[-1] == ""):
+            cells.pop()
+        if not cells or (isinstance(cells[0], str) and cells[0].startswith("#")):
+            continue
+        if headings is None:
+            headings, heading_row = _headings(file, cells, number, log), number
+            if headings is None:
+                return None
+        elif len(cells) > len(headings):
+            expected = f"{len(cells)} cells, expected {len(headings)} as in the heading{hint}"
+            log.problem(file, expected, number)
+            skipped += 1
+        elif width < len(headings):
+            log.problem(file, f"{width} cells, expected {len(headings)} as in the heading", number)
+            skipped += 1
+        else:
+            rows.append(tuple(cells + [None] * (len(headings) - len(cells))))
+            numbers.append(number)
+    if headings is None:
+        log.problem(file, "empty; expected a row of headings and the rows below it")
+        return None
+    return Table(file, headings, heading_row, tuple(rows), tuple(numbers), decimal, skipped)
+
+
+def _headings(file, cells, number, log):
+    if len(cells) == 1 and isinstance(cells[0], str):
+        for separator in SEPARATORS:
+            if separator in cells[0]:
+                name = "tab" if separator == "\t" else separator
+                log.problem(
+                    file,
+                    f"the cells are separated by '{name}'; expected the comma, or what"
+                    " job.toml says under [csv] separator",
+                    number,
+                )
+                return None
+    sound = True
+    for position, cell in enumerate(cells):
+        if not isinstance(cell, str) or not cell:
+            found = "no heading" if cell in (None, "") else "a heading that is no text"
+            log.problem(file, f"column {position + 1} has {found}", number)
+            sound = False
+        elif cell in cells[:position]:
+            log.problem(file, "this heading stands there twice; expected once", number, cell)
+            sound = False
+    return tuple(cells) if sound else None

@@ -1,0 +1,219 @@
+"""Builds small valid jobs for tests: a cylinder of R 6.5 m and H 9.5 m in five courses.
+
+    write_job(folder)                                  a folder with job.toml and CSV files
+    write_job(folder, radius=6.48, sd_mm=3.0)
+    write_job(folder, radius=lambda theta, z: 6.5 + 0.01 * np.cos(2 * theta), rings=2)
+    write_job(folder, settings={"table.step_m": 0.1, "survey.side": "inside", "tank.owner": None})
+    write_workbook(path, rings=2)                      the same as a workbook
+
+`job_parts` gives the job as plain data (`Parts`), to be spoilt before `write_folder` or
+`write_book` writes it.
+"""
+
+import csv
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+SETTINGS = {
+    "tank.id": "T-1",
+    "tank.kind": "vertical",
+    "tank.nominal_diameter_m": 13.0,
+    "tank.nominal_height_m": 9.5,
+    "survey.side": "outside",
+    "survey.date": "2024-05-31",
+    "datum.bottom_z_m": 0.0,
+    "table.step_m": 0.01,
+    "table.reference_temperature_c": 20.0,
+}
+
+
+@dataclass
+class Parts:
+    """A job as plain data: settings by dotted key, tables as rows with the headings first."""
+
+    settings: dict
+    tables: dict
+    covariance_m2: np.ndarray | None = None
+    extra_files: dict = field(default_factory=dict)  # name: text or bytes, folder form only
+
+
+def job_parts(
+    *,
+    radius=6.5,
+    height=9.5,
+    courses=5,
+    rings=1,
+    points_per_ring=24,
+    thickness_mm=8.0,
+    paint_mm=None,
+    sd_mm=None,
+    covariance_m2=None,
+    noise_mm=0.0,
+    jitter=0.0,
+    seed=1,
+    centre=(0.0, 0.0),
+    tilt=(0.0, 0.0),
+    extra_points=(),
+    uncertainty=(),
+    settings=None,
+):
+    """Parts of a job.
+
+    radius           m: a number, one for each course, or a function r(theta, z) of arrays;
+                     theta is the azimuth, rad, clockwise from +y, z the height above the bottom, m
+    courses          their number (equal heights), or a list of heights, m
+    rings            rings of points in each course, at the middles of equal parts of its height
+    thickness_mm     a number or one for each course; so paint_mm
+    sd_mm            of x, y and z: a number or three of them; None: columns left out
+    noise_mm         sd of Gaussian noise added to every coordinate
+    jitter           part of the point spacing by which azimuths scatter (uniform, plus or minus)
+    centre, tilt     x and y of the axis at the bottom, m, and its slopes dx/dz, dy/dz
+    extra_points     rows (name, x_m, y_m, z_m)
+    uncertainty      rows (input, u, unit)
+    settings         {dotted key: value}; None removes the key
+    """
+    rng = np.random.default_rng(seed)
+    heights = [height / courses] * courses if isinstance(courses, int) else list(courses)
+    given = {**SETTINGS, "tank.nominal_height_m": round(sum(heights), 9), **(settings or {})}
+    given = {key: value for key, value in given.items() if value is not None}
+    bottom_z = given.get("datum.bottom_z_m", 0.0)
+    rows, bottom = [], 0.0
+    for number, course_height in enumerate(heights, 1):
+        for ring in range(rings):
+            z = bottom + (ring + 0.5) * course_height / rings
+            theta = (
+                2
+                * np.pi
+                / points_per_ring
+                * (np.arange(points_per_ring) + jitter * rng.uniform(-1, 1, points_per_ring))
+            )
+            r = _radius(radius, number, theta, z)
+            xyz = np.column_stack(
+                [
+                    centre[0] + tilt[0] * z + r * np.sin(theta),
+                    centre[1] + tilt[1] * z + r * np.cos(theta),
+                    np.full(points_per_ring, bottom_z + z),
+                ]
+            )
+            xyz += rng.normal(0.0, noise_mm / 1000, xyz.shape)
+            for place, point in enumerate(xyz, 1):
+                rows.append([f"C{number}R{ring + 1}P{place}", *map(float, point)])
+        bottom += course_height
+    rows += [list(row) for row in extra_points]
+    headings = ["point", "x_m", "y_m", "z_m"]
+    if sd_mm is not None:
+        headings += ["sx_mm", "sy_mm", "sz_mm"]
+        sds = [float(sd) for sd in np.broadcast_to(sd_mm, 3)]
+        rows = [row + sds for row in rows]
+    tables = {
+        "points": [headings, *rows],
+        "courses": _courses(heights, thickness_mm, paint_mm),
+    }
+    if uncertainty:
+        tables["uncertainty"] = [["input", "u", "unit"], *map(list, uncertainty)]
+    return Parts(given, tables, covariance_m2)
+
+
+def _radius(radius, course, theta, z):
+    if callable(radius):
+        return radius(theta, np.full_like(theta, z))
+    return np.full_like(theta, radius if np.isscalar(radius) else radius[course - 1])
+
+
+def _courses(heights, thickness_mm, paint_mm):
+    n = len(heights)
+    columns = {
+        "course": [str(number) for number in range(1, n + 1)],
+        "height_m": heights,
+        "thickness_mm": np.broadcast_to(thickness_mm, n).tolist(),
+    }
+    if paint_mm is not None:
+        columns["paint_mm"] = np.broadcast_to(paint_mm, n).tolist()
+    return [list(columns), *map(list, zip(*columns.values(), strict=True))]
+
+
+def write_job(folder, **changes):
+    """Write a job folder (see `job_parts` for the changes); returns its path."""
+    return write_folder(folder, job_parts(**changes))
+
+
+def write_workbook(path, **changes):
+    """Write the same job as a workbook; returns its path."""
+    return write_book(path, job_parts(**changes))
+
+
+def write_folder(folder, parts):
+    """Write Parts as a job folder, in the separator and decimal mark of its [csv] settings."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "job.toml").write_text(toml_text(parts.settings), encoding="utf-8")
+    separator = parts.settings.get("csv.separator", ",")
+    decimal = parts.settings.get("csv.decimal", ".")
+    for name, rows in parts.tables.items():
+        with open(folder / f"{name}.csv", "w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, delimiter=separator)
+            writer.writerows([_csv_cell(cell, decimal) for cell in row] for row in rows)
+    if parts.covariance_m2 is not None:
+        names = np.array([row[0] for row in parts.tables["points"][1:]])
+        np.savez(folder / "points_cov.npz", covariance_m2=parts.covariance_m2, points=names)
+    for name, content in parts.extra_files.items():
+        data = content.encode() if isinstance(content, str) else content
+        (folder / name).write_bytes(data)
+    return folder
+
+
+def _csv_cell(cell, decimal):
+    if isinstance(cell, float):
+        return repr(cell).replace(".", decimal)
+    return "" if cell is None else cell
+
+
+def toml_text(settings):
+    """job.toml with one section after the other, keys in the order given."""
+    sections = {}
+    for dotted, value in settings.items():
+        section, _, key = dotted.rpartition(".")
+        sections.setdefault(section, []).append(f"{key} = {_toml_value(value)}")
+    return "\n".join(
+        line for section, lines in sections.items() for line in (f"[{section}]", *lines, "")
+    )
+
+
+def _toml_value(value):
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return '"' + "".join(_toml_char(char) for char in escaped) + '"'
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml_value, value)) + "]"
+    return repr(value)
+
+
+def _toml_char(char):
+    return f"\\u{ord(char):04x}" if ord(char) < 32 or ord(char) == 127 else char
+
+
+def write_book(path, parts):
+    """Write Parts as a workbook with the sheets job, points, courses, ..."""
+    import xlsxwriter
+
+    path = Path(path)
+    with xlsxwriter.Workbook(path) as book:
+        rows = [["section", "key", "value"]]
+        rows += [[*dotted.rpartition(".")[::2], value] for dotted, value in parts.settings.items()]
+        _write_sheet(book.add_worksheet("job"), rows)
+        for name, table in parts.tables.items():
+            _write_sheet(book.add_worksheet(name), table)
+    return path
+
+
+def _write_sheet(sheet, rows):
+    for number, row in enumerate(rows):
+        for column, cell in enumerate(row):
+            if isinstance(cell, str):
+                sheet.write_string(number, column, cell)
+            elif cell is not None:
+                sheet.write(number, column, cell)

@@ -1,0 +1,529 @@
+"""Each kind of bad input gives its line, with file, row and column; nothing ever gives a traceback.
+
+The truth of these tests is the property itself: what was spoilt, and where, is known.
+"""
+
+import datetime
+import io
+import math
+import tempfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from job_builder import Parts, job_parts, toml_text, write_book, write_folder
+
+from tankcal.errors import InputError
+from tankcal.job import Job, load
+
+FORMS = ("folder", "workbook")
+
+
+def write(tmp_path, parts, form):
+    return (
+        write_folder(tmp_path / "job", parts)
+        if form == "folder"
+        else write_book(tmp_path / "job.xlsx", parts)
+    )
+
+
+def problems_of(path):
+    with pytest.raises(InputError) as caught:
+        load(path)
+    return caught.value.problems
+
+
+def places(problems):
+    return [(problem.file, problem.row, problem.column) for problem in problems]
+
+
+def table_file(form, table):
+    return f"{table}.csv" if form == "folder" else f"sheet {table}"
+
+
+def settings_place(form, parts, key):
+    """File, row and column of a key that `parts` has."""
+    if form == "workbook":
+        return "sheet job", [*parts.settings].index(key) + 2, key
+    section, _, name = key.rpartition(".")
+    lines = toml_text(parts.settings).split("\n")
+    start = lines.index(f"[{section}]")
+    row = next(i for i, line in enumerate(lines) if i > start and line.startswith(f"{name} ="))
+    return "job.toml", row + 1, key
+
+
+# key, bad value, words that the message must hold
+BAD_SETTINGS = [
+    ("tank.id", "../../x", "found '../../x'"),
+    ("tank.id", "=cmd()", "found '=cmd()'"),
+    ("tank.id", "a..b", "no .."),
+    ("tank.id", ".hidden", "found"),
+    ("tank.id", "x" * 65, "at most 64"),
+    ("tank.id", True, "truth value"),
+    ("tank.kind", "sphere", "not available in this version"),
+    ("tank.kind", "vertcal", "expected 'vertical'"),
+    ("tank.nominal_diameter_m", 13000.0, "another unit"),
+    ("tank.nominal_diameter_m", "13.0", "found the text '13.0'"),
+    ("tank.nominal_diameter_m", "13,0", "stored as a number"),
+    ("tank.nominal_diameter_m", True, "truth value"),
+    ("tank.nominal_height_m", -9.5, "expected a number from 0.1"),
+    ("tank.colour", "red", "unknown key"),
+    ("tank.ower", "x", "did you mean owner?"),
+    ("tank.owner", "one line\nand another", "in one line"),
+    ("tank.owner", "x" * 301, "at most 300"),
+    ("survey.side", "out", "'outside' or 'inside'"),
+    ("survey.date", "31/05/2024", "a date such as"),
+    ("survey.date", "2024-02-30", "a date such as"),
+    ("survey.liquid_level_m", 3.0, "not available in this version"),
+    ("survey.liquid_density_kg_m3", 850.0, "without liquid_level_m"),
+    ("datum.dip_plate_z_m", 1.5, "above the bottom"),
+    ("datum.dip_plate_z_m", -1.5, "below the bottom"),
+    ("datum.reference_height_m", 0, "above 0"),
+    ("table.step_m", 0, "above 0"),
+    ("table.step_m", -0.01, "above 0"),
+    ("table.step_m", 10, "millimetres?"),
+    ("table.step_m", 1e-5, "rows in the table"),
+    ("table.coverage_probability", 95, "from 0.5 to 0.9999"),
+    ("table.liquid_density_kg_m3", 850.0, "not available in this version"),
+    ("table.fine_step_m", 0.001, "not available in this version"),
+    ("table.minimum_delivery_m", 2.0, "not available in this version"),
+    ("table.rule", "API", "not available in this version"),
+    ("material.e_gpa", 206000, "from 40 to 500"),
+    ("material.expansion_per_k", 11, "at most 0.0001"),
+    ("adjustment.datum", "inner", "not available in this version"),
+    ("adjustment.scale", "posterior", "a_posteriori"),
+    ("adjustment.snooping", "perhaps", "true or false"),
+    ("roof.mass_kg", 3000, "not available in this version"),
+    ("adjustment.camera.default", "camera free", "not available in this version"),
+    ("certificate.date_of_issue", "soon", "a date such as"),
+    ("certificate.signed_by", "x", "unknown key"),
+]
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(("key", "value", "words"), BAD_SETTINGS)
+def test_bad_setting_is_told_with_its_row_and_key(tmp_path, form, key, value, words):
+    parts = job_parts(settings={key: value})
+    (problem,) = problems_of(write(tmp_path, parts, form))
+    assert places([problem]) == [settings_place(form, parts, key)]
+    assert words in problem.expected
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_setting_that_is_no_finite_number(tmp_path, value):
+    parts = job_parts(settings={"tank.nominal_height_m": value})  # TOML can write nan and inf
+    (problem,) = problems_of(write(tmp_path, parts, "folder"))
+    assert problem.column == "tank.nominal_height_m"
+    assert "not NaN or infinite" in problem.expected
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_missing_key_and_unknown_section(tmp_path, form):
+    parts = job_parts(settings={"survey.side": None, "tnak.id": "x"})
+    problems = problems_of(write(tmp_path, parts, form))
+    file = settings_place(form, parts, "tank.id")[0]
+    row = settings_place(form, parts, "tnak.id")[1] - (form == "folder")  # the [section] line
+    assert places(problems) == [(file, None, "survey.side"), (file, row, "[tnak]")]
+    assert "did you mean tank?" in problems[1].expected
+
+
+# table, row in the file, column, bad cell, words
+BAD_CELLS = [
+    ("points", 4, "x_m", "abc", "abc"),
+    ("points", 4, "x_m", "nan", "expected a number"),
+    ("points", 4, "y_m", "inf", "expected a number"),
+    ("points", 4, "y_m", "1_000", "expected a number"),
+    ("points", 4, "z_m", "１２", "expected a number"),
+    ("points", 4, "z_m", "1.2.3", "expected a number"),
+    ("points", 4, "z_m", "0x1F", "expected a number"),
+    ("points", 4, "z_m", None, "blank"),
+    ("points", 4, "point", None, "blank"),
+    ("points", 4, "point", "=cmd()", "a letter, digit or underscore first"),
+    ("points", 4, "point", "@SUM(A1)", "a letter, digit or underscore first"),
+    ("courses", 3, "height_m", 0.0, "above 0"),
+    ("courses", 3, "height_m", -1.9, "above 0"),
+    ("courses", 3, "height_m", 1900.0, "another unit"),
+    ("courses", 3, "thickness_mm", -8.0, "from 0 to 100"),
+    ("courses", 3, "thickness_mm", 0.008, "in metres?"),
+    ("courses", 3, "thickness_mm", 8000.0, "from 0 to 100"),
+    ("courses", 3, "thickness_mm", None, "blank"),
+    ("courses", 3, "paint_mm", 11.0, "from 0 to 10"),
+    ("courses", 3, "course", "1", "already, in row 2"),
+    ("points", 7, "sx_mm", -2.0, "above 0"),
+    ("points", 7, "sx_mm", 0.0, "above 0"),
+    ("points", 7, "sx_mm", 1001.0, "at most 1000"),
+    ("points", 7, "sx_mm", None, "blank"),
+    ("uncertainty", 2, "input", "wind", "expected 'scale'"),
+    ("uncertainty", 2, "u", -5.0, "or more"),
+    ("uncertainty", 2, "u", 5e5, "at most 10000 ppm"),
+    ("uncertainty", 2, "unit", "mm", "expected 'ppm' for scale"),
+    ("uncertainty", 2, "dof", 0.0, "above 0"),
+    ("uncertainty", 2, "type", "C", "'A' or 'B'"),
+    ("uncertainty", 2, "distribution", "flat", "rectangular"),
+    ("uncertainty", 3, "input", "scale", "already, in row 2"),
+]
+
+
+# a course of another height also misses the shell's; the unit of an unlike input is wrong too
+CONSEQUENCES = {("height_m", None), ("unit", 3)}
+
+
+def full_parts(**changes):
+    """A job with every table and most of the optional columns."""
+    parts = job_parts(sd_mm=2.0, paint_mm=0.3, **changes)
+    parts.tables["uncertainty"] = [
+        ["input", "u", "unit", "type", "distribution", "dof", "note"],
+        ["scale", 5.0, "ppm", "B", "normal", None, "certificate"],
+        ["datum", 1.0, "mm", "A", "t", 9.0, None],
+    ]
+    return parts
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(("table", "row", "column", "cell", "words"), BAD_CELLS)
+def test_bad_cell_is_told_with_its_row_and_column(tmp_path, form, table, row, column, cell, words):
+    parts = full_parts()
+    rows = parts.tables[table]
+    rows[row - 1][rows[0].index(column)] = cell
+    found = problems_of(write(tmp_path, parts, form))
+    here = [problem for problem in found if problem.row == row and problem.column == column]
+    assert [problem.file for problem in here] == [table_file(form, table)]
+    assert words in here[0].expected
+    others = [problem for problem in found if problem not in here]
+    assert {(problem.column, problem.row) for problem in others} <= CONSEQUENCES
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_missing_unknown_and_repeated_columns(tmp_path, form):
+    parts = job_parts()
+    parts.tables["points"][0] = ["point", "x_m", "y_m", "height"]
+    parts.tables["courses"][0] = ["course", "height_m", "height_m"]
+    problems = problems_of(write(tmp_path, parts, form))
+    points, courses = table_file(form, "points"), table_file(form, "courses")
+    assert places(problems) == [
+        (courses, 1, "height_m"),
+        (points, 1, "height"),
+        (points, 1, "z_m"),
+    ]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_missing_tables(tmp_path, form):
+    parts = job_parts()
+    parts.tables.clear()
+    problems = problems_of(write(tmp_path, parts, form))
+    expected = [(table_file(form, name), None, None) for name in ("points", "courses")]
+    assert places(problems) == expected
+    words = "missing file" if form == "folder" else "the sheets job, points, courses, uncertainty"
+    assert all(words in problem.expected for problem in problems)
+
+
+def test_missing_settings(tmp_path):
+    folder = write_folder(tmp_path / "job", job_parts())
+    (folder / "job.toml").unlink()
+    assert places(problems_of(folder)) == [("job.toml", None, None)]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_repeated_point_names_both_rows(tmp_path, form):
+    parts = job_parts()
+    parts.tables["points"][9][0] = parts.tables["points"][2][0]
+    (problem,) = problems_of(write(tmp_path, parts, form))
+    assert places([problem]) == [(table_file(form, "points"), 10, "point")]
+    assert "row 3" in problem.expected
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_points_per_course(tmp_path, form):
+    parts = job_parts()
+    rows = parts.tables["points"]
+    keep = [row for row in rows[1:] if row[0].startswith("C1")]
+    keep += [row for row in rows[1:] if row[0].startswith("C2")][:4]  # under 5: an error
+    keep += [row for row in rows[1:] if row[0][:2] in ("C4", "C5")]  # course 3 has none
+    parts.tables["points"] = [rows[0], *keep]
+    problems = problems_of(write(tmp_path, parts, form))
+    courses = table_file(form, "courses")
+    assert places(problems) == [(courses, 3, "course"), (courses, 4, "course")]
+    assert [problem.expected[:8] for problem in problems] == ["4 points", "0 points"]
+
+
+@pytest.mark.parametrize(
+    ("nominal", "accepted"), [(9.519, True), (9.521, False), (19.037, True), (19.039, False)]
+)
+def test_courses_against_shell_height(tmp_path, nominal, accepted):
+    # closed form: 20 mm rules up to 10 m of height, 0.2 % above: 38.08 mm at 19.038 m
+    courses = 5 if nominal < 10 else 10
+    parts = job_parts(
+        courses=courses, height=1.9 * courses, settings={"tank.nominal_height_m": nominal}
+    )
+    path = write_folder(tmp_path / "job", parts)
+    if accepted:
+        assert load(path).tank.nominal_height_m == nominal
+    else:
+        assert places(problems_of(path)) == [("courses.csv", None, "height_m")]
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(
+    ("scale", "column", "words"),
+    [
+        ((1000, 1000, 1), "x_m", "the points in millimetres?"),
+        ((1, 1, 1000), "z_m", "the points in millimetres?"),
+        ((100, 100, 1), "x_m", "the points in centimetres?"),
+        ((1e-3, 1e-3, 1), "x_m", "tank.nominal_diameter_m in millimetres?"),
+    ],
+)
+def test_points_in_another_unit(tmp_path, form, scale, column, words):
+    parts = job_parts()
+    for row in parts.tables["points"][1:]:
+        row[1:4] = [value * factor for value, factor in zip(row[1:4], scale, strict=True)]
+    (problem,) = problems_of(write(tmp_path, parts, form))
+    assert places([problem]) == [(table_file(form, "points"), None, column)]
+    assert words in problem.expected
+
+
+def test_bottom_in_another_frame(tmp_path):
+    parts = job_parts()
+    parts.settings["datum.bottom_z_m"] = 100.0
+    (problem,) = problems_of(write_folder(tmp_path / "job", parts))
+    assert places([problem]) == [settings_place("folder", parts, "datum.bottom_z_m")]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_standard_deviations_for_all_axes_or_none(tmp_path, form):
+    parts = job_parts(sd_mm=2.0)
+    parts.tables["points"] = [row[:6] for row in parts.tables["points"]]
+    (problem,) = problems_of(write(tmp_path, parts, form))
+    assert places([problem]) == [(table_file(form, "points"), None, "sz_mm")]
+
+
+def test_dip_point_needs_both_coordinates(tmp_path):
+    parts = job_parts(settings={"datum.dip_x_m": 1.0})
+    (problem,) = problems_of(write_folder(tmp_path / "job", parts))
+    assert problem.column == "datum.dip_y_m"
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("deadwood.csv", "not available in this version"),
+        ("bottom.csv", "not available in this version"),
+        ("image_points.csv", "not available in this version"),
+        ("cameras.toml", "not available in this version"),
+        ("Points.csv", "did you mean points.csv?"),
+        ("notes.csv", "points.csv, courses.csv, uncertainty.csv"),
+    ],
+)
+def test_files_that_do_not_belong(tmp_path, name, words):
+    parts = job_parts()
+    if name == "Points.csv":  # where names differ by case only, this is points.csv itself
+        parts.extra_files["pts.csv"] = "point\n"
+        name, words = "pts.csv", "unknown file"
+    parts.extra_files |= {name: "x\n", "readme.txt": "ignored", ".hidden.csv": "ignored"}
+    (problem,) = problems_of(write_folder(tmp_path / "job", parts))
+    assert (problem.file, problem.row, problem.column) == (name, None, None)
+    assert words in problem.expected
+
+
+def test_sheets_that_do_not_belong(tmp_path):
+    parts = job_parts()
+    parts.tables |= {"Sheet1": [["x"]], "deadwood": [["name"]], "# notes": [["kept"]]}
+    problems = problems_of(write_book(tmp_path / "job.xlsx", parts))
+    assert places(problems) == [("job.xlsx", None, None), ("sheet deadwood", None, None)]
+    assert "unknown sheet 'Sheet1'" in problems[0].expected
+
+
+def test_all_problems_of_a_run_come_together(tmp_path):
+    parts = full_parts(settings={"tank.id": "../../x", "table.step_m": 0})
+    parts.tables["points"][3][1] = "1,25"
+    parts.tables["points"][5][2] = "NaN"
+    parts.tables["courses"][2][2] = -8.0
+    parts.tables["uncertainty"][1][2] = "m"
+    parts.extra_files["deadwood.csv"] = "name\n"
+    problems = problems_of(write_folder(tmp_path / "job", parts))
+    assert sorted(places(problems), key=str) == sorted(
+        [
+            settings_place("folder", parts, "tank.id"),
+            settings_place("folder", parts, "table.step_m"),
+            ("points.csv", 4, "x_m"),
+            ("points.csv", 6, "y_m"),
+            ("courses.csv", 3, "thickness_mm"),
+            ("uncertainty.csv", 2, "unit"),
+            ("deadwood.csv", None, None),
+        ],
+        key=str,
+    )
+
+
+def test_a_long_list_of_problems_is_cut_and_counted(tmp_path):
+    parts = job_parts()
+    for row in parts.tables["points"][1:]:
+        row[1] = "x"
+    problems = problems_of(write_folder(tmp_path / "job", parts))
+    assert len(problems) == 51
+    assert problems[-1].expected == "and 70 more problems; mend these first"  # of 120
+
+
+@pytest.mark.parametrize("name", ["", "nowhere", "nul\0l", "job.xlsx", "job.xls"])
+def test_a_path_that_is_no_job(tmp_path, name):
+    (tmp_path / "job.xls").write_bytes(b"x")
+    (problem,) = problems_of(tmp_path / name if name else tmp_path)[:1]
+    assert problem.expected
+
+
+# What is handed in may be anything: a job, or an InputError of one-line problems.
+
+NASTY_TEXT = st.sampled_from(
+    ["", " ", "nan", "-inf", "1,25", "1_000", "=1+1", "../..", "é\u2028x", "a\nb", "'", '"', "#N/A"]
+    + ["1e999", "0", "-1", "2024-13-01", "\u202egnp", "[tank]", "\ud7ff", "#"]
+)
+NASTY = st.one_of(
+    NASTY_TEXT,
+    st.text(max_size=10),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.integers(-(10**20), 10**20),
+    st.booleans(),
+    st.none(),
+)
+QUICK = settings(
+    max_examples=150,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+
+
+def assert_job_or_problems(path):
+    job, problems = None, ()
+    try:
+        job = load(path)
+    except InputError as error:
+        problems = error.problems
+    if job is not None:
+        assert np.all(np.isfinite(job.points.xyz_m))
+        return
+    assert problems
+    for problem in problems:
+        assert len(str(problem).splitlines()) == 1
+        assert problem.file
+        assert problem.expected
+
+
+@st.composite
+def spoilt_parts(draw):
+    """A small job with one to four things changed to anything."""
+    parts = full_parts(points_per_ring=10)
+    for _ in range(draw(st.integers(1, 4))):
+        name = draw(st.sampled_from(["settings", *parts.tables]))
+        if name == "settings":
+            key = draw(st.sampled_from([*parts.settings, "tank.owner", "roof.x", "a.b.c", "x"]))
+            parts.settings[key] = draw(NASTY)
+            continue
+        rows = parts.tables[name]
+        row = rows[draw(st.integers(0, min(len(rows) - 1, 12)))]
+        column = draw(st.integers(0, len(row)))
+        if column < len(row):
+            row[column] = draw(NASTY)
+        else:
+            row.append(draw(NASTY))
+    return parts
+
+
+@QUICK
+@given(spoilt_parts())
+def test_any_cell_in_a_folder(parts):
+    with tempfile.TemporaryDirectory() as place:
+        assert_job_or_problems(write_folder(Path(place) / "job", parts))
+
+
+@settings(QUICK, max_examples=60)
+@given(spoilt_parts(), st.booleans())
+def test_any_cell_in_a_workbook(parts, with_date):
+    if with_date:
+        parts.tables["points"][2][2] = datetime.date(2024, 5, 31).isoformat()
+    with tempfile.TemporaryDirectory() as place:
+        assert_job_or_problems(write_book(Path(place) / "job.xlsx", parts))
+
+
+@st.composite
+def byte_changes(draw):
+    """A function that changes some bytes: cut, insert, overwrite, double."""
+    place, length = draw(st.floats(0, 1)), draw(st.integers(0, 40))
+    put = draw(st.one_of(st.binary(max_size=8), st.sampled_from(BITS)))
+    repeat = draw(st.sampled_from([1, 1, 1, 50]))
+
+    def change(data):
+        start = int(place * len(data))
+        return data[:start] + put * repeat + data[start + length :]
+
+    return change
+
+
+BITS = [b"\0", b'"', b"\n", b"\r", b"\xff", b",", b";", b"[", b"]", b"=", b"nan", b"\xef\xbb\xbf"]
+BITS += [b"<", b">", b"<c/>", b' r="-1"', b"&#0;", b"<f/>", b"{", b"'''", b"#", b"\xe2\x80\xa8"]
+
+
+@QUICK
+@given(
+    st.sampled_from(["job.toml", "points.csv", "courses.csv", "uncertainty.csv", "points_cov.npz"]),
+    byte_changes(),
+)
+def test_any_bytes_in_a_folder(name, change):
+    parts = full_parts(points_per_ring=10)
+    if name == "points_cov.npz":
+        parts = job_parts(points_per_ring=10)
+        parts.covariance_m2 = np.eye(3 * 50) * 4e-6
+    with tempfile.TemporaryDirectory() as place:
+        folder = write_folder(Path(place) / "job", parts)
+        (folder / name).write_bytes(change((folder / name).read_bytes()))
+        assert_job_or_problems(folder)
+
+
+def workbook_bytes():
+    with tempfile.TemporaryDirectory() as place:
+        parts = full_parts(points_per_ring=10)
+        return write_book(Path(place) / "job.xlsx", parts).read_bytes()
+
+
+WORKBOOK = workbook_bytes()
+
+
+def load_bytes(data):
+    with tempfile.TemporaryDirectory() as place:
+        path = Path(place) / "job.xlsx"
+        path.write_bytes(data)
+        assert_job_or_problems(path)
+
+
+@settings(QUICK, max_examples=60)
+@given(byte_changes())
+def test_any_bytes_of_a_workbook(change):
+    load_bytes(change(WORKBOOK))
+
+
+MEMBERS = ["[Content_Types].xml", "xl/workbook.xml", "xl/_rels/workbook.xml.rels"]
+MEMBERS += ["xl/worksheets/sheet1.xml", "xl/worksheets/sheet2.xml", "xl/styles.xml"]
+MEMBERS += ["xl/sharedStrings.xml"]
+
+
+@settings(QUICK, max_examples=120)
+@given(st.sampled_from(MEMBERS), byte_changes())
+def test_any_bytes_inside_a_workbook(name, change):
+    packed = io.BytesIO()
+    with (
+        zipfile.ZipFile(io.BytesIO(WORKBOOK)) as old,
+        zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as new,
+    ):
+        for member in old.namelist():
+            data = old.read(member)
+            new.writestr(member, change(data) if member == name else data)
+    load_bytes(packed.getvalue())
+
+
+def test_the_unspoilt_jobs_of_these_tests_are_sound(tmp_path):
+    load_bytes(WORKBOOK)
+    assert isinstance(load(write_folder(tmp_path / "job", full_parts())), Job)
+    assert isinstance(full_parts(), Parts)
