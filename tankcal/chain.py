@@ -9,7 +9,7 @@ import scipy.sparse
 from tankcal.capacity import Capacity, Propagation, table_heights
 from tankcal.errors import InputError, Problem
 from tankcal.job import Job
-from tankcal.outlines import Components, estimate_components, evenly_spread, polar
+from tankcal.outlines import FULL_TURN, Components, estimate_components, evenly_spread, polar
 from tankcal.sections import (
     Section,
     fit_circle,
@@ -24,7 +24,8 @@ from tankcal.uncertainty import factor_of
 from tankcal.volumes import ShellVolume, course_shape, feature_jacobian
 
 LEAST_NOISE_M = 1e-6  # perfect points would have no covariance at all
-FEWEST_POINTS = 5
+FEWEST_POINTS, ADVISED_POINTS = 5, 10  # of a section
+WIDE_GAP_DEG = 45
 
 
 @dataclass(frozen=True)
@@ -63,13 +64,15 @@ class Result:
     def capacity(self):
         """The capacity table: height_m, volume_m3, u_m3, k, U_m3."""
         table = self.table
-        return pd.DataFrame({
-            "height_m": table.height_m,
-            "volume_m3": table.volume_m3,
-            "u_m3": table.u_m3,
-            "k": table.k,
-            "U_m3": table.U_m3,
-        })
+        return pd.DataFrame(
+            {
+                "height_m": table.height_m,
+                "volume_m3": table.volume_m3,
+                "u_m3": table.u_m3,
+                "k": table.k,
+                "U_m3": table.U_m3,
+            }
+        )
 
     def at(self, height_m):
         """Volume at a dip, with its uncertainty (`capacity.Quantity`); HeightError outside."""
@@ -107,7 +110,7 @@ def run(job, progress=None):
     tell("propagating the covariance to every row of the table")
     propagation = _propagation(job, volume, sections, covariance, noise)
     table = _table(job, propagation)
-    warnings = (*job.warnings, *_few_points(groups, job.courses, wall_of=len(wall)))
+    warnings = (*job.warnings, *_weak_sections(job, shell, wall, groups))
     return Result(
         job, shell, joints, wall, covariance, noise, sections, gross, propagation, table, warnings
     )
@@ -157,14 +160,12 @@ def shell_volume(courses, joints_m, sections, insets_m=None, scale=1.0):
 def _groups(job, shell, wall, joints):
     """Groups of indices into `wall`; raises InputError for courses and sections with too few."""
     points = job.points
-    xyz = points.xyz_m[wall]
-    height = xyz[:, 2] - job.datum.bottom_z_m
+    height = points.xyz_m[wall, 2] - job.datum.bottom_z_m
     names = [points.section[i] for i in wall]
     if all(names):
         groups = group_by_name(names, height, lambda z: course_of(z, joints))
     else:
-        axis = np.array(shell.axis_m) + np.outer(xyz[:, 2] - shell.z_m, shell.slope)
-        azimuth, _ = polar(xyz[:, :2] - axis, 0.0, 0.0)
+        azimuth = _azimuths(job, shell, wall)
         groups = group_by_height(height, azimuth, course_of(height, joints), joints)
     _refuse_weak(groups, job.courses, height)
     return groups
@@ -178,7 +179,7 @@ def _refuse_weak(groups, courses, height):
         if count < FEWEST_POINTS:
             problems.append(
                 f"section {group.name} has {count} points on the wall, expected at least "
-                f"{FEWEST_POINTS} (10 or more are advised)"
+                f"{FEWEST_POINTS} ({ADVISED_POINTS} or more are advised)"
             )
         if tall > 1.2 * courses[group.course].height_m:
             problems.append(
@@ -195,16 +196,28 @@ def _refuse_weak(groups, courses, height):
         raise InputError([Problem("points.csv", text) for text in problems])
 
 
-def _few_points(groups, courses, wall_of):
-    return [
-        Problem(
-            "points.csv",
-            f"section {group.name} (course {courses[group.course].name}) stands on "
-            f"{len(group.members)} of {wall_of} points of the wall: 10 or more are advised",
-        )
-        for group in groups
-        if len(group.members) < 10
-    ]
+def _weak_sections(job, shell, wall, groups):
+    """Warnings for sections with few points, or with a part of the turn that nobody measured."""
+    azimuth = _azimuths(job, shell, wall)
+    texts = []
+    for group in groups:
+        ordered = np.sort(azimuth[group.members])
+        gap = np.degrees(np.max(np.diff(ordered, append=ordered[0] + FULL_TURN)))
+        name = f"section {group.name} (course {job.courses[group.course].name})"
+        if len(ordered) < ADVISED_POINTS:
+            texts.append(
+                f"{name} stands on {len(ordered)} points, {ADVISED_POINTS} or more are advised"
+            )
+        if gap > WIDE_GAP_DEG:
+            texts.append(f"{name} has no point over {gap:.0f} deg of its turn: measure there")
+    return [Problem("points.csv", text) for text in texts]
+
+
+def _azimuths(job, shell, wall):
+    """Azimuths of the wall points about the axis at their own height."""
+    xyz = job.points.xyz_m[wall]
+    axis = np.array(shell.axis_m) + np.outer(xyz[:, 2] - shell.z_m, shell.slope)
+    return polar(xyz[:, :2] - axis, 0.0, 0.0)[0]
 
 
 def _covariance(job, shell, wall, groups):

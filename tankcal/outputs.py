@@ -81,18 +81,20 @@ def _swap(temporary, directory):
 def _write_tables(record, directory):
     """points.csv, sections.csv and capacity.csv: the record's tables for a spreadsheet."""
     reason = {row["point"]: row["reason"] for row in record["rejected"]}
-    points = pd.DataFrame([
-        {
-            **{key: row[key] for key in ("point", "x_m", "y_m", "z_m")},
-            **_sds_mm(row["cov_m2"]),
-            "course": row["course"],
-            "section": row["section"],
-            "residual_mm": None if row["residual_m"] is None else 1000 * row["residual_m"],
-            "used": "yes" if row["used"] else "no",
-            "reason": reason.get(row["point"], ""),
-        }
-        for row in record["points"]
-    ])
+    points = pd.DataFrame(
+        [
+            {
+                **{key: row[key] for key in ("point", "x_m", "y_m", "z_m")},
+                **_sds_mm(row["cov_m2"]),
+                "course": row["course"],
+                "section": row["section"],
+                "residual_mm": None if row["residual_m"] is None else 1000 * row["residual_m"],
+                "used": "yes" if row["used"] else "no",
+                "reason": reason.get(row["point"], ""),
+            }
+            for row in record["points"]
+        ]
+    )
     sections = pd.DataFrame(record["sections"]).drop(
         columns=["points", "azimuth_deg", "residual_m", "outline", "modes"]
     )

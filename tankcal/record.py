@@ -19,34 +19,36 @@ DECLARABLE = ("scale", "datum", "plate_thickness", "paint", "shell_temperature",
 
 def record_of(result):
     """The record of a `chain.Result`: a dict of plain numbers, texts and lists."""
-    return _plain({
-        "format": FORMAT,
-        "tankcal": tankcal.__version__,
-        "versions": {
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-            "scipy": scipy.__version__,
-        },
-        "files": [asdict(file) for file in result.job.files],
-        "job": _job(result.job),
-        "shell": _shell(result),
-        "points": _points(result),
-        "rejected": _rejected(result),
-        "sections": [_section(result, section) for section in result.sections],
-        "courses": _courses(result),
-        "capacity": _capacity(result),
-        "gross": _gross(result),
-        "corrections": _corrections(result),
-        "budget": _budget(result),
-        "choices": _choices(result),
-        "warnings": [
-            {"file": w.file, "row": w.row, "column": w.column, "text": w.expected}
-            for w in result.warnings
-        ],
-        "adjustment": None,
-        "deliveries": None,
-        "monte_carlo": None,
-    })
+    return _plain(
+        {
+            "format": FORMAT,
+            "tankcal": tankcal.__version__,
+            "versions": {
+                "python": platform.python_version(),
+                "numpy": np.__version__,
+                "scipy": scipy.__version__,
+            },
+            "files": [asdict(file) for file in result.job.files],
+            "job": _job(result.job),
+            "shell": _shell(result),
+            "points": _points(result),
+            "rejected": _rejected(result),
+            "sections": [_section(result, section) for section in result.sections],
+            "courses": _courses(result),
+            "capacity": _capacity(result),
+            "gross": _gross(result),
+            "corrections": _corrections(result),
+            "budget": _budget(result),
+            "choices": _choices(result),
+            "warnings": [
+                {"file": w.file, "row": w.row, "column": w.column, "text": w.expected}
+                for w in result.warnings
+            ],
+            "adjustment": None,
+            "deliveries": None,
+            "monte_carlo": None,
+        }
+    )
 
 
 def save(record, path):
@@ -107,22 +109,22 @@ def _points(result):
     job, shell = result.job, result.shell
     place = {}
     for section in result.sections:
-        for member, residual in zip(
-            section.group.members, section.circle.residuals_m, strict=True
-        ):
+        for member, residual in zip(section.group.members, section.circle.residuals_m, strict=True):
             place[result.wall[member]] = (section.group, residual, member)
     rows = []
     for index, name in enumerate(job.points.names):
         group, residual, member = place.get(index, (None, None, None))
-        rows.append({
-            "point": name,
-            **_coordinates(job.points.xyz_m[index]),
-            "cov_m2": None if group is None else _covariance_of(result, member),
-            "course": job.courses[group.course].name if group else None,
-            "section": group.name if group else None,
-            "residual_m": residual,
-            "used": shell.reason[index] == "",
-        })
+        rows.append(
+            {
+                "point": name,
+                **_coordinates(job.points.xyz_m[index]),
+                "cov_m2": None if group is None else _covariance_of(result, member),
+                "course": job.courses[group.course].name if group else None,
+                "section": group.name if group else None,
+                "residual_m": residual,
+                "used": shell.reason[index] == "",
+            }
+        )
     return rows
 
 
@@ -211,24 +213,26 @@ def _courses(result):
             bottom + shape.bottom_m <= job.points.xyz_m[i, 2] < bottom + shape.top_m
             for i in rejected
         ]
-        rows.append({
-            "course": course.name,
-            "bottom_m": shape.bottom_m,
-            "top_m": shape.top_m,
-            "height_m": course.height_m,
-            "thickness_m": course.thickness_m,
-            "paint_m": course.paint_m,
-            "sections": [section.group.name for section in own],
-            "points": sum(len(section.group.members) for section in own),
-            "rejected": sum(in_course),
-            "radius_m": np.mean([section.circle.radius_m for section in own]),
-            "radius_sd_m": _mean_radius_sd(own),
-            "inside_radius_m": np.sqrt(volume / height / np.pi),
-            "area_m2": volume / height,
-            "area_sd_m2": u / height,
-            "volume_m3": volume,
-            "u_m3": u,
-        })
+        rows.append(
+            {
+                "course": course.name,
+                "bottom_m": shape.bottom_m,
+                "top_m": shape.top_m,
+                "height_m": course.height_m,
+                "thickness_m": course.thickness_m,
+                "paint_m": course.paint_m,
+                "sections": [section.group.name for section in own],
+                "points": sum(len(section.group.members) for section in own),
+                "rejected": sum(in_course),
+                "radius_m": np.mean([section.circle.radius_m for section in own]),
+                "radius_sd_m": _mean_radius_sd(own),
+                "inside_radius_m": np.sqrt(volume / height / np.pi),
+                "area_m2": volume / height,
+                "area_sd_m2": u / height,
+                "volume_m3": volume,
+                "u_m3": u,
+            }
+        )
     return rows
 
 
@@ -340,19 +344,21 @@ def _budget(result):
         contribution = float(np.sqrt(np.sum(source.columns_m3[-1] ** 2)))
         declared = source.u is not None
         known = declared and source.u > 0
-        rows.append({
-            "input": source.kind,
-            "kind": source.kind,
-            "u": source.u,
-            "unit": source.unit,
-            "type": source.type,
-            "distribution": source.distribution,
-            "dof": source.dof,
-            "sensitivity": float(source.columns_m3[-1, 0]) / source.u if known else None,
-            "sensitivity_unit": _sensitivity_unit(source.unit) if declared else None,
-            "contribution_m3": contribution,
-            "share": contribution**2 / total if total > 0 else 0.0,
-        })
+        rows.append(
+            {
+                "input": source.kind,
+                "kind": source.kind,
+                "u": source.u,
+                "unit": source.unit,
+                "type": source.type,
+                "distribution": source.distribution,
+                "dof": source.dof,
+                "sensitivity": float(source.columns_m3[-1, 0]) / source.u if known else None,
+                "sensitivity_unit": _sensitivity_unit(source.unit) if declared else None,
+                "contribution_m3": contribution,
+                "share": contribution**2 / total if total > 0 else 0.0,
+            }
+        )
     return rows
 
 

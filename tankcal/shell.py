@@ -18,6 +18,7 @@ WIDE_BAND, WALL_BAND = 0.03, 0.01  # of the nominal radius: start, and largest b
 END_TOLERANCE_M = 0.020  # a point this far above or below the shell still belongs to its edge
 SAMPLES = 1000  # three-point circles tried; with half the points clutter one in eight is sound
 MODES = 24  # highest mode of the form that the snooping allows for
+LEAST_PART = 0.5  # of the points between bottom and top that the wall must hold
 LEAST_NOISE_M = 1e-4  # a sound point is never rejected for less than a third of a millimetre
 
 
@@ -68,7 +69,8 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, snooping=True):
     """Tell the wall from the clutter and find the axis of the shell.
 
     xyz_m (n, 3); joints_m (courses + 1,) heights of the course joints in the same frame.
-    Raises SolutionError when no cylinder near the nominal radius holds a third of the points.
+    Raises SolutionError when no cylinder near the nominal radius holds half of the points between
+    the bottom and the top.
     """
     xyz_m = np.asarray(xyz_m, dtype=float)
     n = len(xyz_m)
@@ -86,12 +88,21 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, snooping=True):
     reason[candidates & ~wall] = "consensus"
     wall, axis, cofactor, w, noise = _snoop(local, course, wall, axis, snooping)
     reason[(reason == "") & ~wall] = "snooping"
+    if wall.sum() < LEAST_PART * candidates.sum():
+        raise SolutionError(
+            f"only {wall.sum()} of {candidates.sum()} points between bottom and top lie on one wall: "
+            "no shell can be told from its surroundings; check nominal_diameter_m and the points"
+        )
 
     distance = _from_axis(local, axis)[1]
-    radii = np.array([
-        distance[wall & (course == c)].mean() if np.any(wall & (course == c)) else nominal_radius_m
-        for c in range(len(joints_m) - 1)
-    ])
+    radii = np.array(
+        [
+            distance[wall & (course == c)].mean()
+            if np.any(wall & (course == c))
+            else nominal_radius_m
+            for c in range(len(joints_m) - 1)
+        ]
+    )
     return Shell(
         axis_m=(float(axis[0] + origin[0]), float(axis[1] + origin[1])),
         z_m=float(origin[2]),
@@ -127,10 +138,10 @@ def _consensus_circle(xy, nominal_radius):
         for x, y, r in circles[near]
     ]
     best = max(support, default=0.0)
-    if best < 1 / 3:
+    if best < LEAST_PART:
         raise SolutionError(
             f"no circle within {WIDE_BAND:.0%} of the nominal radius {nominal_radius:.3f} m holds "
-            f"a third of the points (best {best:.0%}): check nominal_diameter_m, units and axes"
+            f"half of the points (best {best:.0%}): check nominal_diameter_m, units and axes"
         )
     return circles[near][int(np.argmax(support))]
 
@@ -259,4 +270,3 @@ def _from_axis(local, axis):
     """Horizontal offsets (n, 2) and distances (n,) from the axis at each point's own height."""
     offset = local[:, :2] - axis[:2] - local[:, 2:] * axis[2:4]
     return offset, np.hypot(offset[:, 0], offset[:, 1])
-

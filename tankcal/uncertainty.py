@@ -6,7 +6,7 @@ Sources: JCGM 100:2008 (GUM) 5.1, 5.2, G.4, 7.2.6.
 from math import floor, log10
 
 import numpy as np
-import scipy.stats
+from scipy.special import ndtri, stdtrit
 
 
 def factor_of(covariance):
@@ -41,9 +41,7 @@ def coverage_factor(probability, dof):
     dof = np.asarray(dof, dtype=float)
     upper = (1 + probability) / 2
     finite = np.where(np.isfinite(dof), dof, 1.0)
-    return np.where(
-        np.isfinite(dof), scipy.stats.t.ppf(upper, finite), scipy.stats.norm.ppf(upper)
-    )
+    return np.where(np.isfinite(dof), stdtrit(finite, upper), ndtri(upper))
 
 
 def decimals_for(u, significant=2):

@@ -81,7 +81,10 @@ def test_the_order_of_observations_changes_nothing():
     rng = np.random.default_rng(4)
     l, sd = rng.normal(10, 1, 6), rng.uniform(0.1, 1, 6)
     order = rng.permutation(6)
-    one, other = adjust(mean_model, [0], l, sd**2), adjust(mean_model, [0], l[order], sd[order] ** 2)
+    one, other = (
+        adjust(mean_model, [0], l, sd**2),
+        adjust(mean_model, [0], l[order], sd[order] ** 2),
+    )
     assert one.unknowns == pytest.approx(other.unknowns, rel=1e-14)
     assert one.residuals[order] == pytest.approx(other.residuals, abs=1e-14)
 
@@ -107,7 +110,9 @@ def test_badly_scaled_columns_are_no_rank_defect():
     r = np.linspace(1, 60, 50)
     design = np.column_stack([r**3, r**5, r**7])
     truth = np.array([2e-8, -1e-12, 4e-17])
-    found = adjust(lambda x, l: (design @ x - l, design, None), np.zeros(3), design @ truth, r * 0 + 1)
+    found = adjust(
+        lambda x, l: (design @ x - l, design, None), np.zeros(3), design @ truth, r * 0 + 1
+    )
     assert found.unknowns == pytest.approx(truth, rel=1e-9)
 
 

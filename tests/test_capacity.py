@@ -51,8 +51,11 @@ def test_a_table_without_uncertainty_has_none():
 
 def test_a_delivery_cancels_what_both_dips_share():
     shared = Capacity(
-        HEIGHTS, 130 * HEIGHTS, np.full(11, 130.0),
-        (Source("datum", np.full((11, 1), 0.5)),), 0.95,
+        HEIGHTS,
+        130 * HEIGHTS,
+        np.full(11, 130.0),
+        (Source("datum", np.full((11, 1), 0.5)),),
+        0.95,
     )
     assert shared.delivery(2.0, 7.0).u_m3 == pytest.approx(0.0, abs=1e-15)
     assert shared.delivery(2.0, 7.0).value_m3 == pytest.approx(650.0)
@@ -73,7 +76,12 @@ def test_heights_outside_are_errors(height):
 
 @pytest.mark.parametrize(
     ("step", "top", "rows", "last"),
-    [(0.01, 9.5, 951, 9.5), (0.01, 9.4999, 951, 9.4999), (0.3, 1.0, 5, 1.0), (0.001, 12.0, 12001, 12)],
+    [
+        (0.01, 9.5, 951, 9.5),
+        (0.01, 9.4999, 951, 9.4999),
+        (0.3, 1.0, 5, 1.0),
+        (0.001, 12.0, 12001, 12),
+    ],
 )
 def test_rows_go_to_the_very_top(step, top, rows, last):
     heights = table_heights(step, top)
@@ -96,8 +104,13 @@ def propagation(inset=0.008, temperature=12.0, expansion=1.1e-5, stretch=1.0):
     scale = 1 + expansion * temperature
     course = course_shape(0, 9.5, [4.0], [outline], inset_m=inset, scale=scale)
     return Propagation(
-        ShellVolume((course,)), np.zeros((1, 0)), np.inf, np.zeros((1, 0)),
-        tuple(Declared(name) for name in ("scale", "datum")), scale, expansion,
+        ShellVolume((course,)),
+        np.zeros((1, 0)),
+        np.inf,
+        np.zeros((1, 0)),
+        tuple(Declared(name) for name in ("scale", "datum")),
+        scale,
+        expansion,
     )
 
 
@@ -124,9 +137,7 @@ def test_derivatives_by_scale_and_datum_closed_form():
     volume, area = found.volume.volume_m3([4.0])[0], found.volume.area_m2([4.0])[0]
     assert found.derivative("scale", [4.0])[0] == pytest.approx(2 * volume)
     assert found.derivative("datum", [4.0])[0] == pytest.approx(area)
-    by_difference = (
-        propagation(0.0, stretch=1 + 1e-6).volume.volume_m3([4.0])[0] - volume
-    ) / 1e-6
+    by_difference = (propagation(0.0, stretch=1 + 1e-6).volume.volume_m3([4.0])[0] - volume) / 1e-6
     assert found.derivative("scale", [4.0])[0] == pytest.approx(by_difference, rel=1e-5)
 
 

@@ -38,9 +38,19 @@ def test_two_rings_in_a_course_make_two_sections_and_a_frustum_is_exact(tmp_path
     found = result_of(tmp_path, radius=lambda theta, z: 6.5 + 0.004 * z, rings=2)
     assert len(found.sections) == 10
     low, high, inset = 6.5, 6.5 + 0.004 * 9.5, 0.008
-    exact = np.pi * 9.5 * sum(a * b for a, b in (
-        (low - inset, low - inset), (low - inset, high - inset), (high - inset, high - inset)
-    )) / 3  # closed form
+    exact = (
+        np.pi
+        * 9.5
+        * sum(
+            a * b
+            for a, b in (
+                (low - inset, low - inset),
+                (low - inset, high - inset),
+                (high - inset, high - inset),
+            )
+        )
+        / 3
+    )  # closed form
     assert found.capacity.volume_m3.iloc[-1] == pytest.approx(exact, rel=1e-6)
 
 
@@ -55,9 +65,7 @@ def test_tilt_enters_once(tmp_path):
     def cut(theta, z):
         return 6.5 * longer / np.hypot(np.sin(theta), longer * np.cos(theta))
 
-    found = result_of(
-        tmp_path, tilt=(0.03, 0.0), radius=cut, settings={"survey.side": "inside"}
-    )
+    found = result_of(tmp_path, tilt=(0.03, 0.0), radius=cut, settings={"survey.side": "inside"})
     assert found.volume.height_m == pytest.approx(9.5 / longer, rel=1e-9)
     assert found.volume.volume_m3([9.5 / longer])[0] == pytest.approx(
         np.pi * 6.5**2 * 9.5, rel=1e-6
@@ -138,9 +146,7 @@ def test_the_noise_is_estimated_when_no_covariance_is_given(tmp_path):
 def test_a_posteriori_scaling_mends_wrong_sds(tmp_path):
     options = {"noise_mm": 3.0, "sd_mm": 1.0, "points_per_ring": 72}
     prior = result_of(tmp_path / "a", **options)
-    posterior = result_of(
-        tmp_path / "b", **options, settings={"adjustment.scale": "a_posteriori"}
-    )
+    posterior = result_of(tmp_path / "b", **options, settings={"adjustment.scale": "a_posteriori"})
     assert posterior.table.u_m3[-1] / prior.table.u_m3[-1] == pytest.approx(3.0, rel=0.15)
 
 

@@ -39,7 +39,9 @@ def real_job(shared, tmp_path_factory):
         """
     )
     _write(folder / "points.csv", ["point", "x_m", "y_m", "z_m"], rows)
-    courses = [[i + 1, f"{top - low:.3f}", 0] for i, (low, top) in enumerate(zip(joints, joints[1:]))]
+    courses = [
+        [i + 1, f"{top - low:.3f}", 0] for i, (low, top) in enumerate(zip(joints, joints[1:]))
+    ]
     _write(folder / "courses.csv", ["course", "height_m", "thickness_mm"], courses)
     return folder
 

@@ -63,7 +63,9 @@ def test_shares_of_the_budget_add_up_to_one(record):
     assert datum["contribution_m3"] == pytest.approx(
         record["capacity"]["area_m2"][-1] * 0.004, rel=1e-12
     )
-    assert datum["sensitivity"] == pytest.approx(record["capacity"]["area_m2"][-1] / 1000, rel=1e-12)
+    assert datum["sensitivity"] == pytest.approx(
+        record["capacity"]["area_m2"][-1] / 1000, rel=1e-12
+    )
     assert datum["sensitivity_unit"] == "m3/mm"
 
 

@@ -122,8 +122,10 @@ def test_area_of_300_random_shapes_closed_form(jitter, limit_ppm, figure):
         errors.append(section.outline.area_m2() / area - 1)
     ppm = 1e6 * np.array(errors)
     rms = np.sqrt(np.mean(ppm**2))
-    figure(f"area of 300 shapes, jitter {jitter:.0%}, rms and worst in ppm",
-           f"{rms:.3f}, {np.abs(ppm).max():.3f}")
+    figure(
+        f"area of 300 shapes, jitter {jitter:.0%}, rms and worst in ppm",
+        f"{rms:.3f}, {np.abs(ppm).max():.3f}",
+    )
     assert rms < limit_ppm
 
 
@@ -164,7 +166,9 @@ def test_points_without_section_numbers_are_grouped_by_height():
     course = np.searchsorted(joints[1:-1], height)
     groups = group_by_height(height, azimuth, course, joints)
     assert [(g.name, g.course, len(g.members)) for g in groups] == [
-        ("1.1", 0, 12), ("1.2", 0, 12), ("2", 1, 12),
+        ("1.1", 0, 12),
+        ("1.2", 0, 12),
+        ("2", 1, 12),
     ]
     assert groups[0].height_m == pytest.approx(0.41)
 

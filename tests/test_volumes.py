@@ -56,7 +56,9 @@ def test_plate_and_temperature_are_exact_for_a_cylinder():
 
 def test_the_loss_by_plate_is_the_derivative_by_the_inset():
     def volume(inset):
-        shape = shell([0, 9.5], [[2.0, 7.5]], lambda z: 6.5 + 0.01 * z, inset_m=inset[0], scale=1.01)
+        shape = shell(
+            [0, 9.5], [[2.0, 7.5]], lambda z: 6.5 + 0.01 * z, inset_m=inset[0], scale=1.01
+        )
         return shape.volume_m3([1.0, 9.5])
 
     stack = shell([0, 9.5], [[2.0, 7.5]], lambda z: 6.5 + 0.01 * z, inset_m=0.008, scale=1.01)
@@ -114,11 +116,14 @@ def test_a_mesh_lofted_from_the_outlines_second_method():
     course = course_shape(0.0, 1.9, [0.0, 1.9], outlines)
     n = 7200
     azimuth = np.arange(n) * 2 * np.pi / n
-    rings = [ring(o.radius_m(azimuth), azimuth, z=z) for o, z in zip(outlines, (0, 1.9), strict=True)]
+    rings = [
+        ring(o.radius_m(azimuth), azimuth, z=z) for o, z in zip(outlines, (0, 1.9), strict=True)
+    ]
     i, j = np.arange(n), (np.arange(n) + 1) % n
     side = np.vstack([np.column_stack([i, i + n, j]), np.column_stack([j, i + n, j + n])])
-    caps = np.vstack([np.column_stack([i, j, 0 * i + 2 * n]),
-                      np.column_stack([j + n, i + n, 0 * i + 2 * n + 1])])
+    caps = np.vstack(
+        [np.column_stack([i, j, 0 * i + 2 * n]), np.column_stack([j + n, i + n, 0 * i + 2 * n + 1])]
+    )
     vertices = np.vstack([*rings, [[0, 0, 0], [0, 0, 1.9]]])
     mesh = trimesh.Trimesh(vertices, np.vstack([side, caps]), process=False)
     assert mesh.is_watertight

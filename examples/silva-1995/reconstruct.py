@@ -26,11 +26,16 @@ ROUNDING_M = 0.0005  # residuals are printed to a millimetre
 def main():
     """Write points.csv beside this script."""
     rng = np.random.default_rng(SEED)
-    circles, residuals = _rows("published/table11_circles.csv"), _rows("published/table11_residuals.csv")
+    circles, residuals = (
+        _rows("published/table11_circles.csv"),
+        _rows("published/table11_residuals.csv"),
+    )
     lines = []
     for number, (circle, height) in enumerate(zip(circles, SECTION_HEIGHTS_M, strict=True), 1):
         seen = [row for row in residuals if row[f"s{number}_m"]]
-        azimuth = np.radians([15 * (int(row["generatrix"]) - 1) + FIRST_AZIMUTH_DEG for row in seen])
+        azimuth = np.radians(
+            [15 * (int(row["generatrix"]) - 1) + FIRST_AZIMUTH_DEG for row in seen]
+        )
         size = np.array([float(row[f"s{number}_m"]) for row in seen])
         residual = signed_residuals(size, azimuth, rng)
         radius = np.sqrt(float(circle["area_m2"]) / np.pi) + residual

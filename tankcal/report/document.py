@@ -1,0 +1,124 @@
+"""From an executed notebook to the list of its blocks, whatever the paper is."""
+
+import base64
+
+from tankcal.errors import TankcalError
+from tankcal.report import blocks
+from tankcal.report.markdown import nodes
+
+PARTS = ("certificate", "working-papers")
+
+
+def blocks_of(notebook, part="", name="notebook"):
+    """The blocks of the notebook, in order, as data; the first one is its `document`.
+
+    part   "" for everything, else the cells of that part: those tagged with it, and the untagged
+           cells that follow them
+    name   title of a notebook that has no document block of its own
+
+    Raises TankcalError for an unknown or empty part and for a cell that ended in an error.
+    """
+    if part not in ("", *PARTS):
+        raise TankcalError(f"part {part!r} is not known; it is one of: {', '.join(PARTS)}")
+    found = []
+    for number, cell in _cells(notebook, part):
+        found += _blocks_of_cell(cell, f"cell {number}")
+    if part and not found:
+        raise TankcalError(f"the notebook has nothing to show that is tagged {part!r}")
+    if not found or found[0]["kind"] != "document":
+        found.insert(0, blocks.document(title=name).data)
+    return _headings_in_steps(found)
+
+
+def _headings_in_steps(found):
+    """The blocks with no level of heading left out: a reader's program builds a tree of them."""
+    level = 0
+
+    def stepped(item):
+        nonlocal level
+        if "level" not in item:
+            return item
+        level = min(item["level"], level + 1)
+        return item | {"level": level}
+
+    return [
+        block | {"nodes": [stepped(node) for node in block["nodes"]]}
+        if block["kind"] == "markdown"
+        else stepped(block)
+        for block in found
+    ]
+
+
+def _cells(notebook, part):
+    """(number, cell) of the cells that belong to `part`; a cell belongs with those before it."""
+    current = ""
+    for number, cell in enumerate(notebook.cells, 1):
+        tags = cell.metadata.get("tags", [])
+        current = next((tag for tag in tags if tag in PARTS), current)
+        if not part or current in ("", part):
+            yield number, cell
+
+
+def _blocks_of_cell(cell, place):
+    if cell.cell_type == "markdown":
+        return [{"kind": "markdown", "nodes": nodes(cell.source)}] if cell.source.strip() else []
+    if cell.cell_type != "code":
+        return []
+    shown = [_block_of_output(output, place) for output in cell.outputs]
+    return [block for block in shown if block]
+
+
+def _block_of_output(output, place):
+    if output.output_type == "error":
+        raise TankcalError(f"{place} of the notebook failed: {output.ename}: {output.evalue}")
+    if output.output_type == "stream":
+        if output.name == "stderr":  # remarks of libraries; they stay in the notebook
+            return None
+        return blocks.code(output.text.rstrip("\n")).data if output.text.strip() else None
+    data = output.get("data", {})
+    if blocks.MIME in data:
+        return _checked(data[blocks.MIME], place)
+    if "image/svg+xml" in data:
+        return _picture(data, "svg", data["image/svg+xml"])
+    if "image/png" in data:
+        return _picture(data, "png", data["image/png"])
+    if "text/plain" in data:
+        return blocks.code(data["text/plain"]).data
+    return None
+
+
+def _picture(data, kind, content):
+    """A picture that a cell shows without our helper: no caption, described by its text."""
+    if kind == "png":
+        content = base64.b64encode(base64.b64decode(content)).decode("ascii")
+    alt = data.get("text/plain", "picture")
+    return {"kind": "figure", kind: content, "caption": "", "alt": alt, "width": 1.0}
+
+
+_KEYS = {
+    "document": {"part", "title", "author", "date", "language", "notice", "running", "footer"},
+    "masthead": {"title", "subtitle", "laboratory", "number_label", "number"},
+    "heading": {"text", "level"},
+    "paragraph": {"text"},
+    "list": {"items"},
+    "notice": {"text"},
+    "result": {"label", "text", "note"},
+    "signature": {"labels"},
+    "end": {"text"},
+    "code": {"text"},
+    "key_values": {"caption", "items"},
+    "table": {"caption", "columns", "rows", "align"},
+    "columns_table": {"caption", "columns", "rows", "align", "across"},
+    "figure": {"caption", "alt", "width", "svg"},
+}
+
+
+def _checked(data, place):
+    """`data` when it is a block of this version; a notebook of a newer one is refused."""
+    kind = data.get("kind") if isinstance(data, dict) else None
+    if kind not in _KEYS:
+        raise TankcalError(f"{place} of the notebook shows a block of unknown kind: {kind!r}")
+    missing = sorted(_KEYS[kind] - set(data))
+    if missing:
+        raise TankcalError(f"{place} of the notebook: its {kind} lacks {', '.join(missing)}")
+    return data

@@ -1,0 +1,54 @@
+"""nbconvert exporters: `jupyter nbconvert --to tankcal-pdf report.ipynb`, and tankcal-html.
+
+They set an executed notebook without its input cells. `--PdfExporter.part=certificate` takes one
+part only.
+"""
+
+from nbconvert.exporters import Exporter
+from traitlets import Unicode, default
+
+from tankcal.report.document import blocks_of
+from tankcal.report.html import page
+from tankcal.report.pdf import pdf
+
+
+class _BlocksExporter(Exporter):
+    """What both exporters share: from the notebook to the blocks of the part that is wanted."""
+
+    part = Unicode(
+        "", help='Which part: "certificate", "working-papers", or "" for everything.'
+    ).tag(config=True)
+
+    def _blocks(self, notebook, resources):
+        name = (resources or {}).get("metadata", {}).get("name") or "notebook"
+        return blocks_of(notebook, self.part, name)
+
+
+class PdfExporter(_BlocksExporter):
+    """Notebook to PDF/A-3a, PDF/UA-1, by typst."""
+
+    export_from_notebook = "tankcal PDF"
+    output_mimetype = "application/pdf"
+
+    @default("file_extension")
+    def _file_extension_default(self):
+        return ".pdf"
+
+    def from_notebook_node(self, nb, resources=None, **kwargs):
+        notebook, resources = super().from_notebook_node(nb, resources, **kwargs)
+        return pdf(self._blocks(notebook, resources)), resources
+
+
+class HtmlExporter(_BlocksExporter):
+    """Notebook to one HTML page that needs no network and no script."""
+
+    export_from_notebook = "tankcal HTML"
+    output_mimetype = "text/html"
+
+    @default("file_extension")
+    def _file_extension_default(self):
+        return ".html"
+
+    def from_notebook_node(self, nb, resources=None, **kwargs):
+        notebook, resources = super().from_notebook_node(nb, resources, **kwargs)
+        return page(self._blocks(notebook, resources)), resources

@@ -1,0 +1,177 @@
+"""The command line as a user meets it: help, exit status, one line a problem, results untouched."""
+
+import subprocess
+import sys
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from job_builder import write_job
+
+import tankcal
+from tankcal.cli import main
+
+
+def test_help_shows_the_way_for_a_new_tank(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["--help"])
+    assert stop.value.code == 0
+    text = capsys.readouterr().out
+    for word in ("tankcal new", "tankcal run", "demo", "exit status", "job.xlsx"):
+        assert word in text
+
+
+def test_help_loads_nothing_heavy():
+    """The goal is 0.5 s (benchmarks); what would cost them is that numpy or pandas is imported."""
+    code = (
+        "import sys; from tankcal.cli import main\n"
+        "try: main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'scipy', 'pandas', 'matplotlib', 'openpyxl', 'nbformat'}\n"
+        "sys.exit(len(heavy & set(sys.modules)))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], stdout=subprocess.DEVNULL).returncode == 0
+
+
+def test_no_command_is_no_traceback(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([])
+    assert stop.value.code == 2
+    assert "usage" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("job", ["nowhere", "nowhere.xlsx", "\0", "x" * 5000])
+def test_a_job_that_is_not_there(job, capsys):
+    assert main(["run", job]) == 2
+    error = capsys.readouterr().err
+    assert "Traceback" not in error
+    assert "not found" in error or "name" in error
+
+
+def test_all_problems_at_once_and_nothing_written(tmp_path, capsys):
+    job = tmp_path / "job"
+    write_job(job, settings={"table.step_m": 0, "tank.id": "../../x"})
+    points = (job / "points.csv").read_text().splitlines()
+    cells = points[4].split(",")
+    points[4] = ",".join([cells[0], "nan", *cells[2:]])
+    (job / "points.csv").write_text("\n".join(points) + "\n")
+    before = sorted(path.name for path in job.iterdir())
+    assert main(["run", str(job)]) == 2
+    lines = [line for line in capsys.readouterr().err.splitlines() if "expected" in line]
+    assert any("points.csv, row 5" in line and "x_m" in line for line in lines)
+    assert any("table.step_m" in line for line in lines)
+    assert any("tank.id" in line for line in lines)
+    assert sorted(path.name for path in job.iterdir()) == before
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """A job that was run once, with all its outputs."""
+    job = tmp_path_factory.mktemp("cli") / "job"
+    write_job(job, settings={"table.step_m": 0.5})
+    assert main(["run", str(job), "--quiet"]) == 0
+    return job
+
+
+def test_a_run_writes_everything(done, capsys):
+    names = {path.name for path in (done / "results").iterdir()}
+    assert names == {
+        "record.json",
+        "points.csv",
+        "sections.csv",
+        "capacity.csv",
+        "capacity.xlsx",
+        "report.ipynb",
+        "certificate.pdf",
+        "working-papers.pdf",
+        "report.pdf",
+        "report.html",
+    }
+    assert not list(done.glob(".tankcal-*"))
+
+
+def test_earlier_results_stay_when_the_input_breaks(done, capsys):
+    before = (done / "results" / "record.json").read_bytes()
+    good = (done / "courses.csv").read_text()
+    try:
+        (done / "courses.csv").write_text(good.replace("1.9", "1,9"))
+        assert main(["run", str(done)]) == 2
+    finally:
+        (done / "courses.csv").write_text(good)
+    assert (done / "results" / "record.json").read_bytes() == before
+
+
+def test_earlier_results_are_replaced_by_a_good_run(done, capsys):
+    assert main(["run", str(done), "--quiet"]) == 0
+    assert "results in" in capsys.readouterr().out
+    assert [path.name for path in done.glob("*results*")] == ["results"]
+
+
+def test_a_folder_with_foreign_files_is_refused(done, tmp_path, capsys):
+    (tmp_path / "thesis.docx").write_text("mine")
+    assert main(["run", str(done), "--out", str(tmp_path), "--quiet"]) == 2
+    assert "thesis.docx" in capsys.readouterr().err
+    assert (tmp_path / "thesis.docx").read_text() == "mine"
+
+
+def test_a_failing_report_leaves_the_earlier_results(done, monkeypatch, capsys):
+    from tankcal import report
+    from tankcal.errors import TankcalError
+
+    def fail(*arguments):
+        raise TankcalError("the report stopped")
+
+    before = (done / "results" / "capacity.csv").read_bytes()
+    monkeypatch.setattr(report, "build", fail)
+    assert main(["run", str(done), "--quiet"]) == 1
+    assert (done / "results" / "capacity.csv").read_bytes() == before
+    assert not list(done.glob(".tankcal-*"))
+
+
+def test_a_survey_without_a_wall_exits_with_3(tmp_path, capsys):
+    write_job(tmp_path / "job", radius=lambda theta, z: 6.5 + 0.6 * (theta > 2) + 0.9 * (theta > 4))
+    assert main(["run", str(tmp_path / "job")]) == 3
+    assert "nominal" in capsys.readouterr().err
+
+
+def test_new_writes_a_job_and_refuses_a_full_folder(tmp_path, capsys):
+    assert main(["new", str(tmp_path / "mine")]) == 0
+    assert {"job.toml", "points.csv", "courses.csv", "job.xlsx"} <= {
+        path.name for path in (tmp_path / "mine").iterdir()
+    }
+    assert main(["new", str(tmp_path / "mine")]) == 2
+    assert main(["run", str(tmp_path / "mine")]) == 2
+    assert "job.toml" in capsys.readouterr().err
+
+
+coordinates = st.floats(-1e4, 1e4, allow_nan=False).map(lambda value: f"{value:.3f}")
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@given(
+    spoilt=st.lists(st.tuples(st.integers(1, 60), st.integers(1, 3), coordinates), max_size=40),
+    heights=st.lists(st.sampled_from(["1.9", "0.1", "3.0", "9.5"]), min_size=2, max_size=2),
+)
+def test_whatever_the_numbers_are_a_job_computes_or_says_why(tmp_path_factory, spoilt, heights):
+    """Property: the chain gives a table or raises one of our exceptions, never another."""
+    job = tmp_path_factory.mktemp("spoilt") / "job"
+    write_job(job, courses=2, height=3.8, points_per_ring=30, settings={"table.step_m": 0.5})
+    lines = (job / "points.csv").read_text().splitlines()
+    for row, column, value in spoilt:
+        cells = lines[row].split(",")
+        cells[column] = value
+        lines[row] = ",".join(cells)
+    (job / "points.csv").write_text("\n".join(lines) + "\n")
+    courses = (job / "courses.csv").read_text().splitlines()
+    for row, height in enumerate(heights, 1):
+        cells = courses[row].split(",")
+        courses[row] = ",".join([cells[0], height, *cells[2:]])
+    (job / "courses.csv").write_text("\n".join(courses) + "\n")
+    try:
+        table = tankcal.run(tankcal.load(job)).capacity
+    except tankcal.TankcalError as error:
+        assert str(error)
+        assert error.exit_status in (2, 3)
+    else:
+        assert (table.volume_m3.diff().dropna() > 0).all()
+        assert table.notna().all().all()
