@@ -71,7 +71,7 @@ def _check_step(step, height, raw, log):
 
 def check_courses(courses, values, log):
     """Course names once; plates of a credible thickness; heights that add up to the shell's."""
-    if not courses.rows:
+    if not courses.rows and not courses.skipped:
         log.problem(courses.file, "no rows; expected one row for each course, from the bottom up")
         return
     _refuse_repeated(courses, "course", log)
@@ -80,8 +80,8 @@ def check_courses(courses, values, log):
             expected = f"found {thickness:g}; expected millimetres, 0 or at least 1: in metres?"
             log.problem(courses.file, expected, row, "thickness_mm")
     heights, nominal = courses.of("height_m"), values["tank"]["nominal_height_m"]
-    if nominal is None or None in heights:
-        return
+    if nominal is None or None in heights or courses.skipped:
+        return  # a course that cannot be read is told already
     miss = sum(heights) - nominal
     allowed = max(HEIGHT_MISS_M, HEIGHT_MISS_RELATIVE * nominal)
     if abs(miss) > allowed * (1 + 1e-9):
@@ -106,7 +106,7 @@ def _refuse_repeated(table, column, log):
 
 def check_points(points, log):
     """Point names once, places once (a warning), credible and complete standard deviations."""
-    if not points.rows:
+    if not points.rows and not points.skipped:
         log.problem(points.file, "no rows; expected one row for each surveyed point")
         return
     _refuse_repeated(points, "point", log)
@@ -149,8 +149,10 @@ def check_geometry(points, courses, values, raw, log):
         same_unit = _check_extent(points, "x_m", width, "nominal_diameter_m", diameter, log)
     if height is not None and rise > UNIT_FACTOR * height:
         same_unit = _check_extent(points, "z_m", rise, "nominal_height_m", height, log)
-    heights = courses.of("height_m") if courses is not None else [None]
-    if not same_unit or bottom is None or None in heights:
+    heights = [None]
+    if courses is not None and not courses.skipped:
+        heights = courses.of("height_m")
+    if not same_unit or bottom is None or not heights or None in heights:
         return
     edges = bottom + np.concatenate([[0.0], np.cumsum(heights)])
     _check_points_in_courses(xyz[:, 2], unplaced, edges, courses, raw, log)

@@ -48,14 +48,14 @@ def read_folder(folder, log):
             settings, sections = read_toml(SETTINGS_FILE, data, log)
     else:
         log.problem(SETTINGS_FILE, "missing file; every job folder has one" + _hint(names))
-    separator, decimal = _csv_marks(settings or {}, log)
+    marks = _csv_marks(settings or {}, log)
     tables = {}
     for table in TABLES:
         name = f"{table}.csv"
         if name in names:
             data = content(name)
-            readable = data is not None
-            tables[table] = read_csv(name, data, separator, decimal, log) if readable else None
+            is_readable = data is not None and marks is not None
+            tables[table] = read_csv(name, data, *marks, log) if is_readable else None
     covariance = content(COVARIANCE_FILE) if COVARIANCE_FILE in names else None
     return RawJob(
         folder.resolve().name, SETTINGS_FILE, settings, sections, tables, covariance, tuple(files)
@@ -156,22 +156,25 @@ def _flatten(file, data, rows, log):
             elif section:
                 settings[section][key] = Value(value, rows.get(name))
             else:
-                expected = "stands before the first [section]; expected inside one, such as [tank]"
+                expected = "stands in no [section]; expected inside one, such as [tank]"
                 log.problem(file, expected, rows.get(name), name)
     return settings, sections
 
 
 def _csv_marks(settings, log):
-    """Separator and decimal mark; values that are not known are told by the settings' check."""
+    """(separator, decimal mark), or None when they cannot be used.
+
+    Marks that are not known are told by the check of the settings.
+    """
     given = {key: value.raw for key, value in settings.get("csv", {}).items()}
     separator, decimal = given.get("separator") or ",", given.get("decimal") or "."
     if separator not in SEPARATORS or decimal not in DECIMALS:
-        return ",", "."
+        return None
     if separator == decimal:
         row = next(iter(settings["csv"].values())).row
-        expected = "separator and decimal are both a comma; expected separator = ';'"
+        expected = "separator and decimal are both a comma; expected two marks, such as ; and ,"
         log.problem(SETTINGS_FILE, expected, row, "csv.separator")
-        return ";", decimal
+        return None
     return separator, decimal
 
 

@@ -120,7 +120,8 @@ def smooth_outline(xy_m, x_m, y_m, noise_m2, form_m2):
     shell's own spectrum allows, and the form that was not seen stays in the covariance. Modes 0 and
     1 (radius, centre) are free.
 
-    noise_m2  covariance of the measured radii, (n, n) or (n,); form_m2  number >= 0 (`estimate_components`).
+    noise_m2  covariance of the measured radii, (n, n) or (n,)
+    form_m2   amplitude of the form, >= 0 (`estimate_components`)
     Raises SolutionError when the points do not determine radius and centre.
     """
     azimuth, radius = polar(xy_m, x_m, y_m)

@@ -64,7 +64,7 @@ def refuse_foreign(directory):
 
 
 def _swap(temporary, directory):
-    """Put `temporary` in the place of `directory`; the old one goes only when the new one stands."""
+    """Put `temporary` in the place of `directory`; the old one goes last."""
     if not directory.exists():
         temporary.rename(directory)
         return

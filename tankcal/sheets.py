@@ -9,7 +9,6 @@ import io
 import re
 import warnings
 import zipfile
-import zlib
 from itertools import zip_longest
 
 from tankcal.tables import (
@@ -83,9 +82,7 @@ def _complaint(data):
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             return _archive_complaint(archive, len(data))
-    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError, ValueError):
-        return f"{_NOT_A_WORKBOOK}, or damaged"
-    except (EOFError, UnicodeError, KeyError, IndexError, OverflowError):
+    except Exception:  # zipfile and zlib raise whatever a damaged part happens to trip over
         return f"{_NOT_A_WORKBOOK}, or damaged"
 
 
@@ -215,7 +212,9 @@ def _known_sheets(file, cells, log):
         name = title.strip().lower()
         if _is_ignored(title):
             continue
-        if name in known:
+        if name in sheets:
+            log.problem(file, f"two sheets are called {shown(name)}; expected one")
+        elif name in known:
             sheets[name] = rows
         elif name in LATER_TABLES or name in ("cameras", "instruments"):
             log.problem(f"sheet {name}", "not available in this version of tankcal: remove it")
@@ -258,7 +257,8 @@ def _settings(table, log):
             continue  # a row that only names a section or carries a note
         if not isinstance(section, str) or not isinstance(key, str):
             expected = "a value without section or key; expected both, such as tank and id"
-            log.problem(table.file, expected, row, "section" if key else "key")
+            column = "key" if isinstance(section, str) else "section"
+            log.problem(table.file, expected, row, column)
             continue
         section = section.strip("[] ")
         known = settings.setdefault(section, {})

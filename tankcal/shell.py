@@ -90,8 +90,8 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, snooping=True):
     reason[(reason == "") & ~wall] = "snooping"
     if wall.sum() < LEAST_PART * candidates.sum():
         raise SolutionError(
-            f"only {wall.sum()} of {candidates.sum()} points between bottom and top lie on one wall: "
-            "no shell can be told from its surroundings; check nominal_diameter_m and the points"
+            f"only {wall.sum()} of {candidates.sum()} points between bottom and top lie on one "
+            "wall: no shell can be told from its surroundings; check nominal_diameter_m and points"
         )
 
     distance = _from_axis(local, axis)[1]

@@ -56,3 +56,16 @@ def decimals_for(u, significant=2):
     if decimals >= 0 and round(u, decimals) >= 10.0 ** (exponent + 1):  # 0.0996 -> 0.10
         decimals -= 1
     return max(decimals, 0)
+
+
+def row_decimals(uncertainties, least=0):
+    """Decimals of each row of a column, by its own uncertainty but never fewer than `least`.
+
+    A row without an uncertainty (0 or None: the empty tank) is written as the next one is, else as
+    the one before it.
+    """
+    decimals = [max(decimals_for(u), least) if u else None for u in uncertainties]
+    following = next((d for d in reversed(decimals) if d is not None), decimals_for(0.0))
+    for i in reversed(range(len(decimals))):
+        following = decimals[i] = following if decimals[i] is None else decimals[i]
+    return decimals

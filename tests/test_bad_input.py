@@ -307,6 +307,24 @@ def test_dip_point_needs_both_coordinates(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("settings", "column"),
+    [({"csv.separator": "|"}, "csv.separator"), ({"csv.decimal": ","}, "csv.separator")],
+)
+def test_csv_marks_that_cannot_be_used_hide_no_other_problem(tmp_path, settings, column):
+    parts = job_parts(settings={**settings, "table.step_m": 0})
+    problems = problems_of(write_folder(tmp_path / "job", parts))
+    assert {problem.column for problem in problems} == {"table.step_m", column}
+
+
+def test_decimal_commas_among_separators(tmp_path):
+    folder = write_folder(tmp_path / "job", job_parts())
+    (folder / "points.csv").write_text("point,x_m,y_m,z_m\nA,1,25,2,3\n")
+    (problem,) = problems_of(folder)
+    assert places([problem]) == [("points.csv", 2, None)]
+    assert "for decimal commas set [csv] separator" in problem.expected
+
+
+@pytest.mark.parametrize(
     ("name", "words"),
     [
         ("deadwood.csv", "not available in this version"),
@@ -527,3 +545,11 @@ def test_the_unspoilt_jobs_of_these_tests_are_sound(tmp_path):
     load_bytes(WORKBOOK)
     assert isinstance(load(write_folder(tmp_path / "job", full_parts())), Job)
     assert isinstance(full_parts(), Parts)
+
+
+def test_courses_without_rows_are_one_problem(tmp_path):
+    parts = job_parts()
+    parts.tables["courses"] = parts.tables["courses"][:1]
+    assert places(problems_of(write_folder(tmp_path / "job", parts))) == [
+        ("courses.csv", None, None)
+    ]

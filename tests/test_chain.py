@@ -55,10 +55,11 @@ def test_two_rings_in_a_course_make_two_sections_and_a_frustum_is_exact(tmp_path
 
 
 def test_tilt_enters_once(tmp_path):
-    """A cylinder of radius r and axis length 9.5 m holds pi r^2 9.5, however it leans (closed form).
+    """A cylinder of radius r and axis length 9.5 m holds pi r^2 9.5, however it leans.
 
     Its horizontal cut is an ellipse, sqrt(1 + m^2) longer along the tilt, and its height along the
-    vertical is less by the same factor. A factor forgotten or applied twice is 0.045 %.
+    vertical is less by the same factor (closed form). A factor forgotten or taken twice is
+    0.045 %.
     """
     longer = np.hypot(1, 0.03)
 

@@ -18,7 +18,7 @@ def test_a_rule_is_exact_up_to_degree_2n_minus_1(nodes):
 
 
 def test_gauss_levels_of_a_course():
-    """Published: methods of tank calibration, two levels at 0.2113 and 0.7887, three at 0.1127..."""
+    """Published: two levels at 0.2113 and 0.7887 of a course, three at 0.1127, 0.5, 0.8873."""
     assert panels([0, 1], 2)[0] == pytest.approx([0.2113, 0.7887], abs=5e-5)
     assert panels([0, 1], 3)[0] == pytest.approx([0.1127, 0.5, 0.8873], abs=5e-5)
 

@@ -1,6 +1,7 @@
 """A real vertical tank, surveyed from outside by total station (read in place, see its NOTE)."""
 
 import csv
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -39,9 +40,7 @@ def real_job(shared, tmp_path_factory):
         """
     )
     _write(folder / "points.csv", ["point", "x_m", "y_m", "z_m"], rows)
-    courses = [
-        [i + 1, f"{top - low:.3f}", 0] for i, (low, top) in enumerate(zip(joints, joints[1:]))
-    ]
+    courses = [[i + 1, f"{top - low:.3f}", 0] for i, (low, top) in enumerate(pairwise(joints))]
     _write(folder / "courses.csv", ["course", "height_m", "thickness_mm"], courses)
     return folder
 
@@ -76,7 +75,7 @@ def test_radii_and_their_sds(result, figure):
 def test_tilt_and_residuals(result, figure):
     """Independent: 1.86 mm/m towards -129.5 deg (219.5 deg clockwise from +y), residuals 9 mm.
 
-    That fit had no form; dents that deepen with height take part in its tilt, so 0.5 mm/m is allowed.
+    That fit had no form; dents that deepen with height take part in its tilt: 0.5 mm/m is allowed.
     """
     record = record_of(result)["shell"]
     tilt, azimuth = 1000 * record["tilt"], record["tilt_azimuth_deg"]
@@ -96,6 +95,6 @@ def test_stations_marks_and_clutter_are_rejected(result, figure):
 
 
 def test_the_vertical_dents_are_kept(result):
-    """At two generatrices the wall lies 20 to 40 mm inside over all its height: form, not clutter."""
+    """At two generatrices the wall lies 20 to 40 mm inside over its whole height: form."""
     deep = np.sum(result.shell.residual_m[result.shell.reason == ""] < -0.020)
     assert deep > 30

@@ -12,8 +12,9 @@ from tankcal.report import blocks
 from tankcal.report.html import block_html, decimal_fills
 from tankcal.report.latex_math import formula
 from tankcal.report.markdown import nodes
-from tankcal.report.numbers import fixed, row_decimals, significant, symbol, unit
+from tankcal.report.numbers import fixed, significant, symbol, unit
 from tankcal.report.paper import Column, Paper
+from tankcal.uncertainty import row_decimals
 from tankcal.words import load_words
 
 

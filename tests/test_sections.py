@@ -24,7 +24,7 @@ def table_11(shared):
 
 
 def test_sds_of_centre_and_radius_published_s_table_11(table_11):
-    """Generatrix 24 of section 3 is missing; at an azimuth of -22.5 deg it gives the printed sds."""
+    """Generatrix 24 of section 3 is missing; at -22.5 deg it gives the printed sds."""
     circles, residuals = table_11
     for number in range(5):
         seen = [row for row in residuals if row[f"s{number + 1}_m"]]

@@ -80,7 +80,7 @@ def test_settings_know_their_rows():
     [
         ("[tank]\nid = T-1\n", 2, "Invalid value"),
         ("[tank]\nid = 1\nid = 2\n", 3, "overwrite"),
-        ("id = 1\n", 1, "inside one, such as [tank]"),
+        ("id = 1\n", 1, "stands in no [section]"),
         ("x = " + "[" * 3000, None, "too deeply nested"),
         ("x = 1" + "0" * 5000, 1, "more than 4000 characters"),
     ],

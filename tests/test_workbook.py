@@ -95,11 +95,16 @@ def test_every_row_of_the_table_is_the_record(book, record):
     assert litres == pytest.approx([10 * area for area in record["capacity"]["area_m2"]], rel=SAME)
 
 
-def test_each_row_shows_two_digits_of_its_u(book, record):
-    for cell, u in zip(named(book, "capacity_volume"), record["capacity"]["u_m3"], strict=True):
-        if u > 0:
-            decimals = len(cell.number_format.partition(".")[2])
-            assert decimals == decimals_for(u)
+def test_each_row_shows_two_digits_of_its_U_and_keeps_its_litres(book, record):
+    columns = (named(book, "capacity_volume"), named(book, "capacity_U"))
+    for volume, expanded, U in zip(*columns, record["capacity"]["U_m3"], strict=True):
+        if U > 0:
+            assert _decimals(expanded) == decimals_for(U)
+            assert _decimals(volume) == max(decimals_for(U), 3)
+
+
+def _decimals(cell):
+    return len(cell.number_format.partition(".")[2])
 
 
 def test_the_certificate_has_volume_U_and_k_on_one_line(book, record):

@@ -1,10 +1,10 @@
 """Rebuild the points of Silva's tank (1995, table 11) that the dissertation does not print.
 
-Printed are the centre, radius and area of five sections and the magnitude of the residual of each of
-24 generatrices. The points are rebuilt so that the least-squares circles come back: the signs of the
-residuals are searched (seeded) until they are free of a mean and of a shift of the centre, what is
-left is spread over the magnitudes within their rounding, and the radius is taken from the area, which
-is printed with more digits. Run it to write points.csv again:
+Printed are the centre, radius and area of five sections and the magnitude of the residual of each
+of 24 generatrices. The points are rebuilt so that the least-squares circles come back: the signs of
+the residuals are searched (seeded) until they are free of a mean and of a shift of the centre, what
+is left is taken from the magnitudes within their rounding, and the radius is taken from the area,
+which is printed with more digits. Run it to write points.csv again:
 
     python reconstruct.py
 """
@@ -20,6 +20,7 @@ SECTION_HEIGHTS_M = (0.95, 2.85, 4.75, 6.65, 8.55)  # invented: the middle of fi
 BOTTOM_Z_M = 10.000  # invented
 FIRST_AZIMUTH_DEG = -7.5  # invented, so that the printed sds of section 3 come back
 COORDINATE_SD_MM = 14.142  # published: coordinate variance 2.0e-4 m2
+HEADINGS = "point x_m y_m z_m sx_mm sy_mm sz_mm section generatrix"
 ROUNDING_M = 0.0005  # residuals are printed to a millimetre
 
 
@@ -49,7 +50,7 @@ def main():
             lines.append([name, f"{px:.5f}", f"{py:.5f}", f"{z:.5f}", *sd, number, generatrix])
     with open(HERE / "points.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow("point x_m y_m z_m sx_mm sy_mm sz_mm section generatrix".split())
+        writer.writerow(HEADINGS.split())
         writer.writerows(lines)
 
 
@@ -64,7 +65,7 @@ def signed_residuals(size, azimuth, rng):
 
 
 def _best_signs(size, design, rng):
-    """Signs with the least change of the circle; simulated annealing with single and double flips."""
+    """Signs with the least change of the circle, by simulated annealing."""
     n = len(size)
     sign = rng.choice([-1.0, 1.0], size=n)
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from math import floor, isfinite, log10
 
 from tankcal.errors import TankcalError
-from tankcal.uncertainty import decimals_for
 
 NOTHING = "–"
 _MINUS = "\N{MINUS SIGN}"
@@ -71,20 +70,6 @@ def significant(value, digits, decimal_mark="."):
         return fixed(value, max(digits - 1 - exponent, 0), decimal_mark)
     mantissa = fixed(value / 10.0**exponent, digits - 1, decimal_mark)
     return f"{mantissa}·10{_superscript(exponent)}"
-
-
-def row_decimals(uncertainties):
-    """Decimals of each row of a column, from its uncertainties (in the unit shown).
-
-    A row without an uncertainty (0 or None: the empty tank) is written as its next one is, else as
-    the one before it.
-    """
-    decimals = [decimals_for(u) if u else None for u in uncertainties]
-    known = [d for d in decimals if d is not None]
-    following = known[-1] if known else decimals_for(0.0)
-    for i in reversed(range(len(decimals))):
-        following = decimals[i] = following if decimals[i] is None else decimals[i]
-    return decimals
 
 
 def _superscript(exponent):

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from tankcal.errors import TankcalError
 from tankcal.report import blocks, numbers
+from tankcal.uncertainty import row_decimals
 from tankcal.words import load_words, sentence
 
 _SPACE = "\N{NO-BREAK SPACE}"
@@ -25,6 +26,7 @@ class Column:
     unit      unit in which it is shown, one of numbers.UNITS; "" for text and bare numbers
     decimals  this many decimals, or
     u         key of the standard or expanded uncertainty that sets them (two digits of it), or
+    least     but never fewer decimals than this
     digits    this many significant digits; none of the three: text
     words     group of words that a code is looked up in
     heading   key of another heading
@@ -35,6 +37,7 @@ class Column:
     unit: str = ""
     decimals: int | None = None
     u: str | None = None
+    least: int = 0
     digits: int | None = None
     words: str | None = None
     heading: str | None = None
@@ -71,7 +74,7 @@ class Paper:
             return None
         shown = numbers.unit(unit)
         if u is not None:
-            decimals = numbers.row_decimals([u * shown.factor])[0]
+            decimals = row_decimals([u * shown.factor])[0]
         if decimals is not None:
             text = numbers.fixed(value * shown.factor, decimals, self.mark)
         else:
@@ -186,7 +189,8 @@ class Paper:
             return [numbers.significant(value, column.digits, self.mark) for value in scaled]
         decimals = [column.decimals] * len(rows)
         if column.u is not None:
-            decimals = numbers.row_decimals([(row.get(column.u) or 0.0) * factor for row in rows])
+            of_rows = [(row.get(column.u) or 0.0) * factor for row in rows]
+            decimals = row_decimals(of_rows, column.least)
         return [
             numbers.fixed(value, places, self.mark)
             for value, places in zip(scaled, decimals, strict=True)

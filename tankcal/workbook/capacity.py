@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from tankcal.uncertainty import decimals_for
+from tankcal.capacity import LITRE_DECIMALS
+from tankcal.uncertainty import row_decimals
 from tankcal.workbook.book import ACCENT, Column
 
 SHEET = "Capacity"
@@ -16,15 +17,6 @@ class Rows:
 
     first: int
     last: int
-
-
-def digits_of_rows(u_m3):
-    """Decimals of each row of the table, by its u; a row without u takes those of the next."""
-    known = [None if not u else decimals_for(u) for u in u_m3]
-    following = next((digits for digits in reversed(known) if digits is not None), 3)
-    for row in reversed(range(len(known))):
-        following = known[row] = following if known[row] is None else known[row]
-    return known
 
 
 def digits_of_heights(height_m):
@@ -41,10 +33,11 @@ def capacity_sheet(book, record):
         "Capacity table",
         f"reference temperature {spec['reference_temperature_c']:g} °C",
     )
-    digits = digits_of_rows(capacity["u_m3"])
+    digits = row_decimals(capacity["U_m3"])
+    digits_of_volumes = row_decimals(capacity["U_m3"], LITRE_DECIMALS)
     columns = [
         Column("Dip height (m)", capacity["height_m"], digits_of_heights(capacity["height_m"]), 13),
-        Column("Volume (m³)", capacity["volume_m3"], digits, 16),
+        Column("Volume (m³)", capacity["volume_m3"], digits_of_volumes, 16),
         Column("Expanded uncertainty U (m³)", capacity["U_m3"], digits, 18),
         Column("Coverage factor k", capacity["k"], 2, 13),
         Column("Standard uncertainty u (m³)", capacity["u_m3"], digits, 20),

@@ -85,7 +85,7 @@ def _entries(book, sheet, row, title, lines):
 def _result(book, sheet, row, record, words):
     """The capacity at the top of the table with U and k on its line; returns the next row."""
     capacity = record["capacity"]
-    cubic = number_format(decimals_for(capacity["u_m3"][-1]))
+    cubic = number_format(decimals_for(capacity["U_m3"][-1]))
     book.heading(sheet, row, sentence(words, "headings", "result"), len(_WIDTHS))
     heads = ("", "Volume", "Expanded uncertainty U", "Factor k", "Dip height")
     for column, text in enumerate(heads):
@@ -113,7 +113,7 @@ def _corrections(book, sheet, row, record, words):
     """The corrections that were applied, with their sizes; returns the next row."""
     book.heading(sheet, row, sentence(words, "headings", "corrections"), len(_WIDTHS))
     applied = [correction for correction in record["corrections"] if correction["applied"]]
-    cubic = number_format(decimals_for(record["capacity"]["u_m3"][-1]) + 1)
+    cubic = number_format(decimals_for(record["capacity"]["U_m3"][-1]) + 1)
     for correction in applied:
         row += 1
         book.put(sheet, row, 0, sentence(words, "corrections", correction["code"]))

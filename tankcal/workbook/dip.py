@@ -7,9 +7,10 @@ The last row of the table is the shell's top, any number of metres; the sheets p
 Whoever types what is printed there gets that row; anything above both is refused.
 """
 
-from tankcal.uncertainty import decimals_for
+from tankcal.capacity import LITRE_DECIMALS
+from tankcal.uncertainty import row_decimals
 from tankcal.workbook.book import ACCENT, INPUT, MUTED, NONE, number_format
-from tankcal.workbook.capacity import digits_of_heights, digits_of_rows
+from tankcal.workbook.capacity import digits_of_heights
 
 SHEET = "Dip calculator"
 REFUSED = "Refused"
@@ -99,23 +100,23 @@ def _results(record, at):
 
 
 def _lines(digits_of_height, has_reference):
-    """(row, label, unit, decimals or None for the volume's) of the lines with a result."""
+    """(row, label, unit, decimals, whether U sets finer ones) of the lines with a result."""
     lines = [
-        (_VOLUME, "Volume", "m³", None),
-        (_EXPANDED, "Expanded uncertainty U", "m³", None),
-        (_K, "Coverage factor k", "", 2),
-        (_STANDARD, "Standard uncertainty u", "m³", None),
-        (_ROW, "Row of the table at or below the dip", "", 0),
-        (_NEXT, "Next row", "", 0),
-        (_HEIGHT_0, "Height of that row", "m", digits_of_height),
-        (_HEIGHT_1, "Height of the next row", "m", digits_of_height),
-        (_VOLUME_0, "Volume of that row", "m³", None),
-        (_VOLUME_1, "Volume of the next row", "m³", None),
-        (_PART, "Part of the way to the next row", "", 4),
-        (_ROW_OF_U, "Row whose U and k are taken", "", 0),
+        (_VOLUME, "Volume", "m³", LITRE_DECIMALS, True),
+        (_EXPANDED, "Expanded uncertainty U", "m³", 0, True),
+        (_K, "Coverage factor k", "", 2, False),
+        (_STANDARD, "Standard uncertainty u", "m³", 0, True),
+        (_ROW, "Row of the table at or below the dip", "", 0, False),
+        (_NEXT, "Next row", "", 0, False),
+        (_HEIGHT_0, "Height of that row", "m", digits_of_height, False),
+        (_HEIGHT_1, "Height of the next row", "m", digits_of_height, False),
+        (_VOLUME_0, "Volume of that row", "m³", LITRE_DECIMALS, True),
+        (_VOLUME_1, "Volume of the next row", "m³", LITRE_DECIMALS, True),
+        (_PART, "Part of the way to the next row", "", 4, False),
+        (_ROW_OF_U, "Row whose U and k are taken", "", 0, False),
     ]
     if has_reference:
-        lines.append((_ULLAGE, "Ullage (reference height less dip)", "m", digits_of_height))
+        lines.append((_ULLAGE, "Ullage (reference height less dip)", "m", digits_of_height, False))
     return lines
 
 
@@ -133,17 +134,17 @@ def dip_sheet(book, record):
     book.heading(sheet, _ROW - 2, "How it is found", len(_WIDTHS))
 
     formulas, results = _formulas(digits), _results(record, at)
-    finest = digits_of_rows(record["capacity"]["u_m3"])
-    coarse = decimals_for(max(record["capacity"]["u_m3"]))
-    for row, label, unit, decimals in _lines(digits, reference is not None):
+    decimals_by_u = row_decimals(record["capacity"]["U_m3"])
+    coarse, fine = min(decimals_by_u), max(decimals_by_u)
+    for row, label, unit, decimals, set_by_u in _lines(digits, reference is not None):
         strong = {"bold": True} if row in (_VOLUME, _EXPANDED) else {}
         book.put(sheet, row - 1, 0, label, **strong)
-        shown = coarse if decimals is None else decimals
+        shown = max(decimals, coarse) if set_by_u else decimals
         look = book.format(align="right", num_format=number_format(shown), **strong)
         sheet.write_formula(row - 1, 1, formulas[row], look, results[row])
         book.put(sheet, row - 1, 2, unit, indent=1)
-        if decimals is None:
-            _digits_by_u(book, sheet, row, range(coarse + 1, max(finest) + 1))
+        if set_by_u:
+            _digits_by_u(book, sheet, row, range(shown + 1, fine + 1))
     if reference is not None:
         book.put(sheet, _REFERENCE - 1, 0, "Reference height")
         book.put(sheet, _REFERENCE - 1, 1, reference, num_format=number_format(digits))
@@ -188,7 +189,7 @@ def _input_cell(book, sheet, height_m, at, digits):
 
 
 def _digits_by_u(book, sheet, row, finer):
-    """Show more decimals where u is small, as the sheet Capacity does."""
+    """Show more decimals where U is small, as the sheet Capacity does."""
     for digits in reversed(finer):
         sheet.conditional_format(
             row - 1,
@@ -197,7 +198,7 @@ def _digits_by_u(book, sheet, row, finer):
             1,
             {
                 "type": "formula",
-                "criteria": f"=$B${_STANDARD}<{0.995 * 10.0 ** (2 - digits):.10g}",
+                "criteria": f"=$B${_EXPANDED}<{0.995 * 10.0 ** (2 - digits):.10g}",
                 "format": book.format(num_format=number_format(digits)),
                 "stop_if_true": True,
             },
