@@ -43,9 +43,9 @@ notebooks: $(VENV)/full ## execute every notebook, top to bottom
 bench: $(VENV)/full ## time and memory of the main job
 	$(BIN)/python benchmarks/main_job.py
 
-picture: $(VENV)/full ## the picture in the README, from the example's certificate (needs poppler)
+picture: $(VENV)/full ## the picture in the README, from the example's report (needs poppler)
 	$(BIN)/tankcal demo --quiet --out demo-results
-	pdftoppm -r 55 -png -f 1 -l 4 demo-results/certificate.pdf build/page
+	mkdir -p build && pdftoppm -r 55 -png demo-results/report.pdf build/page
 	$(BIN)/python docs/picture.py build docs/images/certificate.png
 
 wheel: $(VENV)/full ## build the wheel and run the example from it, away from this checkout

@@ -43,6 +43,7 @@ class Source:
     unit: str | None = None
     type: str = "A"
     distribution: str = "normal"
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Propagation:
     """What is uncertain about a shell, ready for any heights above its bottom.
 
     points_m2, form_m2  (f, c) factors of the covariance of the shell's features
-    declared            inputs with name, u (SI), u_as_read, unit, type, distribution, dof
+    declared            inputs with name, u (SI), u_as_read, unit, type, distribution, dof, note
     scale               of horizontal lengths, by temperature; expansion_per_k its coefficient
     """
 
@@ -79,6 +80,7 @@ class Propagation:
                     one.unit,
                     one.type,
                     one.distribution,
+                    one.note,
                 )
             )
         return tuple(sources)

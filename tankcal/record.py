@@ -357,6 +357,7 @@ def _budget(result):
                 "sensitivity_unit": _sensitivity_unit(source.unit) if declared else None,
                 "contribution_m3": contribution,
                 "share": contribution**2 / total if total > 0 else 0.0,
+                "note": source.note,
             }
         )
     return rows
@@ -386,7 +387,7 @@ def _choices(result):
         "interpolation": "linear",
         "coverage": job.table.coverage_probability,
         "k": "normal" if np.all(np.isinf(result.table.dof)) else "student",
-        "expansion": "given" if job.material.given else "default",
+        "expansion": "given" if job.material.expansion_given else "default",
         "snooping": CRITICAL_W if job.snooping else "off",
         "not_in_budget": [
             name for name in DECLARABLE if name not in {declared.name for declared in job.inputs}

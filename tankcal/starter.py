@@ -1,14 +1,14 @@
 """The starter job of `tankcal new`: an empty form, as a folder of text files and as a workbook.
 
-Both are written from the lists of `tankcal.contract`, so that they name every key and column.
+Both are written from the lists of `tankcal.job.contract`, so that they name every key and column.
 """
 
 from pathlib import Path
 
-from tankcal.contract import COLUMNS, INPUT_UNITS, KEYS
 from tankcal.errors import InputError, Problem
-from tankcal.sheets import README_SHEET, SETTINGS_HEADINGS, SETTINGS_SHEET
-from tankcal.tables import SETTINGS_FILE
+from tankcal.job.contract import COLUMNS, INPUT_UNITS, KEYS
+from tankcal.job.sheets import README_SHEET, SETTINGS_HEADINGS, SETTINGS_SHEET
+from tankcal.job.tables import SETTINGS_FILE
 
 WORKBOOK_FILE = "job.xlsx"
 SECTION_NOTES = {

@@ -93,7 +93,8 @@ def test_rows_go_to_the_very_top(step, top, rows, last):
 
 
 class Declared:
-    u, u_as_read, unit, type, distribution, dof = 1.0, 1.0, "x", "B", "normal", np.inf
+    u, u_as_read, unit, note = 1.0, 1.0, "x", ""
+    type, distribution, dof = "B", "normal", np.inf
 
     def __init__(self, name):
         self.name = name

@@ -53,7 +53,7 @@ def test_a_job_in_si(tmp_path):
     assert (job.survey.shell_temperature_c, job.survey.liquid_level_m) == (31.5, 0.0)
     assert job.datum == tankcal.job.Datum(0.0, 0.05, 1.0, 2.0, 11.2)
     assert (job.table.step_m, job.table.coverage_probability) == (0.01, 0.99)
-    assert job.material == tankcal.job.Material(200e9, 1.1e-5, given=True)
+    assert job.material == tankcal.job.Material(200e9, 1.1e-5, expansion_given=True)
     assert [course.name for course in job.courses] == ["1", "2", "3", "4", "5"]
     assert [course.thickness_m for course in job.courses] == [0.012, 0.010, 0.008, 0.008, 0.0065]
     assert [course.paint_m for course in job.courses] == [0.0003, 0.0002, 0.0, 0.0, 0.0001]
@@ -83,7 +83,7 @@ def test_a_job_in_si(tmp_path):
 
 def test_defaults(tmp_path):
     job = load(write_job(tmp_path / "job"))
-    assert job.material == tankcal.job.Material(206e9, 1.1e-5, given=False)
+    assert job.material == tankcal.job.Material(206e9, 1.1e-5, expansion_given=False)
     assert job.table == tankcal.job.TableSpec(0.01, 20.0)
     assert job.datum == tankcal.job.Datum(0.0)
     assert (job.snooping, job.scale, job.inputs, job.certificate) == (True, "a_priori", (), {})
@@ -295,3 +295,13 @@ def test_sheets_that_are_not_read(tmp_path):
     parts = job_parts()
     parts.tables |= {"Read me": [["anything"]], "# old points": [["point"], ["x"]]}
     assert_same_job(load(write_book(tmp_path / "a.xlsx", parts)), load(write_job(tmp_path / "a")))
+
+
+def test_a_section_is_for_all_points_or_for_none(tmp_path):
+    job = write_job(tmp_path / "job")
+    lines = (job / "points.csv").read_text().splitlines()
+    lines = [lines[0] + ",section", *(f"{line},1" for line in lines[1:])]
+    lines[7] = lines[7].removesuffix("1")
+    (job / "points.csv").write_text("\n".join(lines) + "\n")
+    with pytest.raises(tankcal.InputError, match=r"points\.csv, row 8, section: blank"):
+        load(job)

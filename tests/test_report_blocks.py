@@ -6,8 +6,8 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from tankcal.contract import KEYS
 from tankcal.errors import TankcalError
+from tankcal.job.contract import KEYS
 from tankcal.report import blocks
 from tankcal.report.html import block_html, decimal_fills
 from tankcal.report.latex_math import formula

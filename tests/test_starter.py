@@ -6,9 +6,9 @@ import openpyxl
 import pytest
 from job_builder import SETTINGS, assert_same_job, job_parts, write_folder
 
-from tankcal.contract import COLUMNS, KEYS
 from tankcal.errors import InputError
 from tankcal.job import load
+from tankcal.job.contract import COLUMNS, KEYS
 from tankcal.starter import write_starter
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "job-format.md"

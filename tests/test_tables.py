@@ -7,10 +7,10 @@ import openpyxl
 import pytest
 from job_builder import job_parts, write_book
 
-from tankcal.fields import Field, Refused, read_value
-from tankcal.folder import read_csv, read_folder, read_toml
-from tankcal.sheets import read_workbook
-from tankcal.tables import BadCell, Log, nearest, shown
+from tankcal.job.fields import Field, Refused, read_value
+from tankcal.job.folder import read_csv, read_folder, read_toml
+from tankcal.job.sheets import read_workbook
+from tankcal.job.tables import BadCell, Log, nearest, shown
 
 
 def csv_table(text, separator=",", decimal="."):

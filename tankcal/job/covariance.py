@@ -10,7 +10,7 @@ import zlib
 
 import numpy as np
 
-from tankcal.tables import COVARIANCE_FILE, shown
+from tankcal.job.tables import COVARIANCE_FILE, shown
 
 MAX_POINTS = 2500  # the matrix is 450 MB then
 TOLERANCE = 1e-8  # of a correlation

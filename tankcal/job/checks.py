@@ -6,9 +6,9 @@ missing or bad stays silent: what is wrong with them has been told already.
 
 import numpy as np
 
-from tankcal.contract import INPUT_UNITS
-from tankcal.entries import settings_place
-from tankcal.fields import is_blank
+from tankcal.job.contract import INPUT_UNITS
+from tankcal.job.entries import settings_place
+from tankcal.job.fields import is_blank
 
 MIN_POINTS_PER_COURSE = 5
 FEW_POINTS_PER_COURSE = 10
@@ -16,7 +16,8 @@ HEIGHT_MISS_M, HEIGHT_MISS_RELATIVE = 0.020, 0.002
 UNIT_FACTOR = 5  # sizes that differ by more cannot be in the same unit
 DOUBTFUL_EXTENT = 1.5  # points wider than the tank by more: feet, or many points off the tank
 MAX_DIP_OFFSET_M = 1.0
-MAX_TABLE_ROWS = 200_000
+MAX_TABLE_ROWS = 25_000  # a 20 m tank in millimetres; its certificate has 90 pages
+MAX_POINTS = 50_000
 COARSE_STEP_M = 0.5
 TINY_SD_MM = 0.01
 SMALLEST_THICKNESS_MM = 1.0
@@ -109,17 +110,12 @@ def check_points(points, log):
     if not points.rows and not points.skipped:
         log.problem(points.file, "no rows; expected one row for each surveyed point")
         return
+    if len(points.rows) > MAX_POINTS:
+        expected = f"{len(points.rows)} points; expected at most {MAX_POINTS}: thin the scan first"
+        log.problem(points.file, expected)
     _refuse_repeated(points, "point", log)
-    first_row = {}
-    places = zip(points.of("x_m"), points.of("y_m"), points.of("z_m"), strict=True)
-    for row, place in zip(points.rows, places, strict=True):
-        if None in place:
-            continue
-        if place in first_row:
-            expected = f"the same coordinates as row {first_row[place]}; counted once"
-            log.warning(points.file, expected, row, "x_m")
-        else:
-            first_row[place] = row
+    _warn_same_places(points, log)
+    _refuse_some_sections(points, log)
     sds = ("sx_mm", "sy_mm", "sz_mm")
     given = [name for name in sds if points.columns[name] is not None]
     for name in sds:
@@ -131,6 +127,30 @@ def check_points(points, log):
         if found and max(found) < TINY_SD_MM:
             expected = f"at most {max(found):g} mm; expected millimetres: is it in metres?"
             log.warning(points.file, expected, None, name)
+
+
+def _warn_same_places(points, log):
+    first_row = {}
+    places = zip(points.of("x_m"), points.of("y_m"), points.of("z_m"), strict=True)
+    for row, place in zip(points.rows, places, strict=True):
+        if None in place:
+            continue
+        if place in first_row:
+            expected = f"the same coordinates as row {first_row[place]}; counted once"
+            log.warning(points.file, expected, row, "x_m")
+        else:
+            first_row[place] = row
+
+
+def _refuse_some_sections(points, log):
+    """A section for every point or for none: else some would be placed by height, some by name."""
+    sections = points.of("section")
+    if not any(sections):
+        return
+    for row, section in zip(points.rows, sections, strict=True):
+        if not section:
+            expected = "blank; expected a section for every point or for none (placed by height)"
+            log.problem(points.file, expected, row, "section")
 
 
 def check_geometry(points, courses, values, raw, log):

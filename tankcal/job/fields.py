@@ -10,7 +10,7 @@ import re
 import unicodedata
 from dataclasses import dataclass
 
-from tankcal.tables import BadCell, nearest, shown
+from tankcal.job.tables import BadCell, nearest, shown
 
 MAX_TEXT = 300
 MAX_NAME = 64

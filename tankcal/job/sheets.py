@@ -11,7 +11,7 @@ import warnings
 import zipfile
 from itertools import zip_longest
 
-from tankcal.tables import (
+from tankcal.job.tables import (
     COVARIANCE_FILE,
     LATER_TABLES,
     TABLES,

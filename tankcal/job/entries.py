@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tankcal.contract import (
+from tankcal.job.contract import (
     COLUMNS,
     KEYS,
     LATER_ABOVE_ZERO,
@@ -10,8 +10,8 @@ from tankcal.contract import (
     LATER_KINDS,
     LATER_SECTIONS,
 )
-from tankcal.fields import Refused, is_blank, read_value
-from tankcal.tables import nearest
+from tankcal.job.fields import Refused, is_blank, read_value
+from tankcal.job.tables import nearest
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import hashlib
 import re
 import tomllib
 
-from tankcal.tables import (
+from tankcal.job.tables import (
     COVARIANCE_FILE,
     LATER_TABLES,
     MAX_FILE_BYTES,

@@ -1,7 +1,7 @@
 """The raw tables of a job: text and numbers as they stand, with the file and row of each.
 
-Nothing here knows what a value means. `tankcal.folder` reads job.toml and CSV files,
-`tankcal.sheets` the same from one Excel workbook. Both give a `RawJob`, and tell everything that
+Nothing here knows what a value means. `tankcal.job.folder` reads job.toml and CSV files,
+`tankcal.job.sheets` the same from one workbook. Both give a `RawJob`, and tell everything that
 is wrong to a `Log`, so that all problems of a job come in one run.
 """
 

@@ -3,7 +3,7 @@
 `docs/job-format.md` says the same for people, and the starter job is written from these lists.
 """
 
-from tankcal.fields import Field
+from tankcal.job.fields import Field
 
 
 def _text(name, note):
