@@ -53,7 +53,7 @@ def test_a_job_in_si(tmp_path):
     assert (job.survey.shell_temperature_c, job.survey.liquid_level_m) == (31.5, 0.0)
     assert job.datum == tankcal.job.Datum(0.0, 0.05, 1.0, 2.0, 11.2)
     assert (job.table.step_m, job.table.coverage_probability) == (0.01, 0.99)
-    assert job.material == tankcal.job.Material(200e9, 1.1e-5, expansion_given=True)
+    assert job.material == tankcal.job.Material(200e9, 1.1e-5, expansion_given=False)
     assert [course.name for course in job.courses] == ["1", "2", "3", "4", "5"]
     assert [course.thickness_m for course in job.courses] == [0.012, 0.010, 0.008, 0.008, 0.0065]
     assert [course.paint_m for course in job.courses] == [0.0003, 0.0002, 0.0, 0.0, 0.0001]
