@@ -13,9 +13,6 @@ from tankcal.errors import HeightError
 from tankcal.uncertainty import coverage_factor, effective_dof
 from tankcal.volumes import ShellVolume
 
-# a row keeps its litres: differences of rows (deliveries) are far better known than the rows
-LITRE_DECIMALS = 3
-
 
 @dataclass(frozen=True)
 class Quantity:

@@ -8,6 +8,9 @@ from math import floor, log10
 import numpy as np
 from scipy.special import ndtri, stdtrit
 
+# rows of a table in m3 keep their litres: differences of rows are far better known than the rows
+LITRE_DECIMALS = 3
+
 
 def factor_of(covariance):
     """(n, r) factor L of a positive semidefinite covariance, covariance = L L', r its rank.

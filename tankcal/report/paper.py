@@ -6,11 +6,10 @@ The cells of the templates use it; nothing here computes a number.
 >>> paper.table("courses", paper.record["courses"], [Column("course"), Column("height_m", "m", 3)])
 """
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 
 from tankcal.errors import TankcalError
+from tankcal.record import load
 from tankcal.report import blocks, numbers
 from tankcal.uncertainty import row_decimals
 from tankcal.words import load_words, sentence
@@ -45,12 +44,10 @@ class Column:
 
 
 class Paper:
-    """The record at `path` with its language's words; raises TankcalError for another format."""
+    """The record at `path` with its language's words; raises InputError for another format."""
 
     def __init__(self, path):
-        self.record = json.loads(Path(path).read_text(encoding="utf-8"))
-        if self.record.get("format") != "tankcal-record/1":
-            raise TankcalError(f"{path} is not a record of this version (tankcal-record/1)")
+        self.record = load(path)
         self.words = load_words(self.record["job"]["table"]["language"])
         self.mark = self.words["language"]["decimal"]
 

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from tankcal.capacity import LITRE_DECIMALS
-from tankcal.uncertainty import row_decimals
+from tankcal.uncertainty import LITRE_DECIMALS, row_decimals
 from tankcal.workbook.book import ACCENT, Column
 
 SHEET = "Capacity"

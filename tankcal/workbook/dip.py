@@ -7,8 +7,7 @@ The last row of the table is the shell's top, any number of metres; the sheets p
 Whoever types what is printed there gets that row; anything above both is refused.
 """
 
-from tankcal.capacity import LITRE_DECIMALS
-from tankcal.uncertainty import row_decimals
+from tankcal.uncertainty import LITRE_DECIMALS, row_decimals
 from tankcal.workbook.book import ACCENT, INPUT, MUTED, NONE, number_format
 from tankcal.workbook.capacity import digits_of_heights
 

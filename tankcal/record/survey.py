@@ -1,0 +1,175 @@
+"""The part of the record that says what was measured: wall, points, sections, courses."""
+
+import numpy as np
+
+from tankcal.chain import noise_is_estimated
+
+
+def shell_of(result):
+    """The wall as one body: axis, tilt, residuals."""
+    shell, sections = result.shell, result.sections
+    residuals = np.concatenate([section.circle.residuals_m for section in sections])
+    estimated = noise_is_estimated(result.job)
+    return {
+        "x_m": shell.axis_m[0],
+        "y_m": shell.axis_m[1],
+        "z_m": shell.z_m,
+        "slope_x": shell.slope[0],
+        "slope_y": shell.slope[1],
+        "tilt": shell.tilt,
+        "tilt_sd": shell.tilt_sd,
+        "tilt_azimuth_deg": np.degrees(shell.tilt_azimuth_rad),
+        "residual_sd_m": np.sqrt(np.sum(residuals**2) / (len(residuals) - 3 * len(sections))),
+        "points": len(shell.reason),
+        "accepted": len(result.wall),
+        "noise_sd_m": np.sqrt(result.covariance_m2.diagonal().mean()) if estimated else None,
+        "noise_dof": result.noise.dof if estimated else None,
+        "height_m": result.volume.height_m,
+    }
+
+
+def points_of(result):
+    """Every surveyed point, used or not."""
+    job, shell = result.job, result.shell
+    place = {}
+    for section in result.sections:
+        for member, residual in zip(section.group.members, section.circle.residuals_m, strict=True):
+            place[result.wall[member]] = (section.group, residual, member)
+    rows = []
+    for index, name in enumerate(job.points.names):
+        group, residual, member = place.get(index, (None, None, None))
+        rows.append(
+            {
+                "point": name,
+                **_coordinates(job.points.xyz_m[index]),
+                "cov_m2": None if group is None else _covariance_of(result, member),
+                "course": job.courses[group.course].name if group else None,
+                "section": group.name if group else None,
+                "residual_m": residual,
+                "used": shell.reason[index] == "",
+            }
+        )
+    return rows
+
+
+def _covariance_of(result, member):
+    block = result.covariance_m2[3 * member : 3 * member + 3][:, 3 * member : 3 * member + 3]
+    return block if isinstance(block, np.ndarray) else block.toarray()
+
+
+def _coordinates(xyz):
+    return dict(zip(("x_m", "y_m", "z_m"), xyz, strict=True))
+
+
+def rejected_of(result):
+    """Every point that is not on the wall, with the reason."""
+    job, shell = result.job, result.shell
+    return [
+        {
+            "point": job.points.names[i],
+            **_coordinates(job.points.xyz_m[i]),
+            "residual_m": shell.residual_m[i],
+            "w": shell.w[i],
+            "reason": shell.reason[i],
+            "row": job.points.rows[i],
+        }
+        for i in np.flatnonzero(shell.reason != "")
+    ]
+
+
+def section_of(result, section):
+    """Circle and outline of one section, as surveyed."""
+    circle, outline, group = section.circle, section.outline, section.group
+    sd = np.sqrt(np.diag(circle.cofactor_m2))
+    xyz = result.job.points.xyz_m[result.wall[group.members]]
+    height = xyz[:, 2] - result.job.datum.bottom_z_m - group.height_m
+    offset = xyz[:, :2] - np.outer(height, result.shell.slope) - (circle.x_m, circle.y_m)
+    modes = outline.modes_m()
+    return {
+        "section": group.name,
+        "course": result.job.courses[group.course].name,
+        "height_m": group.height_m,
+        "n": len(group.members),
+        "x_m": circle.x_m,
+        "y_m": circle.y_m,
+        "x_sd_m": sd[0],
+        "y_sd_m": sd[1],
+        "radius_m": circle.radius_m,
+        "radius_sd_m": sd[2],
+        "variance_factor": circle.variance_factor,
+        "shape": outline.kind,
+        "points": [result.job.points.names[i] for i in result.wall[group.members]],
+        "azimuth_deg": np.degrees(np.arctan2(offset[:, 0], offset[:, 1])) % 360,
+        "residual_m": circle.residuals_m,
+        "area_m2": outline.area_m2(),
+        "area_sd_m2": _area_sd(result, section),
+        "outline": {
+            "azimuth_deg": np.arange(360.0),
+            "radius_m": outline.radius_m(np.radians(np.arange(360.0))),
+        },
+        "modes": [
+            {
+                "k": k,
+                "amplitude_m": np.hypot(*modes[k]),
+                "azimuth_deg": np.degrees(np.arctan2(modes[k, 1], modes[k, 0])) / k % (360 / k),
+            }
+            for k in range(2, len(modes))
+        ],
+    }
+
+
+def _area_sd(result, section):
+    azimuth, weight = section.outline.nodes()
+    gradient = (section.outline.radius_m(azimuth) * weight) @ section.outline.basis(azimuth)
+    by_points = gradient @ section.parameters_by_points
+    index = (3 * section.group.members[:, None] + np.arange(3)).ravel()
+    form = gradient @ section.outline.form_factor_m
+    return np.sqrt(by_points @ (result.covariance_m2[index][:, index] @ by_points) + form @ form)
+
+
+def courses_of(result):
+    """Each course: plates, radii, and its volume with all corrections."""
+    job, rows = result.job, []
+    rejected = np.flatnonzero(np.isin(result.shell.reason, ("consensus", "snooping")))
+    bottom = job.datum.bottom_z_m
+    for index, (course, shape) in enumerate(zip(job.courses, result.volume.courses, strict=True)):
+        own = [section for section in result.sections if section.group.course == index]
+        height = shape.top_m - shape.bottom_m
+        volume, u = _partial(result, shape.bottom_m, shape.top_m)
+        in_course = [
+            bottom + shape.bottom_m <= job.points.xyz_m[i, 2] < bottom + shape.top_m
+            for i in rejected
+        ]
+        rows.append(
+            {
+                "course": course.name,
+                "bottom_m": shape.bottom_m,
+                "top_m": shape.top_m,
+                "height_m": course.height_m,
+                "thickness_m": course.thickness_m,
+                "paint_m": course.paint_m,
+                "sections": [section.group.name for section in own],
+                "points": sum(len(section.group.members) for section in own),
+                "rejected": sum(in_course),
+                "radius_m": np.mean([section.circle.radius_m for section in own]),
+                "radius_sd_m": _mean_radius_sd(own),
+                "inside_radius_m": np.sqrt(volume / height / np.pi),
+                "area_m2": volume / height,
+                "area_sd_m2": u / height,
+                "volume_m3": volume,
+                "u_m3": u,
+            }
+        )
+    return rows
+
+
+def _mean_radius_sd(sections):
+    return np.sqrt(sum(s.circle.cofactor_m2[2, 2] for s in sections)) / len(sections)
+
+
+def _partial(result, low_m, high_m):
+    """Volume between two heights above the bottom and its standard uncertainty, exactly."""
+    volume = result.volume.volume_m3([low_m, high_m])
+    sources = result.propagation.sources([low_m, high_m])
+    variance = sum(np.sum(np.diff(source.columns_m3, axis=0) ** 2) for source in sources)
+    return volume[1] - volume[0], np.sqrt(variance)
