@@ -33,13 +33,14 @@ def capacity_sheet(book, record):
         f"reference temperature {spec['reference_temperature_c']:g} °C",
     )
     digits = row_decimals(capacity["U_m3"])
+    digits_of_u = row_decimals(capacity["u_m3"])
     digits_of_volumes = row_decimals(capacity["U_m3"], LITRE_DECIMALS)
     columns = [
         Column("Dip height (m)", capacity["height_m"], digits_of_heights(capacity["height_m"]), 13),
         Column("Volume (m³)", capacity["volume_m3"], digits_of_volumes, 16),
         Column("Expanded uncertainty U (m³)", capacity["U_m3"], digits, 18),
         Column("Coverage factor k", capacity["k"], 2, 13),
-        Column("Standard uncertainty u (m³)", capacity["u_m3"], digits, 20),
+        Column("Standard uncertainty u (m³)", capacity["u_m3"], digits_of_u, 20),
         Column("Litres per centimetre (L/cm)", [10.0 * a for a in capacity["area_m2"]], 1, 20),
     ]
     sheet.set_default_row(13.5)

@@ -1,0 +1,63 @@
+"""The shipped example: the published circles come back from the reconstructed points."""
+
+import csv
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from conftest import EXAMPLE
+
+
+def published(name):
+    with open(EXAMPLE / "published" / name, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def test_centres_radii_and_areas_published_s_table_11(example_result):
+    for section, printed in zip(
+        example_result.sections, published("table11_circles.csv"), strict=True
+    ):
+        circle = section.circle
+        assert circle.x_m == pytest.approx(float(printed["x_m"]), abs=1e-3)
+        assert circle.y_m == pytest.approx(float(printed["y_m"]), abs=1e-3)
+        assert circle.radius_m == pytest.approx(float(printed["radius_m"]), abs=1e-3)
+        area = np.pi * circle.radius_m**2
+        assert area == pytest.approx(float(printed["area_m2"]), abs=5e-3)
+
+
+def test_residual_magnitudes_published_s_table_11(example_result):
+    printed = published("table11_residuals.csv")
+    names = example_result.job.points.generatrix
+    for number, section in enumerate(example_result.sections, 1):
+        size = {row["generatrix"]: row[f"s{number}_m"] for row in printed}
+        members = example_result.wall[section.group.members]
+        for member, residual in zip(members, section.circle.residuals_m, strict=True):
+            assert abs(residual) == pytest.approx(float(size[names[member]]), abs=1e-3)
+
+
+def test_no_point_is_rejected(example_result):
+    assert len(example_result.wall) == 24 * 5 - 1  # published: section 3 has 23 points
+
+
+def test_gross_volume_is_the_published_one(example_result):
+    """Published: 1252.82 m3 for one mean radius of 6.479 m; the areas of table 11 give 1252.65."""
+    areas = [float(row["area_m2"]) for row in published("table11_circles.csv")]
+    gross = example_result.gross.volume_m3(example_result.gross.height_m)[0]
+    assert gross == pytest.approx(9.5 * np.mean(areas), rel=2e-5)
+    assert gross == pytest.approx(1252.82, rel=2e-4)
+
+
+def test_the_script_writes_the_same_points_again(tmp_path):
+    shutil.copytree(EXAMPLE, tmp_path / "example", ignore=shutil.ignore_patterns("results"))
+    before = (tmp_path / "example" / "points.csv").read_bytes()
+    (tmp_path / "example" / "points.csv").unlink()
+    subprocess.run([sys.executable, tmp_path / "example" / "reconstruct.py"], check=True)
+    assert (tmp_path / "example" / "points.csv").read_bytes() == before
+
+
+def test_what_is_invented_is_listed():
+    text = (EXAMPLE / "README.md").read_text(encoding="utf-8")
+    for word in ("sign of each", "heights of the sections", "courses", "plates", "temperatures"):
+        assert word in text
