@@ -68,7 +68,8 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
     unknowns      (u,) start values
     observations  (n,)
     covariance    (n,) variances, or (n, n) dense or sparse
-    tolerance     the largest last step of an unknown or residual, in standard deviations
+    tolerance     the largest last step of an unknown or residual, in standard deviations; a step
+                  that no longer shrinks is accepted up to 1e4 times it (rounding)
 
     Raises SolutionError when the conditions do not determine the unknowns, when there are fewer
     conditions than unknowns, or when the iteration does not converge.

@@ -61,8 +61,11 @@ class Propagation:
     expansion_per_k: float
 
     def sources(self, levels_m):
-        """One `Source` for each input, with a row for each height above the bottom."""
-        weights = self.volume.weights_m(levels_m)
+        """One `Source` for each input, with a row for each height above the bottom.
+
+        A height below the bottom (a dip plate that lies lower) has no volume and no uncertainty.
+        """
+        weights = self.volume.weights_m(np.maximum(levels_m, 0.0))
         sources = [Source("points", weights @ self.points_m2, self.points_dof)]
         if self.form_m2.shape[1]:
             sources.append(Source("form", weights @ self.form_m2))
@@ -85,17 +88,18 @@ class Propagation:
     def derivative(self, name, levels_m):
         """(rows,) derivative of the volumes by a declared input, m3 per SI unit of the input.
 
-        "scale" multiplies all lengths square to the axis, "datum" lifts the table's zero.
+        "scale" multiplies the surveyed lengths square to the axis, "datum" lifts the table's zero.
         """
-        volume = self.volume.volume_m3(levels_m)
-        by_scale = 2 * volume / self.scale
+        wet = np.asarray(levels_m) >= 0
+        levels = np.maximum(levels_m, 0.0)
+        by_length = 2 * self.volume.volume_m3(levels) / self.scale
         return {
-            "scale": lambda: 2 * volume,
-            "datum": lambda: self.volume.area_m2(levels_m),
-            "plate_thickness": lambda: -self.volume.inset_m2(levels_m),
-            "paint": lambda: -self.volume.inset_m2(levels_m),
-            "shell_temperature": lambda: -self.expansion_per_k * by_scale,
-            "expansion": lambda: (self.scale - 1) / self.expansion_per_k * by_scale,
+            "scale": lambda: self.volume.by_scale_m3(levels),
+            "datum": lambda: self.volume.area_m2(levels) * wet,
+            "plate_thickness": lambda: -self.volume.inset_m2(levels),
+            "paint": lambda: -self.volume.inset_m2(levels),
+            "shell_temperature": lambda: -self.expansion_per_k * by_length,
+            "expansion": lambda: (self.scale - 1) / self.expansion_per_k * by_length,
         }[name]()
 
 
@@ -137,7 +141,8 @@ class Capacity:
     def at(self, height_m):
         """The volume at a dip, interpolated linearly between rows as a gauge does.
 
-        Raises HeightError outside the table.
+        The top of the shell rounded to a millimetre counts as the top. Raises HeightError outside
+        the table.
         """
         return self._combined([(height_m, 1.0)])
 
@@ -158,6 +163,8 @@ class Capacity:
 
     def _row_weights(self, height_m):
         first, last = self.height_m[0], self.height_m[-1]
+        if last < height_m <= round(last, 3):
+            height_m = last  # a dip is read to the millimetre, the shell ends a little below it
         if not first <= height_m <= last:
             raise HeightError(
                 f"height {height_m:g} m is outside the capacity table ({first:g} to {last:g} m)"

@@ -7,9 +7,10 @@ import pandas as pd
 import scipy.sparse
 
 from tankcal.capacity import Capacity, Propagation, table_heights
+from tankcal.doubts import ADVISED_POINTS, FEWEST_POINTS, doubts, incomplete, weak_sections
 from tankcal.errors import InputError, Problem
 from tankcal.job import Job
-from tankcal.outlines import FULL_TURN, Components, estimate_components, evenly_spread, polar
+from tankcal.outlines import estimate_form, polar
 from tankcal.sections import (
     Section,
     fit_circle,
@@ -23,17 +24,13 @@ from tankcal.shell import Shell, course_of, find_shell
 from tankcal.uncertainty import factor_of
 from tankcal.volumes import ShellVolume, course_shape, feature_jacobian
 
-LEAST_NOISE_M = 1e-6  # perfect points would have no covariance at all
-FEWEST_POINTS, ADVISED_POINTS = 5, 10  # of a section
-WIDE_GAP_DEG = 45
-
 
 @dataclass(frozen=True)
 class Result:
     """Everything that a job gave; `capacity` is the table as a DataFrame.
 
     wall         (m,) indices of the accepted points in job.points
-    noise        variance components of the sections; None when no estimate was needed
+    form_m2      amplitude of the form of the sections: variance form_m2 k^-3 of mode k
     gross        the shell as surveyed, without any correction
     propagation  the shell inside, corrected, and what is uncertain about it
     """
@@ -43,7 +40,7 @@ class Result:
     joints_m: np.ndarray
     wall: np.ndarray
     covariance_m2: object
-    noise: Components | None
+    form_m2: float
     sections: tuple[Section, ...]
     gross: ShellVolume
     propagation: Propagation
@@ -96,23 +93,39 @@ def run(job, progress=None):
         job.points.xyz_m,
         job.datum.bottom_z_m + heights,
         job.tank.nominal_diameter_m / 2,
+        sd_m=_radial_sds(job.points),
         snooping=job.snooping,
     )
     wall = np.flatnonzero(shell.reason == "")
     joints = heights / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
     tell(f"fitting sections through {len(wall)} points of the wall")
     groups = _groups(job, shell, wall, joints)
-    covariance, noise = _covariance(job, shell, wall, groups)
-    sections = _sections(job, shell, wall, groups, covariance, noise)
+    covariance, form_m2 = _covariance(job, shell, wall, groups)
+    sections = _sections(job, shell, wall, groups, covariance, form_m2)
     tell("integrating volumes")
     gross = shell_volume(job.courses, joints, sections)
     volume = shell_volume(job.courses, joints, sections, **corrections_of(job))
     tell("propagating the covariance to every row of the table")
-    propagation = _propagation(job, volume, sections, covariance, noise)
+    propagation = _propagation(job, volume, sections, covariance, shell.noise_dof)
     table = _table(job, propagation)
-    warnings = (*job.warnings, *_weak_sections(job, shell, wall, groups))
+    warnings = (
+        *job.warnings,
+        *weak_sections(job, groups, _azimuths(job, shell, wall)),
+        *incomplete(job),
+        *doubts(job, shell, sections, _radial_sds(job.points)),
+    )
     return Result(
-        job, shell, joints, wall, covariance, noise, sections, gross, propagation, table, warnings
+        job,
+        shell,
+        joints,
+        wall,
+        covariance,
+        form_m2,
+        sections,
+        gross,
+        propagation,
+        table,
+        warnings,
     )
 
 
@@ -196,23 +209,6 @@ def _refuse_weak(groups, courses, height):
         raise InputError([Problem("points.csv", text) for text in problems])
 
 
-def _weak_sections(job, shell, wall, groups):
-    """Warnings for sections with few points, or with a part of the turn that nobody measured."""
-    azimuth = _azimuths(job, shell, wall)
-    texts = []
-    for group in groups:
-        ordered = np.sort(azimuth[group.members])
-        gap = np.degrees(np.max(np.diff(ordered, append=ordered[0] + FULL_TURN)))
-        name = f"section {group.name} (course {job.courses[group.course].name})"
-        if len(ordered) < ADVISED_POINTS:
-            texts.append(
-                f"{name} stands on {len(ordered)} points, {ADVISED_POINTS} or more are advised"
-            )
-        if gap > WIDE_GAP_DEG:
-            texts.append(f"{name} has no point over {gap:.0f} deg of its turn: measure there")
-    return [Problem("points.csv", text) for text in texts]
-
-
 def _azimuths(job, shell, wall):
     """Azimuths of the wall points about the axis at their own height."""
     xyz = job.points.xyz_m[wall]
@@ -221,16 +217,28 @@ def _azimuths(job, shell, wall):
 
 
 def _covariance(job, shell, wall, groups):
-    """Covariance of the wall points (3m, 3m), and the variance components when they are needed."""
+    """Covariance of the wall points (3m, 3m), and the amplitude of the form of the sections."""
     given = _given_covariance(job.points, wall)
     radii = _radii(job, shell, wall, groups, given)
-    if noise_is_estimated(job):
-        components = estimate_components(radii)
-        least = LEAST_NOISE_M**2 if job.points.sd_m is None else 0.0
-        return given * max(components.noise, least), components
-    if all(evenly_spread(azimuth) for azimuth, _, _ in radii):
-        return given, None
-    return given, estimate_components(radii, noise=1.0)
+    factor = (shell.noise_m / _median_sd(job.points)) ** 2 if noise_is_estimated(job) else 1.0
+    return given * factor, estimate_form(radii, factor)
+
+
+def _radial_sds(points):
+    """(n,) standard deviations of the points in plan, or None when the file gives none."""
+    if points.covariance_m2 is not None:
+        variances = points.covariance_m2.diagonal().reshape(-1, 3)
+    elif points.sd_m is not None:
+        variances = points.sd_m**2
+    else:
+        return None
+    return np.sqrt(variances[:, :2].mean(axis=1))
+
+
+def _median_sd(points):
+    """Median standard deviation of the points in plan; one metre when the file gives none."""
+    sds = _radial_sds(points)
+    return 1.0 if sds is None else float(np.median(sds))
 
 
 def noise_is_estimated(job):
@@ -273,9 +281,8 @@ def _block(covariance, group):
     return covariance[index][:, index]
 
 
-def _sections(job, shell, wall, groups, covariance, noise):
+def _sections(job, shell, wall, groups, covariance, form_m2):
     xyz = job.points.xyz_m[wall]
-    form = noise.form_m2 if noise else 0.0
     return tuple(
         fit_section(
             group,
@@ -283,19 +290,19 @@ def _sections(job, shell, wall, groups, covariance, noise):
             _block(covariance, group),
             shell.slope,
             job.datum.bottom_z_m + group.height_m,
-            form,
+            form_m2,
         )
         for group in groups
     )
 
 
-def _propagation(job, volume, sections, covariance, noise):
-    by_points, form = _feature_uncertainty(volume, sections, covariance)
+def _propagation(job, volume, sections, covariance, noise_dof):
+    jacobian = _features_by_points(volume, sections, covariance.shape[0])
     return Propagation(
         volume=volume,
-        points_m2=factor_of(by_points),
-        points_dof=noise.dof if noise_is_estimated(job) else np.inf,
-        form_m2=factor_of(form),
+        points_m2=factor_of(jacobian @ (covariance @ jacobian.T)),
+        points_dof=noise_dof if noise_is_estimated(job) else np.inf,
+        form_m2=factor_of(volume.form_m2 @ volume.form_m2.T),
         declared=job.inputs,
         scale=thermal_scale(job),
         expansion_per_k=job.material.expansion_per_k,
@@ -305,35 +312,29 @@ def _propagation(job, volume, sections, covariance, noise):
 def _table(job, propagation):
     volume, zero = propagation.volume, zero_height(job)
     heights = table_heights(job.table.step_m, volume.height_m - zero)
-    levels = np.clip(heights + zero, 0.0, volume.height_m)
+    levels = np.minimum(heights + zero, volume.height_m)
+    wet = np.maximum(levels, 0.0)
     return Capacity(
         height_m=heights,
-        volume_m3=volume.volume_m3(levels),
-        area_m2=volume.area_m2(levels),
+        volume_m3=volume.volume_m3(wet),
+        area_m2=volume.area_m2(wet) * (levels >= 0),
         sources=propagation.sources(levels),
         probability=job.table.coverage_probability,
     )
 
 
-def _feature_uncertainty(volume, sections, covariance):
-    """(f, f) covariance of the features from the points, and from the form between them.
-
-    The form is common to all sections (dents run up the wall), so its modes correlate them.
-    """
-    by_points, form = [], []
+def _features_by_points(volume, sections, coordinates):
+    """(f, coordinates) derivative of the features of the shell by the points' coordinates."""
+    jacobians = []
     for index, course in enumerate(volume.courses):
-        own = [section for section in sections if section.group.course == index]
-        jacobian = feature_jacobian(course)
-        wide = np.zeros((len(jacobian), covariance.shape[0]))
+        by_parameters = feature_jacobian(course)
+        jacobian = np.zeros((len(by_parameters), coordinates))
         start = 0
-        by_form = np.zeros((len(jacobian), own[0].outline.form_factor_m.shape[1]))
-        for section in own:
-            part = jacobian[:, start : start + len(section.outline.parameters)]
-            start += part.shape[1]
-            columns = (3 * section.group.members[:, None] + np.arange(3)).ravel()
-            wide[:, columns] += part @ section.parameters_by_points
-            by_form += part @ section.outline.form_factor_m
-        by_points.append(wide)
-        form.append(by_form)
-    jacobian, form = np.vstack(by_points), np.vstack(form)
-    return jacobian @ (covariance @ jacobian.T), form @ form.T
+        for section in sections:
+            if section.group.course == index:
+                part = by_parameters[:, start : start + len(section.outline.parameters)]
+                start += part.shape[1]
+                columns = (3 * section.group.members[:, None] + np.arange(3)).ravel()
+                jacobian[:, columns] += part @ section.parameters_by_points
+        jacobians.append(jacobian)
+    return np.vstack(jacobians)

@@ -35,13 +35,25 @@ def main(arguments=None):
         for line in str(error).splitlines():
             print(f"tankcal: {line}", file=sys.stderr)
         return error.exit_status
-    except KeyboardInterrupt:
-        print("tankcal: stopped; nothing was written", file=sys.stderr)
-        return 130
+    except BrokenPipeError:  # the reader of our output went away: nothing to say to nobody
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except OSError as error:
         print(f"tankcal: {error.filename or 'system'}: {error.strerror or error}", file=sys.stderr)
         return 2
+    except BaseException as error:
+        if not _interrupted(error):
+            raise
+        print("tankcal: stopped; nothing was written", file=sys.stderr)
+        return 130
     return 0
+
+
+def _interrupted(error):
+    """Whether Ctrl-C is behind an error, however a library dressed it."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__context__
+    return error is not None
 
 
 def _parser():

@@ -16,7 +16,9 @@ from tankcal.errors import SolutionError
 from tankcal.quadrature import panels, polar_products
 
 FULL_TURN = 2 * np.pi
-HARMONICS = 36  # a dent of 10 deg still shows; the prior decides how much of it is believed
+HARMONICS = 36  # of a smoothed outline: a dent of 10 deg still shows, if the prior believes it
+LEAST_FORM_M2 = 1e-12  # a micrometre
+FORM_MODES = 100  # of the form that may lie between points; higher ones add 1e-4 of its variance
 MOST_KNOTS = 400  # above this many points an outline is smoothed, not interpolated
 
 
@@ -27,8 +29,8 @@ class Outline:
     kind              "interpolated" (periodic cubic through the points) or "smoothed" (harmonics)
     parameters        (p,) radii at the knots, or coefficients of the harmonics, m
     from_radii        (p, n) derivative of the parameters by the n measured radii
-    form_factor_m     (p, modes) effect of a unit of each prior mode that the points did not see;
-                      all zero when interpolated. Modes are common to all sections of a shell.
+    azimuth_rad       (n,) azimuths of the measured radii
+    form_m2           amplitude of the form: variance form_m2 k^-3 of each mode k >= 2
     knots_rad         (k,) ascending azimuths where the polynomial pieces meet
     """
 
@@ -37,7 +39,8 @@ class Outline:
     kind: str
     parameters: np.ndarray
     from_radii: np.ndarray
-    form_factor_m: np.ndarray
+    azimuth_rad: np.ndarray
+    form_m2: float
     knots_rad: np.ndarray
 
     def basis(self, azimuth_rad, derivative=0):
@@ -53,13 +56,23 @@ class Outline:
         return self.basis(azimuth_rad, derivative) @ self.parameters
 
     def nodes(self):
-        """Azimuths and weights that integrate r^2 (degree 6 between knots) exactly."""
+        """Azimuths and weights of a rule that is exact for r^2 of an interpolated outline."""
         return panels(np.append(self.knots_rad, self.knots_rad[0] + FULL_TURN), 4)
 
     def area_m2(self):
         """A = 1/2 integral of r^2 over the full turn, by Gaussian quadrature."""
         azimuth, weight = self.nodes()
         return float(polar_products(self.radius_m(azimuth), weight)[0, 0])
+
+    def unseen_form_m(self, azimuth_rad):
+        """(len(azimuth), modes) how far the outline misses one sd of each mode of the form.
+
+        The outline of a mode sampled at the points, less the mode itself. The modes are common to
+        all sections of a shell: dents and ovality run up the wall.
+        """
+        shown = self.basis(azimuth_rad) @ (self.from_radii @ _form(self.azimuth_rad))
+        sd = np.sqrt(self.form_m2 * mode_variances(FORM_MODES))
+        return (shown - _form(azimuth_rad)) * sd
 
     def modes_m(self, highest=6):
         """(highest + 1, 2) cos and sin amplitude of each Fourier mode; row 0 is the mean radius."""
@@ -88,7 +101,7 @@ def evenly_spread(azimuth_rad):
     return bool(gaps.max() <= 2.5 * np.median(gaps) and gaps.min() >= 0.3 * np.median(gaps))
 
 
-def interpolate_outline(xy_m, x_m, y_m):
+def interpolate_outline(xy_m, x_m, y_m, form_m2=0.0):
     """Periodic cubic r(azimuth) through every point, about the centre (x_m, y_m).
 
     The spline has continuous curvature and no end. Raises SolutionError below 5 points or when two
@@ -108,7 +121,8 @@ def interpolate_outline(xy_m, x_m, y_m):
         kind="interpolated",
         parameters=radius[order],
         from_radii=np.eye(n)[order],
-        form_factor_m=np.zeros((n, 2 * HARMONICS + 1)),
+        azimuth_rad=azimuth,
+        form_m2=form_m2,
         knots_rad=knots,
     )
 
@@ -121,7 +135,7 @@ def smooth_outline(xy_m, x_m, y_m, noise_m2, form_m2):
     1 (radius, centre) are free.
 
     noise_m2  covariance of the measured radii, (n, n) or (n,)
-    form_m2   amplitude of the form, >= 0 (`estimate_components`)
+    form_m2   amplitude of the form, >= 0 (`estimate_form`)
     Raises SolutionError when the points do not determine radius and centre.
     """
     azimuth, radius = polar(xy_m, x_m, y_m)
@@ -130,73 +144,50 @@ def smooth_outline(xy_m, x_m, y_m, noise_m2, form_m2):
     normal, scaled = _normal_matrix(_whitened(design, noise_m2), scale)
     weighted = _whitened(scaled, noise_m2, transposed=True)
     from_radii = scale[:, None] * np.linalg.solve(normal, weighted.T)
-    unseen = from_radii @ design - np.eye(len(scale))
-    unseen[:, :3] = 0.0  # the free modes are reproduced, they have no prior
     return Outline(
         x_m=x_m,
         y_m=y_m,
         kind="smoothed",
         parameters=from_radii @ radius,
         from_radii=from_radii,
-        form_factor_m=unseen * scale,
+        azimuth_rad=azimuth,
+        form_m2=form_m2,
         knots_rad=np.arange(4 * HARMONICS) * FULL_TURN / (4 * HARMONICS),
     )
 
 
-@dataclass(frozen=True)
-class Components:
-    """Two variance components of sections: the noise of a radius and the amplitude of the form.
-
-    noise multiplies the radii's given covariance (m2 when that was relative to one); form_m2 k^-3
-    is the variance of the cos and sin amplitudes of mode k.
-    """
-
-    noise: float
-    form_m2: float
-    dof: float
-
-
-def estimate_components(sections, noise=None):
-    """Noise and form of a set of sections by restricted maximum likelihood.
+def estimate_form(sections, noise=1.0):
+    """Amplitude of the form of a set of sections by restricted maximum likelihood, m2.
 
     sections  list of (azimuth_rad (n,), radius_m (n,), covariance (n,) or (n, n)), one a section
-    noise     None: estimated, the covariances being relative; 1.0: they are absolute
+    noise     factor of the covariances
 
-    The likelihood is that of radii with free modes 0 and 1 and random modes k >= 2 (Patterson &
-    Thompson 1971); dof is the number of radii less the effective number of parameters.
+    The likelihood is that of radii with free modes 0 and 1 and random modes k >= 2 of variance
+    form_m2 k^-3 (Patterson & Thompson 1971). The noise is never estimated here: in one section it
+    cannot be told from the form.
     """
     moments = []
     for azimuth, radius, covariance in sections:
         columns = np.column_stack([harmonics(azimuth, HARMONICS), radius - radius.mean()])
-        columns = _whitened(columns, covariance)
+        columns = _whitened(columns, noise * covariance)
         moments.append((columns[:, :-1], columns[:, -1]))
-    count = sum(len(radius) - 3 for _, radius in moments)
 
-    def at(log_ratio):
-        """Restricted log-likelihood (negative, doubled), noise and parameters, at form/noise."""
-        scale = _prior_scale(np.exp(log_ratio))
-        squares = logdet = parameters = 0.0
+    def misfit(log_form):
+        """Doubled negative log-likelihood, but for a constant."""
+        scale = _prior_scale(np.exp(log_form))
+        total = 0.0
         for design, radius in moments:
             normal, scaled = _normal_matrix(design, scale)
             projected = scaled.T @ radius
-            squares += radius @ radius - projected @ np.linalg.solve(normal, projected)
-            logdet += np.linalg.slogdet(normal)[1]
-            parameters += np.trace(np.linalg.solve(normal, scaled.T @ scaled))
-        found = max(squares / count, np.finfo(float).tiny) if noise is None else noise
-        return count * np.log(found) + squares / found + logdet, found, parameters
+            total += np.linalg.slogdet(normal)[1] - projected @ np.linalg.solve(normal, projected)
+        return total
 
-    variance = np.mean([np.mean(np.diag(c) if np.ndim(c) == 2 else c) for *_, c in sections])
-    grid = np.log(variance) + np.arange(-12.0, 17.0, 2.0)  # form/noise of 1e-5 to 1e7
-    start = grid[np.argmin([at(log_ratio)[0] for log_ratio in grid])]
+    grid = np.log(LEAST_FORM_M2) + np.arange(0.0, 29.0, 2.0)  # to a form of 1.2 m
+    start = grid[np.argmin([misfit(log_form) for log_form in grid])]
     best = scipy.optimize.minimize_scalar(
-        lambda log_ratio: at(log_ratio)[0], bounds=(start - 2.0, start + 2.0), method="bounded"
+        misfit, bounds=(start - 2.0, start + 2.0), method="bounded"
     ).x
-    _, found, parameters = at(best)
-    return Components(
-        noise=float(found),
-        form_m2=float(np.exp(best) * found),
-        dof=float(max(count + 3 * len(moments) - parameters, 1.0)),
-    )
+    return float(np.exp(best))
 
 
 def _whitened(array, covariance, transposed=False):
@@ -225,6 +216,11 @@ def _normal_matrix(design, scale):
 def mode_variances(highest):
     """Prior variance of the cos and sin amplitudes of modes 2..highest over form_m2: k^-3."""
     return np.repeat(np.arange(2.0, highest + 1) ** -3, 2)
+
+
+def _form(azimuth_rad):
+    """(n, modes) cos and sin of the modes 2 to FORM_MODES."""
+    return harmonics(azimuth_rad, FORM_MODES)[:, 3:]
 
 
 def harmonics(azimuth_rad, highest, derivative=0):

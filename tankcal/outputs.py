@@ -22,7 +22,7 @@ def write(result, directory, progress=None):
     progress   called as progress(text, done, total)
     Returns the paths. Raises InputError for a folder that is not tankcal's to replace.
     """
-    directory = Path(directory)
+    directory = Path(directory).resolve()  # where a link points to
     refuse_foreign(directory)
     tell = progress or (lambda text, done, total: None)
     directory.parent.mkdir(parents=True, exist_ok=True)
@@ -68,14 +68,16 @@ def _swap(temporary, directory):
     if not directory.exists():
         temporary.rename(directory)
         return
-    old = Path(tempfile.mkdtemp(prefix=".tankcal-old-", dir=directory.parent)) / directory.name
-    directory.rename(old)
+    aside = Path(tempfile.mkdtemp(prefix=".tankcal-old-", dir=directory.parent))
     try:
-        temporary.rename(directory)
-    except OSError:
-        old.rename(directory)
-        raise
-    shutil.rmtree(old.parent, ignore_errors=True)
+        directory.rename(aside / directory.name)
+        try:
+            temporary.rename(directory)
+        except OSError:
+            (aside / directory.name).rename(directory)
+            raise
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
 
 
 def _write_tables(record, directory):
@@ -88,6 +90,7 @@ def _write_tables(record, directory):
                 **_sds_mm(row["cov_m2"]),
                 "course": row["course"],
                 "section": row["section"],
+                "generatrix": row["generatrix"],
                 "residual_mm": None if row["residual_m"] is None else 1000 * row["residual_m"],
                 "used": "yes" if row["used"] else "no",
                 "reason": reason.get(row["point"], ""),

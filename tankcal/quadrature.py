@@ -19,7 +19,7 @@ def panels(breaks, nodes):
 
 
 def polar_products(radii_m, weights_rad):
-    """Area products of outlines about a common centre: G_ij = 1/2 integral r_i r_j dtheta, m2.
+    """Area products of outlines, each about its centre: G_ij = 1/2 integral r_i r_j dtheta, m2.
 
     radii_m (k, q) of k outlines at q nodes; G_ii is the area of outline i. An outline interpolated
     between them, r = sum l_i r_i, has the area l' G l.
@@ -36,7 +36,7 @@ def height_basis(levels, z, degree):
     """
     levels, z = np.asarray(levels, dtype=float), np.asarray(z, dtype=float)
     middle = levels.mean()
-    half = max(np.ptp(levels) / 2, np.finfo(float).tiny)
+    half = np.ptp(levels) / 2 or 1.0
     powers = np.vander((levels - middle) / half, degree + 1, increasing=True)
     return np.vander((z - middle) / half, degree + 1, increasing=True) @ np.linalg.pinv(powers)
 

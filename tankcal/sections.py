@@ -117,14 +117,14 @@ class Section:
     parameters_by_points: np.ndarray
 
 
-RING_GAP, RING_SPREAD = 0.10, 0.05  # of the course height: between rings, within one ring
+RING_GAP, RING_SPREAD = 0.10, 0.15  # of the course height: between rings, within one ring
 
 
 def group_by_height(height_m, azimuth_rad, course, joints_m):
     """Sections of points without a section number: rings where they lie level, else one a course.
 
     Points of a course form rings when each cluster of heights (apart by a tenth of the course,
-    level within a twentieth) has 5 points or more and no gap of a third of a turn.
+    level within 15 % of it) has 5 points or more and no gap of a third of a turn.
     height_m (n,) and joints_m (courses + 1,) above the bottom; course (n,) index. Names: "1", "2",
     or "2.1", "2.2" for rings, from the bottom up.
     """
@@ -189,7 +189,7 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
     """Circle and outline of the points of one group.
 
     xyz_m (n, 3) of the members; covariance_m2 (3n, 3n) dense or sparse; slope of the axis; z_m
-    height of the cut in the frame of the points; form_m2 amplitude of `estimate_components`.
+    height of the cut in the frame of the points; form_m2 amplitude of `estimate_form`.
     The outline is interpolated where the points are evenly spread, else smoothed.
     """
     xy, by_xyz = slide(xyz_m, slope, z_m)
@@ -197,7 +197,7 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
     circle = fit_circle(xy, covariance_xy)
     azimuth, _ = polar(xy, circle.x_m, circle.y_m)
     if evenly_spread(azimuth):
-        outline = interpolate_outline(xy, circle.x_m, circle.y_m)
+        outline = interpolate_outline(xy, circle.x_m, circle.y_m, form_m2)
     else:
         noise = radial_covariance(xy, circle, covariance_xy)
         outline = smooth_outline(xy, circle.x_m, circle.y_m, noise, form_m2)

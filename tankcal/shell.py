@@ -2,14 +2,14 @@
 
 A survey hits stairs, pipes and the roof too. A consensus of circles finds the wall, a leaning
 cylinder with one radius a course refines it, and data snooping about the shell's smooth form (dents
-that run up the wall are form, not blunders) rejects what remains, one point at a time.
+that run up the wall are form, not blunders) rejects what remains, the worst points first.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.adjust import adjust
+from tankcal.adjust import Adjustment, adjust
 from tankcal.errors import SolutionError
 from tankcal.outlines import harmonics, mode_variances
 
@@ -19,6 +19,9 @@ END_TOLERANCE_M = 0.020  # a point this far above or below the shell still belon
 SAMPLES = 1000  # three-point circles tried; with half the points clutter one in eight is sound
 MODES = 24  # highest mode of the form that the snooping allows for
 LEAST_PART = 0.5  # of the points between bottom and top that the wall must hold
+WIDEST_SLOPE = 0.05  # sd of the slope before anything is measured: tanks hardly lean by more
+VAGUE_TILT = 2e-3  # sd above which the tilt counts as not determined by the points
+REJECTED = 1e3  # factor on the sd of a rejected point: it is predicted, not fitted
 LEAST_NOISE_M = 1e-4  # a sound point is never rejected for less than a third of a millimetre
 
 
@@ -29,9 +32,13 @@ class Shell:
     axis_m        (x, y) of the axis at height z_m
     slope         (dx/dz, dy/dz) of the axis; slope_cofactor (2, 2) its covariance
     reason        (n,) "" for points of the wall, else why the point was rejected
-    residual_m    (n,) distance to the leaning cylinder of the point's course, outwards positive
+    residual_m    (n,) distance outwards to the smooth form of the shell; of points far from the
+                  wall to the leaning cylinder of their course
     w             (n,) normalised residual of the snooping test, nan where none was made
-    noise_m       standard deviation of a point about the smooth form common to all courses
+    noise_m       standard deviation of a point about the smooth form common to all courses;
+                  of a point of median standard deviation where those are given
+    noise_dof     its degrees of freedom
+    tilt_known    False: the points do not determine a tilt, and the shell is taken as upright
     """
 
     axis_m: tuple[float, float]
@@ -42,6 +49,8 @@ class Shell:
     residual_m: np.ndarray
     w: np.ndarray
     noise_m: float
+    noise_dof: float
+    tilt_known: bool
 
     @property
     def tilt(self):
@@ -65,10 +74,11 @@ def course_of(z_m, joints_m):
     return np.searchsorted(np.asarray(joints_m)[1:-1], z_m, side="right")
 
 
-def find_shell(xyz_m, joints_m, nominal_radius_m, *, snooping=True):
+def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
     """Tell the wall from the clutter and find the axis of the shell.
 
-    xyz_m (n, 3); joints_m (courses + 1,) heights of the course joints in the same frame.
+    xyz_m (n, 3); joints_m (courses + 1,) heights of the course joints in the same frame; sd_m (n,)
+    standard deviations of the radii, which are believed in relation to each other.
     Raises SolutionError when no cylinder near the nominal radius holds half of the points between
     the bottom and the top.
     """
@@ -86,7 +96,13 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, snooping=True):
     start = _consensus_circle(local[candidates, :2], nominal_radius_m)
     wall, axis = _leaning_cylinder(local, course, candidates, start, nominal_radius_m)
     reason[candidates & ~wall] = "consensus"
-    wall, axis, cofactor, w, noise = _snoop(local, course, wall, axis, snooping)
+    relative = np.ones(n) if sd_m is None else sd_m / np.median(sd_m)
+    found = _snoop(local, course, wall, axis, relative, WIDEST_SLOPE, snooping)
+    tilt_known = np.sqrt(np.diag(found.slope_cofactor).max()) < VAGUE_TILT
+    if not tilt_known:
+        upright = np.array([*axis[:2], 0.0, 0.0])
+        found = _snoop(local, course, wall, upright, relative, 1e-9, snooping)
+    in_band, wall, axis = wall, found.wall, found.axis
     reason[(reason == "") & ~wall] = "snooping"
     if wall.sum() < LEAST_PART * candidates.sum():
         raise SolutionError(
@@ -107,12 +123,27 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, snooping=True):
         axis_m=(float(axis[0] + origin[0]), float(axis[1] + origin[1])),
         z_m=float(origin[2]),
         slope=(float(axis[2]), float(axis[3])),
-        slope_cofactor=cofactor,
+        slope_cofactor=found.slope_cofactor,
         reason=reason,
-        residual_m=distance - radii[course],
-        w=w,
-        noise_m=noise,
+        residual_m=np.where(in_band, found.residual, distance - radii[course]),
+        w=found.w,
+        noise_m=found.noise,
+        noise_dof=found.noise_dof,
+        tilt_known=bool(tilt_known),
     )
+
+
+@dataclass(frozen=True)
+class _Wall:
+    """What the snooping left: mask, axis (x, y, dx/dz, dy/dz), residuals, tests, point noise."""
+
+    wall: np.ndarray
+    axis: np.ndarray
+    slope_cofactor: np.ndarray
+    w: np.ndarray
+    residual: np.ndarray
+    noise: float
+    noise_dof: float
 
 
 def _repeated(xyz_m):
@@ -164,7 +195,8 @@ def _leaning_cylinder(local, course, candidates, circle, nominal_radius):
     distance = _from_axis(local, axis)[1]
     wall = candidates & (np.abs(distance - circle[2]) < WIDE_BAND * nominal_radius)
     for band in np.repeat(np.geomspace(WIDE_BAND, WALL_BAND, 5), 3) * nominal_radius:
-        fit = adjust(*_shell_problem(local[wall], course[wall], axis, 1.0, None))
+        rough = np.full(wall.sum(), 0.01)
+        fit = adjust(*_shell_problem(local[wall], course[wall], axis, rough, None, WIDEST_SLOPE))
         axis = fit.unknowns[:4]
         distance = _from_axis(local, axis)[1]
         names, first = np.unique(course[wall], return_inverse=True)
@@ -177,44 +209,89 @@ def _leaning_cylinder(local, course, candidates, circle, nominal_radius):
     return wall, axis
 
 
-def _snoop(local, course, wall, axis, snooping):
-    """Reject the worst normalised residual about the smooth form until all are sound."""
-    wall = wall.copy()
-    w = np.full(len(local), np.nan)
-    noise, form = None, None
+def _snoop(local, course, candidates, axis, relative, slope_sd, snooping):
+    """Reject the worst points about the smooth form until all are sound; re-admit whom it spares.
+
+    A pass rejects the points within a tenth of the worst and fits anew. When none is left to
+    reject, rejected points that agree with the fit after all come back, each once.
+    """
+    index = np.flatnonzero(candidates)
+    xyz, of, relative = local[index], course[index], relative[index]
+    accepted, returned = np.ones(len(index), dtype=bool), np.zeros(len(index), dtype=bool)
+    state = None
     while True:
-        fit, noise, form = _fit_form(local[wall], course[wall], axis, noise, form)
-        axis = fit.unknowns[:4]
-        tested = fit.w[: wall.sum()]
-        w[wall] = tested
-        size = np.nan_to_num(np.abs(tested))
-        if not snooping or size.max() <= CRITICAL_W:
-            return wall, axis, fit.cofactor[2:4, 2:4], w, noise
-        worst = size >= max(CRITICAL_W, 0.9 * size.max())
-        wall[np.flatnonzero(wall)[worst]] = False
+        state = _fit_form(xyz, of, axis, relative, slope_sd, accepted, state)
+        size = np.abs(state.w)
+        worst = accepted & (size > CRITICAL_W)
+        sound = ~accepted & ~returned & (size <= CRITICAL_W)
+        if snooping and worst.any():
+            accepted &= ~(worst & (size >= 0.9 * size[worst].max()))
+        elif snooping and sound.any():
+            accepted, returned = accepted | sound, returned | sound
+        else:
+            return _wall_of(state, index, accepted, len(local))
 
 
-def _fit_form(xyz, course, axis, noise, form):
+def _wall_of(state, index, accepted, count):
+    """The `_Wall` of all `count` points from the fit of the candidates `index`."""
+    wall, w, residual = np.zeros(count, dtype=bool), np.full(count, np.nan), np.full(count, np.nan)
+    wall[index], w[index], residual[index] = accepted, state.w, state.residual
+    fit = state.fit
+    dof = float(np.sum(fit.redundancy[: len(index)][accepted]))
+    return _Wall(wall, fit.unknowns[:4], fit.cofactor[2:4, 2:4], w, residual, state.noise, dof)
+
+
+@dataclass(frozen=True)
+class _FormFit:
+    """A fit of the form: its components, and residual and test quantity of every candidate."""
+
+    fit: Adjustment
+    noise: float
+    form: float
+    residual: np.ndarray
+    w: np.ndarray
+
+
+def _fit_form(xyz, course, axis, relative, slope_sd, accepted, before):
     """Shell with form, its point noise and form amplitude as two variance components.
 
     Helmert's simple iteration: each standard deviation is scaled by the root of its group's sum of
     squared normalised residuals over its redundancy (Foerstner 1979). The point noise is kept
-    robust: never above 1.4826 times the median residual.
+    robust: never above 1.4826 times the median residual. Accepted points beyond two standard
+    deviations weigh less (Huber 1964), so that clutter does not bend the form.
     """
-    first = noise is None
-    noise, form = noise or 0.005, form or 0.010
-    for _ in range(10 if first else 2):
-        before = noise, form
-        fit = adjust(*_shell_problem(xyz, course, axis, noise, form))
-        axis = fit.unknowns[:4]
-        points, modes = slice(0, len(xyz)), slice(len(xyz), None)
-        noise *= _component(fit, points)
-        robust = before[0] * 1.4826 * np.median(np.abs(np.nan_to_num(fit.w[points])))
-        noise = max(min(noise, robust), LEAST_NOISE_M)
-        form = max(form * _component(fit, modes), 0.1 * noise)
-        if np.allclose(before, (noise, form), rtol=0.05):
+    noise, form = (before.noise, before.form) if before else (0.005, 0.010)
+    residual = before.residual if before else np.zeros(len(xyz))
+    axis = before.fit.unknowns[:4] if before else axis
+    n = len(xyz)
+    for _ in range(3 if before else 10):
+        was = noise, form
+        doubt = np.maximum(1.0, np.abs(residual) / (2 * noise * relative))
+        sd = noise * relative * np.where(accepted, doubt, REJECTED)
+        fit = adjust(*_shell_problem(xyz, course, axis, sd, form, slope_sd))
+        axis, residual = fit.unknowns[:4], fit.residuals[:n]
+        noise = _noise(residual[accepted] / relative[accepted], fit.redundancy[:n][accepted])
+        form = max(form * _component(fit, slice(n, -2)), 0.1 * noise)
+        if np.allclose(was, (noise, form), rtol=0.05):
             break
-    return fit, noise, form
+    return _FormFit(fit, noise, form, residual, _left_out(fit, residual, sd, noise * relative))
+
+
+def _left_out(fit, residual, sd, noise):
+    """(n,) residual of each point from the fit without it, over its standard deviation.
+
+    For a point of full weight this is Baarda's w = v / (s sqrt(r)); for a rejected one it tests
+    whether the point agrees with all the others.
+    """
+    r = np.maximum(fit.redundancy[: len(residual)], 1e-9)
+    return (residual / r) / np.sqrt(noise**2 + sd**2 * (1 - r) / r)
+
+
+def _noise(residual, redundancy):
+    """Point noise: root of the squares over the redundancy, at most the normal median's."""
+    whole = np.sqrt(np.sum(residual**2) / np.sum(redundancy))
+    robust = 1.4826 * np.median(np.abs(residual) / np.sqrt(np.maximum(redundancy, 1e-9)))
+    return max(min(whole, robust), LEAST_NOISE_M)
 
 
 def _component(fit, group):
@@ -222,11 +299,12 @@ def _component(fit, group):
     return np.sqrt(np.sum(fit.normalised[group] ** 2) / max(redundancy, 1e-9))
 
 
-def _shell_problem(xyz, course, axis, noise, form):
+def _shell_problem(xyz, course, axis, sd, form, slope_sd):
     """Arguments of `adjust` for radii = R of the course + form(azimuth, height).
 
     The form is the same at all heights but for a part that grows linearly with height; its modes
-    are unknowns with a prior (an observation of zero). Without `form` the shell is round.
+    and the slope are unknowns with a prior (an observation of zero). Without `form` the shell is
+    round. sd (n,) of the radii.
     """
     courses, row_of = np.unique(course, return_inverse=True)
     n, modes = len(xyz), 0 if form is None else 2 * (MODES - 1)
@@ -234,7 +312,9 @@ def _shell_problem(xyz, course, axis, noise, form):
     height = xyz[:, 2] / max(np.abs(xyz[:, 2]).max(), 1e-9)
     by_radius = np.zeros((n, len(courses)))
     by_radius[np.arange(n), row_of] = -1.0
-    priors = np.eye(2 * modes)
+    priors = np.zeros((2 * modes + 2, first_mode + 2 * modes))
+    priors[: 2 * modes, first_mode:] = np.eye(2 * modes)
+    priors[2 * modes :, 2:4] = np.eye(2)
 
     def model(x, observations):
         offset, distance = _from_axis(xyz, x[:4])
@@ -251,19 +331,16 @@ def _shell_problem(xyz, course, axis, noise, form):
         by_xy = -np.column_stack([sin - turn * cos, cos + turn * sin])
         by_axis = np.hstack([by_xy, by_xy * xyz[:, 2:]])
         top = np.hstack([by_axis, by_radius, -by_form])
-        bottom = np.hstack([np.zeros((2 * modes, first_mode)), priors])
         misclosure = distance - x[4:first_mode][row_of] - form_now
-        modelled = np.concatenate([misclosure, x[first_mode:]])
-        return modelled - observations, np.vstack([top, bottom]), None
+        modelled = np.concatenate([misclosure, x[first_mode:], x[2:4]])
+        return modelled - observations, np.vstack([top, priors]), None
 
     distance = _from_axis(xyz, axis)[1]
     radii = [np.median(distance[row_of == i]) for i in range(len(courses))]
     start = np.concatenate([axis, radii, np.zeros(2 * modes)])
-    variances = np.full(n, noise**2)
-    if modes:
-        prior = form**2 * mode_variances(MODES)
-        variances = np.concatenate([variances, prior, prior])
-    return model, start, np.zeros(n + 2 * modes), variances
+    prior = form**2 * mode_variances(MODES) if modes else np.zeros(0)
+    variances = np.concatenate([sd**2, prior, prior, np.full(2, slope_sd**2)])
+    return model, start, np.zeros(len(variances)), variances
 
 
 def _from_axis(local, axis):

@@ -72,3 +72,8 @@ def row_decimals(uncertainties, least=0):
     for i in reversed(range(len(decimals))):
         following = decimals[i] = following if decimals[i] is None else decimals[i]
     return decimals
+
+
+def height_decimals(height_m):
+    """Decimals of a height: millimetres, and up to two more where it is no whole millimetre."""
+    return next((d for d in (3, 4) if abs(height_m - round(height_m, d)) < 1e-9), 5)

@@ -17,17 +17,21 @@ from tankcal.errors import HeightError
 from tankcal.outlines import FULL_TURN
 from tankcal.quadrature import height_basis, height_products, panels, polar_products
 
-DEGREE_BY_SPREAD = ((0.6, 2), (0.4, 1), (0.0, 0))  # share of the course that the sections span
+FORM_GRID = 720  # azimuths; resolves products of an outline with the highest mode of the form
+HIGHEST_DEGREE, MOST_AMPLIFICATION = 2, 2.5  # of the noise of a section, at the ends of a course
 
 
 @dataclass(frozen=True)
 class CourseShape:
     """One course: where it stands, the heights of its k sections, and its area products.
 
-    degree        of the polynomial in height: sections - 1, at most 2, less when they lie close
+    degree        of the polynomial in height: sections - 1, at most 2, less where it would carry
+                  the noise of a section more than 2.5-fold to an end of the course
     products_m2   (k, k) G_ij of the inside outlines
     girths_m      (k, k) derivative of -G_ij by the inset (plate, paint): mean girths
+    by_scale_m2   (k, k) derivative of G_ij by a scale of the surveyed lengths
     by_parameters (k, k, p) derivative of G_ij by the parameters of the course's outlines
+    by_form_m2    (k, k, modes) effect on G_ij of one sd of each mode of the form between points
     """
 
     bottom_m: float
@@ -36,7 +40,9 @@ class CourseShape:
     degree: int
     products_m2: np.ndarray
     girths_m: np.ndarray
+    by_scale_m2: np.ndarray
     by_parameters: np.ndarray
+    by_form_m2: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -52,6 +58,11 @@ class ShellVolume:
     def height_m(self):
         """Height of the shell, along the vertical."""
         return self.courses[-1].top_m
+
+    @property
+    def form_m2(self):
+        """(f, modes) effect on the features of one sd of each mode of the form between points."""
+        return np.vstack([_upper(course.by_form_m2) for course in self.courses])
 
     @property
     def features(self):
@@ -92,6 +103,11 @@ class ShellVolume:
         girths = np.concatenate([_upper(course.girths_m) for course in self.courses])
         return self.weights_m(heights_m) @ girths
 
+    def by_scale_m3(self, heights_m):
+        """(rows,) derivative of the volume below each height by a scale of surveyed lengths."""
+        by_scale = np.concatenate([_upper(course.by_scale_m2) for course in self.courses])
+        return self.weights_m(heights_m) @ by_scale
+
     def _inside(self, heights_m):
         heights = np.atleast_1d(np.asarray(heights_m, dtype=float))
         outside = ~((heights >= 0) & (heights <= self.height_m * (1 + 1e-12)))
@@ -116,6 +132,7 @@ def course_shape(bottom_m, top_m, levels_m, outlines, *, inset_m=0.0, scale=1.0)
     radii = np.array([b @ o.parameters for b, o in zip(bases, outlines, strict=True)])
     inside = scale * (radii - inset_m)
     sums = (inside * weight).sum(axis=1)
+    products, girths = polar_products(inside, weight), 0.5 * scale * (sums[:, None] + sums[None, :])
     count = len(outlines)
     starts = np.cumsum([0] + [len(outline.parameters) for outline in outlines])
     by_parameters = np.zeros((count, count, starts[-1]))
@@ -128,23 +145,36 @@ def course_shape(bottom_m, top_m, levels_m, outlines, *, inset_m=0.0, scale=1.0)
         bottom_m=float(bottom_m),
         top_m=float(top_m),
         levels_m=levels,
-        degree=_degree(levels, top_m - bottom_m),
-        products_m2=polar_products(inside, weight),
-        girths_m=0.5 * scale * (sums[:, None] + sums[None, :]),
+        degree=_degree(levels, bottom_m, top_m),
+        products_m2=products,
+        girths_m=girths,
+        by_scale_m2=2 * products + inset_m * girths,  # plates do not grow with a wrong scale
         by_parameters=by_parameters,
+        by_form_m2=_by_form(outlines, inset_m, scale),
     )
+
+
+def _by_form(outlines, inset_m, scale):
+    """(k, k, modes) effect of the unseen form; an even grid, for high modes lie between knots."""
+    azimuth = np.arange(FORM_GRID) * FULL_TURN / FORM_GRID
+    inside = np.array([scale * (outline.radius_m(azimuth) - inset_m) for outline in outlines])
+    unseen = scale * np.array([outline.unseen_form_m(azimuth) for outline in outlines])
+    moved = 0.5 * FULL_TURN / FORM_GRID * np.einsum("iqm,jq->ijm", unseen, inside, optimize=True)
+    return moved + moved.transpose(1, 0, 2)
 
 
 def feature_jacobian(course):
     """(f, p) derivative of the features of one course by the parameters of its outlines."""
-    rows = np.triu_indices(len(course.levels_m))
-    return course.by_parameters[rows]
+    return _upper(course.by_parameters)
 
 
-def _degree(levels, tall):
-    spread = np.ptp(levels) / tall
-    allowed = next(degree for least, degree in DEGREE_BY_SPREAD if spread >= least)
-    return min(len(np.unique(levels)) - 1, allowed)
+def _degree(levels, bottom, top):
+    """The highest degree that the levels carry to the ends of the course without much noise."""
+    for degree in range(min(len(np.unique(levels)) - 1, HIGHEST_DEGREE), 0, -1):
+        at_ends = height_basis(levels, [bottom, top], degree)
+        if np.linalg.norm(at_ends, axis=1).max() <= MOST_AMPLIFICATION:
+            return degree
+    return 0
 
 
 def _upper(matrix):

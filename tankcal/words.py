@@ -45,3 +45,21 @@ def sentence(words, group, code, value=None):
     if template is None:
         return code if value is None else f"{code}: {value}"
     return template.format(value=shown)
+
+
+def choice_sentence(words, choice):
+    """One choice {code, value} of the record as a sentence, its numbers in the reader's style."""
+    value = choice["value"]
+    if choice["code"] == "coverage":
+        value = f"{100 * value:.6g}\N{NO-BREAK SPACE}%"
+    elif isinstance(value, int | float):
+        value = f"{value:.3g}"
+    elif isinstance(value, list):
+        return sentence(
+            words, "choices", choice["code"], [words["inputs"].get(name, name) for name in value]
+        )
+    mark = words["language"]["decimal"]
+    is_number = any(sign.isdigit() for sign in value)
+    return sentence(
+        words, "choices", choice["code"], value.replace(".", mark) if is_number else value
+    )

@@ -1,5 +1,7 @@
 """The capacity table: rows, deliveries, declared inputs and degrees of freedom."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from jacobians import assert_derivative
@@ -72,6 +74,21 @@ def test_between_rows_the_table_is_read_linearly():
 def test_heights_outside_are_errors(height):
     with pytest.raises(HeightError, match="outside the capacity table"):
         table().at(height)
+
+
+def test_the_top_may_be_typed_as_it_is_read():
+    """A leaning shell ends at 9.49995 m; a dip is read to the millimetre."""
+    found = replace(table(), height_m=np.append(HEIGHTS[:-1], 9.49995))
+    assert found.at(9.5).value_m3 == found.volume_m3[-1]
+    with pytest.raises(HeightError):
+        found.at(9.501)
+
+
+def test_below_the_bottom_there_is_nothing_and_no_uncertainty():
+    sources = propagation().sources(np.array([-0.02, 0.0, 1.0]))
+    datum = next(source for source in sources if source.kind == "datum")
+    assert datum.columns_m3[0, 0] == 0.0
+    assert datum.columns_m3[2, 0] > 100
 
 
 @pytest.mark.parametrize(

@@ -172,3 +172,27 @@ def test_whatever_the_numbers_are_a_job_computes_or_says_why(tmp_path_factory, s
         table = tankcal.run(tankcal.load(job)).capacity
         assert (table.volume_m3.diff().dropna() > 0).all()
         assert table.notna().all().all()
+
+
+def test_a_link_is_followed(done, tmp_path, capsys):
+    (tmp_path / "disk").mkdir()
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "disk")
+    assert main(["run", str(done), "--out", str(link), "--quiet"]) == 0
+    assert link.is_symlink()
+    assert (tmp_path / "disk" / "record.json").is_file()
+
+
+def test_an_interruption_in_disguise_is_no_traceback(done, monkeypatch, capsys):
+    """nbclient turns Ctrl-C at the start of a kernel into an AssertionError."""
+    from tankcal import report
+
+    def interrupted(*arguments):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            raise AssertionError from None
+
+    monkeypatch.setattr(report, "build", interrupted)
+    assert main(["run", str(done), "--quiet"]) == 130
+    assert "stopped; nothing was written" in capsys.readouterr().err

@@ -1,5 +1,7 @@
 """Outlines: interpolated and smoothed, their derivatives, their components and their coverage."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from jacobians import assert_derivative
@@ -8,7 +10,7 @@ from shapes import azimuths, modes, ring
 from tankcal.errors import SolutionError
 from tankcal.outlines import (
     HARMONICS,
-    estimate_components,
+    estimate_form,
     evenly_spread,
     harmonics,
     interpolate_outline,
@@ -95,22 +97,30 @@ def simulated_sections(rng, noise, form, count=8, n=150):
     return sections
 
 
-def test_noise_and_form_are_found_again():
-    """Simulation: noise 3 mm, form 20 mm; the noise has about 1000 degrees of freedom."""
-    found = estimate_components(simulated_sections(np.random.default_rng(4), 0.003, 0.020))
-    assert np.sqrt(found.noise) == pytest.approx(0.003, rel=3 / np.sqrt(2 * found.dof))
-    assert np.sqrt(found.form_m2) == pytest.approx(0.020, rel=0.25)
-    assert 8 * 150 - 8 * (2 * HARMONICS + 1) < found.dof < 8 * (150 - 3)
+@pytest.mark.parametrize("form", [0.020, 0.006])
+def test_the_form_is_found_again(form):
+    """Simulation: eight sections of 150 points with 3 mm of noise."""
+    sections = simulated_sections(np.random.default_rng(4), 0.003, form)
+    assert np.sqrt(estimate_form(sections, 0.003**2)) == pytest.approx(form, rel=0.25)
 
 
-def test_a_given_noise_is_kept():
-    sections = [
-        (azimuth, radius, 0.003**2 * ones)
-        for azimuth, radius, ones in simulated_sections(np.random.default_rng(4), 0.003, 0.020)
-    ]
-    found = estimate_components(sections, noise=1.0)
-    assert found.noise == 1.0
-    assert np.sqrt(found.form_m2) == pytest.approx(0.020, rel=0.25)
+def test_a_round_tank_has_no_form():
+    """Simulation: the amplitude is far below what 3 mm of noise could hide in a mode."""
+    sections = simulated_sections(np.random.default_rng(4), 0.003, 0.0)
+    assert np.sqrt(estimate_form(sections, 0.003**2)) < 0.001
+
+
+@pytest.mark.parametrize("kind", ["interpolated", "smoothed"])
+def test_the_unseen_form_is_what_a_mode_of_one_sd_does(kind):
+    """Second method: fit the same azimuths to a shape that holds the mode."""
+    plain = outlines()[kind]
+    grid = np.linspace(0, 6, 7)
+    unseen = replace(plain, form_m2=1e-6).unseen_form_m(grid)
+    for k, column in ((3, 2), (24, 44)):
+        sd = 1e-3 * k**-1.5
+        radius = 6.5 + sd * np.cos(k * plain.azimuth_rad)
+        shown = plain.basis(grid) @ (plain.from_radii @ radius)
+        assert shown - 6.5 - sd * np.cos(k * grid) == pytest.approx(unseen[:, column], abs=1e-8)
 
 
 def coverage(tanks):
@@ -129,7 +139,9 @@ def coverage(tanks):
         nodes, weight = outline.nodes()
         gradient = (outline.radius_m(nodes) * weight) @ outline.basis(nodes)
         variance = 0.003**2 * np.sum((gradient @ outline.from_radii) ** 2)
-        variance += np.sum((gradient @ outline.form_factor_m) ** 2)
+        even = np.arange(720) * np.pi / 360
+        form = outline.radius_m(even) @ outline.unseen_form_m(even) * np.pi / 360
+        variance += np.sum(form**2)
         inside += abs(outline.area_m2() - area) < 1.96 * np.sqrt(variance)
     return inside / tanks
 

@@ -99,3 +99,39 @@ def test_no_wall_is_said(xyz, message):
 
 def test_heights_belong_to_courses():
     assert list(course_of([1.99, 2.0, 3.89, 3.91, 11.5, 11.51], JOINTS)) == [0, 0, 0, 1, 4, 4]
+
+
+def test_one_level_of_points_leaves_the_shell_upright():
+    """The z noise of a single ring would be a tilt of any size."""
+    rng = np.random.default_rng(13)
+    xyz = wall(rng, n=24)
+    xyz[:, 2] = 5.0 + rng.normal(0, 0.001, 24)
+    shell = find_shell(xyz, JOINTS, 6.5)
+    assert not shell.tilt_known
+    assert shell.tilt < 1e-6
+
+
+def test_points_of_large_declared_sd_are_not_blunders():
+    """15 % of the points have, rightly, five times the sd of the others."""
+    rng = np.random.default_rng(14)
+    xyz = wall(rng, noise=0.0)
+    sd = np.where(rng.uniform(size=600) < 0.15, 0.010, 0.002)
+    xyz[:, :2] += rng.normal(size=(600, 2)) * sd[:, None]
+    rejected = find_shell(xyz, JOINTS, 6.5, sd_m=sd).reason != ""
+    assert rejected.sum() <= 6
+    assert np.sum(find_shell(xyz, JOINTS, 6.5).reason != "") > 20  # what the sds are for
+
+
+def test_a_spiral_stair_before_the_wall_takes_no_wall_point_with_it():
+    """20 steps over a third of the turn, 20 to 60 mm off a wall of 15 mm ovality."""
+    rng = np.random.default_rng(15)
+    xyz = wall(rng, n=400, noise=0.002)
+    out = (xyz[:, :2] - (30, 20)) / np.hypot(*(xyz[:, :2] - (30, 20)).T)[:, None]
+    azimuth = np.arctan2(out[:, 0], out[:, 1])
+    xyz[:, :2] += out * (0.015 * np.cos(2 * azimuth))[:, None]
+    turn, z = np.linspace(1.0, 3.0, 20), np.linspace(2.5, 11, 20)
+    radius = 6.5 + 0.015 * np.cos(2 * turn) + rng.uniform(0.020, 0.060, 20)
+    steps = np.column_stack([30 + radius * np.sin(turn), 20 + radius * np.cos(turn), z])
+    shell = find_shell(np.vstack([xyz, steps]), JOINTS, 6.5)
+    assert np.sum(shell.reason[:400] != "") <= 3
+    assert np.sum(shell.reason[400:] != "") >= 18

@@ -149,3 +149,18 @@ def test_variance_of_the_volume_published_s_equation_64(correlated, published, f
     if correlated:
         assert variance == pytest.approx(1.624, abs=0.005)
         assert stack.volume_m3([9.5])[0] == pytest.approx(1252.82, abs=0.005)
+
+
+def test_one_ring_surveyed_twice_amplifies_no_noise():
+    """Levels 0.4, 0.4002 and 1.8 m of a 2 m course carry a line, not a parabola (property)."""
+    stack = shell([0, 2.0], [[0.4, 0.4002, 1.8]], lambda z: 6.5)
+    assert stack.courses[0].degree == 1
+    evenly = shell([0, 2.0], [[0.2254, 1.0, 1.7746]], lambda z: 6.5)
+    assert evenly.courses[0].degree == 2
+
+
+def test_a_wrong_scale_of_the_survey_leaves_the_plates_alone():
+    """dV/ds = integral of 2 r (r - t), closed form for a cylinder."""
+    stack = shell([0, 9.5], [[4.0]], lambda z: 6.5, inset_m=0.008)
+    expected = 2 * np.pi * 6.5 * (6.5 - 0.008) * 9.5
+    assert stack.by_scale_m3([9.5])[0] == pytest.approx(expected, rel=1e-12)

@@ -16,7 +16,7 @@ import pytest
 from openpyxl.utils import get_column_letter
 
 from tankcal.uncertainty import decimals_for
-from tankcal.words import load_words, sentence
+from tankcal.words import choice_sentence, load_words, sentence
 from tankcal.workbook import write
 
 # openpyxl does not know our data bars, and says so each time
@@ -125,7 +125,7 @@ def test_the_certificate_lists_tank_and_choices_and_leaves_the_authorisation_emp
     for value in record["job"]["tank"]["details"].values():
         assert str(value) in said
     for choice in record["choices"]:
-        assert sentence(words, "choices", choice["code"], choice["value"]) in said
+        assert choice_sentence(words, choice) in said
     for key in ("authorised_by", "signature", "place_and_date"):
         line = row_of(sheet, words["labels"][key])
         assert all(cell.value is None for cell in line[1:])

@@ -218,14 +218,18 @@ def _check_points_in_courses(z, unplaced, edges, courses, raw, log):
             log.warning(courses.file, f"{expected} {FEW_POINTS_PER_COURSE} or more", row, "course")
 
 
-def check_inputs(inputs, log):
-    """uncertainty.csv: each input once, in its own unit, of a credible size."""
+def check_inputs(inputs, values, log):
+    """uncertainty.csv: each input once, in its own unit, of a credible size, and of use here."""
+    inside = values is not None and values["survey"]["side"] == "inside"
     _refuse_repeated(inputs, "input", log)
     given = zip(inputs.rows, inputs.of("input"), inputs.of("u"), inputs.of("unit"), strict=True)
     for row, name, u, unit in given:
         if None in (name, u, unit):
             continue
         expected_unit, _, largest, _ = INPUT_UNITS[name]
+        if inside and name in ("plate_thickness", "paint"):
+            expected = f"found {name}; expected only with side = outside: nothing is subtracted"
+            log.problem(inputs.file, expected, row, "input")
         if unit != expected_unit:
             expected = f"found {unit!r}; expected {expected_unit!r} for {name}"
             log.problem(inputs.file, expected, row, "unit")

@@ -104,7 +104,7 @@ def _check(values, tables, raw, log):
     if points is not None and values is not None:
         check_geometry(points, courses, values, raw, log)
     if inputs is not None:
-        check_inputs(inputs, log)
+        check_inputs(inputs, values, log)
     return covariance
 
 

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from tankcal.chain import noise_is_estimated
+from tankcal.outlines import FULL_TURN
+from tankcal.volumes import FORM_GRID
 
 
 def shell_of(result):
     """The wall as one body: axis, tilt, residuals."""
     shell, sections = result.shell, result.sections
     residuals = np.concatenate([section.circle.residuals_m for section in sections])
-    estimated = noise_is_estimated(result.job)
     return {
         "x_m": shell.axis_m[0],
         "y_m": shell.axis_m[1],
@@ -22,8 +22,8 @@ def shell_of(result):
         "residual_sd_m": np.sqrt(np.sum(residuals**2) / (len(residuals) - 3 * len(sections))),
         "points": len(shell.reason),
         "accepted": len(result.wall),
-        "noise_sd_m": np.sqrt(result.covariance_m2.diagonal().mean()) if estimated else None,
-        "noise_dof": result.noise.dof if estimated else None,
+        "noise_sd_m": shell.noise_m,
+        "noise_dof": shell.noise_dof,
         "height_m": result.volume.height_m,
     }
 
@@ -45,6 +45,7 @@ def points_of(result):
                 "cov_m2": None if group is None else _covariance_of(result, member),
                 "course": job.courses[group.course].name if group else None,
                 "section": group.name if group else None,
+                "generatrix": job.points.generatrix[index],
                 "residual_m": residual,
                 "used": shell.reason[index] == "",
             }
@@ -123,7 +124,9 @@ def _area_sd(result, section):
     gradient = (section.outline.radius_m(azimuth) * weight) @ section.outline.basis(azimuth)
     by_points = gradient @ section.parameters_by_points
     index = (3 * section.group.members[:, None] + np.arange(3)).ravel()
-    form = gradient @ section.outline.form_factor_m
+    even = np.arange(FORM_GRID) * FULL_TURN / FORM_GRID
+    form = section.outline.radius_m(even) @ section.outline.unseen_form_m(even)
+    form = form * FULL_TURN / FORM_GRID
     return np.sqrt(by_points @ (result.covariance_m2[index][:, index] @ by_points) + form @ form)
 
 
@@ -152,7 +155,7 @@ def courses_of(result):
                 "points": sum(len(section.group.members) for section in own),
                 "rejected": sum(in_course),
                 "radius_m": np.mean([section.circle.radius_m for section in own]),
-                "radius_sd_m": _mean_radius_sd(own),
+                "radius_sd_m": _radius_sd(result, shape),
                 "inside_radius_m": np.sqrt(volume / height / np.pi),
                 "area_m2": volume / height,
                 "area_sd_m2": u / height,
@@ -163,13 +166,18 @@ def courses_of(result):
     return rows
 
 
-def _mean_radius_sd(sections):
-    return np.sqrt(sum(s.circle.cofactor_m2[2, 2] for s in sections)) / len(sections)
+def _radius_sd(result, shape):
+    """Of the mean radius of a course, from points and form: their part of sd(V) / (2 pi r h)."""
+    sources = result.propagation.sources([shape.bottom_m, shape.top_m])
+    of_survey = [source for source in sources if source.kind in ("points", "form")]
+    variance = sum(np.sum(np.diff(source.columns_m3, axis=0) ** 2) for source in of_survey)
+    return np.sqrt(variance) / np.diff(result.volume.inset_m2([shape.bottom_m, shape.top_m]))[0]
 
 
 def _partial(result, low_m, high_m):
     """Volume between two heights above the bottom and its standard uncertainty, exactly."""
     volume = result.volume.volume_m3([low_m, high_m])
     sources = result.propagation.sources([low_m, high_m])
-    variance = sum(np.sum(np.diff(source.columns_m3, axis=0) ** 2) for source in sources)
+    of_shell = [source for source in sources if source.kind != "datum"]  # joints know no zero
+    variance = sum(np.sum(np.diff(source.columns_m3, axis=0) ** 2) for source in of_shell)
     return volume[1] - volume[0], np.sqrt(variance)

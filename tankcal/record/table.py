@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tankcal.chain import corrections_of, noise_is_estimated, shell_volume, thermal_scale
-from tankcal.job.contract import INPUT_UNITS
+from tankcal.chain import corrections_of, shell_volume, thermal_scale
+from tankcal.doubts import undeclared_inputs
 from tankcal.shell import CRITICAL_W
 
 
@@ -139,7 +139,7 @@ def choices_of(result):
         "course_of_points": "section" if any(job.points.section) else "height",
         "shape": _one_or_mixed(section.outline.kind for section in result.sections),
         "between_sections": _between_sections(result),
-        "tilt": "horizontal_cut",
+        "tilt": "horizontal_cut" if result.shell.tilt_known else "not_determined",
         "course_heights": "along_axis",
         "thickness": _thickness_choice(job),
         "temperature": "not_applied" if job.survey.shell_temperature_c is None else "applied",
@@ -152,12 +152,10 @@ def choices_of(result):
         "k": "normal" if np.all(np.isinf(result.table.dof)) else "student",
         "expansion": "given" if job.material.expansion_given else "default",
         "snooping": CRITICAL_W if job.snooping else "off",
-        "not_in_budget": [
-            name for name in INPUT_UNITS if name not in {declared.name for declared in job.inputs}
-        ],
+        "form": "common",
+        "not_in_budget": list(undeclared_inputs(job)),
+        "covariance_sd_mm": 1000 * np.sqrt(np.median(result.covariance_m2.diagonal())),
     }
-    if noise_is_estimated(job):
-        values["covariance_sd_mm"] = 1000 * np.sqrt(result.covariance_m2.diagonal().mean())
     return [{"code": code, "value": value} for code, value in values.items()]
 
 
@@ -175,8 +173,8 @@ def _thickness_choice(job):
 
 
 def _between_sections(result):
-    degrees = {course.degree for course in result.volume.courses}
-    return "constant" if degrees == {0} else "polynomial"
+    constant = [course.degree == 0 for course in result.volume.courses]
+    return "constant" if all(constant) else "mixed" if any(constant) else "polynomial"
 
 
 def _one_or_mixed(values):

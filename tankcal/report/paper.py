@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from tankcal.errors import TankcalError
 from tankcal.record import load
 from tankcal.report import blocks, numbers
-from tankcal.uncertainty import row_decimals
-from tankcal.words import load_words, sentence
+from tankcal.uncertainty import height_decimals, row_decimals
+from tankcal.words import choice_sentence, load_words
 
 _SPACE = "\N{NO-BREAK SPACE}"
 
@@ -26,7 +26,8 @@ class Column:
     decimals  this many decimals, or
     u         key of the standard or expanded uncertainty that sets them (two digits of it), or
     least     but never fewer decimals than this
-    digits    this many significant digits; none of the three: text
+    digits    this many significant digits, or
+    height    True: a height, in millimetres or finer where it must be; none of the four: text
     words     group of words that a code is looked up in
     heading   key of another heading
     nothing   what is printed for a value that does not exist
@@ -38,6 +39,7 @@ class Column:
     u: str | None = None
     least: int = 0
     digits: int | None = None
+    height: bool = False
     words: str | None = None
     heading: str | None = None
     nothing: str = numbers.NOTHING
@@ -85,22 +87,13 @@ class Paper:
     def _percent(self, share):
         return f"{100 * share:.6g}".replace(".", self.mark) + f"{_SPACE}%"
 
-    def choices(self):
-        """One sentence for each choice of the record."""
+    def choices(self, code=None):
+        """One sentence for each choice of the record, or for that with the given code."""
         return [
-            sentence(self.words, "choices", choice["code"], self._choice_value(choice))
+            choice_sentence(self.words, choice)
             for choice in self.record["choices"]
+            if code in (None, choice["code"])
         ]
-
-    def _choice_value(self, choice):
-        value = choice["value"]
-        if choice["code"] == "coverage":
-            return self._percent(value)
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            return numbers.significant(value, 3, self.mark)
-        if isinstance(value, list):
-            return [self.words["inputs"].get(name, name) for name in value]
-        return value
 
     # ---- blocks
 
@@ -185,6 +178,8 @@ class Paper:
         if column.digits is not None:
             return [numbers.significant(value, column.digits, self.mark) for value in scaled]
         decimals = [column.decimals] * len(rows)
+        if column.height:
+            decimals = [height_decimals(value) for value in values]
         if column.u is not None:
             of_rows = [(row.get(column.u) or 0.0) * factor for row in rows]
             decimals = row_decimals(of_rows, column.least)
@@ -200,4 +195,5 @@ class Paper:
 
 
 def _is_text(column):
-    return column.decimals is None and column.u is None and column.digits is None
+    numeric = (column.decimals, column.u, column.digits)
+    return not column.height and all(rule is None for rule in numeric)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tankcal.uncertainty import LITRE_DECIMALS, row_decimals
+from tankcal.uncertainty import LITRE_DECIMALS, height_decimals, row_decimals
 from tankcal.workbook.book import ACCENT, Column
 
 SHEET = "Capacity"
@@ -33,10 +33,11 @@ def capacity_sheet(book, record):
         f"reference temperature {spec['reference_temperature_c']:g} °C",
     )
     digits = row_decimals(capacity["U_m3"])
+    digits_of_height = [height_decimals(height) for height in capacity["height_m"]]
     digits_of_u = row_decimals(capacity["u_m3"])
     digits_of_volumes = row_decimals(capacity["U_m3"], LITRE_DECIMALS)
     columns = [
-        Column("Dip height (m)", capacity["height_m"], digits_of_heights(capacity["height_m"]), 13),
+        Column("Dip height (m)", capacity["height_m"], digits_of_height, 13),
         Column("Volume (m³)", capacity["volume_m3"], digits_of_volumes, 16),
         Column("Expanded uncertainty U (m³)", capacity["U_m3"], digits, 18),
         Column("Coverage factor k", capacity["k"], 2, 13),

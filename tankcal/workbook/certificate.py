@@ -1,7 +1,7 @@
 """The sheet Certificate: what was calibrated, the main result, and what was assumed."""
 
-from tankcal.uncertainty import decimals_for
-from tankcal.words import sentence
+from tankcal.uncertainty import decimals_for, height_decimals
+from tankcal.words import choice_sentence, sentence
 from tankcal.workbook.book import ACCENT, MUTED, number_format
 
 _WIDTHS = (36, 20, 24, 14, 14)
@@ -86,6 +86,7 @@ def _result(book, sheet, row, record, words):
     """The capacity at the top of the table with U and k on its line; returns the next row."""
     capacity = record["capacity"]
     cubic = number_format(decimals_for(capacity["U_m3"][-1]))
+    top = number_format(height_decimals(capacity["height_m"][-1]))
     book.heading(sheet, row, sentence(words, "headings", "result"), len(_WIDTHS))
     heads = ("", "Volume", "Expanded uncertainty U", "Factor k", "Dip height")
     for column, text in enumerate(heads):
@@ -97,7 +98,7 @@ def _result(book, sheet, row, record, words):
         (1, "volume_m3", f'{cubic} "m³"'),
         (2, "U_m3", f'"± "{cubic} "m³"'),
         (3, "k", '"k = "0.00'),
-        (4, "height_m", '0.000 "m"'),
+        (4, "height_m", f'{top} "m"'),
     ):
         book.put(sheet, row + 2, column, capacity[key][-1], num_format=shown, **line)
     probability = record["job"]["table"]["coverage_probability"]
@@ -130,7 +131,7 @@ def _choices(book, sheet, row, record, words):
     book.heading(sheet, row, sentence(words, "headings", "choices"), len(_WIDTHS))
     for choice in record["choices"]:
         row += 1
-        text = sentence(words, "choices", choice["code"], choice["value"])
+        text = choice_sentence(words, choice)
         book.paragraph(sheet, row, text, _WIDTHS)
     return row + 2
 

@@ -1,7 +1,7 @@
 """The working papers: courses, corrections, points, uncertainty budget, choices and provenance."""
 
 from tankcal.uncertainty import decimals_for
-from tankcal.words import sentence
+from tankcal.words import choice_sentence, sentence
 from tankcal.workbook.book import Column, in_mm
 
 _HEAD_ROW = 3
@@ -96,7 +96,7 @@ def _sections(rows):
         Column("Height (m)", _of(rows, "height_m"), 3, 10),
         Column("Points", _of(rows, "n"), 0, 9),
         Column("Centre x (m)", _of(rows, "x_m"), _digits(rows, "x_sd_m"), 12),
-        Column("Centre y (m)", _of(rows, "y_m"), _digits(rows, "y_sd_m"), 12),
+        Column("Centre y (m)", _of(rows, "y_m"), _digits(rows, "y_sd_m"), 16),
         Column("u of x (mm)", [in_mm(row["x_sd_m"]) for row in rows], 2, 10),
         Column("u of y (mm)", [in_mm(row["y_sd_m"]) for row in rows], 2, 10),
         Column("Radius (m)", _of(rows, "radius_m"), radius, 10),
@@ -269,7 +269,7 @@ def provenance_sheet(book, record, words):
                 Column("Value", [_text(row["value"]) for row in choices], None, 24),
                 Column(
                     "Meaning",
-                    [sentence(words, "choices", row["code"], row["value"]) for row in choices],
+                    [choice_sentence(words, row) for row in choices],
                     None,
                     90,
                 ),
