@@ -99,7 +99,7 @@ BAD_SETTINGS = [
     ("roof.mass_kg", 3000, "not available in this version"),
     ("adjustment.camera.default", "camera free", "not available in this version"),
     ("certificate.date_of_issue", "soon", "a date such as"),
-    ("certificate.signed_by", "x", "unknown key"),
+    ("certificate.numbr", "x", "unknown key"),
 ]
 
 

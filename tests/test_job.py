@@ -305,3 +305,12 @@ def test_a_section_is_for_all_points_or_for_none(tmp_path):
     (job / "points.csv").write_text("\n".join(lines) + "\n")
     with pytest.raises(tankcal.InputError, match=r"points\.csv, row 8, section: blank"):
         load(job)
+
+
+def test_the_certificate_takes_fields_of_ones_own_but_no_slips(tmp_path):
+    own = {"certificate.accreditation_number": "CAL 0815"}
+    job = load(write_job(tmp_path / "own", settings=own))
+    assert job.certificate["accreditation_number"] == "CAL 0815"
+    for slip in ("certificate.notise", "certificate.Number"):
+        with pytest.raises(tankcal.InputError, match="unknown key"):
+            load(write_job(tmp_path / slip, settings={slip: "x"}))

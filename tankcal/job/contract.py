@@ -185,6 +185,7 @@ KEYS = {
     ),
 }
 
+OPEN_SECTIONS = ("certificate",)  # hold text fields of the user's own, too
 LATER_SECTIONS = ("roof", "adjustment.camera")
 LATER_KEYS = {
     "table": ("fine_step_m", "fine_zones", "rule", "minimum_delivery_m"),

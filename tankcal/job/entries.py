@@ -1,5 +1,6 @@
 """From raw tables to values: each key and cell is read as its `Field` says, or told to the log."""
 
+import re
 from dataclasses import dataclass
 
 from tankcal.job.contract import (
@@ -9,8 +10,9 @@ from tankcal.job.contract import (
     LATER_KEYS,
     LATER_KINDS,
     LATER_SECTIONS,
+    OPEN_SECTIONS,
 )
-from tankcal.job.fields import Refused, is_blank, read_value
+from tankcal.job.fields import Field, Refused, is_blank, read_value
 from tankcal.job.tables import nearest
 
 
@@ -42,7 +44,7 @@ def read_settings(raw, log):
         given = raw.settings.get(section, {})
         values[section] = {
             field.name: _setting(file, section, field, given.get(field.name), log)
-            for field in fields
+            for field in (*fields, *_own_fields(section, fields, given))
         }
     for section, key, what in LATER_ABOVE_ZERO:
         if (values[section][key] or 0) > 0:
@@ -62,8 +64,24 @@ def _refuse_unknown(file, section, entries, section_row, log):
         if section in LATER_SECTIONS or key in LATER_KEYS.get(section, ()):
             if not is_blank(value.raw) and value.raw not in (0, []):
                 log.problem(file, later, value.row, name)
-        elif key not in known:
+        elif key not in known and not _is_own(section, key, known):
             log.problem(file, f"unknown key{nearest(key, known)}", value.row, name)
+
+
+def _own_fields(section, fields, given):
+    """Text fields of the user's own: printed under the name that they have in job.toml."""
+    known = [field.name for field in fields]
+    return [
+        Field(key, "text", "a field of your own")
+        for key in given
+        if key not in known and _is_own(section, key, known)
+    ]
+
+
+def _is_own(section, key, known):
+    """Whether a key is the user's own: only in OPEN_SECTIONS, and no slip of a known one."""
+    plain = re.fullmatch(r"[a-z][a-z0-9_]{0,39}", key)
+    return section in OPEN_SECTIONS and plain is not None and not nearest(key, known)
 
 
 def _setting(file, section, field, value, log):
