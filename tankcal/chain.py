@@ -25,7 +25,7 @@ from tankcal.uncertainty import factor_of
 from tankcal.volumes import ShellVolume, course_shape, feature_jacobian
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Result:
     """Everything that a job gave; `capacity` is the table as a DataFrame.
 
@@ -46,6 +46,14 @@ class Result:
     propagation: Propagation
     table: Capacity
     warnings: tuple[Problem, ...]
+
+    def __repr__(self):
+        top = self.at(self.table.height_m[-1])
+        return (
+            f"<tankcal.Result of {self.job.tank.id}: {top.value_m3:.3f} m3 at "
+            f"{self.table.height_m[-1]:.3f} m, U = {top.U_m3:.3f} m3 (k = {top.k:.2f}), "
+            f"{len(self.wall)} of {len(self.job.points.names)} points>"
+        )
 
     @property
     def volume(self):
@@ -84,8 +92,11 @@ def run(job, progress=None):
     """Compute a job: wall and axis, sections, volumes, capacity table with its covariance.
 
     progress  called with a line of text as each step begins
-    Raises InputError when a course is left with too few points, SolutionError without a wall.
+    Raises InputError when a course is left with too few points, SolutionError when there is no
+    wall, TypeError for anything but a `Job`.
     """
+    if not isinstance(job, Job):
+        raise TypeError(f"found {type(job).__name__}; expected a Job: run(tankcal.load(path))")
     tell = progress or (lambda text: None)
     tell(f"separating the wall from clutter in {len(job.points.names)} points")
     heights = np.cumsum([0.0] + [course.height_m for course in job.courses])

@@ -282,3 +282,9 @@ def test_intervals_cover_tanks_with_form_between_the_targets_study(common, figur
     if common:
         assert np.all(np.abs(inside - 0.95) < 0.02 + 2 * np.sqrt(0.95 * 0.05 / 1000))
     assert np.all(inside > 0.90)
+
+
+def test_a_result_shows_itself_in_a_line_and_a_path_is_no_job(example_result):
+    assert repr(example_result).startswith("<tankcal.Result of SILVA-1995: 1249.76")
+    with pytest.raises(TypeError, match="expected a Job"):
+        run("examples/silva-1995")
