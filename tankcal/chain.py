@@ -24,6 +24,8 @@ from tankcal.shell import Shell, course_of, find_shell
 from tankcal.uncertainty import factor_of
 from tankcal.volumes import ShellVolume, course_shape, feature_jacobian
 
+LEAST_SD_M = 1e-6  # added to a full covariance that is singular
+
 
 @dataclass(frozen=True, repr=False)
 class Result:
@@ -263,7 +265,12 @@ def _given_covariance(points, wall):
     """(3m, 3m) as in the file; one metre for every coordinate when the file gives none."""
     if points.covariance_m2 is not None:
         index = (3 * wall[:, None] + np.arange(3)).ravel()
-        return points.covariance_m2[np.ix_(index, index)]
+        given = points.covariance_m2[np.ix_(index, index)]
+        try:
+            np.linalg.cholesky(given)
+        except np.linalg.LinAlgError:  # a fixed point, or a free network
+            given = given + LEAST_SD_M**2 * np.eye(len(index))
+        return given
     if points.sd_m is not None:
         return scipy.sparse.diags_array(points.sd_m[wall].ravel() ** 2).tocsr()
     return scipy.sparse.eye_array(3 * len(wall), format="csr")

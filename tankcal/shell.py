@@ -96,7 +96,8 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
     start = _consensus_circle(local[candidates, :2], nominal_radius_m)
     wall, axis = _leaning_cylinder(local, course, candidates, start, nominal_radius_m)
     reason[candidates & ~wall] = "consensus"
-    relative = np.ones(n) if sd_m is None else sd_m / np.median(sd_m)
+    believed = np.ones(n) if sd_m is None else np.maximum(sd_m, LEAST_NOISE_M)
+    relative = believed / np.median(believed)
     found = _snoop(local, course, wall, axis, relative, WIDEST_SLOPE, snooping)
     tilt_known = np.sqrt(np.diag(found.slope_cofactor).max()) < VAGUE_TILT
     if not tilt_known:

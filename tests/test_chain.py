@@ -288,3 +288,18 @@ def test_a_result_shows_itself_in_a_line_and_a_path_is_no_job(example_result):
     assert repr(example_result).startswith("<tankcal.Result of SILVA-1995: 1249.76")
     with pytest.raises(TypeError, match="expected a Job"):
         run("examples/silva-1995")
+
+
+def test_a_fixed_point_in_a_full_covariance_is_no_stumbling_block(tmp_path):
+    """A network with a fixed point has a singular covariance.
+
+    Its circle goes through that point, so the outline's origin moves by the noise, and the area of
+    the same points by a small part of its uncertainty.
+    """
+    variances = np.full(360, 4e-6)
+    plain = result_of(tmp_path / "a", noise_mm=2.0, covariance_m2=np.diag(variances))
+    variances[30:33] = 0.0
+    fixed = result_of(tmp_path / "b", noise_mm=2.0, covariance_m2=np.diag(variances))
+    moved = np.abs(fixed.table.volume_m3 - plain.table.volume_m3)
+    assert np.all(moved[1:] < 0.2 * plain.table.u_m3[1:])
+    assert fixed.table.u_m3[-1] == pytest.approx(plain.table.u_m3[-1], rel=0.05)
