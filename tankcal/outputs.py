@@ -22,11 +22,11 @@ def write(result, directory, progress=None):
     progress   called as progress(text, done, total)
     Returns the paths. Raises InputError for a folder that is not tankcal's to replace.
     """
-    directory = Path(directory).resolve()  # where a link points to
     refuse_foreign(directory)
+    target = Path(directory).resolve()  # where a link points to
     tell = progress or (lambda text, done, total: None)
-    directory.parent.mkdir(parents=True, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(prefix=".tankcal-", dir=directory.parent))
+    target.parent.mkdir(parents=True, exist_ok=True)
+    temporary = Path(tempfile.mkdtemp(prefix=".tankcal-", dir=target.parent))
     try:
         tell("writing the record and the workbook", 0, 1)
         record = records.record_of(result)
@@ -39,10 +39,10 @@ def write(result, directory, progress=None):
             lambda done, total: tell("writing the report", done, total),
         )
         temporary.chmod(0o755)
-        _swap(temporary, directory)
+        _swap(temporary, target)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-    return [directory / name for name in FILES]
+    return [Path(directory) / name for name in FILES]
 
 
 def refuse_foreign(directory):
