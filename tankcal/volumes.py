@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.errors import HeightError
-from tankcal.outlines import FULL_TURN
+from tankcal.outlines import FORM_MODES, FULL_TURN
 from tankcal.quadrature import height_basis, height_products, panels, polar_products
 
 FORM_GRID = 720  # azimuths; resolves products of an outline with the highest mode of the form
@@ -156,6 +156,8 @@ def course_shape(bottom_m, top_m, levels_m, outlines, *, inset_m=0.0, scale=1.0)
 
 def _by_form(outlines, inset_m, scale):
     """(k, k, modes) effect of the unseen form; an even grid, for high modes lie between knots."""
+    if not any(outline.form_m2 for outline in outlines):
+        return np.zeros((len(outlines), len(outlines), 2 * (FORM_MODES - 1)))
     azimuth = np.arange(FORM_GRID) * FULL_TURN / FORM_GRID
     inside = np.array([scale * (outline.radius_m(azimuth) - inset_m) for outline in outlines])
     unseen = scale * np.array([outline.unseen_form_m(azimuth) for outline in outlines])
