@@ -49,16 +49,6 @@ class Adjustment:
         """A-posteriori variance factor chi2 / dof; nan when nothing is redundant."""
         return self.chi2 / self.dof if self.dof > 0 else np.nan
 
-    @property
-    def w(self):
-        """(m,) Baarda's test quantity: normalised residual over the root of its redundancy.
-
-        nan where the redundancy is zero: nothing checks that condition.
-        """
-        checked = self.redundancy > 1e-9
-        root = np.sqrt(np.where(checked, self.redundancy, 1.0))
-        return np.where(checked, self.normalised / root, np.nan)
-
 
 def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tolerance=1e-8):
     """Adjust observations so that the conditions of `model` hold.

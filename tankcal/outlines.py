@@ -18,7 +18,7 @@ from tankcal.quadrature import panels, polar_products
 FULL_TURN = 2 * np.pi
 HARMONICS = 36  # of a smoothed outline: a dent of 10 deg still shows, if the prior believes it
 LEAST_FORM_M2 = 1e-12  # a micrometre
-FORM_MODES = 100  # of the form that may lie between points; higher ones add 1e-4 of its variance
+FORM_MODES = 100  # of the form that may lie between points; the others hold 2.5e-4 of its variance
 MOST_KNOTS = 400  # above this many points an outline is smoothed, not interpolated
 
 

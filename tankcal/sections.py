@@ -174,7 +174,8 @@ def slide(xyz_m, slope, z_m):
     """Points slid parallel to the axis to height z: xy (n, 2) and d(xy)/d(xyz), (2n, 3n) sparse.
 
     A horizontal cut of a leaning shell is what is wanted, so the tilt is contained and never
-    corrected again. The slope itself is taken as exact: over half a course its error is microns.
+    corrected again. The slope itself is taken as exact: what it errs has opposite signs on
+    opposite sides of the tank, so the area hardly knows it.
     """
     xyz_m = np.asarray(xyz_m, dtype=float)
     n = len(xyz_m)

@@ -122,7 +122,8 @@ def course_shape(bottom_m, top_m, levels_m, outlines, *, inset_m=0.0, scale=1.0)
     """One course from the outlines of its sections, as surveyed.
 
     inset_m  plate and paint to take off the radius (0 when surveyed inside); the difference between
-             radial and normal thickness is its (r'/r)^2/2 part, under 1e-5 of it for a dented tank
+             radial and normal thickness is its (r'/r)^2/2 part, 5e-4 of it at the
+             flank of a narrow dent of 30 mm
     scale    of horizontal lengths, for the shell's temperature
     """
     levels = np.asarray(levels_m, dtype=float)
