@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.errors import HeightError
-from tankcal.uncertainty import coverage_factor, effective_dof
+from tankcal.uncertainty import Source, coverage_factor, effective_dof
 from tankcal.volumes import ShellVolume
 
 
@@ -23,24 +23,6 @@ class Quantity:
     dof: float
     k: float
     U_m3: float
-
-
-@dataclass(frozen=True)
-class Source:
-    """One cause of uncertainty, with one or more columns of the factor that belong together.
-
-    kind "points", "form" or the name of a declared input; u and unit as declared (None for points
-    and form); columns_m3 (rows, c) derivative of the volume times standard uncertainty.
-    """
-
-    kind: str
-    columns_m3: np.ndarray
-    dof: float = np.inf
-    u: float | None = None
-    unit: str | None = None
-    type: str = "A"
-    distribution: str = "normal"
-    note: str = ""
 
 
 @dataclass(frozen=True)

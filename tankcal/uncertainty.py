@@ -3,6 +3,7 @@
 Sources: JCGM 100:2008 (GUM) 5.1, 5.2, G.4, 7.2.6.
 """
 
+from dataclasses import dataclass
 from math import floor, log10
 
 import numpy as np
@@ -10,6 +11,25 @@ from scipy.special import ndtri, stdtrit
 
 # rows of a table in m3 keep their litres: differences of rows are far better known than the rows
 LITRE_DECIMALS = 3
+
+
+@dataclass(frozen=True)
+class Source:
+    """One cause of uncertainty, with one or more columns of the factor that belong together.
+
+    kind        "points", "form", ... or the name of a declared input
+    columns_m3  (rows, c) derivative of the volume times standard uncertainty
+    u, unit     as declared; None for what was not declared but computed
+    """
+
+    kind: str
+    columns_m3: np.ndarray
+    dof: float = np.inf
+    u: float | None = None
+    unit: str | None = None
+    type: str = "A"
+    distribution: str = "normal"
+    note: str = ""
 
 
 def factor_of(covariance):

@@ -7,8 +7,9 @@ import pytest
 from jacobians import assert_derivative
 from shapes import azimuths, ring, section_of
 
-from tankcal.capacity import Capacity, Propagation, Source, table_heights
+from tankcal.capacity import Capacity, Propagation, table_heights
 from tankcal.errors import HeightError
+from tankcal.uncertainty import Source
 from tankcal.volumes import ShellVolume, course_shape
 
 HEIGHTS = np.linspace(0, 9.5, 11)
