@@ -40,8 +40,10 @@ notebooks: $(VENV)/full ## execute every notebook, top to bottom
 	  ../$(BIN)/jupyter nbconvert --to notebook --execute --output-dir ../build/notebooks "$$one" || exit 1; \
 	done
 
-bench: $(VENV)/full ## time and memory of the main job
+bench: $(VENV)/full ## time and memory of the main job, a table of 1 mm rows, ten million points
 	$(BIN)/python benchmarks/main_job.py
+	$(BIN)/python benchmarks/table.py
+	$(BIN)/python benchmarks/rings.py
 
 picture: $(VENV)/full ## the picture in the README, from the example's report (needs poppler)
 	$(BIN)/tankcal demo --quiet --out demo-results

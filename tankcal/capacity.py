@@ -11,89 +11,37 @@ import numpy as np
 
 from tankcal.errors import HeightError
 from tankcal.uncertainty import Source, coverage_factor, effective_dof
-from tankcal.volumes import ShellVolume
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A volume with its uncertainty: value, standard u, effective dof, factor k, expanded U."""
+    """A volume with its uncertainty: value, standard u, effective dof, factor k, expanded U.
+
+    for_use  False where a dip stands in a zone in which the table must not be used
+    """
 
     value_m3: float
     u_m3: float
     dof: float
     k: float
     U_m3: float
-
-
-@dataclass(frozen=True)
-class Propagation:
-    """What is uncertain about a shell, ready for any heights above its bottom.
-
-    points_m2, form_m2  (f, c) factors of the covariance of the shell's features
-    declared            inputs with name, u (SI), u_as_read, unit, type, distribution, dof, note
-    scale               of horizontal lengths, by temperature; expansion_per_k its coefficient
-    """
-
-    volume: ShellVolume
-    points_m2: np.ndarray
-    points_dof: float
-    form_m2: np.ndarray
-    declared: tuple
-    scale: float
-    expansion_per_k: float
-
-    def sources(self, levels_m):
-        """One `Source` for each input, with a row for each height above the bottom.
-
-        A height below the bottom (a dip plate that lies lower) has no volume and no uncertainty.
-        """
-        weights = self.volume.weights_m(np.maximum(levels_m, 0.0))
-        sources = [Source("points", weights @ self.points_m2, self.points_dof)]
-        if self.form_m2.shape[1]:
-            sources.append(Source("form", weights @ self.form_m2))
-        for one in self.declared:
-            column = self.derivative(one.name, levels_m) * one.u
-            sources.append(
-                Source(
-                    one.name,
-                    column[:, None],
-                    one.dof,
-                    one.u_as_read,
-                    one.unit,
-                    one.type,
-                    one.distribution,
-                    one.note,
-                )
-            )
-        return tuple(sources)
-
-    def derivative(self, name, levels_m):
-        """(rows,) derivative of the volumes by a declared input, m3 per SI unit of the input.
-
-        "scale" multiplies the surveyed lengths square to the axis, "datum" lifts the table's zero.
-        """
-        wet = np.asarray(levels_m) >= 0
-        levels = np.maximum(levels_m, 0.0)
-        by_length = 2 * self.volume.volume_m3(levels) / self.scale
-        return {
-            "scale": lambda: self.volume.by_scale_m3(levels),
-            "datum": lambda: self.volume.area_m2(levels) * wet,
-            "plate_thickness": lambda: -self.volume.inset_m2(levels),
-            "paint": lambda: -self.volume.inset_m2(levels),
-            "shell_temperature": lambda: -self.expansion_per_k * by_length,
-            "expansion": lambda: (self.scale - 1) / self.expansion_per_k * by_length,
-        }[name]()
+    for_use: bool = True
 
 
 @dataclass(frozen=True)
 class Capacity:
-    """The table: (rows,) dip heights from the table's zero, volumes, and areas of the cut."""
+    """The table: (rows,) dip heights from the table's zero, volumes, and areas of the cut.
+
+    critical_m  (low, high) dips between which the table is not for use, or None: a floating roof
+                that is partly afloat
+    """
 
     height_m: np.ndarray
     volume_m3: np.ndarray
     area_m2: np.ndarray
     sources: tuple[Source, ...]
     probability: float
+    critical_m: tuple[float, float] | None = None
 
     @property
     def factor_m3(self):
@@ -135,13 +83,22 @@ class Capacity:
         """
         return self._combined([(high_m, 1.0), (low_m, -1.0)])
 
+    def for_use(self, height_m):
+        """Whether the table may be used at each height: not inside the critical zone of a roof."""
+        height_m = np.asarray(height_m, dtype=float)
+        if self.critical_m is None:
+            return np.full(height_m.shape, True)
+        low, high = self.critical_m
+        return (height_m <= low) | (height_m >= high)
+
     def _combined(self, terms):
         weights = sum(sign * self._row_weights(height) for height, sign in terms)
         columns = [(weights @ source.columns_m3)[None, :] for source in self.sources]
         u = float(np.sqrt(sum(np.sum(column**2) for column in columns)))
         dof = float(self._dof_of(columns)[0])
         k = float(coverage_factor(self.probability, dof))
-        return Quantity(float(weights @ self.volume_m3), u, dof, k, k * u)
+        for_use = bool(np.all(self.for_use([height for height, _ in terms])))
+        return Quantity(float(weights @ self.volume_m3), u, dof, k, k * u, for_use)
 
     def _row_weights(self, height_m):
         first, last = self.height_m[0], self.height_m[-1]
@@ -163,13 +120,3 @@ class Capacity:
             return np.full(len(self.height_m), np.inf)
         by_source = np.column_stack([np.sqrt(np.sum(c**2, axis=1)) for c in columns])
         return effective_dof(by_source, [source.dof for source in self.sources])
-
-
-def table_heights(step_m, top_m):
-    """Rows at 0, step, 2 step, ... and the top itself, m; a last step under a micron is dropped."""
-    count = int(np.floor(top_m / step_m + 1e-9))
-    heights = np.round(np.arange(count + 1) * step_m, 9)
-    if top_m - heights[-1] > 1e-6:
-        return np.append(heights, top_m)
-    heights[-1] = min(heights[-1], top_m)
-    return heights

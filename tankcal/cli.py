@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import tankcal
-from tankcal.errors import TankcalError
+from tankcal.errors import InputError, Problem, TankcalError
 
 DESCRIPTION = """\
 tankcal calibrates storage tanks: from surveyed points of the wall to the capacity
@@ -19,18 +19,21 @@ a new tank, step by step:
   (fill in the blanks, in the CSV files or in the workbook)
   tankcal run my-tank           compute it; the results are in my-tank/results
   tankcal run my-tank/job.xlsx  the same, from the workbook
+  tankcal lint table.csv        look for mistakes in any capacity table
 
 exit status: 0 done; 2 the input must be mended (one line per problem: file, row, column, what was
 expected; earlier results stay as they were); 3 the survey has no sound solution.
 
 the job format: docs/job-format.md; axes, signs and units: docs/conventions.md"""
 
+MOST_FINDINGS = 50  # that are shown at once
+
 
 def main(arguments=None):
     """Run the command line; returns the exit status."""
     options = _parser().parse_args(arguments)
     try:
-        options.command(options)
+        return options.command(options) or 0
     except TankcalError as error:
         for line in str(error).splitlines():
             print(f"tankcal: {line}", file=sys.stderr)
@@ -46,7 +49,6 @@ def main(arguments=None):
             raise
         print("tankcal: stopped; nothing was written", file=sys.stderr)
         return 130
-    return 0
 
 
 def _interrupted(error):
@@ -86,10 +88,16 @@ def _parser():
     new = commands.add_parser(
         "new",
         help="write an empty job to fill in",
-        description="Write a starter job: job.toml, points.csv, courses.csv and uncertainty.csv "
-        "with comments, and the same as one workbook, job.xlsx. Fill in one of the two.",
+        description="Write a starter job: job.toml and the CSV files of that kind of tank, with "
+        "comments, and the same as one workbook, job.xlsx. Fill in one of the two.",
     )
     new.add_argument("directory", metavar="DIR", help="a folder to make")
+    new.add_argument(
+        "--kind",
+        choices=("vertical", "horizontal", "sphere", "mesh"),
+        default="vertical",
+        help="kind of tank (default: vertical)",
+    )
     new.set_defaults(command=_new)
 
     demo = commands.add_parser(
@@ -100,7 +108,41 @@ def _parser():
     demo.add_argument("--out", metavar="DIR", help="where to write", default="tankcal-demo-results")
     demo.add_argument("--quiet", action="store_true", help="no progress, only problems")
     demo.set_defaults(command=_demo)
+
+    _add_lint(commands)
     return parser
+
+
+def _add_lint(commands):
+    lint = commands.add_parser(
+        "lint",
+        help="look for mistakes in a capacity table, of any origin",
+        description="Look for mistakes in a capacity table: unreadable numbers, rows missing, "
+        "doubled or swapped, wrong digits, shifted blocks, wrong units, a total or a last row "
+        "that does not fit. One line a finding; docs/table.md says how they are found.",
+        epilog="exit status: 0 no errors (there may be warnings); 2 errors found, or no table.",
+    )
+    lint.add_argument(
+        "file", metavar="FILE", help="a CSV file, an Excel workbook (.xlsx), or a record.json"
+    )
+    lint.add_argument("--sheet", metavar="NAME", help="of a workbook (default: the longest table)")
+    for name, unit, what in (
+        ("volume", "M3", "volume the tank is meant to hold, m3"),
+        ("diameter", "M", "inside diameter of an upright tank, m; with --nominal-height"),
+        ("height", "M", "height that the last row is meant to have, m"),
+    ):
+        lint.add_argument(f"--nominal-{name}", metavar=unit, type=_positive, help=what)
+    lint.set_defaults(command=_lint)
+
+
+def _positive(text):
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"found {text!r}; expected a number above 0")
+    return value
 
 
 def _run(options):
@@ -133,12 +175,14 @@ def _compute(source, out, quiet):
     show.end()
     for warning in result.warnings:
         print(f"tankcal: warning: {warning}", file=sys.stderr)
-    rejected = len(job.points.names) - len(result.wall)
     top = result.at(result.table.height_m[-1])
+    points = ""
+    if result.accepted is not None:
+        accepted = len(result.accepted)
+        points = f", {accepted} points of the wall, {len(job.points.names) - accepted} rejected"
     print(
         f"{job.tank.id}: {top.value_m3:.3f} m3 at {result.table.height_m[-1]:.3f} m, "
-        f"U = {top.U_m3:.3f} m3 (k = {top.k:.2f}), "
-        f"{len(result.wall)} points of the wall, {rejected} rejected"
+        f"U = {top.U_m3:.3f} m3 (k = {top.k:.2f}){points}"
     )
     print(f"results in {out}:")
     for path in paths:
@@ -149,9 +193,34 @@ def _new(options):
     from tankcal.starter import write_starter
 
     directory = Path(options.directory)
-    write_starter(directory)
+    write_starter(directory, options.kind)
     print(f"wrote {directory}: fill in job.toml and the CSV files, or job.xlsx instead, then")
     print(f"  tankcal run {directory}     or     tankcal run {directory / 'job.xlsx'}")
+
+
+def _lint(options):
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from tankcal.linter import Nominal, lint
+
+    if options.nominal_diameter is not None and options.nominal_height is None:
+        expected = "given without --nominal-height; expected both"
+        raise InputError(Problem("--nominal-diameter", expected))
+    nominal = Nominal(options.nominal_volume, options.nominal_diameter, options.nominal_height)
+    report = lint(options.file, nominal, options.sheet)
+    for finding in report.findings[:MOST_FINDINGS]:
+        print(finding)
+    more = len(report.findings) - MOST_FINDINGS
+    if more > 0:
+        print(f"and {more} more findings; mend these first")
+    warnings = len(report.findings) - report.errors
+    for summary in report.summaries:
+        print(summary)
+    print(f"{_counted(report.errors, 'error')}, {_counted(warnings, 'warning')}")
+    return 2 if report.errors else 0
+
+
+def _counted(count, thing):
+    return f"{count or 'no'} {thing}{'' if count == 1 else 's'}"
 
 
 class _Progress:

@@ -54,28 +54,15 @@ def doubts(job, shell, sections, given_sd_m):
     return _problems(texts)
 
 
-def undeclared_inputs(job):
-    """Names of the inputs that bear on this job and have no declared uncertainty."""
-    declared = {one.name for one in job.inputs}
-    outside = job.survey.side == "outside"
-    bears = {
-        "scale": True,
-        "datum": True,
-        "plate_thickness": outside and any(course.thickness_m for course in job.courses),
-        "paint": outside and any(course.paint_m for course in job.courses),
-        "shell_temperature": job.survey.shell_temperature_c is not None,
-        "expansion": job.survey.shell_temperature_c is not None,
-    }
-    return tuple(name for name, does in bears.items() if does and name not in declared)
+def incomplete(job, undeclared):
+    """A warning that names what U does not contain, and one for an incomplete certificate.
 
-
-def incomplete(job):
-    """A warning that names what U does not contain, and one for an incomplete certificate."""
+    undeclared  names of the inputs that bear on the tank and have no declared uncertainty
+    """
     problems = []
-    missing = undeclared_inputs(job)
-    if missing:
+    if undeclared:
         problems.append(
-            Problem("uncertainty.csv", f"not declared, so not in U: {', '.join(missing)}")
+            Problem("uncertainty.csv", f"not declared, so not in U: {', '.join(undeclared)}")
         )
     lacking = [key for key in CERTIFICATE_NEEDS if not job.certificate.get(key)]
     if lacking:

@@ -5,21 +5,27 @@ outline is linear in its parameters and they are linear in the measured radii.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.interpolate
-import scipy.linalg
-import scipy.optimize
 import scipy.sparse
 
 from tankcal.errors import SolutionError
+from tankcal.form import (
+    HARMONICS,
+    Form,
+    free_columns,
+    harmonics,
+    mode_variances,
+    unit_form,
+    whitened,
+)
 from tankcal.quadrature import panels, polar_products
 
 FULL_TURN = 2 * np.pi
-HARMONICS = 36  # of a smoothed outline: a dent of 10 deg still shows, if the prior believes it
-LEAST_FORM_M2 = 1e-12  # a micrometre
-FORM_MODES = 100  # of the form that may lie between points; the others hold 2.5e-4 of its variance
 MOST_KNOTS = 400  # above this many points an outline is smoothed, not interpolated
+WIDEST_GAP, NARROWEST_GAP = 1.5, 0.3  # of the median one, where an outline is interpolated
 
 
 @dataclass(frozen=True)
@@ -30,7 +36,9 @@ class Outline:
     parameters        (p,) radii at the knots, or coefficients of the harmonics, m
     from_radii        (p, n) derivative of the parameters by the n measured radii
     azimuth_rad       (n,) azimuths of the measured radii
-    form_m2           amplitude of the form: variance form_m2 k^-3 of each mode k >= 2
+    zeta              (n,) their heights within the course, -1 at its bottom to +1 at its top
+    level_zeta        height of the outline within the course
+    form              `Form` of the shell
     knots_rad         (k,) ascending azimuths where the polynomial pieces meet
     """
 
@@ -40,16 +48,20 @@ class Outline:
     parameters: np.ndarray
     from_radii: np.ndarray
     azimuth_rad: np.ndarray
-    form_m2: float
+    zeta: np.ndarray
+    level_zeta: float
+    form: Form
     knots_rad: np.ndarray
 
     def basis(self, azimuth_rad, derivative=0):
         """(len(azimuth), p) functions that the parameters multiply, or their derivative."""
         if self.kind == "smoothed":
             return harmonics(azimuth_rad, (len(self.parameters) - 1) // 2, derivative)
-        return _cardinal_splines(self.knots_rad)(
-            _into_turn(azimuth_rad, self.knots_rad[0]), derivative
-        )
+        return self._splines(_into_turn(azimuth_rad, self.knots_rad[0]), derivative)
+
+    @cached_property
+    def _splines(self):
+        return _cardinal_splines(self.knots_rad)
 
     def radius_m(self, azimuth_rad, derivative=0):
         """(len(azimuth),) radius at each azimuth, or its derivative by the azimuth."""
@@ -64,15 +76,26 @@ class Outline:
         azimuth, weight = self.nodes()
         return float(polar_products(self.radius_m(azimuth), weight)[0, 0])
 
-    def unseen_form_m(self, azimuth_rad):
-        """(len(azimuth), modes) how far the outline misses one sd of each mode of the form.
+    def shown_form(self):
+        """(2, p, modes) parameters that a form of amplitude one, sd of each mode, makes here.
 
-        The outline of a mode sampled at the points, less the mode itself. The modes are common to
-        all sections of a shell: dents and ovality run up the wall.
+        First of a form that is the same at all heights, then of one that grows with zeta.
         """
-        shown = self.basis(azimuth_rad) @ (self.from_radii @ _form(self.azimuth_rad))
-        sd = np.sqrt(self.form_m2 * mode_variances(FORM_MODES))
-        return (shown - _form(azimuth_rad)) * sd
+        waves = unit_form(self.azimuth_rad)
+        return np.stack([self.from_radii @ waves, self.from_radii @ (waves * self.zeta[:, None])])
+
+    def unseen_form_m(self, azimuth_rad):
+        """(len(azimuth), 2 modes) how far the outline misses one sd of each mode of the form.
+
+        The outline of a mode sampled at the points, less the mode itself: first of the form that is
+        the same at all heights of the course, then of the rising form.
+        """
+        shown = self.basis(azimuth_rad) @ self.shown_form()
+        there = unit_form(azimuth_rad)
+        missed = shown - np.stack([there, self.level_zeta * there])
+        return np.hstack(
+            [np.sqrt(self.form.level_m2) * missed[0], np.sqrt(self.form.rising_m2) * missed[1]]
+        )
 
     def modes_m(self, highest=6):
         """(highest + 1, 2) cos and sin amplitude of each Fourier mode; row 0 is the mean radius."""
@@ -91,21 +114,24 @@ def polar(xy_m, x_m, y_m):
 def evenly_spread(azimuth_rad):
     """Whether an interpolated outline can be trusted through these azimuths.
 
-    No gap over 2.5 times or under 0.3 times the median one, 5 to 400 points.
+    No gap over 1.5 times or under 0.3 times the median one, 5 to 400 points: beyond, the spectrum
+    of the form bridges a gap better than a spline does.
     """
     n = len(azimuth_rad)
     if not 5 <= n <= MOST_KNOTS:
         return False
     ordered = np.sort(azimuth_rad)
     gaps = np.diff(ordered, append=ordered[0] + FULL_TURN)
-    return bool(gaps.max() <= 2.5 * np.median(gaps) and gaps.min() >= 0.3 * np.median(gaps))
+    middle = np.median(gaps)
+    return bool(gaps.max() <= WIDEST_GAP * middle and gaps.min() >= NARROWEST_GAP * middle)
 
 
-def interpolate_outline(xy_m, x_m, y_m, form_m2=0.0):
+def interpolate_outline(xy_m, x_m, y_m, form, zeta=0.0):
     """Periodic cubic r(azimuth) through every point, about the centre (x_m, y_m).
 
-    The spline has continuous curvature and no end. Raises SolutionError below 5 points or when two
-    points share an azimuth.
+    The spline has continuous curvature and no end. form: `Form` of the shell; zeta: height of the
+    section within its course. Raises SolutionError below 5 points or when two points share an
+    azimuth.
     """
     azimuth, radius = polar(xy_m, x_m, y_m)
     order = np.argsort(azimuth)
@@ -122,119 +148,88 @@ def interpolate_outline(xy_m, x_m, y_m, form_m2=0.0):
         parameters=radius[order],
         from_radii=np.eye(n)[order],
         azimuth_rad=azimuth,
-        form_m2=form_m2,
+        zeta=np.full(n, zeta),
+        level_zeta=zeta,
+        form=form,
         knots_rad=knots,
     )
 
 
-def smooth_outline(xy_m, x_m, y_m, noise_m2, form_m2):
+def smooth_outline(xy_m, x_m, y_m, noise_m2, form, zeta=0.0):
     """Harmonics r = c0 + sum a_k cos k a + b_k sin k a, k <= 36, weighted by a prior on the form.
 
-    Mode k >= 2 has the prior variance form_m2 k^-3, so a gap between points is bridged by what the
-    shell's own spectrum allows, and the form that was not seen stays in the covariance. Modes 0 and
-    1 (radius, centre) are free.
+    Mode k >= 2 has the prior variance form.level_m2 k^-3, so a gap between points is bridged by
+    what the shell's own spectrum allows, and the form that was not seen stays in the covariance.
+    Modes 0 and 1 (radius, centre) are free.
 
     noise_m2  covariance of the measured radii, (n, n) or (n,)
-    form_m2   amplitude of the form, >= 0 (`estimate_form`)
+    form      `Form` of the shell (`estimate_form`); zeta  height of the section within its course
     Raises SolutionError when the points do not determine radius and centre.
     """
+    zetas = np.full(len(xy_m), zeta)
+    return smooth_outlines(xy_m, x_m, y_m, noise_m2, form, zetas, [zeta], degree=0)[0]
+
+
+def smooth_outlines(xy_m, x_m, y_m, noise_m2, form, zeta, levels_zeta, degree):
+    """Outlines at some heights of a course, fitted together to points that are not level.
+
+    r(a, zeta) = r0(a) + zeta r1(a) + (3 zeta^2 - 1)/2 c, with harmonics to order 36 in r0 (prior
+    variance form.level_m2 k^-3 of mode k >= 2) and in r1 (form.rising_m2 k^-3). Free are radius and
+    centre of r0, from degree 1 on those of r1 (taper and lean, so that a frustum and a leaning
+    cylinder are exact), and at degree 2 the barrel c. At degree 0 nothing changes with height.
+
+    noise_m2          covariance of the measured radii, (n, n) or (n,)
+    zeta (n,)         heights of the points within the course, -1 to 1; levels_zeta of the outlines
+    Returns a tuple of `Outline`. Raises SolutionError when the points do not determine what is
+    free.
+    """
     azimuth, radius = polar(xy_m, x_m, y_m)
-    scale = _prior_scale(form_m2)
-    design = harmonics(azimuth, HARMONICS)
-    normal, scaled = _normal_matrix(_whitened(design, noise_m2), scale)
-    weighted = _whitened(scaled, noise_m2, transposed=True)
-    from_radii = scale[:, None] * np.linalg.solve(normal, weighted.T)
-    return Outline(
-        x_m=x_m,
-        y_m=y_m,
-        kind="smoothed",
-        parameters=from_radii @ radius,
-        from_radii=from_radii,
-        azimuth_rad=azimuth,
-        form_m2=form_m2,
-        knots_rad=np.arange(4 * HARMONICS) * FULL_TURN / (4 * HARMONICS),
+    free = free_columns(azimuth, zeta, degree)
+    waves = unit_form(azimuth, HARMONICS)
+    random = [np.sqrt(form.level_m2) * waves]
+    random += [np.sqrt(form.rising_m2) * waves * zeta[:, None]] * (degree > 0)
+    solution = _shrunk(np.hstack([free, *random]), free.shape[1], noise_m2)
+    return tuple(
+        Outline(
+            x_m=x_m,
+            y_m=y_m,
+            kind="smoothed",
+            parameters=from_radii @ radius,
+            from_radii=from_radii,
+            azimuth_rad=azimuth,
+            zeta=zeta,
+            level_zeta=level,
+            form=form,
+            knots_rad=np.arange(4 * HARMONICS) * FULL_TURN / (4 * HARMONICS),
+        )
+        for level in levels_zeta
+        for from_radii in [_at_level(solution, level, form, degree)]
     )
 
 
-def estimate_form(sections, noise=1.0):
-    """Amplitude of the form of a set of sections by restricted maximum likelihood, m2.
-
-    sections  list of (azimuth_rad (n,), radius_m (n,), covariance (n,) or (n, n)), one a section
-    noise     factor of the covariances
-
-    The likelihood is that of radii with free modes 0 and 1 and random modes k >= 2 of variance
-    form_m2 k^-3 (Patterson & Thompson 1971). The noise is never estimated here: in one section it
-    cannot be told from the form.
-    """
-    moments = []
-    for azimuth, radius, covariance in sections:
-        columns = np.column_stack([harmonics(azimuth, HARMONICS), radius - radius.mean()])
-        columns = _whitened(columns, noise * covariance)
-        moments.append((columns[:, :-1], columns[:, -1]))
-
-    def misfit(log_form):
-        """Doubled negative log-likelihood, but for a constant."""
-        scale = _prior_scale(np.exp(log_form))
-        total = 0.0
-        for design, radius in moments:
-            normal, scaled = _normal_matrix(design, scale)
-            projected = scaled.T @ radius
-            total += np.linalg.slogdet(normal)[1] - projected @ np.linalg.solve(normal, projected)
-        return total
-
-    grid = np.log(LEAST_FORM_M2) + np.arange(0.0, 29.0, 2.0)  # to a form of 1.2 m
-    start = grid[np.argmin([misfit(log_form) for log_form in grid])]
-    best = scipy.optimize.minimize_scalar(
-        misfit, bounds=(start - 2.0, start + 2.0), method="bounded"
-    ).x
-    return float(np.exp(best))
-
-
-def _whitened(array, covariance, transposed=False):
-    """L^-1 array (or L^-T array) with covariance = L L', which may be (n,) variances."""
-    if np.ndim(covariance) == 1:
-        return array / np.sqrt(covariance)[:, None]
-    factor = np.linalg.cholesky(covariance)
-    return scipy.linalg.solve_triangular(factor, array, lower=True, trans=int(transposed))
-
-
-def _prior_scale(form_m2):
-    """(p,) standard deviations of the parameters: one for the free modes, else the prior's."""
-    return np.concatenate([np.ones(3), np.sqrt(form_m2 * mode_variances(HARMONICS))])
-
-
-def _normal_matrix(design, scale):
-    """Normal matrix of parameters scaled to unit prior variance, and the scaled design."""
-    scaled = design * scale
-    normal = scaled.T @ scaled
-    normal[np.arange(3, len(scale)), np.arange(3, len(scale))] += 1.0
-    if np.linalg.matrix_rank(normal[:3, :3]) < 3:
+def _shrunk(design, free, noise_m2):
+    """(p, n) estimates by the radii: the first `free` columns free, the others of unit variance."""
+    white = whitened(design, noise_m2)
+    normal = white.T @ white
+    bound = np.arange(free, len(normal))
+    normal[bound, bound] += 1.0
+    if np.linalg.matrix_rank(normal[:free, :free]) < free:
         raise SolutionError("the points of a section do not determine its centre and radius")
-    return normal, scaled
+    return np.linalg.solve(normal, whitened(white, noise_m2, transposed=True).T)
 
 
-def mode_variances(highest):
-    """Prior variance of the cos and sin amplitudes of modes 2..highest over form_m2: k^-3."""
-    return np.repeat(np.arange(2.0, highest + 1) ** -3, 2)
-
-
-def _form(azimuth_rad):
-    """(n, modes) cos and sin of the modes 2 to FORM_MODES."""
-    return harmonics(azimuth_rad, FORM_MODES)[:, 3:]
-
-
-def harmonics(azimuth_rad, highest, derivative=0):
-    """(n, 2 highest + 1) columns 1, cos a, sin a, cos 2a, sin 2a, ... or their first derivative."""
-    angles = np.outer(azimuth_rad, np.arange(1, highest + 1))
-    columns = np.empty((len(angles), 2 * highest + 1))
-    if derivative == 0:
-        columns[:, 0] = 1.0
-        columns[:, 1::2], columns[:, 2::2] = np.cos(angles), np.sin(angles)
-    else:
-        k = np.arange(1, highest + 1)
-        columns[:, 0] = 0.0
-        columns[:, 1::2], columns[:, 2::2] = -k * np.sin(angles), k * np.cos(angles)
-    return columns
+def _at_level(solution, level, form, degree):
+    """(2 HARMONICS + 1, n) coefficients of the outline at one height, by the radii."""
+    free = len(free_columns(np.zeros(1), np.zeros(1), degree)[0])
+    sd = np.sqrt(mode_variances(HARMONICS))[:, None]
+    first = free + len(sd)
+    coefficients = np.vstack([solution[:3], np.sqrt(form.level_m2) * sd * solution[free:first]])
+    if degree >= 1:
+        rising = np.sqrt(form.rising_m2) * sd * solution[first:]
+        coefficients = coefficients + level * np.vstack([solution[3:6], rising])
+    if degree == 2:
+        coefficients[0] += (1.5 * level**2 - 0.5) * solution[6]
+    return coefficients
 
 
 def radii_by_coordinates(outline, xy_m):

@@ -42,7 +42,7 @@ def write(result, directory, progress=None):
         _swap(temporary, target)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-    return [Path(directory) / name for name in FILES]
+    return [Path(directory) / name for name in FILES if (target / name).exists()]
 
 
 def refuse_foreign(directory):
@@ -81,7 +81,7 @@ def _swap(temporary, directory):
 
 
 def _write_tables(record, directory):
-    """points.csv, sections.csv and capacity.csv: the record's tables for a spreadsheet."""
+    """points.csv, sections.csv and capacity.csv: the record's tables, those that have rows."""
     reason = {row["point"]: row["reason"] for row in record["rejected"]}
     points = pd.DataFrame(
         [
@@ -99,15 +99,30 @@ def _write_tables(record, directory):
         ]
     )
     sections = pd.DataFrame(record["sections"]).drop(
-        columns=["points", "azimuth_deg", "residual_m", "outline", "modes"]
+        columns=["points", "azimuth_deg", "residual_m", "outline", "modes"], errors="ignore"
     )
-    capacity = pd.DataFrame(
-        {key: record["capacity"][key] for key in ("height_m", "volume_m3", "u_m3", "k", "U_m3")}
-    )
-    for name, table in (("points", points), ("sections", sections), ("capacity", capacity)):
-        table.to_csv(
-            directory / f"{name}.csv", index=False, float_format="%.6f", lineterminator="\n"
-        )
+    for name, table in (
+        ("points", points),
+        ("sections", sections),
+        ("capacity", _capacity_table(record)),
+    ):
+        if len(table):
+            table.to_csv(
+                directory / f"{name}.csv", index=False, float_format="%.6f", lineterminator="\n"
+            )
+
+
+def _capacity_table(record):
+    """Rows in metres and cubic metres; further columns only where the job asks for them."""
+    capacity, spec = record["capacity"], record["job"]["table"]
+    columns = {key: capacity[key] for key in ("height_m", "volume_m3", "u_m3", "k", "U_m3")}
+    if spec["height_unit"] != "m":
+        columns["dip"] = capacity["dip"]
+    for other in record["densities"]:
+        columns[f"volume_m3_at_{other['density_kg_m3']:g}_kg_m3"] = other["volume_m3"]
+    if not all(capacity["for_use"]):
+        columns["for_use"] = ["yes" if good else "no" for good in capacity["for_use"]]
+    return pd.DataFrame(columns)
 
 
 def _sds_mm(covariance):

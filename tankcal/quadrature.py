@@ -41,15 +41,24 @@ def height_basis(levels, z, degree):
     return np.vander((z - middle) / half, degree + 1, increasing=True) @ np.linalg.pinv(powers)
 
 
-def height_products(levels, bottom, tops, degree):
-    """W_ij = integral from bottom to top of l_i l_j dz for each top: (len(tops), k, k), m.
+def height_polynomials(levels, degree):
+    """Coefficients c_mi of l_i(t) = sum c_mi t^m, the functions of `height_basis`: (degree + 1, k).
 
-    l_i are those of `height_basis`. With G of `polar_products`, the volume of the interpolated
-    shape is sum W_ij G_ij; degree + 1 nodes integrate the degree 2 degree exactly.
+    levels and t are fractions of the height of a course.
     """
-    tops = np.asarray(tops, dtype=float)
-    x, w = np.polynomial.legendre.leggauss(degree + 1)
-    half = (tops - bottom) / 2
-    z = bottom + half[:, None] * (1 + x)
-    basis = height_basis(levels, z.ravel(), degree).reshape(len(tops), degree + 1, len(levels))
-    return np.einsum("tq,tqi,tqj->tij", half[:, None] * w, basis, basis, optimize=True)
+    t = np.linspace(0.0, 1.0, degree + 1)
+    return np.linalg.solve(np.vander(t, increasing=True), height_basis(levels, t, degree))
+
+
+def height_products(levels, degree):
+    """Coefficients P_mij of l_i(t) l_j(t) = sum P_mij t^m: (2 degree + 1, k, k).
+
+    With G of `polar_products` the area at the part t of a course's height is sum P_mij G_ij t^m,
+    and the volume below it, over that height, sum P_mij G_ij t^(m + 1) / (m + 1).
+    """
+    powers = height_polynomials(levels, degree)
+    products = np.zeros((2 * degree + 1, powers.shape[1], powers.shape[1]))
+    for i in range(degree + 1):
+        for j in range(degree + 1):
+            products[i + j] += np.outer(powers[i], powers[j])
+    return products

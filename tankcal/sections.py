@@ -1,123 +1,81 @@
-"""Horizontal sections of a shell: points grouped, the circle through them, and their outline."""
+"""Horizontal sections of a shell: points grouped, the circle through them, and their outline.
 
-from dataclasses import dataclass
+Points of a course that do not lie level make no section: they are fitted together, and the course
+is integrated through outlines at its Gauss levels.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse
 
-from tankcal.adjust import adjust
-from tankcal.errors import SolutionError
+from tankcal.circles import Circle, fit_circle, radial_covariance, taubin_circle
+from tankcal.form import Form, Sample, free_columns, harmonics
 from tankcal.outlines import (
     Outline,
     evenly_spread,
     interpolate_outline,
     polar,
     radii_by_coordinates,
-    smooth_outline,
+    smooth_outlines,
 )
+from tankcal.quadrature import panels
 
-
-@dataclass(frozen=True)
-class Circle:
-    """Least-squares circle through n points of a section.
-
-    x_m, y_m, radius_m   centre and radius
-    cofactor_m2          (3, 3) covariance of x, y, radius for variance factor 1
-    residuals_m          (n,) distance of each point to the circle, outwards positive
-    variance_factor      v' Q^-1 v / (n - 3)
-    """
-
-    x_m: float
-    y_m: float
-    radius_m: float
-    cofactor_m2: np.ndarray
-    residuals_m: np.ndarray
-    variance_factor: float
-    dof: int
-
-
-def fit_circle(xy_m, covariance_m2):
-    """Geometric circle: the sum of squared, weighted point corrections is the minimum.
-
-    Condition for each point: hypot(x - xc, y - yc) - R = 0 (Silva 1995, program CIRCUM, linearised
-    at the adjusted points). For n even points of standard deviation s: s_centre = s sqrt(2/n),
-    s_radius = s / sqrt(n).
-
-    xy_m (n, 2); covariance_m2 (2n, 2n) dense or sparse, in the order x1 y1 x2 y2 ...
-    Raises SolutionError for fewer than 3 points or points on a line.
-    """
-    xy_m = np.asarray(xy_m, dtype=float)
-    n = len(xy_m)
-    if n < 3:
-        raise SolutionError(f"a circle needs 3 points, {n} were given")
-    centre = xy_m.mean(axis=0)
-    local = xy_m - centre
-    adjusted = adjust(circle_conditions, _taubin(local), local.ravel(), covariance_m2)
-    x, y, radius = adjusted.unknowns
-    return Circle(
-        x_m=float(x + centre[0]),
-        y_m=float(y + centre[1]),
-        radius_m=float(radius),
-        cofactor_m2=adjusted.cofactor,
-        residuals_m=np.hypot(local[:, 0] - x, local[:, 1] - y) - radius,
-        variance_factor=adjusted.variance_factor,
-        dof=adjusted.dof,
-    )
-
-
-def circle_conditions(unknowns, coordinates):
-    """Misclosures and both Jacobians of hypot(x - xc, y - yc) - R = 0 (a model for `adjust`)."""
-    x, y, radius = unknowns
-    d = coordinates.reshape(-1, 2) - (x, y)
-    distance = np.hypot(d[:, 0], d[:, 1])
-    unit = d / distance[:, None]
-    n = len(unit)
-    by_points = scipy.sparse.csr_array(
-        (unit.ravel(), np.arange(2 * n), np.arange(0, 2 * n + 1, 2)), shape=(n, 2 * n)
-    )
-    return distance - radius, np.column_stack([-unit, -np.ones(n)]), by_points
-
-
-def _taubin(local):
-    """Centre and radius of Taubin's algebraic circle (1991), the start of the geometric fit."""
-    z = np.sum(local**2, axis=1)
-    mean = z.mean()
-    if not mean > 0:
-        raise SolutionError("all points of the section lie on one place")
-    design = np.column_stack([(z - mean) / (2 * np.sqrt(mean)), local])
-    values, vectors = np.linalg.svd(design, full_matrices=False)[1:]
-    if values[1] < 1e-9 * values[0] or abs(vectors[-1, 0]) < 1e-12:
-        raise SolutionError("the points of the section lie on a line")
-    a = vectors[-1]
-    scaled = a[0] / (2 * np.sqrt(mean))
-    x, y = -a[1:] / (2 * scaled)
-    return np.array([x, y, np.sqrt(x**2 + y**2 + mean)])
+RING_GAP, RING_SPREAD = 0.10, 0.15  # of the course height: between rings, within one ring
+HIGHEST_DEGREE, MOST_AMPLIFICATION = 2, 6.0  # of the sd of a mean radius, at an end of a course
 
 
 @dataclass(frozen=True)
 class Group:
-    """Points that make one section: its name, course (index), height above the bottom, members."""
+    """Points that make one section, or the one course that they stand on all over its height.
+
+    height_m  mean height above the bottom; members (n,) indices of the points
+    span_m    (bottom, top) of the course, or None when it is not known
+    degree    of the polynomial in height that the points are fitted by; 0 when they are level
+    """
 
     name: str
     course: int
     height_m: float
     members: np.ndarray
+    span_m: tuple[float, float] | None = None
+    degree: int = 0
+
+    def zeta(self, height_m):
+        """Heights within the course: -1 at its bottom, +1 at its top; 0 when it is not known."""
+        if self.span_m is None:
+            return 0.0 * np.asarray(height_m)
+        bottom, top = self.span_m
+        return (2 * np.asarray(height_m) - bottom - top) / (top - bottom)
+
+
+@dataclass(frozen=True)
+class Level:
+    """An outline at one height, of those that a course is integrated through.
+
+    by_points  (p, 3 n) derivative of the outline's parameters by x, y, z of the group's points
+    """
+
+    height_m: float
+    outline: Outline
+    by_points: np.ndarray
 
 
 @dataclass(frozen=True)
 class Section:
-    """One horizontal section: the group of its points, its circle and its outline.
+    """The group of points, its circle, its outline, and the levels that stand for it in a volume.
 
-    parameters_by_points  (p, 3 n) derivative of the outline's parameters by x, y, z of its points
+    outline                at group.height_m
+    parameters_by_points   (p, 3 n) derivative of its parameters by x, y, z of the points
+    levels                 the outline itself; of points that are not level, the outlines at two or
+                           three Gauss levels of the course
     """
 
     group: Group
     circle: Circle
     outline: Outline
     parameters_by_points: np.ndarray
-
-
-RING_GAP, RING_SPREAD = 0.10, 0.15  # of the course height: between rings, within one ring
+    levels: tuple[Level, ...]
 
 
 def group_by_height(height_m, azimuth_rad, course, joints_m):
@@ -133,28 +91,77 @@ def group_by_height(height_m, azimuth_rad, course, joints_m):
         members = np.flatnonzero(course == index)
         if len(members) == 0:
             continue
-        tall = joints_m[index + 1] - joints_m[index]
+        span = (float(joints_m[index]), float(joints_m[index + 1]))
+        tall = span[1] - span[0]
         rings = _rings(height_m[members], tall)
+        name = str(index + 1)
         if len(rings) > 1 and all(
             _is_ring(height_m[members[ring]], azimuth_rad[members[ring]], tall) for ring in rings
         ):
             for number, ring in enumerate(rings, start=1):
                 chosen = members[ring]
-                name = f"{index + 1}.{number}"
-                groups.append(Group(name, index, float(height_m[chosen].mean()), chosen))
+                height = float(height_m[chosen].mean())
+                groups.append(Group(f"{name}.{number}", index, height, chosen, span))
         else:
-            groups.append(Group(str(index + 1), index, float(height_m[members].mean()), members))
-    return groups
+            height = float(height_m[members].mean())
+            groups.append(Group(name, index, height, members, span))
+    return _with_degrees(groups, height_m, azimuth_rad)
 
 
-def group_by_name(names, height_m, course_of):
-    """Sections of points that carry a section name; their mean height decides the course."""
+def group_by_name(names, height_m, course_of, azimuth_rad=None, joints_m=None):
+    """Sections of points that carry a section name; their mean height decides the course.
+
+    azimuth_rad (n,) and joints_m (courses + 1,) above the bottom tell whether a section whose
+    points are not level carries a fit in height; without them every section counts as level.
+    """
     groups = []
     for name in dict.fromkeys(names):
         members = np.array([i for i, other in enumerate(names) if other == name])
         height = float(height_m[members].mean())
-        groups.append(Group(name, int(course_of(height)), height, members))
-    return sorted(groups, key=lambda group: group.height_m)
+        course = int(course_of(height))
+        span = None if joints_m is None else tuple(map(float, joints_m[course : course + 2]))
+        groups.append(Group(name, course, height, members, span))
+    groups.sort(key=lambda group: group.height_m)
+    return groups if joints_m is None else _with_degrees(groups, height_m, azimuth_rad)
+
+
+def _with_degrees(groups, height_m, azimuth_rad):
+    """The groups, with the degree in height of those that have a course for themselves."""
+    courses = [group.course for group in groups]
+    return [
+        replace(group, degree=_degree(group, height_m[group.members], azimuth_rad[group.members]))
+        if courses.count(group.course) == 1
+        else group
+        for group in groups
+    ]
+
+
+def _degree(group, height_m, azimuth_rad):
+    """Degree of the polynomial in height that points determine: 0, 1 or 2.
+
+    The highest by which the mean radius at either end of the course has at most 6 times the sd of
+    the mean radius of all points, whatever low harmonics the section has (points along a spiral
+    tell nothing of a taper), with two points or more for each of these unknowns. Level points
+    (within 15 % of the course) have degree 0.
+    """
+    bottom, top = group.span_m
+    if np.ptp(height_m) <= RING_SPREAD * (top - bottom):
+        return 0
+    n = len(height_m)
+    waves = harmonics(azimuth_rad, max(min(n // 8, 6), 1))[:, 3:]
+    ends = np.array([-1.0, 1.0])
+    for degree in range(HIGHEST_DEGREE, 0, -1):
+        free = free_columns(azimuth_rad, group.zeta(height_m), degree)
+        design = np.hstack([free, waves])
+        if n < 2 * design.shape[1] or np.linalg.matrix_rank(design) < design.shape[1]:
+            continue
+        at_ends = np.zeros((2, design.shape[1]))
+        at_ends[:, : free.shape[1]] = free_columns(np.zeros(2), ends, degree)
+        at_ends[:, [1, 2, 4, 5]] = 0.0  # the mean has no wave
+        variance = np.sum(at_ends * np.linalg.solve(design.T @ design, at_ends.T).T, axis=1)
+        if np.sqrt(n * variance.max()) <= MOST_AMPLIFICATION:
+            return degree
+    return 0
 
 
 def _rings(height_m, tall_m):
@@ -186,36 +193,50 @@ def slide(xyz_m, slope, z_m):
     return xy, scipy.sparse.csr_array((values, (rows, columns)), shape=(2 * n, 3 * n))
 
 
-def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
-    """Circle and outline of the points of one group.
+def sample_of(group, xyz_m, covariance_m2, slope, z_m):
+    """`form.Sample` of a group: what it tells of the shell's form. Arguments: `fit_section`.
+
+    Radius and centre are free there, so an approximate centre will do.
+    """
+    xy, by_xyz = slide(xyz_m, slope, z_m)
+    middle = xy.mean(axis=0)
+    centre = taubin_circle(xy - middle)[:2] + middle
+    noise = radial_covariance(xy, centre, by_xyz @ covariance_m2 @ by_xyz.T)
+    azimuth, radius = polar(xy, *centre)
+    return Sample(azimuth, radius, noise, group.course, _zeta(group, xyz_m, z_m), group.degree)
+
+
+def fit_section(group, xyz_m, covariance_m2, slope, z_m, form):
+    """Circle and outlines of the points of one group.
 
     xyz_m (n, 3) of the members; covariance_m2 (3n, 3n) dense or sparse; slope of the axis; z_m
-    height of the cut in the frame of the points; form_m2 amplitude of `estimate_form`.
-    The outline is interpolated where the points are evenly spread, else smoothed.
+    height of the cut (group.height_m) in the frame of the points; form: `Form` of the shell, or the
+    amplitude of one that is common to all sections.
+    The outline of level points is interpolated where they are evenly spread, else smoothed. Points
+    that are not level (group.degree above 0) give smoothed outlines at the Gauss levels of the
+    course, fitted together.
     """
+    form = form if isinstance(form, Form) else Form(common_m2=form)
     xy, by_xyz = slide(xyz_m, slope, z_m)
     covariance_xy = by_xyz @ covariance_m2 @ by_xyz.T
     circle = fit_circle(xy, covariance_xy)
-    azimuth, _ = polar(xy, circle.x_m, circle.y_m)
-    if evenly_spread(azimuth):
-        outline = interpolate_outline(xy, circle.x_m, circle.y_m, form_m2)
+    centre = circle.x_m, circle.y_m
+    here, zeta = float(group.zeta(group.height_m)), _zeta(group, xyz_m, z_m)
+    if group.degree == 0 and evenly_spread(polar(xy, *centre)[0]):
+        outlines = (interpolate_outline(xy, *centre, form, here),) * 2
+        heights = [group.height_m]
     else:
-        noise = radial_covariance(xy, circle, covariance_xy)
-        outline = smooth_outline(xy, circle.x_m, circle.y_m, noise, form_m2)
-    by_points = (outline.from_radii @ radii_by_coordinates(outline, xy)) @ by_xyz
-    return Section(group, circle, outline, by_points)
-
-
-def radial_covariance(xy_m, circle, covariance_m2):
-    """Covariance of the distances of points from the centre of their circle.
-
-    (n, n), or (n,) variances when the points are independent of each other (sparse covariance).
-    """
-    d = np.asarray(xy_m) - (circle.x_m, circle.y_m)
-    unit = d / np.hypot(d[:, 0], d[:, 1])[:, None]
-    n = len(unit)
-    radial = scipy.sparse.csr_array(
-        (unit.ravel(), np.arange(2 * n), np.arange(0, 2 * n + 1, 2)), shape=(n, 2 * n)
+        noise = radial_covariance(xy, centre, covariance_xy)
+        heights = panels(group.span_m, group.degree + 1)[0] if group.degree else [group.height_m]
+        zetas = [here, *group.zeta(heights)]
+        outlines = smooth_outlines(xy, *centre, noise, form, zeta, zetas, group.degree)
+    by_radii = radii_by_coordinates(outlines[0], xy) @ by_xyz
+    by_points = [outline.from_radii @ by_radii for outline in outlines]
+    levels = zip(heights, outlines[1:], by_points[1:], strict=True)
+    return Section(
+        group, circle, outlines[0], by_points[0], tuple(Level(float(h), o, b) for h, o, b in levels)
     )
-    covariance = radial @ covariance_m2 @ radial.T
-    return covariance.diagonal() if scipy.sparse.issparse(covariance) else covariance
+
+
+def _zeta(group, xyz_m, z_m):
+    return group.zeta(np.asarray(xyz_m)[:, 2] - z_m + group.height_m)

@@ -6,16 +6,22 @@ Both are written from the lists of `tankcal.job.contract`, so that they name eve
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
-from tankcal.job.contract import COLUMNS, INPUT_UNITS, KEYS
+from tankcal.job.contract import COLUMNS, INPUTS, KEYS, TABLES_OF_KIND
 from tankcal.job.sheets import README_SHEET, SETTINGS_HEADINGS, SETTINGS_SHEET
 from tankcal.job.tables import SETTINGS_FILE
 
 WORKBOOK_FILE = "job.xlsx"
 SECTION_NOTES = {
     "tank": "the tank, as in the drawing; the texts are printed when given",
-    "survey": "how and when the wall was surveyed",
+    "survey": "how and when the tank was surveyed",
     "datum": "heights, in the frame of the points",
-    "table": "what the capacity table is to be",
+    "table": "what the capacity table is to be; dips count from the table's zero",
+    "horizontal": "the cylinder and its ends; sizes as measured, inside or outside (survey.side)",
+    "sphere": "the sphere; its size as measured, inside or outside (survey.side)",
+    "mesh": "the closed surface of the inside",
+    "bottom": "what the bottom is like; see bottom.csv, too",
+    "roof": "the floating roof: all of it, or nothing when there is none",
+    "corrections": "false switches a correction off, and the report says so",
     "material": "the shell's steel",
     "adjustment": "how bad points are treated",
     "certificate": "printed when given, never invented",
@@ -24,16 +30,17 @@ SECTION_NOTES = {
 TABLE_NOTES = {
     "points": "one row for each surveyed point of the wall",
     "courses": "one row for each course (ring of plates), from the bottom up",
+    "bottom": "one row for each surveyed point of the bottom (x_m, y_m, z_m), or for each level"
+    " measured with liquid (level_m, volume_m3); leave it empty for other bottoms",
+    "deadwood": "one row for each thing in the tank that takes or gives room; may stay empty",
     "uncertainty": "one row for each uncertainty that the points do not carry themselves",
 }
 README_LINES = (
     "A tankcal job as a workbook: one sheet for the settings, one for each table.",
-    "1. Sheet job: fill in every row whose note begins with FILL IN. Leave what you do not know.",
-    "2. Sheet points: paste the surveyed points. Columns with optional headings may stay blank.",
-    "3. Sheet courses: one row for each course, from the bottom up.",
-    "4. Sheet uncertainty: what else is uncertain. It may stay empty.",
-    "5. Run: tankcal run job.xlsx",
+    "Sheet job: fill in every row whose note begins with FILL IN. Leave what you do not know.",
+    "Run: tankcal run job.xlsx",
     "Hold the pointer over a heading to read what the column is. Units stand in the headings.",
+    "Columns with optional headings may stay blank.",
     "Rows that begin with # are comments. This sheet, and any sheet whose name begins with #,"
     " is not read.",
     "The same job as a folder of text files stands beside this file; use one of the two.",
@@ -41,60 +48,81 @@ README_LINES = (
 _LAST_ROW_WITH_LIST = 100
 
 
-def write_starter(directory):
-    """Write the starter job into `directory`, made when it does not exist.
+def write_starter(directory, kind="vertical"):
+    """Write the starter job of a kind of tank into `directory`, made when it does not exist.
 
-    Raises InputError when the directory holds something already or cannot be written.
+    kind  "vertical", "horizontal", "sphere" or "mesh"; only what it can use is written
+
+    Raises InputError when the directory holds something already or cannot be written, ValueError
+    for another kind.
     """
+    if kind not in TABLES_OF_KIND:
+        raise ValueError(f"found {kind!r}; expected one of {', '.join(TABLES_OF_KIND)}")
     directory = Path(directory)
     try:
         if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
             found = "is not empty" if directory.is_dir() else "is a file"
             raise InputError(Problem(directory.name, f"{found}; expected a new or empty directory"))
         directory.mkdir(parents=True, exist_ok=True)
-        (directory / SETTINGS_FILE).write_text(_toml(), encoding="utf-8")
-        for table in COLUMNS:
-            (directory / f"{table}.csv").write_text(_csv(table), encoding="utf-8")
-        _write_workbook(directory / WORKBOOK_FILE)
+        (directory / SETTINGS_FILE).write_text(_toml(kind), encoding="utf-8")
+        for table in TABLES_OF_KIND[kind]:
+            (directory / f"{table}.csv").write_text(_csv(table, kind), encoding="utf-8")
+        _write_workbook(directory / WORKBOOK_FILE, kind)
     except OSError as error:
         reason = f"cannot be written ({error.strerror})"
         raise InputError(Problem(directory.name, reason)) from error
 
 
-def _toml():
+def _keys_of(kind):
+    """{section: its fields} of the kind of tank; sections without any are left out."""
+    suiting = {
+        section: [field for field in fields if field.suits(kind)]
+        for section, fields in KEYS.items()
+    }
+    return {section: fields for section, fields in suiting.items() if fields}
+
+
+def _start(field, kind):
+    return kind if field.name == "kind" else field.start
+
+
+def _toml(kind):
+    tables = [f"{table}.csv" for table in TABLES_OF_KIND[kind]]
     lines = [
         "# A tankcal job. Fill in every line marked FILL IN; leave the others or fill them in.",
         '# "" is a blank. Numbers stand without quotation marks: nominal_diameter_m = 13.0',
-        "# The units stand in the names. Then fill in points.csv and courses.csv, and run:",
+        f"# The units stand in the names. Then fill in {', '.join(tables)}",
+        "# (each says what it is for, and which may stay empty), and run:",
         "#     tankcal run .",
     ]
-    for section, fields in KEYS.items():
+    for section, fields in _keys_of(kind).items():
         lines += ["", f"# {SECTION_NOTES[section]}", f"[{section}]"]
         for field in fields:
-            is_bare = field.kind == "number" and field.start
-            value = field.start if is_bare else f'"{field.start}"'
-            lines.append(f"{f'{field.name} = {value}':<32} # {_note(field)}")
+            start = _start(field, kind)
+            value = start if field.kind == "number" and start else f'"{start}"'
+            lines.append(f"{f'{field.name} = {value}':<32} # {_note(field, kind)}")
     return "\n".join(lines) + "\n"
 
 
-def _note(field):
-    fill_in = "FILL IN: " if field.required and not field.start else ""
+def _note(field, kind):
+    is_blank = field.is_required(kind) and not _start(field, kind)
     choices = ""
-    if field.kind == "choice" and field.required and not field.start:
+    if field.kind == "choice" and is_blank:
         choices = f" ({field.expectation()})"
-    return f"{fill_in}{field.note}{choices}"
+    return f"{'FILL IN: ' if is_blank else ''}{field.note}{choices}"
 
 
-def _csv(table):
+def _csv(table, kind):
     lines = [f"# {TABLE_NOTES[table]}; lines that begin with # are comments"]
     for field in COLUMNS[table]:
         required = "" if field.required else " [may be blank]"
         lines.append(f"# {field.name}: {field.note}{required}")
-    lines += [f"# {name}: {row[3]}" for name, row in INPUT_UNITS.items() if table == "uncertainty"]
+    if table == "uncertainty":
+        lines += [f"# {name}: {one.note}" for name, one in INPUTS.items() if kind in one.kinds]
     return "\n".join([*lines, ",".join(field.name for field in COLUMNS[table])]) + "\n"
 
 
-def _write_workbook(path):
+def _write_workbook(path, kind):
     import xlsxwriter
 
     with xlsxwriter.Workbook(path) as book:
@@ -113,14 +141,15 @@ def _write_workbook(path):
         }
         readme = book.add_worksheet(README_SHEET)
         readme.set_column(0, 0, 100)
-        for row, line in enumerate(README_LINES):
+        tables = [f"Sheet {table}: {TABLE_NOTES[table]}." for table in TABLES_OF_KIND[kind]]
+        for row, line in enumerate((*README_LINES[:2], *tables, *README_LINES[2:])):
             readme.write_string(row, 0, line, formats["bold"] if row == 0 else None)
-        _write_settings(book.add_worksheet(SETTINGS_SHEET), formats)
-        for table, fields in COLUMNS.items():
-            _write_table(book.add_worksheet(table), table, fields, formats)
+        _write_settings(book.add_worksheet(SETTINGS_SHEET), kind, formats)
+        for table in TABLES_OF_KIND[kind]:
+            _write_table(book.add_worksheet(table), table, formats)
 
 
-def _write_settings(sheet, formats):
+def _write_settings(sheet, kind, formats):
     sheet.set_column(0, 1, 26)
     sheet.set_column(2, 2, 32)
     sheet.set_column(3, 3, 90)
@@ -128,32 +157,34 @@ def _write_settings(sheet, formats):
     for column, heading in enumerate(SETTINGS_HEADINGS):
         sheet.write_string(0, column, heading, formats["bold"])
     row = 0
-    for section, fields in KEYS.items():
+    for section, fields in _keys_of(kind).items():
         if section == "csv":  # of no use in a workbook
             continue
         for field in fields:
             row += 1
             sheet.write_string(row, 0, section)
             sheet.write_string(row, 1, field.name)
-            sheet.write_string(row, 3, _note(field))
-            _write_start(sheet, row, 2, field, formats)
+            sheet.write_string(row, 3, _note(field, kind))
+            _write_start(sheet, row, field, kind, formats)
             _offer_choices(sheet, row, row, 2, field)
 
 
-def _write_start(sheet, row, column, field, formats):
+def _write_start(sheet, row, field, kind, formats):
     """The value the starter has, in a cell whose format keeps what will be typed there."""
-    kind = {"number": "number", "flag": "number", "date": "date"}.get(field.kind, "text")
-    if field.required and not field.start:
-        kind = "fill in" if kind == "number" else f"fill in {kind}"
-    if not field.start:
-        sheet.write_blank(row, column, None, formats[kind])
+    start, column = _start(field, kind), 2
+    cell = {"number": "number", "flag": "number", "date": "date"}.get(field.kind, "text")
+    if field.is_required(kind) and not start:
+        cell = "fill in" if cell == "number" else f"fill in {cell}"
+    if not start:
+        sheet.write_blank(row, column, None, formats[cell])
     elif field.kind == "number":
-        sheet.write_number(row, column, float(field.start), formats[kind])
+        sheet.write_number(row, column, float(start), formats[cell])
     else:
-        sheet.write_string(row, column, field.start, formats[kind])
+        sheet.write_string(row, column, start, formats[cell])
 
 
-def _write_table(sheet, table, fields, formats):
+def _write_table(sheet, table, formats):
+    fields = COLUMNS[table]
     sheet.freeze_panes(1, 0)
     for column, field in enumerate(fields):
         kind = "number" if field.kind == "number" else "text"

@@ -1,10 +1,14 @@
-"""Builds small valid jobs for tests: a cylinder of R 6.5 m and H 9.5 m in five courses.
+"""Builds small valid jobs for tests: a cylinder of R 6.5 m and H 9.5 m in five courses, and others.
 
     write_job(folder)                                  a folder with job.toml and CSV files
     write_job(folder, radius=6.48, sd_mm=3.0)
     write_job(folder, radius=lambda theta, z: 6.5 + 0.01 * np.cos(2 * theta), rings=2)
     write_job(folder, settings={"table.step_m": 0.1, "survey.side": "inside", "tank.owner": None})
     write_workbook(path, rings=2)                      the same as a workbook
+    write_job(folder, deadwood=[("coil", 0.5, 1.0, -0.2)], roof={"mass_kg": 9000.0})
+    write_job(folder, settings={"bottom.form": "cone", "bottom.centre_z_m": -0.15})
+    write_job(folder, kind="horizontal", settings={"horizontal.tilt_mm_per_m": 5.0})
+    write_job(folder, kind="mesh", mesh=stl_bytes)
 
 `job_parts` gives the job as plain data (`Parts`), to be spoilt before `write_folder` or
 `write_book` writes it.
@@ -29,6 +33,27 @@ SETTINGS = {
     "table.reference_temperature_c": 20.0,
 }
 
+OF_KIND = {
+    "vertical": {},
+    "horizontal": {
+        "survey.side": "inside",
+        "horizontal.diameter_m": 2.4,
+        "horizontal.length_m": 10.0,
+        "horizontal.end_a": "flat",
+        "horizontal.end_b": "flat",
+    },
+    "sphere": {"survey.side": "inside", "sphere.diameter_m": 20.0},
+    "mesh": {"survey.side": None, "mesh.file": "tank.stl", "mesh.unit": "m"},
+}
+VERTICAL_ONLY = ("tank.nominal_diameter_m", "tank.nominal_height_m", "datum.bottom_z_m")
+ROOF = {
+    "mass_kg": 9000.0,
+    "critical_bottom_m": 1.0,
+    "critical_top_m": 1.3,
+    "reference_density_kg_m3": 850.0,
+    "weighing": "air",
+}
+
 
 @dataclass
 class Parts:
@@ -38,6 +63,7 @@ class Parts:
     tables: dict
     covariance_m2: np.ndarray | None = None
     extra_files: dict = field(default_factory=dict)  # name: text or bytes, folder form only
+    beside: dict = field(default_factory=dict)  # name: bytes, in the folder or beside the workbook
 
 
 def job_parts(
@@ -59,6 +85,12 @@ def job_parts(
     extra_points=(),
     uncertainty=(),
     settings=None,
+    kind="vertical",
+    bottom=(),
+    bottom_volumes=(),
+    deadwood=(),
+    roof=None,
+    mesh=None,
 ):
     """Parts of a job.
 
@@ -74,12 +106,67 @@ def job_parts(
     extra_points     rows (name, x_m, y_m, z_m)
     uncertainty      rows (input, u, unit)
     settings         {dotted key: value}; None removes the key
+    kind             "vertical", "horizontal" (2.4 x 10 m, flat ends), "sphere" (20 m), "mesh": the
+                     others have no courses, and no points but the extra_points
+    bottom           rows (x_m, y_m, z_m) or (x_m, y_m, z_m, s_mm)
+    bottom_volumes   rows (level_m, volume_m3) or (level_m, volume_m3, u_m3)
+    deadwood         rows (name, bottom_m, top_m, volume_m3) or with u_m3
+    roof             {key: value} over the keys of ROOF; {}: ROOF as it is
+    mesh             bytes of the file tank.stl, for kind "mesh"
     """
-    rng = np.random.default_rng(seed)
     heights = [height / courses] * courses if isinstance(courses, int) else list(courses)
-    given = {**SETTINGS, "tank.nominal_height_m": round(sum(heights), 9), **(settings or {})}
-    given = {key: value for key, value in given.items() if value is not None}
-    bottom_z = given.get("datum.bottom_z_m", 0.0)
+    given = _settings(kind, heights, roof, settings)
+    rows = []
+    if kind == "vertical":
+        rows = _wall(
+            radius,
+            heights,
+            rings,
+            points_per_ring,
+            noise_mm,
+            jitter,
+            seed,
+            centre,
+            tilt,
+            given.get("datum.bottom_z_m", 0.0),
+        )
+    rows += [list(row) for row in extra_points]
+    headings = ["point", "x_m", "y_m", "z_m"]
+    if sd_mm is not None:
+        headings += ["sx_mm", "sy_mm", "sz_mm"]
+        sds = [float(sd) for sd in np.broadcast_to(sd_mm, 3)]
+        rows = [row + sds for row in rows]
+    tables = {}
+    if rows:
+        tables["points"] = [headings, *rows]
+    if kind == "vertical":
+        tables["courses"] = _courses(heights, thickness_mm, paint_mm)
+    for name, columns, its_rows in (
+        ("uncertainty", "input u unit", uncertainty),
+        ("bottom", "x_m y_m z_m s_mm", bottom),
+        ("bottom", "level_m volume_m3 u_m3", bottom_volumes),
+        ("deadwood", "name bottom_m top_m volume_m3 u_m3", deadwood),
+    ):
+        if its_rows:
+            tables[name] = _table(columns.split(), its_rows)
+    return Parts(given, tables, covariance_m2, beside={} if mesh is None else {"tank.stl": mesh})
+
+
+def _settings(kind, heights, roof, settings):
+    given = {**SETTINGS, "tank.kind": kind}
+    if kind == "vertical":
+        given["tank.nominal_height_m"] = round(sum(heights), 9)
+    else:
+        given = {key: value for key, value in given.items() if key not in VERTICAL_ONLY}
+    given |= OF_KIND[kind]
+    if roof is not None:
+        given |= {f"roof.{key}": value for key, value in (ROOF | roof).items()}
+    given |= settings or {}
+    return {key: value for key, value in given.items() if value is not None}
+
+
+def _wall(radius, heights, rings, points_per_ring, noise_mm, jitter, seed, centre, tilt, bottom_z):
+    rng = np.random.default_rng(seed)
     rows, bottom = [], 0.0
     for number, course_height in enumerate(heights, 1):
         for ring in range(rings):
@@ -102,19 +189,13 @@ def job_parts(
             for place, point in enumerate(xyz, 1):
                 rows.append([f"C{number}R{ring + 1}P{place}", *map(float, point)])
         bottom += course_height
-    rows += [list(row) for row in extra_points]
-    headings = ["point", "x_m", "y_m", "z_m"]
-    if sd_mm is not None:
-        headings += ["sx_mm", "sy_mm", "sz_mm"]
-        sds = [float(sd) for sd in np.broadcast_to(sd_mm, 3)]
-        rows = [row + sds for row in rows]
-    tables = {
-        "points": [headings, *rows],
-        "courses": _courses(heights, thickness_mm, paint_mm),
-    }
-    if uncertainty:
-        tables["uncertainty"] = [["input", "u", "unit"], *map(list, uncertainty)]
-    return Parts(given, tables, covariance_m2)
+    return rows
+
+
+def _table(columns, rows):
+    width = max(len(row) for row in rows)
+    padded = [[*row, *[None] * (width - len(row))] for row in rows]
+    return [columns[:width], *padded]
 
 
 def _radius(radius, course, theta, z):
@@ -159,7 +240,7 @@ def write_folder(folder, parts):
     if parts.covariance_m2 is not None:
         names = np.array([row[0] for row in parts.tables["points"][1:]])
         np.savez(folder / "points_cov.npz", covariance_m2=parts.covariance_m2, points=names)
-    for name, content in parts.extra_files.items():
+    for name, content in (parts.extra_files | parts.beside).items():
         data = content.encode() if isinstance(content, str) else content
         (folder / name).write_bytes(data)
     return folder
@@ -167,7 +248,7 @@ def write_folder(folder, parts):
 
 def _csv_cell(cell, decimal):
     if isinstance(cell, float):
-        return repr(cell).replace(".", decimal)
+        return repr(float(cell)).replace(".", decimal)
     return "" if cell is None else cell
 
 
@@ -202,13 +283,25 @@ def write_book(path, parts):
     import xlsxwriter
 
     path = Path(path)
+    for name, content in parts.beside.items():
+        (path.parent / name).write_bytes(content)
     with xlsxwriter.Workbook(path) as book:
         rows = [["section", "key", "value"]]
-        rows += [[*dotted.rpartition(".")[::2], value] for dotted, value in parts.settings.items()]
+        rows += [
+            [*dotted.rpartition(".")[::2], _book_cell(value)]
+            for dotted, value in parts.settings.items()
+        ]
         _write_sheet(book.add_worksheet("job"), rows)
         for name, table in parts.tables.items():
             _write_sheet(book.add_worksheet(name), table)
     return path
+
+
+def _book_cell(value):
+    """A list as the text of a cell: 700; 850, or 0-0.3; 2.1-2.4 for pairs."""
+    if not isinstance(value, list):
+        return value
+    return "; ".join("-".join(map(repr, v)) if isinstance(v, list) else repr(v) for v in value)
 
 
 def _write_sheet(sheet, rows):
@@ -223,14 +316,22 @@ def _write_sheet(sheet, rows):
 def assert_same_job(one, other):
     """The two jobs are equal but for where they come from: files, rows, name of the source."""
     for part in dataclasses.fields(one):
-        if part.name in ("files", "source", "points", "warnings"):
-            continue
-        assert getattr(one, part.name) == getattr(other, part.name), part.name
-    for part in dataclasses.fields(one.points):
-        if part.name == "rows":
-            continue
-        a, b = getattr(one.points, part.name), getattr(other.points, part.name)
-        if isinstance(a, np.ndarray):
-            np.testing.assert_allclose(a, b, rtol=1e-15)  # a workbook keeps 16 digits
-        else:
-            assert a == b, part.name
+        if part.name not in ("files", "source", "warnings"):
+            _assert_same(getattr(one, part.name), getattr(other, part.name), part.name)
+
+
+def _assert_same(one, other, name):
+    assert type(one) is type(other), name
+    if isinstance(one, np.ndarray):
+        np.testing.assert_allclose(one, other, rtol=1e-15)  # a workbook keeps 16 digits
+    elif dataclasses.is_dataclass(one):
+        for part in dataclasses.fields(one):
+            if part.name not in ("rows", "row"):
+                values = (getattr(one, part.name), getattr(other, part.name))
+                _assert_same(*values, f"{name}.{part.name}")
+    elif isinstance(one, tuple):
+        assert len(one) == len(other), name
+        for a, b in zip(one, other, strict=True):
+            _assert_same(a, b, name)
+    else:
+        assert one == other, name

@@ -7,8 +7,8 @@ import scipy.sparse
 from jacobians import assert_derivative
 
 from tankcal.adjust import adjust
+from tankcal.circles import circle_conditions
 from tankcal.errors import SolutionError
-from tankcal.sections import circle_conditions
 
 
 def mean_model(x, l):

@@ -14,46 +14,13 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from job_builder import Parts, job_parts, toml_text, write_book, write_folder
+from job_builder import Parts, job_parts, write_book, write_folder
+from spoilt import FORMS, places, problems_of, settings_place, table_file, write
 
 from tankcal.errors import InputError
 from tankcal.job import Job, load
-
-FORMS = ("folder", "workbook")
-
-
-def write(tmp_path, parts, form):
-    return (
-        write_folder(tmp_path / "job", parts)
-        if form == "folder"
-        else write_book(tmp_path / "job.xlsx", parts)
-    )
-
-
-def problems_of(path):
-    with pytest.raises(InputError) as caught:
-        load(path)
-    return caught.value.problems
-
-
-def places(problems):
-    return [(problem.file, problem.row, problem.column) for problem in problems]
-
-
-def table_file(form, table):
-    return f"{table}.csv" if form == "folder" else f"sheet {table}"
-
-
-def settings_place(form, parts, key):
-    """File, row and column of a key that `parts` has."""
-    if form == "workbook":
-        return "sheet job", [*parts.settings].index(key) + 2, key
-    section, _, name = key.rpartition(".")
-    lines = toml_text(parts.settings).split("\n")
-    start = lines.index(f"[{section}]")
-    row = next(i for i, line in enumerate(lines) if i > start and line.startswith(f"{name} ="))
-    return "job.toml", row + 1, key
-
+from tankcal.job.contract import KINDS
+from tankcal.job.tables import TABLES
 
 # key, bad value, words that the message must hold
 BAD_SETTINGS = [
@@ -63,7 +30,6 @@ BAD_SETTINGS = [
     ("tank.id", ".hidden", "found"),
     ("tank.id", "x" * 65, "at most 64"),
     ("tank.id", True, "truth value"),
-    ("tank.kind", "sphere", "not available in this version"),
     ("tank.kind", "vertcal", "expected 'vertical'"),
     ("tank.nominal_diameter_m", 13000.0, "another unit"),
     ("tank.nominal_diameter_m", "13.0", "found the text '13.0'"),
@@ -77,7 +43,6 @@ BAD_SETTINGS = [
     ("survey.side", "out", "'outside' or 'inside'"),
     ("survey.date", "31/05/2024", "a date such as"),
     ("survey.date", "2024-02-30", "a date such as"),
-    ("survey.liquid_level_m", 3.0, "not available in this version"),
     ("survey.liquid_density_kg_m3", 850.0, "without liquid_level_m"),
     ("datum.dip_plate_z_m", 1.5, "above the bottom"),
     ("datum.dip_plate_z_m", -1.5, "below the bottom"),
@@ -87,8 +52,7 @@ BAD_SETTINGS = [
     ("table.step_m", 10, "millimetres?"),
     ("table.step_m", 1e-5, "rows in the table"),
     ("table.coverage_probability", 95, "from 0.5 to 0.9999"),
-    ("table.liquid_density_kg_m3", 850.0, "not available in this version"),
-    ("table.fine_step_m", 0.001, "not available in this version"),
+    ("table.liquid_density_kg_m3", 0.85, "in g/cm3?"),
     ("table.minimum_delivery_m", 2.0, "not available in this version"),
     ("table.rule", "API", "not available in this version"),
     ("material.e_gpa", 206000, "from 40 to 500"),
@@ -96,7 +60,6 @@ BAD_SETTINGS = [
     ("adjustment.datum", "inner", "not available in this version"),
     ("adjustment.scale", "posterior", "a_posteriori"),
     ("adjustment.snooping", "perhaps", "true or false"),
-    ("roof.mass_kg", 3000, "not available in this version"),
     ("adjustment.camera.default", "camera free", "not available in this version"),
     ("certificate.date_of_issue", "soon", "a date such as"),
     ("certificate.numbr", "x", "unknown key"),
@@ -171,9 +134,29 @@ BAD_CELLS = [
 CONSEQUENCES = {("height_m", None), ("unit", 3)}
 
 
+BOTTOM = [(x, y, -0.01 * abs(x), 2.0) for x in (-4, 0, 1, 4) for y in (-4, 0, 1, 4)]
+
+
 def full_parts(**changes):
-    """A job with every table and most of the optional columns."""
-    parts = job_parts(sd_mm=2.0, paint_mm=0.3, **changes)
+    """A vertical job with every table, most of the optional columns and most sections."""
+    settings = {
+        "table.liquid_density_kg_m3": 850.0,
+        "table.other_densities_kg_m3": [700.0, 750.0],
+        "table.fine_step_m": 0.001,
+        "table.fine_zones": [[0.0, 0.3], [2.1, 2.4]],
+        "table.max_interpolation_error_l": 5.0,
+        "corrections.tilt": False,
+        "bottom.form": "points",
+    } | changes.pop("settings", {})
+    parts = job_parts(
+        sd_mm=2.0,
+        paint_mm=0.3,
+        bottom=BOTTOM,
+        deadwood=[("coil", 0.5, 1.0, -0.2, 0.01), ("manhole", 0.6, 1.2, 0.05)],
+        roof={},
+        settings=settings,
+        **changes,
+    )
     parts.tables["uncertainty"] = [
         ["input", "u", "unit", "type", "distribution", "dof", "note"],
         ["scale", 5.0, "ppm", "B", "normal", None, "certificate"],
@@ -217,7 +200,7 @@ def test_missing_tables(tmp_path, form):
     problems = problems_of(write(tmp_path, parts, form))
     expected = [(table_file(form, name), None, None) for name in ("points", "courses")]
     assert places(problems) == expected
-    words = "missing file" if form == "folder" else "the sheets job, points, courses, uncertainty"
+    words = "missing file" if form == "folder" else "the sheets job, points, courses, bottom"
     assert all(words in problem.expected for problem in problems)
 
 
@@ -327,12 +310,11 @@ def test_decimal_commas_among_separators(tmp_path):
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("deadwood.csv", "not available in this version"),
-        ("bottom.csv", "not available in this version"),
+        ("targets.csv", "not available in this version"),
         ("image_points.csv", "not available in this version"),
         ("cameras.toml", "not available in this version"),
         ("Points.csv", "did you mean points.csv?"),
-        ("notes.csv", "points.csv, courses.csv, uncertainty.csv"),
+        ("notes.csv", "points.csv, courses.csv, bottom.csv, deadwood.csv, uncertainty.csv"),
     ],
 )
 def test_files_that_do_not_belong(tmp_path, name, words):
@@ -348,9 +330,9 @@ def test_files_that_do_not_belong(tmp_path, name, words):
 
 def test_sheets_that_do_not_belong(tmp_path):
     parts = job_parts()
-    parts.tables |= {"Sheet1": [["x"]], "deadwood": [["name"]], "# notes": [["kept"]]}
+    parts.tables |= {"Sheet1": [["x"]], "targets": [["name"]], "# notes": [["kept"]]}
     problems = problems_of(write_book(tmp_path / "job.xlsx", parts))
-    assert places(problems) == [("job.xlsx", None, None), ("sheet deadwood", None, None)]
+    assert places(problems) == [("job.xlsx", None, None), ("sheet targets", None, None)]
     assert "unknown sheet 'Sheet1'" in problems[0].expected
 
 
@@ -360,7 +342,7 @@ def test_all_problems_of_a_run_come_together(tmp_path):
     parts.tables["points"][5][2] = "NaN"
     parts.tables["courses"][2][2] = -8.0
     parts.tables["uncertainty"][1][2] = "m"
-    parts.extra_files["deadwood.csv"] = "name\n"
+    parts.extra_files["targets.csv"] = "point\n"
     problems = problems_of(write_folder(tmp_path / "job", parts))
     assert sorted(places(problems), key=str) == sorted(
         [
@@ -370,7 +352,7 @@ def test_all_problems_of_a_run_come_together(tmp_path):
             ("points.csv", 6, "y_m"),
             ("courses.csv", 3, "thickness_mm"),
             ("uncertainty.csv", 2, "unit"),
-            ("deadwood.csv", None, None),
+            ("targets.csv", None, None),
         ],
         key=str,
     )
@@ -406,6 +388,7 @@ NASTY = st.one_of(
     st.booleans(),
     st.none(),
 )
+LISTS = st.lists(st.one_of(st.floats(0, 1000), st.lists(st.floats(0, 10), max_size=3)), max_size=3)
 QUICK = settings(
     max_examples=150,
     deadline=None,
@@ -421,7 +404,7 @@ def assert_job_or_problems(path):
     except InputError as error:
         problems = error.problems
     if job is not None:
-        assert np.all(np.isfinite(job.points.xyz_m))
+        assert job.points is None or np.all(np.isfinite(job.points.xyz_m))
         return
     assert problems
     for problem in problems:
@@ -430,15 +413,43 @@ def assert_job_or_problems(path):
         assert problem.expected
 
 
+def parts_of_kind(kind):
+    """A small job of a kind, with most of what it may have."""
+    if kind == "vertical":
+        return full_parts(points_per_ring=10)
+    scan = [(f"P{i}", np.cos(2.4 * i), i / 5, np.sin(2.4 * i)) for i in range(30)]
+    parts = job_parts(
+        kind=kind,
+        extra_points=scan if kind == "sphere" else (),
+        deadwood=[("pipe", 0.5, 1.0, -0.02, 0.001)],
+        uncertainty=[("datum", 1.0, "mm"), ("scale", 5.0, "ppm")],
+        mesh=b"solid" if kind == "mesh" else None,
+    )
+    if kind == "sphere":
+        del parts.settings["sphere.diameter_m"]
+    elif kind == "horizontal":
+        parts.settings |= {
+            "horizontal.end_a": "torispherical",
+            "horizontal.end_a_dish_radius_m": 2.4,
+            "horizontal.end_a_knuckle_radius_m": 0.24,
+            "horizontal.end_b": "ellipsoidal",
+            "horizontal.end_b_depth_m": 0.6,
+            "horizontal.tilt_mm_per_m": 5.0,
+            "horizontal.dip_from_a_m": 5.0,
+            "horizontal.dip_direction": "square",
+        }
+    return parts
+
+
 @st.composite
 def spoilt_parts(draw):
-    """A small job with one to four things changed to anything."""
-    parts = full_parts(points_per_ring=10)
+    """A small job of any kind with one to four things changed to anything."""
+    parts = parts_of_kind(draw(st.sampled_from(["vertical", "vertical", *KINDS])))
     for _ in range(draw(st.integers(1, 4))):
         name = draw(st.sampled_from(["settings", *parts.tables]))
         if name == "settings":
-            key = draw(st.sampled_from([*parts.settings, "tank.owner", "roof.x", "a.b.c", "x"]))
-            parts.settings[key] = draw(NASTY)
+            key = draw(st.sampled_from([*parts.settings, *MORE_KEYS]))
+            parts.settings[key] = draw(NASTY | LISTS)
             continue
         rows = parts.tables[name]
         row = rows[draw(st.integers(0, min(len(rows) - 1, 12)))]
@@ -460,10 +471,14 @@ def test_any_cell_in_a_folder(parts):
 @settings(QUICK, max_examples=60)
 @given(spoilt_parts(), st.booleans())
 def test_any_cell_in_a_workbook(parts, with_date):
-    if with_date:
+    if with_date and "points" in parts.tables:
         parts.tables["points"][2][2] = datetime.date(2024, 5, 31).isoformat()
     with tempfile.TemporaryDirectory() as place:
         assert_job_or_problems(write_book(Path(place) / "job.xlsx", parts))
+
+
+MORE_KEYS = ["tank.owner", "roof.x", "a.b.c", "x", "tank.kind", "bottom.centre_z_m", "sphere.x"]
+MORE_KEYS += ["table.height_unit", "horizontal.diameter_m", "mesh.file", "survey.liquid_level_m"]
 
 
 @st.composite
@@ -486,7 +501,7 @@ BITS += [b"<", b">", b"<c/>", b' r="-1"', b"&#0;", b"<f/>", b"{", b"'''", b"#", 
 
 @QUICK
 @given(
-    st.sampled_from(["job.toml", "points.csv", "courses.csv", "uncertainty.csv", "points_cov.npz"]),
+    st.sampled_from(["job.toml", *(f"{table}.csv" for table in TABLES), "points_cov.npz"]),
     byte_changes(),
 )
 def test_any_bytes_in_a_folder(name, change):
@@ -543,7 +558,10 @@ def test_any_bytes_inside_a_workbook(name, change):
 
 def test_the_unspoilt_jobs_of_these_tests_are_sound(tmp_path):
     load_bytes(WORKBOOK)
-    assert isinstance(load(write_folder(tmp_path / "job", full_parts())), Job)
+    for kind in KINDS:
+        job = load(write_folder(tmp_path / kind, parts_of_kind(kind)))
+        assert isinstance(job, Job)
+        assert job.warnings == ()
     assert isinstance(full_parts(), Parts)
 
 

@@ -1,16 +1,13 @@
-"""The capacity table: rows, deliveries, declared inputs and degrees of freedom."""
+"""The capacity table: rows, deliveries, degrees of freedom, zones that are not for use."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from jacobians import assert_derivative
-from shapes import azimuths, ring, section_of
 
-from tankcal.capacity import Capacity, Propagation, table_heights
+from tankcal.capacity import Capacity
 from tankcal.errors import HeightError
 from tankcal.uncertainty import Source
-from tankcal.volumes import ShellVolume, course_shape
 
 HEIGHTS = np.linspace(0, 9.5, 11)
 
@@ -85,81 +82,11 @@ def test_the_top_may_be_typed_as_it_is_read():
         found.at(9.501)
 
 
-def test_below_the_bottom_there_is_nothing_and_no_uncertainty():
-    sources = propagation().sources(np.array([-0.02, 0.0, 1.0]))
-    datum = next(source for source in sources if source.kind == "datum")
-    assert datum.columns_m3[0, 0] == 0.0
-    assert datum.columns_m3[2, 0] > 100
-
-
-@pytest.mark.parametrize(
-    ("step", "top", "rows", "last"),
-    [
-        (0.01, 9.5, 951, 9.5),
-        (0.01, 9.4999, 951, 9.4999),
-        (0.3, 1.0, 5, 1.0),
-        (0.001, 12.0, 12001, 12),
-    ],
-)
-def test_rows_go_to_the_very_top(step, top, rows, last):
-    heights = table_heights(step, top)
-    assert len(heights) == rows
-    assert heights[-1] == pytest.approx(last, abs=1e-9)
-    assert heights[-1] <= top
-    assert np.all(np.diff(heights) > 0)
-    assert np.allclose(heights[:-1], np.arange(rows - 1) * step)
-
-
-class Declared:
-    u, u_as_read, unit, note = 1.0, 1.0, "x", ""
-    type, distribution, dof = "B", "normal", np.inf
-
-    def __init__(self, name):
-        self.name = name
-
-
-def propagation(inset=0.008, temperature=12.0, expansion=1.1e-5, stretch=1.0):
-    outline = section_of(ring(6.5 * stretch, azimuths(24))).outline
-    scale = 1 + expansion * temperature
-    course = course_shape(0, 9.5, [4.0], [outline], inset_m=inset, scale=scale)
-    return Propagation(
-        ShellVolume((course,)),
-        np.zeros((1, 0)),
-        np.inf,
-        np.zeros((1, 0)),
-        tuple(Declared(name) for name in ("scale", "datum")),
-        scale,
-        expansion,
-    )
-
-
-@pytest.mark.parametrize(
-    ("name", "vary", "at", "step"),
-    [
-        ("plate_thickness", lambda x: propagation(inset=x), 0.008, 1e-5),
-        ("paint", lambda x: propagation(inset=x), 0.008, 1e-5),
-        ("expansion", lambda x: propagation(expansion=x), 1.1e-5, 1e-7),
-        ("shell_temperature", lambda x: propagation(temperature=12.0 - x), 0.0, 1e-2),
-    ],
-)
-def test_derivatives_by_declared_inputs(name, vary, at, step):
-    """Against differences of the volume itself."""
-    levels = [0.5, 9.5]
-    analytic = propagation().derivative(name, levels)[:, None]
-    assert_derivative(
-        lambda x: vary(x[0]).volume.volume_m3(levels), [at], analytic, step=step, tolerance=1e-5
-    )
-
-
-def test_derivatives_by_scale_and_datum_closed_form():
-    found = propagation(inset=0.0)
-    volume, area = found.volume.volume_m3([4.0])[0], found.volume.area_m2([4.0])[0]
-    assert found.derivative("scale", [4.0])[0] == pytest.approx(2 * volume)
-    assert found.derivative("datum", [4.0])[0] == pytest.approx(area)
-    by_difference = (propagation(0.0, stretch=1 + 1e-6).volume.volume_m3([4.0])[0] - volume) / 1e-6
-    assert found.derivative("scale", [4.0])[0] == pytest.approx(by_difference, rel=1e-5)
-
-
-def test_every_declared_input_is_one_source():
-    kinds = [source.kind for source in propagation().sources([1.0])]
-    assert kinds == ["points", "scale", "datum"]
+def test_the_critical_zone_of_a_roof_is_flagged_and_its_edges_are_not():
+    found = replace(table(), critical_m=(1.9, 3.8))
+    assert found.for_use([0.0, 1.9, 2.0, 3.7, 3.8]).tolist() == [True, True, False, False, True]
+    assert not found.at(2.5).for_use
+    assert found.at(5.0).for_use
+    assert not found.delivery(3.0, 7.0).for_use
+    assert found.delivery(0.5, 7.0).for_use
+    assert table().at(2.5).for_use

@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from job_builder import write_job
-from shapes import azimuths, modes, ring
 
 import tankcal
 from tankcal.chain import run
 from tankcal.errors import InputError
-from tankcal.job import Course, Datum, Job, Material, Points, Survey, TableSpec, Tank
 from tankcal.sections import fit_section
+from tankcal.tanks import insets_of, shell_volume, thermal_scale
 
 
 def result_of(tmp_path, **changes):
@@ -28,7 +27,7 @@ def test_a_cylinder_comes_out_exactly(tmp_path):
     heights = found.capacity.height_m.to_numpy()
     # closed form; the points are written to 1e-6 m or better
     assert found.capacity.volume_m3.to_numpy() == pytest.approx(inside(6.5) * heights, rel=1e-6)
-    assert np.all(found.shell.reason == "")
+    assert np.all(found.wall.shell.reason == "")
 
 
 def test_an_inside_survey_keeps_its_radius(tmp_path):
@@ -38,7 +37,7 @@ def test_an_inside_survey_keeps_its_radius(tmp_path):
 
 def test_two_rings_in_a_course_make_two_sections_and_a_frustum_is_exact(tmp_path):
     found = result_of(tmp_path, radius=lambda theta, z: 6.5 + 0.004 * z, rings=2)
-    assert len(found.sections) == 10
+    assert len(found.wall.sections) == 10
     low, high, inset = 6.5, 6.5 + 0.004 * 9.5, 0.008
     exact = (
         np.pi
@@ -69,8 +68,8 @@ def test_tilt_enters_once(tmp_path):
         return 6.5 * longer / np.hypot(np.sin(theta), longer * np.cos(theta))
 
     found = result_of(tmp_path, tilt=(0.03, 0.0), radius=cut, settings={"survey.side": "inside"})
-    assert found.volume.height_m == pytest.approx(9.5 / longer, rel=1e-9)
-    assert found.volume.volume_m3([9.5 / longer])[0] == pytest.approx(
+    assert found.body.shell.volume.height_m == pytest.approx(9.5 / longer, rel=1e-9)
+    assert found.body.shell.volume.volume_m3([9.5 / longer])[0] == pytest.approx(
         np.pi * 6.5**2 * 9.5, rel=1e-6
     )
 
@@ -141,9 +140,9 @@ def test_fully_correlated_sections_add_linearly(tmp_path):
 def test_the_noise_is_estimated_when_no_covariance_is_given(tmp_path):
     """Simulation: 360 points with 3 mm in every coordinate."""
     found = result_of(tmp_path, noise_mm=3.0, points_per_ring=72)
-    noise = np.sqrt(found.covariance_m2.diagonal()[0])
-    assert noise == pytest.approx(0.003, rel=3 / np.sqrt(2 * found.shell.noise_dof))
-    assert found.table.sources[0].dof == found.shell.noise_dof
+    noise = np.sqrt(found.wall.covariance_m2.diagonal()[0])
+    assert noise == pytest.approx(0.003, rel=3 / np.sqrt(2 * found.wall.shell.noise_dof))
+    assert found.table.sources[0].dof == found.wall.shell.noise_dof
 
 
 def test_a_posteriori_scaling_mends_wrong_sds(tmp_path):
@@ -175,10 +174,9 @@ def simulate(result, surveys):
     """Volumes at full height of surveys drawn from the covariance of the points."""
     rng = np.random.default_rng(20)
     job, wall = result.job, result.wall
-    xyz, sd = job.points.xyz_m[wall], job.points.sd_m[wall]
+    xyz, sd = job.points.xyz_m[wall.accepted], job.points.sd_m[wall.accepted]
+    insets, scale = insets_of(job, job.switches), thermal_scale(job, job.switches)
     volumes = np.empty(surveys)
-    from tankcal.chain import corrections_of, shell_volume
-
     for i in range(surveys):
         drawn = xyz + rng.normal(size=xyz.shape) * sd
         sections = tuple(
@@ -186,13 +184,13 @@ def simulate(result, surveys):
                 section.group,
                 drawn[section.group.members],
                 np.diag(sd[section.group.members].ravel() ** 2),
-                result.shell.slope,
+                wall.shell.slope,
                 job.datum.bottom_z_m + section.group.height_m,
-                0.0,
+                wall.form,
             )
-            for section in result.sections
+            for section in wall.sections
         )
-        volume = shell_volume(job.courses, result.joints_m, sections, **corrections_of(job))
+        volume = shell_volume(job.courses, wall.joints_m, sections, insets, scale)
         volumes[i] = volume.volume_m3(volume.height_m)[0]
     return volumes
 
@@ -219,71 +217,6 @@ def test_the_propagated_sd_is_the_scatter_of_simulated_surveys_study(example_res
     assert ratio == pytest.approx(1.0, abs=0.02)
 
 
-def simulated_tank(rng, common):
-    """A job of 24 x 5 targets (1 mm) on a tank of R 10 m, and its true volumes at 1 m and 10 m.
-
-    Form of variance k^-3 for k = 2..200, 20 mm rms, common to all courses or not.
-    """
-    k = np.arange(2, 201)
-    sd = 0.020 * np.sqrt(k**-3.0 / np.sum(k**-3.0))
-    azimuth = azimuths(24)
-    xyz, areas = [], []
-    for course in range(5):
-        if course == 0 or not common:
-            outline, area = modes(10.0, 2, rng.normal(size=199) * sd, rng.normal(size=199) * sd)
-        xyz.append(ring(outline, azimuth, z=2.0 * course + 1.0))
-        areas.append(area)
-    xyz = np.vstack(xyz) + rng.normal(0, 0.001, (120, 3))
-    nothing = (None,) * 120
-    names = tuple(str(i) for i in range(120))
-    points = Points(names, xyz, np.full((120, 3), 0.001), None, nothing, nothing, tuple(range(120)))
-    job = Job(
-        Tank("T", "vertical", 20.0, 10.0, {}),
-        Survey("inside", "2024-01-01"),
-        Datum(0.0),
-        TableSpec(1.0, 20.0),
-        Material(),
-        tuple(Course(str(i + 1), 2.0, 0.0) for i in range(5)),
-        points,
-    )
-    return job, np.array([areas[0], 2.0 * np.sum(areas)])
-
-
-def coverage(tanks, common):
-    """Parts of the tanks whose true volumes lie within U, and within U of the points alone."""
-    rng = np.random.default_rng(31)
-    inside, by_noise = np.zeros(2), np.zeros(2)
-    for _ in range(tanks):
-        job, truth = simulated_tank(rng, common)
-        table = run(job).table
-        rows = [1, 10]
-        error = np.abs(table.volume_m3[rows] - truth)
-        inside += error < table.U_m3[rows]
-        by_noise += error < 1.96 * np.linalg.norm(table.sources[0].columns_m3[rows], axis=1)
-    return inside / tanks, by_noise / tanks
-
-
-@pytest.mark.parametrize("common", [True, False], ids=["common form", "form of each course"])
-def test_intervals_cover_tanks_with_form_between_the_targets(common, figure):
-    """50 tanks. The points' noise alone would cover about half."""
-    inside, by_noise = coverage(50, common)
-    figure(f"coverage of 95 % intervals at 1 m and 10 m, 50 tanks, common form {common}", inside)
-    assert np.all(inside > 0.95 - 3 * np.sqrt(0.95 * 0.05 / 50))
-    assert np.all(by_noise < 0.75)
-
-
-@pytest.mark.study
-@pytest.mark.parametrize("common", [True, False], ids=["common form", "form of each course"])
-def test_intervals_cover_tanks_with_form_between_the_targets_study(common, figure):
-    """1000 tanks: 93 to 97 % where the form is common, no less than 90 % where it is not."""
-    inside, by_noise = coverage(1000, common)
-    figure(f"coverage of 95 % intervals at 1 m and 10 m, 1000 tanks, common form {common}", inside)
-    figure(f"the same of the points' noise alone, common form {common}", by_noise)
-    if common:
-        assert np.all(np.abs(inside - 0.95) < 0.02 + 2 * np.sqrt(0.95 * 0.05 / 1000))
-    assert np.all(inside > 0.90)
-
-
 def test_a_result_shows_itself_in_a_line_and_a_path_is_no_job(example_result):
     assert repr(example_result).startswith("<tankcal.Result of SILVA-1995: 1249.76")
     with pytest.raises(TypeError, match="expected a Job"):
@@ -294,12 +227,14 @@ def test_a_fixed_point_in_a_full_covariance_is_no_stumbling_block(tmp_path):
     """A network with a fixed point has a singular covariance.
 
     Its circle goes through that point, so the outline's origin moves by the noise, and the area of
-    the same points by a small part of its uncertainty.
+    the same points by a small part of its uncertainty. Without snooping: a section that loses a
+    point is smoothed, and then a point without an error rightly counts for more.
     """
     variances = np.full(360, 4e-6)
-    plain = result_of(tmp_path / "a", noise_mm=2.0, covariance_m2=np.diag(variances))
+    options = {"noise_mm": 2.0, "settings": {"adjustment.snooping": False}}
+    plain = result_of(tmp_path / "a", covariance_m2=np.diag(variances), **options)
     variances[30:33] = 0.0
-    fixed = result_of(tmp_path / "b", noise_mm=2.0, covariance_m2=np.diag(variances))
+    fixed = result_of(tmp_path / "b", covariance_m2=np.diag(variances), **options)
     moved = np.abs(fixed.table.volume_m3 - plain.table.volume_m3)
     assert np.all(moved[1:] < 0.2 * plain.table.u_m3[1:])
     assert fixed.table.u_m3[-1] == pytest.approx(plain.table.u_m3[-1], rel=0.05)

@@ -196,3 +196,67 @@ def test_an_interruption_in_disguise_is_no_traceback(done, monkeypatch, capsys):
     monkeypatch.setattr(report, "build", interrupted)
     assert main(["run", str(done), "--quiet"]) == 130
     assert "stopped; nothing was written" in capsys.readouterr().err
+
+
+def table(path, wrong=None):
+    """A capacity table of a cylinder of 130 m2, with one wrong volume if wanted."""
+    volumes = [f"{1.3 * k:.3f}" for k in range(101)]
+    if wrong is not None:
+        volumes[wrong] = "65.400"
+    rows = [f"{k / 100:.2f},{volume}" for k, volume in enumerate(volumes)]
+    path.write_text("height_m,volume_m3\n" + "\n".join(rows) + "\n")
+    return str(path)
+
+
+def test_lint_of_a_clean_table(tmp_path, capsys):
+    arguments = ["--nominal-diameter", "12.87", "--nominal-height", "1"]
+    assert main(["lint", table(tmp_path / "t.csv"), *arguments]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "t.csv: 101 rows, 0 to 1 m, step 0.01 m, total 130 m3",
+        "no errors, no warnings",
+    ]
+
+
+def test_lint_tells_each_finding_in_one_line(tmp_path, capsys):
+    file = table(tmp_path / "t.csv", wrong=50)
+    assert main(["lint", file, "--nominal-volume", "145"]) == 2
+    assert capsys.readouterr().out.splitlines() == [
+        "t.csv: warning: total 130 m3, expected about 145 m3 (nominal)",
+        "t.csv, row 52, volume_m3: error: found 65.400; expected about 65.000: 65.000? (one digit)",
+        "t.csv: 101 rows, 0 to 1 m, step 0.01 m, total 130 m3",
+        "1 error, 1 warning",
+    ]
+
+
+def test_lint_shows_the_first_findings_only(tmp_path, capsys):
+    rows = "".join(f"{k},x\n" for k in range(60))
+    (tmp_path / "t.csv").write_text("height_m,volume_m3\n" + rows)
+    assert main(["lint", str(tmp_path / "t.csv")]) == 2
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[50].startswith("and ")
+    assert lines[50].endswith(" more findings; mend these first")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nowhere.csv"], "not found"),
+        (["\0"], "not found"),
+        (["{table}", "--nominal-diameter", "12"], "expected both"),
+        (["{table}", "--sheet", "x"], "no sheet 'x'"),
+    ],
+)
+def test_lint_of_what_is_no_table(arguments, words, tmp_path, capsys):
+    file = table(tmp_path / "t.csv")
+    assert main(["lint", *(argument.format(table=file) for argument in arguments)]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert "Traceback" not in error
+
+
+@pytest.mark.parametrize("number", ["0", "-1", "nan", "inf", "ten"])
+def test_nominal_sizes_are_above_zero(number, tmp_path, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["lint", table(tmp_path / "t.csv"), f"--nominal-volume={number}"])
+    assert stop.value.code == 2
+    assert "expected a number above 0" in capsys.readouterr().err

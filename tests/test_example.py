@@ -17,7 +17,7 @@ def published(name):
 
 def test_centres_radii_and_areas_published_s_table_11(example_result):
     for section, printed in zip(
-        example_result.sections, published("table11_circles.csv"), strict=True
+        example_result.wall.sections, published("table11_circles.csv"), strict=True
     ):
         circle = section.circle
         assert circle.x_m == pytest.approx(float(printed["x_m"]), abs=1e-3)
@@ -30,15 +30,15 @@ def test_centres_radii_and_areas_published_s_table_11(example_result):
 def test_residual_magnitudes_published_s_table_11(example_result):
     printed = published("table11_residuals.csv")
     names = example_result.job.points.generatrix
-    for number, section in enumerate(example_result.sections, 1):
+    for number, section in enumerate(example_result.wall.sections, 1):
         size = {row["generatrix"]: row[f"s{number}_m"] for row in printed}
-        members = example_result.wall[section.group.members]
+        members = example_result.wall.accepted[section.group.members]
         for member, residual in zip(members, section.circle.residuals_m, strict=True):
             assert abs(residual) == pytest.approx(float(size[names[member]]), abs=1e-3)
 
 
 def test_no_point_is_rejected(example_result):
-    assert len(example_result.wall) == 24 * 5 - 1  # published: section 3 has 23 points
+    assert len(example_result.wall.accepted) == 24 * 5 - 1  # published: section 3 has 23 points
 
 
 def test_gross_volume_is_the_published_one(example_result):

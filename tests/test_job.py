@@ -1,11 +1,13 @@
 """A sound job comes out in SI, the same from a folder and from a workbook."""
 
 import datetime
+import hashlib
 
 import numpy as np
 import openpyxl
 import pytest
 from job_builder import (
+    ROOF,
     assert_same_job,
     job_parts,
     toml_text,
@@ -147,6 +149,214 @@ def test_order_of_columns_and_names_of_sections(tmp_path):
     assert job.points.names == plain.points.names
     assert set(job.points.section) == {"S1"}
     assert set(job.points.generatrix) == {"007"}
+
+
+VERTICAL = {
+    "bottom": [(x, y, -0.01 * abs(x), 2.0) for x in (-4, 0, 4) for y in (-4, 0, 1, 4)],
+    "deadwood": [("coil", 0.5, 1.0, -0.25, 0.01), ("manhole", 0.6, 1.2, 0.05)],
+    "roof": {},
+    "settings": {
+        "tank.nominal_volume_m3": 1260.0,
+        "survey.liquid_level_m": 2.0,
+        "survey.liquid_density_kg_m3": 998.0,
+        "table.fine_step_m": 0.001,
+        "table.fine_zones": [[2.1, 2.4], [0.0, 0.3]],
+        "table.volume_unit": "L",
+        "table.max_interpolation_error_l": 5.0,
+        "table.liquid_density_kg_m3": 850.0,
+        "table.other_densities_kg_m3": [700.0, 1000.0],
+        "table.height_expansion": True,
+        "corrections.paint": False,
+    },
+    "uncertainty": [
+        ("youngs_modulus", 5.0, "GPa"),
+        ("liquid_density", 3.0, "kg/m3"),
+        ("survey_level", 2.0, "mm"),
+        ("survey_density", 1.0, "kg/m3"),
+        ("bottom", 3.0, "mm"),
+        ("barrel", 1.0, "mm"),
+        ("roof_mass", 50.0, "kg"),
+    ],
+}
+HORIZONTAL = {
+    "kind": "horizontal",
+    "settings": {
+        "survey.side": "outside",
+        "datum.dip_plate_z_m": 0.012,
+        "table.step_m": None,
+        "table.height_unit": "ft-in-16",
+        "table.volume_unit": "bbl",
+        "horizontal.end_a": "torispherical",
+        "horizontal.end_a_dish_radius_m": 2.4,
+        "horizontal.end_a_knuckle_radius_m": 0.24,
+        "horizontal.end_b": "ellipsoidal",
+        "horizontal.end_b_depth_m": 0.6,
+        "horizontal.tilt_mm_per_m": -5.0,
+        "horizontal.dip_from_a_m": 2.0,
+        "horizontal.dip_direction": "square",
+        "horizontal.thickness_mm": 8.0,
+    },
+    "uncertainty": [
+        ("diameter", 2.0, "mm"),
+        ("length", 5.0, "mm"),
+        ("end_depth", 4.0, "mm"),
+        ("tilt", 0.5, "mm/m"),
+        ("dip_position", 20.0, "mm"),
+        ("plate_thickness", 0.2, "mm"),
+    ],
+}
+ELLIPTICAL = {
+    "kind": "horizontal",
+    "settings": {
+        "horizontal.diameter_m": None,
+        "horizontal.width_m": 1.78,
+        "horizontal.height_m": 1.2,
+        "horizontal.length_m": 2.45,
+        "horizontal.roll_deg": -90.0,
+    },
+}
+LYING = [(f"P{i}", np.sin(i), i / 4, np.cos(i)) for i in range(40)]
+SCAN = {
+    "kind": "horizontal",
+    "extra_points": LYING,
+    "settings": {
+        "survey.side": "outside",
+        "horizontal.diameter_m": None,
+        "horizontal.azimuth_deg": 90.0,
+        "horizontal.dip_from_a_m": 1.0,
+        "horizontal.thickness_mm": 6.0,
+    },
+}
+BALL = {"kind": "sphere", "uncertainty": [("diameter", 3.0, "mm")]}
+MESH = {
+    "kind": "mesh",
+    "mesh": b"solid tank",
+    "settings": {"mesh.unit": "in", "table.step_m": None, "table.max_interpolation_error_l": 1.0},
+    "uncertainty": [("surface", 2.0, "mm"), ("scale", 20.0, "ppm")],
+}
+MEASURED = {"bottom_volumes": [(-0.05, 0.25, 0.01), (0.0, 1.5, 0.02), (0.2, 27.5, 0.05)]}
+DRY = {"bottom_volumes": [(0.01, 0.0), (0.02, 0.0), (0.2, 15.5), (0.3, 28.5)]}
+
+
+def test_parts_of_a_vertical_tank_in_si(tmp_path):
+    job = load(write_job(tmp_path / "job", **VERTICAL))
+    assert job.tank.nominal_volume_m3 == 1260.0
+    assert (job.survey.liquid_level_m, job.survey.liquid_density_kg_m3) == (2.0, 998.0)
+    table = job.table
+    assert (table.liquid_density_kg_m3, table.other_densities_kg_m3) == (850.0, (700.0, 1000.0))
+    assert (table.fine_step_m, table.fine_zones) == (0.001, ((0.0, 0.3), (2.1, 2.4)))
+    assert (table.height_unit, table.volume_unit) == ("m", "L")
+    assert (table.max_interpolation_error_m3, table.height_expansion) == (0.005, True)
+    assert job.switches == tankcal.job.Switches(paint=False)
+    assert (job.bottom.form, job.bottom.rows) == ("points", tuple(range(2, 14)))
+    np.testing.assert_array_equal(job.bottom.xyz_m[:2], [[-4, -4, -0.04], [-4, 0, -0.04]])
+    np.testing.assert_array_equal(job.bottom.sd_m, [0.002] * 12)
+    assert job.deadwood == (
+        tankcal.job.Deadwood("coil", 0.5, 1.0, -0.25, 0.01, 2),
+        tankcal.job.Deadwood("manhole", 0.6, 1.2, 0.05, None, 3),
+    )
+    assert job.roof == tankcal.job.Roof(**ROOF)
+    assert [declared.u for declared in job.inputs] == [5e9, 3.0, 2e-3, 1.0, 3e-3, 1e-3, 50.0]
+    assert (job.horizontal, job.sphere, job.mesh) == (None, None, None)
+
+
+def test_a_bottom_measured_with_liquid(tmp_path):
+    bottom = load(write_job(tmp_path / "job", **MEASURED)).bottom
+    assert bottom.form == "liquid"
+    np.testing.assert_array_equal(bottom.level_m, [-0.05, 0.0, 0.2])
+    np.testing.assert_array_equal(bottom.volume_m3, [0.25, 1.5, 27.5])
+    np.testing.assert_array_equal(bottom.u_m3, [0.01, 0.02, 0.05])
+
+
+@pytest.mark.parametrize(("form", "z"), [("cone", -0.15), ("dish", 0.15), ("leaning", None)])
+def test_bottoms_of_a_form(tmp_path, form, z):
+    settings = {"bottom.form": form, "bottom.centre_z_m": z}
+    bottom = load(write_job(tmp_path / "job", settings=settings)).bottom
+    assert (bottom.form, bottom.centre_z_m, bottom.xyz_m) == (form, z, None)
+
+
+def test_a_dip_plate_lies_on_the_bottom_however_deep(tmp_path):
+    settings = {"bottom.form": "cone", "bottom.centre_z_m": -2.5, "datum.dip_plate_z_m": -2.4}
+    job = load(write_job(tmp_path / "job", settings=settings))
+    assert (job.bottom.centre_z_m, job.datum.dip_plate_z_m) == (-2.5, -2.4)
+    with pytest.raises(InputError, match=r"1\.1 m below the bottom"):
+        load(write_job(tmp_path / "deep", settings=settings | {"datum.dip_plate_z_m": -3.6}))
+
+
+def test_a_horizontal_cylinder_in_si(tmp_path):
+    job = load(write_job(tmp_path / "job", **HORIZONTAL))
+    assert (job.points, job.courses, job.tank.nominal_diameter_m) == (None, (), None)
+    assert job.survey.side == "outside"
+    assert (job.datum.bottom_z_m, job.datum.dip_plate_z_m) == (0.0, 0.012)
+    assert (job.table.step_m, job.table.height_unit) == (None, "ft-in-16")
+    end_a = tankcal.job.End("torispherical", 0.0, 2.4, 0.24)
+    end_b = tankcal.job.End("ellipsoidal", 0.6)
+    lying = job.horizontal
+    assert (lying.width_m, lying.height_m, lying.length_m) == (2.4, 2.4, 10.0)
+    assert (lying.end_a, lying.end_b) == (end_a, end_b)
+    assert (lying.tilt, lying.roll_rad, lying.azimuth_rad) == (-0.005, 0.0, None)
+    assert (lying.dip_from_a_m, lying.dip_direction, lying.thickness_m) == (2.0, "square", 0.008)
+    assert [declared.u for declared in job.inputs] == [2e-3, 5e-3, 4e-3, 5e-4, 0.02, 2e-4]
+    assert job.bottom == tankcal.job.Bottom()
+
+
+def test_an_elliptical_cylinder(tmp_path):
+    lying = load(write_job(tmp_path / "job", **ELLIPTICAL)).horizontal
+    assert (lying.width_m, lying.height_m, lying.dip_from_a_m) == (1.78, 1.2, 1.225)
+    assert (lying.tilt, lying.roll_rad) == (0.0, -np.pi / 2)
+    assert (lying.end_a, lying.dip_direction) == (tankcal.job.End("flat"), "plumb")
+
+
+def test_a_scan_tells_diameter_and_tilt(tmp_path):
+    job = load(write_job(tmp_path / "job", **SCAN))
+    assert (len(job.points.names), job.datum.bottom_z_m) == (40, None)
+    lying = job.horizontal
+    assert (lying.width_m, lying.height_m, lying.tilt) == (None, None, None)
+    assert (lying.azimuth_rad, lying.thickness_m) == (np.pi / 2, 0.006)
+
+
+def test_a_sphere_and_a_mesh(tmp_path):
+    ball = load(write_job(tmp_path / "ball", **BALL))
+    assert (ball.sphere, ball.datum.bottom_z_m) == (tankcal.job.Sphere(20.0), 0.0)
+    job = load(write_job(tmp_path / "mesh", **MESH))
+    assert (job.mesh.file, job.mesh.unit_m, job.mesh.data) == ("tank.stl", 0.0254, b"solid tank")
+    assert (job.survey.side, job.datum.bottom_z_m, job.table.step_m) == ("inside", None, None)
+    assert job.table.max_interpolation_error_m3 == 0.001
+    assert "solid" not in repr(job)  # a mesh may have millions of bytes
+    digest = hashlib.sha256(b"solid tank").hexdigest()
+    assert job.files[-1] == tankcal.job.InputFile("tank.stl", digest, 10)
+
+
+@pytest.mark.parametrize(
+    "changes", [VERTICAL, MEASURED, DRY, HORIZONTAL, ELLIPTICAL, SCAN, BALL, MESH]
+)
+def test_parts_are_the_same_from_a_folder_and_a_workbook(tmp_path, changes):
+    folder = load(write_job(tmp_path / "job", **changes))
+    book = load(write_workbook(tmp_path / "job.xlsx", **changes))
+    assert_same_job(folder, book)
+    assert folder.files[-1].file == ("tank.stl" if changes is MESH else folder.files[-1].file)
+
+
+def test_lists_may_stand_as_text_and_as_one_number(tmp_path):
+    lists = {"table.other_densities_kg_m3": [700.0], "table.fine_zones": [[0.0, 0.3]]}
+    texts = {"table.other_densities_kg_m3": 700.0, "table.fine_zones": " 0 – 0.3 "}
+    jobs = [
+        load(write_job(tmp_path / name, settings=settings | {"table.fine_step_m": 0.001}))
+        for name, settings in (("lists", lists), ("texts", texts))
+    ]
+    assert_same_job(*jobs)
+
+
+def test_what_a_kind_cannot_use_may_stand_blank_zero_or_false(tmp_path):
+    nothing = {
+        "survey.liquid_level_m": 0,
+        "corrections.head": False,
+        "roof.mass_kg": "",
+        "bottom.form": "",
+        "table.other_densities_kg_m3": [],
+    }
+    job = load(write_job(tmp_path / "job", kind="sphere", settings=nothing))
+    assert_same_job(job, load(write_job(tmp_path / "plain", kind="sphere")))
 
 
 def warnings_of(path):

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from tankcal.quadrature import height_basis, height_products, panels, polar_products
+from tankcal.quadrature import (
+    height_basis,
+    height_polynomials,
+    height_products,
+    panels,
+    polar_products,
+)
 
 
 @pytest.mark.parametrize("nodes", [1, 2, 3, 4, 7])
@@ -45,10 +51,17 @@ def test_height_basis_reproduces_polynomials_and_sums_to_one():
     assert height_basis(levels, z, 2) @ parabola == pytest.approx(expected, abs=1e-13)
 
 
-def test_height_products_integrate_a_frustum_exactly():
-    levels, radii = np.array([0.4, 1.5]), np.array([6.5 + 0.4 * 0.01, 6.5 + 1.5 * 0.01])
-    tops = np.array([1e-3, 0.5, 1.9])
-    found = np.einsum("tij,i,j->t", height_products(levels, 0.0, tops, 1), radii, radii) * np.pi
-    low, high = 6.5, 6.5 + 0.01 * tops
-    exact = np.pi * tops * (low**2 + low * high + high**2) / 3  # closed form
-    assert found == pytest.approx(exact, rel=1e-13)
+def test_height_products_are_the_area_of_a_frustum_at_every_height():
+    levels, t = np.array([0.2, 0.8]), np.linspace(0, 1, 7)
+    products = height_products(levels, 1)
+    radii = 6.5 + 0.01 * levels
+    coefficients = np.pi * np.einsum("mij,i,j->m", products, radii, radii)
+    area = np.polynomial.polynomial.polyval(t, coefficients)
+    assert area == pytest.approx(np.pi * (6.5 + 0.01 * t) ** 2, rel=1e-13)  # closed form
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_height_polynomials_are_the_basis_in_powers(degree):
+    levels, t = [0.1, 0.5, 0.7], np.linspace(0, 1, 5)
+    basis = np.vander(t, degree + 1, increasing=True) @ height_polynomials(levels, degree)
+    assert basis == pytest.approx(height_basis(levels, t, degree), abs=1e-13)

@@ -63,8 +63,8 @@ def test_volume_and_height(result, figure):
 
 
 def test_radii_and_their_sds(result, figure):
-    radii = [section.circle.radius_m for section in result.sections]
-    sds = [1000 * np.sqrt(section.circle.cofactor_m2[2, 2]) for section in result.sections]
+    radii = [section.circle.radius_m for section in result.wall.sections]
+    sds = [1000 * np.sqrt(section.circle.cofactor_m2[2, 2]) for section in result.wall.sections]
     figure("real survey, radii in m", " ".join(f"{radius:.4f}" for radius in radii))
     figure("real survey, their sds in mm", " ".join(f"{sd:.2f}" for sd in sds))
     assert radii[0] == pytest.approx(7.582, abs=1.5e-3)
@@ -87,7 +87,7 @@ def test_tilt_and_residuals(result, figure):
 
 def test_stations_marks_and_clutter_are_rejected(result, figure):
     names = np.array(result.job.points.names)
-    rejected = set(names[result.shell.reason != ""])
+    rejected = set(names[result.wall.shell.reason != ""])
     assert {"st1", "st2", "st3", "st4", "luk", "kor", "m1", "m2", "m3", "m4", "m5"} <= rejected
     part = len(rejected) / len(names)
     figure("real survey, part of rejected points", f"{part:.1%} ({len(rejected)} of {len(names)})")
@@ -96,5 +96,26 @@ def test_stations_marks_and_clutter_are_rejected(result, figure):
 
 def test_the_vertical_dents_are_kept(result):
     """At two generatrices the wall lies 20 to 40 mm inside over its whole height: form."""
-    residuals = np.concatenate([section.circle.residuals_m for section in result.sections])
+    residuals = np.concatenate([section.circle.residuals_m for section in result.wall.sections])
     assert np.sum(residuals < -0.020) > 30
+
+
+def test_every_course_is_a_barrel(result, figure):
+    """Second method: residuals about the circles, inner half of each course against its ends.
+
+    A barrel b lifts the mean of the inner half over that of the outer half by b / 2.
+    """
+    barrels = result.body.shell.volume.barrels_m
+    figure("real survey, barrels of the courses in mm", np.round(1000 * barrels, 1))
+    xyz, lifts = result.job.points.xyz_m[result.wall.accepted], []
+    for section in result.wall.sections:
+        group = section.group
+        zeta = group.zeta(xyz[group.members, 2] - result.job.datum.bottom_z_m)
+        residual, inner = section.circle.residuals_m, np.abs(zeta) < 0.5
+        lifts.append(2 * (residual[inner].mean() - residual[~inner].mean()))
+    figure(
+        "real survey, mean barrel in mm, and by residuals",
+        1000 * np.round([barrels.mean(), np.mean(lifts)], 5),
+    )
+    assert np.all(barrels > 0.002)
+    assert barrels.mean() == pytest.approx(np.mean(lifts), abs=0.003)  # 1.1 mm of noise

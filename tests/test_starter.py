@@ -1,5 +1,6 @@
 """The starter job: an empty form that says what is missing, and a job when it is filled in."""
 
+import tomllib
 from pathlib import Path
 
 import openpyxl
@@ -8,7 +9,7 @@ from job_builder import SETTINGS, assert_same_job, job_parts, write_folder
 
 from tankcal.errors import InputError
 from tankcal.job import load
-from tankcal.job.contract import COLUMNS, KEYS
+from tankcal.job.contract import COLUMNS, INPUTS, KEYS, KINDS, TABLES_OF_KIND
 from tankcal.starter import write_starter
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "job-format.md"
@@ -30,17 +31,35 @@ def starter(tmp_path):
 
 
 def test_what_is_written(starter):
-    names = ["courses.csv", "job.toml", "job.xlsx", "points.csv", "uncertainty.csv"]
-    assert sorted(path.name for path in starter.iterdir()) == names
+    assert_written(starter, "vertical")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_kind_has_what_it_can_use(tmp_path, kind):
+    write_starter(tmp_path / "starter", kind)
+    assert_written(tmp_path / "starter", kind)
+
+
+def assert_written(starter, kind):
+    names = ["job.toml", "job.xlsx", *(f"{table}.csv" for table in TABLES_OF_KIND[kind])]
+    assert sorted(path.name for path in starter.iterdir()) == sorted(names)
     text = (starter / "job.toml").read_text(encoding="utf-8")
+    assert f'\nkind = "{kind}"' in text
+    settings = tomllib.loads(text)
     for section, fields in KEYS.items():
-        assert f"\n[{section}]\n" in text
-        for field in fields:
-            assert f"\n{field.name} = " in text
-            assert field.note in text
-    for table, fields in COLUMNS.items():
+        suiting = [field for field in fields if field.suits(kind)]
+        assert list(settings.get(section, {})) == [field.name for field in suiting]
+        assert all(field.note in text for field in suiting)
+    for table in TABLES_OF_KIND[kind]:
         heading = (starter / f"{table}.csv").read_text(encoding="utf-8").splitlines()[-1]
-        assert heading.split(",") == [field.name for field in fields]
+        assert heading.split(",") == [field.name for field in COLUMNS[table]]
+    notes = (starter / "uncertainty.csv").read_text(encoding="utf-8")
+    assert ("# barrel:" in notes, "# surface:" in notes) == (kind == "vertical", kind == "mesh")
+
+
+def test_another_kind_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="found 'cube'; expected one of vertical, horizontal"):
+        write_starter(tmp_path / "starter", "cube")
 
 
 def test_a_directory_that_holds_something_is_left_alone(starter, tmp_path):
@@ -122,7 +141,8 @@ def test_both_forms_filled_in_give_the_same_job(starter):
 
 def test_the_workbook_helps_to_fill_it_in(starter):
     book = openpyxl.load_workbook(starter / "job.xlsx")
-    assert book.sheetnames == ["read me", "job", "points", "courses", "uncertainty"]
+    tables = ["points", "courses", "bottom", "deadwood", "uncertainty"]
+    assert book.sheetnames == ["read me", "job", *tables]
     lists = {rule.formula1 for rule in book["job"].data_validations.dataValidation}
     assert '"outside,inside"' in lists
     assert book["points"]["B1"].comment.text == "coordinate x, metres."
@@ -142,6 +162,8 @@ def test_the_documentation_names_every_key_column_and_choice():
             assert f"`{field.name}`" in text, field.name
             for choice in field.choices:
                 assert choice in text
+    for name, known in INPUTS.items():
+        assert f"| `{name}` | `{known.unit}` |" in text
 
 
 def documented(language):

@@ -25,9 +25,11 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*extension is not supported:Use
 # XlsxWriter stores 16 significant digits, one less than a double may need
 SAME = 1e-15
 DIP_CELL = "B5"
+SHELL_CELL = "B28"
 SHEETS = [
     "Certificate",
     "Capacity",
+    "Proportional parts",
     "Dip calculator",
     "Courses and sections",
     "Corrections",
@@ -234,7 +236,7 @@ def test_every_sheet_prints_on_A4_with_tank_and_page(book, record):
         assert book[name].freeze_panes in ("A5", "B5")
 
 
-def test_only_the_dip_cell_is_open(book):
+def test_only_dip_and_shell_temperature_are_open(book):
     open_cells = [
         (sheet.title, cell.coordinate)
         for sheet in book
@@ -242,7 +244,7 @@ def test_only_the_dip_cell_is_open(book):
         for cell in row
         if not cell.protection.locked
     ]
-    assert open_cells == [("Dip calculator", DIP_CELL)]
+    assert open_cells == [("Dip calculator", DIP_CELL), ("Dip calculator", SHELL_CELL)]
     assert all(sheet.protection.sheet and not sheet.protection.password for sheet in book)
 
 
@@ -378,6 +380,7 @@ def with_dips(path, dips, out):
                 value = re.sub(r"\bB(\d+)\b", rf"{letter}\1", value)
             sheet[f"{letter}{cell.row}"] = value
     sheet[DIP_CELL] = dips[1]
+    sheet[SHELL_CELL] = 55.0
     book.save(out)
 
 
@@ -425,6 +428,15 @@ def test_the_dip_cell_was_changed_and_recalculated(recalculated, record):
     line = row_of(book["Dip calculator"], "Volume")
     assert book["Dip calculator"][DIP_CELL].value == dips[1]
     assert line[1].value == pytest.approx(record["capacity"]["volume_m3"][1], rel=1e-12)
+
+
+def test_a_warm_shell_holds_ctsh_times_the_volume(recalculated, record):
+    book, _ = recalculated
+    sheet, job = book["Dip calculator"], record["job"]
+    warmer = 55.0 - job["table"]["reference_temperature_c"]
+    ctsh = (1 + job["material"]["expansion_per_k"] * warmer) ** 2
+    assert sheet["B29"].value == pytest.approx(ctsh, rel=1e-14)
+    assert sheet["B30"].value == pytest.approx(ctsh * record["capacity"]["volume_m3"][1], rel=1e-13)
 
 
 def test_recalculated_at_every_row_it_is_the_record(recalculated, record):

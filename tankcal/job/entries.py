@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from tankcal.job.contract import (
     COLUMNS,
     KEYS,
-    LATER_ABOVE_ZERO,
+    KINDS,
     LATER_KEYS,
-    LATER_KINDS,
     LATER_SECTIONS,
     OPEN_SECTIONS,
 )
@@ -33,24 +32,47 @@ class ColumnValues:
         """The values of a column; a list of None when the column is not given."""
         return self.columns[name] or [None] * len(self.rows)
 
+    @property
+    def is_empty(self):
+        """Has it no row at all, not even one that cannot be read?"""
+        return not self.rows and not self.skipped
+
 
 def read_settings(raw, log):
     """{section: {key: value}} with None for what is blank, missing or bad (told to `log`)."""
-    file = raw.settings_file
+    kind = kind_of(raw)
     for section, entries in raw.settings.items():
-        _refuse_unknown(file, section, entries, raw.sections.get(section), log)
+        _refuse_unknown(raw.settings_file, section, entries, raw.sections.get(section), log)
     values = {}
     for section, fields in KEYS.items():
         given = raw.settings.get(section, {})
+        is_foreign = not any(field.suits(kind) for field in fields)
+        if is_foreign and not all(_says_nothing(value) for value in given.values()):
+            expected = f"{_only_for(fields[0], kind)}; remove the section"
+            log.problem(raw.settings_file, expected, raw.sections.get(section), f"[{section}]")
         values[section] = {
-            field.name: _setting(file, section, field, given.get(field.name), log)
+            field.name: None
+            if is_foreign
+            else _setting(raw.settings_file, section, field, given.get(field.name), kind, log)
             for field in (*fields, *_own_fields(section, fields, given))
         }
-    for section, key, what in LATER_ABOVE_ZERO:
-        if (values[section][key] or 0) > 0:
-            expected = f"not available in this version: {what}; remove it or set it to 0"
-            log.problem(file, expected, raw.settings[section][key].row, f"{section}.{key}")
     return values
+
+
+def kind_of(raw):
+    """The kind of tank, or None where the settings do not tell it; nothing is told to a log."""
+    value = (raw.settings or {}).get("tank", {}).get("kind")
+    kind = value.raw.strip() if value and isinstance(value.raw, str) else None
+    return kind if kind in KINDS else None
+
+
+def _says_nothing(value):
+    """Whether a setting may stand in a job of a kind that it is not for: blank, 0 or false."""
+    return is_blank(value.raw) or (isinstance(value.raw, int | float) and value.raw == 0)
+
+
+def _only_for(field, kind):
+    return f"only for a tank of kind {' or '.join(field.kinds)}, this one is {kind}"
 
 
 def _refuse_unknown(file, section, entries, section_row, log):
@@ -84,17 +106,17 @@ def _is_own(section, key, known):
     return section in OPEN_SECTIONS and plain is not None and not nearest(key, known)
 
 
-def _setting(file, section, field, value, log):
+def _setting(file, section, field, value, kind, log):
     name = f"{section}.{field.name}"
     if value is None or (is_blank(value.raw) and value.raw not in field.choices):
-        if field.required:
+        if field.is_required(kind):
             found = "missing" if value is None else "blank"
             row = None if value is None else value.row
             log.problem(file, f"{found}; expected {field.wanted()}", row, name)
         return None
-    if name == "tank.kind" and value.raw in LATER_KINDS:
-        expected = f"not available in this version: a tank of kind {value.raw!r}; only 'vertical'"
-        log.problem(file, expected, value.row, name)
+    if not field.suits(kind):
+        if not _says_nothing(value):
+            log.problem(file, f"{_only_for(field, kind)}; remove it", value.row, name)
         return None
     try:
         return read_value(field, value.raw)

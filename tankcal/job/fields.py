@@ -14,12 +14,15 @@ from tankcal.job.tables import BadCell, nearest, shown
 
 MAX_TEXT = 300
 MAX_NAME = 64
+MAX_LIST = 50  # numbers or pairs
 NAME_RULE = "a letter, digit or underscore first, then letters, digits, spaces or _ - . ( ) / #"
 TANK_ID_RULE = "letters, digits, spaces or _ - . ( ), no .. and no . or - first"
 
 _NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
 _NAME = re.compile(r"\w[\w .()/#-]*")
 _TANK_ID = re.compile(r"(?!.*\.\.)[\w(][\w .()-]*")
+_MESH_FILE = re.compile(r"(?!.*\.\.)\w[\w .()-]*\.(stl|obj|ply|off)", re.IGNORECASE)
+_PAIR = re.compile(r"\s*([0-9.]+)\s*[-–]\s*([0-9.]+)\s*")
 _ISO_DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 
 
@@ -32,9 +35,12 @@ class Field:
     """One key or column.
 
     name       as written in the file, with its unit
-    kind       "number", "text", "name", "tank id", "choice", "flag" or "date"
+    kind       "number", "text", "name", "tank id", "choice", "flag", "date", "mesh file",
+               "numbers" (several of them) or "ranges" (pairs of numbers)
     note       one line for the person who fills it in
-    required   must be there and filled in
+    required   must be there and filled in, for every kind of tank in `kinds`
+    kinds      the kinds of tank that it is for; (): all
+    required_for  kinds of tank for which it is required though `required` is not set
     low, high  bounds of a number, both allowed unless `above_low`: then low itself is not
     choices    what a choice may be
     in_full    an optional column that is filled in for every row, or for none
@@ -51,6 +57,18 @@ class Field:
     choices: tuple[str, ...] = ()
     in_full: bool = False
     start: str = ""
+    kinds: tuple[str, ...] = ()
+    required_for: tuple[str, ...] = ()
+
+    def suits(self, tank_kind):
+        """Is it for tanks of this kind? Of a kind that is not known (None), nothing is refused."""
+        return tank_kind is None or not self.kinds or tank_kind in self.kinds
+
+    def is_required(self, tank_kind):
+        """Must it be filled in for tanks of this kind (None: not known)?"""
+        if self.required:
+            return not self.kinds or tank_kind in self.kinds
+        return tank_kind in self.required_for
 
     def expectation(self):
         """What is expected, in words: "a number above 0, at most 300"."""
@@ -58,12 +76,16 @@ class Field:
             return " or ".join(repr(choice) for choice in self.choices)
         if self.kind == "number":
             return "a number" + self._bounds()
+        if self.kind == "numbers":
+            return f"numbers{self._bounds()}, such as 700; 850 (in job.toml also [700, 850])"
         return {
             "text": f"text of at most {MAX_TEXT} characters in one line",
             "name": f"a name of at most {MAX_NAME} characters ({NAME_RULE})",
             "tank id": f"a name of at most {MAX_NAME} characters ({TANK_ID_RULE})",
             "flag": "true or false",
             "date": "a date such as 2024-05-31",
+            "ranges": "pairs such as 0-0.3; 2.1-2.4 (in job.toml also [[0, 0.3], [2.1, 2.4]])",
+            "mesh file": "the plain name of a .stl, .obj, .ply or .off file, in the job's folder",
         }[self.kind]
 
     def wanted(self):
@@ -72,7 +94,7 @@ class Field:
         return self.note if is_plain else f"{self.note} ({self.expectation()})"
 
     def _bounds(self):
-        if self.low == -self.high:  # bounds that only keep nonsense out
+        if self.low == -self.high and self.high >= 1e5:  # bounds that only keep nonsense out
             return ""
         if math.isinf(self.high):
             return f" above {self.low:g}" if self.above_low else f" of {self.low:g} or more"
@@ -82,8 +104,8 @@ class Field:
 
 
 def is_blank(raw):
-    """Is nothing given? An empty text counts as blank; 0 and false do not."""
-    return raw is None or (isinstance(raw, str) and not raw.strip())
+    """Is nothing given? An empty text and an empty list count as blank; 0 and false do not."""
+    return raw is None or raw == [] or (isinstance(raw, str) and not raw.strip())
 
 
 def read_value(field, raw, decimal=None):
@@ -99,6 +121,8 @@ def read_value(field, raw, decimal=None):
         "choice": _read_choice,
         "flag": _read_flag,
         "date": _read_date,
+        "numbers": _read_numbers,
+        "ranges": _read_ranges,
     }.get(field.kind, _read_text)
     return reader(field, raw, decimal)
 
@@ -156,6 +180,8 @@ def _kind_of(raw):
 
 
 def _other_unit(field):
+    if "_per_" in field.name:
+        return ""
     unit = {"_m": "metres", "_mm": "millimetres"}.get("_" + field.name.rpartition("_")[2])
     return f" (in {unit}: is it in another unit?)" if unit else ""
 
@@ -176,7 +202,7 @@ def _read_text(field, raw, _decimal):
     if field.kind == "text":
         sound = len(text) <= MAX_TEXT and all(_is_writing(char) for char in text)
     else:
-        pattern = _NAME if field.kind == "name" else _TANK_ID
+        pattern = {"name": _NAME, "tank id": _TANK_ID, "mesh file": _MESH_FILE}[field.kind]
         sound = len(text) <= MAX_NAME and pattern.fullmatch(text) is not None
     if not sound:
         raise Refused(f"found {shown(text)}; expected {field.expectation()}")
@@ -216,3 +242,32 @@ def _read_date(field, raw, _decimal):
     except ValueError:
         pass
     raise Refused(f"found {shown(raw)}; expected {field.expectation()}")
+
+
+def _read_numbers(field, raw, _decimal):
+    """Tuple of a list of numbers, of a text such as 700; 850, or of one number."""
+    parts = raw.split(";") if isinstance(raw, str) else raw if isinstance(raw, list) else [raw]
+    if not parts or len(parts) > MAX_LIST:
+        raise Refused(f"found {shown(raw)}; expected 1 to {MAX_LIST} {field.expectation()}")
+    decimal = "." if isinstance(raw, str) else None
+    try:
+        return tuple(
+            _read_number(field, part.strip() if decimal else part, decimal) for part in parts
+        )
+    except Refused as refusal:
+        found = str(refusal).partition("; expected")[0]
+        raise Refused(f"{found}; expected {field.expectation()}") from None
+
+
+def _read_ranges(field, raw, _decimal):
+    """Tuple of (low, high) of a list of pairs, or of a text such as 0-0.3; 2.1-2.4."""
+    pairs = raw
+    if isinstance(raw, str):
+        matches = [_PAIR.fullmatch(part) for part in raw.split(";")]
+        pairs = [match.groups() for match in matches] if all(matches) else None
+    is_list = isinstance(pairs, list) and 0 < len(pairs) <= MAX_LIST
+    if not is_list or not all(isinstance(pair, list | tuple) and len(pair) == 2 for pair in pairs):
+        raise Refused(f"found {_kind_of(raw)}{shown(raw)}; expected {field.expectation()}")
+    decimal = "." if isinstance(raw, str) else None
+    number = Field(field.name, "number", field.note, low=0, high=200)
+    return tuple(tuple(_read_number(number, end, decimal) for end in pair) for pair in pairs)

@@ -58,7 +58,14 @@ def read_folder(folder, log):
             tables[table] = read_csv(name, data, *marks, log) if is_readable else None
     covariance = content(COVARIANCE_FILE) if COVARIANCE_FILE in names else None
     return RawJob(
-        folder.resolve().name, SETTINGS_FILE, settings, sections, tables, covariance, tuple(files)
+        folder.resolve().name,
+        folder,
+        SETTINGS_FILE,
+        settings,
+        sections,
+        tables,
+        covariance,
+        tuple(files),
     )
 
 

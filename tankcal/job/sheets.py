@@ -67,12 +67,15 @@ def read_workbook(path, log):
         settings, sections = _settings(tables[SETTINGS_SHEET], log)
     files = ((path.name, hashlib.sha256(data).hexdigest(), len(data)),)
     wanted = {name: tables[name] for name in TABLES if name in tables}
-    return RawJob(path.name, f"sheet {SETTINGS_SHEET}", settings, sections, wanted, None, files)
+    place = f"sheet {SETTINGS_SHEET}"
+    return RawJob(path.name, path.parent, place, settings, sections, wanted, None, files)
 
 
 def expected_sheets():
     """One phrase that names the sheets of a workbook."""
-    return f"a workbook has the sheets {SETTINGS_SHEET}, {', '.join(TABLES)} (the last optional)"
+    return (
+        f"a workbook has the sheets {SETTINGS_SHEET}, {', '.join(TABLES)} (the last three optional)"
+    )
 
 
 def _complaint(data):

@@ -7,13 +7,13 @@ is wrong to a `Log`, so that all problems of a job come in one run.
 
 import difflib
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 
-TABLES = ("points", "courses", "uncertainty")
-OPTIONAL_TABLES = ("uncertainty",)
+TABLES = ("points", "courses", "bottom", "deadwood", "uncertainty")
 LATER_TABLES = (
-    *("targets", "bottom", "deadwood", "photos", "image_points", "fiducials", "control", "check"),
+    *("targets", "photos", "image_points", "fiducials", "control", "check"),
     *("setups", "distances", "slope_distances", "directions", "zenith_angles", "azimuths"),
     *("horizontal_angles", "vertical_angles", "height_differences", "plumb_lines"),
 )
@@ -124,9 +124,11 @@ class RawJob:
     sections    {section: row}
     covariance  bytes of points_cov.npz, or None
     files       (name, SHA-256, bytes) of each file read
+    folder      Path of the folder of job.toml or of the workbook
     """
 
     source: str
+    folder: Path
     settings_file: str
     settings: dict | None
     sections: dict

@@ -8,13 +8,16 @@ import scipy
 
 import tankcal
 from tankcal.record import FORMAT
-from tankcal.record.survey import courses_of, points_of, rejected_of, section_of, shell_of
+from tankcal.record.parts import bottom_of, deadwood_of, roof_of, solid_of
+from tankcal.record.survey import courses_of, points_of, rejected_of, sections_of, shell_of
 from tankcal.record.table import (
     budget_of,
     capacity_of,
     choices_of,
-    corrections_with_sizes,
+    densities_of,
     gross_of,
+    interpolation_of,
+    proportional_parts_of,
 )
 
 
@@ -34,11 +37,18 @@ def record_of(result):
             "shell": shell_of(result),
             "points": points_of(result),
             "rejected": rejected_of(result),
-            "sections": [section_of(result, section) for section in result.sections],
+            "sections": sections_of(result),
             "courses": courses_of(result),
             "capacity": capacity_of(result),
+            "interpolation": interpolation_of(result),
+            "proportional_parts": proportional_parts_of(result),
+            "densities": densities_of(result),
             "gross": gross_of(result),
-            "corrections": corrections_with_sizes(result),
+            "corrections": [asdict(correction) for correction in result.corrections],
+            "solid": solid_of(result),
+            "bottom": bottom_of(result),
+            "deadwood": deadwood_of(result),
+            "roof": roof_of(result),
             "budget": budget_of(result),
             "choices": choices_of(result),
             "warnings": [
@@ -60,6 +70,7 @@ def _job(job):
         "table": asdict(job.table),
         "material": asdict(job.material),
         "courses": [asdict(course) for course in job.courses],
+        "corrections": asdict(job.switches),
         "certificate": job.certificate,
         "source": job.source,
     }

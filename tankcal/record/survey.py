@@ -1,14 +1,18 @@
 """The part of the record that says what was measured: wall, points, sections, courses."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from tankcal.courses import FORM_GRID
 from tankcal.outlines import FULL_TURN
-from tankcal.volumes import FORM_GRID
 
 
 def shell_of(result):
-    """The wall as one body: axis, tilt, residuals."""
-    shell, sections = result.shell, result.sections
+    """The wall as one body: axis, tilt, residuals; None for a tank without courses."""
+    if result.wall is None:
+        return None
+    shell, sections = result.wall.shell, result.wall.sections
     residuals = np.concatenate([section.circle.residuals_m for section in sections])
     return {
         "x_m": shell.axis_m[0],
@@ -21,20 +25,22 @@ def shell_of(result):
         "tilt_azimuth_deg": np.degrees(shell.tilt_azimuth_rad),
         "residual_sd_m": np.sqrt(np.sum(residuals**2) / (len(residuals) - 3 * len(sections))),
         "points": len(shell.reason),
-        "accepted": len(result.wall),
+        "accepted": len(result.wall.accepted),
         "noise_sd_m": shell.noise_m,
         "noise_dof": shell.noise_dof,
-        "height_m": result.volume.height_m,
+        "height_m": result.body.shell.volume.height_m,
     }
 
 
 def points_of(result):
     """Every surveyed point, used or not."""
-    job, shell = result.job, result.shell
+    if result.wall is None:
+        return _points_of_scan(result) if result.scan is not None else []
+    job, shell = result.job, result.wall.shell
     place = {}
-    for section in result.sections:
+    for section in result.wall.sections:
         for member, residual in zip(section.group.members, section.circle.residuals_m, strict=True):
-            place[result.wall[member]] = (section.group, residual, member)
+            place[result.wall.accepted[member]] = (section.group, residual, member)
     rows = []
     for index, name in enumerate(job.points.names):
         group, residual, member = place.get(index, (None, None, None))
@@ -53,8 +59,41 @@ def points_of(result):
     return rows
 
 
+def _points_of_scan(result):
+    points, scan = result.job.points, result.scan
+    used = set(scan.accepted.tolist())
+    return [
+        {
+            "point": name,
+            **_coordinates(points.xyz_m[index]),
+            "cov_m2": None,
+            "course": None,
+            "section": None,
+            "generatrix": points.generatrix[index],
+            "residual_m": scan.residuals_m[index] if index in used else None,
+            "used": index in used,
+        }
+        for index, name in enumerate(points.names)
+    ]
+
+
+def _rejected_of_scan(result):
+    points, scan = result.job.points, result.scan
+    return [
+        {
+            "point": points.names[i],
+            **_coordinates(points.xyz_m[i]),
+            "residual_m": scan.residuals_m[i],
+            "w": scan.residuals_m[i] / scan.noise_m,
+            "reason": "far_off",
+            "row": points.rows[i],
+        }
+        for i in np.setdiff1d(np.arange(len(points.names)), scan.accepted)
+    ]
+
+
 def _covariance_of(result, member):
-    block = result.covariance_m2[3 * member : 3 * member + 3][:, 3 * member : 3 * member + 3]
+    block = result.wall.covariance_m2[3 * member : 3 * member + 3][:, 3 * member : 3 * member + 3]
     return block if isinstance(block, np.ndarray) else block.toarray()
 
 
@@ -64,7 +103,9 @@ def _coordinates(xyz):
 
 def rejected_of(result):
     """Every point that is not on the wall, with the reason."""
-    job, shell = result.job, result.shell
+    if result.wall is None:
+        return _rejected_of_scan(result) if result.scan is not None else []
+    job, shell = result.job, result.wall.shell
     return [
         {
             "point": job.points.names[i],
@@ -78,13 +119,19 @@ def rejected_of(result):
     ]
 
 
-def section_of(result, section):
-    """Circle and outline of one section, as surveyed."""
+def sections_of(result):
+    """Circle and outline of each section, as surveyed, from the bottom up."""
+    if result.wall is None:
+        return []
+    return [_section_of(result, section) for section in result.wall.sections]
+
+
+def _section_of(result, section):
     circle, outline, group = section.circle, section.outline, section.group
     sd = np.sqrt(np.diag(circle.cofactor_m2))
-    xyz = result.job.points.xyz_m[result.wall[group.members]]
+    xyz = result.job.points.xyz_m[result.wall.accepted[group.members]]
     height = xyz[:, 2] - result.job.datum.bottom_z_m - group.height_m
-    offset = xyz[:, :2] - np.outer(height, result.shell.slope) - (circle.x_m, circle.y_m)
+    offset = xyz[:, :2] - np.outer(height, result.wall.shell.slope) - (circle.x_m, circle.y_m)
     modes = outline.modes_m()
     return {
         "section": group.name,
@@ -99,7 +146,7 @@ def section_of(result, section):
         "radius_sd_m": sd[2],
         "variance_factor": circle.variance_factor,
         "shape": outline.kind,
-        "points": [result.job.points.names[i] for i in result.wall[group.members]],
+        "points": [result.job.points.names[i] for i in result.wall.accepted[group.members]],
         "azimuth_deg": np.degrees(np.arctan2(offset[:, 0], offset[:, 1])) % 360,
         "residual_m": circle.residuals_m,
         "area_m2": outline.area_m2(),
@@ -127,16 +174,22 @@ def _area_sd(result, section):
     even = np.arange(FORM_GRID) * FULL_TURN / FORM_GRID
     form = section.outline.radius_m(even) @ section.outline.unseen_form_m(even)
     form = form * FULL_TURN / FORM_GRID
-    return np.sqrt(by_points @ (result.covariance_m2[index][:, index] @ by_points) + form @ form)
+    return np.sqrt(
+        by_points @ (result.wall.covariance_m2[index][:, index] @ by_points) + form @ form
+    )
 
 
 def courses_of(result):
-    """Each course: plates, radii, and its volume with all corrections."""
+    """Each course: plates, radii, and the volume of its shell, without head or parts inside."""
+    if result.wall is None:
+        return []
     job, rows = result.job, []
-    rejected = np.flatnonzero(np.isin(result.shell.reason, ("consensus", "snooping")))
+    rejected = np.flatnonzero(np.isin(result.wall.shell.reason, ("consensus", "snooping")))
     bottom = job.datum.bottom_z_m
-    for index, (course, shape) in enumerate(zip(job.courses, result.volume.courses, strict=True)):
-        own = [section for section in result.sections if section.group.course == index]
+    for index, (course, shape) in enumerate(
+        zip(job.courses, result.body.shell.volume.courses, strict=True)
+    ):
+        own = [section for section in result.wall.sections if section.group.course == index]
         height = shape.top_m - shape.bottom_m
         volume, u = _partial(result, shape.bottom_m, shape.top_m)
         in_course = [
@@ -168,16 +221,19 @@ def courses_of(result):
 
 def _radius_sd(result, shape):
     """Of the mean radius of a course, from points and form: their part of sd(V) / (2 pi r h)."""
-    sources = result.propagation.sources([shape.bottom_m, shape.top_m])
-    of_survey = [source for source in sources if source.kind in ("points", "form")]
-    variance = sum(np.sum(np.diff(source.columns_m3, axis=0) ** 2) for source in of_survey)
-    return np.sqrt(variance) / np.diff(result.volume.inset_m2([shape.bottom_m, shape.top_m]))[0]
+    sources = result.body.shell.sources([shape.bottom_m, shape.top_m])
+    variance = sum(np.sum(np.diff(source.columns_m3, axis=0) ** 2) for source in sources)
+    return (
+        np.sqrt(variance)
+        / np.diff(result.body.shell.volume.inset_m2([shape.bottom_m, shape.top_m]))[0]
+    )
 
 
 def _partial(result, low_m, high_m):
     """Volume between two heights above the bottom and its standard uncertainty, exactly."""
-    volume = result.volume.volume_m3([low_m, high_m])
-    sources = result.propagation.sources([low_m, high_m])
+    shell = replace(result.body, parts=(result.body.shell,))
+    volume = shell.volume_m3([low_m, high_m])
+    sources = shell.sources([low_m, high_m])
     of_shell = [source for source in sources if source.kind != "datum"]  # joints know no zero
     variance = sum(np.sum(np.diff(source.columns_m3, axis=0) ** 2) for source in of_shell)
     return volume[1] - volume[0], np.sqrt(variance)

@@ -1,10 +1,12 @@
 """The part of the record that says what follows: table, corrections, budget, choices."""
 
+from dataclasses import asdict
+
 import numpy as np
 
-from tankcal.chain import corrections_of, shell_volume, thermal_scale
-from tankcal.doubts import undeclared_inputs
-from tankcal.shell import CRITICAL_W
+from tankcal.chain import PARTS
+from tankcal.dips import dip_label
+from tankcal.snooping import CRITICAL_W
 
 
 def capacity_of(result):
@@ -14,15 +16,17 @@ def capacity_of(result):
     counts = {kind: kinds.count(kind) for kind in kinds}
     numbers = [kinds[: i + 1].count(kind) for i, kind in enumerate(kinds)]
     return {
-        "zero": "bottom" if result.job.datum.dip_plate_z_m is None else "dip_plate",
+        "zero": zero_of(result),
         "zero_m": result.zero_m,
         "height_m": table.height_m,
+        "dip": [dip_label(height, result.job.table.height_unit) for height in table.height_m],
         "volume_m3": table.volume_m3,
         "u_m3": table.u_m3,
         "U_m3": table.U_m3,
         "k": table.k,
         "dof": table.dof,
         "area_m2": table.area_m2,
+        "for_use": table.for_use(table.height_m),
         "inputs": [
             kind if counts[kind] == 1 else f"{kind} {number}"
             for kind, number in zip(kinds, numbers, strict=True)
@@ -32,69 +36,44 @@ def capacity_of(result):
     }
 
 
-def gross_of(result):
-    """Volume and mean area of the shell as surveyed."""
-    volume = float(result.gross.volume_m3(result.gross.height_m)[0])
-    return {"volume_m3": volume, "area_m2": volume / result.gross.height_m}
+def interpolation_of(result):
+    """The largest error of linear interpolation between two rows, and the dip where it is."""
+    found = result.straightness
+    return {"largest_m3": found.largest_m3, "at_m": found.at_m}
 
 
-def corrections_with_sizes(result):
-    """Each correction with its size at full height: the volume with it less that without it."""
-    job, shell = result.job, result.shell
-    gross = gross_of(result)["volume_m3"]
+def proportional_parts_of(result):
+    """What the millimetres of a dip add to a row of a centimetre table, zone by zone."""
+    zones = result.proportional_parts
+    return {
+        "parts": PARTS,
+        "zones": [asdict(zone) for zone in zones],
+        "largest_m3": max((abs(zone.deviation_m3) for zone in zones), default=None),
+    }
 
-    def full(**switched_on):
-        off = dict.fromkeys(("plate", "paint", "temperature"), False) | switched_on
-        volume = shell_volume(
-            job.courses, result.joints_m, result.sections, **corrections_of(job, **off)
-        )
-        return float(volume.volume_m3(volume.height_m)[0])
 
-    plate = full(plate=True)
-    both = full(plate=True, paint=True)
-    outside = job.survey.side == "outside"
-    tilt = gross * (1 - 1 / np.hypot(1.0, shell.tilt))
-    rows = [
-        (
-            "plate",
-            outside and any(course.thickness_m for course in job.courses),
-            plate - gross,
-            "r_inside = r - t, per course",
-            "ISO 7507-1",
-        ),
-        (
-            "paint",
-            outside and any(course.paint_m for course in job.courses),
-            both - plate,
-            "r_inside = r - t - paint, per course",
-            "ISO 7507-1",
-        ),
-        (
-            "temperature",
-            job.survey.shell_temperature_c is not None,
-            full(plate=True, paint=True, temperature=True) - both,
-            f"horizontal lengths times 1 + a (T_ref - T_shell) = {thermal_scale(job):.8f}",
-            "ISO 7507-1",
-        ),
-        (
-            "tilt",
-            True,
-            tilt,
-            "horizontal cut: area of the cut square to the axis times sqrt(1 + m^2); contained",
-            "ISO 7507-1",
-        ),
-    ]
+def densities_of(result):
+    """The volumes of the same rows for each further density of the liquid."""
     return [
-        {
-            "code": code,
-            "applied": bool(applied),
-            "size_m3": size,
-            "size_percent": 100 * size / gross,
-            "formula": formula,
-            "source": source,
-        }
-        for code, applied, size, formula, source in rows
+        {"density_kg_m3": density, "volume_m3": volume_m3}
+        for density, volume_m3 in result.by_density.items()
     ]
+
+
+def zero_of(result):
+    """What heights of the table count from, as a code."""
+    if result.job.datum.dip_plate_z_m is not None:
+        return "dip_plate"
+    return "bottom" if result.wall is not None else f"{result.job.tank.kind}_bottom"
+
+
+def gross_of(result):
+    """Volume and mean area of the shell as surveyed; None for a tank without courses."""
+    shell = result.gross
+    if shell is None:
+        return None
+    volume = float(shell.volume_m3(shell.height_m)[0])
+    return {"volume_m3": volume, "area_m2": volume / shell.height_m}
 
 
 def budget_of(result):
@@ -133,30 +112,66 @@ def choices_of(result):
     """Everything that was assumed, as codes and values."""
     job = result.job
     values = {
-        "zero": "bottom" if job.datum.dip_plate_z_m is None else "dip_plate",
-        "bottom": "flat_level",
-        "covariance": _covariance_choice(job),
-        "course_of_points": "section" if any(job.points.section) else "height",
-        "shape": _one_or_mixed(section.outline.kind for section in result.sections),
-        "between_sections": _between_sections(result),
-        "tilt": "horizontal_cut" if result.shell.tilt_known else "not_determined",
-        "course_heights": "along_axis",
+        "zero": zero_of(result),
+        **(_shell_choices(job, result) if result.wall is not None else {}),
         "thickness": _thickness_choice(job),
-        "temperature": "not_applied" if job.survey.shell_temperature_c is None else "applied",
-        "height_expansion": "no",
-        "head": "none",
-        "deadwood": "none",
-        "roof": "none",
+        "temperature": _temperature_choice(job),
+        "height_expansion": "yes" if job.table.height_expansion else "no",
+        "head": _head_choice(job),
+        "deadwood": _fitting_choice(job.switches.deadwood, job.deadwood),
         "interpolation": "linear",
         "coverage": job.table.coverage_probability,
         "k": "normal" if np.all(np.isinf(result.table.dof)) else "student",
         "expansion": "given" if job.material.expansion_given else "default",
-        "snooping": CRITICAL_W if job.snooping else "off",
-        "form": "common",
-        "not_in_budget": list(undeclared_inputs(job)),
-        "covariance_sd_mm": 1000 * np.sqrt(np.median(result.covariance_m2.diagonal())),
+        "not_in_budget": list(result.body.undeclared()),
     }
     return [{"code": code, "value": value} for code, value in values.items()]
+
+
+def _shell_choices(job, result):
+    """What was assumed about a shell of courses, and how its points were used."""
+    wall = result.wall
+    roof = job.roof and job.roof.weighing
+    return {
+        "bottom": job.bottom.form if job.switches.bottom else "off",
+        "covariance": _covariance_choice(job),
+        "course_of_points": "section" if any(job.points.section) else "height",
+        "shape": _one_or_mixed(section.outline.kind for section in wall.sections),
+        "between_sections": _between_sections(result),
+        "tilt": _tilt_choice(job, wall.shell),
+        "course_heights": "along_axis",
+        "roof": _fitting_choice(job.switches.roof, roof, roof),
+        "snooping": CRITICAL_W if job.snooping else "off",
+        "form": "estimated",
+        "covariance_sd_mm": 1000 * np.sqrt(np.median(wall.covariance_m2.diagonal())),
+    }
+
+
+def _tilt_choice(job, shell):
+    if not shell.tilt_known:
+        return "not_determined"
+    return "horizontal_cut" if job.switches.tilt else "off"
+
+
+def _temperature_choice(job):
+    if job.survey.shell_temperature_c is None:
+        return "not_applied"
+    return "applied" if job.switches.temperature else "off"
+
+
+def _head_choice(job):
+    """Density that the table is loaded for; "unloaded" when only the survey's was taken off."""
+    if not job.switches.head:
+        return "off"
+    if job.table.liquid_density_kg_m3:
+        return job.table.liquid_density_kg_m3
+    return "unloaded" if job.survey.liquid_density_kg_m3 else "none"
+
+
+def _fitting_choice(switched_on, given, applied="declared"):
+    if not given:
+        return "none"
+    return applied if switched_on else "off"
 
 
 def _covariance_choice(job):
@@ -169,11 +184,15 @@ def _covariance_choice(job):
 def _thickness_choice(job):
     if job.survey.side == "inside":
         return "inside"
-    return "subtracted" if any(c.thickness_m + c.paint_m for c in job.courses) else "none"
+    solid = job.horizontal or job.sphere
+    given = any(c.thickness_m + c.paint_m for c in job.courses) or (solid and solid.thickness_m)
+    if not given:
+        return "none"
+    return "subtracted" if job.switches.plate and job.switches.paint else "off"
 
 
 def _between_sections(result):
-    constant = [course.degree == 0 for course in result.volume.courses]
+    constant = [course.degree == 0 for course in result.body.shell.volume.courses]
     return "constant" if all(constant) else "mixed" if any(constant) else "polynomial"
 
 

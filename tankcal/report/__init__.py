@@ -21,6 +21,7 @@ def build(record_path, directory, progress=None):
 
     import nbformat
 
+    from tankcal import record as records
     from tankcal.report.document import blocks_of
     from tankcal.report.html import page
     from tankcal.report.notebook import execute, joined
@@ -30,7 +31,8 @@ def build(record_path, directory, progress=None):
     beside = directory / "record.json"
     if Path(record_path).resolve() != beside.resolve():
         shutil.copyfile(record_path, beside)
-    notebook = joined(beside.name)
+    record = records.load(beside)
+    notebook = joined(beside.name, [part for part, value in record.items() if not value])
     total = len(notebook.cells) + len(FILES)
     tell = progress or (lambda done, total: None)
     execute(notebook, directory, on_cell=lambda done: tell(done, total))

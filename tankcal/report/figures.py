@@ -174,7 +174,7 @@ def capacity_curves(paper):
 def budget_bars(paper):
     """The share of the variance of each input, in percent."""
     budget = paper.record["budget"]
-    names = [paper.words["inputs"].get(row["input"], row["input"]) for row in budget]
+    names = [paper.input_name(row) for row in budget]
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(_WIDTH, 0.24 * len(budget) + 0.6))
         ax = figure.subplots()
@@ -185,7 +185,7 @@ def budget_bars(paper):
         ax.set_xlim(0, 100)
         ax.grid(True, axis="x")
         ax.set_axisbelow(True)
-        _margins(figure, left=1.75, right=0.2, bottom=0.42, top=0.05)
+        _margins(figure, left=2.9, right=0.2, bottom=0.42, top=0.05)
     return figure
 
 

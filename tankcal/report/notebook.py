@@ -16,15 +16,18 @@ CELL_TIMEOUT_S = 600
 LONGEST_SOCKET = 90  # characters of a socket's path; systems end at 104 to 108
 
 
-def joined(record_name):
+def joined(record_name, lacks=()):
     """One notebook from the shipped templates, to be kept beside the record of that name.
 
-    Cells tagged "parameters" or "setup" are taken from the first template only.
+    Cells tagged "parameters" or "setup" are taken from the first template only. A cell tagged
+    "if:courses" is left out when "courses" is among `lacks`, what the record has nothing of.
     """
     folder = shipped("report_templates")
     whole, *others = (nbformat.read(folder / name, as_version=4) for name in TEMPLATES)
     for other in others:
         whole.cells += [c for c in other.cells if not _tags(c) & {"parameters", "setup"}]
+    unneeded = {f"if:{part}" for part in lacks}
+    whole.cells = [cell for cell in whole.cells if not _tags(cell) & unneeded]
     parameters = [cell for cell in whole.cells if "parameters" in _tags(cell)]
     if len(parameters) != 1:
         raise TankcalError(f"the templates have {len(parameters)} parameters cells, not one")

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from math import floor, isfinite, log10
 
+from tankcal.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
 from tankcal.errors import TankcalError
 
 NOTHING = "–"
@@ -11,10 +12,14 @@ _MINUS = "\N{MINUS SIGN}"
 
 @dataclass(frozen=True)
 class Unit:
-    """How a value of the record (SI, or as its key says) is shown: its symbol, and the factor."""
+    """How a value of the record (SI, or as its key says) is shown: its symbol, and the factor.
+
+    least  decimals that rows of a capacity table have in it at least: litres
+    """
 
     symbol: str
     factor: float = 1.0
+    least: int = 0
 
 
 UNITS = {
@@ -22,7 +27,10 @@ UNITS = {
     "m": Unit("m"),
     "mm": Unit("mm", 1e3),
     "m2": Unit("m²"),
-    "m3": Unit("m³"),
+    "m3": Unit("m³", least=TABLE_DECIMALS["m3"]),
+    "L": Unit("L", float(1 / VOLUME_UNITS_M3["L"])),
+    "bbl": Unit("bbl", float(1 / VOLUME_UNITS_M3["bbl"]), TABLE_DECIMALS["bbl"]),
+    "kg": Unit("kg"),
     "mm/m": Unit("mm/m", 1e3),
     "deg": Unit("°"),
     "degC": Unit("°C"),

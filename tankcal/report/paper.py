@@ -14,6 +14,7 @@ from tankcal.report import blocks, numbers
 from tankcal.uncertainty import height_decimals, row_decimals
 from tankcal.words import choice_sentence, load_words
 
+_DECIMALS_OF_PARTS = {"m": 4, "m3": 4, "mm/m": 2, "mm": 2, "deg": 2, "kg/m3": 1}
 _SPACE = "\N{NO-BREAK SPACE}"
 
 
@@ -80,6 +81,11 @@ class Paper:
             text = numbers.significant(value * shown.factor, digits or 6, self.mark)
         return f"{text}{_SPACE}{shown.symbol}" if shown.symbol else text
 
+    def input_name(self, row):
+        """The name of an input of the budget; an item of the deadwood has its own beside it."""
+        name = self.words["inputs"].get(row["input"], row["input"])
+        return f"{name}: {row['note']}" if row["input"] == "deadwood" and row["note"] else name
+
     def coverage(self):
         """The coverage probability in percent."""
         return self._percent(self.record["job"]["table"]["coverage_probability"])
@@ -132,6 +138,19 @@ class Paper:
         return blocks.key_values(
             [(self.label(key), value) for key, value in items if value not in (None, "")]
         )
+
+    def dimensions(self, described):
+        """What the record says of a part: [{code, value, unit}], a text where there is no unit.
+
+        A code that is a text is looked up in the words `parts`.
+        """
+        return blocks.key_values([(self.label(one["code"]), self._part(one)) for one in described])
+
+    def _part(self, one):
+        value, unit = one["value"], one["unit"]
+        if unit is None:
+            return self.words["parts"].get(value, str(value))
+        return self.number(value, unit, decimals=_DECIMALS_OF_PARTS.get(unit, 0))
 
     def rows(self, table, keys):
         """The rows of a table that the record holds as one list per column."""

@@ -16,6 +16,7 @@ from tankcal.workbook.papers import (
     points_sheet,
     provenance_sheet,
 )
+from tankcal.workbook.parts import densities_sheet, inside_sheet, proportional_parts_sheet
 
 
 def write(record, path):
@@ -28,10 +29,15 @@ def write(record, path):
     with Book(path, record) as book:
         certificate_sheet(book, record, words)
         rows = capacity_sheet(book, record)
+        proportional_parts_sheet(book, record)
+        densities_sheet(book, record)
         dip_sheet(book, record)
-        courses_sheet(book, record, words)
+        inside_sheet(book, record, words)
+        if record["courses"]:
+            courses_sheet(book, record, words)
         corrections_sheet(book, record, words)
-        points_sheet(book, record, words)
+        if record["points"]:
+            points_sheet(book, record, words)
         budget_sheet(book, record, words)
         provenance_sheet(book, record, words)
         charts_sheet(book, rows)

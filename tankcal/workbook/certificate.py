@@ -40,8 +40,15 @@ def _tank(record, words):
         (_label(words, "tank_id"), tank["id"], None),
         (_label(words, "kind"), sentence(words, "kinds", tank["kind"]), None),
         *((_label(words, key), value, None) for key, value in tank["details"].items()),
-        ("Nominal diameter", tank["nominal_diameter_m"], '0.000 "m"'),
-        ("Nominal height", tank["nominal_height_m"], '0.000 "m"'),
+        *(
+            (_label(words, key), tank[f"{key}_{unit}"], shown)
+            for key, unit, shown in (
+                ("nominal_diameter", "m", '0.000 "m"'),
+                ("nominal_height", "m", '0.000 "m"'),
+                ("nominal_volume", "m3", '0.000 "m³"'),
+            )
+            if tank[f"{key}_{unit}"] is not None
+        ),
     ]
 
 

@@ -22,6 +22,7 @@ _DIP, _MESSAGE = 5, 6
 _VOLUME, _EXPANDED, _K, _STANDARD, _ULLAGE = 9, 10, 11, 12, 13
 _ROW, _NEXT, _HEIGHT_0, _HEIGHT_1, _VOLUME_0, _VOLUME_1 = range(16, 22)
 _PART, _ROW_OF_U, _REFERENCE = range(22, 25)
+_SHELL, _CTSH, _IN_SERVICE = 28, 29, 30
 
 
 def _formulas(digits_of_height):
@@ -155,7 +156,33 @@ def dip_sheet(book, record):
     refused = {"type": "formula", "criteria": f'=LEFT($B${_MESSAGE},{len(REFUSED)})="{REFUSED}"'}
     warning = book.format(font_color="#B00020", bold=True)
     sheet.conditional_format(_MESSAGE - 1, 1, _MESSAGE - 1, 1, {**refused, "format": warning})
+    _service(book, sheet, record, coarse, fine)
     _notes(book, sheet, record)
+
+
+def _service(book, sheet, record, coarse, fine):
+    """What the tank holds when its shell is at another temperature: CTSh times the volume."""
+    base = record["job"]["table"]["reference_temperature_c"]
+    expansion = record["job"]["material"]["expansion_per_k"]
+    book.heading(sheet, _SHELL - 2, "In service, at another temperature of the shell", len(_WIDTHS))
+    book.put(sheet, _SHELL - 1, 0, "Temperature of the shell: type it", bold=True)
+    look = {"bg_color": INPUT, "border": 1, "border_color": ACCENT, "locked": False, "bold": True}
+    book.put(sheet, _SHELL - 1, 1, base, num_format="0.0", **look)
+    book.put(sheet, _SHELL - 1, 2, "°C", indent=1)
+    book.put(sheet, _SHELL - 1, 3, "(7 liquid + ambient)/8 when not insulated")
+    book.name("shell_temperature", sheet, _SHELL - 1, _SHELL - 1, 1)
+    step = f"{expansion!r}*(B{_SHELL}-{base!r})"
+    factor = f'=IF(ISNUMBER(B{_SHELL}),1+2*{step}+({step})^2,"{NONE}")'
+    book.put(sheet, _CTSH - 1, 0, "Factor CTSh = 1 + 2 a dT + (a dT)²")
+    sheet.write_formula(_CTSH - 1, 1, factor, book.format(num_format="0.000000"), 1.0)
+    warm = f'=IF(ISNUMBER(B{_VOLUME}*B{_CTSH}),B{_VOLUME}*B{_CTSH},"{NONE}")'
+    shown = max(LITRE_DECIMALS, coarse)
+    book.put(sheet, _IN_SERVICE - 1, 0, "Volume at that temperature", bold=True)
+    strong = book.format(align="right", num_format=number_format(shown), bold=True)
+    at = len(record["capacity"]["volume_m3"]) // 2
+    sheet.write_formula(_IN_SERVICE - 1, 1, warm, strong, record["capacity"]["volume_m3"][at])
+    book.put(sheet, _IN_SERVICE - 1, 2, "m³", indent=1)
+    _digits_by_u(book, sheet, _IN_SERVICE, range(shown + 1, fine + 1))
 
 
 def _input_cell(book, sheet, height_m, at, digits):
@@ -213,5 +240,5 @@ def _notes(book, sheet, record):
         f"The volume is that of the tank at {temperature:g} °C, as the sheet Capacity gives it. "
         "A height outside the table is refused, never extrapolated.",
     )
-    for row, text in enumerate(notes, start=_REFERENCE + 1):
+    for row, text in enumerate(notes, start=_IN_SERVICE + 1):
         book.paragraph(sheet, row, text, _WIDTHS, font_color=MUTED)

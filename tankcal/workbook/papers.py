@@ -156,10 +156,13 @@ def corrections_sheet(book, record, words):
     _set_widths(book, sheet, columns)
     last = _write_table(book, sheet, _HEAD_ROW, "corrections", columns)
     shown = f'0.{"0" * digits} "m³"'
+    gross = record["gross"] and record["gross"]["volume_m3"]
     for below, label, value in (
-        (2, "Shell as surveyed, full height", record["gross"]["volume_m3"]),
+        (2, "Shell as surveyed, full height", gross),
         (3, "Top row of the table", record["capacity"]["volume_m3"][-1]),
     ):
+        if value is None:
+            continue
         book.put(sheet, last + below, 0, label)
         book.put(sheet, last + below, 2, value, num_format=shown)
 
@@ -179,8 +182,8 @@ def points_sheet(book, record, words):
     sheet = book.sheet(
         "Points and residuals",
         "Points and residuals",
-        f"{record['shell']['points']} points surveyed, {record['shell']['accepted']} accepted; "
-        "residual from the circle of the section, outwards positive",
+        f"{len(rows)} points surveyed, {sum(row['used'] for row in rows)} accepted; "
+        "residual from the circle of the section (or the wall of a solid), outwards positive",
         landscape=True,
     )
     columns = [
@@ -214,7 +217,7 @@ def budget_sheet(book, record, words):
     )
     digits = decimals_for(capacity["u_m3"][-1]) + 1
     columns = [
-        Column("Input", [sentence(words, "inputs", row["input"]) for row in rows], None, 34),
+        Column("Input", [_input_name(words, row) for row in rows], None, 34),
         Column("u of the input", _of(rows, "u"), _digits(rows, "u"), 12),
         Column("Unit", _of(rows, "unit"), None, 8),
         Column("Type", _of(rows, "type"), None, 7),
@@ -254,6 +257,11 @@ def budget_sheet(book, record, words):
         book.put(sheet, last + below, 0, label, bold=True)
         book.put(sheet, last + below, 1, capacity[key][-1], num_format=shown, bold=True)
     sheet.freeze_panes(_HEAD_ROW + 1, 0)
+
+
+def _input_name(words, row):
+    name = sentence(words, "inputs", row["input"])
+    return f"{name}: {row['note']}" if row["input"] == "deadwood" and row["note"] else name
 
 
 def provenance_sheet(book, record, words):

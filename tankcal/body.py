@@ -1,0 +1,191 @@
+"""A tank as the sum of its parts: shell, head, bottom, deadwood, roof, or one solid.
+
+Every part gives volume, free surface and derivatives below any level; the table is their sum. An
+input that several parts share (a scale, the table's zero) moves all of them at once: it is one
+column of the covariance, the sum of their derivatives times its standard uncertainty.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.uncertainty import Source
+from tankcal.volumes import ShellVolume
+
+
+@dataclass(frozen=True)
+class ShellPart:
+    """The shell of courses as a part; it has nothing below the bottom of its first course.
+
+    volume           inside, at the table's temperature
+    factors          what the survey leaves uncertain: (kind, (f, c) factor of the covariance of the
+                     shell's features, degrees of freedom) of the points and of the form between
+                     them, common to all courses ("form") or of each course ("own_form")
+    scale            of horizontal lengths, by temperature; expansion_per_k its coefficient
+    stretch          of heights, by temperature; 1 where heights are not corrected
+    bearing          which of the inputs "plate_thickness", "paint", "shell_temperature" and
+                     "expansion" were used
+    """
+
+    volume: ShellVolume
+    factors: tuple[tuple[str, np.ndarray, float], ...]
+    scale: float
+    expansion_per_k: float
+    stretch: float = 1.0
+    bearing: tuple[str, ...] = ()
+
+    def volume_m3(self, levels_m):
+        """(rows,) volume of the shell below each level."""
+        return self.volume.volume_m3(np.maximum(levels_m, 0.0))
+
+    def area_m2(self, levels_m):
+        """(rows,) inside area at each level; 0 below the bottom."""
+        return self.volume.area_m2(np.maximum(levels_m, 0.0)) * (np.asarray(levels_m) >= 0)
+
+    def derivatives(self, levels_m):
+        """{input: (rows,)} m3 per SI unit.
+
+        "barrel" is the same in all courses, for in a real tank they had one sign. "scale"
+        multiplies the surveyed lengths square to the axis, "datum" lifts the table's zero.
+        """
+        wet = np.maximum(levels_m, 0.0)
+        loss = -self.volume.inset_m2(wet)
+        area = self.area_m2(levels_m)
+        by_length = 2 * self.volume.volume_m3(wet) / self.scale
+        if self.stretch != 1.0:
+            by_length = by_length + (self.volume.volume_m3(wet) - area * wet) / self.stretch
+        of_corrections = {
+            "plate_thickness": loss,
+            "paint": loss,
+            "shell_temperature": -self.expansion_per_k * by_length,
+            "expansion": (self.scale - 1) / self.expansion_per_k * by_length,
+        }
+        return {
+            "scale": self.volume.by_scale_m3(wet),
+            "datum": area,
+            "barrel": self.volume.by_barrel_m2(wet).sum(axis=1),
+            **{name: of_corrections[name] for name in self.bearing},
+        }
+
+    def sources(self, levels_m):
+        """What the survey itself leaves uncertain: the points, and the form between them."""
+        wet = np.maximum(levels_m, 0.0)
+        return tuple(
+            Source(kind, self.volume.integrated(wet, factor), dof)
+            for kind, factor, dof in self.factors
+        )
+
+
+@dataclass(frozen=True)
+class SolidPart:
+    """A tank of one solid (lying cylinder, sphere, mesh) at the table's temperature.
+
+    solid            a part whose lengths are at that temperature already
+    scale            of its lengths by temperature; expansion_per_k its coefficient; warmed whether
+                     a temperature was given
+    surveyed         names of the inputs of the solid that a survey of its wall gave; () without one
+    survey_factor    (len(surveyed), c) factor of their covariance; survey_dof of its noise
+    unused           names of the solid's inputs that have no meaning in this job
+    """
+
+    solid: object
+    scale: float = 1.0
+    expansion_per_k: float = 0.0
+    warmed: bool = False
+    surveyed: tuple[str, ...] = ()
+    survey_factor: np.ndarray | None = None
+    survey_dof: float = np.inf
+    unused: tuple[str, ...] = ()
+
+    def volume_m3(self, levels_m):
+        """(rows,) volume below each level."""
+        return self.solid.volume_m3(levels_m)
+
+    def area_m2(self, levels_m):
+        """(rows,) derivative of the volume by the level."""
+        return self.solid.area_m2(levels_m)
+
+    def derivatives(self, levels_m):
+        """{input: (rows,)} m3 per SI unit: those of the solid, and of its temperature."""
+        found = self.solid.derivatives(levels_m)
+        if self.warmed:
+            by_length = found["scale"] / self.scale
+            found["shell_temperature"] = -self.expansion_per_k * by_length
+            found["expansion"] = (self.scale - 1) / self.expansion_per_k * by_length
+        without = {*self.unused, *self.surveyed}
+        return {name: one for name, one in found.items() if name not in without}
+
+    def sources(self, levels_m):
+        """What the survey of the wall leaves uncertain, beside the solid's own sources."""
+        own = tuple(self.solid.sources(levels_m))
+        if not self.surveyed:
+            return own
+        found = self.solid.derivatives(levels_m)
+        by_survey = np.column_stack([found[name] for name in self.surveyed])
+        return (Source("points", by_survey @ self.survey_factor, self.survey_dof), *own)
+
+
+@dataclass(frozen=True)
+class Body:
+    """The parts of a tank together.
+
+    declared            inputs with name, u (SI), u_as_read, unit, type, distribution, dof, note
+    lowest_m, highest_m levels between which there is a tank, in the frame of the parts
+    kinks_m             levels at which the free surface jumps: joints, edges of what stands or
+                        floats inside
+    """
+
+    parts: tuple
+    declared: tuple
+    lowest_m: float
+    highest_m: float
+    kinks_m: tuple[float, ...] = ()
+
+    @property
+    def shell(self):
+        """The shell of courses among the parts; None for a tank without."""
+        inner = (getattr(part, "part", part) for part in self.parts)  # above a measured zone
+        return next((part for part in inner if isinstance(part, ShellPart)), None)
+
+    def volume_m3(self, levels_m):
+        """(rows,) volume below each level."""
+        return sum(part.volume_m3(levels_m) for part in self.parts)
+
+    def area_m2(self, levels_m):
+        """(rows,) derivative of the volume by the level: the free surface."""
+        return sum(part.area_m2(levels_m) for part in self.parts)
+
+    def undeclared(self):
+        """Names of the inputs that move the volume of the full tank and have no declared u."""
+        top = np.array([self.highest_m])
+        moved = {}
+        for part in self.parts:
+            for name, derivative in part.derivatives(top).items():
+                moved[name] = moved.get(name, 0.0) + np.abs(derivative).max()
+        declared = {one.name for one in self.declared}
+        return tuple(name for name, size in moved.items() if size > 0 and name not in declared)
+
+    def sources(self, levels_m):
+        """One `Source` for each cause of uncertainty: the parts' own, then what was declared."""
+        own = [source for part in self.parts for source in part.sources(levels_m)]
+        derivatives = [part.derivatives(levels_m) for part in self.parts]
+        for one in self.declared:
+            columns = [given[one.name] for given in derivatives if one.name in given]
+            if columns:
+                own.append(_declared_source(one, sum(columns)))
+        return tuple(own)
+
+
+def _declared_source(one, derivative):
+    """The source of a declared input, from the (rows,) derivative by it."""
+    columns = np.asarray(derivative, dtype=float)[:, None] * one.u
+    return Source(
+        one.name,
+        columns,
+        one.dof,
+        one.u_as_read,
+        one.unit,
+        one.type,
+        one.distribution,
+        one.note,
+    )

@@ -1,0 +1,104 @@
+"""The circle through the points of a section, by the sum of squared distances (CIRCUM)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+
+from tankcal.adjust import adjust
+from tankcal.errors import SolutionError
+
+
+@dataclass(frozen=True)
+class Circle:
+    """Least-squares circle through n points of a section.
+
+    x_m, y_m, radius_m   centre and radius
+    cofactor_m2          (3, 3) covariance of x, y, radius for variance factor 1
+    residuals_m          (n,) distance of each point to the circle, outwards positive
+    variance_factor      v' Q^-1 v / (n - 3)
+    """
+
+    x_m: float
+    y_m: float
+    radius_m: float
+    cofactor_m2: np.ndarray
+    residuals_m: np.ndarray
+    variance_factor: float
+    dof: int
+
+
+def fit_circle(xy_m, covariance_m2):
+    """Geometric circle: the sum of squared, weighted point corrections is the minimum.
+
+    Condition for each point: hypot(x - xc, y - yc) - R = 0 (Silva 1995, program CIRCUM, linearised
+    at the adjusted points). For n even points of standard deviation s: s_centre = s sqrt(2/n),
+    s_radius = s / sqrt(n).
+
+    xy_m (n, 2); covariance_m2 (2n, 2n) dense or sparse, in the order x1 y1 x2 y2 ...
+    Raises SolutionError for fewer than 3 points or points on a line.
+    """
+    xy_m = np.asarray(xy_m, dtype=float)
+    n = len(xy_m)
+    if n < 3:
+        raise SolutionError(f"a circle needs 3 points, {n} were given")
+    centre = xy_m.mean(axis=0)
+    local = xy_m - centre
+    adjusted = adjust(circle_conditions, taubin_circle(local), local.ravel(), covariance_m2)
+    x, y, radius = adjusted.unknowns
+    return Circle(
+        x_m=float(x + centre[0]),
+        y_m=float(y + centre[1]),
+        radius_m=float(radius),
+        cofactor_m2=adjusted.cofactor,
+        residuals_m=np.hypot(local[:, 0] - x, local[:, 1] - y) - radius,
+        variance_factor=adjusted.variance_factor,
+        dof=adjusted.dof,
+    )
+
+
+def circle_conditions(unknowns, coordinates):
+    """Misclosures and both Jacobians of hypot(x - xc, y - yc) - R = 0 (a model for `adjust`)."""
+    x, y, radius = unknowns
+    d = coordinates.reshape(-1, 2) - (x, y)
+    distance = np.hypot(d[:, 0], d[:, 1])
+    unit = d / distance[:, None]
+    n = len(unit)
+    by_points = scipy.sparse.csr_array(
+        (unit.ravel(), np.arange(2 * n), np.arange(0, 2 * n + 1, 2)), shape=(n, 2 * n)
+    )
+    return distance - radius, np.column_stack([-unit, -np.ones(n)]), by_points
+
+
+def taubin_circle(local):
+    """Centre and radius of Taubin's algebraic circle (1991), the start of the geometric fit.
+
+    local (n, 2) about a place near the centre. Raises SolutionError for points on a line.
+    """
+    z = np.sum(local**2, axis=1)
+    mean = z.mean()
+    if not mean > 0:
+        raise SolutionError("all points of the section lie on one place")
+    design = np.column_stack([(z - mean) / (2 * np.sqrt(mean)), local])
+    values, vectors = np.linalg.svd(design, full_matrices=False)[1:]
+    if values[1] < 1e-9 * values[0] or abs(vectors[-1, 0]) < 1e-12:
+        raise SolutionError("the points of the section lie on a line")
+    a = vectors[-1]
+    scaled = a[0] / (2 * np.sqrt(mean))
+    x, y = -a[1:] / (2 * scaled)
+    return np.array([x, y, np.sqrt(x**2 + y**2 + mean)])
+
+
+def radial_covariance(xy_m, centre_m, covariance_m2):
+    """Covariance of the distances of points (n, 2) from a centre, by that of their coordinates.
+
+    (n, n), or (n,) variances when the points are independent of each other (sparse covariance).
+    """
+    d = np.asarray(xy_m) - centre_m
+    unit = d / np.hypot(d[:, 0], d[:, 1])[:, None]
+    n = len(unit)
+    radial = scipy.sparse.csr_array(
+        (unit.ravel(), np.arange(2 * n), np.arange(0, 2 * n + 1, 2)), shape=(n, 2 * n)
+    )
+    covariance = radial @ covariance_m2 @ radial.T
+    return covariance.diagonal() if scipy.sparse.issparse(covariance) else covariance

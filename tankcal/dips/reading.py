@@ -1,0 +1,82 @@
+"""Reading a table: ullage instead of dip, and the dip of a volume."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.errors import HeightError
+
+
+@dataclass(frozen=True)
+class Dips:
+    """Dips of given volumes: (n,) heights, m, and their standard uncertainties, m."""
+
+    height_m: np.ndarray
+    u_m: np.ndarray
+
+
+def ullage_m(reference_height_m, dip_m):
+    """Height from the liquid up to the reference point: reference height - dip; or back again.
+
+    Both directions are the same subtraction. Raises HeightError for a dip (ullage) below 0 or
+    above the reference height.
+    """
+    dips = np.asarray(dip_m, dtype=float)
+    outside = ~((dips >= 0) & (dips <= reference_height_m))
+    if np.any(outside):
+        raise HeightError(
+            f"dip {np.atleast_1d(dips)[np.atleast_1d(outside)][0]:g} m is outside 0 to the "
+            f"reference height, {reference_height_m:g} m"
+        )
+    return reference_height_m - dips
+
+
+def dips_of(height_m, volume_m3, factor_m3, wanted_m3):
+    """`Dips` at which the table, read linearly between its rows, gives the wanted volumes.
+
+    h = h_a + (V - V_a) (h_b - h_a) / (V_b - V_a),   u(h) = u(V) / ((V_b - V_a) / (h_b - h_a))
+
+    height_m   (rows,) dips, ascending; volume_m3  (rows,)
+    factor_m3  (rows, inputs) factor of the covariance of the rows: u(V) is that of the table at h
+    wanted_m3  a volume or (n,) of them
+    A row itself is read with the slope of the interval below it, as in the table's own reading.
+    Raises HeightError for a volume outside the table, and for one that stands there at more than
+    one height (rows of equal volume, or a volume that falls).
+    """
+    heights, volumes = np.asarray(height_m, dtype=float), np.asarray(volume_m3, dtype=float)
+    wanted = np.atleast_1d(np.asarray(wanted_m3, dtype=float))
+    upper = _row_above(heights, volumes, wanted)
+    lower = upper - 1
+    step = heights[upper] - heights[lower]
+    slope = (volumes[upper] - volumes[lower]) / step
+    part = (wanted - volumes[lower]) / (volumes[upper] - volumes[lower])
+    factor = np.asarray(factor_m3, dtype=float)
+    columns = (1 - part)[:, None] * factor[lower] + part[:, None] * factor[upper]
+    from_below, from_above = heights[lower] + part * step, heights[upper] - (1 - part) * step
+    dips = np.where(part < 0.5, from_below, from_above)  # so that a row gives its own height
+    return Dips(dips, np.sqrt(np.sum(columns**2, axis=1)) / slope)
+
+
+def _row_above(heights, volumes, wanted):
+    """(n,) first row that is not below each volume (1 for the first row of all).
+
+    Raises HeightError where there is none, or more than one place in the table.
+    """
+    rising = np.maximum.accumulate(volumes)
+    lasting = np.minimum.accumulate(volumes[::-1])[::-1]
+    outside = ~((wanted >= lasting[0]) & (wanted <= rising[-1]))
+    if np.any(outside):
+        raise HeightError(
+            f"volume {wanted[outside][0]:g} m3 is outside the capacity table "
+            f"({lasting[0]:g} to {rising[-1]:g} m3)"
+        )
+    reached = np.searchsorted(rising, wanted, side="left")  # first row not below the volume
+    left = np.searchsorted(lasting, wanted, side="right") - 1  # last row not above it
+    unclear = left > reached
+    if np.any(unclear):
+        low, high = heights[reached[unclear][0]], heights[left[unclear][0]]
+        raise HeightError(
+            f"volume {wanted[unclear][0]:g} m3 has no single dip: the table has it from "
+            f"{low:g} to {high:g} m"
+        )
+    return np.clip(reached, 1, len(heights) - 1)

@@ -1,0 +1,200 @@
+"""What stands or floats in a tank: deadwood, and a floating roof.
+
+Levels and heights count from the bottom of the first course, in metres.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.errors import SolutionError
+from tankcal.uncertainty import Source
+
+AIR_KG_M3, WEIGHTS_KG_M3 = 1.2, 8000.0  # of conventional weighing (OIML D 28)
+
+
+@dataclass(frozen=True)
+class Deadwood:
+    """Items inside (negative volume) or beside a tank (positive), each linear in height.
+
+        V(h) = sum v_i (h - b_i) / (t_i - b_i), kept between 0 and v_i
+
+    An item without height counts from its level on. Items may overlap.
+
+    names                (n,) as in the job
+    bottoms_m, tops_m    (n,)
+    volumes_m3, u_m3     (n,) signed volumes and their standard uncertainties
+    """
+
+    names: tuple[str, ...]
+    bottoms_m: np.ndarray
+    tops_m: np.ndarray
+    volumes_m3: np.ndarray
+    u_m3: np.ndarray
+
+    @property
+    def lowest_m(self):
+        """Lowest level of an item that adds to the capacity; inf when none does."""
+        return float(np.min(self.bottoms_m[self.volumes_m3 > 0], initial=np.inf))
+
+    def volume_m3(self, levels_m):
+        """(rows,) sum of what each item has below each level."""
+        return self._parts(levels_m) @ self.volumes_m3
+
+    def area_m2(self, levels_m):
+        """(rows,) derivative of `volume_m3` by the level; the upper side where an item begins."""
+        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))[:, None]
+        tall = self.tops_m > self.bottoms_m
+        here = (levels >= self.bottoms_m[tall]) & (levels < self.tops_m[tall])
+        return here @ (self.volumes_m3[tall] / (self.tops_m - self.bottoms_m)[tall])
+
+    def derivatives(self, levels_m):
+        """{input: (rows,)} only "datum", which is by the level."""
+        return {"datum": self.area_m2(levels_m)}
+
+    def sources(self, levels_m):
+        """One `Source` for each item that has an uncertainty: the part of it below each level."""
+        parts = self._parts(levels_m)
+        return tuple(
+            Source(
+                "deadwood",
+                parts[:, [index]] * u,
+                u=float(u),
+                unit="m3",
+                type="B",
+                note=name,
+            )
+            for index, (name, u) in enumerate(zip(self.names, self.u_m3, strict=True))
+            if u > 0
+        )
+
+    def _parts(self, levels_m):
+        """(rows, n) which part of each item lies below each level."""
+        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))[:, None]
+        heights = self.tops_m - self.bottoms_m
+        step = heights == 0
+        linear = np.clip((levels - self.bottoms_m) / np.where(step, 1.0, heights), 0.0, 1.0)
+        return np.where(step, levels >= self.bottoms_m, linear)
+
+
+def deadwood(names, bottoms_m, tops_m, volumes_m3, u_m3=None):
+    """`Deadwood` of items; u_m3 None: exact.
+
+    Raises SolutionError, naming the item, for a top below its bottom, a negative uncertainty, or a
+    number that is not finite.
+    """
+    names = tuple(names)
+    u = np.zeros(len(names)) if u_m3 is None else u_m3
+    columns = [np.asarray(c, dtype=float) for c in (bottoms_m, tops_m, volumes_m3, u)]
+    for name, bottom, top, volume, sd in zip(names, *columns, strict=True):
+        if not np.all(np.isfinite([bottom, top, volume, sd])):
+            raise SolutionError(f"deadwood {name}: expected finite numbers")
+        if top < bottom:
+            raise SolutionError(
+                f"deadwood {name}: its top {top:g} m is below its bottom {bottom:g} m"
+            )
+        if sd < 0:
+            raise SolutionError(f"deadwood {name}: its uncertainty {sd:g} m3 is negative")
+    return Deadwood(names, *columns)
+
+
+@dataclass(frozen=True)
+class FloatingRoof:
+    """What a floating roof displaces: nothing below its critical zone, all of it above.
+
+    Between the critical levels the roof rests partly on its legs: what is given there, linear in
+    height, is not for use.
+
+    mass_kg                  as weighed
+    critical_bottom_m        level at which the liquid first touches the roof
+    critical_top_m           level from which it floats freely
+    reference_density_kg_m3  of the liquid that the table is for
+    weighing                 "air" (conventional, with weights of 8000 kg/m3) or "vacuum" (mass)
+    """
+
+    mass_kg: float
+    critical_bottom_m: float
+    critical_top_m: float
+    reference_density_kg_m3: float
+    weighing: str
+
+    @property
+    def not_for_use(self):
+        """(low, high) levels of the critical zone, m."""
+        return (self.critical_bottom_m, self.critical_top_m)
+
+    def displacement_m3(self, density_kg_m3=None):
+        """Volume of liquid that the floating roof displaces; None: at the reference density.
+
+            "vacuum"  M / rho
+            "air"     M (1 - 1.2 / 8000) / (rho - 1.2)
+
+        Weighed in air, a reading M of conventional weights stands for the true mass m less the air
+        that the roof displaces: m - 1.2 V = M (1 - 1.2 / 8000). Afloat, liquid and air carry it:
+        rho D + 1.2 (V - D) = m, hence D without knowing V. Raises SolutionError for a density not
+        above the air's.
+        """
+        density = self.reference_density_kg_m3 if density_kg_m3 is None else density_kg_m3
+        return self.mass_kg * self._per_kg(density)
+
+    def density_correction_m3(self, observed_kg_m3):
+        """To be added to a volume read from the table: - M (1 / rho_observed - 1 / rho_reference).
+
+        In air with the densities and mass of `displacement_m3`. Negative in a lighter liquid, in
+        which the roof sinks deeper. Only for dips above the critical zone.
+        """
+        return self.displacement_m3() - self.displacement_m3(observed_kg_m3)
+
+    def volume_m3(self, levels_m):
+        """(rows,) minus what is displaced at each level, at the reference density."""
+        return -self.displacement_m3() * self._afloat(levels_m)
+
+    def area_m2(self, levels_m):
+        """(rows,) derivative of `volume_m3` by the level; 0 outside the critical zone."""
+        low, high = self.not_for_use
+        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))
+        return np.where(
+            (levels >= low) & (levels < high), -self.displacement_m3() / (high - low), 0
+        )
+
+    def derivatives(self, levels_m):
+        """{input: (rows,)} by "roof_mass" (kg) and "datum" (m)."""
+        by_mass = -self._per_kg(self.reference_density_kg_m3) * self._afloat(levels_m)
+        return {"roof_mass": by_mass, "datum": self.area_m2(levels_m)}
+
+    def sources(self, levels_m):
+        """None of its own: the mass is a declared input."""
+        return ()
+
+    def _afloat(self, levels_m):
+        low, high = self.not_for_use
+        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))
+        return np.clip((levels - low) / (high - low), 0.0, 1.0)
+
+    def _per_kg(self, density):
+        air = AIR_KG_M3 if self.weighing == "air" else 0.0
+        if not np.all(np.asarray(density) > AIR_KG_M3):
+            raise SolutionError(f"liquid of {density} kg/m3; expected it denser than air")
+        return (1 - air / WEIGHTS_KG_M3) / (density - air)
+
+
+def floating_roof(mass_kg, critical_bottom_m, critical_top_m, reference_density_kg_m3, weighing):
+    """`FloatingRoof`; raises SolutionError for a mass, zone, density or weighing that cannot be."""
+    if not (np.isfinite(mass_kg) and mass_kg > 0):
+        raise SolutionError(f"floating roof of {mass_kg:g} kg; expected a mass above 0")
+    if not critical_bottom_m < critical_top_m:
+        raise SolutionError(
+            f"critical zone from {critical_bottom_m:g} to {critical_top_m:g} m; "
+            "expected its top above its bottom"
+        )
+    if weighing not in ("air", "vacuum"):
+        raise SolutionError(f'weighing "{weighing}"; expected "air" or "vacuum"')
+    roof = FloatingRoof(
+        float(mass_kg),
+        float(critical_bottom_m),
+        float(critical_top_m),
+        float(reference_density_kg_m3),
+        weighing,
+    )
+    roof.displacement_m3()
+    return roof

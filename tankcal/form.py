@@ -1,0 +1,98 @@
+"""The form of a shell: what departs from a circle, as a spectrum that its own points are asked for.
+
+Mode k >= 2 of the outline has the variance amplitude k^-3 (dents, ovality, plates that do not meet
+in a circle). One part of it runs up the whole shell, one belongs to each course, and one grows with
+the height within a course.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+HARMONICS = 36  # of a smoothed outline: a dent of 10 deg still shows, if the prior believes it
+FORM_MODES = 100  # of the form that may lie between points; the others hold 2.5e-4 of its variance
+
+
+@dataclass(frozen=True)
+class Form:
+    """Amplitudes of the form: variance amplitude k^-3 of the cos and the sin of each mode k >= 2.
+
+    common_m2   of what runs up the whole shell
+    own_m2      of what each course has of its own
+    rising_m2   of what grows from the middle of a course, -1 at its bottom to +1 at its top
+    common_dof, own_dof   degrees of freedom of the first two
+    """
+
+    common_m2: float = 0.0
+    own_m2: float = 0.0
+    rising_m2: float = 0.0
+    common_dof: float = np.inf
+    own_dof: float = np.inf
+
+    @property
+    def level_m2(self):
+        """Amplitude of the form of one section."""
+        return self.common_m2 + self.own_m2
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Measured radii of one section, or of one course whose points are not level.
+
+    azimuth_rad, radius_m  (n,) about the centre of its circle
+    covariance_m2          (n, n) or (n,) of the radii
+    course                 index
+    zeta                   (n,) height within the course, -1 at its bottom to +1 at its top
+    degree                 of the polynomial in height that is fitted to them (0: level)
+    """
+
+    azimuth_rad: np.ndarray
+    radius_m: np.ndarray
+    covariance_m2: np.ndarray
+    course: int
+    zeta: np.ndarray
+    degree: int = 0
+
+
+def harmonics(azimuth_rad, highest, derivative=0):
+    """(n, 2 highest + 1) columns 1, cos a, sin a, cos 2a, sin 2a, ... or their first derivative."""
+    angles = np.outer(azimuth_rad, np.arange(1, highest + 1))
+    columns = np.empty((len(angles), 2 * highest + 1))
+    if derivative == 0:
+        columns[:, 0] = 1.0
+        columns[:, 1::2], columns[:, 2::2] = np.cos(angles), np.sin(angles)
+    else:
+        k = np.arange(1, highest + 1)
+        columns[:, 0] = 0.0
+        columns[:, 1::2], columns[:, 2::2] = -k * np.sin(angles), k * np.cos(angles)
+    return columns
+
+
+def mode_variances(highest):
+    """Prior variance of the cos and sin amplitudes of modes 2..highest over the amplitude: k^-3."""
+    return np.repeat(np.arange(2.0, highest + 1) ** -3, 2)
+
+
+def unit_form(azimuth_rad, highest=FORM_MODES):
+    """(n, 2 (highest - 1)) one standard deviation of each mode of a form of amplitude one."""
+    return harmonics(azimuth_rad, highest)[:, 3:] * np.sqrt(mode_variances(highest))
+
+
+def free_columns(azimuth_rad, zeta, degree):
+    """(n, 3, 6 or 7) columns of what no prior binds: radius and centre, taper and lean, barrel.
+
+    1, cos a, sin a; from degree 1 on the same times zeta; at degree 2 the Legendre polynomial
+    (3 zeta^2 - 1) / 2 of the radius alone.
+    """
+    level = harmonics(azimuth_rad, 1)
+    columns = [level, level * zeta[:, None], (1.5 * zeta**2 - 0.5)[:, None]]
+    return np.hstack(columns[: degree + 1])
+
+
+def whitened(array, covariance, transposed=False):
+    """L^-1 array (or L^-T array) with covariance = L L', which may be (n,) variances."""
+    if np.ndim(covariance) == 1:
+        return array / np.sqrt(covariance)[:, None]
+    factor = np.linalg.cholesky(covariance)
+    return scipy.linalg.solve_triangular(factor, array, lower=True, trans=int(transposed))

@@ -1,0 +1,59 @@
+"""Does the job make sense as a whole? Checks that need more than one value of it.
+
+Each check tells `log` its problems and warnings and returns nothing. A check whose values are
+missing or bad stays silent: what is wrong with them has been told already.
+"""
+
+from tankcal.job.checks.bottom import bottom_form, check_bottom
+from tankcal.job.checks.common import extent_of, has_rows
+from tankcal.job.checks.courses import check_courses
+from tankcal.job.checks.deadwood import check_deadwood
+from tankcal.job.checks.geometry import check_cylinder, check_scan
+from tankcal.job.checks.inputs import check_inputs
+from tankcal.job.checks.kinds import check_horizontal, check_sphere
+from tankcal.job.checks.points import check_points
+from tankcal.job.checks.roof import check_roof
+from tankcal.job.checks.settings import check_settings
+from tankcal.job.checks.steps import check_steps
+from tankcal.job.entries import kind_of
+
+__all__ = ["bottom_form", "check_all"]
+
+
+def check_all(values, tables, raw, log):
+    """All checks that the readable parts allow.
+
+    values  of the settings, or None: unreadable; tables  {name: ColumnValues, or None: not there}
+    """
+    kind = kind_of(raw)
+    points, inputs = tables["points"], tables["uncertainty"]
+    extent = None
+    if values is not None:
+        extent = extent_of(values, tables, kind)
+        check_steps(values["table"], extent, raw, log)
+        check_settings(values, tables, extent, kind, raw, log)
+    if points is not None and (kind == "vertical" or has_rows(points)):
+        check_points(points, log)
+    if values is not None:
+        _check_of_kind(values, tables, extent, kind, raw, log)
+    if inputs is not None:
+        check_inputs(inputs, values, tables, kind, log)
+
+
+def _check_of_kind(values, tables, extent, kind, raw, log):
+    points, courses = tables["points"], tables["courses"]
+    if kind == "vertical":
+        if courses is not None:
+            check_courses(courses, values, log)
+        if points is not None:
+            check_cylinder(points, courses, values, raw, log)
+        check_bottom(values, tables["bottom"], points, extent, raw, log)
+        check_roof(values["roof"], extent, raw, log)
+    elif has_rows(points):
+        check_scan(points, values, kind, raw, log)
+    if kind == "horizontal":
+        check_horizontal(values, has_rows(points), raw, log)
+    if kind == "sphere":
+        check_sphere(values, has_rows(points), raw, log)
+    if tables["deadwood"] is not None:
+        check_deadwood(tables["deadwood"], extent, log)

@@ -1,0 +1,220 @@
+"""[bottom] and bottom.csv: one form, complete, within the tank and in metres."""
+
+import numpy as np
+
+from tankcal.job.checks.common import has_rows, is_not_given, tell, zero_z
+from tankcal.job.checks.geometry import places_of
+
+SURVEYED, MEASURED = ("x_m", "y_m", "z_m"), ("level_m", "volume_m3")
+MIN_POINTS, MAX_POINTS = 12, 500  # that a surface is made through
+MIN_LEVELS = 2
+NARROW, PARTIAL = 0.01, 0.1  # spread (rms) over the diameter; that of a full disc is 0.25
+OUTSIDE_FACTOR, OUTSIDE_M = 1.05, 0.2  # of the nominal radius, which is not the real one
+RISE_FACTOR, STEEP_FACTOR, LEAST_DEPTH_M = 0.1, 0.1, 0.5  # of the diameter
+OVERFULL, EMPTY = 1.5, 0.5  # volume of a slice over that of the full cross-section
+
+
+def bottom_form(values, table):
+    """The form of the bottom: as given, else by the columns of bottom.csv, else flat."""
+    form = values["bottom"]["form"]
+    if form is not None or not has_rows(table):
+        return form or "flat"
+    return "liquid" if _given(table, MEASURED) else "points"
+
+
+def _given(table, names):
+    return [name for name in names if table.columns[name] is not None]
+
+
+def check_bottom(values, table, points, extent, raw, log):
+    """The form with what belongs to it, and nothing that belongs to another one."""
+    form = bottom_form(values, table)
+    _check_centre(form, values, raw, log)
+    if form not in ("points", "liquid"):
+        if has_rows(table):
+            expected = f"rows beside bottom.form = {form}; expected points or liquid, or no rows"
+            log.problem(table.file, expected)
+        return
+    wanted = SURVEYED if form == "points" else MEASURED
+    if not has_rows(table):
+        expected = f"no rows; expected {', '.join(wanted)}, as bottom.form = {form} says"
+        log.problem(raw.file_of("bottom"), expected)
+    elif _has_its_columns(table, form, wanted, log):
+        if form == "points":
+            _check_points(table, points, values, log)
+        else:
+            _check_volumes(table, values, extent, log)
+
+
+def _has_its_columns(table, form, wanted, log):
+    """Has the table all columns of its form, and none of the other one?"""
+    surveyed, measured = _given(table, (*SURVEYED, "s_mm")), _given(table, (*MEASURED, "u_m3"))
+    if surveyed and measured:
+        expected = f"given beside {measured[0]}; expected surveyed points or measured volumes"
+        log.problem(table.file, f"{expected}, never both", None, surveyed[0])
+        return False
+    missing = [name for name in wanted if table.columns[name] is None]
+    for name in missing:
+        expected = f"not given; expected {', '.join(wanted)} for a bottom of form {form}"
+        log.problem(table.file, expected, None, name)
+    return not missing
+
+
+def _check_centre(form, values, raw, log):
+    centre, edge = values["bottom"]["centre_z_m"], values["datum"]["bottom_z_m"]
+    diameter = values["tank"]["nominal_diameter_m"]
+    if form not in ("cone", "dish"):
+        if centre is not None:
+            expected = f"given for a bottom of form {form}; expected only for a cone or a dish"
+            tell(log.problem, raw, "bottom", "centre_z_m", expected)
+        return
+    if is_not_given(raw, "bottom", "centre_z_m"):
+        expected = f"missing; expected the z of the centre of the {form}"
+        tell(log.problem, raw, "bottom", "centre_z_m", expected)
+    if None in (centre, edge, diameter):
+        return
+    rise = centre - edge
+    where = f"{abs(rise):g} m {'above' if rise > 0 else 'below'} its edge (datum.bottom_z_m)"
+    deepest = diameter if form == "cone" else diameter / 2
+    if not -deepest <= rise <= diameter / 4:
+        expected = f"{where}; expected at most {diameter / 4:g} m above, {deepest:g} m below:"
+        tell(log.problem, raw, "bottom", "centre_z_m", f"{expected} another unit or frame?")
+    elif abs(rise) > STEEP_FACTOR * diameter:
+        expected = f"{where}, which is steep: is it in the frame of the points?"
+        tell(log.warning, raw, "bottom", "centre_z_m", expected)
+    elif rise == 0:
+        tell(log.warning, raw, "bottom", "centre_z_m", f"at the height of the edge: a flat {form}")
+
+
+def _check_points(table, wall, values, log):
+    xyz, diameter = places_of(table), values["tank"]["nominal_diameter_m"]
+    if len(table.rows) + table.skipped < MIN_POINTS:
+        log.problem(table.file, f"{len(table.rows)} points; expected {MIN_POINTS} or more")
+        return
+    if len(table.rows) > MAX_POINTS:
+        expected = f"{len(table.rows)} points; expected at most {MAX_POINTS}: thin the scan first"
+        log.problem(table.file, expected)
+    if not len(xyz) or len(xyz) < len(table.rows) or diameter is None:
+        return
+    plan = xyz[:, :2] - xyz[:, :2].mean(axis=0)
+    spread = float(np.linalg.svd(plan, compute_uv=False)[1] / np.sqrt(len(xyz)))
+    if spread < NARROW * diameter:
+        expected = "all points lie in one place or on one line; expected them all over the bottom"
+        log.problem(table.file, expected, None, "x_m")
+        return
+    if spread < PARTIAL * diameter:
+        expected = "the points cover a small part of the bottom; expected them all over it"
+        log.warning(table.file, expected, None, "x_m")
+    _refuse_same_places(table, xyz, log)
+    if wall is not None:
+        _check_places(table, xyz, places_of(wall), diameter, log)
+    if values["datum"]["bottom_z_m"] is not None:
+        _check_depths(table, xyz[:, 2] - values["datum"]["bottom_z_m"], diameter, log)
+
+
+def _refuse_same_places(table, xyz, log):
+    first_row = {}
+    for row, place in zip(table.rows, map(tuple, xyz[:, :2]), strict=True):
+        if place in first_row:
+            expected = f"the same x and y as row {first_row[place]}; expected one point there"
+            log.problem(table.file, expected, row, "x_m")
+        first_row.setdefault(place, row)
+
+
+def _check_places(table, xyz, wall, diameter, log):
+    """Bottom points within the tank; its axis is about where most wall points centre."""
+    if not len(wall):
+        return
+    low, high = np.percentile(wall[:, :2], [5, 95], axis=0)
+    distance = np.hypot(*(xyz[:, :2] - (low + high) / 2).T)
+    allowed = OUTSIDE_FACTOR * diameter / 2 + OUTSIDE_M
+    if np.min(high - low) < 0.85 * diameter:  # not seen from all around: the centre is vague
+        allowed = diameter + OUTSIDE_M
+    complaint = "m from the axis; expected within the tank, a radius of"
+    texts = [f"{far:.4g} {complaint} {diameter / 2:g} m" for far in distance]
+    hint = "in millimetres, or in another frame than the points of the wall?"
+    _tell_rows(table, "x_m", distance > allowed, texts, hint, log)
+
+
+def _check_depths(table, rise, diameter, log):
+    highest = max(LEAST_DEPTH_M, RISE_FACTOR * diameter)
+    deepest = max(LEAST_DEPTH_M, diameter)
+    texts = [
+        f"{abs(z):.4g} m {'above' if z > 0 else 'below'} datum.bottom_z_m; expected at most"
+        f" {highest:.4g} m above, {deepest:.4g} m below"
+        for z in rise
+    ]
+    bad = (rise > highest) | (rise < -deepest)
+    hint = "in millimetres, or in another frame than the points of the wall?"
+    _tell_rows(table, "z_m", bad, texts, hint, log)
+    steep = np.min(rise) < -max(LEAST_DEPTH_M, STEEP_FACTOR * diameter)
+    if steep and not np.any(bad):
+        expected = f"{-np.min(rise):.4g} m below datum.bottom_z_m, which is deep: in metres?"
+        log.warning(table.file, expected, table.rows[int(np.argmin(rise))], "z_m")
+
+
+def _tell_rows(table, column, bad, texts, hint, log):
+    """A problem for each bad row, or one for the column where more than half of the rows are."""
+    if 2 * np.sum(bad) > len(bad):
+        log.problem(table.file, f"{texts[int(np.argmax(bad))]}: {hint}", None, column)
+        return
+    for row, text, is_bad in zip(table.rows, texts, bad, strict=True):
+        if is_bad:
+            log.problem(table.file, text, row, column)
+
+
+def _check_volumes(table, values, extent, log):
+    levels, volumes = table.of("level_m"), table.of("volume_m3")
+    if len(table.rows) + table.skipped < MIN_LEVELS:
+        log.problem(table.file, f"{len(levels)} level; expected {MIN_LEVELS} or more")
+        return
+    if None in levels or None in volumes or table.skipped:
+        return
+    sound = True
+    for name, column in (("level_m", levels), ("volume_m3", volumes)):
+        pairs = zip(table.rows[1:], column[:-1], column[1:], strict=True)
+        for row, before, after in pairs:
+            is_dry = name == "volume_m3" and after == before == 0
+            if after <= before and not is_dry:
+                expected = f"found {after:g} after {before:g}; expected ascending numbers"
+                log.problem(table.file, expected, row, name)
+                sound = False
+    if sound:
+        _check_reach(table, levels, volumes, values, extent, log)
+        _check_slices(table, levels, volumes, extent, log)
+
+
+def _check_reach(table, levels, volumes, values, extent, log):
+    """Rows from the table's zero up to the shell at least, so that nothing is extrapolated."""
+    shell, zero = values["datum"]["bottom_z_m"], zero_z(values)
+    if levels[0] > 0 and volumes[0] > 0:
+        expected = f"begins at {levels[0]:g}; expected a row at dip 0 or below it, or a volume of 0"
+        log.problem(table.file, expected, table.rows[0], "level_m")
+    if None not in (shell, zero) and levels[-1] < shell - zero:
+        expected = f"ends at {levels[-1]:g}; expected levels up to the shell, {shell - zero:g} m"
+        log.problem(table.file, expected, table.rows[-1], "level_m")
+    if extent.top_m is not None and levels[-1] > extent.top_m:
+        expected = f"found {levels[-1]:g}; expected dips within the shell: in millimetres?"
+        log.problem(table.file, expected, table.rows[-1], "level_m")
+
+
+def _check_slices(table, levels, volumes, extent, log):
+    if extent.area_m2 is None:
+        return
+    full = extent.area_m2 * np.diff(levels)
+    filled = np.diff(volumes) / full
+    texts = [
+        f"{dv:.4g} m3 more than the row above; the full cross-section holds {v:.4g} m3 there"
+        for dv, v in zip(np.diff(volumes), full, strict=True)
+    ]
+    bad = np.append(False, filled > OVERFULL)
+    for row, text, is_bad in zip(table.rows, ["", *texts], bad, strict=True):
+        if is_bad:
+            log.problem(table.file, f"{text}, expected about that: in litres?", row, "volume_m3")
+    if not np.any(bad) and filled[-1] < EMPTY:
+        expected = f"{texts[-1]}: is the bottom not covered yet, or is it another unit?"
+        log.warning(table.file, expected, table.rows[-1], "volume_m3")
+    largest_heel = extent.area_m2 * max(LEAST_DEPTH_M, np.sqrt(extent.area_m2))
+    if not np.any(bad) and volumes[0] > largest_heel:
+        expected = f"found {volumes[0]:g}; expected a heel of at most {largest_heel:.4g} m3"
+        log.problem(table.file, expected, table.rows[0], "volume_m3")

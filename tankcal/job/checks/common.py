@@ -1,0 +1,113 @@
+"""What all checks share: how a setting is told, and what is known of the tank's size."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.job.entries import settings_place
+from tankcal.job.fields import is_blank
+
+
+def tell(to, raw, section, key, expected):
+    """Tell log.problem or log.warning about one setting, with its file and row."""
+    file, row, name = settings_place(raw, section, key)
+    to(file, expected, row, name)
+
+
+def is_not_given(raw, section, key):
+    """Is the key missing or blank? A value that is bad counts as given: it is told already."""
+    value = raw.settings.get(section, {}).get(key)
+    return value is None or is_blank(value.raw)
+
+
+def has_rows(table):
+    """Does the table exist, with at least one row, be it readable or not?"""
+    return table is not None and not table.is_empty
+
+
+def refuse_repeated(table, column, log):
+    """A problem for each name that stands in the table a second time."""
+    first_row = {}
+    for row, name in zip(table.rows, table.of(column), strict=True):
+        if name is None:
+            continue
+        if name in first_row:
+            expected = f"{name!r} is there already, in row {first_row[name]}; expected once"
+            log.problem(table.file, expected, row, column)
+        else:
+            first_row[name] = row
+
+
+def loads_the_shell(values):
+    """Is the table to be made for a shell that the liquid stretches?"""
+    table = values["table"]
+    asked = (table["liquid_density_kg_m3"] or 0) > 0 or table["other_densities_kg_m3"]
+    return bool(asked) and values["corrections"]["head"] is not False
+
+
+def zero_z(values):
+    """z of the table's zero in the frame of the points, m, or None: not known."""
+    plate = values["datum"]["dip_plate_z_m"]
+    return values["datum"]["bottom_z_m"] if plate is None else plate
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What is known of a tank's size before anything is computed; None: not known.
+
+    height_m          from its lowest to its highest inside point at the dip point
+    lowest_m, top_m   dips of its lowest and highest inside points, from the table's zero
+    area_m2           the largest free surface
+    """
+
+    height_m: float | None = None
+    lowest_m: float | None = None
+    top_m: float | None = None
+    area_m2: float | None = None
+
+
+def extent_of(values, tables, kind):
+    """The Extent of a tank of the kind; nothing is known of a mesh, or of an unknown kind."""
+    if kind == "vertical":
+        return _of_vertical(values, tables["bottom"])
+    if kind == "horizontal":
+        return _of_horizontal(values["horizontal"], values, has_rows(tables["points"]))
+    if kind == "sphere":
+        diameter = values["sphere"]["diameter_m"] or values["tank"]["nominal_diameter_m"]
+        area = None if diameter is None else np.pi / 4 * diameter**2
+        return _lying(diameter, 0.0, area, values, has_rows(tables["points"]))
+    return Extent()
+
+
+def _of_vertical(values, bottom):
+    height, diameter = (values["tank"][f"nominal_{name}_m"] for name in ("height", "diameter"))
+    shell_z, zero = values["datum"]["bottom_z_m"], zero_z(values)
+    area = None if diameter is None else np.pi / 4 * diameter**2
+    if None in (shell_z, zero):
+        return Extent(height, area_m2=area)
+    centre = values["bottom"]["centre_z_m"]
+    lowest = [shell_z - zero] if centre is None else [shell_z - zero, centre - zero]
+    if bottom is not None:
+        lowest += [z - zero for z in bottom.of("z_m") if z is not None]
+        lowest += [level for level in bottom.of("level_m") if level is not None]
+    top = None if height is None else shell_z + height - zero
+    return Extent(height, min(lowest), top, area)
+
+
+def _of_horizontal(given, values, has_points):
+    height = given["height_m"] or given["diameter_m"] or values["tank"]["nominal_diameter_m"]
+    width = given["width_m"] or height
+    length = given["length_m"]
+    if None in (height, width, length):
+        return Extent(height)
+    length += sum(given[f"end_{end}_depth_m"] or height / 2 for end in "ab")
+    tilt = abs(given["tilt_mm_per_m"] or 0.0) / 1000
+    return _lying(height, tilt * length, width * length, values, has_points)
+
+
+def _lying(height, reach, area, values, has_points):
+    """reach: how much the ends may lie above or below the place of the dip point, m."""
+    if height is None or has_points:
+        return Extent(height, area_m2=area)
+    zero = values["datum"]["dip_plate_z_m"] or 0.0
+    return Extent(height, -reach - zero, height + reach - zero, area)

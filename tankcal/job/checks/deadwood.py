@@ -1,0 +1,62 @@
+"""deadwood.csv: things that are in the tank, of a size that fits into it."""
+
+from tankcal.job.checks.common import refuse_repeated
+
+TOLERANCE_M = 0.05  # by which a thing may stick out of the drawing's tank
+LEAST_HEIGHT_M = 0.05  # of a thing that is given as if it had none
+SUMP_M = 2.0  # what gives room may lie below the bottom
+LARGE_SHARE = 0.1  # of what the tank holds beside it
+SLACK = 1.05  # the drawing's cross-section is not the real one
+
+
+def check_deadwood(table, extent, log):
+    """Names once; bottom below top, both in the tank; a volume that its slice can hold."""
+    refuse_repeated(table, "name", log)
+    columns = (table.of(name) for name in ("bottom_m", "top_m", "volume_m3", "u_m3"))
+    for row, bottom, top, volume, u in zip(table.rows, *columns, strict=True):
+        if None in (bottom, top):
+            continue
+        if bottom > top:
+            expected = f"found {top:g} below bottom_m = {bottom:g}; expected a top above it"
+            log.problem(table.file, expected, row, "top_m")
+            continue
+        _check_place(table, row, bottom, top, volume, extent, log)
+        if volume is None:
+            continue
+        _check_volume(table, row, top - bottom, volume, extent, log)
+        if u is not None and volume and u > abs(volume):
+            expected = f"u = {u:g} m3 of a volume of {volume:g} m3: is it the right unit?"
+            log.warning(table.file, expected, row, "u_m3")
+
+
+def _check_place(table, row, bottom, top, volume, extent, log):
+    unit = "dips in metres, from the table's zero"
+    if extent.top_m is not None and top > extent.top_m + TOLERANCE_M:
+        expected = (
+            f"found {top:g}; expected at most {extent.top_m:.4g}, the top of the tank: {unit}"
+        )
+        log.problem(table.file, expected, row, "top_m")
+    lowest = extent.lowest_m
+    if lowest is None:
+        return
+    if volume is not None and volume > 0:
+        lowest -= SUMP_M
+    if bottom < lowest - TOLERANCE_M:
+        expected = (
+            f"found {bottom:g}; expected {lowest:.4g} or more, the tank's lowest point: {unit}"
+        )
+        log.problem(table.file, expected, row, "bottom_m")
+
+
+def _check_volume(table, row, height, volume, extent, log):
+    if volume == 0:
+        log.warning(table.file, "found 0; a volume of nothing", row, "volume_m3")
+    if extent.area_m2 is None:
+        return
+    full = extent.area_m2 * max(height, LEAST_HEIGHT_M)
+    found = f"found {volume:g}; the whole tank holds {full:.4g} m3 between bottom_m and top_m"
+    if abs(volume) > SLACK * full:
+        expected = f"{found}, expected less, in cubic metres: in litres?"
+        log.problem(table.file, expected, row, "volume_m3")
+    elif abs(volume) > LARGE_SHARE * full:
+        log.warning(table.file, f"{found}: in litres?", row, "volume_m3")

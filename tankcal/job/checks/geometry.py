@@ -1,0 +1,111 @@
+"""Points, drawing and courses: in the same unit and frame, and enough points everywhere?"""
+
+import numpy as np
+
+from tankcal.job.checks.common import tell
+
+MIN_POINTS_PER_COURSE = 5
+FEW_POINTS_PER_COURSE = 10
+MIN_POINTS_OF_SCAN = {"horizontal": 20, "sphere": 12}
+UNIT_FACTOR = 5  # sizes that differ by more cannot be in the same unit
+DOUBTFUL_EXTENT = 1.5  # points wider than the tank by more: feet, or many points off the tank
+LARGEST_SPHERE_M = 100
+
+
+def places_of(table):
+    """(n, 3) coordinates of the rows of a table that have all three."""
+    places = zip(table.of("x_m"), table.of("y_m"), table.of("z_m"), strict=True)
+    return np.array([place for place in places if None not in place]).reshape(-1, 3)
+
+
+def check_cylinder(points, courses, values, raw, log):
+    """Points, drawing and courses of a vertical tank, and enough points in each course."""
+    xyz = places_of(points)
+    unplaced = points.skipped + len(points.rows) - len(xyz)
+    tank, bottom = values["tank"], values["datum"]["bottom_z_m"]
+    if not len(xyz):
+        return
+    diameter, height = tank["nominal_diameter_m"], tank["nominal_height_m"]
+    low, high = np.percentile(xyz, [5, 95], axis=0)
+    width, rise = float(np.max(high[:2] - low[:2])), float(high[2] - low[2])
+    same_unit = True
+    if diameter is not None and len(xyz) >= MIN_POINTS_PER_COURSE:
+        same_unit = check_extent(points, "x_m", width, "tank.nominal_diameter_m", diameter, log)
+    if height is not None and rise > UNIT_FACTOR * height:
+        same_unit = check_extent(points, "z_m", rise, "tank.nominal_height_m", height, log)
+    heights = [None]
+    if courses is not None and not courses.skipped:
+        heights = courses.of("height_m")
+    if not same_unit or bottom is None or not heights or None in heights:
+        return
+    edges = bottom + np.concatenate([[0.0], np.cumsum(heights)])
+    _check_points_in_courses(xyz[:, 2], unplaced, edges, courses, raw, log)
+
+
+def check_scan(points, values, kind, raw, log):
+    """Points of a horizontal cylinder or a sphere: enough, in metres, in the datum's frame?"""
+    xyz = places_of(points)
+    unplaced = points.skipped + len(points.rows) - len(xyz)
+    if len(xyz) + unplaced < MIN_POINTS_OF_SCAN.get(kind, 0):
+        expected = f"{len(xyz)} points; expected {MIN_POINTS_OF_SCAN[kind]} or more of the wall"
+        log.problem(points.file, expected)
+        return
+    if len(xyz) < MIN_POINTS_PER_COURSE or kind is None:
+        return
+    low, high = np.percentile(xyz, [5, 95], axis=0)
+    across, key = float(np.max(high - low)), "tank.nominal_diameter_m"
+    nominal = values["tank"]["nominal_diameter_m"]
+    if kind == "horizontal":
+        across, key = float(np.hypot(*(high - low)[:2])), "horizontal.length_m"
+        nominal = values["horizontal"]["length_m"]
+    if nominal is not None:
+        if not check_extent(points, "x_m", across, key, nominal, log):
+            return
+    elif across > LARGEST_SPHERE_M:
+        expected = f"the points are {across:.4g} m apart; expected at most {LARGEST_SPHERE_M} m"
+        log.problem(points.file, f"{expected}: in millimetres?", None, "x_m")
+        return
+    plate, rise = values["datum"]["dip_plate_z_m"], high[2] - low[2]
+    if plate is not None and not low[2] - rise - 1 <= plate <= high[2]:
+        expected = f"found {plate:g}; the points lie from z = {low[2]:.4g} to {high[2]:.4g} m,"
+        tell(log.problem, raw, "datum", "dip_plate_z_m", f"{expected} expected it about there")
+
+
+def check_extent(points, column, extent, key, nominal, log):
+    """Is the points' extent of the size of the drawing's? Returns False after telling a problem."""
+    ratio = extent / nominal
+    found = f"the points are {extent:.4g} m apart (most of them), {key} is {nominal:g} m"
+    if 1 / UNIT_FACTOR <= ratio <= UNIT_FACTOR:
+        if ratio > DOUBTFUL_EXTENT:
+            expected = f"{found}: one of them in feet, or many points far off the tank?"
+            log.warning(points.file, expected, None, column)
+        return True
+    large, small = ("the points", key) if ratio > 1 else (key, "the points")
+    factor = max(ratio, 1 / ratio) if ratio > 0 else np.inf
+    if 200 <= factor <= 5000:
+        guess = f"about 1000 to 1: {large} in millimetres?"
+    elif 20 <= factor < 200:
+        guess = f"about 100 to 1: {large} in centimetres?"
+    else:
+        guess = f"{large} too large or {small} too small"
+    log.problem(points.file, f"{found}; expected the same size in metres: {guess}", None, column)
+    return False
+
+
+def _check_points_in_courses(z, unplaced, edges, courses, raw, log):
+    """Enough points in each course, even if all points that could not be read lie there?"""
+    if not np.any((z >= edges[0]) & (z <= edges[-1])):
+        expected = (
+            f"no point lies on the shell, which goes from z = {edges[0]:g} to {edges[-1]:g} m;"
+            f" expected points there, found z from {z.min():g} to {z.max():g} m"
+        )
+        tell(log.problem, raw, "datum", "bottom_z_m", expected)
+        return
+    counts, _ = np.histogram(z, bins=edges)
+    for row, name, count in zip(courses.rows, courses.of("course"), counts, strict=True):
+        if count + unplaced < MIN_POINTS_PER_COURSE:
+            expected = f"{count} points lie in course {name}, expected {MIN_POINTS_PER_COURSE}"
+            log.problem(courses.file, expected + " or more", row, "course")
+        elif count + unplaced < FEW_POINTS_PER_COURSE:
+            expected = f"only {count} points lie in course {name}, expected"
+            log.warning(courses.file, f"{expected} {FEW_POINTS_PER_COURSE} or more", row, "course")

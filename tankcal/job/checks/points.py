@@ -1,0 +1,54 @@
+"""points.csv by itself: names and places once, standard deviations and sections complete."""
+
+from tankcal.job.checks.common import refuse_repeated
+
+MAX_POINTS = 50_000
+TINY_SD_MM = 0.01
+
+
+def check_points(points, log):
+    """Point names once, places once (a warning), credible and complete standard deviations."""
+    if not points.rows and not points.skipped:
+        log.problem(points.file, "no rows; expected one row for each surveyed point")
+        return
+    if len(points.rows) > MAX_POINTS:
+        expected = f"{len(points.rows)} points; expected at most {MAX_POINTS}: thin the scan first"
+        log.problem(points.file, expected)
+    refuse_repeated(points, "point", log)
+    _warn_same_places(points, log)
+    _refuse_some_sections(points, log)
+    sds = ("sx_mm", "sy_mm", "sz_mm")
+    given = [name for name in sds if points.columns[name] is not None]
+    for name in sds:
+        if given and name not in given:
+            expected = f"not given; expected beside {given[0]}, for all points or for none"
+            log.problem(points.file, expected, None, name)
+    for name in given:
+        found = [sd for sd in points.of(name) if sd is not None]
+        if found and max(found) < TINY_SD_MM:
+            expected = f"at most {max(found):g} mm; expected millimetres: is it in metres?"
+            log.warning(points.file, expected, None, name)
+
+
+def _warn_same_places(points, log):
+    first_row = {}
+    places = zip(points.of("x_m"), points.of("y_m"), points.of("z_m"), strict=True)
+    for row, place in zip(points.rows, places, strict=True):
+        if None in place:
+            continue
+        if place in first_row:
+            expected = f"the same coordinates as row {first_row[place]}; counted once"
+            log.warning(points.file, expected, row, "x_m")
+        else:
+            first_row[place] = row
+
+
+def _refuse_some_sections(points, log):
+    """A section for every point or for none: else some would be placed by height, some by name."""
+    sections = points.of("section")
+    if not any(sections):
+        return
+    for row, section in zip(points.rows, sections, strict=True):
+        if not section:
+            expected = "blank; expected a section for every point or for none (placed by height)"
+            log.problem(points.file, expected, row, "section")

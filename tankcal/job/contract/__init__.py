@@ -1,0 +1,43 @@
+"""The closed lists of a job: every key of job.toml and every column of its tables.
+
+`docs/job-format.md` says the same for people, and the starter job is written from these lists.
+"""
+
+from tankcal.job.contract.columns import COLUMNS
+from tankcal.job.contract.inputs import INPUTS
+from tankcal.job.contract.keys import KEYS as COMMON_KEYS
+from tankcal.job.contract.kinds import KINDS
+from tankcal.job.contract.parts import KEYS as PART_KEYS
+
+SECTIONS = (
+    *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "bottom", "roof"),
+    *("corrections", "material", "adjustment", "certificate", "csv"),
+)
+KEYS = {section: (COMMON_KEYS | PART_KEYS)[section] for section in SECTIONS}
+
+REQUIRED_TABLES = {"vertical": ("points", "courses")}
+TABLES_OF_KIND = {
+    "vertical": ("points", "courses", "bottom", "deadwood", "uncertainty"),
+    "horizontal": ("points", "deadwood", "uncertainty"),
+    "sphere": ("points", "deadwood", "uncertainty"),
+    "mesh": ("deadwood", "uncertainty"),
+}
+
+OPEN_SECTIONS = ("certificate",)  # hold text fields of the user's own, too
+LATER_SECTIONS = ("adjustment.camera",)
+LATER_KEYS = {
+    "table": ("rule", "minimum_delivery_m"),
+    "adjustment": ("datum", "datum_points", "fixed_photo", "image_sd_um", "refraction"),
+}
+
+__all__ = [
+    "COLUMNS",
+    "INPUTS",
+    "KEYS",
+    "KINDS",
+    "LATER_KEYS",
+    "LATER_SECTIONS",
+    "OPEN_SECTIONS",
+    "REQUIRED_TABLES",
+    "TABLES_OF_KIND",
+]

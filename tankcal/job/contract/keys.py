@@ -1,0 +1,254 @@
+"""The keys of job.toml that every kind of tank has, or most of them."""
+
+from tankcal.job.contract.kinds import KINDS, VERTICAL, WITH_POINTS
+from tankcal.job.fields import Field
+
+
+def _text(name, note):
+    return Field(name, "text", note)
+
+
+def _size(name, note, high, required_for=()):
+    return Field(name, "number", note, required_for=required_for, low=0.1, high=high)
+
+
+def _temperature(name, note, required=False):
+    return Field(name, "number", note, required=required, low=-60, high=120)
+
+
+TANK = (
+    Field("id", "tank id", "the tank's name or number", required=True),
+    Field(
+        "kind",
+        "choice",
+        "kind of tank: vertical (an upright cylinder), horizontal (a lying one), sphere, or mesh"
+        " (any closed surface)",
+        required=True,
+        choices=KINDS,
+        start="vertical",
+    ),
+    _size("nominal_diameter_m", "diameter from the drawing, metres", 300, VERTICAL),
+    _size("nominal_height_m", "height of the shell from the drawing, metres", 100, VERTICAL),
+    Field(
+        "nominal_volume_m3",
+        "number",
+        "capacity from the drawing, cubic metres; the result is compared with it",
+        low=0.01,
+        high=1e6,
+    ),
+    _text("owner", "who owns the tank"),
+    _text("location", "where it stands"),
+    _text("product", "what is stored in it"),
+    _text("manufacturer", "who built it"),
+    _text("year", "when it was built"),
+    _text("serial_number", "number on its plate"),
+    _text("construction", "such as: welded, butt joints, fixed roof"),
+    _text("remarks", "anything to be printed about the tank"),
+)
+SURVEY = (
+    Field(
+        "side",
+        "choice",
+        "side of the wall on which points and sizes were measured",
+        required=True,
+        kinds=WITH_POINTS,
+        choices=("outside", "inside"),
+    ),
+    Field("date", "date", "day of the survey, year-month-day", required=True),
+    _temperature(
+        "shell_temperature_c",
+        "temperature of the shell during the survey, degrees Celsius; blank: no correction",
+    ),
+    Field(
+        "liquid_level_m",
+        "number",
+        "liquid in the tank during the survey: its dip from the table's zero, metres; 0 or blank:"
+        " empty",
+        kinds=VERTICAL,
+        low=0,
+        high=100,
+    ),
+    Field(
+        "liquid_density_kg_m3",
+        "number",
+        "density of that liquid, kg/m3; 0 or blank: empty",
+        kinds=VERTICAL,
+        low=0,
+        high=3000,
+    ),
+)
+DATUM = (
+    Field(
+        "bottom_z_m",
+        "number",
+        "z of the bottom of the first course, in the frame of the points, metres",
+        required_for=VERTICAL,
+        kinds=VERTICAL,
+        low=-1e5,
+        high=1e5,
+    ),
+    Field(
+        "dip_plate_z_m",
+        "number",
+        "z of the dip plate, the table's zero, metres; blank: the bottom",
+        low=-1e5,
+        high=1e5,
+    ),
+    Field("dip_x_m", "number", "x of the dip point, metres", kinds=VERTICAL, low=-1e8, high=1e8),
+    Field("dip_y_m", "number", "y of the dip point, metres", kinds=VERTICAL, low=-1e8, high=1e8),
+    Field(
+        "reference_height_m",
+        "number",
+        "gauge reference point above the table's zero, metres",
+        low=0,
+        above_low=True,
+        high=200,
+    ),
+)
+TABLE = (
+    Field(
+        "step_m",
+        "number",
+        "step of the capacity table, metres: 0.01 for centimetres; blank with feet and inches",
+        low=0,
+        above_low=True,
+        start="0.01",
+    ),
+    _temperature(
+        "reference_temperature_c",
+        "shell temperature that the table is for, degrees Celsius",
+        required=True,
+    ),
+    Field(
+        "height_unit",
+        "choice",
+        "of the printed table: m, or feet and inches in steps of 1/8 or 1/16 inch; blank: m",
+        choices=("m", "ft-in-8", "ft-in-16"),
+    ),
+    Field(
+        "volume_unit",
+        "choice",
+        "of the printed table: m3, L, or bbl (42 US gallons); blank: m3",
+        choices=("m3", "L", "bbl"),
+    ),
+    Field(
+        "fine_step_m",
+        "number",
+        "smaller step within fine_zones, metres",
+        low=0,
+        above_low=True,
+    ),
+    Field(
+        "fine_zones",
+        "ranges",
+        "dips, metres, between which the table has that step: 0-0.3; 2.1-2.4",
+    ),
+    Field(
+        "max_interpolation_error_l",
+        "number",
+        "largest error of linear interpolation between rows, litres; without step_m the step is"
+        " chosen by it",
+        low=0,
+        above_low=True,
+        high=1e5,
+    ),
+    Field(
+        "height_expansion",
+        "flag",
+        "true: dips expand with the shell, too; blank: false",
+    ),
+    Field(
+        "liquid_density_kg_m3",
+        "number",
+        "density of the liquid that loads the shell, kg/m3; 0 or blank: no head",
+        kinds=VERTICAL,
+        low=0,
+        high=3000,
+    ),
+    Field(
+        "other_densities_kg_m3",
+        "numbers",
+        "densities of further tables, kg/m3: 700; 850",
+        kinds=VERTICAL,
+        low=0,
+        above_low=True,
+        high=3000,
+    ),
+    Field(
+        "coverage_probability",
+        "number",
+        "of the expanded uncertainty; blank: 0.95",
+        low=0.5,
+        high=0.9999,
+    ),
+    _text("language", "this version prints English: en or blank"),
+)
+MATERIAL = (
+    Field(
+        "e_gpa",
+        "number",
+        "Young's modulus of the shell, GPa; blank: 206",
+        kinds=VERTICAL,
+        low=40,
+        high=500,
+    ),
+    Field(
+        "expansion_per_k",
+        "number",
+        "thermal expansion of the shell, 1/K; blank: 1.1e-5",
+        low=0,
+        above_low=True,
+        high=1e-4,
+    ),
+)
+ADJUSTMENT = (
+    Field(
+        "snooping",
+        "flag",
+        "test the points and reject the bad ones; blank: true",
+        kinds=WITH_POINTS,
+    ),
+    Field(
+        "scale",
+        "choice",
+        "variances as given (a_priori) or from the residuals; blank: a_priori",
+        kinds=WITH_POINTS,
+        choices=("a_priori", "a_posteriori"),
+    ),
+)
+CERTIFICATE = (
+    _text("number", "number of the certificate"),
+    _text("laboratory", "who issues the certificate"),
+    _text("laboratory_address", "the issuer's address"),
+    _text("customer", "who ordered the calibration"),
+    _text("customer_address", "the customer's address"),
+    _text("method", "how it was surveyed, such as: total station, ISO 7507-3"),
+    _text("procedure", "the laboratory's own procedure"),
+    _text("operator", "who surveyed"),
+    Field("date_of_issue", "date", "day of issue, year-month-day"),
+    _text("traceability", "instruments and their certificates"),
+    _text("conditions", "weather and state of the tank during the survey"),
+    _text("remarks", "anything to be printed on the certificate"),
+    _text("notice", "a word that every page carries, such as RECONSTRUCTION"),
+)
+CSV = (
+    Field(
+        "separator",
+        "choice",
+        "between the cells of the CSV files: , or ; or a tab",
+        choices=(",", ";", "\t"),
+        start=",",
+    ),
+    Field("decimal", "choice", "decimal mark in the CSV files", choices=(".", ","), start="."),
+)
+
+KEYS = {
+    "tank": TANK,
+    "survey": SURVEY,
+    "datum": DATUM,
+    "table": TABLE,
+    "material": MATERIAL,
+    "adjustment": ADJUSTMENT,
+    "certificate": CERTIFICATE,
+    "csv": CSV,
+}

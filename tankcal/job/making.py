@@ -1,0 +1,206 @@
+"""From checked values to a `Job`: SI units, defaults, one dataclass for each part."""
+
+import numpy as np
+
+from tankcal.job.checks import bottom_form
+from tankcal.job.contract import INPUTS
+from tankcal.job.contract.parts import MESH_UNITS_M
+from tankcal.job.model import (
+    Bottom,
+    Course,
+    Datum,
+    Deadwood,
+    DeclaredInput,
+    End,
+    Horizontal,
+    InputFile,
+    Job,
+    Material,
+    Mesh,
+    Points,
+    Roof,
+    Sphere,
+    Survey,
+    Switches,
+    TableSpec,
+    Tank,
+)
+
+
+def make_job(raw, values, tables, covariance, mesh, warnings):
+    """The Job of values and tables without problems.
+
+    covariance  (3n, 3n) m2 or None; mesh  ((name, SHA-256, size), bytes) or None
+    """
+    tank = dict(values["tank"])
+    sizes = {name: tank.pop(name) for name in tank.copy() if name.startswith("nominal_")}
+    id, kind = tank.pop("id"), tank.pop("kind")
+    adjustment = values["adjustment"]
+    points = _points(tables["points"], covariance)
+    files = raw.files if mesh is None else (*raw.files, mesh[0])
+    return Job(
+        tank=Tank(id, kind, details=_given(tank), **sizes),
+        survey=_survey(values["survey"]),
+        datum=_datum(values["datum"], kind, points),
+        table=_table(values["table"]),
+        material=_material(values["material"]),
+        courses=_courses(tables["courses"]) if kind == "vertical" else (),
+        points=points,
+        inputs=_inputs(tables["uncertainty"]),
+        certificate=_given(values["certificate"]),
+        snooping=adjustment["snooping"] is not False,
+        scale=adjustment["scale"] or "a_priori",
+        files=tuple(InputFile(*file) for file in files),
+        warnings=warnings,
+        source=raw.source,
+        switches=Switches(**_given(values["corrections"])),
+        bottom=_bottom(values, tables["bottom"]),
+        deadwood=_deadwood(tables["deadwood"]),
+        roof=_roof(values["roof"]),
+        horizontal=_horizontal(values["horizontal"], points) if kind == "horizontal" else None,
+        sphere=_sphere(values["sphere"]) if kind == "sphere" else None,
+        mesh=_mesh(values["mesh"], mesh[1]) if kind == "mesh" else None,
+    )
+
+
+def _given(values):
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def _survey(values):
+    return Survey(**{**values, "side": values["side"] or "inside"})
+
+
+def _datum(values, kind, points):
+    has_own_frame = kind in ("horizontal", "sphere") and points is None
+    return Datum(**{**values, "bottom_z_m": 0.0 if has_own_frame else values["bottom_z_m"]})
+
+
+def _table(values):
+    given = _given(values) | {"language": "en"}
+    litres = given.pop("max_interpolation_error_l", None)
+    return TableSpec(
+        step_m=given.pop("step_m", None),
+        fine_zones=tuple(sorted(given.pop("fine_zones", ()))),
+        max_interpolation_error_m3=None if litres is None else litres / 1000,
+        **given,
+    )
+
+
+def _material(values):
+    given = _given(values)
+    si = {"e_pa": 1e9 * given["e_gpa"]} if "e_gpa" in given else {}
+    if "expansion_per_k" in given:
+        si["expansion_per_k"] = given["expansion_per_k"]
+    return Material(**si, expansion_given="expansion_per_k" in given)
+
+
+def _courses(table):
+    columns = (table.of(name) for name in ("course", "height_m", "thickness_mm", "paint_mm"))
+    return tuple(
+        Course(name, height_m, thickness_mm / 1000, (paint_mm or 0.0) / 1000)
+        for name, height_m, thickness_mm, paint_mm in zip(*columns, strict=True)
+    )
+
+
+def _points(table, covariance):
+    if table is None or table.is_empty:
+        return None
+    sd_m = None
+    if table.columns["sx_mm"] is not None:
+        sd_m = np.column_stack([table.of(f"s{axis}_mm") for axis in "xyz"]).astype(float) / 1000
+    return Points(
+        names=tuple(table.of("point")),
+        xyz_m=np.column_stack([table.of(f"{axis}_m") for axis in "xyz"]).astype(float),
+        sd_m=sd_m,
+        covariance_m2=covariance,
+        section=tuple(table.of("section")),
+        generatrix=tuple(table.of("generatrix")),
+        rows=table.rows,
+    )
+
+
+def _bottom(values, table):
+    form = bottom_form(values, table)
+    if form == "points":
+        return Bottom(
+            form,
+            xyz_m=np.column_stack([table.of(f"{axis}_m") for axis in "xyz"]).astype(float),
+            sd_m=_column(table, "s_mm", 1000),
+            rows=table.rows,
+        )
+    if form == "liquid":
+        level, volume, u = (_column(table, name) for name in ("level_m", "volume_m3", "u_m3"))
+        return Bottom(form, level_m=level, volume_m3=volume, u_m3=u, rows=table.rows)
+    return Bottom(form, values["bottom"]["centre_z_m"])
+
+
+def _column(table, name, per_si=1):
+    return None if table.columns[name] is None else np.array(table.of(name)) / per_si
+
+
+def _deadwood(table):
+    if table is None:
+        return ()
+    columns = (table.of(name) for name in ("name", "bottom_m", "top_m", "volume_m3", "u_m3"))
+    return tuple(Deadwood(*row) for row in zip(*columns, table.rows, strict=True))
+
+
+def _roof(values):
+    return None if values["mass_kg"] is None else Roof(**values)
+
+
+def _horizontal(values, points):
+    width, height = (values[name] or values["diameter_m"] for name in ("width_m", "height_m"))
+    length, dip, tilt = (values[name] for name in ("length_m", "dip_from_a_m", "tilt_mm_per_m"))
+    azimuth = values["azimuth_deg"]
+    return Horizontal(
+        length,
+        _end(values, "end_a"),
+        _end(values, "end_b"),
+        width,
+        height,
+        tilt=None if points is not None else (tilt or 0.0) / 1000,
+        roll_rad=float(np.radians(values["roll_deg"] or 0.0)),
+        dip_from_a_m=length / 2 if dip is None else dip,
+        dip_direction=values["dip_direction"] or "plumb",
+        thickness_m=(values["thickness_mm"] or 0.0) / 1000,
+        azimuth_rad=None if azimuth is None else float(np.radians(azimuth)),
+    )
+
+
+def _end(values, end):
+    form, depth = values[end], values[f"{end}_depth_m"]
+    if form == "flat":
+        return End(form)
+    radii = (values[f"{end}_dish_radius_m"], values[f"{end}_knuckle_radius_m"])
+    return End(form, depth or 0.0, *radii)
+
+
+def _sphere(values):
+    return Sphere(values["diameter_m"], (values["thickness_mm"] or 0.0) / 1000)
+
+
+def _mesh(values, data):
+    return Mesh(values["file"], MESH_UNITS_M[values["unit"]], data)
+
+
+def _inputs(table):
+    if table is None:
+        return ()
+    names = ("input", "u", "unit", "type", "distribution", "dof", "note")
+    return tuple(
+        DeclaredInput(
+            name=name,
+            u=u / INPUTS[name].per_si,
+            unit=unit,
+            u_as_read=u,
+            type=type or "B",
+            distribution=distribution or "normal",
+            dof=np.inf if dof is None else dof,
+            note=note or "",
+        )
+        for name, u, unit, type, distribution, dof, note in zip(
+            *(table.of(name) for name in names), strict=True
+        )
+    )

@@ -1,0 +1,153 @@
+"""Examination of a table's volumes: one suspicious row after the other, until all are explained."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.linter.screening import Rows, most_suspicious
+from tankcal.linter.stories import explain
+
+MOST_STORIES = 150
+_SECOND_LOOK = 10  # rows about a joint that only looked like one
+_SAME_SIZE = 0.02
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What is wrong with some rows.
+
+    kind   "row", "swap", "block" (rows first to last are off together) or "shift" (all from first)
+    first, last  rows concerned, numbers within the table
+    size   by how much the volumes are too large, quanta; of a swap 0
+    """
+
+    kind: str
+    first: int
+    last: int
+    size: float
+
+
+@dataclass(frozen=True)
+class Examination:
+    """Result of an examination.
+
+    faults    in the order of the table
+    joints    rows after which the area of the cut jumps, or its derivative
+    volume    (rows,) mended, quanta; nan where a row is wrong
+    complete  False when the table is too rough to be examined to its end
+    """
+
+    faults: tuple[Fault, ...]
+    joints: tuple[int, ...]
+    volume: np.ndarray
+    complete: bool
+
+
+def examine(height, volume, rounding):
+    """`Examination` of (rows,) rising heights, in steps, and (rows,) volumes, in quanta.
+
+    rounding  (rows,) largest rounding error of each height, in steps: 0 where it is a multiple
+    """
+    count = len(height)
+    noise = 0.5 + 8e-16 * float(np.abs(volume).max())
+    slope = np.abs(np.diff(volume) / np.diff(height))
+    steepest = np.maximum(np.append(slope, slope[-1]), np.append(slope[0], slope))
+    rows = Rows(
+        np.asarray(height, dtype=float),
+        np.array(volume, dtype=float),
+        np.ones(count, dtype=bool),
+        np.zeros(count, dtype=bool),
+        [],
+        noise / (noise + steepest * rounding),
+        noise,
+    )
+    faults, doubtful, seen, moved = [], [], set(), set()
+    for _ in range(MOST_STORIES):
+        row = most_suspicious(rows)
+        if row is None:
+            if not doubtful:
+                break
+            _reopen(rows, doubtful.pop())
+            continue
+        story = _beyond_joint(rows, explain(rows, row), moved)
+        if story.kind == "joint" and story.rows[0] not in rows.joints:
+            rows.joints = sorted([*rows.joints, story.rows[0]])
+            if story.excess > 1 and story.rows[0] not in seen:
+                doubtful.append(story.rows[0])
+                seen.add(story.rows[0])
+        elif story.is_innocent:
+            rows.is_settled[row] = True
+        else:
+            faults += _mend(rows, story)
+    else:
+        row = -1
+    mended = np.where(rows.is_sound, rows.volume, np.nan)
+    faults = tuple(sorted(_merged(faults, count), key=lambda fault: fault.first))
+    return Examination(faults, tuple(rows.joints), mended, row != -1)
+
+
+def _reopen(rows, joint):
+    """Look again, without a joint that left more than rounding, now that the others are known."""
+    rows.joints = [one for one in rows.joints if one != joint]
+    rows.is_settled[max(joint - _SECOND_LOOK, 0) : joint + _SECOND_LOOK] = False
+
+
+def _beyond_joint(rows, story, moved):
+    """The story, or a better one: a wrong row beside a joint may be a joint that stands elsewhere.
+
+    moved  joints that were asked about already
+    """
+    beside = [j for j in rows.joints if story.kind == "row" and story.rows[0] in (j, j - 1)]
+    if not beside or beside[0] in moved:
+        return story
+    joint = beside[0]
+    moved.add(joint)
+    rows.joints = [one for one in rows.joints if one != joint]
+    other = explain(rows, story.rows[0])
+    if other.kind == "joint" and other.rows[0] != joint:
+        return other
+    rows.joints = sorted([*rows.joints, joint])
+    return story
+
+
+def _mend(rows, story):
+    """The faults of a guilty story; its rows are mended, or left out from now on."""
+    first, last = story.rows[0], story.rows[-1]
+    if story.kind == "swap":
+        rows.volume[[first, last]] = rows.volume[[last, first]]
+        return [Fault("swap", first, last, 0.0)]
+    if story.kind in ("row", "pair"):
+        wrong = dict(
+            zip(story.rows if story.kind == "pair" else (first,), story.sizes, strict=True)
+        )
+        rows.is_sound[list(wrong)] = False
+        return [
+            Fault("row", row, row, size)
+            for row, size in wrong.items()
+            if not (rows.volume[row] == 0 and size > 0)  # an empty tank above its bottom
+        ]
+    end = len(rows.height) if last is None else last + 1
+    rows.volume[first:end] -= story.sizes[0]
+    return [Fault(story.kind, first, end - 1, story.sizes[0])]
+
+
+def _merged(faults, count):
+    """Shifts that undo each other are one block; one that leaves a single row is that row."""
+    shifts = sorted((f for f in faults if f.kind == "shift"), key=lambda fault: fault.first)
+    others = [f for f in faults if f.kind != "shift"]
+    left = []
+    for shift in shifts:
+        start = next((s for s in left if abs(s.size + shift.size) <= _tolerance(s.size)), None)
+        if start is None:
+            left.append(shift)
+        else:
+            left.remove(start)
+            others.append(Fault("block", start.first, shift.first - 1, start.size))
+    return [
+        Fault("row", f.first, f.first, f.size) if f.kind == "block" and f.first == f.last else f
+        for f in others + left
+    ]
+
+
+def _tolerance(size):
+    return _SAME_SIZE * abs(size) + 3

@@ -1,0 +1,125 @@
+"""Any file as grids of cells: CSV in UTF-8, an Excel workbook, or a record of tankcal."""
+
+import csv
+import json
+import re
+from dataclasses import dataclass
+
+from tankcal.job import sheets
+from tankcal.job.folder import decode
+from tankcal.job.tables import read_bytes, shown
+
+RECORD_FORMAT = "tankcal-record/1"
+MOST_COLUMNS, MOST_LINES = sheets.MAX_COLUMNS, 200_000
+_BY_CERTAINTY = (";", "\t", ",")  # a comma may be a decimal mark
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cells as they stand.
+
+    name     of the file, or file and sheet, as messages show it
+    rows     (row number, cells) of each row that is not blank
+    is_text  CSV: every number is text, and a row wider than its heading is wrong
+    sheet    name of the sheet
+    """
+
+    name: str
+    rows: tuple
+    is_text: bool = False
+    sheet: str | None = None
+
+
+def read_grids(path, log):
+    """Tuple of `Grid`; empty after telling `log` why the file cannot be read."""
+    if not path.exists():
+        log.problem(
+            path.name, "not found; expected a CSV file, a workbook (.xlsx) or a record.json"
+        )
+        return ()
+    data = read_bytes(path, log)
+    if data is None:
+        return ()
+    if data[:2] == b"PK" or data[:4] == b"\xd0\xcf\x11\xe0" or path.suffix.lower() == ".xlsx":
+        return _workbook(path.name, data, log)
+    text = decode(path.name, data, log)
+    if text is None:
+        return ()
+    if path.suffix.lower() == ".json" or text.lstrip()[:1] == "{":
+        return _record(path.name, text, log)
+    return _csv(path.name, text, log)
+
+
+def _workbook(file, data, log):
+    complaint = sheets._complaint(data)
+    if complaint:
+        log.problem(file, complaint)
+        return ()
+    try:
+        cells = sheets._read_cells(data)
+    except Exception:  # openpyxl raises whatever a damaged part happens to trip over
+        log.problem(file, "damaged: open it in Excel or LibreOffice and save it again")
+        return ()
+    return tuple(
+        Grid(
+            f"{file}, sheet {title}",
+            tuple((number, tuple(row)) for number, row in rows),
+            sheet=title,
+        )
+        for title, rows in cells.items()
+        if rows
+    )
+
+
+def _record(file, text, log):
+    try:
+        record = json.loads(text)
+        table = record["capacity"]
+        columns = [list(table[key]) for key in ("height_m", "volume_m3")]
+        is_ours = record["format"] == RECORD_FORMAT
+    except (ValueError, KeyError, TypeError, RecursionError):
+        is_ours = False
+    if not is_ours:
+        log.problem(file, f"not a record of tankcal; expected format {RECORD_FORMAT!r}")
+        return ()
+    if len(columns[0]) != len(columns[1]):
+        found = f"{len(columns[0])} heights and {len(columns[1])} volumes"
+        log.problem(file, f"{found}; expected as many of each", None, "capacity")
+        return ()
+    rows = [(0, ("height_m", "volume_m3"))]
+    rows += [(number, cells) for number, cells in enumerate(zip(*columns, strict=True), 1)]
+    return (Grid(f"{file}, capacity", tuple(rows)),)
+
+
+def _csv(file, text, log):
+    lines = [
+        (number, line)
+        for number, line in enumerate(re.split("\r\n|\r|\n", text), 1)
+        if line.strip() and not line.lstrip(' \t"').startswith("#")
+    ]
+    if not lines:
+        log.problem(file, "empty; expected a table of heights and volumes")
+        return ()
+    if len(lines) > MOST_LINES:
+        log.problem(file, f"{len(lines)} lines; expected at most {MOST_LINES}")
+        return ()
+    separator = max(_BY_CERTAINTY, key=lambda mark: _agreement(lines, mark))
+    rows = []
+    for number, line in lines:
+        try:
+            cells = next(csv.reader([line], delimiter=separator, strict=True))
+        except csv.Error:
+            log.problem(file, f"found {shown(line)}; expected quotation marks in pairs", number)
+            continue
+        if len(cells) > MOST_COLUMNS:
+            log.problem(file, f"{len(cells)} cells; expected at most {MOST_COLUMNS}", number)
+        elif any(cell.strip() for cell in cells):
+            rows.append((number, tuple(cells)))
+    return (Grid(file, tuple(rows), True),)
+
+
+def _agreement(lines, separator):
+    """How many lines have the most frequent number of cells, when that is more than one."""
+    counts = [line.count(separator) for _, line in lines]
+    usual = max(set(counts), key=lambda count: (count > 0, counts.count(count)))
+    return counts.count(usual) if usual > 0 else -1

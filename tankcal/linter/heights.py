@@ -1,0 +1,313 @@
+"""The heights of a table: readable, rising by a constant step, no row missing, twice or astray."""
+
+from bisect import bisect_left
+from dataclasses import dataclass
+
+import numpy as np
+
+_FEWEST_ROWS = 3
+_EXACT = 1e-6  # of a step
+_SHORTEST_ZONE = 3  # steps
+_MOST_STRAY = 100  # rows out of order that are told one by one
+
+
+@dataclass(frozen=True)
+class Series:
+    """The rows of a table in the order of rising volumes.
+
+    entries    of the table, without doubled rows
+    height     (rows,) strictly rising, in the unit of the table; what was mended is mended here
+    direction  1, or -1 where these are ullages with their sign changed
+    step       usual step
+    rounding   (rows,) largest rounding error of each height; 0 where the steps are even
+    """
+
+    entries: tuple
+    height: np.ndarray
+    direction: int
+    step: float
+    rounding: np.ndarray
+
+
+def series_of(table, log):
+    """`Series` of a table; None after telling `log` that there are too few to judge."""
+    entries = [entry for entry in table.entries if _is_readable(table, entry, log)]
+    if len(entries) < _FEWEST_ROWS:
+        found = f"{len(entries)} rows of heights and volumes"
+        log.problem(table.name, f"{found}; expected {_FEWEST_ROWS} or more")
+        return None
+    volumes = [entry.volume.value for entry in entries if entry.volume.value is not None]
+    if _trend(volumes) < 0:
+        entries.reverse()
+    direction = _trend([entry.height.value for entry in entries])
+    height = direction * np.array([entry.height.value for entry in entries])
+    if table.has_heading and table.is_ullage != (direction < 0):
+        found = "ullages rise" if table.is_ullage else "heights fall"
+        log.problem(table.name, f"{found} while volumes rise; expected the other way round")
+    step, tolerance = _usual_step(height, entries)
+    if step is None:
+        log.problem(table.name, "the heights do not rise; expected rising heights, row by row")
+        return None
+    teller = _Teller(table, entries, height, direction, log)
+    height, keep = _in_order(teller, step, tolerance)
+    order = _rising(height, np.flatnonzero(keep), tolerance)
+    entries, height = [entries[k] for k in order], height[order]
+    if len(entries) < _FEWEST_ROWS:
+        log.problem(
+            table.name, f"{len(entries)} heights that rise; expected {_FEWEST_ROWS} or more"
+        )
+        return None
+    teller = _Teller(table, entries, height, direction, log)
+    height = _even_steps(teller, step, tolerance)
+    rounding = _rounding(entries, height, tolerance)
+    return Series(tuple(entries), height, direction, step, rounding)
+
+
+def _is_readable(table, entry, log):
+    reading = entry.height
+    if reading.value is None and reading.complaint:
+        log.problem(table.name, reading.complaint, entry.row, entry.height_column)
+    return reading.value is not None
+
+
+def _trend(values):
+    """1 where most values rise, -1 where most fall."""
+    steps = np.sign(np.diff(values))
+    return 1 if steps.sum() >= 0 else -1
+
+
+def _usual_step(height, entries):
+    """(usual step, what steps may differ by): heights may be rounded multiples of a step."""
+    steps = np.diff(height)
+    rising = steps[steps > 0]
+    if len(rising) == 0:
+        return None, 0.0
+    usual = float(np.median(rising))
+    exact = np.abs(rising - usual) < _EXACT * usual
+    if exact.mean() > 0.7 or all(entry.height.decimals > 8 for entry in entries):
+        return usual, max(_EXACT * usual, 1e-12 * float(np.abs(height).max()))
+    quantum = 10.0 ** -max(entry.height.decimals for entry in entries)
+    near = rising[np.abs(rising - usual) <= 1.01 * quantum]
+    if len(near) > 0.7 * len(rising) and quantum < 0.5 * usual:
+        return float(near.mean()), 1.01 * quantum
+    return usual, _EXACT * usual
+
+
+class _Teller:
+    """Tells what is wrong with a row's height, in the heights and rows of the file."""
+
+    def __init__(self, table, entries, height, direction, log):
+        self.table, self.entries, self.log = table, entries, log
+        self.height, self.direction = height, direction
+
+    def shown(self, height):
+        return f"{self.direction * height:.9g}"
+
+    def row(self, k):
+        return self.entries[k].row
+
+    def problem(self, k, text):
+        entry = self.entries[k]
+        self.log.problem(self.table.name, text, entry.row, entry.height_column)
+
+
+def _in_order(teller, step, tolerance):
+    """(heights, which rows to keep) with the rows that break the order told and mended."""
+    height = teller.height.copy()
+    keep = np.ones(len(height), dtype=bool)
+    chain = _longest_rise(height)
+    stray = sorted(set(range(len(height))) - set(chain))
+    if len(stray) > _MOST_STRAY:
+        keep[stray] = False
+        found = f"{len(stray)} of {len(height)} heights are out of order"
+        teller.problem(stray[0], f"{found}; expected heights that rise row by row")
+        return height, keep
+    expected = {k: _place(k, chain, stray, height, step, tolerance) for k in stray}
+    done = set()
+    for k in stray:
+        if k in done:
+            continue
+        partner = _partner(k, stray, expected, height, tolerance)
+        twin = _twin(height[k], chain, teller.height, tolerance)
+        found = f"found {teller.shown(height[k])}"
+        if partner is not None:
+            done.add(partner)
+            teller.problem(
+                k, f"{found}; rows {teller.row(k)} and {teller.row(partner)} are swapped"
+            )
+        elif twin is not None and expected[k] is None:
+            keep[k] = False
+            _tell_twin(teller, k, twin)
+        elif expected[k] is not None:
+            teller.problem(k, f"{found}; expected {teller.shown(expected[k])}")
+            height[k] = expected[k]
+        else:
+            _tell_astray(teller, k, height)
+    return height, keep
+
+
+def _rising(height, rows, tolerance):
+    """The rows by their heights; of rows that were mended to the same height the first."""
+    order = sorted(rows, key=lambda k: height[k])
+    return [
+        k for n, k in enumerate(order) if n == 0 or height[k] - height[order[n - 1]] > tolerance
+    ]
+
+
+def _longest_rise(height):
+    """Indices of the longest strictly rising subsequence."""
+    ends, tails, before = [], [], np.full(len(height), -1)
+    for k, value in enumerate(height):
+        place = bisect_left(tails, value)
+        if place:
+            before[k] = ends[place - 1]
+        if place == len(tails):
+            tails.append(value)
+            ends.append(k)
+        else:
+            tails[place], ends[place] = value, k
+    chain, k = [], ends[-1]
+    while k >= 0:
+        chain.append(int(k))
+        k = before[k]
+    return chain[::-1]
+
+
+def _place(k, chain, stray, height, step, tolerance):
+    """Height that a stray row should have where it stands; None where no row is missing."""
+    place = bisect_left(chain, k)
+    left = chain[place - 1] if place else None
+    right = chain[place] if place < len(chain) else None
+    if left is None:
+        return height[right] - step if k == right - 1 else None
+    if right is None:
+        return None
+    between = right - left
+    if abs(height[right] - height[left] - between * step) <= between * tolerance:
+        return height[left] + (k - left) * step
+    return None
+
+
+def _twin(value, chain, height, tolerance):
+    """The row in order that has a height, or None."""
+    place = bisect_left(chain, value - tolerance, key=lambda c: height[c])
+    is_twin = place < len(chain) and abs(height[chain[place]] - value) <= tolerance
+    return chain[place] if is_twin else None
+
+
+def _partner(k, stray, expected, height, tolerance):
+    """The stray row whose place this one has, and the other way round."""
+    for other in stray:
+        if other > k and expected[k] is not None and expected[other] is not None:
+            here = abs(expected[k] - height[other]) <= tolerance
+            there = abs(expected[other] - height[k]) <= tolerance
+            if here and there:
+                return other
+    return None
+
+
+def _tell_twin(teller, k, twin):
+    first, second = teller.entries[twin].volume, teller.entries[k].volume
+    found = f"height {teller.shown(teller.height[k])} stands in row {teller.row(twin)}, too"
+    if first.value == second.value:
+        teller.problem(k, f"{found}: a row stands twice")
+    else:
+        teller.problem(k, f"{found}, with volume {first.text}, here {second.text or 'none'}")
+
+
+def _tell_astray(teller, k, height):
+    neighbours = [n for n in (k - 1, k + 1) if 0 <= n < len(height)]
+    for n in neighbours:
+        swapped = height.copy()
+        swapped[[k, n]] = swapped[[n, k]]
+        around = swapped[max(min(k, n) - 1, 0) : max(k, n) + 2]
+        if np.all(np.diff(around) > 0):
+            low, high = sorted((k, n))
+            teller.problem(
+                low,
+                f"found {teller.shown(height[low])}; "
+                f"rows {teller.row(low)} and {teller.row(high)} are swapped",
+            )
+            return
+    teller.problem(k, f"found {teller.shown(height[k])}; expected heights that rise row by row")
+
+
+def _even_steps(teller, step, tolerance):
+    """Heights with single odd ones mended; rows that are missing are told."""
+    height = teller.height.copy()
+    for k in range(1, len(height) - 1):
+        low, high = height[k] - height[k - 1], height[k + 1] - height[k]
+        is_odd = abs(low - step) > tolerance and abs(high - step) > tolerance
+        before = k < 2 or abs(height[k - 1] - height[k - 2] - step) <= tolerance
+        after = k + 2 >= len(height) or abs(height[k + 2] - height[k + 1] - step) <= tolerance
+        if is_odd and before and after and abs(low + high - 2 * step) <= 2 * tolerance:
+            expected = height[k - 1] + step
+            text = f"found {teller.shown(height[k])}; expected {teller.shown(expected)}"
+            teller.problem(k, text)
+            height[k] = expected
+    _tell_gaps(teller, height, tolerance)
+    return height
+
+
+def _tell_gaps(teller, height, tolerance):
+    steps = np.diff(height)
+    zone = _zone_steps(steps, tolerance)
+    last = len(steps) - 1
+    for k in np.flatnonzero(np.isnan(zone)):
+        around = [zone[n] for n in (_near(zone, k, -1), _near(zone, k, 1)) if n is not None]
+        if not around:
+            continue
+        is_same = abs(around[0] - around[-1]) <= tolerance
+        largest = max(around)
+        is_odd = steps[k] > largest + tolerance
+        if k not in (0, last) and is_same:
+            is_odd = True
+        if not is_odd:
+            continue
+        missing = round(steps[k] / largest) - 1
+        fits = missing > 0 and abs(steps[k] - (missing + 1) * largest) <= 2 * tolerance
+        found = f"{teller.shown(height[k + 1])} follows {teller.shown(height[k])}"
+        if fits or k == last:
+            count = max(missing, 1)
+            rows = "a row is missing" if count == 1 else f"{count} rows are missing"
+            expected = f"{teller.shown(height[k] + largest)} next: {rows}"
+        else:
+            expected = f"a step of {largest:.9g}, as in the other rows"
+        teller.problem(k + 1, f"found that {found}; expected {expected}")
+
+
+def _rounding(entries, height, tolerance):
+    """(rows,) half of the last decimal of the heights that stand in no run of even steps.
+
+    The last row, the top of the tank, may be rounded to its place in such a run.
+    """
+    is_even = ~np.isnan(_zone_steps(np.diff(height), tolerance))
+    is_exact = np.append(is_even, False) | np.append(False, is_even)
+    half = np.array([0.5 * 10.0**-entry.height.decimals for entry in entries])
+    if tolerance > 0.5 * half.max():  # rows of a step that is no whole number of decimals
+        return half
+    is_exact[-1] &= 10.0 ** -entries[-1].height.decimals > 0.05 * np.diff(height).min()
+    return np.where(is_exact, 0.0, half)
+
+
+def _zone_steps(steps, tolerance):
+    """(steps,) the step of the zone that each belongs to; nan for single odd steps.
+
+    A zone has three equal steps or more; in a shorter table a single one will do.
+    """
+    zone = np.full(len(steps), np.nan)
+    start = 0
+    for k in range(1, len(steps) + 1):
+        if k == len(steps) or abs(steps[k] - steps[k - 1]) > tolerance:
+            if k - start >= min(_SHORTEST_ZONE, len(steps) // 2):
+                zone[start:k] = steps[start:k].mean()
+            start = k
+    return zone
+
+
+def _near(zone, k, direction):
+    while 0 <= k < len(zone):
+        if not np.isnan(zone[k]):
+            return k
+        k += direction
+    return None

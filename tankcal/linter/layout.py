@@ -1,0 +1,287 @@
+"""Where the heights and volumes of a table stand: headings, pairs across a page, pages.
+
+A printed table repeats its pair of columns across the page, and its heading on every page. The
+pairs are read column by column or row by row, whichever lets the heights rise.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise, zip_longest
+
+from tankcal.dips import parse_dip
+from tankcal.errors import HeightError, InputError, Problem
+from tankcal.linter.headings import announces_parts, heading_of, is_unit
+from tankcal.linter.numbers import (
+    MOST_DECIMALS,
+    Reading,
+    has_digit,
+    has_letter,
+    is_blank,
+    read_number,
+    style_of,
+)
+
+_FEW_SPLIT_ROWS = 5
+_FEET_DECIMALS = 4  # of a metre, in a label with decimals of an inch
+_FEET_MARKS = ("'", '"', "\u2032", "\u2033", "\u2019", "\u201d", "ft")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One pair: its row in the file, heading of its volume column, height and volume as read."""
+
+    row: int
+    height_column: str
+    volume_column: str
+    height: Reading
+    volume: Reading
+
+
+@dataclass(frozen=True)
+class Table:
+    """One capacity table as it stands.
+
+    name           of file and sheet, for messages
+    entries        in the order of the table
+    height_unit_m  size of the unit of heights, m; None: the heading names none
+    volume_unit_m3 size of the unit of volumes, m3; None: the heading names none
+    is_ullage      heights fall while volumes rise
+    has_heading    False: the first two columns were taken
+    is_text        every number is text (CSV)
+    """
+
+    name: str
+    entries: tuple[Entry, ...]
+    height_unit_m: float | None
+    volume_unit_m3: float | None
+    is_ullage: bool
+    has_heading: bool
+    is_text: bool
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Positions and headings of a column of heights and a column of volumes."""
+
+    height: int
+    volume: int
+    height_heading: object
+    volume_heading: object
+
+
+@dataclass(frozen=True)
+class Block:
+    """The rows under one heading: pairs of each kind of volume, left to right."""
+
+    pairs: tuple[Pair, ...]
+    width: int
+    rows: tuple
+    is_parts: bool = False
+    has_heading: bool = True
+
+    @property
+    def kind(self):
+        return tuple((p.height_heading, p.volume_heading) for p in self.pairs)
+
+
+def blocks_of(grid):
+    """Tuple of `Block` of a grid; a text without headings is one block of columns 1 and 2."""
+    found, start, is_parts = [], None, False
+    rows = list(grid.rows)
+    index = 0
+    while index < len(rows):
+        cells = rows[index][1]
+        if not any(has_letter(cell) for cell in cells):
+            index += 1
+            continue
+        if any(announces_parts(cell) for cell in cells):
+            is_parts, start = True, index
+        cells, used = _with_units(rows, index)
+        pairs = _pairs(cells)
+        if pairs:
+            found.append(
+                (
+                    index + used,
+                    pairs,
+                    len(_trimmed(cells)),
+                    is_parts,
+                    index if start is None else start,
+                )
+            )
+            is_parts, start = False, None
+            index += used
+        else:
+            index += 1
+    if not found:
+        return _without_heading(rows) if grid.is_text else ()
+    ends = [heading_start for *_, heading_start in found[1:]] + [len(rows)]
+    return tuple(
+        Block(pairs, width, tuple(rows[first:end]), parts)
+        for (first, pairs, width, parts, _), end in zip(found, ends, strict=True)
+    )
+
+
+def _with_units(rows, index):
+    """(heading cells, rows used): a row of units below a heading belongs to it."""
+    cells = rows[index][1]
+    if index + 1 < len(rows) and any(heading_of(cell).role for cell in cells):
+        below = rows[index + 1][1]
+        named = [cell for cell in below if not is_blank(cell)]
+        if named and all(is_unit(cell) for cell in named):
+            joined = [
+                " ".join(str(part).strip() for part in both if not is_blank(part)) or None
+                for both in zip_longest(cells, below)
+            ]
+            return joined, 2
+    return cells, 1
+
+
+def _pairs(cells):
+    """Pairs of a heading: each run of heights, then volumes, gives the first height to each."""
+    headings = [heading_of(cell) for cell in cells]
+    pairs, heights, after_volume = [], [], False
+    for position, heading in enumerate(headings):
+        if heading.role in ("height", "ullage"):
+            if after_volume:
+                heights, after_volume = [], False
+            heights.append((position, heading))
+        elif heading.role == "volume" and heights:
+            dips = [one for one in heights if one[1].role == "height"] or heights
+            pairs.append(Pair(dips[0][0], position, dips[0][1], heading))
+            after_volume = True
+    return tuple(pairs)
+
+
+def _trimmed(cells):
+    cells = list(cells)
+    while cells and is_blank(cells[-1]):
+        cells.pop()
+    return cells
+
+
+def _without_heading(rows):
+    body = [row for row in rows if all(has_digit(cell) for cell in row[1][:2]) and row[1][1:]]
+    if len(body) < 0.5 * len(rows):
+        return ()
+    nothing = heading_of(None)
+    pair = Pair(0, 1, replace(nothing, text="column 1"), replace(nothing, text="column 2"))
+    width = max(len(_trimmed(cells)) for _, cells in body)
+    return (Block((pair,), width, tuple(body), False, False),)
+
+
+def tables_of(grid, log):
+    """Tuple of `Table`: blocks with the same headings are pages of one table."""
+    pages = {}
+    for block in blocks_of(grid):
+        pages.setdefault((block.kind, block.is_parts), []).append(block)
+    tables = []
+    for blocks in pages.values():
+        for volumes in _kinds(blocks[0].pairs):
+            table = _table(grid, blocks, volumes, log)
+            if table.entries:
+                tables.append(table)
+    return tuple(tables)
+
+
+def _kinds(pairs):
+    """Numbers of the pairs of each kind: of the same units, and the same place after a height."""
+    kinds = {}
+    for number, pair in enumerate(pairs):
+        place = sum(other.height == pair.height for other in pairs[:number])
+        units = (pair.height_heading.unit, pair.volume_heading.unit)
+        kinds.setdefault((place, units), []).append(number)
+    return list(kinds.values())
+
+
+def _table(grid, blocks, numbers, log):
+    cells = [_cells(grid, block, [block.pairs[k] for k in numbers], log) for block in blocks]
+    by_column = [one for page in cells for column in page for one in column]
+    orders = [by_column]
+    if len(numbers) > 1:
+        orders.append([one for page in cells for row in _by_row(page) for one in row])
+    style = style_of([[one[3] for one in by_column], [one[4] for one in by_column]])
+    in_feet = sum(_is_in_feet(one[3]) for one in by_column) > len(by_column) / 2
+    orders = [[_entry(one, style, in_feet) for one in order] for order in orders]
+    entries = min(orders, key=_turns)
+    first = blocks[0].pairs[numbers[0]]
+    return Table(
+        grid.name,
+        tuple(entries),
+        1.0 if in_feet else first.height_heading.unit,
+        first.volume_heading.unit,
+        first.height_heading.role == "ullage",
+        blocks[0].has_heading,
+        grid.is_text,
+    )
+
+
+def _cells(grid, block, pairs, log):
+    """For each pair of columns the list of (row, height name, volume name, height, volume)."""
+    names = _names(block.pairs)
+    columns = [[] for _ in pairs]
+    _refuse_split_rows(grid, block)
+    for row, cells in block.rows:
+        is_split = grid.is_text and len(_trimmed(cells)) > block.width
+        if is_split:
+            expected = f"{len(_trimmed(cells))} cells, expected {block.width} as in the heading"
+            log.problem(grid.name, f"{expected} (a decimal comma, or a thousands mark?)", row)
+        for column, pair in zip(columns, pairs, strict=True):
+            height = cells[pair.height] if pair.height < len(cells) else None
+            volume = cells[pair.volume] if pair.volume < len(cells) else None
+            if not has_digit(height) and not has_digit(volume):
+                continue  # a note between the rows
+            told = Reading(None) if is_split else None  # told already
+            column.append((row, names[pair.height], names[pair.volume], height, told or volume))
+    return columns
+
+
+def _refuse_split_rows(grid, block):
+    """Raise InputError when the numbers themselves are split into cells, row after row."""
+    split = [(row, cells) for row, cells in block.rows if len(_trimmed(cells)) > block.width]
+    if grid.is_text and len(split) > max(_FEW_SPLIT_ROWS, 0.2 * len(block.rows)):
+        row, cells = split[0]
+        expected = (
+            f"{len(_trimmed(cells))} cells, expected {block.width} as in the heading, as in "
+            f"{len(split) - 1} more rows: write ; between the cells when decimals have a comma"
+        )
+        raise InputError(Problem(grid.name, expected, row))
+
+
+def _names(pairs):
+    """{position: heading}, with the number of the column where a heading stands there twice."""
+    named = {p.height: p.height_heading.text for p in pairs}
+    named |= {p.volume: p.volume_heading.text for p in pairs}
+    texts = list(named.values())
+    return {
+        position: text if texts.count(text) == 1 else f"{text} (column {position + 1})"
+        for position, text in named.items()
+    }
+
+
+def _by_row(page):
+    longest = max((len(column) for column in page), default=0)
+    return [[column[k] for column in page if k < len(column)] for k in range(longest)]
+
+
+def _is_in_feet(cell):
+    return isinstance(cell, str) and any(mark in cell for mark in _FEET_MARKS)
+
+
+def _entry(cells, style, in_feet):
+    row, height_name, volume_name, height, volume = cells
+    volume = volume if isinstance(volume, Reading) else read_number(volume, style)
+    if in_feet:
+        try:
+            decimals = _FEET_DECIMALS if "." in str(height) else MOST_DECIMALS
+            height = Reading(parse_dip(str(height), "ft-in-16"), str(height), decimals)
+        except HeightError as error:
+            height = Reading(None, complaint=str(error))
+    else:
+        height = read_number(height, style)
+    return Entry(row, height_name, volume_name, height, volume)
+
+
+def _turns(entries):
+    """How often the heights turn back."""
+    heights = [entry.height.value for entry in entries if entry.height.value is not None]
+    rises = [b > a for a, b in pairwise(heights)]
+    return min(sum(rises), len(rises) - sum(rises))

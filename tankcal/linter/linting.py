@@ -1,0 +1,122 @@
+"""From a file to findings."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from tankcal.errors import InputError, Problem
+from tankcal.job.tables import Log, nearest
+from tankcal.linter.grids import read_grids
+from tankcal.linter.heights import series_of
+from tankcal.linter.layout import tables_of
+from tankcal.linter.parts import MOST_PARTS, check_parts
+from tankcal.linter.totals import NOTHING_NOMINAL, check_totals, units_of
+from tankcal.linter.volumes import volumes_of
+
+_PART_OF_LARGEST = 0.5  # of its rows: smaller tables beside it are not capacity tables
+_ROWS_OF_SLOPE = 10
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was found: an error, or a warning that only deserves a look."""
+
+    severity: str
+    problem: Problem
+
+    def __str__(self):
+        text = f"{self.severity}: {self.problem.expected}"
+        return str(Problem(self.problem.file, text, self.problem.row, self.problem.column))
+
+
+@dataclass(frozen=True)
+class Report:
+    """Findings in the order of the file, and one line about each table that was read."""
+
+    findings: tuple[Finding, ...]
+    summaries: tuple[str, ...]
+
+    @property
+    def errors(self):
+        """Number of findings that are errors."""
+        return sum(finding.severity == "error" for finding in self.findings)
+
+
+def lint(path, nominal=NOTHING_NOMINAL, sheet=None):
+    """`Report` on the capacity table in a file.
+
+    path     a CSV file, an Excel workbook (.xlsx), or a record.json of tankcal
+    nominal  `Nominal` tank to compare total and last row with
+    sheet    name of the sheet; None: the one with the longest table
+    Raises InputError for a file that cannot be read or holds no table.
+    """
+    path, log = Path(path), Log()
+    grids = read_grids(path, log)
+    log.stop_if_problems()
+    tables = _tables(path.name, grids, sheet, log)
+    longest = max(len(table.entries) for table in tables)
+    summaries, areas = [], None
+    for table in tables:
+        if len(table.entries) >= _PART_OF_LARGEST * longest:
+            summary, areas = _check(table, nominal, log)
+            summaries.append(summary)
+    for table in tables:
+        if len(table.entries) <= MOST_PARTS < longest:
+            check_parts(table, areas, log)
+    return Report(_findings(log), tuple(line for line in summaries if line))
+
+
+def _tables(file, grids, sheet, log):
+    """The tables of the sheet to be read; raises InputError where there is none."""
+    if sheet is not None:
+        names = [grid.sheet for grid in grids if grid.sheet]
+        if sheet not in names:
+            listed = ", ".join(names) or "none"
+            expected = f"no sheet {sheet!r}{nearest(sheet, names)}; the file has {listed}"
+            raise InputError(Problem(file, expected))
+        grids = [grid for grid in grids if grid.sheet == sheet]
+    found = []
+    for grid in grids:
+        told = Log()
+        tables = tables_of(grid, told)
+        size = max((len(table.entries) for table in tables), default=0)
+        found.append((size, tables, told))
+    size, tables, told = max(found, key=lambda one: one[0], default=(0, (), Log()))
+    if size == 0:
+        expected = "no table found; expected a column of heights and a column of volumes"
+        raise InputError(Problem(file, f"{expected}, with headings such as height_m, volume_m3"))
+    log.problems += told.problems
+    return tables
+
+
+def _check(table, nominal, log):
+    """(summary, (least, largest) area in m2) of one table, its faults told."""
+    if not table.has_heading:
+        log.warning(table.name, "no heading: taken as heights in column 1, volumes in column 2")
+    series = series_of(table, log)
+    volumes = volumes_of(table, series, log) if series else None
+    if volumes is None:
+        return "", None
+    units = units_of(table, volumes, log)
+    check_totals(table, volumes, units, series.step, nominal, log)
+    low, high = sorted(abs(float(h)) * units.height_m for h in volumes.height[[0, -1]])
+    summary = (
+        f"{table.name}: {len(volumes.volume)} rows, {low:.6g} to {high:.6g} m, "
+        f"step {series.step * units.height_m:.6g} m, "
+        f"total {volumes.volume[-1] * units.volume_m3:.9g} m3"
+    )
+    return summary, _areas(volumes, units)
+
+
+def _areas(volumes, units):
+    """(least, largest) mean area of the cut over ten rows, m2."""
+    apart = min(_ROWS_OF_SLOPE, len(volumes.height) - 1)
+    rise = volumes.volume[apart:] - volumes.volume[:-apart]
+    area = rise / (volumes.height[apart:] - volumes.height[:-apart])
+    scale = units.volume_m3 / units.height_m
+    return float(area.min()) * scale, float(area.max()) * scale
+
+
+def _findings(log):
+    found = [Finding("error", problem) for problem in log.problems]
+    found += [Finding("warning", problem) for problem in log.warnings]
+    return tuple(sorted(dict.fromkeys(found), key=lambda one: one.problem.row or 0))

@@ -1,0 +1,139 @@
+"""Numbers as people type them: decimal comma or point, thousands marks, how many decimals.
+
+A file is read in the one style that leaves the fewest cells unreadable and lets the columns fall
+least often, so that 1.234 is read as 1.234 m3 in one file and as 1234 L in another.
+"""
+
+import re
+from dataclasses import dataclass
+from itertools import pairwise
+from math import isfinite
+
+from tankcal.job.tables import BadCell, shown
+
+THOUSANDS = (",", ".", " ", "'", "\u2019", "\u00a0", "\u2009", "\u202f")
+MOST_DECIMALS = 15
+LARGEST = 1e12
+
+
+@dataclass(frozen=True)
+class Style:
+    """How numbers are written: decimal mark, and the mark between thousands ("": none)."""
+
+    decimal: str
+    thousands: str
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One cell as a number.
+
+    value     None when it cannot be read, with the `complaint`
+    text      as written, with a decimal point and without thousands marks
+    decimals  written after the decimal mark
+    marks     whether it carries thousands marks
+    is_typed  whether it is text (in a workbook: a text that looks like a number)
+    """
+
+    value: float | None
+    text: str = ""
+    decimals: int = 0
+    marks: bool = False
+    is_typed: bool = True
+    complaint: str = ""
+
+
+STYLES = (
+    Style(".", ""),
+    Style(",", ""),
+    *(Style(".", mark) for mark in THOUSANDS if mark != "."),
+    *(Style(",", mark) for mark in THOUSANDS if mark != ","),
+)
+PLAIN = STYLES[0]
+_PLAIN_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
+
+
+def is_blank(cell):
+    """Whether a cell holds nothing."""
+    return cell is None or (isinstance(cell, str) and not cell.strip())
+
+
+def has_digit(cell):
+    """Whether a cell holds a number, or a text with a digit in it."""
+    return not is_blank(cell) and (not isinstance(cell, str) or bool(re.search(r"\d", cell)))
+
+
+def has_letter(cell):
+    """Whether a cell is a text with a letter in it."""
+    return isinstance(cell, str) and bool(re.search(r"[^\W\d_]", cell))
+
+
+def read_number(cell, style):
+    """`Reading` of a cell of a sheet (a number or a text) in a style."""
+    if isinstance(cell, BadCell):
+        return Reading(None, complaint=cell.complaint)
+    if is_blank(cell):
+        return Reading(None, complaint="nothing stands here; expected a number")
+    if isinstance(cell, str):
+        return _read_text(cell.strip(), style)
+    if isinstance(cell, bool) or not isinstance(cell, int | float) or not isfinite(cell):
+        return Reading(None, complaint=f"found {shown(cell)}; expected a number")
+    return _read_text(f"{cell:.15g}" if isinstance(cell, float) else str(cell), PLAIN, False)
+
+
+def _read_text(text, style, is_typed=True):
+    plain, marks = text, False
+    if style.thousands and style.thousands in text:
+        groups = re.fullmatch(
+            rf"[+-]?\d{{1,3}}(?:{re.escape(style.thousands)}\d{{3}})+"
+            rf"(?:{re.escape(style.decimal)}\d*)?",
+            text,
+            re.ASCII,
+        )
+        if groups is None:
+            return Reading(None, complaint=f"found {shown(text)}; expected a number")
+        plain, marks = text.replace(style.thousands, ""), True
+    if style.decimal == ",":
+        if "." in plain:
+            return Reading(None, complaint=f"found {shown(text)}; expected a decimal comma")
+        plain = plain.replace(",", ".")
+    if len(plain) > 40 or not _PLAIN_NUMBER.fullmatch(plain):
+        return Reading(None, complaint=f"found {shown(text)}; expected a number")
+    value = float(plain)
+    if not abs(value) < LARGEST:
+        return Reading(None, complaint=f"found {shown(text)}; expected less than {LARGEST:g}")
+    mantissa, _, exponent = plain.lower().partition("e")
+    decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
+    decimals = min(max(decimals, 0), MOST_DECIMALS)
+    return Reading(
+        value, plain if not exponent else f"{value:.{decimals}f}", decimals, marks, is_typed
+    )
+
+
+def style_of(columns):
+    """The style that reads the columns best.
+
+    columns  lists of cells, each in the order of its table: heights, volumes
+    """
+    texts = [[cell.strip() for cell in column if isinstance(cell, str)] for column in columns]
+    sample = "".join("".join(column) for column in texts)
+    possible = [style for style in STYLES if not style.thousands or style.thousands in sample]
+
+    def badness(style):
+        unreadable = falls = 0
+        for column in columns:
+            values = [read_number(cell, style).value for cell in column if not is_blank(cell)]
+            good = [value for value in values if value is not None]
+            unreadable += len(values) - len(good)
+            rises = sum(b > a for a, b in pairwise(good))
+            falls += min(rises, sum(b < a for a, b in pairwise(good)))
+        return unreadable + falls
+
+    best, least = PLAIN, float("inf")
+    for style in possible:
+        found = badness(style)
+        if found < least:
+            best, least = style, found
+        if least == 0:
+            break
+    return best

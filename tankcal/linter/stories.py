@@ -1,0 +1,299 @@
+"""What explains a row that is not where its neighbours put it? The plainest story is believed.
+
+Innocent stories: the rows around are smooth after all (a polynomial, or the series of a lying
+cylinder at its end), or the area of the cut jumps there (a joint, an edge of deadwood): then the
+curves through the rows on its two sides meet between its two rows. Guilty stories: one volume is
+wrong, two neighbouring volumes are swapped, some rows are shifted together, two volumes are wrong.
+
+A guilty story is believed when it leaves nothing but rounding about a cubic (or less) while no
+story of fewer parameters does; or, where rows lie too far apart for that, when it leaves a sixth of
+what the best innocent story leaves.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+WIDTHS = 17, 11  # rows that are looked at together; fewer where more tell no plain story
+PLAIN = 4  # parameters of a cubic
+MOST_IN_FEW = 4  # parameters of a story that few rows may tell: a line and one wrong row
+BETTER_FACTOR = 6.0
+LEAST_SIZE = 2.5  # quanta
+POINTS_BETWEEN, TOUCH = 9, 0.02  # gap of curves that touch, seen at 9 points, over its largest
+PRICE = 3.0  # of a parameter, in units of twice the log likelihood; about the log of the rows
+
+
+@dataclass(frozen=True)
+class Story:
+    """One explanation of a few rows.
+
+    kind        "smooth", "joint", "row", "swap", "block", "shift" or "pair"
+    parameters  how many numbers it needs
+    rss         sum of the squares of what it leaves, quanta
+    excess      largest part of what rounding allows that it leaves; above 1: more than rounding
+    rows        (first, last) rows concerned; last is None for "from there on"
+    sizes       by how much they are off, quanta
+    """
+
+    kind: str
+    parameters: int
+    rss: float
+    excess: float
+    rows: tuple = ()
+    sizes: tuple = ()
+
+    @property
+    def is_innocent(self):
+        return self.kind in ("smooth", "joint")
+
+    @property
+    def is_telling(self):
+        """Innocent, or of a size that two rounded digits do not explain."""
+        return not self.sizes or max(abs(size) for size in self.sizes) >= LEAST_SIZE
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Least squares of (n,) values over an (n, p) basis; residuals carry the rows' weights.
+
+    noise  largest rounding error of a row of weight 1
+    """
+
+    basis: np.ndarray
+    values: np.ndarray
+    weight: np.ndarray
+    noise: float
+
+    @property
+    def parameters(self):
+        return self.basis.shape[1]
+
+    @cached_property
+    def _qr(self):
+        return np.linalg.qr(self.basis * self.weight[:, None])
+
+    @cached_property
+    def residual_maker(self):
+        """(n, n) matrix that turns weighted values into residuals."""
+        q = self._qr[0]
+        return np.eye(len(self.values)) - q @ q.T
+
+    @cached_property
+    def residuals(self):
+        return self.residual_maker @ (self.values * self.weight)
+
+    @property
+    def rss(self):
+        return float(self.residuals @ self.residuals)
+
+    @property
+    def excess(self):
+        if len(self.values) <= self.parameters:
+            return 0.0
+        return _excess(self.residuals, self.residual_maker, self.noise)
+
+    def at(self, basis):
+        """((m,) values, (m,) what rounding may do to them) at (m, p) rows of the basis."""
+        q, r = self._qr
+        weights = q @ np.linalg.solve(r.T, basis.T)
+        return (self.values * self.weight) @ weights, self.noise * np.abs(weights).sum(axis=0)
+
+
+def _excess(residuals, maker, noise):
+    allowed = noise * np.abs(maker).sum(axis=1)
+    return float((np.abs(residuals) / np.maximum(allowed, 1e-9 * noise)).max())
+
+
+def explain(rows, row):
+    """The `Story` to be believed about a row that is suspicious."""
+    story = _explain(rows, row, WIDTHS[0])
+    if story.is_innocent and story.excess > 1:
+        closer = _explain(rows, row, WIDTHS[1])
+        is_plain = closer.excess <= 1 and closer.parameters <= MOST_IN_FEW
+        return closer if is_plain else story
+    return story
+
+
+def _explain(rows, row, width):
+    members = rows.window(row, width)
+    x = rows.height[members] - rows.height[row]
+    scale = np.abs(x).max() if len(x) > 1 else 1.0
+    x, y = x / scale, rows.volume[members] - rows.volume[row]
+    weight = rows.weight[members]
+    curves = [Curve(basis, y, weight, rows.noise) for basis in _bases(rows, members, x)]
+    stories = [Story("smooth", c.parameters, c.rss, c.excess) for c in curves]
+    stories += _joints(Curve(x, y, weight, rows.noise), members)
+    for curve in curves:
+        if len(x) - curve.parameters >= 4:
+            stories += _blocks(curve, members, _ends(rows, members))
+            stories += _swaps(curve, members)
+    return _believed(stories, curves, members, rows.noise)
+
+
+def _bases(rows, members, x):
+    """Polynomials of degree 1 to 5, and the series of a lying cylinder at the ends of the table."""
+    bases = [x[:, None] ** np.arange(degree + 1) for degree in range(1, 6) if len(x) >= degree + 3]
+    sound = np.flatnonzero(rows.is_sound)
+    powers = np.array([0, 1.5, 2, 2.5, 3, 3.5])
+    for is_end, away in (
+        (members[0] == sound[0], x - x[0]),
+        (members[-1] == sound[-1], x[-1] - x),
+    ):
+        if is_end and len(x) >= 9:
+            bases += [(away[:, None] / away.max()) ** powers[:count] for count in (4, 6)]
+    return bases
+
+
+def _ends(rows, members):
+    """Whether the members begin, and end, at an end of the table or at a joint."""
+    begins = members[0] in (0, *rows.joints)
+    return begins, members[-1] + 1 in (len(rows.height), *rows.joints)
+
+
+def _blocks(curve, members, ends):
+    """Stories of one row, or of neighbouring rows, that are off together.
+
+    Where the members begin or end for good, "all but the first" is the first that is wrong, and
+    the last alone is no shift of what follows.
+    """
+    count = len(members)
+    first, end = np.triu_indices(count + 1, 1)
+    is_all_but_first = (first == 1) & (end == count)
+    keep = (first == 0) & (end == 1) if ends[0] else (first >= 1)
+    keep |= (first >= 1) & ~is_all_but_first
+    first, end = first[keep], end[keep]
+    number = np.arange(count)[:, None]
+    blocks = ((number >= first) & (number < end)) * curve.weight[:, None]
+    maker, residuals = curve.residual_maker, curve.residuals
+    moved = maker @ blocks
+    norm = np.einsum("nk,nk->k", blocks, moved)
+    keep = norm > 1e-6
+    first, end, moved, norm = first[keep], end[keep], moved[:, keep], norm[keep]
+    size = residuals @ blocks[:, keep] / norm
+    rss = np.maximum(curve.rss - size**2 * norm, 0.0)
+    parameters = curve.parameters
+    stories = []
+    for k in np.argsort(rss)[:12]:
+        left = residuals - size[k] * moved[:, k]
+        maker_left = maker - np.outer(moved[:, k], moved[:, k]) / norm[k]
+        excess = _excess(left, maker_left, curve.noise) if parameters <= PLAIN else np.inf
+        low, high = int(members[first[k]]), int(members[end[k] - 1])
+        is_open = end[k] == count
+        if end[k] - first[k] == 1 and (ends[1] or not is_open):
+            kind, price = "row", 2
+        else:
+            kind, price = ("shift", 2) if is_open else ("block", 3)
+        where = (low, None) if kind == "shift" else (low, high)
+        stories.append(
+            Story(kind, parameters + price, float(rss[k]), excess, where, (float(size[k]),))
+        )
+    return stories
+
+
+def _swaps(curve, members):
+    """Stories of two neighbouring volumes in each other's place."""
+    stories = []
+    maker = curve.residual_maker
+    for first in range(len(members) - 1):
+        values = curve.values.copy()
+        values[[first, first + 1]] = values[[first + 1, first]]
+        left = maker @ (values * curve.weight)
+        parameters = curve.parameters
+        excess = _excess(left, maker, curve.noise) if parameters <= PLAIN else np.inf
+        where = (int(members[first]), int(members[first + 1]))
+        stories.append(Story("swap", parameters + 1, float(left @ left), excess, where))
+    return stories
+
+
+def _joints(all_rows, members):
+    """Stories of two curves that meet between two rows, neither of them falling there.
+
+    At a joint of courses they cross, at the edge of a cone they only touch.
+    """
+    stories, x = [], all_rows.basis
+    bottom = 0 if members[0] == 0 else 1  # bottoms have shapes of their own, two rows are enough
+    for cut in range(2, len(x) - 1):
+        between = np.linspace(x[cut - 1], x[cut], POINTS_BETWEEN)
+        left = _side(all_rows, slice(0, cut), between, bottom)
+        right = _side(all_rows, slice(cut, None), between, 1)
+        for low, low_values, low_allowed in left:
+            for high, high_values, high_allowed in right:
+                gap = high_values - low_values
+                allowed = np.maximum(low_allowed + high_allowed, TOUCH * np.abs(gap).max())
+                is_meeting = gap.min() <= 0 <= gap.max() or np.any(np.abs(gap) <= allowed)
+                parameters = low.parameters + high.parameters
+                if is_meeting and len(x) >= parameters + 2:
+                    excess = max(low.excess, high.excess)
+                    where = (int(members[cut]), None)
+                    stories.append(Story("joint", parameters, low.rss + high.rss, excess, where))
+    return stories
+
+
+def _side(all_rows, part, between, spare):
+    """[(curve, its values between two rows, what rounding does to them)] of degree 1 to 3.
+
+    Only curves that do not fall there, with `spare` rows more than parameters.
+    """
+    found, x = [], all_rows.basis[part]
+    for degree in (1, 2, 3):
+        if len(x) > degree + spare:
+            powers = np.arange(degree + 1)
+            basis, values = x[:, None] ** powers, all_rows.values[part]
+            curve = Curve(basis, values, all_rows.weight[part], all_rows.noise)
+            values, allowed = curve.at(between[:, None] ** powers)
+            if values[-1] - values[0] >= -(allowed[0] + allowed[-1]):
+                found.append((curve, values, allowed))
+    return found
+
+
+def _pairs(curve, members):
+    """The best story of two rows that are wrong, each by its own amount."""
+    maker, residuals = curve.residual_maker, curve.residuals
+    first, second = np.triu_indices(len(members), 1)
+    a, b, c = maker[first, first], maker[first, second], maker[second, second]
+    determinant = a * c - b**2
+    keep = determinant > 1e-6
+    first, second, a, b, c = (v[keep] for v in (first, second, a, b, c))
+    determinant = determinant[keep]
+    if len(first) == 0:
+        return []
+    size_1 = (c * residuals[first] - b * residuals[second]) / determinant
+    size_2 = (a * residuals[second] - b * residuals[first]) / determinant
+    rss = curve.rss - size_1 * residuals[first] - size_2 * residuals[second]
+    k = int(np.argmin(rss))
+    where = (int(members[first[k]]), int(members[second[k]]))
+    sizes = (
+        float(size_1[k] / curve.weight[first[k]]),
+        float(size_2[k] / curve.weight[second[k]]),
+    )
+    parameters = curve.parameters + 4
+    return [Story("pair", parameters, max(float(rss[k]), 0.0), np.inf, where, sizes)]
+
+
+def _believed(stories, curves, members, noise):
+    count = len(members)
+
+    def cost(story):
+        return count * np.log(story.rss / count + noise**2 / 3) + PRICE * story.parameters
+
+    stories = [story for story in stories if story.is_telling]
+    possible = [s for s in stories if s.excess <= 1 + 1e-6]
+    if possible:
+        return min(possible, key=lambda s: (s.parameters, not s.is_innocent, s.rss))
+    innocent = min(
+        (s for s in stories if s.is_innocent), key=cost, default=Story("smooth", 0, 0, 0)
+    )
+    guilty = [s for s in stories if not s.is_innocent]
+    margin = 2 * count * np.log(BETTER_FACTOR)
+    best = min(guilty, key=cost, default=innocent)
+    if cost(best) + margin < cost(innocent):
+        return best
+    pairs = [
+        story
+        for curve in curves
+        if curve.parameters <= PLAIN and count - curve.parameters >= 6
+        for story in _pairs(curve, members)
+    ]
+    best = min(pairs, key=cost, default=innocent)
+    return best if cost(best) + margin < cost(innocent) else innocent

@@ -1,0 +1,119 @@
+"""The table as a whole: units, total and last row against what the tank is meant to be."""
+
+from dataclasses import dataclass
+from itertools import product
+from math import log10, pi, sqrt
+
+_USUAL_HEIGHT_UNITS_M, _USUAL_VOLUME_UNITS_M3 = [1.0, 0.01, 0.001], [1.0, 0.001]
+_LEAST_VOLUME = 1e-9  # so that an empty table has proportions, too
+_LOWEST_M, _HIGHEST_M = 0.5, 40.0  # usual tanks
+_SLIMMEST, _FLATTEST = 1 / 20, 30  # diameter over height
+_CLOSE_DIAMETER, _CLOSE_VOLUME, _FAR = 0.02, 0.05, 0.2  # relative differences from nominal
+_LEAST_GAP_M, _USUAL_GAP_M = 0.005, 0.02  # between the last row and the nominal height
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """What the tank is meant to hold (m3), and how high its shell is (m); None: not known."""
+
+    volume_m3: float | None = None
+    diameter_m: float | None = None
+    height_m: float | None = None
+
+
+NOTHING_NOMINAL = Nominal()
+
+
+@dataclass(frozen=True)
+class Units:
+    """Sizes of the units of a table: m, m3."""
+
+    height_m: float
+    volume_m3: float
+
+
+def units_of(table, volumes, log):
+    """`Units` by the headings; where one is silent, those that give a tank of usual proportions."""
+    heights = _USUAL_HEIGHT_UNITS_M
+    if table.height_unit_m is not None:
+        heights = [table.height_unit_m]
+    sizes = _USUAL_VOLUME_UNITS_M3
+    if table.volume_unit_m3 is not None:
+        sizes = [table.volume_unit_m3]
+    span = float(volumes.height[-1] - volumes.height[0])
+    total = max(float(volumes.volume[-1]), _LEAST_VOLUME)
+
+    def oddity(pair):
+        height_m = span * pair[0]
+        too_small, too_high = log10(_LOWEST_M / height_m), log10(height_m / _HIGHEST_M)
+        ratio = _slenderness(height_m, total * pair[1])
+        return abs(log10(ratio)) + max(too_small, too_high, 0.0)
+
+    height, volume = min(product(heights, sizes), key=oddity)
+    if len(heights) * len(sizes) > 1:
+        text = f"no unit in a heading: taken as heights in {height:g} m, volumes in {volume:g} m3"
+        log.warning(table.name, text)
+    return Units(height, volume)
+
+
+def _slenderness(height_m, volume_m3):
+    """Diameter over height of the upright cylinder of that height and volume."""
+    return sqrt(4 * volume_m3 / (pi * height_m)) / height_m
+
+
+def check_totals(table, volumes, units, step, nominal, log):
+    """Tell what does not agree with the nominal tank, or with any tank."""
+    height_m = float(abs(volumes.height[-1] - volumes.height[0])) * units.height_m
+    total_m3 = float(volumes.volume[-1]) * units.volume_m3
+    if total_m3 <= 0:
+        found = f"the last volume is {volumes.volume[-1]:g}"
+        log.problem(table.name, f"{found}; expected the capacity of the tank")
+        return
+    has_nominal = nominal.volume_m3 is not None or nominal.diameter_m is not None
+    if not has_nominal:
+        _check_proportions(table, height_m, total_m3, log)
+    if nominal.volume_m3 is not None:
+        _check_total(table, total_m3, nominal.volume_m3, _CLOSE_VOLUME, log)
+    if nominal.diameter_m is not None:
+        expected = pi / 4 * nominal.diameter_m**2 * nominal.height_m
+        _check_total(table, total_m3, expected, _CLOSE_DIAMETER, log)
+    if nominal.height_m is not None:
+        _check_top(table, volumes, units, step, nominal.height_m, log)
+
+
+def _check_proportions(table, height_m, total_m3, log):
+    ratio = _slenderness(height_m, total_m3)
+    if not _SLIMMEST < ratio < _FLATTEST:
+        text = (
+            f"{total_m3:.6g} m3 in {height_m:.6g} m of height is a cylinder of diameter "
+            f"{ratio * height_m:.4g} m; expected a tank: are the units right?"
+        )
+        log.warning(table.name, text)
+
+
+def _check_total(table, total_m3, expected_m3, close, log):
+    ratio = total_m3 / expected_m3
+    if abs(ratio - 1) <= close:
+        return
+    text = f"total {total_m3:.6g} m3, expected about {expected_m3:.6g} m3 (nominal)"
+    power = round(log10(ratio))
+    if power and abs(ratio / 10.0**power - 1) <= _FAR:
+        larger, factor = ("larger" if power > 0 else "smaller"), 10 ** abs(power)
+        text += f": {factor} times {larger}; are the units, or thousands marks, right?"
+    tell = log.warning if abs(ratio - 1) <= _FAR else log.problem
+    tell(table.name, text)
+
+
+def _check_top(table, volumes, units, step, nominal_m, log):
+    low, high = sorted(abs(float(h)) * units.height_m for h in volumes.height[[0, -1]])
+    top_m = high if not table.is_ullage else high - low
+    gap = nominal_m - top_m
+    expected_gap = min(step * units.height_m * (1 - 1e-6), _USUAL_GAP_M)
+    if abs(gap) < max(expected_gap, _LEAST_GAP_M):
+        return
+    text = f"the table ends at {top_m:.6g} m, nominal height {nominal_m:.6g} m"
+    if gap > 0:
+        text += ": are the last rows missing?"
+    is_small = abs(gap) <= max(5 * step * units.height_m, _CLOSE_DIAMETER * nominal_m)
+    tell = log.warning if is_small else log.problem
+    tell(table.name, text)

@@ -1,0 +1,187 @@
+"""The volumes of a table: readable, rounded alike, never falling, each where the others put it."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from tankcal.linter.examination import examine
+from tankcal.linter.suggestions import suggestion
+
+_USUAL = 0.98  # part of the rows that have at most the usual number of decimals
+_FINEST = 1e-9  # of the total: what lies below it is no rounding
+_MOST_WRITTEN = 6  # decimals that people write
+_FITTING, _EDGE = 0.5, 0.01  # of a step's volume: fittings take up, or give, no more
+
+
+@dataclass(frozen=True)
+class Volumes:
+    """Volumes of a table.
+
+    height, volume  (n,) of the rows that can be read, heights rising, in the units of the table
+    decimals        usual number of them
+    joints          heights at which the area of the cut jumps
+    """
+
+    height: np.ndarray
+    volume: np.ndarray
+    decimals: int
+    joints: tuple[float, ...]
+
+
+def volumes_of(table, series, log):
+    """`Volumes` of a series, after telling `log` what is wrong with them; None when too few."""
+    good = [k for k, entry in enumerate(series.entries) if _is_readable(table, entry, log)]
+    if len(good) < 3:
+        return None
+    entries = [series.entries[k] for k in good]
+    _check_marks(table, entries, log)
+    height = series.height[good]
+    volume = np.array([entry.volume.value for entry in entries])
+    decimals = _check_rounding(table, entries, log)
+    quantum = max(10.0**-decimals, _FINEST * float(np.abs(volume).max()), 1e-300)
+    rounding = series.rounding[good] / series.step
+    found = examine(height / series.step, volume / quantum, rounding)
+    teller = _Teller(table, entries, volume, quantum, decimals, found.joints, log)
+    for fault in found.faults:
+        teller.tell(fault)
+    _check_falls(teller, found.volume * quantum)
+    if not found.complete:
+        log.warning(table.name, "too rough to be examined row by row to its end")
+    joints = tuple(float(height[row]) for row in found.joints)
+    return Volumes(height, volume, decimals, joints)
+
+
+def _is_readable(table, entry, log):
+    reading = entry.volume
+    if reading.value is None:
+        if reading.complaint:
+            log.problem(table.name, reading.complaint, entry.row, entry.volume_column)
+        return False
+    if reading.value < 0:
+        expected = f"found {reading.text}; expected a volume of 0 or more"
+        log.problem(table.name, expected, entry.row, entry.volume_column)
+    return True
+
+
+def _check_marks(table, entries, log):
+    """Tell thousands marks, and in a workbook texts that look like numbers."""
+    for having, what in (
+        ([e for e in entries if e.volume.marks], "a thousands mark"),
+        ([e for e in entries if e.volume.is_typed and not table.is_text], "a text, not a number"),
+    ):
+        if len(having) > 0.5 * sum(e.volume.value >= 1000 for e in entries):
+            text = f"{what} in {len(having)} volumes; expected numbers that any program can read"
+            log.warning(table.name, text, having[0].row, having[0].volume_column)
+        else:
+            for entry in having:
+                text = f"found {what}; expected {entry.volume.text}, as the other rows are written"
+                log.problem(table.name, text, entry.row, entry.volume_column)
+
+
+def _check_rounding(table, entries, log):
+    """The usual number of decimals, after telling which rows have more, or fewer."""
+    decimals = sorted(entry.volume.decimals for entry in entries)
+    usual = decimals[int(_USUAL * (len(decimals) - 1))]
+    if usual > _MOST_WRITTEN:
+        return usual
+    typed = [entry for entry in entries if entry.volume.is_typed]
+    keeps_zeros = any(
+        entry.volume.decimals == usual and entry.volume.text.endswith("0")
+        for entry in typed
+        if usual and entry.volume.value
+    )
+    short = [e for e in typed if e.volume.decimals < usual and e.volume.value]
+    if keeps_zeros and len(short) <= max(1, len(entries) // 100):
+        for entry in short:
+            is_last = entry is entries[-1]
+            text = f"found {entry.volume.text}; expected {usual} decimals as in the other rows"
+            tell = log.problem if is_last else log.warning
+            tell(
+                table.name,
+                text + (": is the last row cut?" if is_last else ""),
+                entry.row,
+                entry.volume_column,
+            )
+    for entry in entries:
+        if entry.volume.decimals > usual:
+            text = f"found {entry.volume.text}; expected {usual} decimals as in the other rows"
+            log.warning(table.name, text, entry.row, entry.volume_column)
+    return usual
+
+
+def _check_falls(teller, mended):
+    """Tell volumes that fall although no other fault explains it."""
+    sound = np.flatnonzero(np.isfinite(mended))
+    for before, row in pairwise(sound):
+        if mended[row] < mended[before] - 0.5 * teller.quantum:
+            text = f"found {teller.text(row)} after {teller.text(before)}"
+            teller.problem(row, f"{text}; expected volumes that do not fall")
+
+
+class _Teller:
+    """Tells faults of volumes in the words and rows of the file."""
+
+    def __init__(self, table, entries, volume, quantum, decimals, joints, log):
+        self.table, self.entries, self.volume, self.log = table, entries, volume, log
+        self.quantum, self.decimals, self.joints = quantum, decimals, joints
+
+    def text(self, k):
+        return self.entries[k].volume.text
+
+    def number(self, value):
+        return f"{value:.{min(self.decimals, _MOST_WRITTEN)}f}"
+
+    def problem(self, k, text, is_error=True):
+        entry = self.entries[k]
+        tell = self.log.problem if is_error else self.log.warning
+        tell(self.table.name, text, entry.row, entry.volume_column)
+
+    def tell(self, fault):
+        first, last = (self.entries[k].row for k in (fault.first, fault.last))
+        if fault.kind == "swap":
+            self.problem(
+                fault.first,
+                f"found {self.text(fault.first)}; volumes of rows {first} and {last} are swapped",
+            )
+        elif fault.kind == "row":
+            self._tell_row(fault)
+        else:
+            self._tell_shift(fault, first, last)
+
+    def _tell_row(self, fault):
+        expected = self.volume[fault.first] - fault.size * self.quantum
+        text = f"found {self.text(fault.first)}; expected about {self.number(expected)}"
+        tolerance = max(3.0, 0.02 * abs(fault.size)) * self.quantum
+        slip = suggestion(self.text(fault.first), expected, tolerance, self.decimals)
+        if slip:
+            text += f": {slip[0]}? ({slip[1]})"
+        is_beside_joint = fault.first in self.joints or fault.first + 1 in self.joints
+        is_fitting = is_beside_joint and abs(fault.size) * self.quantum <= _EDGE * self._step(fault)
+        if is_fitting:
+            text += ", or the edge of a fitting"
+        self.problem(fault.first, text, not is_fitting)
+
+    def _tell_shift(self, fault, first, last):
+        amount = f"{self.number(abs(fault.size) * self.quantum)} too {_size_word(fault.size)}"
+        is_open = fault.kind == "shift"
+        rows = f"from row {first} on" if is_open else f"rows {first} to {last}"
+        text = f"volumes are {amount} for the rows around, {rows}"
+        is_fitting = is_open and fault.first > 0 and self._may_be_fitting(fault)
+        if is_fitting:
+            text += ", or the edge of a fitting"
+        self.problem(fault.first, f"found {self.text(fault.first)}; {text}", not is_fitting)
+
+    def _may_be_fitting(self, fault):
+        """Whether something in the tank may take up, or give, that volume within one step."""
+        size, step = fault.size * self.quantum, self._step(fault)
+        return -_FITTING * step <= size <= _EDGE * step
+
+    def _step(self, fault):
+        """Volume of the step before a fault, without the fault."""
+        before = self.volume[fault.first - 1] if fault.first else 0.0
+        return self.volume[fault.first] - fault.size * self.quantum - before
+
+
+def _size_word(size):
+    return "large" if size > 0 else "small"

@@ -1,0 +1,153 @@
+"""A lowest zone of a tank that was measured by liquid, and what the other parts add above it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from tankcal.errors import HeightError, SolutionError
+from tankcal.uncertainty import Source
+
+
+@dataclass(frozen=True)
+class MeasuredBottom:
+    """The lowest zone of a tank, measured by liquid; it stands for all that is in that zone.
+
+    All other parts count from `highest_m` up only (`Above`): the measured volumes hold shell,
+    deadwood and head of that zone already, and its uncertainty replaces theirs.
+
+    levels_m    (n,) ascending
+    volumes_m3  (n,) capacity below each
+    errors_m3   (n, n) factor of their covariance
+    curve       (rows,) -> volume, monotone and smooth through the volumes
+    """
+
+    levels_m: np.ndarray
+    volumes_m3: np.ndarray
+    errors_m3: np.ndarray
+    curve: PchipInterpolator
+
+    @property
+    def lowest_m(self):
+        """Level below which nothing was measured, or the highest at which the tank is empty."""
+        empty = self.levels_m[self.volumes_m3 == 0]
+        return float(empty[-1] if len(empty) else self.levels_m[0])
+
+    @property
+    def highest_m(self):
+        """Level above which the other parts count."""
+        return float(self.levels_m[-1])
+
+    def volume_m3(self, levels_m):
+        """(rows,) the measured capacity, above `highest_m` that of `highest_m`.
+
+        Between dips by monotone cubics (Fritsch & Carlson 1980). Raises HeightError below the
+        lowest dip, unless the tank is empty there.
+        """
+        return self.curve(self._measured(levels_m))
+
+    def area_m2(self, levels_m):
+        """(rows,) derivative of `volume_m3` by the level; 0 from `highest_m` up."""
+        inside = (_rows(levels_m) >= self.levels_m[0]) & (_rows(levels_m) < self.highest_m)
+        return np.where(inside, self.curve(self._measured(levels_m), 1), 0.0)
+
+    def derivatives(self, levels_m):
+        """None: volumes were measured by dips, from wherever the table's zero is."""
+        return {}
+
+    def sources(self, levels_m):
+        """Errors of the measured volumes, linear between dips, and of the curve between them.
+
+        The curve's half-width is its distance from straight lines, rectangular. Above `highest_m`
+        all rows have the error of the last volume in common.
+        """
+        levels = self._measured(levels_m)
+        errors = [np.interp(levels, self.levels_m, column) for column in self.errors_m3.T]
+        bend = self.curve(levels) - np.interp(levels, self.levels_m, self.volumes_m3)
+        return (
+            Source("bottom_liquid", np.column_stack(errors), type="B"),
+            Source(
+                "bottom_curve", bend[:, None] / np.sqrt(3), type="B", distribution="rectangular"
+            ),
+        )
+
+    def _measured(self, levels_m):
+        levels, lowest = _rows(levels_m), self.levels_m[0]
+        if self.volumes_m3[0] > 0 and not np.all(levels >= lowest):
+            raise HeightError(
+                f"level {levels.min():g} m is below the lowest one measured by liquid "
+                f"({lowest:g} m, {self.volumes_m3[0]:g} m3)"
+            )
+        return np.clip(levels, lowest, self.highest_m)
+
+
+def measured_bottom(levels_m, volumes_m3, u_m3=None):
+    """A bottom measured by liquid: volumes below dips, cumulative, with their standard uncertainty.
+
+    Where u grows from one dip to the next, its growth is the error of what was added between, on
+    its own; where it does not, both errors are one: a delivery within the zone is as uncertain as
+    what was metered between. Raises SolutionError, with the number of the row, when levels do not
+    rise or volumes fall.
+    """
+    levels, volumes = np.asarray(levels_m, dtype=float), np.asarray(volumes_m3, dtype=float)
+    u = np.zeros(len(levels)) if u_m3 is None else np.asarray(u_m3, dtype=float)
+    if len(levels) < 2:
+        raise SolutionError(f"{len(levels)} volumes measured by liquid; expected two or more")
+    finite = np.isfinite(levels) & np.isfinite(volumes) & np.isfinite(u)
+    follows = np.append(True, (np.diff(levels) > 0) & (np.diff(volumes) >= 0))
+    wrong = np.flatnonzero(~(finite & follows & (volumes >= 0) & (u >= 0)))
+    if len(wrong):
+        row = wrong[0]
+        raise SolutionError(
+            f"volume {row + 1} measured by liquid: level {levels[row]:g} m, {volumes[row]:g} m3, "
+            f"u {u[row]:g} m3; expected rising levels, volumes that do not fall, none negative"
+        )
+    errors = np.zeros((len(u), len(u)))
+    for row in range(len(u)):
+        before = u[row - 1] if row else 0.0
+        common = min(1.0, u[row] / before) if before > 0 else 0.0
+        errors[row] = common * errors[row - 1]
+        errors[row, row] = np.sqrt(max(u[row] ** 2 - (common * before) ** 2, 0.0))
+    return MeasuredBottom(levels, volumes, errors, PchipInterpolator(levels, volumes))
+
+
+@dataclass(frozen=True)
+class Above:
+    """Another part of the tank, counted from a level up: P(L) - P(level) for L above it, else 0.
+
+    Its derivatives and sources likewise, so that what a measured zone replaced cancels.
+    """
+
+    part: object
+    level_m: float
+
+    def volume_m3(self, levels_m):
+        """(rows,) contribution above the level."""
+        volume = self.part.volume_m3(self._and_own(levels_m))
+        return volume[:-1] - volume[-1]
+
+    def area_m2(self, levels_m):
+        """(rows,) derivative of `volume_m3` by the level."""
+        levels = _rows(levels_m)
+        area = self.part.area_m2(np.maximum(levels, self.level_m))
+        return np.where(levels >= self.level_m, area, 0.0)
+
+    def derivatives(self, levels_m):
+        """{input: (rows,)} those of the part, less the same at `level_m`."""
+        levels = self._and_own(levels_m)
+        found = self.part.derivatives(levels)
+        return {name: column[:-1] - column[-1] for name, column in found.items()}
+
+    def sources(self, levels_m):
+        """Those of the part, less the same at `level_m`."""
+        return tuple(
+            replace(source, columns_m3=source.columns_m3[:-1] - source.columns_m3[-1])
+            for source in self.part.sources(self._and_own(levels_m))
+        )
+
+    def _and_own(self, levels_m):
+        return np.append(np.maximum(_rows(levels_m), self.level_m), self.level_m)
+
+
+def _rows(levels_m):
+    return np.atleast_1d(np.asarray(levels_m, dtype=float))

@@ -1,0 +1,226 @@
+"""A closed triangle mesh as a part of a tank: exact volumes, checks, files, and lofts of a shell.
+
+With a_T the plan area of triangle T (positive where its outside faces up), the divergence theorem
+gives the volume of the body below height h as a sum over its triangles alone,
+
+    V(h) = - sum a_T mean over T of max(h - z, 0),     A(h) = dV/dh = - sum a_T part of T below h,
+
+and both means are divided differences of (h - .)+^p over the three corner heights, that is, cubics
+and quadratics in h between them (Hermite-Genocchi; de Boor 2001, A Practical Guide to Splines).
+"""
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+
+from tankcal.errors import HeightError
+
+BLOCK = 1 << 16  # faces worked on at a time
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A closed surface of triangles whose corners run anticlockwise seen from outside.
+
+    vertices_m  (n, 3) x, y, z
+    faces       (m, 3) indices of the corners
+    bodies      number of pieces that share no vertex; a hollow counts as a piece
+    notes       what was repaired or deserves a look, one line each
+    """
+
+    vertices_m: np.ndarray
+    faces: np.ndarray
+    bodies: int
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class MeshPart:
+    """A mesh as a part of a tank. Make one with `mesh_part`.
+
+    zero_m      height of level 0 above the lowest vertex, m
+    height_m    of the highest vertex above the lowest
+    corners_m   (m, 3) heights of the corners above the lowest vertex, ascending in each row
+    plan_m2     (m,) area of each face seen from above, positive where the outside faces up
+    surface_m2  (m,) area of each face
+    """
+
+    zero_m: float
+    height_m: float
+    corners_m: np.ndarray
+    plan_m2: np.ndarray
+    surface_m2: np.ndarray
+
+    @property
+    def top_m(self):
+        """The highest level."""
+        return self.height_m - self.zero_m
+
+    @property
+    def capacity_m3(self):
+        """Volume of the full tank."""
+        return float(self.volume_m3([self.top_m])[0])
+
+    def volume_m3(self, levels_m):
+        """(rows,) volume below each level, zero below the mesh; HeightError above it."""
+        heights = self._heights(levels_m)
+        return sums_below(self.corners_m, -self.plan_m2, heights, 3) * (heights > 0)
+
+    def area_m2(self, levels_m):
+        """(rows,) free surface at each level: above a level face, but below it at the very top."""
+        heights = self._heights(levels_m)
+        area = sums_below(self.corners_m, -self.plan_m2, heights, 2)
+        full = heights >= self.height_m
+        if full.any():
+            area[full] = sums_below(self.corners_m, -self.plan_m2, [self.height_m], 2, side="right")
+        return area
+
+    def wetted_m2(self, levels_m):
+        """(rows,) surface of the mesh in touch with the liquid; the free surface is none of it."""
+        heights = self._heights(levels_m)
+        lid = self.plan_m2 > 0
+        return sums_below(self.corners_m[~lid], self.surface_m2[~lid], heights, 2) + sums_below(
+            self.corners_m[lid], self.surface_m2[lid], heights, 2, side="right"
+        )
+
+    def derivatives(self, levels_m):
+        """{input: (rows,)} derivative of the volumes, m3 per unit of the input.
+
+        scale    of all coordinates, with level 0 fixed: 3 V - h A
+        surface  an outward offset of the surface along its normal, m: the wetted area
+        datum    lifts level 0, m: the free surface
+        """
+        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))
+        area = self.area_m2(levels)
+        return {
+            "scale": 3 * self.volume_m3(levels) - levels * area,
+            "surface": self.wetted_m2(levels),
+            "datum": area,
+        }
+
+    def sources(self, levels_m):
+        """No source of uncertainty belongs to a mesh alone."""
+        return ()
+
+    def _heights(self, levels_m):
+        heights = np.atleast_1d(np.asarray(levels_m, dtype=float)) + self.zero_m
+        outside = ~(np.isfinite(heights) & (heights <= self.height_m * (1 + 1e-12)))
+        if outside.any():
+            raise HeightError(
+                f"level {heights[outside][0] - self.zero_m:g} m is outside the mesh, which ends at "
+                f"{self.height_m - self.zero_m:g} m"
+            )
+        return np.minimum(heights, self.height_m)
+
+
+def mesh_part(mesh, zero_z_m=None):
+    """The part of a tank that a `Mesh` encloses.
+
+    zero_z_m  z of level 0; the lowest vertex when None
+    """
+    z = mesh.vertices_m[:, 2]
+    low = float(z.min())
+    normals = normals_of(mesh.vertices_m, mesh.faces)
+    return MeshPart(
+        zero_m=0.0 if zero_z_m is None else float(zero_z_m) - low,
+        height_m=float(z.max()) - low,
+        corners_m=np.sort(z[mesh.faces] - low, axis=1),
+        plan_m2=normals[:, 2] / 2,
+        surface_m2=np.sqrt(np.sum(normals**2, axis=1)) / 2,
+    )
+
+
+def normals_of(vertices, faces):
+    """(m, 3) normals, twice the area of their face long."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    return np.cross(b - a, c - a)
+
+
+def sums_below(corners, weights, heights, power, side="left"):
+    """(rows,) sums over faces of weight times mean depth (power 3) or part (2) below each height.
+
+    corners (m, 3) ascending; a level face counts at its own height (side "left") or above it only.
+    Each face is a cubic (quadratic) on the heights between its corners. A tree over the ascending
+    heights holds it in the few nodes that cover them, as a polynomial about the node's middle:
+    nothing is evaluated face by height, and nothing cancels.
+    """
+    rows, inverse = np.unique(heights, return_inverse=True)
+    tree = _Tree(rows, power)
+    slope, offset = np.zeros(len(rows) + 1), np.zeros(len(rows) + 1)
+    for start in range(0, len(weights), BLOCK):
+        z = corners[start : start + BLOCK].T
+        weight = weights[start : start + BLOCK]
+        first, second, third = (np.searchsorted(rows, z[i], side=side) for i in range(3))
+        slope += np.bincount(second, weights=weight, minlength=len(slope))
+        offset += np.bincount(second, weights=weight * z.sum(axis=0) / 3, minlength=len(slope))
+        tall = np.where(z[2] > z[0], z[2] - z[0], 1.0)
+        share = weight / tall / (3.0 if power == 3 else 1.0)
+        tree.add(first, second, z[0], z[1] - z[0], share)
+        tree.add(second, third, z[2], z[1] - z[2], share if power == 3 else -share)
+    below = slope.cumsum()[:-1]
+    if power == 3:
+        below = rows * below - offset.cumsum()[:-1]
+    return (below + tree.values())[inverse]
+
+
+class _Tree:
+    """Sums of polynomials, each over a range of ascending heights, for all heights at once.
+
+    Node 1 holds all heights, nodes 2 i and 2 i + 1 the halves of node i, the last row one each.
+    """
+
+    def __init__(self, heights, power):
+        self.power = power
+        self.heights = heights
+        self.depth = max(int(np.ceil(np.log2(max(len(heights), 1)))), 0)
+        self.leaves = 1 << self.depth
+        padded = np.concatenate([heights, np.full(self.leaves - len(heights), heights[-1:].sum())])
+        low, high = np.empty(2 * self.leaves), np.empty(2 * self.leaves)
+        for level in range(self.depth + 1):
+            blocks = padded.reshape(1 << level, -1)
+            nodes = slice(1 << level, 2 << level)
+            low[nodes], high[nodes] = blocks[:, 0], blocks[:, -1]
+        low[0], high[0] = 0.0, 0.0
+        self.middle, self.half = (low + high) / 2, (high - low) / 2
+        self.coefficients = np.zeros((power + 1, 2 * self.leaves))
+
+    def add(self, start, stop, foot, reach, share):
+        """Add share |reach|^(power - 1) ((h - foot) / reach)^power to heights[start:stop]."""
+        some = np.flatnonzero(start < stop)
+        left, right = start[some] + self.leaves, stop[some] + self.leaves
+        foot, reach, share = foot[some], reach[some], share[some]
+        share = share * np.abs(reach) ** (self.power - 1)
+        while len(left):
+            odd = (left & 1).astype(bool)
+            self._store(left[odd], foot[odd], reach[odd], share[odd])
+            left = left + odd
+            odd = (right & 1).astype(bool)
+            right = right - odd
+            self._store(right[odd], foot[odd], reach[odd], share[odd])
+            left, right = left >> 1, right >> 1
+            open_ = left < right
+            left, right = left[open_], right[open_]
+            foot, reach, share = foot[open_], reach[open_], share[open_]
+
+    def _store(self, nodes, foot, reach, share):
+        at_middle, step = (self.middle[nodes] - foot) / reach, self.half[nodes] / reach
+        for k in range(self.power + 1):
+            term = share * comb(self.power, k) * at_middle ** (self.power - k) * step**k
+            self.coefficients[k] += np.bincount(nodes, weights=term, minlength=2 * self.leaves)
+
+    def values(self):
+        """(len(heights),) sum of all that was added, at each height."""
+        total = np.zeros(len(self.heights))
+        leaves = np.arange(len(self.heights)) + self.leaves
+        for level in range(self.depth + 1):
+            nodes = leaves >> level
+            half = self.half[nodes]
+            t = np.divide(
+                self.heights - self.middle[nodes], half, out=np.zeros_like(half), where=half > 0
+            )
+            part = np.zeros_like(total)
+            for row in self.coefficients[::-1]:
+                part = part * t + row[nodes]
+            total += part
+        return total

@@ -1,0 +1,279 @@
+"""Ellipses and spheres through points: geometric fits with their full covariance.
+
+Each shape gives one condition for a point, its signed distance from the shape (outwards positive)
+at the foot of the perpendicular, so v' Q^-1 v of the points' corrections is the minimum when the
+adjusted points lie on the shape (Gauss-Helmert, `adjust`); for equal variances that is the sum of
+squared distances. With n the outward normal at the foot f of a point P,
+
+    distance = n (P - f),   by P: n',   by a parameter: -n' df/dparameter at a fixed place of f.
+
+Starts are found here: an algebraic fit, then unweighted distances by Levenberg-Marquardt.
+Source: Ahn 2004, Least Squares Orthogonal Distance Fitting.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.optimize
+import scipy.sparse
+
+from tankcal.adjust import adjust
+from tankcal.errors import SolutionError
+
+FLAT_BEYOND = 100.0  # spreads of the points: a larger radius is that of a plane or a line
+
+
+@dataclass(frozen=True)
+class FittedEllipse:
+    """Least-squares ellipse through n points of a plane.
+
+    x_m, y_m                      centre
+    semi_major_m, semi_minor_m    half axes
+    azimuth_rad                   of the major axis, clockwise from +y, 0 to pi; 0 of a circle
+    cofactor                      (5, 5) covariance of x, y, both half axes and azimuth (m, rad)
+                                  for variance factor 1; azimuth of a circle: inf, uncorrelated.
+                                  Half axes that differ by little more than their standard
+                                  deviations are biased apart, and the azimuth is not normal.
+    residuals_m                   (n,) distance of each point to the ellipse, outwards positive
+    variance_factor               v' Q^-1 v / dof, nan without redundancy
+    """
+
+    x_m: float
+    y_m: float
+    semi_major_m: float
+    semi_minor_m: float
+    azimuth_rad: float
+    cofactor: np.ndarray
+    residuals_m: np.ndarray
+    variance_factor: float
+    dof: int
+
+
+@dataclass(frozen=True)
+class FittedSphere:
+    """Least-squares sphere through n points.
+
+    centre_m (3,), radius_m
+    cofactor_m2      (4, 4) covariance of centre and radius for variance factor 1
+    residuals_m      (n,) distance of each point to the sphere, outwards positive
+    variance_factor  v' Q^-1 v / dof, nan without redundancy
+    """
+
+    centre_m: np.ndarray
+    radius_m: float
+    cofactor_m2: np.ndarray
+    residuals_m: np.ndarray
+    variance_factor: float
+    dof: int
+
+
+def fit_ellipse(xy_m, covariance_m2):
+    """Geometric ellipse: centre + S w for all unit vectors w, S a symmetric matrix.
+
+    S is regular where half axes and azimuth (its eigenvalues and eigenvectors) are not: at a
+    circle. Start: direct least squares (Halir & Flusser 1998).
+
+    xy_m (n, 2); covariance_m2 (2n, 2n) dense or sparse, or (2n,) variances, x1 y1 x2 y2 ...
+    Raises SolutionError for fewer than 5 points, points on a line or on no ellipse.
+    """
+    mean, local = centred(xy_m, 5, "an ellipse")
+    spread = spread_of(local, 2, "line")
+    start = walk(ellipse_distances, _direct_ellipse(local / spread) * spread, local)
+    adjusted = adjust(conditions_of(ellipse_distances, 2), start, local.ravel(), covariance_m2)
+    x, y, *shape = adjusted.unknowns
+    (major, minor, azimuth), by_shape = _axes(*shape)
+    refuse_flat(major, spread, "an ellipse with a half axis")
+    transform = np.eye(5)
+    transform[2:, 2:] = by_shape
+    cofactor = transform @ adjusted.cofactor @ transform.T
+    if not np.any(by_shape[2]):
+        cofactor[4, 4] = np.inf
+    return FittedEllipse(
+        x_m=float(x + mean[0]),
+        y_m=float(y + mean[1]),
+        semi_major_m=major,
+        semi_minor_m=minor,
+        azimuth_rad=azimuth,
+        cofactor=cofactor,
+        residuals_m=ellipse_distances(adjusted.unknowns, local)[0],
+        variance_factor=adjusted.variance_factor,
+        dof=adjusted.dof,
+    )
+
+
+def ellipse_distances(unknowns, points):
+    """Distances (n,) of points (n, 2) to an ellipse x, y, Sxx, Syy, Sxy; by these; normals."""
+    x, y, sxx, syy, sxy = unknowns
+    values, axes = np.linalg.eigh([[sxx, sxy], [sxy, syy]])
+    d = (points - (x, y)) @ axes
+    distance, normal, place = _foot_points(d, np.abs(values))
+    normal, w = normal @ axes.T, (place * np.sign(values)) @ axes.T
+    across = normal[:, 0] * w[:, 1] + normal[:, 1] * w[:, 0]
+    by_unknowns = -np.column_stack([normal, normal * w, across])
+    return distance, by_unknowns, normal
+
+
+def fit_sphere(xyz_m, covariance_m2):
+    """Geometric sphere: distance from the centre, minus R, is 0 for each adjusted point.
+
+    xyz_m (n, 3); covariance_m2 (3n, 3n) dense or sparse, or (3n,) variances, x1 y1 z1 x2 ...
+    Raises SolutionError for fewer than 4 points and points in a plane.
+    """
+    mean, local = centred(xyz_m, 4, "a sphere")
+    spread = spread_of(local, 3, "plane")
+    design = np.column_stack([2 * local, np.ones(len(local))])
+    *centre, rest = np.linalg.lstsq(design, np.sum(local**2, axis=1), rcond=None)[0]
+    algebraic = [*centre, np.sqrt(max(rest + np.sum(np.square(centre)), 0.0))]
+    start = walk(sphere_distances, algebraic, local)
+    refuse_flat(start[3], spread, "a sphere with a radius")
+    adjusted = adjust(conditions_of(sphere_distances), start, local.ravel(), covariance_m2)
+    *centre, radius = adjusted.unknowns
+    return FittedSphere(
+        centre_m=mean + centre,
+        radius_m=float(radius),
+        cofactor_m2=adjusted.cofactor,
+        residuals_m=sphere_distances(adjusted.unknowns, local)[0],
+        variance_factor=adjusted.variance_factor,
+        dof=adjusted.dof,
+    )
+
+
+def sphere_distances(unknowns, points):
+    """Distances (n,) of points (n, 3) to a sphere x, y, z, R; by these; normals (n, 3)."""
+    distance, normal = units(points - unknowns[:3])
+    by_unknowns = -np.column_stack([normal, np.ones(len(normal))])
+    return distance - unknowns[3], by_unknowns, normal
+
+
+def centred(points_m, needed, what):
+    """Mean (k,) of points (n, k) and the points about it; too few are refused."""
+    points_m = np.asarray(points_m, dtype=float)
+    if len(points_m) < needed:
+        raise SolutionError(f"{what} needs {needed} points, {len(points_m)} were given")
+    mean = points_m.mean(axis=0)
+    return mean, points_m - mean
+
+
+def spread_of(local, dimensions, flat):
+    """Root mean square distance from the mean; the points must fill the given dimensions."""
+    sizes = np.linalg.svd(local, compute_uv=False)
+    if not sizes[dimensions - 1] > 1e-9 * sizes[0]:
+        raise SolutionError(
+            f"the points lie in a {flat}: spreads "
+            + ", ".join(f"{size:.3g}" for size in sizes / np.sqrt(len(local)))
+            + " m"
+        )
+    return np.linalg.norm(sizes) / np.sqrt(len(local))
+
+
+def refuse_flat(size_m, spread_m, what):
+    """A shape that is large against the points that it was found by is a line or a plane."""
+    if not size_m < FLAT_BEYOND * spread_m:
+        raise SolutionError(
+            f"{what} of {size_m:.3g} m through points that spread {spread_m:.3g} m: they are flat"
+        )
+
+
+def units(d):
+    """Lengths (n,) of vectors (n, k), and the vectors of length one."""
+    distance = np.linalg.norm(d, axis=1)
+    if not np.all(distance > 0):
+        raise SolutionError("a point lies in the very centre of the shape that is fitted to it")
+    return distance, d / distance[:, None]
+
+
+def conditions_of(distances, dimensions=3):
+    """The model for `adjust` of a function (unknowns, points) -> distances, by unknowns, normals.
+
+    dimensions  of the points, 2 or 3
+    """
+
+    def conditions(unknowns, coordinates):
+        points = coordinates.reshape(-1, dimensions)
+        distance, by_unknowns, normal = distances(unknowns, points)
+        places = (np.arange(points.size), np.arange(0, points.size + 1, dimensions))
+        shape = (len(points), points.size)
+        return distance, by_unknowns, scipy.sparse.csr_array((normal.ravel(), *places), shape=shape)
+
+    return conditions
+
+
+def walk(distances, unknowns, points, steps=100):
+    """Unknowns near the least sum of squared, unweighted distances, after at most some steps."""
+    latest = {}
+
+    def at(x):
+        if latest.get("x") != x.tobytes():
+            latest.update(x=x.tobytes(), found=distances(x, points))
+        return latest["found"]
+
+    found = scipy.optimize.least_squares(
+        lambda x: at(x)[0],
+        unknowns,
+        lambda x: at(x)[1],
+        method="lm",
+        x_scale="jac",
+        xtol=1e-10,
+        max_nfev=steps,
+    )
+    return found.x
+
+
+def _direct_ellipse(local):
+    """Start of an ellipse: direct least squares in the partition of Halir & Flusser 1998."""
+    x, y = local.T
+    quadratic, linear = np.column_stack([x * x, x * y, y * y]), np.column_stack([x, y, x**0])
+    back = -np.linalg.solve(linear.T @ linear, linear.T @ quadratic)
+    reduced = quadratic.T @ (quadratic + linear @ back)
+    vectors = np.linalg.eig(np.array([reduced[2] / 2, -reduced[1], reduced[0] / 2]))[1].real
+    a, b, c = vectors[:, np.argmax(4 * vectors[0] * vectors[2] - vectors[1] ** 2)]
+    matrix = np.array([[a, b / 2], [b / 2, c]])
+    if not np.linalg.det(matrix) > 0:
+        raise SolutionError("the points lie on no ellipse")
+    d, e, f = back @ (a, b, c)
+    centre = -np.linalg.solve(matrix, [d, e]) / 2
+    size = centre @ matrix @ centre - f
+    values, axes = np.linalg.eigh(matrix * np.sign(size))
+    half = np.sqrt(abs(size) / np.abs(values))
+    shape = (axes * half) @ axes.T
+    return np.array([*centre, shape[0, 0], shape[1, 1], shape[0, 1]])
+
+
+def _axes(sxx, syy, sxy):
+    """Half axes and azimuth of a shape matrix, and their Jacobian by sxx, syy, sxy."""
+    middle, lean = (sxx + syy) / 2, (sxx - syy) / 2
+    half = np.hypot(lean, sxy)
+    if not middle > half:
+        raise SolutionError(f"the points lie on no ellipse: half axes {middle + half:.3g} m and 0")
+    sine, cosine = (sxy / half, lean / half) if half > 1e-12 * middle else (0.0, 0.0)
+    by_half = np.array([cosine / 2, -cosine / 2, sine])
+    by_middle = np.array([0.5, 0.5, 0.0])
+    by_angle = np.zeros(3)
+    if sine or cosine:
+        by_angle = np.array([sine / 2, -sine / 2, -cosine]) / (2 * half)
+    azimuth = (np.pi / 2 - np.arctan2(sine, cosine) / 2) % np.pi if np.any(by_angle) else 0.0
+    jacobian = np.array([by_middle + by_half, by_middle - by_half, by_angle])
+    return (float(middle + half), float(middle - half), float(azimuth)), jacobian
+
+
+def _foot_points(d, half):
+    """Signed distances (n,), unit normals and places w (n, 2) of the feet f = half w.
+
+    d (n, 2) in the frame of the axes, half (2,). Newton's method on the convex, falling
+    (a u / (t + a^2))^2 + (b v / (t + b^2))^2 = 1 from its left, which is monotone (Eberly 2013).
+    """
+    sign, u = np.where(d < 0, -1.0, 1.0), np.maximum(np.abs(d), 1e-14 * half)
+    square = half**2
+    t = np.max(half * u - square, axis=1)
+    for _ in range(100):
+        place = half * u / (t[:, None] + square)
+        excess = np.sum(place**2, axis=1) - 1
+        step = excess / (2 * np.sum(place**2 / (t[:, None] + square), axis=1))
+        t = t + step
+        if np.all(np.abs(step) <= 1e-15 * (t + square.min())):
+            break
+    lever = u / (t[:, None] + square)
+    long = np.linalg.norm(lever, axis=1)
+    place = half * lever
+    place = place / np.linalg.norm(place, axis=1)[:, None]
+    return t * long, sign * lever / long[:, None], sign * place

@@ -1,0 +1,153 @@
+"""The surface of a tank's bottom over the plan of the shell, and what stands on it below a level.
+
+Plan coordinates are those of the survey, slid along the shell's axis to the bottom of the first
+course: that shear keeps volumes, and makes a leaning shell upright. Heights count from there, in
+metres; azimuths clockwise from +y.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+FULL_TURN = 2 * np.pi
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """The inside outline of the first course at its bottom.
+
+    x_m, y_m  its centre, on the shell's axis
+    radius_m  (n,) about it, at n even azimuths from +y on
+    """
+
+    x_m: float
+    y_m: float
+    radius_m: np.ndarray
+
+    @property
+    def area_m2(self):
+        """1/2 integral of r^2: the mean of even azimuths, best for a smooth closed outline."""
+        return float(np.pi * np.mean(self.radius_m**2))
+
+    def radius_at(self, azimuth_rad):
+        """(len(azimuth),) radius, linear between the azimuths."""
+        known = np.arange(len(self.radius_m)) * FULL_TURN / len(self.radius_m)
+        return np.interp(azimuth_rad, known, self.radius_m, period=FULL_TURN)
+
+    def mesh(self, rings, azimuths):
+        """(v, 2) plan coordinates about the centre and (t, 3) triangles of a polar mesh.
+
+        Straight sides, so its radii are scaled to the footprint's area.
+        """
+        azimuth = np.arange(azimuths) * FULL_TURN / azimuths
+        radius = self.radius_at(azimuth)
+        sides = 0.5 * np.sin(FULL_TURN / azimuths) * radius @ np.roll(radius, 1)
+        radius = radius * np.sqrt(self.area_m2 / sides)
+        out = np.column_stack([radius * np.sin(azimuth), radius * np.cos(azimuth)])
+        parts = np.arange(1, rings + 1)[:, None, None] / rings
+        plan = np.vstack([np.zeros((1, 2)), (parts * out).reshape(-1, 2)])
+        own, following = np.arange(azimuths), np.roll(np.arange(azimuths), -1)
+        faces = [np.column_stack([np.zeros(azimuths, dtype=int), 1 + own, 1 + following])]
+        for inner in 1 + azimuths * np.arange(rings - 1):
+            outer = inner + azimuths
+            faces.append(np.column_stack([inner + own, outer + own, outer + following]))
+            faces.append(np.column_stack([inner + own, outer + following, inner + following]))
+        return plan, np.vstack(faces)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A surface of triangles over a plan, linear in each; made by `surface`.
+
+    heights_m  (v,) of the vertices
+    faces      (t, 3) corners of each triangle, the lowest first
+    areas_m2   (t,) plan areas
+    """
+
+    heights_m: np.ndarray
+    faces: np.ndarray
+    areas_m2: np.ndarray
+
+    @property
+    def lowest_m(self):
+        """Height of the lowest point."""
+        return float(self.heights_m.min())
+
+    @property
+    def highest_m(self):
+        """Height of the highest point."""
+        return float(self.heights_m.max())
+
+    def below(self, levels_m, fields):
+        """(rows, c) integral over the plan of each field where the surface is at or below a level.
+
+        fields  (v, c) values at the vertices, linear in each triangle. Exact.
+        """
+        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))
+        fields = np.asarray(fields, dtype=float)
+        by_top = np.argsort(self.heights_m[self.faces[:, 2]])
+        tops = self.heights_m[self.faces[by_top, 2]]
+        whole = (self.areas_m2[:, None] * fields[self.faces].mean(axis=1))[by_top]
+        whole = np.vstack([np.zeros((1, fields.shape[1])), np.cumsum(whole, axis=0)])
+        result = whole[np.searchsorted(tops, levels, side="right")]
+        rows, faces, weights = self._cut(levels)
+        for column, field in zip(result.T, fields.T, strict=True):
+            part = np.einsum("pc,pc->p", weights, field[self.faces[faces]])
+            column += np.bincount(rows, part, minlength=len(levels))
+        return result
+
+    def volume_and_area(self, levels_m):
+        """(rows,) integral of (level - z)+ over the plan, and (rows,) plan area that is wet."""
+        area, moment = self.below(
+            levels_m, np.column_stack([np.ones_like(self.heights_m), self.heights_m])
+        ).T
+        return np.atleast_1d(levels_m) * area - moment, area
+
+    def wet_weights(self, levels_m):
+        """(rows, v) derivative of `volume_and_area` by lower vertices, m2; for a few levels."""
+        levels, count = np.atleast_1d(levels_m), len(self.heights_m)
+        rows, faces = np.nonzero(self.heights_m[self.faces[:, 2]] <= levels[:, None])
+        whole = np.broadcast_to(self.areas_m2[faces, None] / 3, (len(faces), 3))
+        cut_rows, cut_faces, cut = self._cut(levels)
+        rows, faces = np.append(rows, cut_rows), np.append(faces, cut_faces)
+        place = (rows[:, None] * count + self.faces[faces]).ravel()
+        weights = np.vstack([whole, cut]).ravel()
+        return np.bincount(place, weights, len(levels) * count).reshape(len(levels), count)
+
+    def _cut(self, levels):
+        """Rows, faces and (pairs, 3) weights of the corners, for triangles that a level cuts.
+
+        The wet corner of a triangle, or the whole less its dry corner: a triangle with the parts p
+        and q of two edges has the area p q, and the means 1 - (p + q) / 3, p / 3, q / 3.
+        """
+        order = np.argsort(levels)
+        low, middle, high = self.heights_m[self.faces].T
+        first = np.searchsorted(levels[order], low, side="right")
+        count = np.searchsorted(levels[order], high, side="left") - first
+        count = np.maximum(count, 0)
+        faces = np.repeat(np.arange(len(count)), count)
+        offset = np.arange(len(faces)) - np.repeat(np.cumsum(count) - count, count)
+        rows = order[first[faces] + offset]
+        level, low, middle, high = levels[rows], low[faces], middle[faces], high[faces]
+        wet = level <= middle  # only the lowest corner is wet
+        p = np.where(wet, level - low, high - level) / (high - low)
+        q = np.where(wet, level - low, high - level)
+        q = q / np.where(wet, middle - low, high - middle)
+        corner = p * q
+        tip = corner * (1 - (p + q) / 3)
+        far, near = corner * p / 3, corner * q / 3
+        weights = np.where(
+            wet[:, None],
+            np.column_stack([tip, near, far]),
+            1 / 3 - np.column_stack([far, near, tip]),
+        )
+        return rows, faces, weights * self.areas_m2[faces, None]
+
+
+def surface(plan_m, faces, heights_m):
+    """`Surface` over a mesh: plan (v, 2), faces (t, 3), heights (v,)."""
+    heights = np.asarray(heights_m, dtype=float)
+    a, b, c = np.moveaxis(plan_m[faces], 1, 0)
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    order = np.argsort(heights[faces], axis=1, kind="stable")
+    return Surface(heights, np.take_along_axis(faces, order, axis=1), np.abs(ux * vy - uy * vx) / 2)

@@ -1,0 +1,181 @@
+"""From surveyed points to the sections of the shell: wall and axis, covariance, form, outlines."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+
+from tankcal.doubts import ADVISED_POINTS, FEWEST_POINTS, doubts, weak_sections
+from tankcal.errors import InputError, Problem
+from tankcal.form import Form
+from tankcal.outlines import polar
+from tankcal.sections import Section, fit_section, group_by_height, group_by_name, sample_of
+from tankcal.shell import Shell, course_of, find_shell
+from tankcal.spectrum import estimate_form
+
+LEAST_SD_M = 1e-6  # added to a full covariance that is singular
+
+
+@dataclass(frozen=True)
+class Wall:
+    """The wall of a tank as surveyed.
+
+    shell          axis, tilt, and what became of every point
+    joints_m       (courses + 1,) heights of the joints above the bottom, along the vertical
+    accepted       (m,) indices of the accepted points in job.points
+    covariance_m2  (3m, 3m) of the accepted points, sparse or dense
+    form           what the points tell of the form between them (`spectrum.Form`)
+    sections       from the bottom up
+    """
+
+    shell: Shell
+    joints_m: np.ndarray
+    accepted: np.ndarray
+    covariance_m2: object
+    form: Form
+    sections: tuple[Section, ...]
+
+
+def find_wall(job, tell):
+    """The wall, its axis and its sections, from the points of a job.
+
+    tell  called with a line of text as each step begins
+    Raises InputError when a course is left with too few points, SolutionError when there is no
+    wall.
+    """
+    tell(f"separating the wall from clutter in {len(job.points.names)} points")
+    heights = np.cumsum([0.0] + [course.height_m for course in job.courses])
+    shell = find_shell(
+        job.points.xyz_m,
+        job.datum.bottom_z_m + heights,
+        job.tank.nominal_diameter_m / 2,
+        sd_m=radial_sds(job.points),
+        snooping=job.snooping,
+    )
+    accepted = np.flatnonzero(shell.reason == "")
+    joints = heights / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
+    tell(f"fitting sections through {len(accepted)} points of the wall")
+    groups = _groups(job, shell, accepted, joints)
+    given = _given_covariance(job.points, accepted)
+    factor = (shell.noise_m / _median_sd(job.points)) ** 2 if noise_is_estimated(job) else 1.0
+    samples = [sample_of(*one) for one in _to_fit(job, shell, accepted, groups, given)]
+    form = estimate_form(samples, factor)
+    covariance = given * factor
+    to_fit = _to_fit(job, shell, accepted, groups, covariance)
+    sections = tuple(fit_section(*one, form) for one in to_fit)
+    return Wall(shell, joints, accepted, covariance, form, sections)
+
+
+def warnings_of(job, wall):
+    """What a sound survey of a sound wall hardly has."""
+    groups = [section.group for section in wall.sections]
+    return (
+        *weak_sections(job, groups, _azimuths(job, wall.shell, wall.accepted)),
+        *doubts(job, wall.shell, wall.sections, radial_sds(job.points)),
+    )
+
+
+def _groups(job, shell, wall, joints):
+    """Groups of indices into `wall`; raises InputError for courses and sections with too few."""
+    points = job.points
+    height = points.xyz_m[wall, 2] - job.datum.bottom_z_m
+    azimuth = _azimuths(job, shell, wall)
+    names = [points.section[i] for i in wall]
+    if all(names):
+        groups = group_by_name(names, height, lambda z: course_of(z, joints), azimuth, joints)
+    else:
+        groups = group_by_height(height, azimuth, course_of(height, joints), joints)
+    _refuse_weak(groups, job.courses, height)
+    return groups
+
+
+def _refuse_weak(groups, courses, height):
+    """Raise InputError for sections of too few points or too tall, and courses without any."""
+    problems = []
+    for group in groups:
+        count, tall = len(group.members), np.ptp(height[group.members])
+        if count < FEWEST_POINTS:
+            problems.append(
+                f"section {group.name} has {count} points on the wall, expected at least "
+                f"{FEWEST_POINTS} ({ADVISED_POINTS} or more are advised)"
+            )
+        if tall > 1.2 * courses[group.course].height_m:
+            problems.append(
+                f"section {group.name} is {tall:.3f} m tall, expected points within one course "
+                f"({courses[group.course].height_m:.3f} m)"
+            )
+    seen = {group.course for group in groups}
+    problems += [
+        f"course {course.name} has no section: expected {FEWEST_POINTS} points or more on its wall"
+        for index, course in enumerate(courses)
+        if index not in seen
+    ]
+    if problems:
+        raise InputError([Problem("points.csv", text) for text in problems])
+
+
+def _azimuths(job, shell, wall):
+    """Azimuths of the wall points about the axis at their own height."""
+    xyz = job.points.xyz_m[wall]
+    axis = np.array(shell.axis_m) + np.outer(xyz[:, 2] - shell.z_m, shell.slope)
+    return polar(xyz[:, :2] - axis, 0.0, 0.0)[0]
+
+
+def radial_sds(points):
+    """(n,) standard deviations of the points in plan, or None when the file gives none."""
+    if points.covariance_m2 is not None:
+        variances = points.covariance_m2.diagonal().reshape(-1, 3)
+    elif points.sd_m is not None:
+        variances = points.sd_m**2
+    else:
+        return None
+    return np.sqrt(variances[:, :2].mean(axis=1))
+
+
+def _median_sd(points):
+    """Median standard deviation of the points in plan; one metre when the file gives none."""
+    sds = radial_sds(points)
+    return 1.0 if sds is None else float(np.median(sds))
+
+
+def noise_is_estimated(job):
+    """Whether the points' covariance is scaled by what their residuals say."""
+    points = job.points
+    given = points.sd_m is not None or points.covariance_m2 is not None
+    return not given or job.scale == "a_posteriori"
+
+
+def _given_covariance(points, wall):
+    """(3m, 3m) as in the file; one metre for every coordinate when the file gives none."""
+    if points.covariance_m2 is not None:
+        index = (3 * wall[:, None] + np.arange(3)).ravel()
+        given = points.covariance_m2[np.ix_(index, index)]
+        try:
+            np.linalg.cholesky(given)
+        except np.linalg.LinAlgError:  # a fixed point, or a free network
+            given = given + LEAST_SD_M**2 * np.eye(len(index))
+        return given
+    if points.sd_m is not None:
+        return scipy.sparse.diags_array(points.sd_m[wall].ravel() ** 2).tocsr()
+    return scipy.sparse.eye_array(3 * len(wall), format="csr")
+
+
+def _to_fit(job, shell, accepted, groups, covariance):
+    """Arguments of `fit_section`, but for the form, of each group."""
+    xyz = job.points.xyz_m[accepted]
+    return [
+        (
+            group,
+            xyz[group.members],
+            _block(covariance, group),
+            shell.slope,
+            job.datum.bottom_z_m + group.height_m,
+        )
+        for group in groups
+    ]
+
+
+def _block(covariance, group):
+    """Covariance of the coordinates of one group."""
+    index = (3 * group.members[:, None] + np.arange(3)).ravel()
+    return covariance[index][:, index]
