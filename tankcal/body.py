@@ -49,19 +49,20 @@ class ShellPart:
         multiplies the surveyed lengths square to the axis, "datum" lifts the table's zero.
         """
         wet = np.maximum(levels_m, 0.0)
-        loss = -self.volume.inset_m2(wet)
+        features = self.volume.features, self.volume.girth_features, self.volume.scale_features
+        volume, loss, by_scale = self.volume.integrated(wet, np.column_stack(features)).T
         area = self.area_m2(levels_m)
-        by_length = 2 * self.volume.volume_m3(wet) / self.scale
+        by_length = 2 * volume / self.scale
         if self.stretch != 1.0:
-            by_length = by_length + (self.volume.volume_m3(wet) - area * wet) / self.stretch
+            by_length = by_length + (volume - area * wet) / self.stretch
         of_corrections = {
-            "plate_thickness": loss,
-            "paint": loss,
+            "plate_thickness": -loss,
+            "paint": -loss,
             "shell_temperature": -self.expansion_per_k * by_length,
             "expansion": (self.scale - 1) / self.expansion_per_k * by_length,
         }
         return {
-            "scale": self.volume.by_scale_m3(wet),
+            "scale": by_scale,
             "datum": area,
             "barrel": self.volume.by_barrel_m2(wet).sum(axis=1),
             **{name: of_corrections[name] for name in self.bearing},
@@ -69,10 +70,16 @@ class ShellPart:
 
     def sources(self, levels_m):
         """What the survey itself leaves uncertain: the points, and the form between them."""
+        if not self.factors:
+            return ()
         wet = np.maximum(levels_m, 0.0)
+        factors = [factor for _, factor, _ in self.factors]
+        columns = self.volume.integrated(wet, np.hstack(factors))
+        ends = np.cumsum([factor.shape[1] for factor in factors])[:-1]
+        parts = np.split(columns, ends, axis=1)
         return tuple(
-            Source(kind, self.volume.integrated(wet, factor), dof)
-            for kind, factor, dof in self.factors
+            Source(kind, part, dof)
+            for (kind, _, dof), part in zip(self.factors, parts, strict=True)
         )
 
 
@@ -167,8 +174,22 @@ class Body:
 
     def sources(self, levels_m):
         """One `Source` for each cause of uncertainty: the parts' own, then what was declared."""
-        own = [source for part in self.parts for source in part.sources(levels_m)]
+        return self._sources(levels_m, [part.derivatives(levels_m) for part in self.parts])
+
+    def rows(self, levels_m):
+        """(volumes, areas, sources) of a table, each as its own method gives it, at one go.
+
+        The derivative by "datum" is that by the level, so it serves as the area, too.
+        """
         derivatives = [part.derivatives(levels_m) for part in self.parts]
+        area = sum(
+            found["datum"] if "datum" in found else part.area_m2(levels_m)
+            for part, found in zip(self.parts, derivatives, strict=True)
+        )
+        return self.volume_m3(levels_m), area, self._sources(levels_m, derivatives)
+
+    def _sources(self, levels_m, derivatives):
+        own = [source for part in self.parts for source in part.sources(levels_m)]
         for one in self.declared:
             columns = [given[one.name] for given in derivatives if one.name in given]
             if columns:

@@ -154,11 +154,12 @@ def run(job, progress=None):
     kinks = np.unique([kink - zero for kink in body.kinks_m if 0 < kink - zero < top])
     heights = _rows(job.table, exact, top, kinks)
     levels = _levels(heights, zero, body)
+    volume, area, sources = body.rows(levels)
     table = Capacity(
         height_m=heights,
-        volume_m3=body.volume_m3(levels),
-        area_m2=body.area_m2(levels),
-        sources=body.sources(levels),
+        volume_m3=volume,
+        area_m2=area,
+        sources=sources,
         probability=job.table.coverage_probability,
         critical_m=critical_zone(job),
     )

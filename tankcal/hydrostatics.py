@@ -235,7 +235,9 @@ def _load(head, hoop, levels, ends):
     stiff = hoop.compliance
     density, survey, seen = head.density_kg_m3, head.survey_density_kg_m3, head.survey_level_m
     girth, lever, length, first, second = _integrals(hoop.course, hoop.girth_m, ends)
-    below = _integrals(hoop.course, hoop.girth_m, np.minimum(ends, seen))  # to level and h_s
+    below = np.zeros((5, len(ends)))  # to level and h_s
+    if seen > hoop.course.bottom_m:
+        below = _integrals(hoop.course, hoop.girth_m, np.minimum(ends, seen))
     depth = [seen * below[i] - below[j] for i, j in ((0, 1), (2, 3), (3, 4))]  # of (h_s - z)+
     mass = density * levels
     hoops = mass * girth - density * lever - survey * depth[0]  # integral of girth u
@@ -282,4 +284,8 @@ def _integrals(course, girth_m, ends):
 
 
 def _girth_m(course, girth_m, z):
-    return np.polynomial.polynomial.polyval((z - course.bottom_m) / course.height_m, girth_m)
+    t = (z - course.bottom_m) / course.height_m
+    girth = girth_m[-1]
+    for coefficient in girth_m[-2::-1]:
+        girth = girth * t + coefficient
+    return girth + 0.0 * t

@@ -56,6 +56,16 @@ class ShellVolume:
         """(f,) the products that every volume is a sum of, m2."""
         return np.concatenate([course.upper("products_m2") for course in self.courses])
 
+    @property
+    def girth_features(self):
+        """(f,) what the features lose by metre of inset, m."""
+        return np.concatenate([course.upper("girths_m") for course in self.courses])
+
+    @property
+    def scale_features(self):
+        """(f,) derivative of the features by a scale of the surveyed lengths, m2."""
+        return np.concatenate([course.upper("by_scale_m2") for course in self.courses])
+
     def integrated(self, heights_m, features):
         """(rows, ...) sums over the features of the volume below each height, m times their unit.
 
@@ -90,13 +100,11 @@ class ShellVolume:
 
     def inset_m2(self, heights_m):
         """(rows,) loss of volume below each height by metre of plate or paint: the wetted wall."""
-        girths = np.concatenate([course.upper("girths_m") for course in self.courses])
-        return self.integrated(heights_m, girths)
+        return self.integrated(heights_m, self.girth_features)
 
     def by_scale_m3(self, heights_m):
         """(rows,) derivative of the volume below each height by a scale of surveyed lengths."""
-        by_scale = np.concatenate([course.upper("by_scale_m2") for course in self.courses])
-        return self.integrated(heights_m, by_scale)
+        return self.integrated(heights_m, self.scale_features)
 
     def by_barrel_m2(self, heights_m):
         """(rows, courses) derivative of the volume below each height by the barrel of each course.

@@ -55,6 +55,15 @@ def test_a_shared_input_is_one_column_and_moves_all_parts():
     assert body.area_m2(LEVELS) == pytest.approx([9.0] * 3)
 
 
+def test_rows_are_volumes_areas_and_sources_at_one_go():
+    body = Body((Slab(10.0, 3.0), shell()), (Declared("scale", 0.5),), 0.0, 4.0)
+    volume, area, sources = body.rows(LEVELS)
+    assert np.array_equal(volume, body.volume_m3(LEVELS))
+    assert np.array_equal(area, body.area_m2(LEVELS))
+    for one, other in zip(sources, body.sources(LEVELS), strict=True):
+        assert np.array_equal(one.columns_m3, other.columns_m3)
+
+
 def test_what_bears_and_was_not_declared_is_named():
     body = Body((Slab(10.0, 3.0),), (Declared("scale"),), 0.0, 4.0)
     assert body.undeclared() == ("datum",)
