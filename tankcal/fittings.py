@@ -49,8 +49,8 @@ class Deadwood:
         return here @ (self.volumes_m3[tall] / (self.tops_m - self.bottoms_m)[tall])
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} only "datum", which is by the level."""
-        return {"datum": self.area_m2(levels_m)}
+        """None: bottoms and tops are dips, they move with the table's zero."""
+        return {}
 
     def sources(self, levels_m):
         """One `Source` for each item that has an uncertainty: the part of it below each level."""
@@ -158,9 +158,9 @@ class FloatingRoof:
         )
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} by "roof_mass" (kg) and "datum" (m)."""
+        """{input: (rows,)} by "roof_mass", kg; its heights are dips and move with the zero."""
         by_mass = -self._per_kg(self.reference_density_kg_m3) * self._afloat(levels_m)
-        return {"roof_mass": by_mass, "datum": self.area_m2(levels_m)}
+        return {"roof_mass": by_mass}
 
     def sources(self, levels_m):
         """None of its own: the mass is a declared input."""

@@ -52,7 +52,7 @@ def test_the_area_is_the_derivative_by_the_level():
     between = np.array([-0.7, -0.3, 0.1, 0.8, 5.0, 11.0])
     area = part.area_m2(between)
     assert_derivative(lambda x: part.volume_m3(between + x[0]), [0.0], area[:, None])
-    assert part.derivatives(between)["datum"] == pytest.approx(area, rel=1e-15)
+    assert part.derivatives(between) == {}  # its heights are dips: they move with the zero
     assert part_of([ITEMS[3]]).area_m2([0.2])[0] == 0  # a step has no area
 
 
@@ -156,7 +156,7 @@ def test_derivatives_of_a_roof():
         assert_derivative(
             lambda x, weighing=weighing: roof(weighing).volume_m3(levels + x[0]),
             [0.0],
-            found["datum"][:, None],
+            roof(weighing).area_m2(levels)[:, None],
         )
 
 

@@ -11,6 +11,7 @@ import tankcal
 from tankcal.chain import run
 from tankcal.circles import fit_circle
 from tankcal.errors import HeightError, InputError
+from tankcal.job import DeclaredInput
 from tankcal.solids import End, LyingTank
 
 RADIUS, HEIGHT = 6.5, 9.5
@@ -150,6 +151,10 @@ def test_a_floating_roof_is_deducted_above_its_critical_zone(tmp_path):
     assert change[100] == pytest.approx(0.0, abs=1e-9)
     assert change[130] == pytest.approx(-weighed)
     assert found.table.critical_m == (1.0, 1.3)
+    datum = DeclaredInput("datum", 0.002, "mm", 2.0)
+    moved = run(replace(found.job, inputs=(datum,))).table
+    by_zero = next(source for source in moved.sources if source.kind == "datum").columns_m3[:, 0]
+    assert by_zero[1:-1] == pytest.approx(0.002 * PLAN, rel=1e-4)  # its heights move with the zero
     assert not found.at(1.15).for_use
     vacuum = inside_cylinder(tmp_path / "c", roof={"weighing": "vacuum"})
     assert sizes(vacuum)["roof"] == pytest.approx(-9000 / 850)
