@@ -234,10 +234,12 @@ def examined(heights, volumes):
 
 
 def wrong_digit(rows, k, rng, column=1):
+    """By 3 units of the last digit or more: smaller ones have a study of their own."""
     text = rows[k][column]
     digits = [place for place, char in enumerate(text) if char.isdigit()]
     rows[k][column] = _other_digit(text, rng.choice(digits), rng)
-    return {k}
+    by = round(abs(float(rows[k][column]) - float(text)) * 10 ** len(text.partition(".")[2]))
+    return {k} if by >= 3 or column == 0 else None
 
 
 def wrong_height(rows, k, rng):

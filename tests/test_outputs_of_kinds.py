@@ -103,6 +103,24 @@ def test_the_workbook_has_a_sheet_for_what_is_in_the_tank(furnished):
     assert [row[0] for row in capacity[4:] if row[use] == "not for use"] == [1.5]
 
 
+def test_the_dip_calculator_refuses_the_critical_zone(furnished, tmp_path):
+    """Recalculated by LibreOffice at 1.3 m: between 1.0 and 1.6 m the roof is partly afloat."""
+    soffice = shutil.which("soffice")
+    if soffice is None:
+        pytest.skip("LibreOffice (soffice) is not installed: the formulas cannot be recalculated")
+    book = openpyxl.load_workbook(furnished[1] / "capacity.xlsx")
+    book["Dip calculator"]["B5"] = 1.3
+    book.save(tmp_path / "dip.xlsx")
+    profile = f"-env:UserInstallation={(tmp_path / 'profile').as_uri()}"
+    convert = ["--headless", "--convert-to", "xlsx", "--outdir", str(tmp_path / "out")]
+    subprocess.run(
+        [soffice, profile, *convert, str(tmp_path / "dip.xlsx")], check=True, capture_output=True
+    )
+    sheet = openpyxl.load_workbook(tmp_path / "out" / "dip.xlsx", data_only=True)["Dip calculator"]
+    assert sheet["B6"].value == "Refused: critical zone of the roof, not for use."
+    assert sheet["B9"].value == "–"
+
+
 def test_the_csv_table_has_further_densities_and_what_is_not_for_use(furnished):
     _, folder = furnished
     record = record_in(folder)

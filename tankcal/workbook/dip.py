@@ -25,12 +25,26 @@ _PART, _ROW_OF_U, _REFERENCE = range(22, 25)
 _SHELL, _CTSH, _IN_SERVICE = 28, 29, 30
 
 
-def _formulas(digits_of_height):
+def _critical_zone(record):
+    """(low, high) dips between which a floating roof forbids the table, or None."""
+    if not record["roof"] or not record["job"]["corrections"]["roof"]:
+        return None
+    roof = {line["code"]: line["value"] for line in record["roof"]}
+    return roof["roof_critical_bottom"], roof["roof_critical_top"]
+
+
+def _formulas(digits_of_height, critical=None):
     """{row of the sheet: formula}; a refused dip leaves no row number and so no result."""
     dip, row, next_row, part = f"B{_DIP}", f"B{_ROW}", f"B{_NEXT}", f"B{_PART}"
     low = f"MIN(capacity_height)-{_NANOMETRE}"
     top = "MAX(capacity_height)"
     high = f"MAX({top},ROUND({top},{digits_of_height}))+{_NANOMETRE}"
+
+    afloat, or_afloat = f'"{WITHIN}"', ""
+    if critical is not None:
+        zone = f"AND({dip}>{critical[0]!r}+{_NANOMETRE},{dip}<{critical[1]!r}-{_NANOMETRE})"
+        afloat = f'IF({zone},"{REFUSED}: critical zone of the roof, not for use.","{WITHIN}")'
+        or_afloat = f",{zone}"
 
     def when_found(expression):
         return f'=IF(ISNUMBER({row}),{expression},"{NONE}")'
@@ -45,11 +59,11 @@ def _formulas(digits_of_height):
             f'IF({dip}<{low},"{REFUSED}: below the table, which begins at "'
             f'&FIXED(MIN(capacity_height),{digits_of_height},TRUE)&" m.",'
             f'IF({dip}>{high},"{REFUSED}: above the table, which ends at "'
-            f'&FIXED({top},{digits_of_height},TRUE)&" m.","{WITHIN}"))))'
+            f'&FIXED({top},{digits_of_height},TRUE)&" m.",{afloat}))))'
         ),
         _ROW: (
             f"=IF(OR(ISLOGICAL({dip}),NOT(ISNUMBER({dip}))),"
-            f'"{NONE}",IF(OR({dip}<{low},{dip}>{high}),"{NONE}",'
+            f'"{NONE}",IF(OR({dip}<{low},{dip}>{high}{or_afloat}),"{NONE}",'
             f"MATCH(MAX({dip},MIN(capacity_height))+{_NANOMETRE},capacity_height,1)))"
         ),
         _NEXT: when_found(f"MIN({row}+1,ROWS(capacity_height))"),
@@ -120,11 +134,17 @@ def _lines(digits_of_height, has_reference):
     return lines
 
 
+def _opening_row(record):
+    """The middle row of the table, or the next one that may be used."""
+    for_use = record["capacity"]["for_use"]
+    return next((row for row in range(len(for_use) // 2, len(for_use)) if for_use[row]), 0)
+
+
 def dip_sheet(book, record):
     """Write the calculator; it opens with the dip on the middle row of the table."""
     height_m = record["capacity"]["height_m"]
     reference = record["job"]["datum"]["reference_height_m"]
-    at = len(height_m) // 2
+    at = _opening_row(record)
     digits = digits_of_heights(height_m)
     sheet = book.sheet(SHEET, "Dip calculator")
     book.widths(sheet, *_WIDTHS)
@@ -133,7 +153,7 @@ def dip_sheet(book, record):
     book.heading(sheet, _VOLUME - 2, "Result", len(_WIDTHS))
     book.heading(sheet, _ROW - 2, "How it is found", len(_WIDTHS))
 
-    formulas, results = _formulas(digits), _results(record, at)
+    formulas, results = _formulas(digits, _critical_zone(record)), _results(record, at)
     decimals_by_u = row_decimals(record["capacity"]["U_m3"])
     coarse, fine = min(decimals_by_u), max(decimals_by_u)
     for row, label, unit, decimals, set_by_u in _lines(digits, reference is not None):
@@ -179,7 +199,7 @@ def _service(book, sheet, record, coarse, fine):
     shown = max(LITRE_DECIMALS, coarse)
     book.put(sheet, _IN_SERVICE - 1, 0, "Volume at that temperature", bold=True)
     strong = book.format(align="right", num_format=number_format(shown), bold=True)
-    at = len(record["capacity"]["volume_m3"]) // 2
+    at = _opening_row(record)
     sheet.write_formula(_IN_SERVICE - 1, 1, warm, strong, record["capacity"]["volume_m3"][at])
     book.put(sheet, _IN_SERVICE - 1, 2, "m³", indent=1)
     _digits_by_u(book, sheet, _IN_SERVICE, range(shown + 1, fine + 1))
