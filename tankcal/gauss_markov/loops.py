@@ -1,0 +1,322 @@
+"""Building and eliminating the normal equations: compiled loops, and the same over whole arrays.
+
+For the rows of a batch with derivatives E by their block and F by reduced unknowns
+
+    V += E'E,   wide += F'E,   S += F'F,   b += E'w,   g += F'w
+
+and for each block, V = L L', the wide part becomes Y = wide L^-T and b becomes y = L^-1 b, so that
+the reduced equations are S - Y Y' and g - Y y. S is kept as a matrix T in which each pair of
+unknowns stands once: S = T + T' - diag T.
+"""
+
+import sys
+
+import numpy as np
+import scipy.sparse
+
+from tankcal.compiled import available, compiled
+
+_COMPILED = ("_add_rows", "_add_plain_rows", "_eliminate", "_back", "_cofactors", "_leverage")
+
+
+def _add_plain_rows(w, jac, columns, t, g):
+    n, m, k = jac.shape
+    for i in range(n):
+        c = columns[i]
+        for row in range(m):
+            f, r = jac[i, row], w[i, row]
+            for a in range(k):
+                g[c[a]] += f[a] * r
+                for b in range(a, k):
+                    t[c[a], c[b]] += f[a] * f[b]
+
+
+def _add_rows(w, jac, block, columns, places, v, wide, b, t, g):
+    n, m, k = jac.shape
+    for i in range(n):
+        c, p, o = columns[i], places[i], block[i]
+        for row in range(m):
+            e, f, r = jac[i, row, :3], jac[i, row, 3:], w[i, row]
+            e0, e1, e2 = e[0], e[1], e[2]
+            b[o, 0] += e0 * r
+            b[o, 1] += e1 * r
+            b[o, 2] += e2 * r
+            v[o, 0] += e0 * e0
+            v[o, 1] += e1 * e0
+            v[o, 2] += e1 * e1
+            v[o, 3] += e2 * e0
+            v[o, 4] += e2 * e1
+            v[o, 5] += e2 * e2
+            for a in range(k - 3):
+                fa = f[a]
+                wide[p[a], 0] += fa * e0
+                wide[p[a], 1] += fa * e1
+                wide[p[a], 2] += fa * e2
+                g[c[a]] += fa * r
+        if m == 2:  # image coordinates: most of the work
+            f, h = jac[i, 0, 3:], jac[i, 1, 3:]
+            for a in range(k - 3):
+                fa, ha, line = f[a], h[a], t[c[a]]
+                for q in range(a, k - 3):
+                    line[c[q]] += fa * f[q] + ha * h[q]
+        else:
+            for row in range(m):
+                f = jac[i, row, 3:]
+                for a in range(k - 3):
+                    for q in range(a, k - 3):
+                        t[c[a], c[q]] += f[a] * f[q]
+
+
+def _eliminate(v, wide, b, starts, columns, t, g, damping, smallest):
+    """Returns the number of the first block that is not determined, or -1."""
+    longest = 0
+    for o in range(len(b)):
+        longest = max(longest, starts[o + 1] - starts[o])
+    y0, y1, y2 = np.empty(longest), np.empty(longest), np.empty(longest)
+    product = np.empty(longest)
+    bad = -1
+    for o in range(len(b)):
+        d0, d1, d2 = v[o, 0], v[o, 2], v[o, 5]
+        more = 1.0 + damping
+        q0 = d0 * more
+        l00 = np.sqrt(q0)
+        l10, l20 = v[o, 1] / l00, v[o, 3] / l00
+        q1 = d1 * more - l10 * l10
+        l11 = np.sqrt(max(q1, 0.0))
+        l21 = (v[o, 4] - l20 * l10) / l11
+        q2 = d2 * more - l20 * l20 - l21 * l21
+        if not (q0 > 0.0 and q1 > smallest * d1 and q2 > smallest * d2):
+            if bad < 0:
+                bad = o
+            continue
+        l22 = np.sqrt(q2)
+        v[o, 0], v[o, 1], v[o, 2] = l00, l10, l11
+        v[o, 3], v[o, 4], v[o, 5] = l20, l21, l22
+        b0 = b[o, 0] / l00
+        b1 = (b[o, 1] - l10 * b0) / l11
+        b2 = (b[o, 2] - l20 * b0 - l21 * b1) / l22
+        b[o, 0], b[o, 1], b[o, 2] = b0, b1, b2
+        first = starts[o]
+        n = starts[o + 1] - first
+        for a in range(n):
+            line = wide[first + a]
+            w0 = line[0] / l00
+            w1 = (line[1] - l10 * w0) / l11
+            w2 = (line[2] - l20 * w0 - l21 * w1) / l22
+            line[0], line[1], line[2] = w0, w1, w2
+            y0[a], y1[a], y2[a] = w0, w1, w2
+            g[columns[first + a]] -= w0 * b0 + w1 * b1 + w2 * b2
+        for a in range(n):
+            w0, w1, w2, line = y0[a], y1[a], y2[a], t[columns[first + a]]
+            for q in range(a, n):
+                product[q] = w0 * y0[q] + w1 * y1[q] + w2 * y2[q]
+            for q in range(a, n):
+                line[columns[first + q]] -= product[q]
+    return bad
+
+
+def _back(v, wide, b, starts, columns, reduced, out):
+    for o in range(len(b)):
+        x0, x1, x2 = b[o, 0], b[o, 1], b[o, 2]
+        for a in range(starts[o], starts[o + 1]):
+            line, r = wide[a], reduced[columns[a]]
+            x0 += line[0] * r
+            x1 += line[1] * r
+            x2 += line[2] * r
+        x2 = x2 / v[o, 5]
+        x1 = (x1 - v[o, 4] * x2) / v[o, 2]
+        x0 = (x0 - v[o, 1] * x1 - v[o, 3] * x2) / v[o, 0]
+        out[o, 0], out[o, 1], out[o, 2] = x0, x1, x2
+
+
+def _cofactors(v, wide, starts, columns, inverse, cross, out):
+    longest = 0
+    for o in range(len(v)):
+        longest = max(longest, starts[o + 1] - starts[o])
+    z, part = np.empty((3, longest)), np.empty(longest)
+    for o in range(len(v)):
+        first, n = starts[o], starts[o + 1] - starts[o]
+        c = columns[first : first + n]
+        i00, i11, i22 = 1.0 / v[o, 0], 1.0 / v[o, 2], 1.0 / v[o, 5]
+        i10 = -v[o, 1] * i00 * i11
+        i21 = -v[o, 4] * i11 * i22
+        i20 = -(v[o, 3] * i00 + v[o, 4] * i10) * i22
+        for a in range(n):
+            y0, y1, y2 = wide[first + a, 0], wide[first + a, 1], wide[first + a, 2]
+            z[0, a] = i00 * y0 + i10 * y1 + i20 * y2
+            z[1, a] = i11 * y1 + i21 * y2
+            z[2, a] = i22 * y2
+        s00, s10, s11, s20, s21, s22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for a in range(n):
+            line = inverse[c[a]]
+            for q in range(n):
+                part[q] = line[c[q]]
+            x0, x1, x2 = 0.0, 0.0, 0.0
+            for q in range(n):
+                x0 += part[q] * z[0, q]
+                x1 += part[q] * z[1, q]
+                x2 += part[q] * z[2, q]
+            cross[first + a, 0], cross[first + a, 1], cross[first + a, 2] = -x0, -x1, -x2
+            s00 += z[0, a] * x0
+            s10 += z[1, a] * x0
+            s11 += z[1, a] * x1
+            s20 += z[2, a] * x0
+            s21 += z[2, a] * x1
+            s22 += z[2, a] * x2
+        out[o, 0, 0] = s00 + i00 * i00 + i10 * i10 + i20 * i20
+        out[o, 1, 0] = s10 + i10 * i11 + i20 * i21
+        out[o, 1, 1] = s11 + i11 * i11 + i21 * i21
+        out[o, 2, 0] = s20 + i20 * i22
+        out[o, 2, 1] = s21 + i21 * i22
+        out[o, 2, 2] = s22 + i22 * i22
+        out[o, 0, 1], out[o, 0, 2], out[o, 1, 2] = out[o, 1, 0], out[o, 2, 0], out[o, 2, 1]
+
+
+def _leverage(jac, block, columns, places, inverse, cross, cofactors, spare, out):
+    n, m, k = jac.shape
+    for i in range(n):
+        o, c, p = block[i], columns[i], places[i]
+        for row in range(m):
+            e, f = jac[i, row, :3], jac[i, row, 3:]
+            q = cofactors[o]
+            total = (
+                e[0] * e[0] * q[0, 0] + e[1] * e[1] * q[1, 1] + e[2] * e[2] * q[2, 2]
+                + 2.0 * (e[0] * e[1] * q[0, 1] + e[0] * e[2] * q[0, 2] + e[1] * e[2] * q[1, 2])
+            )  # fmt: skip
+            for a in range(k - 3):
+                if c[a] == spare:
+                    continue
+                line, x = cross[p[a]], inverse[c[a]]
+                half = 0.5 * f[a] * x[c[a]] + e[0] * line[0] + e[1] * line[1] + e[2] * line[2]
+                for b in range(a + 1, k - 3):
+                    if c[b] != spare:
+                        half += f[b] * x[c[b]]
+                total += 2.0 * f[a] * half
+            out[i, row] = total
+
+
+def add_rows(batch, w, jac, normals):
+    """Add a batch's rows (w, jac already the batch's own) to the Normals."""
+    if available():
+        loops = compiled(sys.modules[__name__], _COMPILED)
+        if batch.block is None:
+            loops._add_plain_rows(w, jac, batch.columns, normals.t, normals.g)
+        else:
+            loops._add_rows(
+                w, jac, batch.block, batch.columns, batch.places,
+                normals.v, normals.wide, normals.b, normals.t, normals.g,
+            )  # fmt: skip
+        return
+    f = jac
+    if batch.block is not None:
+        e, f = jac[:, :, :3], jac[:, :, 3:]
+        square = np.einsum("nma,nmb->nab", e, e)
+        np.add.at(normals.v, batch.block, square[:, *np.tril_indices(3)])
+        np.add.at(normals.b, batch.block, np.einsum("nma,nm->na", e, w))
+        np.add.at(normals.wide, batch.places, np.einsum("nmk,nma->nka", f, e))
+    np.add.at(normals.g, batch.columns, np.einsum("nmk,nm->nk", f, w))
+    once = np.triu(np.ones((f.shape[2],) * 2)) * np.einsum("nma,nmb->nab", f, f)
+    np.add.at(normals.t, (batch.columns[:, :, None], batch.columns[:, None, :]), once)
+
+
+def eliminate(plan, normals, damping, smallest):
+    """Eliminate the blocks in place; the first block that is not determined, or -1."""
+    if available():
+        return compiled(sys.modules[__name__], _COMPILED)._eliminate(
+            normals.v, normals.wide, normals.b, plan.starts, plan.columns,
+            normals.t, normals.g, damping, smallest,
+        )  # fmt: skip
+    v = np.zeros((plan.blocks, 3, 3))
+    v[:, *np.tril_indices(3)] = normals.v
+    v += np.tril(v, -1).transpose(0, 2, 1)
+    diagonal = np.einsum("nii->ni", v)
+    before = diagonal.copy()
+    diagonal *= 1 + damping
+    scale = np.sqrt(np.where(before > 0, before, 1.0))
+    values = np.linalg.eigvalsh(v / (scale[:, :, None] * scale[:, None, :]))
+    bad = np.flatnonzero(~(values[:, 0] > smallest))
+    if len(bad):
+        return int(bad[0])
+    root = np.linalg.cholesky(v)
+    normals.v[:] = root[:, *np.tril_indices(3)]
+    normals.b[:] = np.linalg.solve(root, normals.b[:, :, None])[:, :, 0]
+    owner = np.repeat(np.arange(plan.blocks), np.diff(plan.starts))
+    normals.wide[:-1] = np.linalg.solve(root[owner], normals.wide[:-1, :, None])[:, :, 0]
+    y = block_rows(plan, normals.wide)
+    normals.t[:-1, :-1] -= np.triu((y.T @ y).toarray())
+    normals.g[:-1] -= y.T @ normals.b.ravel()
+    return -1
+
+
+def block_rows(plan, wide):
+    """The wide part as a sparse matrix (3 nb, nr)."""
+    owner = np.repeat(np.arange(plan.blocks), np.diff(plan.starts))
+    rows = 3 * owner[:, None] + np.arange(3)
+    columns = np.repeat(plan.columns[:, None], 3, axis=1)
+    return scipy.sparse.csr_array(
+        (wide[:-1].ravel(), (rows.ravel(), columns.ravel())), shape=(3 * plan.blocks, plan.reduced)
+    )
+
+
+def back_substitute(plan, normals, reduced):
+    """L^-T (y + Y' reduced) of each block (nb, 3); the blocks' step is this with the other sign."""
+    if available():
+        out = np.empty((plan.blocks, 3))
+        compiled(sys.modules[__name__], _COMPILED)._back(
+            normals.v, normals.wide, normals.b, plan.starts, plan.columns, reduced, out
+        )
+        return out
+    right = normals.b + (block_rows(plan, normals.wide) @ reduced).reshape(-1, 3)
+    return np.linalg.solve(roots(normals).transpose(0, 2, 1), right[:, :, None])[:, :, 0]
+
+
+def roots(normals):
+    """The Cholesky factors L (nb, 3, 3) of eliminated blocks."""
+    v = np.zeros((len(normals.v), 3, 3))
+    v[:, *np.tril_indices(3)] = normals.v
+    return v
+
+
+def block_cofactors(plan, normals, inverse):
+    """Cofactors (nb, 3, 3) of all blocks, and (t, 3) of each block with its reduced columns.
+
+    inverse  (nr, nr) cofactor matrix of the reduced unknowns
+    """
+    cross, out = np.empty((len(plan.columns) + 1, 3)), np.empty((plan.blocks, 3, 3))
+    cross[-1] = 0.0
+    if available():
+        compiled(sys.modules[__name__], _COMPILED)._cofactors(
+            normals.v, normals.wide, plan.starts, plan.columns, inverse, cross, out
+        )
+        return out, cross
+    root = np.linalg.inv(roots(normals))
+    for o in range(plan.blocks):
+        here = slice(plan.starts[o], plan.starts[o + 1])
+        z = normals.wide[here] @ root[o]
+        columns = plan.columns[here]
+        cross[here] = -inverse[np.ix_(columns, columns)] @ z
+        out[o] = root[o].T @ root[o] - z.T @ cross[here]
+    return out, cross
+
+
+def leverage(plan, batch, jac, inverse, cross, cofactors):
+    """J Q J' of each row (n, m): one minus the redundancy number.
+
+    inverse, cross, cofactors  of the reduced unknowns, and as block_cofactors gives them
+    """
+    spare = plan.reduced
+    if batch.block is not None and available():
+        out = np.empty(jac.shape[:2])
+        compiled(sys.modules[__name__], _COMPILED)._leverage(
+            jac, batch.block, batch.columns, batch.places, inverse, cross, cofactors, spare, out
+        )
+        return out
+    padded = np.pad(inverse, (0, 1))
+    f = jac if batch.block is None else jac[:, :, 3:]
+    q = padded[batch.columns[:, :, None], batch.columns[:, None, :]]
+    out = np.einsum("nma,nab,nmb->nm", f, q, f)
+    if batch.block is not None:
+        e, mixed = jac[:, :, :3], cross[batch.places]
+        out += np.einsum("nma,nab,nmb->nm", e, cofactors[batch.block], e)
+        out += 2 * np.einsum("nma,nka,nmk->nm", e, mixed, f)
+    return out
