@@ -12,6 +12,9 @@ from functools import cache
 from types import FunctionType, SimpleNamespace
 
 
+FAST = {"contract", "reassoc", "nsz"}  # sums in any order; NaN and infinity stay what they are
+
+
 def available():
     """True when loops can be compiled; TANKCAL_COMPILED=0 turns that off."""
     if os.environ.get("TANKCAL_COMPILED", "1") == "0":
@@ -33,7 +36,5 @@ def compiled(module, names):
         plain = known[name]
         bound = FunctionType(plain.__code__, known, name, plain.__defaults__)
         bound.__module__, bound.__qualname__ = plain.__module__, plain.__qualname__
-        known[name] = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})(
-            bound
-        )
+        known[name] = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)(bound)
     return SimpleNamespace(**{name: known[name] for name in names})

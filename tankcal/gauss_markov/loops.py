@@ -31,7 +31,7 @@ def _add_plain_rows(w, jac, columns, t, g):
                     t[c[a], c[b]] += f[a] * f[b]
 
 
-def _add_rows(w, jac, block, columns, places, v, wide, b, t, g):
+def _add_rows(w, jac, block, columns, places, cuts, v, wide, b, t, g):
     n, m, k = jac.shape
     for i in range(n):
         c, p, o = columns[i], places[i], block[i]
@@ -55,10 +55,15 @@ def _add_rows(w, jac, block, columns, places, v, wide, b, t, g):
                 g[c[a]] += fa * r
         if m == 2:  # image coordinates: most of the work
             f, h = jac[i, 0, 3:], jac[i, 1, 3:]
-            for a in range(k - 3):
-                fa, ha, line = f[a], h[a], t[c[a]]
-                for q in range(a, k - 3):
-                    line[c[q]] += fa * f[q] + ha * h[q]
+            for one in range(len(cuts) - 1):
+                for a in range(cuts[one], cuts[one + 1]):
+                    fa, ha = f[a], h[a]
+                    for other in range(one, len(cuts) - 1):
+                        begin, end = max(a, cuts[other]), cuts[other + 1]
+                        line = t[c[a], c[begin] : c[begin] + end - begin]
+                        f1, h1 = f[begin:end], h[begin:end]
+                        for q in range(end - begin):
+                            line[q] += fa * f1[q] + ha * h1[q]
         else:
             for row in range(m):
                 f = jac[i, row, 3:]
@@ -67,13 +72,12 @@ def _add_rows(w, jac, block, columns, places, v, wide, b, t, g):
                         t[c[a], c[q]] += f[a] * f[q]
 
 
-def _eliminate(v, wide, b, starts, columns, t, g, damping, smallest):
+def _eliminate(v, wide, b, starts, columns, runs, ends, t, g, damping, smallest):
     """Returns the number of the first block that is not determined, or -1."""
     longest = 0
     for o in range(len(b)):
         longest = max(longest, starts[o + 1] - starts[o])
     y0, y1, y2 = np.empty(longest), np.empty(longest), np.empty(longest)
-    product = np.empty(longest)
     bad = -1
     for o in range(len(b)):
         d0, d1, d2 = v[o, 0], v[o, 2], v[o, 5]
@@ -106,12 +110,18 @@ def _eliminate(v, wide, b, starts, columns, t, g, damping, smallest):
             line[0], line[1], line[2] = w0, w1, w2
             y0[a], y1[a], y2[a] = w0, w1, w2
             g[columns[first + a]] -= w0 * b0 + w1 * b1 + w2 * b2
-        for a in range(n):
-            w0, w1, w2, line = y0[a], y1[a], y2[a], t[columns[first + a]]
-            for q in range(a, n):
-                product[q] = w0 * y0[q] + w1 * y1[q] + w2 * y2[q]
-            for q in range(a, n):
-                line[columns[first + q]] -= product[q]
+        for one in range(runs[o], runs[o + 1]):
+            for a in range(ends[one], ends[one + 1]):
+                w0, w1, w2 = -y0[a - first], -y1[a - first], -y2[a - first]
+                for other in range(one, runs[o + 1]):
+                    begin, end = max(a, ends[other]), ends[other + 1]
+                    to = columns[begin]
+                    line = t[columns[a], to : to + end - begin]
+                    u0 = y0[begin - first : end - first]
+                    u1 = y1[begin - first : end - first]
+                    u2 = y2[begin - first : end - first]
+                    for q in range(end - begin):
+                        line[q] += w0 * u0[q] + w1 * u1[q] + w2 * u2[q]
     return bad
 
 
@@ -129,11 +139,11 @@ def _back(v, wide, b, starts, columns, reduced, out):
         out[o, 0], out[o, 1], out[o, 2] = x0, x1, x2
 
 
-def _cofactors(v, wide, starts, columns, inverse, cross, out):
+def _cofactors(v, wide, starts, columns, runs, ends, inverse, cross, out):
     longest = 0
     for o in range(len(v)):
         longest = max(longest, starts[o + 1] - starts[o])
-    z, part = np.empty((3, longest)), np.empty(longest)
+    z = np.empty((3, longest))
     for o in range(len(v)):
         first, n = starts[o], starts[o + 1] - starts[o]
         c = columns[first : first + n]
@@ -148,14 +158,17 @@ def _cofactors(v, wide, starts, columns, inverse, cross, out):
             z[2, a] = i22 * y2
         s00, s10, s11, s20, s21, s22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for a in range(n):
-            line = inverse[c[a]]
-            for q in range(n):
-                part[q] = line[c[q]]
             x0, x1, x2 = 0.0, 0.0, 0.0
-            for q in range(n):
-                x0 += part[q] * z[0, q]
-                x1 += part[q] * z[1, q]
-                x2 += part[q] * z[2, q]
+            for one in range(runs[o], runs[o + 1]):
+                begin, end = ends[one], ends[one + 1]
+                line = inverse[c[a], columns[begin] : columns[begin] + end - begin]
+                z0 = z[0, begin - first : end - first]
+                z1 = z[1, begin - first : end - first]
+                z2 = z[2, begin - first : end - first]
+                for q in range(end - begin):
+                    x0 += line[q] * z0[q]
+                    x1 += line[q] * z1[q]
+                    x2 += line[q] * z2[q]
             cross[first + a, 0], cross[first + a, 1], cross[first + a, 2] = -x0, -x1, -x2
             s00 += z[0, a] * x0
             s10 += z[1, a] * x0
@@ -203,7 +216,7 @@ def add_rows(batch, w, jac, normals):
             loops._add_plain_rows(w, jac, batch.columns, normals.t, normals.g)
         else:
             loops._add_rows(
-                w, jac, batch.block, batch.columns, batch.places,
+                w, jac, batch.block, batch.columns, batch.places, batch.cuts,
                 normals.v, normals.wide, normals.b, normals.t, normals.g,
             )  # fmt: skip
         return
@@ -223,7 +236,7 @@ def eliminate(plan, normals, damping, smallest):
     """Eliminate the blocks in place; the first block that is not determined, or -1."""
     if available():
         return compiled(sys.modules[__name__], _COMPILED)._eliminate(
-            normals.v, normals.wide, normals.b, plan.starts, plan.columns,
+            normals.v, normals.wide, normals.b, plan.starts, plan.columns, plan.runs, plan.ends,
             normals.t, normals.g, damping, smallest,
         )  # fmt: skip
     v = np.zeros((plan.blocks, 3, 3))
@@ -286,8 +299,9 @@ def block_cofactors(plan, normals, inverse):
     cross[-1] = 0.0
     if available():
         compiled(sys.modules[__name__], _COMPILED)._cofactors(
-            normals.v, normals.wide, plan.starts, plan.columns, inverse, cross, out
-        )
+            normals.v, normals.wide, plan.starts, plan.columns, plan.runs, plan.ends,
+            inverse, cross, out,
+        )  # fmt: skip
         return out, cross
     root = np.linalg.inv(roots(normals))
     for o in range(plan.blocks):

@@ -20,6 +20,7 @@ class Batch:
     order    (n, K) place in the group's derivatives of each of this batch's, or None (as they are)
     block    (n,) block whose derivatives come first, or None
     columns  (n, k) reduced column of each further derivative; a fixed unknown has the spare column
+    cuts     where runs of neighbouring columns, common to all these rows, begin; and k at the end
     places   (n, k) where column and block meet in the wide part; a spare place for the fixed ones
     """
 
@@ -28,6 +29,7 @@ class Batch:
     order: object
     block: object
     columns: np.ndarray
+    cuts: np.ndarray
     places: object
 
     def of(self, array):
@@ -46,6 +48,8 @@ class Plan:
     batches           tuple of Batch
     starts            (nb + 1,) where each block's reduced columns start in `columns`
     columns           (t,) reduced columns of all blocks, ascending in each
+    ends              (s + 1,) where in `columns` runs of neighbouring columns begin, t at the end
+    runs              (nb + 1,) where in `ends` each block begins
     """
 
     reduced: int
@@ -53,6 +57,8 @@ class Plan:
     batches: tuple
     starts: np.ndarray
     columns: np.ndarray
+    ends: np.ndarray
+    runs: np.ndarray
 
 
 def plan(reduced, blocks, groups):
@@ -71,10 +77,25 @@ def plan(reduced, blocks, groups):
     starts = np.zeros(blocks + 1, dtype=np.int64)
     np.cumsum(np.bincount(owner, minlength=blocks), out=starts[1:])
     batches = tuple(
-        Batch(g, rows, order, block, cols, None if block is None else place[block[:, None], cols])
+        Batch(
+            g, rows, order, block, cols, _cuts(cols, reduced),
+            None if block is None else place[block[:, None], cols],
+        )
         for g, rows, order, block, cols in raw
-    )
-    return Plan(reduced, blocks, batches, starts, columns)
+    )  # fmt: skip
+    begins = np.ones(len(columns), dtype=bool)
+    begins[1:] = (np.diff(columns) != 1) | (np.diff(owner) != 0)
+    ends = np.append(np.flatnonzero(begins), len(columns))
+    return Plan(reduced, blocks, batches, starts, columns, ends, np.searchsorted(ends, starts))
+
+
+def _cuts(columns, spare):
+    """Where runs begin: places at which some row's column is not the one after its neighbour."""
+    k = columns.shape[1]
+    if k == 0 or len(columns) == 0:
+        return np.arange(k + 1)
+    follows = (columns[:, 1:] == columns[:, :-1] + 1) & (columns[:, 1:] != spare)
+    return np.append(np.flatnonzero(np.append(True, ~follows.all(axis=0))), k)
 
 
 def _split(number, columns, reduced, blocks):
