@@ -11,7 +11,6 @@ import os
 from functools import cache
 from types import FunctionType, SimpleNamespace
 
-
 FAST = {"contract", "reassoc", "nsz"}  # sums in any order; NaN and infinity stay what they are
 
 

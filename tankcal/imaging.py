@@ -195,13 +195,14 @@ def one_image_point(p, r, q, form, of_ideal):
     )
 
 
-def _loop(xyz, photo_xyz, rotation, interior, form, of_ideal, ids, xy, weight, active, w, jac):
+def _loop(
+    xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac
+):
     """image_rows, one image point after the other."""
-    for i in range(len(ids)):
-        point, photo = ids[i, 0], ids[i, 1]
-        s, r, q = photo_xyz[photo], rotation[photo], interior[photo]
+    for i in range(len(point)):
+        p, s, r, q = xyz[point[i]], photo_xyz[photo[i]], rotation[photo[i]], interior[photo[i]]
         x, y, dx, dy = one_image_point(
-            (xyz[point, 0] - s[0], xyz[point, 1] - s[1], xyz[point, 2] - s[2]),
+            (p[0] - s[0], p[1] - s[1], p[2] - s[2]),
             (
                 r[0, 0],
                 r[0, 1],
@@ -260,9 +261,10 @@ _COMPILED = (
 )
 
 
-def _arrays(xyz, photo_xyz, rotation, interior, form, of_ideal, ids, xy, weight, active, w, jac):
+def _arrays(
+    xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac
+):
     """image_rows, over whole arrays."""
-    point, photo = ids.T
     p = (xyz[point] - photo_xyz[photo]).T
     r = rotation.reshape(-1, 9)[photo].T
     x, y, dx, dy = one_image_point(tuple(p), tuple(r), tuple(interior[photo].T), form, of_ideal)
@@ -283,9 +285,10 @@ def image_rows(*arguments):
     xyz        (points, 3) m            photo_xyz  (photos, 3) m
     rotation   (photos, 3, 3)           interior   (photos, 13) mm
     form       tuple of 7, see Form     of_ideal   True for "distortion_of_ideal"
-    ids        (n, 2) point, photo      xy         (n, 2) measured, mm
-    weight     (n, 2) 1/sd, 1/mm        active     (k,) places of the interior parameters asked for
-    w          (n, 2) filled            jac        (n, 2, 9 + k) filled, or (0, 2, 9 + k) to leave out
+    point      (n,)                     photo      (n,)
+    xy         (n, 2) measured, mm
+    weight     (n, 2) 1/sd, 1/mm        active     (k,) places of the parameters asked for
+    w          (n, 2) filled            jac        (n, 2, 9 + k) filled, or of length 0: left out
 
     The derivatives are by point (3), photo (position 3, rotation 3), interior parameters (k).
     """

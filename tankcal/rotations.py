@@ -83,6 +83,28 @@ def rotation_vector(rotation):
     return axial / np.sinc(angle / np.pi)[:, None]
 
 
+def vector_derivatives(vector_rad):
+    """Derivatives (n, 3, 3) of the rotation vector of exp([d]x) exp([v]x) by d, at d = 0."""
+    v = np.asarray(vector_rad, dtype=float)
+    square = np.sum(v * v, axis=1)
+    half = np.sqrt(square) / 2
+    with np.errstate(invalid="ignore", divide="ignore"):
+        second = np.where(square < 1e-8, 1 / 12 + square / 720, (1 - half / np.tan(half)) / square)
+    cross = np.cross(np.eye(3), v[:, None, :]).transpose(0, 2, 1)
+    return np.eye(3) + 0.5 * cross + second[:, None, None] * (cross @ cross)
+
+
+def angle_axes(rotation):
+    """Small rotations (n, 3, 3) in the camera's frame, one column for each of omega, phi, kappa."""
+    r = np.asarray(rotation, dtype=float)
+    kappa = angles_of(r)[:, 2]
+    axes = np.zeros_like(r)
+    axes[:, :, 0] = -r[:, :, 0]
+    axes[:, 0, 1], axes[:, 1, 1] = -np.sin(kappa), -np.cos(kappa)
+    axes[:, 2, 2] = -1.0
+    return axes
+
+
 def angle_derivatives(rotation):
     """Derivatives (n, 3, 3) of omega, phi, kappa (rows) by a small rotation in the camera's frame.
 
