@@ -32,8 +32,8 @@ class Model:
     free        free(state) -> (unknowns, d) directions in which nothing is observed (a datum to be
                 chosen), or None when the observations give the datum
     name_of     name_of(column) -> what the user calls that unknown
-    inner       (unknowns,) 1 where an unknown takes part in the inner constraints, else 0; or None:
-                any datum will do
+    inner       (unknowns,) 1 where an unknown takes part in the inner constraints that choose the
+                datum of the free directions, else 0
     """
 
     reduced: int

@@ -5,15 +5,15 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
-from tankcal.gauss_markov.loops import block_cofactors, leverage, roots
+from tankcal.gauss_markov.loops import block_cofactors, block_rows, leverage, roots
 
 
 class Factor:
     """The factored reduced system: scale and Cholesky factor; eliminated parts in `normals`."""
 
-    def __init__(self, normals, scale, lower, untouched, free):
+    def __init__(self, normals, scale, lower, untouched, free, ties):
         self.normals, self.scale, self.lower = normals, scale, lower
-        self.untouched, self.free = untouched, free
+        self.untouched, self.free, self.ties = untouched, free, ties
 
     def whitened(self, columns):
         """L^-1 D columns, so that columns' S^-1 columns is a sum of squares; columns (nr, k)."""
@@ -67,7 +67,7 @@ class Solution:
 
     @cached_property
     def reduced_cofactors(self):
-        """(nr, nr) cofactor matrix of the reduced unknowns, in the datum of the factor."""
+        """(nr, nr) cofactor matrix of the reduced unknowns; not in the datum of inner constraints."""
         inverse, info = scipy.linalg.lapack.dpotri(self._factor.lower, lower=1)
         if info:
             raise ValueError("a factor that was sound before cannot be inverted")
@@ -84,20 +84,59 @@ class Solution:
     @property
     def block_cofactors(self):
         """(nb, 3, 3) cofactor matrix of each eliminated block."""
-        return self._of_blocks[0]
+        own = self._of_blocks[0]
+        if self._datum is None:
+            return own
+        columns = self._plan.reduced + np.arange(3 * self._plan.blocks).reshape(-1, 3)
+        return self._in_datum(own, columns, columns)
+
+    def reduced_blocks(self, columns):
+        """Cofactors (n, k, k) of groups (n, k) of reduced unknowns; anything where one is -1."""
+        own = self.reduced_cofactors[columns[:, :, None], columns[:, None, :]]
+        return own if self._datum is None else self._in_datum(own, columns, columns)
 
     def cofactors(self, columns):
         """Full cofactor matrix (k, k) of any unknowns, in the order given; columns (k,)."""
         columns, nr = np.asarray(columns), self._plan.reduced
         whitened = self._factor.whitened(self._through_reduced(columns))
-        # whitened' whitened by syrk: half of the work of a product
-        q = scipy.linalg.blas.dsyrk(1.0, whitened, trans=1, lower=1)
-        q += np.tril(q, -1).T
+        q = whitened.T @ whitened
         eliminated = np.flatnonzero(columns >= nr)
         if len(eliminated):
             block, axis = np.divmod(columns[eliminated] - nr, 3)
             self._add_own(q, eliminated, block, axis)
-        return q
+        return q if self._datum is None else self._in_datum(q, columns, columns)
+
+    @cached_property
+    def _datum(self):
+        """What brings cofactors into the datum of the inner constraints, None when there are none.
+
+        With T = I - G B C', B = (C'G)^-1: T Q T' = Q - G H' - H G' + G M G', H = Q C B', M = B C'H.
+        """
+        free, ties = self._factor.free, self._factor.ties
+        if free is None:
+            return None
+        inverse = np.linalg.inv(ties.T @ free)
+        h = self.times(ties) @ inverse.T
+        return free, h, inverse @ (ties.T @ h)
+
+    def _in_datum(self, q, rows, columns):
+        """Cofactors (..., r, k) between unknowns (..., r) and (..., k), brought into the datum."""
+        free, h, m = self._datum
+        g = np.swapaxes(free[columns], -1, -2)
+        return (
+            q - free[rows] @ np.swapaxes(h[columns], -1, -2) - h[rows] @ g + free[rows] @ m @ g
+        )
+
+    def times(self, matrix):
+        """Cofactor matrix times a matrix (unknowns, d), in the datum of the factor."""
+        nr, normals = self._plan.reduced, self._factor.normals
+        wide, root = block_rows(self._plan, normals.wide), roots(normals)
+        inner = np.linalg.solve(root, matrix[nr:].reshape(self._plan.blocks, 3, -1))
+        own = inner.reshape(3 * self._plan.blocks, -1)
+        reduced = self._factor.solved(matrix[:nr] - wide.T @ own)
+        own = (own - wide @ reduced).reshape(inner.shape)
+        blocks = np.linalg.solve(root.transpose(0, 2, 1), own)
+        return np.concatenate([reduced, blocks.reshape(3 * self._plan.blocks, -1)])
 
     def _through_reduced(self, columns):
         """How each unknown follows the reduced ones: (nr, k), d unknown / d reduced."""
@@ -111,16 +150,24 @@ class Solution:
         to = np.repeat(eliminated, count)
         first = np.repeat(starts[block] - np.cumsum(count) + count, count)
         entry = first + np.arange(len(to))
-        inverse = np.linalg.inv(roots(self._factor.normals))[block, :, axis]
-        inverse = np.repeat(inverse, count, axis=0)
+        inverse = np.repeat(self._inverse_roots[block, :, axis], count, axis=0)
         wide = self._factor.normals.wide[entry]
         out[self._plan.columns[entry], to] = -np.einsum("ti,ti->t", wide, inverse)
         return out
 
+    @cached_property
+    def _inverse_roots(self):
+        """L^-1 (nb, 3, 3) of each block."""
+        a, b, c, d, e, f = self._factor.normals.v.T
+        inverse = np.zeros((self._plan.blocks, 3, 3))
+        inverse[:, 0, 0], inverse[:, 1, 1], inverse[:, 2, 2] = 1 / a, 1 / c, 1 / f
+        inverse[:, 1, 0], inverse[:, 2, 1] = -b / (a * c), -e / (c * f)
+        inverse[:, 2, 0] = (b * e / c - d) / (a * f)
+        return inverse
+
     def _add_own(self, q, places, block, axis):
         """Add V^-1 between the unknowns at `places` that belong to one block."""
-        inverse = np.linalg.inv(roots(self._factor.normals))
-        inverse = inverse.transpose(0, 2, 1) @ inverse
+        inverse = self._inverse_roots.transpose(0, 2, 1) @ self._inverse_roots
         order = np.argsort(block, kind="stable")
         for shift in range(3):  # pairs that lie 0, 1 or 2 apart once sorted by block
             i, j = order[: len(order) - shift], order[shift:]

@@ -15,6 +15,10 @@ FIRST_DAMPING = 1e-4
 STRONGEST_DAMPING = 1e12
 
 
+class UndeterminedError(SolutionError):
+    """Some unknowns are not determined by the observations."""
+
+
 def solve(model, state, *, max_iterations=100, tolerance=1e-5):
     """Minimise the sum of squared rows of a Model, starting from `state`.
 
@@ -34,6 +38,9 @@ def solve(model, state, *, max_iterations=100, tolerance=1e-5):
             continue
         step, decrement = work.step(factor)
         if damping == 0.0 and decrement < limit:
+            if len(factor.untouched):
+                names = ", ".join(model.name_of(int(column)) for column in factor.untouched)
+                raise UndeterminedError(f"no observation says anything about: {names}")
             state = model.moved(state, step)
             cost = work.evaluate(state, derivatives=False)
             return Solution(model, work.plan, factor, state, work.w, work.jac, cost, iteration)
@@ -87,7 +94,7 @@ class _Work:
             diagonal[untouched] = 1.0
         bad = eliminate(self.plan, normals, damping, SMALLEST_PIVOT)
         if bad >= 0:
-            return self._look(state, damping, bad)
+            return self._look(damping, bad)
         scale = 1.0 / np.sqrt(diagonal)
         s = normals.t[:nr, :nr] + normals.t[:nr, :nr].T
         corner = np.einsum("ii->i", s)
@@ -95,23 +102,24 @@ class _Work:
         corner[untouched] = 1.0
         s *= scale
         s *= scale[:, None]
-        free = None
+        free = ties = None
         if damping:
             corner += damping
         elif self.model.free is not None:
             free = self.model.free(state)
+            ties = free * self.model.inner[:, None]
             held = np.linalg.qr(free[:nr] / scale[:, None])[0]
             s += held @ held.T
         lower, info = scipy.linalg.lapack.dpotrf(s.T, lower=1, clean=0, overwrite_a=1)
         if info or (nr and lower.diagonal().min() ** 2 < SMALLEST_PIVOT):
-            return self._look(state, damping, None)
-        return Factor(normals, scale, lower, np.flatnonzero(untouched), free)
+            return self._look(damping, None)
+        return Factor(normals, scale, lower, np.flatnonzero(untouched), free, ties)
 
-    def _look(self, state, damping, bad_block):
+    def _look(self, damping, bad_block):
         """A factor that could not be had: raise when it is the survey's fault."""
-        found = None if damping else diagnosis(self, state, bad_block)
+        found = None if damping else diagnosis(self, bad_block)
         if found:
-            raise SolutionError(found)
+            raise UndeterminedError(found)
 
     def step(self, factor):
         """Gauss-Newton step (unknowns,) and the squared size of what it changes in the rows."""
@@ -119,5 +127,7 @@ class _Work:
         reduced = -factor.solved(n.g[:-1])
         blocks = -back_substitute(self.plan, n, reduced)
         step = np.concatenate([reduced, blocks.ravel()])
+        if factor.free is not None:
+            step -= factor.free @ np.linalg.solve(factor.ties.T @ factor.free, factor.ties.T @ step)
         decrement = -float(n.g[:-1] @ reduced) + float(np.vdot(n.b, n.b))
         return step, decrement
