@@ -14,6 +14,7 @@ from types import FunctionType, SimpleNamespace
 FAST = {"contract", "reassoc", "nsz"}  # sums in any order; NaN and infinity stay what they are
 
 
+@cache
 def available():
     """True when loops can be compiled; TANKCAL_COMPILED=0 turns that off."""
     if os.environ.get("TANKCAL_COMPILED", "1") == "0":

@@ -56,20 +56,15 @@ def looking(azimuth_rad, tilt_rad, roll_rad):
 
 def turned(rotation, small_rad):
     """Rotation matrices (n, 3, 3) after exp([d]x) R, d = small_rad (n, 3)."""
-    x, y, z = np.asarray(small_rad, dtype=float).T
-    square = x * x + y * y + z * z
-    angle = np.sqrt(square)
-    first = np.sinc(angle / np.pi)
-    second = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
-    exponential = np.empty((len(x), 3, 3))
-    exponential[:, 0, 0] = 1 - second * (y * y + z * z)
-    exponential[:, 1, 1] = 1 - second * (x * x + z * z)
-    exponential[:, 2, 2] = 1 - second * (x * x + y * y)
-    for i, j, d in ((0, 1, z), (2, 0, y), (1, 2, x)):
-        other = (x, y, z)[i] * (x, y, z)[j]
-        exponential[:, i, j] = second * other - first * d
-        exponential[:, j, i] = second * other + first * d
-    return exponential @ rotation
+    d = np.asarray(small_rad, dtype=float)
+    cross = np.zeros((len(d), 3, 3))
+    cross[:, [2, 0, 1], [1, 2, 0]] = d
+    cross[:, [1, 2, 0], [2, 0, 1]] = -d
+    half = 0.5 * np.sqrt(np.einsum("ni,ni->n", d, d))
+    half = np.maximum(half, 1e-30)[:, None, None]
+    first, second = np.sin(2 * half) / (2 * half), 0.5 * (np.sin(half) / half) ** 2
+    turned_by = first * cross + second * (cross @ cross)
+    return rotation + turned_by @ rotation
 
 
 def rotation_vector(rotation):

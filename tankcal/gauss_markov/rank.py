@@ -47,9 +47,7 @@ def undetermined(work):
     found = []
     for vector in vectors[:, values < FAINT].T:
         reduced = vector * scale[:nr]
-        direction = np.concatenate(
-            [reduced, -back_substitute(work.plan, normals, reduced).ravel()]
-        )
+        direction = np.concatenate([reduced, -back_substitute(work.plan, normals, reduced).ravel()])
         length = np.linalg.norm(direction / scale)
         if _felt(work, direction) < NOTHING * length:
             found.append(direction / scale / length)

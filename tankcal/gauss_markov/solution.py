@@ -67,7 +67,7 @@ class Solution:
 
     @cached_property
     def reduced_cofactors(self):
-        """(nr, nr) cofactor matrix of the reduced unknowns; not in the datum of inner constraints."""
+        """(nr, nr) cofactors of the reduced unknowns, before any inner constraints."""
         inverse, info = scipy.linalg.lapack.dpotri(self._factor.lower, lower=1)
         if info:
             raise ValueError("a factor that was sound before cannot be inverted")
@@ -123,9 +123,7 @@ class Solution:
         """Cofactors (..., r, k) between unknowns (..., r) and (..., k), brought into the datum."""
         free, h, m = self._datum
         g = np.swapaxes(free[columns], -1, -2)
-        return (
-            q - free[rows] @ np.swapaxes(h[columns], -1, -2) - h[rows] @ g + free[rows] @ m @ g
-        )
+        return q - free[rows] @ np.swapaxes(h[columns], -1, -2) - h[rows] @ g + free[rows] @ m @ g
 
     def times(self, matrix):
         """Cofactor matrix times a matrix (unknowns, d), in the datum of the factor."""

@@ -13,6 +13,7 @@ from tankcal.gauss_markov.solution import Factor, Solution
 SMALLEST_PIVOT = 1e-12  # of a scaled normal matrix; below it the rank is looked at
 FIRST_DAMPING = 1e-4
 STRONGEST_DAMPING = 1e12
+NEARLY_THERE = 1e-3  # of the cost, still to be gained: from here on undamped
 
 
 class UndeterminedError(SolutionError):
@@ -37,20 +38,27 @@ def solve(model, state, *, max_iterations=100, tolerance=1e-5):
             damping = _stronger(damping)
             continue
         step, decrement = work.step(factor)
-        if damping == 0.0 and decrement < limit:
-            if len(factor.untouched):
-                names = ", ".join(model.name_of(int(column)) for column in factor.untouched)
-                raise UndeterminedError(f"no observation says anything about: {names}")
-            state = model.moved(state, step)
-            cost = work.evaluate(state, derivatives=False)
-            return Solution(model, work.plan, factor, state, work.w, work.jac, cost, iteration)
+        if damping and decrement < NEARLY_THERE * cost:
+            damping = 0.0
+            continue
         candidate = model.moved(state, step)
+        if not damping and decrement < limit:
+            _refuse_untouched(model, factor)
+            cost = work.evaluate(candidate, derivatives=False)
+            return Solution(model, work.plan, factor, candidate, work.w, work.jac, cost, iteration)
         before, cost = cost, work.evaluate(candidate)
         if cost <= before * (1 + 1e-12):
-            state, damping = candidate, 0.0 if damping <= FIRST_DAMPING else damping / 10
+            gain = 2 * (before - cost) / decrement
+            state, damping = candidate, damping * max(1 / 3, 1 - (2 * gain - 1) ** 3)
         else:
             cost, damping = work.evaluate(state), _stronger(damping)
     raise SolutionError(f"the adjustment did not converge in {max_iterations} iterations")
+
+
+def _refuse_untouched(model, factor):
+    if len(factor.untouched):
+        names = ", ".join(model.name_of(int(column)) for column in factor.untouched)
+        raise UndeterminedError(f"no observation says anything about: {names}")
 
 
 def _stronger(damping):

@@ -3,7 +3,7 @@
 from tankcal.errors import SolutionError
 from tankcal.gauss_markov import UndeterminedError, solve
 from tankcal.network.assembly import assemble
-from tankcal.network.datum import chosen, in_words, unobserved
+from tankcal.network.datum import held, in_words, unobserved
 from tankcal.network.results import Adjusted
 
 
@@ -22,7 +22,7 @@ def adjust(survey, *, datum="control", over=None, tolerance=1e-5, max_iterations
     if datum == "inner":
         free = unobserved(problem.observations, problem.layout, problem.state)
         if free.shape[1]:
-            problem = assemble(survey, chosen(len(survey.points), over, free))
+            problem = held(problem, over, free)
     try:
         solution = solve(
             problem.model, problem.state, tolerance=tolerance, max_iterations=max_iterations
@@ -33,4 +33,3 @@ def adjust(survey, *, datum="control", over=None, tolerance=1e-5, max_iterations
             raise SolutionError(in_words(free)) from error
         raise
     return Adjusted(survey, problem, solution)
-

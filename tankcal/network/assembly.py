@@ -7,6 +7,7 @@ import numpy as np
 from tankcal.camera import PARAMETERS
 from tankcal.errors import SolutionError
 from tankcal.gauss_markov import Group, Model
+from tankcal.network.survey import SCOPES
 from tankcal.observations import (
     ControlCoordinates,
     ImageCoordinates,
@@ -39,11 +40,8 @@ class Problem:
     interior_of: np.ndarray
 
 
-def assemble(survey, datum=None):
-    """The Problem of a Survey; raises SolutionError when something cannot be determined.
-
-    datum  function (layout, state) -> (free, inner) that goes into the model, or None
-    """
+def assemble(survey):
+    """The Problem of a Survey; raises SolutionError when something cannot be determined."""
     images, others, set_aside = _usable(survey)
     centre = _centre(survey)
     table, values, interior_free, known = _interior(survey)
@@ -57,14 +55,11 @@ def assemble(survey, datum=None):
     groups += others
     rows_of += [None] * len(others)
     state = _state(survey, centre, values)
-    free, inner = (None, None) if datum is None else datum(layout, state)
     model = Model(
         reduced=reduced,
         blocks=int(np.count_nonzero(eliminated)),
         groups=tuple(Group(one.columns(layout), one.rows, one.fill) for one in groups),
         moved=layout.moved,
-        free=free,
-        inner=inner,
         name_of=lambda column: name_of(survey, layout, table, column),
     )
     return Problem(
@@ -108,7 +103,12 @@ def _taken(images, keep):
     use = None if images.use is None else images.use[keep]
     point, photo = images.point[keep], images.photo[keep]
     return replace(
-        images, point=point, photo=photo, xy_mm=images.xy_mm[keep], sd_mm=images.sd_mm[keep], use=use
+        images,
+        point=point,
+        photo=photo,
+        xy_mm=images.xy_mm[keep],
+        sd_mm=images.sd_mm[keep],
+        use=use,
     )
 
 
@@ -138,24 +138,22 @@ def _interior(survey):
     photos = survey.photos
     if photos is None:
         return np.zeros((0, 13), dtype=int), np.zeros(1), np.zeros(1, dtype=bool), []
-    table = np.empty((len(photos.names), 13), dtype=int)
-    place, values, free, known = {}, [], [], []
-    for number in range(13):
-        for camera, settings in enumerate(survey.cameras):
-            mine = np.flatnonzero(photos.camera == camera)
-            scope = settings.scope[number]
-            if scope == "off":
-                table[mine, number] = -1
-                continue
-            for group in np.split(mine, np.arange(1, len(mine))) if scope == "photo" else [mine]:
-                key = (number, {"block": -1, "camera": camera}.get(scope, (camera, tuple(group))))
-                if key not in place:
-                    place[key] = len(values)
-                    values.append(settings.values[number])
-                    free.append(settings.state[number] != "fixed")
-                    if settings.state[number] == "weighted":
-                        known.append((place[key], values[-1], settings.sd[number]))
-                table[group, number] = place[key]
+    table = np.full((len(photos.names), 13), -1)
+    values, free, known, shared = [], [], [], {}
+    for camera, settings in enumerate(survey.cameras):
+        mine = np.flatnonzero(photos.camera == camera)
+        wanted = [[k for k in range(13) if settings.scope[k] == scope] for scope in SCOPES]
+        each = [(shared, mine, wanted[1]), ({}, mine, wanted[2])]
+        each += [({}, [photo], wanted[3]) for photo in mine] if wanted[3] else []
+        for place, group, numbers in each:
+            for k in numbers:
+                if k not in place:
+                    place[k] = len(values)
+                    values.append(settings.values[k])
+                    free.append(settings.state[k] != "fixed")
+                    if settings.state[k] == "weighted":
+                        known.append((place[k], values[-1], settings.sd[k]))
+                table[group, k] = place[k]
     table[table < 0] = len(values)
     observed = []
     if known:
@@ -199,7 +197,9 @@ def _eliminated(survey, others, set_aside):
 def _layout(survey, eliminated, set_aside, interior_free):
     """The Layout, reduced unknowns first, and how many of these there are."""
     photos, points = survey.photos, len(survey.points)
-    free_points = np.repeat(np.array([not why for why in set_aside], dtype=bool)[:, None], 3, axis=1)
+    free_points = np.repeat(
+        np.array([not why for why in set_aside], dtype=bool)[:, None], 3, axis=1
+    )
     if survey.fixed is not None:
         free_points &= ~survey.fixed
     free_photos = np.ones((0 if photos is None else len(photos.names), 6), dtype=bool)

@@ -6,10 +6,13 @@ distances changes. Source: Koch 1999, Parameter Estimation and Hypothesis Testin
 Meissl 1969.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 WAYS = ("x", "y", "z", "about X", "about Y", "about Z", "scale")
 UNFELT = 1e-8  # change of the whitened rows, with all columns scaled to length one
+AS_IF_FIXED = 1e4  # weight of a fixed unknown among the rows, as if it were known to 0.1 mm
 
 
 def directions(layout, state):
@@ -61,8 +64,10 @@ def _of_places(xyz):
 def unobserved(groups, layout, state):
     """Combinations (7, d) of the seven ways that neither observations nor fixed unknowns feel."""
     whole = np.vstack([directions(layout, state), np.zeros(7)])
-    felt, lengths = [], np.zeros(len(whole))
+    felt, lengths = [np.zeros((1, 7))], np.zeros(len(whole))
     for one in groups:
+        if not one.feels_datum:
+            continue
         columns = one.columns(layout)
         w = np.empty((len(one), one.rows))
         jac = np.empty((len(one), one.rows, columns.shape[1]))
@@ -70,12 +75,13 @@ def unobserved(groups, layout, state):
         moved = np.einsum("nmk,nkd->nmd", jac, whole[columns]).reshape(-1, 7)
         felt.append(np.linalg.qr(moved, mode="r"))
         np.add.at(lengths, columns, np.einsum("nmk,nmk->nk", jac, jac))
-    size = np.sqrt(np.sum((whole[:-1] ** 2) * lengths[:-1, None], axis=0))
-    size[size == 0] = 1.0
+    square = (whole[:-1] ** 2).T @ lengths[:-1]
     for columns, derivative in _parts(layout, state):
-        fixed = derivative[columns < 0].reshape(-1, 7)
+        fixed = AS_IF_FIXED * derivative[columns < 0].reshape(-1, 7)
         if len(fixed):
-            felt.append(1e3 * np.linalg.qr(fixed, mode="r") * np.where(size > 0, size, 1))
+            felt.append(np.linalg.qr(fixed, mode="r"))
+            square += np.sum(fixed**2, axis=0)
+    size = np.sqrt(np.where(square > 0, square, 1.0))
     _, singular, vectors = np.linalg.svd(np.vstack(felt) / size)
     rank = int(np.sum(singular > UNFELT))
     return (vectors[rank:] / size).T
@@ -112,18 +118,17 @@ def in_words(combinations):
     )
 
 
-def chosen(survey_points, over, combinations):
-    """What makes the datum by inner constraints over chosen points: see assemble.
+def held(problem, over, combinations):
+    """The Problem with a datum by inner constraints over chosen points.
 
-    survey_points  number of points
-    over           (k,) points that take part, or None: all
-    combinations   (7, d) from `unobserved`
+    over          (k,) points that take part, or None: all
+    combinations  (7, d) from `unobserved`
     """
+    layout, mask = problem.layout, np.zeros(problem.model.unknowns + 1)
+    members = slice(None) if over is None else np.asarray(over)
+    mask[layout.points[members].ravel()] = 1.0
 
-    def make(layout, state):
-        mask = np.zeros(unknowns(layout) + 1)
-        members = np.arange(survey_points) if over is None else np.asarray(over)
-        mask[layout.points[members].ravel()] = 1.0
-        return (lambda now: directions(layout, now) @ combinations), mask[:-1]
+    def free(state):
+        return directions(layout, state) @ combinations
 
-    return make
+    return replace(problem, model=replace(problem.model, free=free, inner=mask[:-1]))

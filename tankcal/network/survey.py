@@ -8,6 +8,7 @@ from tankcal.camera import PARAMETERS, Form
 
 SCOPES = ("off", "block", "camera", "photo")
 STATES = ("free", "weighted", "fixed")
+DEFAULT_SCOPE = tuple("off" if name in ("K4", "P3", "P4") else "camera" for name in PARAMETERS)
 
 
 @dataclass(frozen=True)
@@ -23,9 +24,9 @@ class Camera:
     """
 
     values: np.ndarray
-    form: Form = Form()
+    form: Form = field(default_factory=Form)
     sd: np.ndarray = field(default_factory=lambda: np.full(13, np.nan))
-    scope: tuple = ("camera",) * 6 + ("off", "camera", "camera", "off", "off", "camera", "camera")
+    scope: tuple = DEFAULT_SCOPE
     state: tuple = ("free",) * 13
     name: str = "camera"
 
@@ -118,8 +119,3 @@ class Survey:
     sets: np.ndarray = field(default_factory=lambda: np.zeros(0))
     instruments: tuple = ()
     systems: tuple = ()
-
-
-def parameter(name):
-    """Place of an interior parameter in PARAMETERS."""
-    return PARAMETERS.index(name)

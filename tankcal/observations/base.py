@@ -94,6 +94,7 @@ class Observations:
     kind = "observation"
     unit = "m"
     rows = 1
+    feels_datum = True  # False: no motion or scale of the whole survey changes it
     ties = ()  # names of the fields that hold points
 
     def __len__(self):

@@ -33,6 +33,7 @@ class ImageCoordinates(Observations):
     interior_of: np.ndarray
 
     kind, unit, rows, ties = "image coordinate", "mm", 2, ("point",)
+    feels_datum = False
 
     @property
     def _per_row(self):
