@@ -16,7 +16,20 @@ import scipy.sparse
 
 from tankcal.compiled import available, compiled
 
-_COMPILED = ("_add_rows", "_add_plain_rows", "_eliminate", "_back", "_cofactors", "_leverage")
+TOGETHER = 32  # blocks with the same columns that are eliminated at once
+BY_HAND = 2000  # elements; above it a product is worth a call of BLAS
+_COMPILED = (
+    "_add_rows",
+    "_add_plain_rows",
+    "_root",
+    "_forward",
+    "_forward_all",
+    "_subtract",
+    "_eliminate",
+    "_back",
+    "_cofactors",
+    "_leverage",
+)
 
 
 def _add_plain_rows(w, jac, columns, t, g):
@@ -72,57 +85,98 @@ def _add_rows(w, jac, block, columns, places, cuts, v, wide, b, t, g):
                         t[c[a], c[q]] += f[a] * f[q]
 
 
-def _eliminate(v, wide, b, starts, columns, runs, ends, t, g, damping, smallest):
-    """Returns the number of the first block that is not determined, or -1."""
+def _root(v, damping, smallest):
+    """Cholesky factor of a block, in place (six numbers); False when it is not determined."""
+    d1, d2, more = v[2], v[5], 1.0 + damping
+    q0 = v[0] * more
+    l00 = np.sqrt(q0)
+    l10, l20 = v[1] / l00, v[3] / l00
+    q1 = d1 * more - l10 * l10
+    l11 = np.sqrt(max(q1, 0.0))
+    l21 = (v[4] - l20 * l10) / l11
+    q2 = d2 * more - l20 * l20 - l21 * l21
+    if not (q0 > 0.0 and q1 > smallest * d1 and q2 > smallest * d2):
+        return False
+    v[0], v[1], v[2], v[3], v[4], v[5] = l00, l10, l11, l20, l21, np.sqrt(q2)
+    return True
+
+
+def _forward(v, b):
+    """b becomes L^-1 b."""
+    b[0] = b[0] / v[0]
+    b[1] = (b[1] - v[1] * b[0]) / v[2]
+    b[2] = (b[2] - v[3] * b[0] - v[4] * b[1]) / v[5]
+
+
+def _forward_all(v, part, b, y, g, columns):
+    """The wide part of a block becomes Y, also in three rows of y; g loses Y b."""
+    l10, l20, l21 = v[1], v[3], v[4]
+    i0, i1, i2 = 1.0 / v[0], 1.0 / v[2], 1.0 / v[5]
+    b0, b1, b2 = b[0], b[1], b[2]
+    for a in range(len(columns)):
+        w0 = part[a, 0] * i0
+        w1 = (part[a, 1] - l10 * w0) * i1
+        w2 = (part[a, 2] - l20 * w0 - l21 * w1) * i2
+        part[a, 0], part[a, 1], part[a, 2] = w0, w1, w2
+        y[0, a], y[1, a], y[2, a] = w0, w1, w2
+        g[columns[a]] -= w0 * b0 + w1 * b1 + w2 * b2
+
+
+def _subtract(t, columns, runs, first, product):
+    """Take a product (n, n), its upper half, from the places of its columns in t."""
+    for one in range(len(runs) - 1):
+        for a in range(runs[one] - first, runs[one + 1] - first):
+            for other in range(one, len(runs) - 1):
+                begin, end = max(a, runs[other] - first), runs[other + 1] - first
+                to = columns[begin]
+                line, part = t[columns[a], to : to + end - begin], product[a, begin:end]
+                for q in range(end - begin):
+                    line[q] -= part[q]
+
+
+def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, smallest):
+    """Returns the number of the first block that is not determined, or -1.
+
+    Blocks alike[k] to alike[k + 1] have the same columns: they leave t together.
+    """
     longest = 0
     for o in range(len(b)):
         longest = max(longest, starts[o + 1] - starts[o])
-    y0, y1, y2 = np.empty(longest), np.empty(longest), np.empty(longest)
-    bad = -1
-    for o in range(len(b)):
-        d0, d1, d2 = v[o, 0], v[o, 2], v[o, 5]
-        more = 1.0 + damping
-        q0 = d0 * more
-        l00 = np.sqrt(q0)
-        l10, l20 = v[o, 1] / l00, v[o, 3] / l00
-        q1 = d1 * more - l10 * l10
-        l11 = np.sqrt(max(q1, 0.0))
-        l21 = (v[o, 4] - l20 * l10) / l11
-        q2 = d2 * more - l20 * l20 - l21 * l21
-        if not (q0 > 0.0 and q1 > smallest * d1 and q2 > smallest * d2):
-            if bad < 0:
-                bad = o
-            continue
-        l22 = np.sqrt(q2)
-        v[o, 0], v[o, 1], v[o, 2] = l00, l10, l11
-        v[o, 3], v[o, 4], v[o, 5] = l20, l21, l22
-        b0 = b[o, 0] / l00
-        b1 = (b[o, 1] - l10 * b0) / l11
-        b2 = (b[o, 2] - l20 * b0 - l21 * b1) / l22
-        b[o, 0], b[o, 1], b[o, 2] = b0, b1, b2
-        first = starts[o]
-        n = starts[o + 1] - first
-        for a in range(n):
-            line = wide[first + a]
-            w0 = line[0] / l00
-            w1 = (line[1] - l10 * w0) / l11
-            w2 = (line[2] - l20 * w0 - l21 * w1) / l22
-            line[0], line[1], line[2] = w0, w1, w2
-            y0[a], y1[a], y2[a] = w0, w1, w2
-            g[columns[first + a]] -= w0 * b0 + w1 * b1 + w2 * b2
-        for one in range(runs[o], runs[o + 1]):
-            for a in range(ends[one], ends[one + 1]):
-                w0, w1, w2 = -y0[a - first], -y1[a - first], -y2[a - first]
-                for other in range(one, runs[o + 1]):
-                    begin, end = max(a, ends[other]), ends[other + 1]
-                    to = columns[begin]
-                    line = t[columns[a], to : to + end - begin]
-                    u0 = y0[begin - first : end - first]
-                    u1 = y1[begin - first : end - first]
-                    u2 = y2[begin - first : end - first]
-                    for q in range(end - begin):
-                        line[q] += w0 * u0[q] + w1 * u1[q] + w2 * u2[q]
-    return bad
+    store, square = np.empty(3 * TOGETHER * longest), np.empty(longest * longest)
+    for k in range(len(alike) - 1):
+        first = starts[alike[k]]
+        n = starts[alike[k] + 1] - first
+        mine = columns[first : first + n]
+        edges = ends[runs[alike[k]] : runs[alike[k] + 1] + 1]
+        for begin in range(alike[k], alike[k + 1], TOGETHER):
+            count = min(TOGETHER, alike[k + 1] - begin)
+            y = store[: 3 * count * n].reshape((3 * count, n))
+            for o in range(begin, begin + count):
+                if not _root(v[o], damping, smallest):
+                    return o
+                _forward(v[o], b[o])
+                row = 3 * (o - begin)
+                part = wide[starts[o] : starts[o] + n]
+                _forward_all(v[o], part, b[o], y[row : row + 3], g, mine)
+            product = square[: n * n].reshape((n, n))
+            if 3 * count * n > BY_HAND:
+                np.dot(y.T, y, product)
+                _subtract(t, mine, edges, first, product)
+            elif count == 1:
+                for a in range(n):
+                    w0, w1, w2, line = -y[0, a], -y[1, a], -y[2, a], t[mine[a]]
+                    for q in range(a, n):
+                        line[mine[q]] += w0 * y[0, q] + w1 * y[1, q] + w2 * y[2, q]
+            else:
+                product[:] = 0.0
+                for row in range(0, 3 * count, 3):
+                    y0, y1, y2 = y[row], y[row + 1], y[row + 2]
+                    for a in range(n):
+                        w0, w1, w2, line = y0[a], y1[a], y2[a], product[a]
+                        for q in range(a, n):
+                            line[q] += w0 * y0[q] + w1 * y1[q] + w2 * y2[q]
+                _subtract(t, mine, edges, first, product)
+    return -1
 
 
 def _back(v, wide, b, starts, columns, reduced, out):
@@ -237,7 +291,7 @@ def eliminate(plan, normals, damping, smallest):
     if available():
         return compiled(sys.modules[__name__], _COMPILED)._eliminate(
             normals.v, normals.wide, normals.b, plan.starts, plan.columns, plan.runs, plan.ends,
-            normals.t, normals.g, damping, smallest,
+            plan.alike, normals.t, normals.g, damping, smallest,
         )  # fmt: skip
     v = np.zeros((plan.blocks, 3, 3))
     v[:, *np.tril_indices(3)] = normals.v

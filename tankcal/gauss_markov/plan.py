@@ -50,6 +50,7 @@ class Plan:
     columns           (t,) reduced columns of all blocks, ascending in each
     ends              (s + 1,) where in `columns` runs of neighbouring columns begin, t at the end
     runs              (nb + 1,) where in `ends` each block begins
+    alike             where series of neighbouring blocks with the same columns begin; nb at the end
     """
 
     reduced: int
@@ -59,6 +60,7 @@ class Plan:
     columns: np.ndarray
     ends: np.ndarray
     runs: np.ndarray
+    alike: np.ndarray
 
 
 def plan(reduced, blocks, groups):
@@ -86,7 +88,10 @@ def plan(reduced, blocks, groups):
     begins = np.ones(len(columns), dtype=bool)
     begins[1:] = (np.diff(columns) != 1) | (np.diff(owner) != 0)
     ends = np.append(np.flatnonzero(begins), len(columns))
-    return Plan(reduced, blocks, batches, starts, columns, ends, np.searchsorted(ends, starts))
+    changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
+    alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
+    runs = np.searchsorted(ends, starts)
+    return Plan(reduced, blocks, batches, starts, columns, ends, runs, alike)
 
 
 def _cuts(columns, spare):

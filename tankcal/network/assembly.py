@@ -225,8 +225,14 @@ def _layout(survey, eliminated, set_aside, interior_free):
     orientation = columns(np.ones(len(survey.sets), dtype=bool))
     of_points = columns(free_points & ~eliminated[:, None])
     reduced = next_column
-    last = columns(np.repeat(eliminated[:, None], 3, axis=1))
-    of_points = np.where(eliminated[:, None], last, of_points).reshape(points, 3)
+    last = np.flatnonzero(eliminated)
+    if survey.image_points is not None:  # points in the same photos next to one another
+        mark = np.random.default_rng(0).random(len(free_photos))
+        seen = np.bincount(
+            survey.image_points.point, weights=mark[survey.image_points.photo], minlength=points
+        )
+        last = last[np.argsort(seen[last], kind="stable")]
+    of_points[last] = next_column + np.arange(3 * len(last)).reshape(-1, 3)
     return Layout(of_points, of_photos, interior, orientation, scale, offset, system), reduced
 
 
