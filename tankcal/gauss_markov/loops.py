@@ -17,7 +17,7 @@ import scipy.sparse
 from tankcal.compiled import available, compiled
 
 TOGETHER = 32  # blocks with the same columns that are eliminated at once
-BY_HAND = 2000  # elements; above it a product is worth a call of BLAS
+BY_HAND = 500  # elements; above it a product is worth a call of BLAS
 _COMPILED = (
     "_add_rows",
     "_add_plain_rows",
@@ -25,6 +25,7 @@ _COMPILED = (
     "_forward",
     "_forward_all",
     "_subtract",
+    "_leave",
     "_eliminate",
     "_back",
     "_cofactors",
@@ -134,6 +135,28 @@ def _subtract(t, columns, runs, first, product):
                     line[q] -= part[q]
 
 
+def _leave(t, columns, runs, first, y, product):
+    """Take Y'Y, its upper half, from the places of its columns in t; y (3 blocks, n)."""
+    n = len(columns)
+    if y.size > BY_HAND:
+        np.dot(y.T, y, product)
+        _subtract(t, columns, runs, first, product)
+    elif len(y) == 3:
+        for a in range(n):
+            w0, w1, w2, line = -y[0, a], -y[1, a], -y[2, a], t[columns[a]]
+            for q in range(a, n):
+                line[columns[q]] += w0 * y[0, q] + w1 * y[1, q] + w2 * y[2, q]
+    else:
+        product[:] = 0.0
+        for row in range(0, len(y), 3):
+            y0, y1, y2 = y[row], y[row + 1], y[row + 2]
+            for a in range(n):
+                w0, w1, w2, line = y0[a], y1[a], y2[a], product[a]
+                for q in range(a, n):
+                    line[q] += w0 * y0[q] + w1 * y1[q] + w2 * y2[q]
+        _subtract(t, columns, runs, first, product)
+
+
 def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, smallest):
     """Returns the number of the first block that is not determined, or -1.
 
@@ -158,24 +181,7 @@ def _eliminate(v, wide, b, starts, columns, runs, ends, alike, t, g, damping, sm
                 row = 3 * (o - begin)
                 part = wide[starts[o] : starts[o] + n]
                 _forward_all(v[o], part, b[o], y[row : row + 3], g, mine)
-            product = square[: n * n].reshape((n, n))
-            if 3 * count * n > BY_HAND:
-                np.dot(y.T, y, product)
-                _subtract(t, mine, edges, first, product)
-            elif count == 1:
-                for a in range(n):
-                    w0, w1, w2, line = -y[0, a], -y[1, a], -y[2, a], t[mine[a]]
-                    for q in range(a, n):
-                        line[mine[q]] += w0 * y[0, q] + w1 * y[1, q] + w2 * y[2, q]
-            else:
-                product[:] = 0.0
-                for row in range(0, 3 * count, 3):
-                    y0, y1, y2 = y[row], y[row + 1], y[row + 2]
-                    for a in range(n):
-                        w0, w1, w2, line = y0[a], y1[a], y2[a], product[a]
-                        for q in range(a, n):
-                            line[q] += w0 * y0[q] + w1 * y1[q] + w2 * y2[q]
-                _subtract(t, mine, edges, first, product)
+            _leave(t, mine, edges, first, y, square[: n * n].reshape((n, n)))
     return -1
 
 

@@ -178,10 +178,15 @@ class Solution:
 
     def redundancy(self):
         """Redundancy numbers, a list of (n, m): the part of each error that its residual shows."""
-        numbers = [np.ones(w.shape) for w in self.misclosures]
+        return [1.0 - self.leverage(g, jac) for g, jac in enumerate(self.jacobians)]
+
+    def leverage(self, group, jac):
+        """J Q J' of each row (n, m) of a group; jac (n, m, K) ordered as the group's."""
+        out = np.zeros(jac.shape[:2])
         cofactors, cross = self._of_blocks
         for batch in self._plan.batches:
-            jac = batch.of(self.jacobians[batch.group])
-            found = leverage(self._plan, batch, jac, self.reduced_cofactors, cross, cofactors)
-            numbers[batch.group][batch.rows] -= found
-        return numbers
+            if batch.group == group:
+                out[batch.rows] = leverage(
+                    self._plan, batch, batch.of(jac), self.reduced_cofactors, cross, cofactors
+                )
+        return out

@@ -13,14 +13,14 @@ from tankcal.gauss_markov.solution import Factor, Solution
 SMALLEST_PIVOT = 1e-12  # of a scaled normal matrix; below it the rank is looked at
 FIRST_DAMPING = 1e-4
 STRONGEST_DAMPING = 1e12
-NEARLY_THERE = 1e-3  # of the cost, still to be gained: from here on undamped
+NEARLY_THERE = 1e-2  # of the cost, still to be gained: from here on undamped
 
 
 class UndeterminedError(SolutionError):
     """Some unknowns are not determined by the observations."""
 
 
-def solve(model, state, *, max_iterations=100, tolerance=1e-5):
+def solve(model, state, *, max_iterations=100, tolerance=1e-4):
     """Minimise the sum of squared rows of a Model, starting from `state`.
 
     tolerance  of the last step: root of the sum of squares of what it changes in the rows, per root
@@ -38,9 +38,6 @@ def solve(model, state, *, max_iterations=100, tolerance=1e-5):
             damping = _stronger(damping)
             continue
         step, decrement = work.step(factor)
-        if damping and decrement < NEARLY_THERE * cost:
-            damping = 0.0
-            continue
         candidate = model.moved(state, step)
         if not damping and decrement < limit:
             _refuse_untouched(model, factor)
@@ -49,7 +46,9 @@ def solve(model, state, *, max_iterations=100, tolerance=1e-5):
         before, cost = cost, work.evaluate(candidate)
         if cost <= before * (1 + 1e-12):
             gain = 2 * (before - cost) / decrement
-            state, damping = candidate, damping * max(1 / 3, 1 - (2 * gain - 1) ** 3)
+            nearly_there = decrement < NEARLY_THERE * cost
+            damping = 0.0 if nearly_there else damping * max(1 / 3, 1 - (2 * gain - 1) ** 3)
+            state = candidate
         else:
             cost, damping = work.evaluate(state), _stronger(damping)
     raise SolutionError(f"the adjustment did not converge in {max_iterations} iterations")

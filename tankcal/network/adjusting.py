@@ -7,7 +7,7 @@ from tankcal.network.datum import held, in_words, unobserved
 from tankcal.network.results import Adjusted
 
 
-def adjust(survey, *, datum="control", over=None, tolerance=1e-5, max_iterations=100):
+def adjust(survey, *, datum="control", over=None, tolerance=1e-4, max_iterations=100):
     """Least squares of all observations of a Survey.
 
     datum      "control": whatever is known of points and photos must fix it; "inner": what is not

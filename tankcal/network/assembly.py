@@ -24,7 +24,9 @@ class Problem:
 
     model, state, layout   for the solver
     observations           tuple, one for each group of the model
-    rows_of                for each group the user's row numbers, or None (as given)
+    sources                for each group where it comes from: "image points", a number in
+                           Survey.observations, or "known beforehand"
+    rows_of                for each group its rows' numbers there
     set_aside              (points,) why a point does not take part; empty string: it does
     eliminated             (points,) True when a point is eliminated
     """
@@ -33,27 +35,35 @@ class Problem:
     state: State
     layout: Layout
     observations: tuple
+    sources: tuple
     rows_of: tuple
     centre_m: np.ndarray
     set_aside: tuple
     eliminated: np.ndarray
     interior_of: np.ndarray
 
+    def relative(self, observations):
+        """Observations in the survey's frame, as the model has them."""
+        return _relative(observations, self.centre_m)
+
 
 def assemble(survey):
     """The Problem of a Survey; raises SolutionError when something cannot be determined."""
-    images, others, set_aside = _usable(survey)
+    set_aside = _set_aside(survey)
+    used = np.array([not why for why in set_aside], dtype=bool)
     centre = _centre(survey)
     table, values, interior_free, known = _interior(survey)
-    others = [_relative(one, centre) for one in others] + known + _known_tools(survey)
-    eliminated = _eliminated(survey, others, set_aside)
-    layout, reduced = _layout(survey, eliminated, set_aside, interior_free)
-    groups, rows_of = [], []
-    for one, rows in _image_groups(survey, images, layout, reduced, table):
+    groups, sources, rows_of = _others(survey, used, centre)
+    eliminated = _eliminated(survey, groups, used)
+    layout, reduced = _layout(survey, eliminated, used, interior_free)
+    for one, rows in _image_groups(survey, used, layout, reduced, table):
         groups.append(one)
+        sources.append("image points")
         rows_of.append(rows)
-    groups += others
-    rows_of += [None] * len(others)
+    for one in known + _known_tools(survey):
+        groups.append(one)
+        sources.append("known beforehand")
+        rows_of.append(np.arange(len(one)))
     state = _state(survey, centre, values)
     model = Model(
         reduced=reduced,
@@ -63,40 +73,67 @@ def assemble(survey):
         name_of=lambda column: name_of(survey, layout, table, column),
     )
     return Problem(
-        model, state, layout, tuple(groups), tuple(rows_of), centre, set_aside, eliminated, table
-    )
+        model, state, layout, tuple(groups), tuple(sources), tuple(rows_of),
+        centre, set_aside, eliminated, table,
+    )  # fmt: skip
 
 
-def _usable(survey):
-    """Image points and observations without the points that cannot be determined, and why not."""
+def _set_aside(survey):
+    """For each point, why it cannot be determined; an empty string when it can."""
     images, count = survey.image_points, np.zeros(len(survey.points), dtype=int)
+    rays = np.zeros_like(count)
     if images is not None:
-        if images.use is not None:
-            images = _taken(images, images.use > 0)
-        rays = np.bincount(images.point, minlength=len(count))
-        count += 2 * rays
+        seen = images.point if images.use is None else images.point[images.use > 0]
+        rays += np.bincount(seen, minlength=len(count))
+        _refuse_poor_photos(survey)
+    count += 2 * rays
     for one in survey.observations:
         for name in one.ties:
-            np.add.at(count, getattr(one, name), one.rows)
+            point = getattr(one, name)
+            point = point if one.use is None else point[one.use > 0]
+            count += one.rows * np.bincount(point, minlength=len(count))
     if survey.fixed is not None:
         count += survey.fixed.sum(axis=1)
     bad = count < 3
-    set_aside = [""] * len(count)
     if not bad.any():
-        return images, list(survey.observations), tuple(set_aside)
-    for i in np.flatnonzero(bad):
-        one_ray = images is not None and rays[i] == 1
-        what = "has one ray" if one_ray else "has too few observations"
-        set_aside[i] = f"point {survey.points[i]} {what}"
-    if images is not None:
-        images = _taken(images, ~bad[images.point])
-    others = []
+        return ("",) * len(count)
+    what = np.where(rays == 1, "has one ray", "has too few observations")
+    names = zip(survey.points, what, bad, strict=True)
+    return tuple(f"point {name} {why}" if poor else "" for name, why, poor in names)
+
+
+def _refuse_poor_photos(survey):
+    """Raise when a photo has fewer observations than unknowns."""
+    images, photos = survey.image_points, survey.photos
+    seen = images.photo if images.use is None else images.photo[images.use > 0]
+    rays = np.bincount(seen, minlength=len(photos.names))
+    count = 2 * rays
     for one in survey.observations:
+        if hasattr(one, "photo"):
+            count += one.rows * np.bincount(one.photo, minlength=len(count))
+    if photos.fixed is not None:
+        count += np.repeat(photos.fixed, (1, 1, 1, 3), axis=1).sum(axis=1)
+    poor = np.flatnonzero(count < 6)
+    if len(poor):
+        told = ", ".join(f"{photos.names[i]} ({rays[i]})" for i in poor)
+        raise SolutionError(f"a photo needs at least 3 image points: {told}")
+
+
+def _others(survey, used, centre):
+    """Observations other than image points, relative to the centre, between points that are used.
+
+    Returns the observations, their numbers in the survey, and the numbers of their rows.
+    """
+    groups, sources, rows_of = [], [], []
+    for number, one in enumerate(survey.observations):
         keep = np.ones(len(one), dtype=bool)
         for name in one.ties:
-            keep &= ~bad[getattr(one, name)]
-        others.append(one if keep.all() else one.taken(keep))
-    return images, others, tuple(set_aside)
+            keep &= used[getattr(one, name)]
+        rows = np.flatnonzero(keep)
+        groups.append(_relative(one if len(rows) == len(one) else one.taken(rows), centre))
+        sources.append(number)
+        rows_of.append(rows)
+    return groups, sources, rows_of
 
 
 def _taken(images, keep):
@@ -174,9 +211,9 @@ def _known_tools(survey):
     return observed
 
 
-def _eliminated(survey, others, set_aside):
+def _eliminated(survey, others, used):
     """Points that may be eliminated: free in all coordinates, no two of them in one row."""
-    eliminated = np.array([not why for why in set_aside], dtype=bool)
+    eliminated = used.copy()
     if survey.fixed is not None:
         eliminated &= ~survey.fixed.any(axis=1)
     neighbours = {}
@@ -194,12 +231,10 @@ def _eliminated(survey, others, set_aside):
     return eliminated
 
 
-def _layout(survey, eliminated, set_aside, interior_free):
+def _layout(survey, eliminated, used, interior_free):
     """The Layout, reduced unknowns first, and how many of these there are."""
     photos, points = survey.photos, len(survey.points)
-    free_points = np.repeat(
-        np.array([not why for why in set_aside], dtype=bool)[:, None], 3, axis=1
-    )
+    free_points = np.repeat(used[:, None], 3, axis=1)
     if survey.fixed is not None:
         free_points &= ~survey.fixed
     free_photos = np.ones((0 if photos is None else len(photos.names), 6), dtype=bool)
@@ -236,8 +271,9 @@ def _layout(survey, eliminated, set_aside, interior_free):
     return Layout(of_points, of_photos, interior, orientation, scale, offset, system), reduced
 
 
-def _image_groups(survey, images, layout, reduced, table):
+def _image_groups(survey, used, layout, reduced, table):
     """Image coordinates by form of camera, those of eliminated points first and point by point."""
+    images = survey.image_points
     if images is None or not len(images.point):
         return
     forms = {}
@@ -251,6 +287,8 @@ def _image_groups(survey, images, layout, reduced, table):
             rows = np.flatnonzero(np.isin(survey.photos.camera[images.photo], cameras))
             left = table[np.isin(survey.photos.camera, cameras)]
         order = np.arange(len(key))[rows]
+        if not used.all():
+            order = order[used[images.point[order]]]
         if (np.diff(key[order]) < 0).any():
             order = order[np.argsort(key[order], kind="stable")]
         one = _taken(images, order)

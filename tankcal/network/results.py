@@ -7,6 +7,7 @@ import numpy as np
 import scipy.stats
 
 from tankcal.camera import PARAMETERS
+from tankcal.network.reliability import residuals_of
 from tankcal.rotations import angle_derivatives, angles_of
 
 
@@ -129,6 +130,11 @@ class Adjusted:
         columns = self.problem.layout.interior[places]
         names = tuple(name for name, column in zip(PARAMETERS, columns, strict=True) if column >= 0)
         return values, names, self.solution.cofactors(columns[columns >= 0])
+
+    @cached_property
+    def residuals(self):
+        """A tuple of Residuals, one for each group of observations (alpha 0.001, power 0.80)."""
+        return residuals_of(self.problem, self.solution)
 
     def test(self, confidence=0.95, sides=2):
         """The GlobalTest of the whole adjustment."""

@@ -1,6 +1,6 @@
 """A survey as it goes into the adjustment: names, start values and observations, all in arrays."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -119,3 +119,14 @@ class Survey:
     sets: np.ndarray = field(default_factory=lambda: np.zeros(0))
     instruments: tuple = ()
     systems: tuple = ()
+
+    def with_sds(self, factors):
+        """The survey with the sds of groups multiplied; factors {source: factor}, see Residuals."""
+        observations = tuple(
+            replace(one, sd=one.sd * factors.get(number, 1.0))
+            for number, one in enumerate(self.observations)
+        )
+        images = self.image_points
+        if images is not None:
+            images = replace(images, sd_mm=images.sd_mm * factors.get("image points", 1.0))
+        return replace(self, observations=observations, image_points=images)
