@@ -14,14 +14,16 @@ FAINT = 1e-9  # eigenvalue of the scaled reduced system that makes a direction a
 NAMES_SHOWN = 8
 
 
-def diagnosis(work, bad_block):
+def diagnosis(work, state, bad_block):
     """One line that names the unknowns that are not determined, or None when all are."""
     model = work.model
     if bad_block is not None:
         first = model.reduced + 3 * bad_block
         names = ", ".join(model.name_of(column) for column in range(first, first + 3))
         return f"not determined by the observations: {names}"
-    directions = undetermined(work)
+    directions, lengths = undetermined(work)
+    if model.free is not None:
+        directions = _without(directions, model.free(state) * lengths[:, None])
     if not directions.shape[1]:
         return None
     size = np.sqrt(np.sum(directions**2, axis=1))
@@ -32,13 +34,17 @@ def diagnosis(work, bad_block):
 
 
 def undetermined(work):
-    """Directions (unknowns, d), in units of scaled columns, that the rows do not feel."""
+    """Directions (unknowns, d) that the rows do not feel, and the columns' lengths (unknowns,).
+
+    The directions are in units of columns of length one.
+    """
     normals, nr = work.normals, work.plan.reduced
     normals.clear()
     for batch in work.plan.batches:
         add_rows(batch, batch.of(work.w[batch.group]), batch.of(work.jac[batch.group]), normals)
-    diagonal = np.concatenate([normals.t.diagonal()[:nr], normals.v[:, [0, 2, 5]].ravel()])
-    scale = 1.0 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    diagonal = normals.t.diagonal()[:nr].copy(), normals.v[:, [0, 2, 5]].ravel()
+    lengths = np.sqrt(np.concatenate(diagonal))
+    scale = 1.0 / np.where(lengths > 0, lengths, 1.0)
     eliminate(work.plan, normals, 0.0, 0.0)
     s = np.triu(normals.t[:nr, :nr] + np.tril(normals.t[:nr, :nr], -1).T)
     s += np.triu(s, 1).T
@@ -51,7 +57,17 @@ def undetermined(work):
         length = np.linalg.norm(direction / scale)
         if _felt(work, direction) < NOTHING * length:
             found.append(direction / scale / length)
-    return np.array(found).T if found else np.zeros((work.model.unknowns, 0))
+    found = np.array(found).T if found else np.zeros((work.model.unknowns, 0))
+    return found, lengths
+
+
+def _without(directions, free):
+    """The directions that are left when those that the datum fixes are taken out."""
+    basis = np.linalg.qr(free)[0]
+    vectors, sizes, _ = np.linalg.svd(
+        directions - basis @ (basis.T @ directions), full_matrices=False
+    )
+    return vectors[:, sizes > 0.1]
 
 
 def _felt(work, direction):

@@ -35,20 +35,34 @@ class Solution:
     state        adjusted, as the model writes it
     cost         half the sum of squares of the rows
     misclosures  list of (n, m) whitened, computed minus observed, one array a group
-    jacobians    list of (n, m, K) whitened, before the last (small) step
     iterations   until the last step was below the tolerance
     rows         number of rows that weigh anything
     unknowns     number of unknowns that are estimated
     rank_defect  number of directions that only the datum fixes
     """
 
-    def __init__(self, model, plan, factor, state, misclosures, jacobians, cost, iterations):
-        self.model, self.state, self.cost, self.iterations = model, state, cost, iterations
-        self.misclosures, self.jacobians = misclosures, jacobians
-        self._plan, self._factor = plan, factor
-        self.rank_defect = 0 if factor.free is None else factor.free.shape[1]
-        self.unknowns = model.unknowns
-        self.rows = int(sum(np.count_nonzero(j.any(axis=2)) for j in jacobians))
+    def __init__(self, work, state, cost, iterations, factor):
+        self.model, self.state, self.cost, self.iterations = work.model, state, cost, iterations
+        self.misclosures = work.w
+        self._plan, self._work, self._last = work.plan, work, factor
+        self.rank_defect = 0
+        if self.model.free is not None:
+            self.rank_defect = self.model.free(state).shape[1]
+        self.unknowns = self.model.unknowns
+        self.rows = int(sum(np.count_nonzero(j.any(axis=2)) for j in work.jac))
+
+    @cached_property
+    def _factor(self):
+        """Normal equations at the solution itself, not before the last step."""
+        if self._last is not None:
+            return self._last
+        self._work.evaluate(self.state)
+        return self._work.factor(self.state, 0.0)
+
+    @property
+    def jacobians(self):
+        """List of (n, m, K) whitened derivatives at the solution, one array a group."""
+        return self._factor and self._work.jac
 
     @property
     def dof(self):

@@ -14,6 +14,7 @@ SMALLEST_PIVOT = 1e-12  # of a scaled normal matrix; below it the rank is looked
 FIRST_DAMPING = 1e-4
 STRONGEST_DAMPING = 1e12
 NEARLY_THERE = 1e-2  # of the cost, still to be gained: from here on undamped
+SHARP = 1e-13  # of the rows, gained by the last step: below it derivatives need no renewal
 
 
 class UndeterminedError(SolutionError):
@@ -42,7 +43,8 @@ def solve(model, state, *, max_iterations=100, tolerance=1e-4):
         if not damping and decrement < limit:
             _refuse_untouched(model, factor)
             cost = work.evaluate(candidate, derivatives=False)
-            return Solution(model, work.plan, factor, candidate, work.w, work.jac, cost, iteration)
+            sharp = decrement < SHARP * max(work.rows, 1)
+            return Solution(work, candidate, cost, iteration, factor if sharp else None)
         before, cost = cost, work.evaluate(candidate)
         if cost <= before * (1 + 1e-12):
             gain = 2 * (before - cost) / decrement
@@ -101,7 +103,7 @@ class _Work:
             diagonal[untouched] = 1.0
         bad = eliminate(self.plan, normals, damping, SMALLEST_PIVOT)
         if bad >= 0:
-            return self._look(damping, bad)
+            return self._look(state, damping, bad)
         scale = 1.0 / np.sqrt(diagonal)
         s = normals.t[:nr, :nr] + normals.t[:nr, :nr].T
         corner = np.einsum("ii->i", s)
@@ -119,12 +121,12 @@ class _Work:
             s += held @ held.T
         lower, info = scipy.linalg.lapack.dpotrf(s.T, lower=1, clean=0, overwrite_a=1)
         if info or (nr and lower.diagonal().min() ** 2 < SMALLEST_PIVOT):
-            return self._look(damping, None)
+            return self._look(state, damping, None)
         return Factor(normals, scale, lower, np.flatnonzero(untouched), free, ties)
 
-    def _look(self, damping, bad_block):
+    def _look(self, state, damping, bad_block):
         """A factor that could not be had: raise when it is the survey's fault."""
-        found = None if damping else diagnosis(self, bad_block)
+        found = None if damping else diagnosis(self, state, bad_block)
         if found:
             raise UndeterminedError(found)
 

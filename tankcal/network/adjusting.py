@@ -5,6 +5,7 @@ from tankcal.gauss_markov import UndeterminedError, solve
 from tankcal.network.assembly import assemble
 from tankcal.network.datum import held, in_words, unobserved
 from tankcal.network.results import Adjusted
+from tankcal.observations import PlumbLines
 
 
 def adjust(survey, *, datum="control", over=None, tolerance=1e-4, max_iterations=100):
@@ -20,16 +21,24 @@ def adjust(survey, *, datum="control", over=None, tolerance=1e-4, max_iterations
     """
     problem = assemble(survey)
     if datum == "inner":
-        free = unobserved(problem.observations, problem.layout, problem.state)
+        free = unobserved(problem)
         if free.shape[1]:
             problem = held(problem, over, free)
+    elif any(isinstance(one, PlumbLines) for one in survey.observations):
+        _refuse_defect(problem)  # a plumb line that is not quite plumb would hide one
     try:
         solution = solve(
             problem.model, problem.state, tolerance=tolerance, max_iterations=max_iterations
         )
-    except UndeterminedError as error:
-        free = unobserved(problem.observations, problem.layout, problem.state)
-        if datum != "inner" and free.shape[1]:
-            raise SolutionError(in_words(free)) from error
+    except UndeterminedError:
+        if datum != "inner":
+            _refuse_defect(problem)
         raise
     return Adjusted(survey, problem, solution)
+
+
+def _refuse_defect(problem):
+    """Raise when the datum is missing, in words."""
+    free = unobserved(problem)
+    if free.shape[1]:
+        raise SolutionError(in_words(free))

@@ -54,10 +54,13 @@ def snoop(survey, *, critical=CRITICAL, robust=True, max_rounds=200, **options):
     if robust and _worst(adjusted).max(initial=0) > critical:
         survey, rounds = _robust(survey, adjusted, critical, options)
         adjusted = adjust(survey, **options)
+    seen = {}
     for _ in range(max_rounds):
         uses, changed = _verdict(adjusted, critical)
+        for table in _tables(adjusted):
+            seen.update(_quantities(table))
         if not changed:
-            return Cleaned(adjusted, survey, _removed(adjusted), rounds)
+            return Cleaned(adjusted, survey, _removed(survey, seen), rounds)
         survey = with_use(started(survey, adjusted), uses)
         adjusted, rounds = adjust(survey, **options), rounds + 1
     raise SolutionError(f"data snooping did not come to rest in {max_rounds} rounds")
@@ -147,6 +150,8 @@ def _verdict(adjusted, critical):
     for table in tables:
         away = table.whole
         goes = table.used & (away > max(critical, AT_ONCE * worst))
+        if table.source == "image points":
+            goes &= _largest_of_each(survey.image_points.point[table.rows], np.where(goes, away, 0))
         comes = ~table.used & (away < critical) if worst <= critical else np.zeros_like(goes)
         shares[table.source][table.rows[goes]] = 0.0
         shares[table.source][table.rows[comes]] = 1.0
@@ -154,11 +159,25 @@ def _verdict(adjusted, critical):
     return shares, changed
 
 
-def _removed(adjusted):
-    """Every observation that was set aside, the worst first."""
+def _largest_of_each(owner, value):
+    """True where a value is the largest of its owner's."""
+    largest = np.zeros(owner.max(initial=-1) + 1)
+    np.maximum.at(largest, owner, value)
+    return value >= largest[owner]
+
+
+def _quantities(table):
+    """{(source, row): test quantity} of a table of residuals."""
+    rows, values = table.rows.tolist(), table.whole.tolist()
+    return {(table.source, row): value for row, value in zip(rows, values, strict=True)}
+
+
+def _removed(survey, seen):
+    """Every observation that is set aside, with the last test quantity it had, the worst first."""
+    kinds = {number: one.kind for number, one in enumerate(survey.observations)}
     found = [
-        Removed(table.kind, table.source, int(table.rows[i]), float(table.whole[i]))
-        for table in _tables(adjusted)
-        for i in np.flatnonzero(~table.used)
+        Removed(kinds.get(source, "image coordinate"), source, int(row), seen.get((source, row), 0))
+        for source, share in _shares(survey).items()
+        for row in np.flatnonzero(share == 0).tolist()
     ]
     return tuple(sorted(found, key=lambda one: -one.w))

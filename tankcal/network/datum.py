@@ -40,6 +40,9 @@ def _parts(layout, state):
     turn = np.zeros((len(state.orientation_rad), 7))
     turn[:, 5] = -1.0
     yield layout.orientation, turn
+    stretch = np.zeros((len(state.scale), 7))
+    stretch[:, 6] = -(1.0 + state.scale)
+    yield layout.scale, stretch
     systems = np.zeros((len(state.system), 7, 7))
     if len(systems):
         m = 1.0 + state.system_scale
@@ -61,23 +64,30 @@ def _of_places(xyz):
     return out
 
 
-def unobserved(groups, layout, state):
+def unobserved(problem):
     """Combinations (7, d) of the seven ways that neither observations nor fixed unknowns feel."""
+    layout, state = problem.layout, problem.state
+    idle = _idle(problem)
     whole = np.vstack([directions(layout, state), np.zeros(7)])
     felt, lengths = [np.zeros((1, 7))], np.zeros(len(whole))
-    for one in groups:
+    for one in problem.observations:
         if not one.feels_datum:
             continue
         columns = one.columns(layout)
         w = np.empty((len(one), one.rows))
         jac = np.empty((len(one), one.rows, columns.shape[1]))
-        one.fill(state, w, jac)
-        moved = np.einsum("nmk,nkd->nmd", jac, whole[columns]).reshape(-1, 7)
+        undisturbed = one.undisturbed(state)
+        one.fill(undisturbed, w, jac)
+        ways = whole
+        if undisturbed is not state:
+            ways = np.vstack([directions(layout, undisturbed), np.zeros(7)])
+        moved = np.einsum("nmk,nkd->nmd", jac, ways[columns]).reshape(-1, 7)
         felt.append(np.linalg.qr(moved, mode="r"))
         np.add.at(lengths, columns, np.einsum("nmk,nmk->nk", jac, jac))
     square = (whole[:-1] ** 2).T @ lengths[:-1]
     for columns, derivative in _parts(layout, state):
-        fixed = AS_IF_FIXED * derivative[columns < 0].reshape(-1, 7)
+        holds = (columns < 0) & np.logical_not(idle.get(id(columns), False))
+        fixed = AS_IF_FIXED * derivative[holds].reshape(-1, 7)
         if len(fixed):
             felt.append(np.linalg.qr(fixed, mode="r"))
             square += np.sum(fixed**2, axis=0)
@@ -85,6 +95,17 @@ def unobserved(groups, layout, state):
     _, singular, vectors = np.linalg.svd(np.vstack(felt) / size)
     rank = int(np.sum(singular > UNFELT))
     return (vectors[rank:] / size).T
+
+
+def _idle(problem):
+    """{id of columns: mask} of the unknowns that have no column because nobody observed them."""
+    layout = problem.layout
+    aside = np.array([bool(why) for why in problem.set_aside], dtype=bool)
+    unused = np.ones(len(layout.scale), dtype=bool)
+    for one in problem.observations:
+        instrument = getattr(one, "instrument", np.zeros(0, dtype=int))
+        unused[instrument[instrument >= 0]] = False
+    return {id(layout.points): aside[:, None], id(layout.scale): unused}
 
 
 def in_words(combinations):

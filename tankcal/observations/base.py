@@ -131,6 +131,10 @@ class Observations:
         """Computed values (n, m) and, if asked for, derivatives (n, m, K)."""
         raise NotImplementedError
 
+    def undisturbed(self, state):
+        """The state in which misclosures that would feel a motion falsely are zero."""
+        return state
+
     def difference(self, computed):
         """Computed minus observed (n, m)."""
         return computed - np.reshape(self.value, computed.shape)

@@ -1,6 +1,6 @@
 """Control coordinates, height differences, plumb lines, and unknowns known beforehand."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -115,6 +115,12 @@ class PlumbLines(Observations):
         computed = state.xyz_m[self.end, :2] - state.xyz_m[self.start, :2]
         rows = np.hstack([np.eye(2, 3), -np.eye(2, 3)])
         return computed, np.tile(rows, (len(self), 1, 1)) if derivatives else None
+
+    def undisturbed(self, state):
+        """Plumb: an oblique pair would pretend to know the rotation about the vertical."""
+        xyz = state.xyz_m.copy()
+        xyz[self.end, :2] = xyz[self.start, :2]
+        return replace(state, xyz_m=xyz)
 
 
 @dataclass(frozen=True)
