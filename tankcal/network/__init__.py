@@ -4,6 +4,7 @@ from tankcal.network.adjusting import adjust
 from tankcal.network.cleaning import Cleaned, snoop
 from tankcal.network.reliability import Residuals
 from tankcal.network.results import Adjusted
+from tankcal.network.starting import approximate
 from tankcal.network.survey import Camera, ImagePoints, Instrument, Photos, Survey, System
 
 __all__ = [
@@ -17,5 +18,6 @@ __all__ = [
     "Survey",
     "System",
     "adjust",
+    "approximate",
     "snoop",
 ]
