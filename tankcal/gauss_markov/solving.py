@@ -11,6 +11,7 @@ from tankcal.gauss_markov.rank import diagnosis
 from tankcal.gauss_markov.solution import Factor, Solution
 
 SMALLEST_PIVOT = 1e-12  # of a scaled normal matrix; below it the rank is looked at
+SMALL = 2e7  # rows times unknowns squared: below it a system without blocks is solved by QR
 FIRST_DAMPING = 1e-4
 STRONGEST_DAMPING = 1e12
 NEARLY_THERE = 1e-2  # of the cost, still to be gained: from here on undamped
@@ -32,11 +33,12 @@ def solve(model, state, *, max_iterations=100, tolerance=1e-4):
     """
     work = _Work(model)
     cost = work.evaluate(state)
-    damping, limit = 0.0, tolerance**2 * max(work.rows, 1)
+    damping, resting = 0.0, FIRST_DAMPING
+    limit = tolerance**2 * max(work.rows, 1)
     for iteration in range(1, max_iterations + 1):
         factor = work.factor(state, damping)
         if factor is None:
-            damping = _stronger(damping)
+            damping = _stronger(damping, resting)
             continue
         step, decrement = work.step(factor)
         candidate = model.moved(state, step)
@@ -48,11 +50,12 @@ def solve(model, state, *, max_iterations=100, tolerance=1e-4):
         before, cost = cost, work.evaluate(candidate)
         if cost <= before * (1 + 1e-12):
             gain = 2 * (before - cost) / decrement
-            nearly_there = decrement < NEARLY_THERE * cost
-            damping = 0.0 if nearly_there else damping * max(1 / 3, 1 - (2 * gain - 1) ** 3)
+            damping *= max(1 / 3, 1 - (2 * gain - 1) ** 3)
+            if damping and decrement < NEARLY_THERE * cost:
+                damping, resting = 0.0, damping
             state = candidate
         else:
-            cost, damping = work.evaluate(state), _stronger(damping)
+            cost, damping = work.evaluate(state), _stronger(damping, resting)
     raise SolutionError(f"the adjustment did not converge in {max_iterations} iterations")
 
 
@@ -62,8 +65,8 @@ def _refuse_untouched(model, factor):
         raise UndeterminedError(f"no observation says anything about: {names}")
 
 
-def _stronger(damping):
-    damping = max(10 * damping, FIRST_DAMPING)
+def _stronger(damping, resting):
+    damping = 10 * damping or resting
     if damping > STRONGEST_DAMPING:
         raise SolutionError("the adjustment cannot be improved, and is not at a minimum")
     return damping
@@ -105,24 +108,51 @@ class _Work:
         if bad >= 0:
             return self._look(state, damping, bad)
         scale = 1.0 / np.sqrt(diagonal)
-        s = normals.t[:nr, :nr] + normals.t[:nr, :nr].T
+        free = ties = held = None
+        if self.model.free is not None and not damping:
+            free = self.model.free(state)
+            ties = free * self.model.inner[:, None]
+            held = np.linalg.qr(free[:nr] / scale[:, None])[0]
+        if self.plan.blocks == 0 and self.rows * nr * nr < SMALL:
+            lower, sound = self._dense_root(scale, untouched, damping, held)
+        else:
+            lower, sound = self._root(scale, untouched, damping, held)
+        if not sound:
+            return self._look(state, damping, None)
+        return Factor(normals, scale, lower, np.flatnonzero(untouched), free, ties)
+
+    def _root(self, scale, untouched, damping, held):
+        """Cholesky factor of the scaled reduced system, and whether its pivots are sound."""
+        nr = self.plan.reduced
+        s = self.normals.t[:nr, :nr] + self.normals.t[:nr, :nr].T
         corner = np.einsum("ii->i", s)
         corner *= 0.5
         corner[untouched] = 1.0
         s *= scale
         s *= scale[:, None]
-        free = ties = None
-        if damping:
-            corner += damping
-        elif self.model.free is not None:
-            free = self.model.free(state)
-            ties = free * self.model.inner[:, None]
-            held = np.linalg.qr(free[:nr] / scale[:, None])[0]
+        corner += damping
+        if held is not None:
             s += held @ held.T
         lower, info = scipy.linalg.lapack.dpotrf(s.T, lower=1, clean=0, overwrite_a=1)
-        if info or (nr and lower.diagonal().min() ** 2 < SMALLEST_PIVOT):
-            return self._look(state, damping, None)
-        return Factor(normals, scale, lower, np.flatnonzero(untouched), free, ties)
+        return lower, not info and not lower.diagonal().min(initial=1.0) ** 2 < SMALLEST_PIVOT
+
+    def _dense_root(self, scale, untouched, damping, held):
+        """The same factor by QR of the rows themselves: nothing is squared."""
+        nr = self.plan.reduced
+        rows = [np.diag(untouched.astype(float)), np.sqrt(damping) * np.eye(nr)]
+        if held is not None:
+            rows.append(held.T)
+        for batch in self.plan.batches:
+            jac = batch.of(self.jac[batch.group])
+            n, m, _ = jac.shape
+            dense = np.zeros((n, m, nr + 1))
+            columns = np.broadcast_to(batch.columns[:, None, :], jac.shape)
+            dense[np.arange(n)[:, None, None], np.arange(m)[:, None], columns] = jac
+            rows.append(dense.reshape(n * m, -1)[:, :nr] * scale)
+        r = np.linalg.qr(np.vstack(rows), mode="r")
+        lower = np.asfortranarray((r * np.sign(r.diagonal())[:, None]).T)
+        limit = max(self.rows, nr) * np.finfo(float).eps
+        return lower, not lower.diagonal().min(initial=1.0) < limit
 
     def _look(self, state, damping, bad_block):
         """A factor that could not be had: raise when it is the survey's fault."""
