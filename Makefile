@@ -6,7 +6,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test study check format notebooks bench picture wheel clean
+.PHONY: help demo test study check format notebooks bench peer picture wheel clean
 
 help: ## what can be made
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -42,6 +42,10 @@ notebooks: $(VENV)/full ## execute every notebook, top to bottom
 
 bench: $(VENV)/full ## time and memory of the main job
 	$(BIN)/python benchmarks/main_job.py
+
+peer: $(VENV)/full ## the adjustment against C++ Ceres (needs libceres-dev)
+	$(MAKE) -C benchmarks/adjustment
+	$(BIN)/python benchmarks/adjustment/run.py
 
 picture: $(VENV)/full ## the picture in the README, from the example's report (needs poppler)
 	$(BIN)/tankcal demo --quiet --out demo-results
