@@ -145,53 +145,34 @@ def one_image_point(p, r, q, form, of_ideal):
         e, f, g, h = 1.0, 0.0, 0.0, 1.0
     else:
         e, f, g, h = side * a, side * b, side * c, side * d
-    one = 1.0 + 0.0 * x
-    zero = 0.0 * x
+    one, zero = 1.0 + 0.0 * x, 0.0 * x
     return (
         x,
         y,
-        (
-            a * dxi[0] + b * deta[0],
-            a * dxi[1] + b * deta[1],
-            a * dxi[2] + b * deta[2],
-            a * dxi[3] + b * deta[3],
-            a * dxi[4] + b * deta[4],
-            a * dxi[5] + b * deta[5],
-            a * dxi[6] + b * deta[6],
-            one,
-            zero,
-            e * kx[0] + f * ky[0],
-            e * kx[1] + f * ky[1],
-            e * kx[2] + f * ky[2],
-            e * kx[3] + f * ky[3],
-            e * kx[4] + f * ky[4],
-            e * kx[5] + f * ky[5],
-            e * kx[6] + f * ky[6],
-            e * kx[7] + f * ky[7],
-            e * kx[8] + f * ky[8],
-            e * kx[9] + f * ky[9],
-        ),
-        (
-            c * dxi[0] + d * deta[0],
-            c * dxi[1] + d * deta[1],
-            c * dxi[2] + d * deta[2],
-            c * dxi[3] + d * deta[3],
-            c * dxi[4] + d * deta[4],
-            c * dxi[5] + d * deta[5],
-            c * dxi[6] + d * deta[6],
-            zero,
-            one,
-            g * kx[0] + h * ky[0],
-            g * kx[1] + h * ky[1],
-            g * kx[2] + h * ky[2],
-            g * kx[3] + h * ky[3],
-            g * kx[4] + h * ky[4],
-            g * kx[5] + h * ky[5],
-            g * kx[6] + h * ky[6],
-            g * kx[7] + h * ky[7],
-            g * kx[8] + h * ky[8],
-            g * kx[9] + h * ky[9],
-        ),
+        seven(a, b, dxi, deta) + (one, zero) + ten(e, f, kx, ky),
+        seven(c, d, dxi, deta) + (zero, one) + ten(g, h, kx, ky),
+    )
+
+
+def seven(a, b, p, q):
+    """a p + b q, element by element: seven numbers or arrays."""
+    return (
+        a * p[0] + b * q[0],
+        a * p[1] + b * q[1],
+        a * p[2] + b * q[2],
+        a * p[3] + b * q[3],
+        a * p[4] + b * q[4],
+        a * p[5] + b * q[5],
+        a * p[6] + b * q[6],
+    )
+
+
+def ten(a, b, p, q):
+    """a p + b q, element by element: ten numbers or arrays."""
+    return seven(a, b, p[:7], q[:7]) + (
+        a * p[7] + b * q[7],
+        a * p[8] + b * q[8],
+        a * p[9] + b * q[9],
     )
 
 
@@ -203,32 +184,8 @@ def _loop(
         p, s, r, q = xyz[point[i]], photo_xyz[photo[i]], rotation[photo[i]], interior[photo[i]]
         x, y, dx, dy = one_image_point(
             (p[0] - s[0], p[1] - s[1], p[2] - s[2]),
-            (
-                r[0, 0],
-                r[0, 1],
-                r[0, 2],
-                r[1, 0],
-                r[1, 1],
-                r[1, 2],
-                r[2, 0],
-                r[2, 1],
-                r[2, 2],
-            ),
-            (
-                q[0],
-                q[1],
-                q[2],
-                q[3],
-                q[4],
-                q[5],
-                q[6],
-                q[7],
-                q[8],
-                q[9],
-                q[10],
-                q[11],
-                q[12],
-            ),
+            (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2]),
+            (q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8], q[9], q[10], q[11], q[12]),
             form,
             of_ideal,
         )
@@ -256,6 +213,8 @@ _COMPILED = (
     "undistorted_by",
     "image_point",
     "ideal_point",
+    "seven",
+    "ten",
     "one_image_point",
     "_loop",
 )

@@ -7,13 +7,22 @@ import pytest
 from conftest import ROOT
 from networks import INTERIOR, SCOPE, by_total_station, photographed
 
-import tankcal.gauss_markov.loops
+import tankcal.gauss_markov.eliminating
 import tankcal.imaging
 from tankcal.camera import CONVENTIONS, Form
 from tankcal.errors import SolutionError
 from tankcal.network import Instrument, adjust, snoop
 from tankcal.network.datum import directions
-from tankcal.network.quality import compared, components, ellipsoid_factor
+from tankcal.network.quality import (
+    accuracy,
+    balanced,
+    compared,
+    components,
+    control_factor,
+    ellipsoid_factor,
+    ellipsoids,
+    precision,
+)
 from tankcal.network.reliability import noncentrality, tau_limit
 from tankcal.observations import ControlCoordinates, Distances, HeightDifferences, PlumbLines
 from tankcal.rotations import from_angles
@@ -85,7 +94,7 @@ def test_cofactors_are_the_inverse_of_the_whole_normal_matrix(adjusted):
 def test_compiled_loops_and_arrays_agree(make, monkeypatch):
     survey = make()[0]
     first = adjust(survey, datum="inner")
-    for room in (tankcal.gauss_markov.loops, tankcal.imaging):
+    for room in (tankcal.gauss_markov.eliminating, tankcal.imaging):
         monkeypatch.setattr(room, "available", lambda: False)
     second = adjust(survey, datum="inner")
     assert second.solution.cost == pytest.approx(first.solution.cost, rel=1e-10)
@@ -364,3 +373,33 @@ def test_components_tell_which_group_is_worse_than_declared():
     found = {c.source: c for c in components(adjust(hopeful).residuals)}
     assert found[0].factor > 2.5
     assert found["image points"].factor == pytest.approx(1, abs=0.2)
+
+
+def test_balanced_weights_find_the_true_sds(figure):
+    """Property: the control was made with 2 mm; declared with 0.4 mm it comes out near 2 mm."""
+    survey, _ = photographed(seed=4)
+    control, tapes = survey.observations
+    hopeful = replace(survey, observations=(replace(control, sd=control.sd / 5), tapes))
+    found, factors = balanced(hopeful, adjust)
+    figure("control declared five times too good: factor found", f"{factors[0]:.2f}")
+    assert factors[0] == pytest.approx(5, rel=0.35)
+    assert found.sigma0 == pytest.approx(1, abs=0.03)
+
+
+def test_quality_of_points(adjusted):
+    """Closed form: a known covariance; and check points at the adjusted places have no error."""
+    blocks = np.array([np.diag([4.0, 1.0, 9.0]), np.eye(3)])
+    axes, directions_ = ellipsoids(blocks, 0.95)
+    assert axes[0] == pytest.approx(np.array([3, 2, 1]) * np.sqrt(7.8147), rel=1e-4)
+    assert np.abs(directions_[0][:, 0]) == pytest.approx([0, 0, 1])
+    found = precision(np.array([[0.0, 0, 0], [3, 4, 0]]), blocks)
+    assert found.mean_sd_m == pytest.approx(np.sqrt(17 / 6))
+    assert found.spherical_sd_m == pytest.approx([2, 1])
+    assert found.quadratic_sd_m == pytest.approx([14**0.5, 3**0.5])
+    assert found.range_m == pytest.approx([1, 0, 2])
+    assert found.proportional == pytest.approx(5 / np.sqrt(17 / 6))
+    away = np.array([[0.003, 0.004, 0], [0, 0, 0.001]])
+    check = accuracy(adjusted, [3, 9], adjusted.xyz_m[[3, 9]] - away, np.zeros((2, 3)))
+    assert check.r_xyz_m == pytest.approx(np.sqrt((25e-6 + 1e-6) / 2))
+    assert (check.largest_m, check.mean_m) == (pytest.approx(0.005), pytest.approx(0.003))
+    assert control_factor(10, 6) == pytest.approx(np.sqrt(30 / 24))

@@ -7,7 +7,7 @@ different units or nearly equal parameters stays far above it.
 
 import numpy as np
 
-from tankcal.gauss_markov.loops import add_rows, back_substitute, eliminate
+from tankcal.gauss_markov.eliminating import add_rows, back_substitute, eliminate
 
 NOTHING = 1e-7
 FAINT = 1e-9  # eigenvalue of the scaled reduced system that makes a direction a candidate

@@ -5,7 +5,7 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
-from tankcal.gauss_markov.loops import block_cofactors, block_rows, leverage, roots
+from tankcal.gauss_markov.eliminating import block_cofactors, block_rows, leverage, roots
 
 
 class Factor:

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.errors import SolutionError
-from tankcal.gauss_markov.loops import add_rows, back_substitute, eliminate
+from tankcal.gauss_markov.eliminating import add_rows, back_substitute, eliminate
 from tankcal.gauss_markov.model import Normals
 from tankcal.gauss_markov.plan import plan
 from tankcal.gauss_markov.rank import diagnosis
