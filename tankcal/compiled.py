@@ -36,5 +36,13 @@ def compiled(module, names):
         plain = known[name]
         bound = FunctionType(plain.__code__, known, name, plain.__defaults__)
         bound.__module__, bound.__qualname__ = plain.__module__, plain.__qualname__
-        known[name] = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)(bound)
+        known[name] = _jitted(numba, bound)
     return SimpleNamespace(**{name: known[name] for name in names})
+
+
+def _jitted(numba, function):
+    options = {"nogil": True, "error_model": "numpy", "fastmath": FAST}
+    try:
+        return numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # nowhere to keep the result: compile in each run
+        return numba.njit(**options)(function)
