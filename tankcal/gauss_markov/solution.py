@@ -6,6 +6,7 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.gauss_markov.eliminating import block_cofactors, block_rows, leverage, roots
+from tankcal.threads import threads_for
 
 
 class Factor:
@@ -82,7 +83,8 @@ class Solution:
     @cached_property
     def reduced_cofactors(self):
         """(nr, nr) cofactors of the reduced unknowns, before any inner constraints."""
-        inverse, info = scipy.linalg.lapack.dpotri(self._factor.lower, lower=1)
+        with threads_for(self._plan.reduced):
+            inverse, info = scipy.linalg.lapack.dpotri(self._factor.lower, lower=1)
         if info:
             raise ValueError("a factor that was sound before cannot be inverted")
         inverse = np.tril(inverse)
@@ -111,7 +113,11 @@ class Solution:
 
     def cofactors(self, columns):
         """Full cofactor matrix (k, k) of any unknowns, in the order given; columns (k,)."""
-        columns, nr = np.asarray(columns), self._plan.reduced
+        with threads_for(max(self._plan.reduced, len(columns))):
+            return self._cofactors(np.asarray(columns))
+
+    def _cofactors(self, columns):
+        nr = self._plan.reduced
         whitened = self._factor.whitened(self._through_reduced(columns))
         q = whitened.T @ whitened
         eliminated = np.flatnonzero(columns >= nr)

@@ -9,6 +9,7 @@ from tankcal.gauss_markov.model import Normals
 from tankcal.gauss_markov.plan import plan
 from tankcal.gauss_markov.rank import diagnosis
 from tankcal.gauss_markov.solution import Factor, Solution
+from tankcal.threads import threads_for
 
 SMALLEST_PIVOT = 1e-12  # of a scaled normal matrix; below it the rank is looked at
 SMALL = 2e7  # rows times unknowns squared: below it a system without blocks is solved by QR
@@ -31,8 +32,13 @@ def solve(model, state, *, max_iterations=100, tolerance=1e-4):
     Returns a Solution. Raises SolutionError when the observations do not determine the unknowns
     (the message names them) or when the iteration does not converge.
     """
-    work = _Work(model)
-    cost = work.evaluate(state)
+    with threads_for(model.reduced):
+        return _solved(_Work(model), state, max_iterations, tolerance)
+
+
+def _solved(work, state, max_iterations, tolerance):
+    """The iteration of `solve`."""
+    model, cost = work.model, work.evaluate(state)
     damping, resting = 0.0, FIRST_DAMPING
     limit = tolerance**2 * max(work.rows, 1)
     for iteration in range(1, max_iterations + 1):
