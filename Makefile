@@ -6,7 +6,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test study check format notebooks bench picture wheel clean
+.PHONY: help demo test study check format notebooks bench peer picture wheel clean
 
 help: ## what can be made
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -44,6 +44,10 @@ bench: $(VENV)/full ## time and memory of the main job, a table of 1 mm rows, te
 	$(BIN)/python benchmarks/main_job.py
 	$(BIN)/python benchmarks/table.py
 	$(BIN)/python benchmarks/rings.py
+
+peer: $(VENV)/full ## the adjustment against C++ Ceres (needs libceres-dev)
+	$(MAKE) -C benchmarks/adjustment
+	$(BIN)/python benchmarks/adjustment/run.py
 
 picture: $(VENV)/full ## the picture in the README, from the example's report (needs poppler)
 	$(BIN)/tankcal demo --quiet --out demo-results

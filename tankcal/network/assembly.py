@@ -1,0 +1,342 @@
+"""From a survey to a least-squares problem: what is unknown, and in which column it stands."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tankcal.camera import PARAMETERS
+from tankcal.errors import SolutionError
+from tankcal.gauss_markov import Group, Model
+from tankcal.network.survey import SCOPES
+from tankcal.observations import (
+    ControlCoordinates,
+    ImageCoordinates,
+    KnownUnknowns,
+    Layout,
+    PhotoOrientation,
+    State,
+)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A survey ready to be adjusted; coordinates relative to `centre_m`.
+
+    model, state, layout   for the solver
+    observations           tuple, one for each group of the model
+    sources                for each group where it comes from: "image points", a number in
+                           Survey.observations, or "known beforehand"
+    rows_of                for each group its rows' numbers there
+    set_aside              (points,) why a point does not take part; empty string: it does
+    eliminated             (points,) True when a point is eliminated
+    """
+
+    model: Model
+    state: State
+    layout: Layout
+    observations: tuple
+    sources: tuple
+    rows_of: tuple
+    centre_m: np.ndarray
+    set_aside: tuple
+    eliminated: np.ndarray
+    interior_of: np.ndarray
+
+    def relative(self, observations):
+        """Observations in the survey's frame, as the model has them."""
+        return _relative(observations, self.centre_m)
+
+
+def assemble(survey):
+    """The Problem of a Survey; raises SolutionError when something cannot be determined."""
+    set_aside = _set_aside(survey)
+    used = np.array([not why for why in set_aside], dtype=bool)
+    centre = _centre(survey)
+    table, values, interior_free, known = _interior(survey)
+    groups, sources, rows_of = _others(survey, used, centre)
+    eliminated = _eliminated(survey, groups, used)
+    layout, reduced = _layout(survey, eliminated, used, interior_free)
+    for one, rows in _image_groups(survey, used, layout, reduced, table):
+        groups.append(one)
+        sources.append("image points")
+        rows_of.append(rows)
+    for one in known + _known_tools(survey):
+        groups.append(one)
+        sources.append("known beforehand")
+        rows_of.append(np.arange(len(one)))
+    state = _state(survey, centre, values)
+    model = Model(
+        reduced=reduced,
+        blocks=int(np.count_nonzero(eliminated)),
+        groups=tuple(Group(one.columns(layout), one.rows, one.fill) for one in groups),
+        moved=layout.moved,
+        name_of=lambda column: name_of(survey, layout, table, column),
+    )
+    return Problem(
+        model, state, layout, tuple(groups), tuple(sources), tuple(rows_of),
+        centre, set_aside, eliminated, table,
+    )  # fmt: skip
+
+
+def _set_aside(survey):
+    """For each point, why it cannot be determined; an empty string when it can."""
+    images, count = survey.image_points, np.zeros(len(survey.points), dtype=int)
+    rays = np.zeros_like(count)
+    if images is not None:
+        seen = images.point if images.use is None else images.point[images.use > 0]
+        rays += np.bincount(seen, minlength=len(count))
+        _refuse_poor_photos(survey)
+    count += 2 * rays
+    for one in survey.observations:
+        for name in one.ties:
+            point = getattr(one, name)
+            point = point if one.use is None else point[one.use > 0]
+            count += one.rows * np.bincount(point, minlength=len(count))
+    if survey.fixed is not None:
+        count += survey.fixed.sum(axis=1)
+    bad = count < 3
+    if not bad.any():
+        return ("",) * len(count)
+    what = np.where(rays == 1, "has one ray", "has too few observations")
+    names = zip(survey.points, what, bad, strict=True)
+    return tuple(f"point {name} {why}" if poor else "" for name, why, poor in names)
+
+
+def _refuse_poor_photos(survey):
+    """Raise when a photo has fewer observations than unknowns."""
+    images, photos = survey.image_points, survey.photos
+    seen = images.photo if images.use is None else images.photo[images.use > 0]
+    rays = np.bincount(seen, minlength=len(photos.names))
+    count = 2 * rays
+    for one in survey.observations:
+        if hasattr(one, "photo"):
+            count += one.rows * np.bincount(one.photo, minlength=len(count))
+    if photos.fixed is not None:
+        count += np.repeat(photos.fixed, (1, 1, 1, 3), axis=1).sum(axis=1)
+    poor = np.flatnonzero(count < 6)
+    if len(poor):
+        told = ", ".join(f"{photos.names[i]} ({rays[i]})" for i in poor)
+        raise SolutionError(f"a photo needs at least 3 image points: {told}")
+
+
+def _others(survey, used, centre):
+    """Observations other than image points, relative to the centre, between points that are used.
+
+    Returns the observations, their numbers in the survey, and the numbers of their rows.
+    """
+    groups, sources, rows_of = [], [], []
+    for number, one in enumerate(survey.observations):
+        keep = np.ones(len(one), dtype=bool)
+        for name in one.ties:
+            keep &= used[getattr(one, name)]
+        rows = np.flatnonzero(keep)
+        groups.append(_relative(one if len(rows) == len(one) else one.taken(rows), centre))
+        sources.append(number)
+        rows_of.append(rows)
+    return groups, sources, rows_of
+
+
+def _taken(images, keep):
+    use = None if images.use is None else images.use[keep]
+    point, photo = images.point[keep], images.photo[keep]
+    return replace(
+        images,
+        point=point,
+        photo=photo,
+        xy_mm=images.xy_mm[keep],
+        sd_mm=images.sd_mm[keep],
+        use=use,
+    )
+
+
+def _centre(survey):
+    """Middle of the start coordinates: where the adjustment puts its origin."""
+    known = np.isfinite(survey.xyz_m).all(axis=1)
+    if not known.all():
+        missing = [survey.points[i] for i in np.flatnonzero(~known)[:5]]
+        raise SolutionError(f"no approximate coordinates for {', '.join(missing)}")
+    return survey.xyz_m.mean(axis=0)
+
+
+def _relative(one, centre):
+    """An observation of coordinates, relative to the centre."""
+    if isinstance(one, ControlCoordinates):
+        return replace(one, value=one.value - centre[one.axis])
+    if isinstance(one, PhotoOrientation):
+        return replace(one, value=one.value - np.append(centre, np.zeros(3))[one.element])
+    return one
+
+
+def _interior(survey):
+    """Where each photo's interior parameters stand, their values, and which are unknowns.
+
+    Returns table (photos, 13), values (q + 1,), free (q + 1,), and observations of weighted ones.
+    """
+    photos = survey.photos
+    if photos is None:
+        return np.zeros((0, 13), dtype=int), np.zeros(1), np.zeros(1, dtype=bool), []
+    table = np.full((len(photos.names), 13), -1)
+    values, free, known, shared = [], [], [], {}
+    for camera, settings in enumerate(survey.cameras):
+        mine = np.flatnonzero(photos.camera == camera)
+        wanted = [[k for k in range(13) if settings.scope[k] == scope] for scope in SCOPES]
+        each = [(shared, mine, wanted[1]), ({}, mine, wanted[2])]
+        each += [({}, [photo], wanted[3]) for photo in mine] if wanted[3] else []
+        for place, group, numbers in each:
+            for k in numbers:
+                if k not in place:
+                    place[k] = len(values)
+                    values.append(settings.values[k])
+                    free.append(settings.state[k] != "fixed")
+                    if settings.state[k] == "weighted":
+                        known.append((place[k], values[-1], settings.sd[k]))
+                table[group, k] = place[k]
+    table[table < 0] = len(values)
+    observed = []
+    if known:
+        index, value, sd = np.array(known).T
+        observed = [KnownUnknowns(value, sd, "interior", index.astype(int))]
+    return table, np.append(values, 0.0), np.append(free, False).astype(bool), observed
+
+
+def _known_tools(survey):
+    """Scales and offsets of instruments with an sd: weighted unknowns."""
+    observed = []
+    for of, value, sd in (("scale", "scale", "scale_sd"), ("offset_m", "offset_m", "offset_sd_m")):
+        values = np.array([getattr(tool, value) for tool in survey.instruments])
+        sds = np.array([getattr(tool, sd) for tool in survey.instruments])
+        index = np.flatnonzero(np.nan_to_num(sds) > 0)
+        if len(index):
+            observed.append(KnownUnknowns(values[index], sds[index], of, index))
+    return observed
+
+
+def _eliminated(survey, others, used):
+    """Points that may be eliminated: free in all coordinates, no two of them in one row."""
+    eliminated = used.copy()
+    if survey.fixed is not None:
+        eliminated &= ~survey.fixed.any(axis=1)
+    neighbours = {}
+    for one in others:
+        if len(one.ties) > 1:
+            for row in np.column_stack([getattr(one, name) for name in one.ties]).tolist():
+                for point in row:
+                    neighbours.setdefault(point, set()).update(row)
+    done = set()
+    for point in sorted(neighbours, key=lambda p: len(neighbours[p])):
+        if eliminated[point] and neighbours[point] & done:
+            eliminated[point] = False
+        if eliminated[point]:
+            done.add(point)
+    return eliminated
+
+
+def _layout(survey, eliminated, used, interior_free):
+    """The Layout, reduced unknowns first, and how many of these there are."""
+    photos, points = survey.photos, len(survey.points)
+    free_points = np.repeat(used[:, None], 3, axis=1)
+    if survey.fixed is not None:
+        free_points &= ~survey.fixed
+    free_photos = np.ones((0 if photos is None else len(photos.names), 6), dtype=bool)
+    if photos is not None and photos.fixed is not None:
+        free_photos = ~np.repeat(photos.fixed, (1, 1, 1, 3), axis=1)
+    tools = survey.instruments
+    free_scale = np.array([tool.scale_sd != 0 for tool in tools], dtype=bool)
+    free_offset = np.array([tool.offset_sd_m != 0 for tool in tools], dtype=bool)
+    free_system = np.ones((len(survey.systems), 7), dtype=bool)
+    free_system[:, 6] = [system.scale_free for system in survey.systems]
+    next_column = 0
+
+    def columns(free):
+        nonlocal next_column
+        found = np.full(free.shape, -1)
+        count = int(np.count_nonzero(free))
+        found[free] = np.arange(next_column, next_column + count)
+        next_column += count
+        return found
+
+    kinds = [interior_free, free_photos, free_scale, free_offset, free_system]
+    interior, of_photos, scale, offset, system = (columns(free) for free in kinds)
+    orientation = columns(np.ones(len(survey.sets), dtype=bool))
+    of_points = columns(free_points & ~eliminated[:, None])
+    reduced = next_column
+    last = np.flatnonzero(eliminated)
+    if survey.image_points is not None:  # points in the same photos next to one another
+        mark = np.random.default_rng(0).random(len(free_photos))
+        seen = np.bincount(
+            survey.image_points.point, weights=mark[survey.image_points.photo], minlength=points
+        )
+        last = last[np.argsort(seen[last], kind="stable")]
+    of_points[last] = next_column + np.arange(3 * len(last)).reshape(-1, 3)
+    return Layout(of_points, of_photos, interior, orientation, scale, offset, system), reduced
+
+
+def _image_groups(survey, used, layout, reduced, table):
+    """Image coordinates by form of camera, those of eliminated points first and point by point."""
+    images = survey.image_points
+    if images is None or not len(images.point):
+        return
+    forms = {}
+    for number, camera in enumerate(survey.cameras):
+        forms.setdefault(camera.form, []).append(number)
+    key = layout.points[images.point, 0]
+    key = np.where(key < reduced, np.iinfo(np.int64).max, key)
+    for form, cameras in forms.items():
+        rows, left = slice(None), table
+        if len(forms) > 1:
+            rows = np.flatnonzero(np.isin(survey.photos.camera[images.photo], cameras))
+            left = table[np.isin(survey.photos.camera, cameras)]
+        order = np.arange(len(key))[rows]
+        if not used.all():
+            order = order[used[images.point[order]]]
+        if (np.diff(key[order]) < 0).any():
+            order = order[np.argsort(key[order], kind="stable")]
+        one = _taken(images, order)
+        active = np.flatnonzero((left < layout.interior.size - 1).any(axis=0))
+        active = active[(layout.interior[left[:, active]] >= 0).any(axis=0)]
+        yield (
+            ImageCoordinates(
+                one.xy_mm, one.sd_mm, one.point, one.photo, form, active, table, use=one.use
+            ),
+            order,
+        )
+
+
+def _state(survey, centre, values):
+    photos, tools, systems = survey.photos, survey.instruments, survey.systems
+    state = State(
+        xyz_m=survey.xyz_m - centre,
+        interior=values,
+        orientation_rad=np.array(survey.sets, dtype=float),
+        scale=np.array([tool.scale for tool in tools], dtype=float),
+        offset_m=np.array([tool.offset_m for tool in tools], dtype=float),
+    )
+    if photos is not None:
+        state = replace(state, photo_xyz_m=photos.xyz_m - centre, rotation=photos.rotation)
+    if systems:
+        rotation = np.array([system.rotation for system in systems])
+        scale = np.array([system.scale for system in systems])
+        shift = np.array([system.shift_m for system in systems])
+        shift = shift + (1 + scale)[:, None] * (rotation @ centre)
+        state = replace(state, system=rotation, system_shift_m=shift, system_scale=scale)
+    return state
+
+
+def name_of(survey, layout, table, column):
+    """What the user calls the unknown in a column."""
+    for row, axis in np.argwhere(layout.points == column):
+        return f"{'xyz'[axis]} of point {survey.points[row]}"
+    for row, element in np.argwhere(layout.photos == column):
+        what = ("x", "y", "z", "rotation 1", "rotation 2", "rotation 3")[element]
+        return f"{what} of photo {survey.photos.names[row]}"
+    for place in np.flatnonzero(layout.interior == column):
+        photo, number = np.argwhere(table == place)[0]
+        camera = survey.cameras[survey.photos.camera[photo]].name
+        return f"{PARAMETERS[number]} of {camera}"
+    for place in np.flatnonzero(layout.orientation == column):
+        return f"orientation of direction set {place + 1}"
+    for what, columns in (("scale", layout.scale), ("offset", layout.offset)):
+        for place in np.flatnonzero(columns == column):
+            return f"{what} of {survey.instruments[place].name}"
+    system = np.argwhere(layout.system == column)[0, 0]
+    return f"transformation of system {survey.systems[system].name}"

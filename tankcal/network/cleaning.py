@@ -1,0 +1,183 @@
+"""Finding blunders: a robust start for many, iterative data snooping for the rest.
+
+Whole image points are set aside (both coordinates), other observations one by one. An observation
+that agrees after all, once others have gone, comes back. Source: Baarda 1968; Krarup, Juhl & Kubik
+1980 (the Danish method); Huber 1964.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tankcal.errors import SolutionError
+from tankcal.network.adjusting import adjust
+
+CRITICAL = 3.29  # two-sided normal, 0.1 %
+HUBER_ROUNDS, ROUNDS = 5, 25
+HUBER, DANISH = 2.0, 3.0
+AT_ONCE = 0.6  # all whose test quantity is above this share of the largest go together
+
+
+@dataclass(frozen=True)
+class Cleaned:
+    """A survey without its blunders.
+
+    adjusted  Adjusted of what is left      survey   with `use` filled in
+    removed   tuple of Removed              rounds   adjustments that this took
+    """
+
+    adjusted: object
+    survey: object
+    removed: tuple
+    rounds: int
+
+
+@dataclass(frozen=True)
+class Removed:
+    """An observation that was set aside: kind, source, row there, and its test quantity."""
+
+    kind: str
+    source: object
+    row: int
+    w: float
+
+
+def snoop(survey, *, critical=CRITICAL, robust=True, max_rounds=200, **options):
+    """Adjust a Survey without the observations that disagree with the others.
+
+    critical  of the w-test          robust   whether to start with the robust rounds
+    options   of tankcal.network.adjust
+
+    Returns a Cleaned. Raises SolutionError when the adjustment fails.
+    """
+    adjusted, rounds = adjust(survey, **options), 1
+    if robust and _worst(adjusted).max(initial=0) > critical:
+        survey, rounds = _robust(survey, adjusted, critical, options)
+        adjusted = adjust(survey, **options)
+    seen = {}
+    for _ in range(max_rounds):
+        uses, changed = _verdict(adjusted, critical)
+        for table in _tables(adjusted):
+            seen.update(_quantities(table))
+        if not changed:
+            return Cleaned(adjusted, survey, _removed(survey, seen), rounds)
+        survey = with_use(started(survey, adjusted), uses)
+        adjusted, rounds = adjust(survey, **options), rounds + 1
+    raise SolutionError(f"data snooping did not come to rest in {max_rounds} rounds")
+
+
+def started(survey, adjusted):
+    """The survey with the adjusted values as its start values, where there are any."""
+    state, centre = adjusted.solution.state, adjusted.problem.centre_m
+    found = np.isfinite(adjusted.xyz_m)
+    changes = {"xyz_m": np.where(found, centre + state.xyz_m, survey.xyz_m)}
+    changes["sets"] = state.orientation_rad
+    if survey.photos is not None:
+        changes["photos"] = replace(
+            survey.photos, xyz_m=centre + state.photo_xyz_m, rotation=state.rotation
+        )
+    return replace(survey, **changes)
+
+
+def with_use(survey, uses):
+    """The survey with the share of each observation; uses {source: (n,)}."""
+    observations = [
+        one.using(uses[number]) if number in uses else one
+        for number, one in enumerate(survey.observations)
+    ]
+    images = survey.image_points
+    if "image points" in uses:
+        images = replace(images, use=uses["image points"])
+    return replace(survey, observations=tuple(observations), image_points=images)
+
+
+def _shares(survey):
+    """{source: (n,)} the shares that a survey has now."""
+    shares = {
+        number: np.ones(len(one)) if one.use is None else np.array(one.use, dtype=float)
+        for number, one in enumerate(survey.observations)
+    }
+    images = survey.image_points
+    if images is not None:
+        n = len(images.point)
+        shares["image points"] = np.ones(n) if images.use is None else np.array(images.use, float)
+    return shares
+
+
+def _tables(adjusted):
+    return [table for table in adjusted.residuals if table.source != "known beforehand"]
+
+
+def _worst(adjusted):
+    """Largest |w| of each observation, all groups one after the other."""
+    return np.concatenate([table.whole for table in _tables(adjusted)])
+
+
+def _robust(survey, adjusted, critical, options):
+    """A survey in which what disagrees has a share of zero, found by weights that fall off."""
+    for turn in range(ROUNDS):
+        size = max(1.0, 1.4826 * float(np.median(_worst(adjusted))) / 1.4)
+        shares, change = _shares(survey), 0.0
+        for table in _tables(adjusted):
+            away = table.whole / size
+            if turn < HUBER_ROUNDS:
+                share = np.minimum(1.0, HUBER / np.maximum(away, 1e-9))
+            else:
+                share = np.exp(-0.5 * np.maximum(0.0, (away / DANISH) ** 2 - 1))
+            share = np.maximum(share, 1e-6)
+            mine = shares[table.source]
+            change = max(change, float(np.abs(share - mine[table.rows]).max(initial=0)))
+            mine[table.rows] = share
+        survey = with_use(started(survey, adjusted), shares)
+        adjusted = adjust(survey, **{**options, "tolerance": 1e-2})
+        if turn > HUBER_ROUNDS and change < 0.02:
+            break
+    shares = _shares(survey)
+    for table in _tables(adjusted):
+        good = table.whole / size <= critical
+        shares[table.source][table.rows] = good.astype(float)
+    return with_use(survey, shares), turn + 2
+
+
+def _verdict(adjusted, critical):
+    """The shares that the residuals ask for, and whether they differ from those there are."""
+    survey = adjusted.survey
+    shares, worst = _shares(survey), 0.0
+    tables = _tables(adjusted)
+    for table in tables:
+        worst = max(worst, float(table.whole[table.used].max(initial=0)))
+    changed = False
+    for table in tables:
+        away = table.whole
+        goes = table.used & (away > max(critical, AT_ONCE * worst))
+        if table.source == "image points":
+            goes &= _largest_of_each(survey.image_points.point[table.rows], np.where(goes, away, 0))
+        comes = ~table.used & (away < critical) if worst <= critical else np.zeros_like(goes)
+        shares[table.source][table.rows[goes]] = 0.0
+        shares[table.source][table.rows[comes]] = 1.0
+        changed |= bool(goes.any() or comes.any())
+    return shares, changed
+
+
+def _largest_of_each(owner, value):
+    """True where a value is the largest of its owner's."""
+    largest = np.zeros(owner.max(initial=-1) + 1)
+    np.maximum.at(largest, owner, value)
+    return value >= largest[owner]
+
+
+def _quantities(table):
+    """{(source, row): test quantity} of a table of residuals."""
+    rows, values = table.rows.tolist(), table.whole.tolist()
+    return {(table.source, row): value for row, value in zip(rows, values, strict=True)}
+
+
+def _removed(survey, seen):
+    """Every observation that is set aside, with the last test quantity it had, the worst first."""
+    kinds = {number: one.kind for number, one in enumerate(survey.observations)}
+    found = [
+        Removed(kinds.get(source, "image coordinate"), source, int(row), seen.get((source, row), 0))
+        for source, share in _shares(survey).items()
+        for row in np.flatnonzero(share == 0).tolist()
+    ]
+    return tuple(sorted(found, key=lambda one: -one.w))

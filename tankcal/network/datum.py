@@ -1,0 +1,155 @@
+"""The seven ways in which a whole survey can move, and which of them nothing observes.
+
+Translations, rotations about the axes through the centre, and scale move points, projection
+centres, directions of circles and further systems together, so that no image, angle or ratio of
+distances changes. Source: Koch 1999, Parameter Estimation and Hypothesis Testing, section 3.3;
+Meissl 1969.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+WAYS = ("x", "y", "z", "about X", "about Y", "about Z", "scale")
+UNFELT = 1e-8  # change of the whitened rows, with all columns scaled to length one
+AS_IF_FIXED = 1e4  # weight of a fixed unknown among the rows, as if it were known to 0.1 mm
+
+
+def directions(layout, state):
+    """The seven directions (unknowns, 7) at a state; fixed unknowns are left out."""
+    whole = np.zeros((unknowns(layout) + 1, 7))
+    for columns, derivative in _parts(layout, state):
+        whole[columns.ravel()] = derivative.reshape(-1, 7)
+    return whole[:-1]
+
+
+def unknowns(layout):
+    """Number of unknowns of a layout."""
+    return 1 + max((columns.max(initial=-1) for columns in vars(layout).values()), default=-1)
+
+
+def _parts(layout, state):
+    """Columns (...) of each kind of unknown with their derivatives (..., 7)."""
+    yield layout.points, _of_places(state.xyz_m)
+    n = len(state.photo_xyz_m)
+    photos = np.zeros((n, 6, 7))
+    if n:
+        photos[:, :3] = _of_places(state.photo_xyz_m)
+        photos[:, 3:, 3:6] = -state.rotation
+    yield layout.photos, photos
+    turn = np.zeros((len(state.orientation_rad), 7))
+    turn[:, 5] = -1.0
+    yield layout.orientation, turn
+    stretch = np.zeros((len(state.scale), 7))
+    stretch[:, 6] = -(1.0 + state.scale)
+    yield layout.scale, stretch
+    systems = np.zeros((len(state.system), 7, 7))
+    if len(systems):
+        m = 1.0 + state.system_scale
+        systems[:, :3, 3:6] = -state.system
+        systems[:, 3:6, :3] = -m[:, None, None] * state.system
+        systems[:, 6, 6] = -m
+    yield layout.system, systems
+
+
+def _of_places(xyz):
+    """Derivatives (n, 3, 7) of places by the seven ways."""
+    x, y, z = xyz.T
+    out = np.zeros((len(xyz), 3, 7))
+    out[:, :, :3] = np.eye(3)
+    out[:, 0, 4], out[:, 0, 5] = z, -y
+    out[:, 1, 3], out[:, 1, 5] = -z, x
+    out[:, 2, 3], out[:, 2, 4] = y, -x
+    out[:, :, 6] = xyz
+    return out
+
+
+def unobserved(problem):
+    """Combinations (7, d) of the seven ways that neither observations nor fixed unknowns feel."""
+    layout, state = problem.layout, problem.state
+    idle = _idle(problem)
+    whole = np.vstack([directions(layout, state), np.zeros(7)])
+    felt, lengths = [np.zeros((1, 7))], np.zeros(len(whole))
+    for one in problem.observations:
+        if not one.feels_datum:
+            continue
+        columns = one.columns(layout)
+        w = np.empty((len(one), one.rows))
+        jac = np.empty((len(one), one.rows, columns.shape[1]))
+        undisturbed = one.undisturbed(state)
+        one.fill(undisturbed, w, jac)
+        ways = whole
+        if undisturbed is not state:
+            ways = np.vstack([directions(layout, undisturbed), np.zeros(7)])
+        moved = np.einsum("nmk,nkd->nmd", jac, ways[columns]).reshape(-1, 7)
+        felt.append(np.linalg.qr(moved, mode="r"))
+        np.add.at(lengths, columns, np.einsum("nmk,nmk->nk", jac, jac))
+    square = (whole[:-1] ** 2).T @ lengths[:-1]
+    for columns, derivative in _parts(layout, state):
+        holds = (columns < 0) & np.logical_not(idle.get(id(columns), False))
+        fixed = AS_IF_FIXED * derivative[holds].reshape(-1, 7)
+        if len(fixed):
+            felt.append(np.linalg.qr(fixed, mode="r"))
+            square += np.sum(fixed**2, axis=0)
+    size = np.sqrt(np.where(square > 0, square, 1.0))
+    _, singular, vectors = np.linalg.svd(np.vstack(felt) / size)
+    rank = int(np.sum(singular > UNFELT))
+    return (vectors[rank:] / size).T
+
+
+def _idle(problem):
+    """{id of columns: mask} of the unknowns that have no column because nobody observed them."""
+    layout = problem.layout
+    aside = np.array([bool(why) for why in problem.set_aside], dtype=bool)
+    unused = np.ones(len(layout.scale), dtype=bool)
+    for one in problem.observations:
+        instrument = getattr(one, "instrument", np.zeros(0, dtype=int))
+        unused[instrument[instrument >= 0]] = False
+    return {id(layout.points): aside[:, None], id(layout.scale): unused}
+
+
+def in_words(combinations):
+    """The datum defect in words, from combinations (7, d) of the seven ways."""
+    d = combinations.shape[1]
+    basis = np.linalg.qr(combinations)[0]
+    share = np.sum(basis**2, axis=1)
+    pure = [i for i in range(7) if share[i] > 1 - 1e-6]
+    parts = []
+    shifts = [WAYS[i] for i in pure if i < 3]
+    turns = [WAYS[i] for i in pure if 3 <= i < 6]
+    if len(shifts) == 3:
+        parts.append("three translations")
+    elif shifts:
+        parts.append("the translation" + "s" * (len(shifts) > 1) + " in " + " and ".join(shifts))
+    if len(turns) == 3:
+        parts.append("three rotations")
+    elif turns:
+        parts.append("the rotation" + "s" * (len(turns) > 1) + " " + " and ".join(turns))
+    if 6 in pure:
+        parts.append("the scale")
+    if len(pure) < d:
+        rest = d - len(pure)
+        mixed = [WAYS[i] for i in range(7) if 1e-6 < share[i] <= 1 - 1e-6]
+        parts.append(f"{rest} combination" + "s" * (rest > 1) + " of " + ", ".join(mixed))
+    listed = parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
+    verb = "is" if d == 1 else "are"
+    return (
+        f"datum defect {d}: {listed} {verb} not determined by any observation; "
+        "add control or choose datum = inner"
+    )
+
+
+def held(problem, over, combinations):
+    """The Problem with a datum by inner constraints over chosen points.
+
+    over          (k,) points that take part, or None: all
+    combinations  (7, d) from `unobserved`
+    """
+    layout, mask = problem.layout, np.zeros(problem.model.unknowns + 1)
+    members = slice(None) if over is None else np.asarray(over)
+    mask[layout.points[members].ravel()] = 1.0
+
+    def free(state):
+        return directions(layout, state) @ combinations
+
+    return replace(problem, model=replace(problem.model, free=free, inner=mask[:-1]))

@@ -1,0 +1,39 @@
+"""The kinds of observation: what each one computes, and its derivatives."""
+
+from tankcal.observations.base import Layout, Observations, State
+from tankcal.observations.coordinates import (
+    ControlCoordinates,
+    HeightDifferences,
+    KnownUnknowns,
+    PlumbLines,
+    SystemCoordinates,
+)
+from tankcal.observations.photographs import ImageCoordinates, PhotoOrientation, PhotoRotation
+from tankcal.observations.sights import (
+    Azimuths,
+    Directions,
+    Distances,
+    HorizontalAngles,
+    Sights,
+    VerticalAngles,
+)
+
+__all__ = [
+    "Azimuths",
+    "ControlCoordinates",
+    "Directions",
+    "Distances",
+    "HeightDifferences",
+    "HorizontalAngles",
+    "ImageCoordinates",
+    "KnownUnknowns",
+    "Layout",
+    "Observations",
+    "PhotoOrientation",
+    "PhotoRotation",
+    "PlumbLines",
+    "Sights",
+    "State",
+    "SystemCoordinates",
+    "VerticalAngles",
+]

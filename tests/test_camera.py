@@ -1,0 +1,123 @@
+"""Cameras and rotations: the published formulas, other programs, singular places."""
+
+import numpy as np
+import pytest
+from jacobians import assert_derivative
+
+from tankcal.camera import AFFINITIES, CONVENTIONS, Form, corrected, from_opencv, measured
+from tankcal.rotations import (
+    angle_derivatives,
+    angles_of,
+    from_angles,
+    looking,
+    rotation_vector,
+    turned,
+    vector_derivatives,
+)
+
+RNG = np.random.default_rng(11)
+Q = np.array([100, 0.3, -0.2, 2e-6, 3e-10, -1e-14, 1e-18, 3e-6, -2e-6, 1e-5, 1e-9, 2e-3, -1e-3])
+IDEAL = RNG.uniform(-60, 60, (40, 2))
+
+
+def silva(x, y, q, affinity, balance):
+    """The published sums, term by term: Silva 40-47 and 58, Pessoa 3-6."""
+    _, _, _, k1, k2, k3, k4, p1, p2, p3, p4, a, b = q
+    r2, e = x**2 + y**2, balance**2
+    radial = k1 * (r2 - e) + k2 * (r2**2 - e**2) + k3 * (r2**3 - e**3) + k4 * (r2**4 - e**4)
+    more = 1 + p3 * r2 + p4 * r2**2
+    dx = x * radial + (p1 * (r2 + 2 * x**2) + 2 * p2 * x * y) * more
+    dy = y * radial + (p2 * (r2 + 2 * y**2) + 2 * p1 * x * y) * more
+    ax, ay = {"both_y": (a * y, b * y), "both_x": (a * x, b * x), "b1_b2": (a * x + b * y, 0)}[
+        affinity
+    ]
+    return np.column_stack([dx + ax, dy + ay])
+
+
+@pytest.mark.parametrize("balance", [0.0, 40.0])
+@pytest.mark.parametrize("affinity", AFFINITIES)
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_each_convention_says_what_its_source_says(convention, affinity, balance):
+    """Published: the equations of Silva 39, Pessoa 10 and the distortion of the ideal point."""
+    form = Form(convention, affinity, balance)
+    found = measured(IDEAL, Q, form)
+    x, y = (found - Q[1:3]).T
+    if convention == "distortion_of_ideal":
+        expected = IDEAL + silva(*IDEAL.T, Q, affinity, balance)
+        assert found - Q[1:3] == pytest.approx(expected, abs=1e-12)
+    else:
+        sign = 1 if convention == "correction_added" else -1
+        ideal = np.column_stack([x, y]) + sign * silva(x, y, Q, affinity, balance)
+        assert ideal == pytest.approx(IDEAL, abs=1e-11)
+    assert corrected(found, Q, form) == pytest.approx(IDEAL, abs=1e-11)
+
+
+def test_added_and_subtracted_differ_by_the_sign_of_all_parameters():
+    other = np.concatenate([Q[:3], -Q[3:9], Q[9:11], -Q[11:]])
+    added = measured(IDEAL, Q, Form("correction_added"))
+    assert measured(IDEAL, other, Form("correction_subtracted")) == pytest.approx(added, abs=1e-12)
+
+
+def test_opencv_camera():
+    """Closed form: OpenCV's published model, pixels, y downwards."""
+    f, cx, cy = 3000.0, 2010.0, 1490.0
+    k1, k2, p1, p2, k3 = -0.12, 0.08, 4e-4, -3e-4, 0.02
+    x, y = RNG.uniform(-0.5, 0.5, (2, 30))
+    r2 = x * x + y * y
+    radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
+    u = f * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx
+    v = f * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy
+    pixel, size = 0.005, (4000, 3000)
+    q = from_opencv(f, f, cx, cy, (k1, k2, p1, p2, k3), pixel, size)
+    found = measured(q[0] * np.column_stack([x, -y]), q, Form())
+    expected = np.column_stack([u - (size[0] - 1) / 2, -(v - (size[1] - 1) / 2)]) * pixel
+    assert found == pytest.approx(expected, abs=1e-11)
+
+
+def test_rotations_and_their_angles():
+    """Property: R3 R2 R1; angles come back; the tangent step is the exponential (scipy)."""
+    from scipy.spatial.transform import Rotation
+
+    angles = RNG.uniform(-1.5, 1.5, (20, 3))
+    r = from_angles(*angles.T)
+    for one, (omega, phi, kappa) in zip(r, angles, strict=True):
+        passive = Rotation.from_euler("xyz", [-omega, -phi, -kappa]).as_matrix()
+        assert one == pytest.approx(passive, abs=1e-14)
+    assert angles_of(r) == pytest.approx(angles, abs=1e-13)
+    small = RNG.normal(0, 0.5, (20, 3))
+    exponential = Rotation.from_rotvec(small).as_matrix()
+    assert turned(r, small) == pytest.approx(exponential @ r, abs=1e-14)
+    assert turned(r, 0 * small) == pytest.approx(r, abs=1e-15)
+    assert rotation_vector(exponential) == pytest.approx(small, abs=1e-13)
+
+
+def test_derivatives_of_angles_and_vectors():
+    r = from_angles(*RNG.uniform(-1.3, 1.3, (3, 4)))
+    small = RNG.normal(0, 0.6, (4, 3))
+    exponential = turned(np.tile(np.eye(3), (4, 1, 1)), small)
+    for i in range(4):
+        one = slice(i, i + 1)
+        assert_derivative(
+            lambda d, one=one: angles_of(turned(r[one], d[None]))[0],
+            np.zeros(3),
+            angle_derivatives(r[one])[0],
+        )
+        assert_derivative(
+            lambda d, one=one: rotation_vector(turned(exponential[one], d[None]))[0],
+            np.zeros(3),
+            vector_derivatives(small[one])[0],
+        )
+
+
+def test_angles_at_the_singular_place():
+    """phi = +-90 deg: omega is reported as 0, and the angles still give the same rotation."""
+    for sign in (1, -1):
+        r = from_angles(np.array([0.4]), np.array([sign * np.pi / 2]), np.array([0.9]))
+        assert from_angles(*angles_of(r).T) == pytest.approx(r, abs=1e-12)
+
+
+def test_a_camera_that_looks_north():
+    """Closed form: axis along +y, x of the image to the east, y up; roll turns the image."""
+    assert looking(0.0, 0.0, 0.0) == pytest.approx(np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]))
+    east = looking(np.pi / 2, 0.0, np.pi / 2)
+    assert east == pytest.approx(np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]]), abs=1e-15)
