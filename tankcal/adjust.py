@@ -18,6 +18,8 @@ import scipy.sparse
 
 from tankcal.errors import SolutionError
 
+SMALLEST_PIVOT = 1e-12  # of normal equations with ones in the diagonal: below it is rounding
+
 
 @dataclass(frozen=True)
 class Adjustment:
@@ -100,6 +102,23 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
     raise SolutionError(f"the adjustment did not converge in {max_iterations} iterations")
 
 
+def determined(pivots, rows, of_normals=False):
+    """Which unknowns are determined: (k,) True for pivots of a factor that are more than rounding.
+
+    The one rule about rank, here and in tankcal.gauss_markov: columns are scaled to length one
+    first; then a pivot of the rows themselves (QR) must be above max(rows, k) eps of the largest,
+    a squared pivot of normal equations (Cholesky), which have lost half the digits, above 1e-12.
+
+    pivots      (k,) diagonal of R or of the Cholesky factor, not squared
+    rows        number of rows                of_normals  True for a Cholesky factor
+    """
+    pivots = np.abs(pivots)
+    if of_normals:
+        return pivots**2 >= SMALLEST_PIVOT
+    limit = max(rows, len(pivots)) * np.finfo(float).eps
+    return pivots > limit * pivots.max(initial=0.0)
+
+
 def _whitener(m):
     """A function that multiplies by L^-1 (or L^-T), where L L' = m."""
     diagonal = m.diagonal()
@@ -140,8 +159,7 @@ def _solve(a, w):
         raise SolutionError("the adjustment left the numbers: a derivative is not finite")
     scale[scale == 0] = 1.0
     basis, r, order = scipy.linalg.qr(a / scale, mode="economic", pivoting=True, check_finite=False)
-    pivots = np.abs(np.diag(r))
-    rank = int(np.sum(pivots > pivots[0] * max(a.shape) * np.finfo(float).eps))
+    rank = int(np.sum(determined(np.diag(r), len(a))))
     if rank < a.shape[1]:
         raise SolutionError(
             f"rank {rank} of {a.shape[1]}: the observations do not determine unknown(s) "

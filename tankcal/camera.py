@@ -30,6 +30,7 @@ import numpy as np
 
 from tankcal.imaging import distort, image_point, undistorted_by
 
+NEWTON_ROUNDS = 50
 PARAMETERS = ("c", "x0", "y0", "K1", "K2", "K3", "K4", "P1", "P2", "P3", "P4", "A", "B")
 CONVENTIONS = {"distortion_of_ideal": 0.0, "correction_added": 1.0, "correction_subtracted": -1.0}
 # (dx by A x, dx by A y, dx by B y, dy by B x, dy by B y)
@@ -84,23 +85,115 @@ def measured(ideal_mm, interior, form):
     return np.column_stack(image_point(*ideal_mm.T, q, form.numbers, of_ideal)[:2])
 
 
+def balanced_about(interior, form, radius_mm):
+    """The same camera with its radial distortion balanced about another radius R0: (13,) and Form.
+
+    What R0 takes out of the radial terms, s = 1 - (K1 R0^2 + ...), is a change of scale, which c
+    takes: exact, whatever the convention (in the one that subtracts K counts with the other sign).
+    radius_mm 0 gives the plain form.
+    """
+    side = CONVENTIONS[form.convention]
+    plain = _rescaled(
+        interior, side, 1 - (side or 1) * _at_balance(interior, form.radial_balance_mm)
+    )
+    target = Form(form.convention, form.affinity, float(radius_mm))
+    s = 1.0
+    for _ in range(NEWTON_ROUNDS):
+        found = _rescaled(plain, side, 1 / s)
+        wanted = 1 - (side or 1) * _at_balance(found, radius_mm)
+        if abs(wanted - s) < 1e-15:
+            break
+        s = wanted
+    return found, target
+
+
+def _at_balance(interior, radius_mm):
+    """K1 R0^2 + K2 R0^4 + ..."""
+    e = radius_mm**2
+    return float(np.polyval(np.append(np.asarray(interior)[6:2:-1], 0.0), e))
+
+
+def _rescaled(interior, side, s):
+    """Interior parameters when the balanced terms' part 1 - s goes over to c (see above)."""
+    q = np.array(interior, dtype=float)
+    if side:  # s (x - x0) + ... = xi: divide the equation by s
+        q[0] /= s
+        q[[3, 4, 5, 6, 7, 8, 11, 12]] /= s
+        return q
+    powers = np.array([1, 0, 0, -3, -5, -7, -9, -2, -2, -2, -4, -1, -1], dtype=float)
+    return q * s**powers  # s xi is the ideal point of a camera with s c
+
+
 def from_opencv(fx_px, fy_px, cx_px, cy_px, coefficients, pixel_mm, size_px):
-    """Interior parameters (13,), form "distortion_of_ideal", affinity "b1_b2", of OpenCV's camera.
+    """Interior parameters (13,), of the plain Form(), and the sides (2,) of a pixel, mm.
 
     fx_px, fy_px, cx_px, cy_px  the camera matrix
     coefficients                k1, k2, p1, p2, [k3], in units of the focal length, y downwards
-    pixel_mm                    side of a pixel
+    pixel_mm                    height of a pixel; the width follows from fx and fy
     size_px                     (columns, lines) of the image
 
-    The image of tankcal has its origin in the middle, y upwards (Pessoa 1, 2).
+    The image of tankcal has its origin in the middle, y upwards (Pessoa 1, 2). OpenCV's fx and fy
+    differ after the distortion, as pixels that are not square: exactly so here.
     """
     k1, k2, p1, p2, k3 = (*coefficients, 0.0)[:5]
     c = fy_px * pixel_mm
-    x0 = (cx_px - (size_px[0] - 1) / 2) * pixel_mm
-    y0 = -(cy_px - (size_px[1] - 1) / 2) * pixel_mm
-    if fx_px != fy_px and (k1, k2, p1, p2, k3) != (0.0,) * 5:
-        raise ValueError("fx and fy differ: OpenCV's distortion comes before that affinity")
-    affinity = fx_px / fy_px - 1.0
-    return np.array(
-        [c, x0, y0, k1 / c**2, k2 / c**4, k3 / c**6, 0, p2 / c, -p1 / c, 0, 0, affinity, 0]
-    )
+    pixel = np.array([c / fx_px, pixel_mm])
+    x0 = (cx_px - (size_px[0] - 1) / 2) * pixel[0]
+    y0 = -(cy_px - (size_px[1] - 1) / 2) * pixel[1]
+    radial = (k1 / c**2, k2 / c**4, k3 / c**6, 0.0)
+    return np.array([c, x0, y0, *radial, p2 / c, -p1 / c, 0, 0, 0, 0]), pixel
+
+
+@dataclass(frozen=True)
+class OpenCV:
+    """A camera as OpenCV writes it: matrix (3, 3) in px, coefficients k1, k2, p1, p2, k3.
+
+    error_px  largest difference of an image point over the frame; 0 but for rounding where OpenCV
+              has all the terms
+    """
+
+    matrix: np.ndarray
+    coefficients: np.ndarray
+    error_px: float
+
+
+def to_opencv(interior, form, pixel_mm, size_px):
+    """The camera that OpenCV would have: exact for the plain form, else fitted over the frame.
+
+    interior  (13,)                    form     its Form
+    pixel_mm  sides (2,) of a pixel    size_px  (columns, lines) of the image
+
+    Least squares of the images of ideal points that cover the frame, no derivatives spared: the
+    model is linear but for fx and fy. See OpenCV.error_px for what is left.
+    """
+    size, pixel = np.array(size_px, dtype=float), np.broadcast_to(pixel_mm, 2).astype(float)
+    half = (size - 1) / 2
+    grid = np.meshgrid(*(np.linspace(-1, 1, 21) * h * p for h, p in zip(half, pixel, strict=True)))
+    seen = np.column_stack([part.ravel() for part in grid])
+    ideal = corrected(seen, interior, form) / interior[0] * [1, -1]
+    place = seen / pixel * [1, -1] + half
+    focal = np.array([interior[0] / pixel[0], interior[0] / pixel[1]])
+    x, y = ideal.T
+    r2, one, zero = x * x + y * y, np.ones_like(x), np.zeros_like(x)
+    powers = [r2, r2**2, r2**3]
+    by_x = np.column_stack([x * r for r in powers] + [2 * x * y, r2 + 2 * x * x])
+    by_y = np.column_stack([y * r for r in powers] + [r2 + 2 * y * y, 2 * x * y])
+    k = np.zeros(5)
+    for _ in range(NEWTON_ROUNDS):
+        along = np.column_stack([x + by_x @ k, zero, one, zero, focal[0] * by_x])
+        down = np.column_stack([zero, y + by_y @ k, zero, one, focal[1] * by_y])
+        a = np.vstack([along, down])
+        full = np.concatenate(
+            [place[:, 0] + focal[0] * (by_x @ k), place[:, 1] + focal[1] * (by_y @ k)]
+        )
+        scale = np.linalg.norm(a, axis=0)
+        found = np.linalg.lstsq(a / scale, full, rcond=None)[0] / scale
+        moved = np.abs(
+            np.append(found[:2] / focal - 1, (found[4:] - k) * scale[4:] / focal[0])
+        ).max()
+        focal, middle, k = found[:2], found[2:4], found[4:]
+        if moved < 1e-14:
+            break
+    image = focal * np.column_stack([x + by_x @ k, y + by_y @ k]) + middle
+    matrix = np.array([[focal[0], 0, middle[0]], [0, focal[1], middle[1]], [0, 0, 1]])
+    return OpenCV(matrix, k[[0, 1, 3, 4, 2]], float(np.abs(image - place).max()))

@@ -4,6 +4,13 @@ A room writes its loops as ordinary functions beside their array form; here they
 first asked for, with the results kept beside the source file. All functions that call one another
 must live in one module: numba looks only at that file's date when it decides whether what it kept
 is still true.
+
+Compiling takes 12 s, once on a machine, and loading what was kept 0.5 s in each run. The array form
+needs about 16 us for an image point in an iteration (elimination included), compiled loops less
+than a tenth of that. TANKCAL_COMPILED says what to do: 1 compiles at first use (so does leaving it
+out: programs that call tankcal are served best in the long run); patient, which the command line
+sets, leaves the work to arrays until there is enough of it, so that no small job waits for a
+compiler; 0 never compiles.
 """
 
 import importlib.util
@@ -11,15 +18,37 @@ import os
 from functools import cache
 from types import FunctionType, SimpleNamespace
 
+AT_ONCE = 20_000  # rows of one problem from which compiling pays at once: 0.3 s an iteration
+ENOUGH = 200_000  # rows that arrays have worked through, 3 s, before a compiler is asked
 FAST = {"contract", "reassoc", "nsz"}  # sums in any order; NaN and infinity stay what they are
 
 
 @cache
 def available():
     """True when loops can be compiled; TANKCAL_COMPILED=0 turns that off."""
-    if os.environ.get("TANKCAL_COMPILED", "1") == "0":
+    if _asked_for() == "0":
         return False
     return importlib.util.find_spec("numba") is not None
+
+
+@cache
+def _asked_for():
+    return os.environ.get("TANKCAL_COMPILED", "1")
+
+
+_worked = 0  # rows that arrays have worked through in this process
+
+
+def worthwhile(rows=0):
+    """True when compiled loops are to be used, for so many rows after those that came before.
+
+    The first call about a problem names its rows; what follows from them names none.
+    """
+    global _worked
+    if _asked_for() != "patient":
+        return available()
+    _worked = max(_worked + rows, ENOUGH if rows >= AT_ONCE else 0)
+    return _worked >= ENOUGH and available()
 
 
 @cache

@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 
-from tankcal.compiled import available, compiled
+from tankcal.compiled import compiled, worthwhile
 
 NEWTON_STEPS = 6  # quadratic: a distortion of 30 % of the radius is solved to the last digit
 
@@ -251,7 +251,7 @@ def image_rows(*arguments):
 
     The derivatives are by point (3), photo (position 3, rotation 3), interior parameters (k).
     """
-    if available():
+    if worthwhile(len(arguments[6])):
         compiled(sys.modules[__name__], _COMPILED)._loop(*arguments)
     else:
         _arrays(*arguments)

@@ -8,6 +8,7 @@ import pytest
 import tankcal
 from tankcal.record import record_of, save
 
+os.environ.setdefault("TANKCAL_COMPILED", "patient")  # a run of few tests waits for no compiler
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "silva-1995"
 

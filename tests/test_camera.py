@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 from jacobians import assert_derivative
 
-from tankcal.camera import AFFINITIES, CONVENTIONS, Form, corrected, from_opencv, measured
+from tankcal.camera import (
+    AFFINITIES,
+    CONVENTIONS,
+    Form,
+    balanced_about,
+    corrected,
+    from_opencv,
+    measured,
+    to_opencv,
+)
 from tankcal.rotations import (
     angle_derivatives,
     angles_of,
@@ -18,6 +27,7 @@ from tankcal.rotations import (
 RNG = np.random.default_rng(11)
 Q = np.array([100, 0.3, -0.2, 2e-6, 3e-10, -1e-14, 1e-18, 3e-6, -2e-6, 1e-5, 1e-9, 2e-3, -1e-3])
 IDEAL = RNG.uniform(-60, 60, (40, 2))
+PLACES = RNG.uniform(-1, 1, (2000, 2)) * [1999, 1499]  # px from the middle
 
 
 def silva(x, y, q, affinity, balance):
@@ -58,20 +68,86 @@ def test_added_and_subtracted_differ_by_the_sign_of_all_parameters():
     assert measured(IDEAL, other, Form("correction_subtracted")) == pytest.approx(added, abs=1e-12)
 
 
-def test_opencv_camera():
-    """Closed form: OpenCV's published model, pixels, y downwards."""
-    f, cx, cy = 3000.0, 2010.0, 1490.0
+@pytest.mark.parametrize("ratio", [1.0, 1.003])
+def test_opencv_camera(ratio):
+    """Closed form: OpenCV's published model, pixels, y downwards, fx and fy alike or not."""
+    fx, fy, cx, cy = ratio * 3000.0, 3000.0, 2010.0, 1490.0
     k1, k2, p1, p2, k3 = -0.12, 0.08, 4e-4, -3e-4, 0.02
     x, y = RNG.uniform(-0.5, 0.5, (2, 30))
     r2 = x * x + y * y
     radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
-    u = f * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx
-    v = f * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy
+    u = fx * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx
+    v = fy * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy
     pixel, size = 0.005, (4000, 3000)
-    q = from_opencv(f, f, cx, cy, (k1, k2, p1, p2, k3), pixel, size)
+    q, sides = from_opencv(fx, fy, cx, cy, (k1, k2, p1, p2, k3), pixel, size)
     found = measured(q[0] * np.column_stack([x, -y]), q, Form())
-    expected = np.column_stack([u - (size[0] - 1) / 2, -(v - (size[1] - 1) / 2)]) * pixel
+    expected = np.column_stack([u - (size[0] - 1) / 2, -(v - (size[1] - 1) / 2)]) * sides
     assert found == pytest.approx(expected, abs=1e-11)
+    assert sides == pytest.approx([pixel * fy / fx, pixel])
+    back = to_opencv(q, Form(), sides, size)
+    assert back.matrix == pytest.approx(np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]), rel=1e-10)
+    assert back.coefficients == pytest.approx([k1, k2, p1, p2, k3], abs=1e-9)
+    assert back.error_px < 1e-9
+
+
+def test_to_opencv_states_what_it_cannot_say(figure):
+    """Second method: OpenCV's published model at the points; the error is the one stated."""
+    size, pixel = (4000, 3000), 0.005
+    q = np.array([15.0, 0.02, -0.01, -5e-4, 1e-6, 0, 0, 1e-5, -2e-5, 0, 0, 2e-4, 1e-4])
+    for convention in CONVENTIONS:
+        form = Form(convention, "b1_b2", 6.0)
+        found = to_opencv(q, form, pixel, size)
+        x, y = (corrected(PLACES * pixel, q, form) / q[0] * [1, -1]).T
+        k1, k2, p1, p2, k3 = found.coefficients
+        r2 = x * x + y * y
+        radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
+        u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+        v = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+        seen = np.column_stack([u, v, np.ones_like(u)]) @ found.matrix.T
+        expected = PLACES * [1, -1] + [1999.5, 1499.5]
+        worst = np.abs(seen[:, :2] - expected).max()
+        figure(f"{convention} as OpenCV's, over the frame", f"{found.error_px:.2e} px")
+        assert 0.3 * found.error_px < worst < 1.05 * found.error_px
+
+
+def test_conventions_round_trip_over_the_frame(figure):
+    """Property: measured to ideal and back, all forms, within 1e-9 px of 5 um, 24 x 36 mm."""
+    pixel, worst = 0.005, 0.0
+    q = np.array([35, 0.1, -0.1, 5e-5, -3e-8, 1e-11, 0, 1e-5, -2e-5, 1e-5, 1e-9, 1e-3, -5e-4])
+    grid = np.column_stack([a.ravel() for a in np.meshgrid(np.linspace(-18, 18, 31),
+                                                            np.linspace(-12, 12, 21))])  # fmt: skip
+    for convention in CONVENTIONS:
+        for affinity in AFFINITIES:
+            for balance in (0.0, 12.0):
+                form = Form(convention, affinity, balance)
+                back = measured(corrected(grid, q, form), q, form)
+                worst = max(worst, np.abs(back - grid).max() / pixel)
+    figure("round trip through all conventions", f"{worst:.1e} px")
+    assert worst < 1e-9
+
+
+@pytest.mark.parametrize("affinity", AFFINITIES)
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_balanced_form_both_ways(convention, affinity):
+    """Property: the same image points, from plain to balanced (Zeiss, AICON), to another, back."""
+    points = np.column_stack([IDEAL, np.full(len(IDEAL), 100.0)]) / 100
+    q, form = Q, Form(convention, affinity, 0.0)
+    expected = measured(q[0] * points[:, :2], q, form)
+    for radius in (40.0, 25.0, 0.0):
+        q, form = balanced_about(q, form, radius)
+        assert form.radial_balance_mm == radius
+        assert measured(q[0] * points[:, :2], q, form) == pytest.approx(expected, abs=1e-11)
+    assert q == pytest.approx(Q, rel=1e-12)
+
+
+def test_pixels_that_are_not_square():
+    """Closed form: no distortion: fx over fy is the ratio of the pixel's sides."""
+    q, sides = from_opencv(3000, 3030, 2000, 1500, (0, 0, 0, 0), 0.004, (4001, 3001))
+    assert q[:3] == pytest.approx([12.12, 0, 0])
+    assert sides == pytest.approx([12.12 / 3000, 0.004])
+    plain = to_opencv(np.array([12.12, 0, 0, *[0] * 8, 1e-3, 0]), Form(), 0.004, (4001, 3001))
+    assert plain.matrix[0, 0] == pytest.approx(3030 * 1.001)
+    assert plain.error_px < 1e-9
 
 
 def test_rotations_and_their_angles():

@@ -11,6 +11,7 @@ from tankcal.observations import (
     Directions,
     Distances,
     HeightDifferences,
+    HeldOrientation,
     HorizontalAngles,
     ImageCoordinates,
     KnownUnknowns,
@@ -100,6 +101,12 @@ KINDS = {
         np.full((3, 3), 0.01) * [1, 2, 3],
         np.arange(3),
         turned(STATE.rotation, RNG.normal(0, 0.5, (3, 3))),
+    ),
+    "photo held": HeldOrientation(
+        *(np.linspace(-0.4, 0.5, 11), np.ones(11)),
+        photo=np.arange(11) % 3,
+        row=np.arange(11),
+        rotation=np.tile(turned(STATE.rotation, RNG.normal(0, 0.4, (3, 3))), (4, 1, 1))[:11],
     ),
     "control": ControlCoordinates(*FOUR, np.array([0, 1, 2, 5]), np.array([0, 1, 2, 0])),
     "system": SystemCoordinates(

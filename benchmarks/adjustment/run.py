@@ -1,12 +1,13 @@
 """Adjustment against C++ Ceres: the same problems, interleaved, correctness beside time.
 
     make -C benchmarks/adjustment          (needs Debian's libceres-dev)
-    OPENBLAS_NUM_THREADS=1 python benchmarks/adjustment/run.py [a b c] [--repeats 5]
+    OPENBLAS_NUM_THREADS=1 python benchmarks/adjustment/run.py [a b c d] [--repeats 5]
 
 a, b: networks of sim_tank.py; c: "Bundle Adjustment in the Large", Ladybug 16-22106. Both are read
 from the shared data ($TANKCAL_DATA, else ../shared). Ours is the public call, checks and results
-included; Ceres is Solve() and Covariance with its defaults (and once with a wide trust region), the
-problem already built.
+included, loops compiled before; Ceres is Solve() and Covariance with its defaults (and once with a
+wide trust region), the problem already built. d: 200 photos, 20 000 points, ours alone, on two
+threads of BLAS: time and peak memory (large.py).
 """
 
 import argparse
@@ -27,7 +28,11 @@ from tankcal.network import adjust
 
 HERE = Path(__file__).resolve().parent
 SHARED = Path(os.environ.get("TANKCAL_DATA", HERE.parents[2] / "shared"))
-SIZES = {"a": (), "b": ("--stations", "60", "--points", "3000")}
+SIZES = {
+    "a": (),
+    "b": ("--stations", "60", "--points", "3000"),
+    "d": ("--stations", "200", "--points", "20000"),
+}
 BAL = SHARED / "data" / "bal-16-22106" / "problem-16-22106-pre.txt.bz2"
 
 
@@ -53,11 +58,29 @@ def made(name, folder):
         text = folder / "bal.txt"
         text.write_bytes(bz2.decompress(BAL.read_bytes()))
         return problems.bal(BAL), Peer("bal", text)
-    make = [sys.executable, SHARED / "bench" / "sim_tank.py", folder / name, *SIZES[name]]
-    subprocess.run(make, check=True, stdout=subprocess.DEVNULL)
+    simulate(name, folder)
     return problems.tank(dict(np.load(folder / f"{name}.npz"))), Peer(
         "tank", folder / f"{name}.bin"
     )
+
+
+def simulate(name, folder):
+    """Write a network of sim_tank.py."""
+    make = [sys.executable, SHARED / "bench" / "sim_tank.py", folder / name, *SIZES[name]]
+    subprocess.run(make, check=True, stdout=subprocess.DEVNULL)
+
+
+def large(name, folder):
+    """The large network in its own process, on two threads."""
+    simulate(name, folder)
+    command = [sys.executable, HERE / "large.py", folder / f"{name}.npz"]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "2"}
+    answer = subprocess.run(
+        command, check=True, stdout=subprocess.PIPE, text=True, env=environment
+    ).stdout
+    print(f"\n{name}: a large network, ours alone")
+    for key, value in json.loads(answer).items():
+        print(f"{key:26}{value:14.6g}")
 
 
 def ours(name, survey):
@@ -111,13 +134,17 @@ def compare(name, repeats, solver, folder):
 
 def main():
     """Read the arguments and print the tables."""
+    os.environ["TANKCAL_COMPILED"] = "1"
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("problems", nargs="*", default=["a", "b", "c"])
+    parser.add_argument("problems", nargs="*", default=["a", "b", "c", "d"])
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--solver", default="DENSE_SCHUR", help="Ceres' fastest here")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         for name in given.problems:
+            if name == "d":
+                large(name, Path(folder))
+                continue
             repeats = max(given.repeats, 41) if name == "a" else given.repeats
             compare(name, repeats, given.solver, Path(folder))
 

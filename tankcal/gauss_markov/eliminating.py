@@ -6,13 +6,13 @@ Both forms give the same numbers but for rounding; see tankcal.gauss_markov.loop
 import numpy as np
 import scipy.sparse
 
-from tankcal.compiled import available, compiled
+from tankcal.compiled import compiled, worthwhile
 from tankcal.gauss_markov import loops
 
 
 def add_rows(batch, w, jac, normals):
     """Add a batch's rows (w, jac already the batch's own) to the Normals."""
-    if available():
+    if worthwhile():
         run = compiled(loops, loops.COMPILED)
         if batch.block is None:
             run._add_plain_rows(w, jac, batch.columns, normals.t, normals.g)
@@ -36,7 +36,7 @@ def add_rows(batch, w, jac, normals):
 
 def eliminate(plan, normals, damping, smallest):
     """Eliminate the blocks in place; the first block that is not determined, or -1."""
-    if available():
+    if worthwhile():
         return compiled(loops, loops.COMPILED)._eliminate(
             normals.v, normals.wide, normals.b, plan.starts, plan.columns, plan.runs, plan.ends,
             plan.alike, normals.t, normals.g, damping, smallest,
@@ -75,7 +75,7 @@ def block_rows(plan, wide):
 
 def back_substitute(plan, normals, reduced):
     """L^-T (y + Y' reduced) of each block (nb, 3); the blocks' step is this with the other sign."""
-    if available():
+    if worthwhile():
         out = np.empty((plan.blocks, 3))
         compiled(loops, loops.COMPILED)._back(
             normals.v, normals.wide, normals.b, plan.starts, plan.columns, reduced, out
@@ -99,7 +99,7 @@ def block_cofactors(plan, normals, inverse):
     """
     cross, out = np.empty((len(plan.columns) + 1, 3)), np.empty((plan.blocks, 3, 3))
     cross[-1] = 0.0
-    if available():
+    if worthwhile():
         compiled(loops, loops.COMPILED)._cofactors(
             normals.v, normals.wide, plan.starts, plan.columns, plan.runs, plan.ends,
             inverse, cross, out,
@@ -121,7 +121,7 @@ def leverage(plan, batch, jac, inverse, cross, cofactors):
     inverse, cross, cofactors  of the reduced unknowns, and as block_cofactors gives them
     """
     spare = plan.reduced
-    if batch.block is not None and available():
+    if batch.block is not None and worthwhile():
         out = np.empty(jac.shape[:2])
         compiled(loops, loops.COMPILED)._leverage(
             jac, batch.block, batch.columns, batch.places, inverse, cross, cofactors, spare, out

@@ -32,8 +32,12 @@ class Model:
     free        free(state) -> (unknowns, d) directions in which nothing is observed (a datum to be
                 chosen), or None when the observations give the datum
     name_of     name_of(column) -> what the user calls that unknown
+    in_words    in_words(directions) -> the unknowns that take part in directions (unknowns, d), all
+                columns of length one, in words; None: their names
     inner       (unknowns,) 1 where an unknown takes part in the inner constraints that choose the
                 datum of the free directions, else 0
+    exact       tuple of Group: rows that are zero exactly, between reduced unknowns only
+    name_of_exact  name_of_exact(row) -> what the user calls that row, all rows of `exact` counted
     """
 
     reduced: int
@@ -42,7 +46,18 @@ class Model:
     moved: Callable
     free: Callable = None
     name_of: Callable = str
+    in_words: Callable = None
     inner: np.ndarray = None
+    exact: tuple = ()
+    name_of_exact: Callable = str
+
+    def in_datum(self, state, step):
+        """A step (unknowns,) without what the inner constraints forbid; there may be none."""
+        if self.free is None:
+            return step
+        free = self.free(state)
+        ties = free * self.inner[:, None]
+        return step - free @ np.linalg.solve(ties.T @ free, ties.T @ step)
 
     @property
     def unknowns(self):

@@ -121,6 +121,8 @@ def _split(number, columns, reduced, blocks):
     order = np.argsort(~eliminated, axis=1, kind="stable")
     has = eliminated.any(axis=1)
     parts = [(number, np.flatnonzero(~has), None, None, spare[~has])] if not has.all() else []
+    if not has.any():
+        return parts
     order = order[has]
     moved = np.take_along_axis(spare[has], order, axis=1)
     block = (moved[:, 0] - reduced) // 3

@@ -11,6 +11,7 @@ from tankcal.gauss_markov.eliminating import add_rows, back_substitute, eliminat
 
 NOTHING = 1e-7
 FAINT = 1e-9  # eigenvalue of the scaled reduced system that makes a direction a candidate
+WEAK = 1e-6  # eigenvalue of a direction along which an iteration may stray
 NAMES_SHOWN = 8
 
 
@@ -21,22 +22,41 @@ def diagnosis(work, state, bad_block):
         first = model.reduced + 3 * bad_block
         names = ", ".join(model.name_of(column) for column in range(first, first + 3))
         return f"not determined by the observations: {names}"
-    directions, lengths = undetermined(work)
+    directions, lengths = undetermined(work, state)
     if model.free is not None:
         directions = _without(directions, model.free(state) * lengths[:, None])
     if not directions.shape[1]:
         return None
+    told = _in_words(model, directions)
+    return f"rank defect {directions.shape[1]}: not determined by the observations: {told}"
+
+
+def weakness(work, state):
+    """Words on the direction that the rows feel least, or "" when they feel all."""
+    model = work.model
+    directions, lengths = undetermined(work, state, WEAK, np.inf)
+    if model.free is not None:
+        directions = _without(directions, model.free(state) * lengths[:, None])
+    if not directions.shape[1]:
+        return ""
+    return f"; hardly determined by the observations: {_in_words(model, directions[:, :1])}"
+
+
+def _in_words(model, directions):
+    """The unknowns that take part in directions (unknowns, d)."""
+    if model.in_words is not None:
+        return model.in_words(directions)
     size = np.sqrt(np.sum(directions**2, axis=1))
     worst = np.argsort(-size)[:NAMES_SHOWN]
     worst = worst[size[worst] > 0.1 * size.max()]
-    names = ", ".join(model.name_of(int(column)) for column in worst)
-    return f"rank defect {directions.shape[1]}: not determined by the observations: {names}"
+    return ", ".join(model.name_of(int(column)) for column in worst)
 
 
-def undetermined(work):
+def undetermined(work, state, faint=FAINT, nothing=NOTHING):
     """Directions (unknowns, d) that the rows do not feel, and the columns' lengths (unknowns,).
 
-    The directions are in units of columns of length one.
+    The directions are in units of columns of length one, and obey the exact conditions.
+    faint  eigenvalue, see FAINT      nothing  see NOTHING
     """
     normals, nr = work.normals, work.plan.reduced
     normals.clear()
@@ -48,14 +68,18 @@ def undetermined(work):
     eliminate(work.plan, normals, 0.0, 0.0)
     s = np.triu(normals.t[:nr, :nr] + np.tril(normals.t[:nr, :nr], -1).T)
     s += np.triu(s, 1).T
-    values, vectors = np.linalg.eigh(s * scale[:nr] * scale[:nr, None])
+    s = s * scale[:nr] * scale[:nr, None]
+    tangent = work.conditions.tangent(state, scale[:nr]) if work.conditions else None
+    values, vectors = np.linalg.eigh(s if tangent is None else tangent.square(s)[0])
+    if tangent is not None:
+        vectors = tangent.whole(vectors)
     normals.b[:] = 0.0
     found = []
-    for vector in vectors[:, values < FAINT].T:
+    for vector in vectors[:, values < faint].T:
         reduced = vector * scale[:nr]
         direction = np.concatenate([reduced, -back_substitute(work.plan, normals, reduced).ravel()])
         length = np.linalg.norm(direction / scale)
-        if _felt(work, direction) < NOTHING * length:
+        if _felt(work, direction) < nothing * length:
             found.append(direction / scale / length)
     found = np.array(found).T if found else np.zeros((work.model.unknowns, 0))
     return found, lengths

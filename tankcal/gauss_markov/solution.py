@@ -5,29 +5,52 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
-from tankcal.gauss_markov.eliminating import block_cofactors, block_rows, leverage, roots
+from tankcal.gauss_markov.effects import followed, following, times
+from tankcal.gauss_markov.eliminating import block_cofactors, leverage
 from tankcal.threads import threads_for
 
 
 class Factor:
-    """The factored reduced system: scale and Cholesky factor; eliminated parts in `normals`."""
+    """The factored reduced system: scale and Cholesky factor; eliminated parts in `normals`.
 
-    def __init__(self, normals, scale, lower, untouched, free, ties):
+    tangent, pull  where conditions hold exactly: their Tangent, and Q1' S Q, see there
+    """
+
+    def __init__(self, normals, scale, lower, untouched, free, ties, tangent, pull):
         self.normals, self.scale, self.lower = normals, scale, lower
         self.untouched, self.free, self.ties = untouched, free, ties
+        self.tangent, self.pull = tangent, pull
+
+    def inverse(self):
+        """(nr, nr) inverse of the reduced system; in the null space, where conditions hold."""
+        inverse, info = self.lower, 0
+        if inverse.size:
+            inverse, info = scipy.linalg.lapack.dpotri(self.lower, lower=1)
+        if info:
+            raise ValueError("a factor that was sound before cannot be inverted")
+        inverse = np.tril(inverse)
+        inverse += np.tril(inverse, -1).T
+        if self.tangent is not None:
+            inverse = self.tangent.whole(self.tangent.whole(inverse).T)
+        inverse *= self.scale
+        inverse *= self.scale[:, None]
+        return inverse
 
     def whitened(self, columns):
         """L^-1 D columns, so that columns' S^-1 columns is a sum of squares; columns (nr, k)."""
-        return scipy.linalg.solve_triangular(
-            self.lower, columns * self.scale[:, None], lower=True, check_finite=False
-        )
+        scaled = columns * self.scale[:, None]
+        if self.tangent is not None:
+            scaled = self.tangent.inside(scaled)
+        return scipy.linalg.solve_triangular(self.lower, scaled, lower=True, check_finite=False)
 
     def solved(self, columns):
         """S^-1 columns, columns (nr,) or (nr, k)."""
         scale = self.scale if columns.ndim == 1 else self.scale[:, None]
-        return scale * scipy.linalg.cho_solve(
-            (self.lower, True), scale * columns, check_finite=False
-        )
+        inner = scale * columns
+        if self.tangent is not None:
+            inner = self.tangent.inside(inner)
+        inner = scipy.linalg.cho_solve((self.lower, True), inner, check_finite=False)
+        return scale * (inner if self.tangent is None else self.tangent.whole(inner))
 
 
 class Solution:
@@ -38,22 +61,28 @@ class Solution:
     misclosures  list of (n, m) whitened, computed minus observed, one array a group
     iterations   until the last step was below the tolerance
     rows         number of rows that weigh anything
-    unknowns     number of unknowns that are estimated
+    unknowns     number of unknowns that are estimated, less those that exact conditions take
+    nearly       Factor before the last step
+    plan, factor, conditions  of the solver, for tankcal.gauss_markov.effects
     rank_defect  number of directions that only the datum fixes
     """
 
-    def __init__(self, work, state, cost, iterations, factor):
+    def __init__(self, work, state, cost, iterations, factor, nearly):
         self.model, self.state, self.cost, self.iterations = work.model, state, cost, iterations
         self.misclosures = work.w
-        self._plan, self._work, self._last = work.plan, work, factor
+        self.plan, self._work, self._last = work.plan, work, factor
+        self.conditions = work.conditions
+        self.nearly = nearly
         self.rank_defect = 0
         if self.model.free is not None:
             self.rank_defect = self.model.free(state).shape[1]
         self.unknowns = self.model.unknowns
+        if self.conditions:
+            self.unknowns -= self.factor.tangent.rank
         self.rows = int(sum(np.count_nonzero(j.any(axis=2)) for j in work.jac))
 
     @cached_property
-    def _factor(self):
+    def factor(self):
         """Normal equations at the solution itself, not before the last step."""
         if self._last is not None:
             return self._last
@@ -63,7 +92,7 @@ class Solution:
     @property
     def jacobians(self):
         """List of (n, m, K) whitened derivatives at the solution, one array a group."""
-        return self._factor and self._work.jac
+        return self.factor and self._work.jac
 
     @property
     def dof(self):
@@ -83,56 +112,50 @@ class Solution:
     @cached_property
     def reduced_cofactors(self):
         """(nr, nr) cofactors of the reduced unknowns, before any inner constraints."""
-        with threads_for(self._plan.reduced):
-            inverse, info = scipy.linalg.lapack.dpotri(self._factor.lower, lower=1)
-        if info:
-            raise ValueError("a factor that was sound before cannot be inverted")
-        inverse = np.tril(inverse)
-        inverse += np.tril(inverse, -1).T
-        inverse *= self._factor.scale
-        inverse *= self._factor.scale[:, None]
-        return inverse
+        with threads_for(self.plan.reduced):
+            return self.factor.inverse()
 
     @cached_property
-    def _of_blocks(self):
-        return block_cofactors(self._plan, self._factor.normals, self.reduced_cofactors)
+    def of_blocks(self):
+        """Cofactors (nb, 3, 3) of the blocks and (t, 3) of each with its reduced columns."""
+        return block_cofactors(self.plan, self.factor.normals, self.reduced_cofactors)
 
     @property
     def block_cofactors(self):
         """(nb, 3, 3) cofactor matrix of each eliminated block."""
-        own = self._of_blocks[0]
-        if self._datum is None:
+        own = self.of_blocks[0]
+        if self.datum is None:
             return own
-        columns = self._plan.reduced + np.arange(3 * self._plan.blocks).reshape(-1, 3)
+        columns = self.plan.reduced + np.arange(3 * self.plan.blocks).reshape(-1, 3)
         return self._in_datum(own, columns, columns)
 
     def reduced_blocks(self, columns):
         """Cofactors (n, k, k) of groups (n, k) of reduced unknowns; anything where one is -1."""
         own = self.reduced_cofactors[columns[:, :, None], columns[:, None, :]]
-        return own if self._datum is None else self._in_datum(own, columns, columns)
+        return own if self.datum is None else self._in_datum(own, columns, columns)
 
     def cofactors(self, columns):
         """Full cofactor matrix (k, k) of any unknowns, in the order given; columns (k,)."""
-        with threads_for(max(self._plan.reduced, len(columns))):
+        with threads_for(max(self.plan.reduced, len(columns))):
             return self._cofactors(np.asarray(columns))
 
     def _cofactors(self, columns):
-        nr = self._plan.reduced
-        whitened = self._factor.whitened(self._through_reduced(columns))
+        nr = self.plan.reduced
+        whitened = self.factor.whitened(self._through_reduced(columns))
         q = whitened.T @ whitened
         eliminated = np.flatnonzero(columns >= nr)
         if len(eliminated):
             block, axis = np.divmod(columns[eliminated] - nr, 3)
             self._add_own(q, eliminated, block, axis)
-        return q if self._datum is None else self._in_datum(q, columns, columns)
+        return q if self.datum is None else self._in_datum(q, columns, columns)
 
     @cached_property
-    def _datum(self):
+    def datum(self):
         """What brings cofactors into the datum of the inner constraints, None when there are none.
 
         With T = I - G B C', B = (C'G)^-1: T Q T' = Q - G H' - H G' + G M G', H = Q C B', M = B C'H.
         """
-        free, ties = self._factor.free, self._factor.ties
+        free, ties = self.factor.free, self.factor.ties
         if free is None:
             return None
         inverse = np.linalg.inv(ties.T @ free)
@@ -141,24 +164,26 @@ class Solution:
 
     def _in_datum(self, q, rows, columns):
         """Cofactors (..., r, k) between unknowns (..., r) and (..., k), brought into the datum."""
-        free, h, m = self._datum
+        free, h, m = self.datum
         g = np.swapaxes(free[columns], -1, -2)
         return q - free[rows] @ np.swapaxes(h[columns], -1, -2) - h[rows] @ g + free[rows] @ m @ g
 
     def times(self, matrix):
         """Cofactor matrix times a matrix (unknowns, d), in the datum of the factor."""
-        nr, normals = self._plan.reduced, self._factor.normals
-        wide, root = block_rows(self._plan, normals.wide), roots(normals)
-        inner = np.linalg.solve(root, matrix[nr:].reshape(self._plan.blocks, 3, -1))
-        own = inner.reshape(3 * self._plan.blocks, -1)
-        reduced = self._factor.solved(matrix[:nr] - wide.T @ own)
-        own = (own - wide @ reduced).reshape(inner.shape)
-        blocks = np.linalg.solve(root.transpose(0, 2, 1), own)
-        return np.concatenate([reduced, blocks.reshape(3 * self._plan.blocks, -1)])
+        return times(self, matrix)
+
+    def followed(self, reduced):
+        """Changes (unknowns, d) of all unknowns, when the reduced ones change by (nr, d)."""
+        return followed(self, reduced)
+
+    @cached_property
+    def following(self):
+        """-V^-1 W' (3 nb, nr), how the blocks follow the reduced unknowns; dense or sparse."""
+        return following(self)
 
     def _through_reduced(self, columns):
         """How each unknown follows the reduced ones: (nr, k), d unknown / d reduced."""
-        nr, starts = self._plan.reduced, self._plan.starts
+        nr, starts = self.plan.reduced, self.plan.starts
         out = np.zeros((nr, len(columns)), order="F")
         own = np.flatnonzero(columns < nr)
         out[columns[own], own] = 1.0
@@ -168,16 +193,16 @@ class Solution:
         to = np.repeat(eliminated, count)
         first = np.repeat(starts[block] - np.cumsum(count) + count, count)
         entry = first + np.arange(len(to))
-        inverse = np.repeat(self._inverse_roots[block, :, axis], count, axis=0)
-        wide = self._factor.normals.wide[entry]
-        out[self._plan.columns[entry], to] = -np.einsum("ti,ti->t", wide, inverse)
+        inverse = np.repeat(self.inverse_roots[block, :, axis], count, axis=0)
+        wide = self.factor.normals.wide[entry]
+        out[self.plan.columns[entry], to] = -np.einsum("ti,ti->t", wide, inverse)
         return out
 
     @cached_property
-    def _inverse_roots(self):
+    def inverse_roots(self):
         """L^-1 (nb, 3, 3) of each block."""
-        a, b, c, d, e, f = self._factor.normals.v.T
-        inverse = np.zeros((self._plan.blocks, 3, 3))
+        a, b, c, d, e, f = self.factor.normals.v.T
+        inverse = np.zeros((self.plan.blocks, 3, 3))
         inverse[:, 0, 0], inverse[:, 1, 1], inverse[:, 2, 2] = 1 / a, 1 / c, 1 / f
         inverse[:, 1, 0], inverse[:, 2, 1] = -b / (a * c), -e / (c * f)
         inverse[:, 2, 0] = (b * e / c - d) / (a * f)
@@ -185,7 +210,7 @@ class Solution:
 
     def _add_own(self, q, places, block, axis):
         """Add V^-1 between the unknowns at `places` that belong to one block."""
-        inverse = self._inverse_roots.transpose(0, 2, 1) @ self._inverse_roots
+        inverse = self.inverse_roots.transpose(0, 2, 1) @ self.inverse_roots
         order = np.argsort(block, kind="stable")
         for shift in range(3):  # pairs that lie 0, 1 or 2 apart once sorted by block
             i, j = order[: len(order) - shift], order[shift:]
@@ -203,10 +228,10 @@ class Solution:
     def leverage(self, group, jac):
         """J Q J' of each row (n, m) of a group; jac (n, m, K) ordered as the group's."""
         out = np.zeros(jac.shape[:2])
-        cofactors, cross = self._of_blocks
-        for batch in self._plan.batches:
+        cofactors, cross = self.of_blocks
+        for batch in self.plan.batches:
             if batch.group == group:
                 out[batch.rows] = leverage(
-                    self._plan, batch, batch.of(jac), self.reduced_cofactors, cross, cofactors
+                    self.plan, batch, batch.of(jac), self.reduced_cofactors, cross, cofactors
                 )
         return out

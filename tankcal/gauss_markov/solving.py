@@ -3,15 +3,16 @@
 import numpy as np
 import scipy.linalg
 
+from tankcal.adjust import SMALLEST_PIVOT, determined
 from tankcal.errors import SolutionError
 from tankcal.gauss_markov.eliminating import add_rows, back_substitute, eliminate
+from tankcal.gauss_markov.exact import Conditions
 from tankcal.gauss_markov.model import Normals
 from tankcal.gauss_markov.plan import plan
-from tankcal.gauss_markov.rank import diagnosis
+from tankcal.gauss_markov.rank import diagnosis, weakness
 from tankcal.gauss_markov.solution import Factor, Solution
 from tankcal.threads import threads_for
 
-SMALLEST_PIVOT = 1e-12  # of a scaled normal matrix; below it the rank is looked at
 SMALL = 2e7  # rows times unknowns squared: below it a system without blocks is solved by QR
 FIRST_DAMPING = 1e-4
 STRONGEST_DAMPING = 1e12
@@ -38,7 +39,8 @@ def solve(model, state, *, max_iterations=100, tolerance=1e-4):
 
 def _solved(work, state, max_iterations, tolerance):
     """The iteration of `solve`."""
-    model, cost = work.model, work.evaluate(state)
+    model, state = work.model, work.closed_start(state)
+    cost = work.evaluate(state)
     damping, resting = 0.0, FIRST_DAMPING
     limit = tolerance**2 * max(work.rows, 1)
     for iteration in range(1, max_iterations + 1):
@@ -47,12 +49,15 @@ def _solved(work, state, max_iterations, tolerance):
             damping = _stronger(damping, resting)
             continue
         step, decrement = work.step(factor)
-        candidate = model.moved(state, step)
+        candidate = work.closed(model.moved(state, step), factor)
+        if candidate is None:
+            damping = _stronger(damping, resting)
+            continue
         if not damping and decrement < limit:
             _refuse_untouched(model, factor)
             cost = work.evaluate(candidate, derivatives=False)
             sharp = decrement < SHARP * max(work.rows, 1)
-            return Solution(work, candidate, cost, iteration, factor if sharp else None)
+            return Solution(work, candidate, cost, iteration, factor if sharp else None, factor)
         before, cost = cost, work.evaluate(candidate)
         if cost <= before * (1 + 1e-12):
             gain = 2 * (before - cost) / decrement
@@ -62,7 +67,9 @@ def _solved(work, state, max_iterations, tolerance):
             state = candidate
         else:
             cost, damping = work.evaluate(state), _stronger(damping, resting)
-    raise SolutionError(f"the adjustment did not converge in {max_iterations} iterations")
+    raise SolutionError(
+        f"the adjustment did not converge in {max_iterations} iterations{weakness(work, state)}"
+    )
 
 
 def _refuse_untouched(model, factor):
@@ -91,6 +98,23 @@ class _Work:
         ]
         self.normals = Normals.zero(self.plan)
         self.rows = sum(w.size for w in self.w)
+        self.conditions = Conditions(model)
+
+    def closed_start(self, state):
+        """The start state, brought to where the exact conditions hold."""
+        if not self.conditions:
+            return state
+        self.evaluate(state)
+        lengths = np.zeros(self.model.unknowns + 1)
+        for group, jac in zip(self.model.groups, self.jac, strict=True):
+            np.add.at(lengths, group.columns, np.einsum("nmk,nmk->nk", jac, jac))
+        lengths = lengths[: self.plan.reduced]
+        scale = 1.0 / np.sqrt(np.where(lengths > 0, lengths, 1.0))
+        return self.conditions.closed(state, scale, strict=True)
+
+    def closed(self, state, factor):
+        """The state after a step, brought back to the exact conditions; None: damp more."""
+        return self.conditions.closed(state, factor.scale) if self.conditions else state
 
     def evaluate(self, state, derivatives=True):
         """Fill misclosures (and derivatives) at a state; half the sum of squares."""
@@ -110,6 +134,10 @@ class _Work:
         untouched = diagonal == 0.0
         if untouched.any():
             diagonal[untouched] = 1.0
+        tangent = None
+        if self.conditions:
+            tangent = self.conditions.tangent(state, 1.0 / np.sqrt(diagonal))
+            untouched &= ~tangent.touched
         bad = eliminate(self.plan, normals, damping, SMALLEST_PIVOT)
         if bad >= 0:
             return self._look(state, damping, bad)
@@ -120,15 +148,19 @@ class _Work:
             ties = free * self.model.inner[:, None]
             held = np.linalg.qr(free[:nr] / scale[:, None])[0]
         if self.plan.blocks == 0 and self.rows * nr * nr < SMALL:
-            lower, sound = self._dense_root(scale, untouched, damping, held)
+            lower, sound, pull = self._dense_root(scale, untouched, damping, held, tangent)
         else:
-            lower, sound = self._root(scale, untouched, damping, held)
+            lower, sound, pull = self._root(scale, untouched, damping, held, tangent)
         if not sound:
             return self._look(state, damping, None)
-        return Factor(normals, scale, lower, np.flatnonzero(untouched), free, ties)
+        untouched = np.flatnonzero(untouched)
+        return Factor(normals, scale, lower, untouched, free, ties, tangent, pull)
 
-    def _root(self, scale, untouched, damping, held):
-        """Cholesky factor of the scaled reduced system, and whether its pivots are sound."""
+    def _root(self, scale, untouched, damping, held, tangent):
+        """Cholesky factor of the scaled reduced system, and whether its pivots are sound.
+
+        And what the conditions hold against: see Tangent.square.
+        """
         nr = self.plan.reduced
         s = self.normals.t[:nr, :nr] + self.normals.t[:nr, :nr].T
         corner = np.einsum("ii->i", s)
@@ -139,10 +171,14 @@ class _Work:
         corner += damping
         if held is not None:
             s += held @ held.T
+        pull = None
+        if tangent is not None:
+            s, pull = tangent.square(s)
         lower, info = scipy.linalg.lapack.dpotrf(s.T, lower=1, clean=0, overwrite_a=1)
-        return lower, not info and not lower.diagonal().min(initial=1.0) ** 2 < SMALLEST_PIVOT
+        sound = not info and determined(lower.diagonal(), self.rows, of_normals=True).all()
+        return lower, sound, pull
 
-    def _dense_root(self, scale, untouched, damping, held):
+    def _dense_root(self, scale, untouched, damping, held, tangent):
         """The same factor by QR of the rows themselves: nothing is squared."""
         nr = self.plan.reduced
         rows = [np.diag(untouched.astype(float)), np.sqrt(damping) * np.eye(nr)]
@@ -155,10 +191,13 @@ class _Work:
             columns = np.broadcast_to(batch.columns[:, None, :], jac.shape)
             dense[np.arange(n)[:, None, None], np.arange(m)[:, None], columns] = jac
             rows.append(dense.reshape(n * m, -1)[:, :nr] * scale)
-        r = np.linalg.qr(np.vstack(rows), mode="r")
+        rows, pull = np.vstack(rows), None
+        if tangent is not None:
+            outer, rows = tangent.split(rows.T)
+            pull, rows = outer @ np.vstack([outer, rows]).T, rows.T
+        r = np.linalg.qr(rows, mode="r")
         lower = np.asfortranarray((r * np.sign(r.diagonal())[:, None]).T)
-        limit = max(self.rows, nr) * np.finfo(float).eps
-        return lower, not lower.diagonal().min(initial=1.0) < limit
+        return lower, determined(lower.diagonal(), self.rows).all(), pull
 
     def _look(self, state, damping, bad_block):
         """A factor that could not be had: raise when it is the survey's fault."""

@@ -1,23 +1,30 @@
-"""The network: everything that was observed on site, in one adjustment."""
+"""The network: everything that was observed on site, in one adjustment.
 
-from tankcal.network.adjusting import adjust
-from tankcal.network.cleaning import Cleaned, snoop
-from tankcal.network.reliability import Residuals
-from tankcal.network.results import Adjusted
-from tankcal.network.starting import approximate
-from tankcal.network.survey import Camera, ImagePoints, Instrument, Photos, Survey, System
+Names are resolved when they are first used: reading a job needs a Camera, not the solver.
+"""
 
-__all__ = [
-    "Adjusted",
-    "Camera",
-    "Cleaned",
-    "ImagePoints",
-    "Instrument",
-    "Photos",
-    "Residuals",
-    "Survey",
-    "System",
-    "adjust",
-    "approximate",
-    "snoop",
-]
+from importlib import import_module
+
+_ROOM_OF = {
+    "Adjusted": "results",
+    "Camera": "survey",
+    "Cleaned": "cleaning",
+    "ImagePoints": "survey",
+    "Instrument": "survey",
+    "Photos": "survey",
+    "Residuals": "reliability",
+    "Survey": "survey",
+    "System": "survey",
+    "adjust": "adjusting",
+    "approximate": "starting",
+    "correlations": "results",
+    "snoop": "cleaning",
+}
+
+__all__ = [*_ROOM_OF]
+
+
+def __getattr__(name):
+    if name not in _ROOM_OF:
+        raise AttributeError(f"module 'tankcal.network' has no attribute {name!r}")
+    return getattr(import_module(f"tankcal.network.{_ROOM_OF[name]}"), name)

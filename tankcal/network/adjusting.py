@@ -5,6 +5,7 @@ from tankcal.gauss_markov import UndeterminedError, solve
 from tankcal.network.assembly import assemble
 from tankcal.network.datum import held, in_words, unobserved
 from tankcal.network.results import Adjusted
+from tankcal.network.soundness import hanging_datum, refuse_worthless_cameras
 from tankcal.observations import PlumbLines
 
 
@@ -34,6 +35,10 @@ def adjust(survey, *, datum="control", over=None, tolerance=1e-4, max_iterations
         if datum != "inner":
             _refuse_defect(problem)
         raise
+    except SolutionError as error:
+        raise SolutionError(f"{error}{hanging_datum(problem)}") from error
+    if survey.photos is not None:
+        refuse_worthless_cameras(survey, problem, solution)
     return Adjusted(survey, problem, solution)
 
 
@@ -41,4 +46,4 @@ def _refuse_defect(problem):
     """Raise when the datum is missing, in words."""
     free = unobserved(problem)
     if free.shape[1]:
-        raise SolutionError(in_words(free))
+        raise SolutionError(in_words(free, problem))

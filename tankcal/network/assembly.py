@@ -4,9 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.camera import PARAMETERS
 from tankcal.errors import SolutionError
 from tankcal.gauss_markov import Group, Model
+from tankcal.network.columns import eliminated_points, layout_of
+from tankcal.network.naming import in_words, name_of, name_of_exact
 from tankcal.network.survey import SCOPES
 from tankcal.observations import (
     ControlCoordinates,
@@ -15,7 +16,25 @@ from tankcal.observations import (
     Layout,
     PhotoOrientation,
     State,
+    as_conditions,
+    exact_rows,
 )
+
+
+@dataclass(frozen=True)
+class Held:
+    """Observations that hold exactly (sd 0).
+
+    observations  as the survey has them (relative to the centre)
+    conditions    the same as conditions      row_of  (conditions,) number of each one's observation
+    source, rows  see Problem
+    """
+
+    observations: object
+    conditions: object
+    row_of: np.ndarray
+    source: object
+    rows: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -29,6 +48,9 @@ class Problem:
     rows_of                for each group its rows' numbers there
     set_aside              (points,) why a point does not take part; empty string: it does
     eliminated             (points,) True when a point is eliminated
+    interior_of            (photos, 13) place of each photo's parameters in State.interior
+    exact                  tuple of Held: observations that hold exactly
+    points                 names
     """
 
     model: Model
@@ -41,6 +63,12 @@ class Problem:
     set_aside: tuple
     eliminated: np.ndarray
     interior_of: np.ndarray
+    exact: tuple = ()
+    points: tuple = ()
+
+    def name_of_point(self, point):
+        """Name of a point."""
+        return self.points[point]
 
     def relative(self, observations):
         """Observations in the survey's frame, as the model has them."""
@@ -53,9 +81,9 @@ def assemble(survey):
     used = np.array([not why for why in set_aside], dtype=bool)
     centre = _centre(survey)
     table, values, interior_free, known = _interior(survey)
-    groups, sources, rows_of = _others(survey, used, centre)
-    eliminated = _eliminated(survey, groups, used)
-    layout, reduced = _layout(survey, eliminated, used, interior_free)
+    groups, sources, rows_of, exact = _others(survey, used, centre)
+    eliminated = eliminated_points(survey, groups, used, exact)
+    layout, reduced = layout_of(survey, eliminated, used, interior_free, table)
     for one, rows in _image_groups(survey, used, layout, reduced, table):
         groups.append(one)
         sources.append("image points")
@@ -68,14 +96,21 @@ def assemble(survey):
     model = Model(
         reduced=reduced,
         blocks=int(np.count_nonzero(eliminated)),
-        groups=tuple(Group(one.columns(layout), one.rows, one.fill) for one in groups),
+        groups=_groups(groups, layout),
         moved=layout.moved,
         name_of=lambda column: name_of(survey, layout, table, column),
+        in_words=lambda directions: in_words(survey, layout, table, directions),
+        exact=_groups([held.conditions for held in exact], layout),
+        name_of_exact=lambda row: name_of_exact(survey, exact, row),
     )
     return Problem(
         model, state, layout, tuple(groups), tuple(sources), tuple(rows_of),
-        centre, set_aside, eliminated, table,
+        centre, set_aside, eliminated, table, exact, survey.points,
     )  # fmt: skip
+
+
+def _groups(observations, layout):
+    return tuple(Group(one.columns(layout), one.rows, one.fill) for one in observations)
 
 
 def _set_aside(survey):
@@ -122,18 +157,26 @@ def _refuse_poor_photos(survey):
 def _others(survey, used, centre):
     """Observations other than image points, relative to the centre, between points that are used.
 
-    Returns the observations, their numbers in the survey, and the numbers of their rows.
+    Returns the observations, their numbers in the survey, the numbers of their rows, and a tuple of
+    Held for those that hold exactly.
     """
-    groups, sources, rows_of = [], [], []
+    groups, sources, rows_of, exact = [], [], [], []
     for number, one in enumerate(survey.observations):
         keep = np.ones(len(one), dtype=bool)
         for name in one.ties:
             keep &= used[getattr(one, name)]
-        rows = np.flatnonzero(keep)
+        holds = exact_rows(one)
+        sharp = np.flatnonzero(keep & holds & (True if one.use is None else one.use > 0))
+        if len(sharp):
+            taken = _relative(one.taken(sharp), centre)
+            exact.append(Held(taken, *as_conditions(taken), number, sharp))
+            if holds.all():
+                continue
+        rows = np.flatnonzero(keep & ~holds)
         groups.append(_relative(one if len(rows) == len(one) else one.taken(rows), centre))
         sources.append(number)
         rows_of.append(rows)
-    return groups, sources, rows_of
+    return groups, sources, rows_of, tuple(exact)
 
 
 def _taken(images, keep):
@@ -178,6 +221,8 @@ def _interior(survey):
     table = np.full((len(photos.names), 13), -1)
     values, free, known, shared = [], [], [], {}
     for camera, settings in enumerate(survey.cameras):
+        if settings.scope[0] == "off" or not settings.values[0] > 0:
+            raise SolutionError(f"{settings.name} has no principal distance c")
         mine = np.flatnonzero(photos.camera == camera)
         wanted = [[k for k in range(13) if settings.scope[k] == scope] for scope in SCOPES]
         each = [(shared, mine, wanted[1]), ({}, mine, wanted[2])]
@@ -211,66 +256,6 @@ def _known_tools(survey):
     return observed
 
 
-def _eliminated(survey, others, used):
-    """Points that may be eliminated: free in all coordinates, no two of them in one row."""
-    eliminated = used.copy()
-    if survey.fixed is not None:
-        eliminated &= ~survey.fixed.any(axis=1)
-    neighbours = {}
-    for one in others:
-        if len(one.ties) > 1:
-            for row in np.column_stack([getattr(one, name) for name in one.ties]).tolist():
-                for point in row:
-                    neighbours.setdefault(point, set()).update(row)
-    done = set()
-    for point in sorted(neighbours, key=lambda p: len(neighbours[p])):
-        if eliminated[point] and neighbours[point] & done:
-            eliminated[point] = False
-        if eliminated[point]:
-            done.add(point)
-    return eliminated
-
-
-def _layout(survey, eliminated, used, interior_free):
-    """The Layout, reduced unknowns first, and how many of these there are."""
-    photos, points = survey.photos, len(survey.points)
-    free_points = np.repeat(used[:, None], 3, axis=1)
-    if survey.fixed is not None:
-        free_points &= ~survey.fixed
-    free_photos = np.ones((0 if photos is None else len(photos.names), 6), dtype=bool)
-    if photos is not None and photos.fixed is not None:
-        free_photos = ~np.repeat(photos.fixed, (1, 1, 1, 3), axis=1)
-    tools = survey.instruments
-    free_scale = np.array([tool.scale_sd != 0 for tool in tools], dtype=bool)
-    free_offset = np.array([tool.offset_sd_m != 0 for tool in tools], dtype=bool)
-    free_system = np.ones((len(survey.systems), 7), dtype=bool)
-    free_system[:, 6] = [system.scale_free for system in survey.systems]
-    next_column = 0
-
-    def columns(free):
-        nonlocal next_column
-        found = np.full(free.shape, -1)
-        count = int(np.count_nonzero(free))
-        found[free] = np.arange(next_column, next_column + count)
-        next_column += count
-        return found
-
-    kinds = [interior_free, free_photos, free_scale, free_offset, free_system]
-    interior, of_photos, scale, offset, system = (columns(free) for free in kinds)
-    orientation = columns(np.ones(len(survey.sets), dtype=bool))
-    of_points = columns(free_points & ~eliminated[:, None])
-    reduced = next_column
-    last = np.flatnonzero(eliminated)
-    if survey.image_points is not None:  # points in the same photos next to one another
-        mark = np.random.default_rng(0).random(len(free_photos))
-        seen = np.bincount(
-            survey.image_points.point, weights=mark[survey.image_points.photo], minlength=points
-        )
-        last = last[np.argsort(seen[last], kind="stable")]
-    of_points[last] = next_column + np.arange(3 * len(last)).reshape(-1, 3)
-    return Layout(of_points, of_photos, interior, orientation, scale, offset, system), reduced
-
-
 def _image_groups(survey, used, layout, reduced, table):
     """Image coordinates by form of camera, those of eliminated points first and point by point."""
     images = survey.image_points
@@ -279,6 +264,8 @@ def _image_groups(survey, used, layout, reduced, table):
     forms = {}
     for number, camera in enumerate(survey.cameras):
         forms.setdefault(camera.form, []).append(number)
+    if not (images.sd_mm > 0).all():
+        raise SolutionError("an image coordinate cannot hold exactly: its sd must be above zero")
     key = layout.points[images.point, 0]
     key = np.where(key < reduced, np.iinfo(np.int64).max, key)
     for form, cameras in forms.items():
@@ -320,23 +307,3 @@ def _state(survey, centre, values):
         shift = shift + (1 + scale)[:, None] * (rotation @ centre)
         state = replace(state, system=rotation, system_shift_m=shift, system_scale=scale)
     return state
-
-
-def name_of(survey, layout, table, column):
-    """What the user calls the unknown in a column."""
-    for row, axis in np.argwhere(layout.points == column):
-        return f"{'xyz'[axis]} of point {survey.points[row]}"
-    for row, element in np.argwhere(layout.photos == column):
-        what = ("x", "y", "z", "rotation 1", "rotation 2", "rotation 3")[element]
-        return f"{what} of photo {survey.photos.names[row]}"
-    for place in np.flatnonzero(layout.interior == column):
-        photo, number = np.argwhere(table == place)[0]
-        camera = survey.cameras[survey.photos.camera[photo]].name
-        return f"{PARAMETERS[number]} of {camera}"
-    for place in np.flatnonzero(layout.orientation == column):
-        return f"orientation of direction set {place + 1}"
-    for what, columns in (("scale", layout.scale), ("offset", layout.offset)):
-        for place in np.flatnonzero(columns == column):
-            return f"{what} of {survey.instruments[place].name}"
-    system = np.argwhere(layout.system == column)[0, 0]
-    return f"transformation of system {survey.systems[system].name}"

@@ -8,9 +8,11 @@ that agrees after all, once others have gone, comes back. Source: Baarda 1968; K
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtr
 
 from tankcal.errors import SolutionError
 from tankcal.network.adjusting import adjust
+from tankcal.network.reliability import tau_limit
 
 CRITICAL = 3.29  # two-sided normal, 0.1 %
 HUBER_ROUNDS, ROUNDS = 5, 25
@@ -24,12 +26,15 @@ class Cleaned:
 
     adjusted  Adjusted of what is left      survey   with `use` filled in
     removed   tuple of Removed              rounds   adjustments that this took
+    suspects  tuple of Removed: what holds exactly (and is never set aside) but disagreed with all
+              others in the first adjustment; what was removed may be their victim
     """
 
     adjusted: object
     survey: object
     removed: tuple
     rounds: int
+    suspects: tuple = ()
 
 
 @dataclass(frozen=True)
@@ -42,28 +47,54 @@ class Removed:
     w: float
 
 
-def snoop(survey, *, critical=CRITICAL, robust=True, max_rounds=200, **options):
+def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, **options):
     """Adjust a Survey without the observations that disagree with the others.
 
     critical  of the w-test          robust   whether to start with the robust rounds
+    test      "w": the sds hold as declared (Baarda); "tau": up to a common factor, which sigma0
+              estimates (Pope); its critical value has the same probability of a false alarm
     options   of tankcal.network.adjust
 
-    Returns a Cleaned. Raises SolutionError when the adjustment fails.
+    What holds exactly (sd 0) is never set aside. Returns a Cleaned. Raises SolutionError when the
+    adjustment fails.
     """
+    if test not in ("w", "tau"):
+        raise ValueError(f"test {test!r}: w or tau")
     adjusted, rounds = adjust(survey, **options), 1
-    if robust and _worst(adjusted).max(initial=0) > critical:
+    limit = _limit(adjusted, critical, test)
+    suspects = _suspects(adjusted, limit)
+    if robust and _worst(adjusted).max(initial=0) > limit:
         survey, rounds = _robust(survey, adjusted, critical, options)
         adjusted = adjust(survey, **options)
     seen = {}
     for _ in range(max_rounds):
-        uses, changed = _verdict(adjusted, critical)
+        uses, changed = _verdict(adjusted, _limit(adjusted, critical, test))
         for table in _tables(adjusted):
             seen.update(_quantities(table))
         if not changed:
-            return Cleaned(adjusted, survey, _removed(survey, seen), rounds)
+            return Cleaned(adjusted, survey, _removed(survey, seen), rounds, suspects)
         survey = with_use(started(survey, adjusted), uses)
         adjusted, rounds = adjust(survey, **options), rounds + 1
     raise SolutionError(f"data snooping did not come to rest in {max_rounds} rounds")
+
+
+def _suspects(adjusted, limit):
+    """Observations that hold exactly against the others, the worst first."""
+    found = [
+        Removed(table.kind, table.source, int(table.rows[i]), float(table.whole[i]))
+        for table in adjusted.residuals
+        if table.exact
+        for i in np.flatnonzero(table.whole > limit)
+    ]
+    return tuple(sorted(found, key=lambda one: -one.w))
+
+
+def _limit(adjusted, critical, test):
+    """Critical value of the test quantities |w|: as given, or sigma0 times that of tau."""
+    if test == "w" or adjusted.dof < 2:
+        return critical
+    alpha = 2 * float(ndtr(-critical))
+    return adjusted.sigma0 * tau_limit(alpha, adjusted.dof)
 
 
 def started(survey, adjusted):
@@ -105,7 +136,8 @@ def _shares(survey):
 
 
 def _tables(adjusted):
-    return [table for table in adjusted.residuals if table.source != "known beforehand"]
+    tables = adjusted.residuals
+    return [t for t in tables if t.source != "known beforehand" and not t.exact]
 
 
 def _worst(adjusted):

@@ -12,6 +12,7 @@ import numpy as np
 
 WAYS = ("x", "y", "z", "about X", "about Y", "about Z", "scale")
 UNFELT = 1e-8  # change of the whitened rows, with all columns scaled to length one
+DEPENDS, TINY = 1e-6, 1e-12  # change of a quantity over the sum of its parts' changes; m or rad
 AS_IF_FIXED = 1e4  # weight of a fixed unknown among the rows, as if it were known to 0.1 mm
 
 
@@ -30,26 +31,30 @@ def unknowns(layout):
 
 def _parts(layout, state):
     """Columns (...) of each kind of unknown with their derivatives (..., 7)."""
-    yield layout.points, _of_places(state.xyz_m)
+    yield from zip((getattr(layout, name) for name in _NAMES), _derivatives(state), strict=True)
+
+
+_NAMES = ("points", "photos", "orientation", "scale", "system")
+
+
+def _derivatives(state):
+    """Derivatives (..., 7) of the unknowns of _NAMES by the seven ways."""
     n = len(state.photo_xyz_m)
     photos = np.zeros((n, 6, 7))
     if n:
         photos[:, :3] = _of_places(state.photo_xyz_m)
         photos[:, 3:, 3:6] = -state.rotation
-    yield layout.photos, photos
     turn = np.zeros((len(state.orientation_rad), 7))
     turn[:, 5] = -1.0
-    yield layout.orientation, turn
     stretch = np.zeros((len(state.scale), 7))
     stretch[:, 6] = -(1.0 + state.scale)
-    yield layout.scale, stretch
     systems = np.zeros((len(state.system), 7, 7))
     if len(systems):
         m = 1.0 + state.system_scale
         systems[:, :3, 3:6] = -state.system
         systems[:, 3:6, :3] = -m[:, None, None] * state.system
         systems[:, 6, 6] = -m
-    yield layout.system, systems
+    return _of_places(state.xyz_m), photos, turn, stretch, systems
 
 
 def _of_places(xyz):
@@ -64,20 +69,22 @@ def _of_places(xyz):
     return out
 
 
-def unobserved(problem):
-    """Combinations (7, d) of the seven ways that neither observations nor fixed unknowns feel."""
+def unobserved(problem, unfelt=UNFELT, fixed=True):
+    """Combinations (7, d) of the seven ways that neither observations nor fixed unknowns feel.
+
+    unfelt  see UNFELT      fixed  False: as if only observations held anything
+    """
     layout, state = problem.layout, problem.state
     idle = _idle(problem)
     whole = np.vstack([directions(layout, state), np.zeros(7)])
     felt, lengths = [np.zeros((1, 7))], np.zeros(len(whole))
-    for one in problem.observations:
-        if not one.feels_datum:
-            continue
+    for one, weight in _feeling(problem):
         columns = one.columns(layout)
         w = np.empty((len(one), one.rows))
         jac = np.empty((len(one), one.rows, columns.shape[1]))
         undisturbed = one.undisturbed(state)
         one.fill(undisturbed, w, jac)
+        jac *= weight
         ways = whole
         if undisturbed is not state:
             ways = np.vstack([directions(layout, undisturbed), np.zeros(7)])
@@ -87,14 +94,23 @@ def unobserved(problem):
     square = (whole[:-1] ** 2).T @ lengths[:-1]
     for columns, derivative in _parts(layout, state):
         holds = (columns < 0) & np.logical_not(idle.get(id(columns), False))
-        fixed = AS_IF_FIXED * derivative[holds].reshape(-1, 7)
-        if len(fixed):
-            felt.append(np.linalg.qr(fixed, mode="r"))
-            square += np.sum(fixed**2, axis=0)
-    size = np.sqrt(np.where(square > 0, square, 1.0))
-    _, singular, vectors = np.linalg.svd(np.vstack(felt) / size)
-    rank = int(np.sum(singular > UNFELT))
-    return (vectors[rank:] / size).T
+        sharp = AS_IF_FIXED * derivative[holds].reshape(-1, 7)
+        if fixed and len(sharp):
+            felt.append(np.linalg.qr(sharp, mode="r"))
+            square += np.sum(sharp**2, axis=0)
+    moving = square > 0  # a levelled line without plan coordinates knows no turn about Z
+    size = np.sqrt(square[moving])
+    _, singular, vectors = np.linalg.svd(np.vstack(felt)[:, moving] / size)
+    rank = int(np.sum(singular > unfelt))
+    free = np.zeros((7, len(size) - rank))
+    free[moving] = (vectors[rank:] / size).T
+    return free
+
+
+def _feeling(problem):
+    """Observations that may feel the datum, each with what its rows are multiplied by."""
+    yield from ((one, 1.0) for one in problem.observations if one.feels_datum)
+    yield from ((held.conditions, AS_IF_FIXED) for held in problem.exact)
 
 
 def _idle(problem):
@@ -102,14 +118,54 @@ def _idle(problem):
     layout = problem.layout
     aside = np.array([bool(why) for why in problem.set_aside], dtype=bool)
     unused = np.ones(len(layout.scale), dtype=bool)
-    for one in problem.observations:
+    for one, _ in _feeling(problem):
         instrument = getattr(one, "instrument", np.zeros(0, dtype=int))
         unused[instrument[instrument >= 0]] = False
     return {id(layout.points): aside[:, None], id(layout.scale): unused}
 
 
-def in_words(combinations):
-    """The datum defect in words, from combinations (7, d) of the seven ways."""
+def dependent(adjusted, quantities, fixed=False):
+    """Which quantities depend on the choice of the datum: (n,) True for those that do.
+
+    A quantity depends on it when a motion or scaling of the whole survey that no observation feels
+    would change it. Distances do when nothing gives the scale, heights and coordinates nearly
+    always, shapes never.
+
+    quantities  observations of tankcal.observations between points of the survey; values and sds
+                do not matter
+    fixed       True: coordinates and photos held fixed count as known, not as a choice
+    """
+    problem, state = adjusted.problem, adjusted.solution.state
+    free = unobserved(problem, fixed=fixed)
+    if not free.shape[1]:
+        return np.zeros(len(quantities), dtype=bool)
+    first, parts, whole = 0, {}, []
+    for name, derivative in zip(_NAMES, _derivatives(state), strict=True):
+        count = int(np.prod(derivative.shape[:-1]))
+        parts[name] = first + np.arange(count).reshape(derivative.shape[:-1])
+        whole.append(derivative.reshape(count, 7))
+        first += count
+    one = problem.relative(quantities)
+    interior, offset = problem.layout.interior, problem.layout.offset
+    layout = replace(
+        problem.layout,
+        **parts,
+        interior=np.full_like(interior, -1),
+        offset=np.full_like(offset, -1),
+    )
+    ways = np.vstack([*whole, np.zeros((1, 7))]) @ free
+    _, derivatives = one.computed(state, True)
+    columns = one.columns(layout)
+    change = np.einsum("nmk,nkd->nmd", derivatives, ways[columns])
+    size = np.einsum("nmk,nkd->nmd", np.abs(derivatives), np.abs(ways[columns]))
+    return (np.abs(change) > DEPENDS * np.maximum(size, TINY)).any(axis=(1, 2))
+
+
+def in_words(combinations, problem=None):
+    """The datum defect in words, from combinations (7, d) of the seven ways.
+
+    problem  to name the points that a single rotation leaves in place, or None
+    """
     d = combinations.shape[1]
     basis = np.linalg.qr(combinations)[0]
     share = np.sum(basis**2, axis=1)
@@ -130,12 +186,25 @@ def in_words(combinations):
     if len(pure) < d:
         rest = d - len(pure)
         mixed = [WAYS[i] for i in range(7) if 1e-6 < share[i] <= 1 - 1e-6]
-        parts.append(f"{rest} combination" + "s" * (rest > 1) + " of " + ", ".join(mixed))
+        axis = _axis(combinations, problem) if d == 1 and problem is not None else ""
+        parts.append(axis or f"{rest} combination{'s' * (rest > 1)} of {', '.join(mixed)}")
     listed = parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
     verb = "is" if d == 1 else "are"
     return (
         f"datum defect {d}: {listed} {verb} not determined by any observation; "
         "add control or choose datum = inner"
+    )
+
+
+def _axis(combination, problem):
+    """Words on a rotation about a line through points of the survey, "" when it is none."""
+    size = np.linalg.norm(_of_places(problem.state.xyz_m) @ combination[:, 0], axis=1)
+    used = ~_idle(problem)[id(problem.layout.points)][:, 0]
+    still = np.flatnonzero(used & (size < 1e-3 * size[used].max()))
+    if len(still) < 2:
+        return ""
+    return "the rotation about the line through points " + ", ".join(
+        problem.name_of_point(int(i)) for i in still[:4]
     )
 
 

@@ -6,7 +6,9 @@ Source: Silva 1995 (5-20); methods of the error ellipsoid: Mikhail & Ackermann 1
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.stats
+from scipy.special import fdtri, gammaincinv
+
+from tankcal.gauss_markov.effects import variances
 
 
 def ellipsoid_factor(probability, dof=np.inf):
@@ -16,8 +18,8 @@ def ellipsoid_factor(probability, dof=np.inf):
     3.37 for 90, 95, 99 %; the standard ellipsoid, factor 1, holds 20 %.
     """
     if np.isinf(dof):
-        return float(np.sqrt(scipy.stats.chi2.ppf(probability, 3)))
-    return float(np.sqrt(3 * scipy.stats.f.ppf(probability, 3, dof)))
+        return float(np.sqrt(2 * gammaincinv(1.5, probability)))
+    return float(np.sqrt(3 * fdtri(3, dof, probability)))
 
 
 def ellipsoids(covariances_m2, probability=0.95, dof=np.inf):
@@ -107,7 +109,7 @@ class Compared:
     """Observations that were not adjusted, against the adjusted survey.
 
     difference  (n, m) computed minus observed      sd  (n, m) of it, both sides counted
-    w           (n, m) their ratio
+    w           (n, m) their ratio; 0 where nothing is uncertain
     """
 
     difference: np.ndarray
@@ -123,15 +125,12 @@ def compared(adjusted, observations):
     problem, state = adjusted.problem, adjusted.solution.state
     one = problem.relative(observations)
     computed, derivatives = one.computed(state, True)
-    columns = one.columns(problem.layout)
     variance = np.reshape(np.square(one.sd), computed.shape).astype(float)
-    for i in range(len(one)):
-        free = columns[i] >= 0
-        q = adjusted.solution.cofactors(columns[i][free])
-        j = derivatives[i][:, free]
-        variance[i] += np.einsum("ma,ab,mb->m", j, q, j)
+    variance += variances(adjusted.solution, one.columns(problem.layout), derivatives)
     difference = one.difference(computed)
-    return Compared(difference, np.sqrt(variance), difference / np.sqrt(variance))
+    sd = np.sqrt(variance)
+    w = np.divide(difference, sd, out=np.zeros_like(sd), where=sd > 0)
+    return Compared(difference, sd, w)
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,24 @@
     tau = w / sigma0                 Pope's, variance factor estimated
     MDB = delta0 s / sqrt(r)         smallest blunder found with the power asked for
     delta0 sqrt((1 - r) / r)         its effect on any adjusted quantity, at most, in sds of that
+    Q J' delta0 / sqrt(r)            its effect on the coordinates, J whitened row, Q cofactors
 
-with the redundancy number r. Source: Baarda 1968, A testing procedure for use in geodetic networks;
-Pope 1976, The statistics of residuals; Foerstner 1987.
+with the redundancy number r. What holds exactly (sd 0) has no residual; it is tested by what pulls
+at it, the limit of all this for s -> 0: w = k / s_k, MDB = delta0 / s_k, k the Lagrange multiplier.
+Source: Baarda 1968, A testing procedure for use in geodetic networks; Pope 1976, The statistics of
+residuals; Foerstner 1987.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
-import scipy.stats
+from scipy.special import chdtri, ndtri, stdtrit
 
+from tankcal.gauss_markov.effects import own_leverage, own_responses, pulls, responses
+from tankcal.observations import lever
+
+EXACTLY = 1e9  # products: up to here effects are worked out for all points, in about 0.2 s
 UNCONTROLLED = 1e-6  # a redundancy number below it is zero: the observation cannot be checked
 
 
@@ -32,6 +40,15 @@ class Residuals:
                 v'Pv would lose without it, brought to the critical value of w (0.1 %)
     mdb         (n, m) minimal detectable bias; inf where nothing controls the observation
     external    (n, m) effect of a blunder of that size on the adjusted quantities, in their sds
+    effect_m    (n, m) largest change of any coordinate of any point by a bias of mdb in this value,
+                in the datum of the adjustment; 0 for those set aside. In large surveys (rows times
+                unknowns times reduced unknowns above 1e9), of rows about one point: the largest
+                change of that point
+    elsewhere_m (n, m) bound in that case: no other point changes by more; None: effect_m is that of
+                all points
+    exact       True: the group holds exactly (sd 0); residual and redundancy are 0
+    changes     function -> change of a coordinate by a whitened error of one (exact: of one), own
+                or of all, and elsewhere or None; for effect_m, which costs more than all the rest
     """
 
     kind: str
@@ -46,49 +63,143 @@ class Residuals:
     whole: np.ndarray
     mdb: np.ndarray
     external: np.ndarray
+    exact: bool = False
+    changes: object = field(default=None, repr=False)
+
+    @cached_property
+    def _effects(self):
+        """effect_m and elsewhere_m: bias times change, worked out when first asked for."""
+        found = self.changes()
+        with np.errstate(invalid="ignore"):
+            biases = self.mdb / np.where(self.sd > 0, self.sd, 1.0)
+            return tuple(
+                None if change is None else np.where(change > 0, biases * change, 0.0)
+                for change in found
+            )
+
+    @property
+    def effect_m(self):
+        """See above."""
+        return self._effects[0]
+
+    @property
+    def elsewhere_m(self):
+        """See above."""
+        return self._effects[1]
 
 
 def noncentrality(alpha=0.001, power=0.80):
     """delta0 of a two-sided test of the normal distribution; 4.13 for 0.001 and 0.80."""
-    return float(scipy.stats.norm.isf(alpha / 2) - scipy.stats.norm.isf(power))
+    return float(ndtri(1 - alpha / 2) + ndtri(power))
 
 
 def tau_limit(alpha, dof):
     """Two-sided critical value of Pope's tau distribution."""
-    t = scipy.stats.t.isf(alpha / 2, dof - 1)
+    t = -stdtrit(dof - 1, alpha / 2)
     return float(t * np.sqrt(dof) / np.sqrt(dof - 1 + t * t))
 
 
 def residuals_of(problem, solution, alpha=0.001, power=0.80):
-    """A tuple of Residuals, one for each group of a solved Problem."""
+    """A tuple of Residuals, one for each group of a solved Problem, then what holds exactly."""
     delta0 = noncentrality(alpha, power)
-    tables = []
-    groups = zip(problem.observations, problem.sources, problem.rows_of, strict=True)
-    for number, (one, source, rows) in enumerate(groups):
-        use = np.ones(len(one)) if one.use is None else np.asarray(one.use, dtype=float)
-        whole = one if one.use is None else one.using(np.ones(len(one)))
-        columns = problem.model.groups[number].columns
-        v = np.empty((len(one), one.rows))
-        jac = np.empty((*v.shape, columns.shape[1]))
-        whole.fill(solution.state, v, jac)
-        leverage = solution.leverage(number, jac)
-        share = use[:, None]
-        r = 1.0 - share * leverage
-        variance = np.where(share > 0, r, 1.0 + leverage)
-        controlled = variance > UNCONTROLLED
-        with np.errstate(divide="ignore", invalid="ignore"):
-            w = np.where(controlled, v / np.sqrt(variance), 0.0)
-            mdb = np.where(controlled, delta0 / np.sqrt(variance), np.inf)
-            hidden = np.where(controlled, delta0 * np.sqrt(np.maximum(1 - r, 0) / r), np.inf)
-        sd, test = 1.0 / whole.weight, np.abs(w).max(axis=1)
-        if one.rows == 2:
-            test = _both(solution, number, v, jac, share, leverage, variance, test)
-        tables.append(
-            Residuals(
-                one.kind, one.unit, source, rows, use > 0, v * sd, sd, r, w, test, mdb * sd, hidden
-            )
+    tables = [_table(problem, solution, number, delta0) for number in range(len(problem.sources))]
+    return (*tables, *_of_exact(problem, solution, delta0))
+
+
+def _table(problem, solution, number, delta0):
+    """The Residuals of a group."""
+    one = problem.observations[number]
+    use = np.ones(len(one)) if one.use is None else np.asarray(one.use, dtype=float)
+    whole = one if one.use is None else one.using(np.ones(len(one)))
+    columns = problem.model.groups[number].columns
+    v = np.empty((len(one), one.rows))
+    jac = np.empty((*v.shape, columns.shape[1]))
+    whole.fill(solution.state, v, jac)
+    leverage = solution.leverage(number, jac)
+    share = use[:, None]
+    r = 1.0 - share * leverage
+    variance = np.where(share > 0, r, 1.0 + leverage)
+    controlled = variance > UNCONTROLLED
+    with np.errstate(divide="ignore", invalid="ignore"):
+        w = np.where(controlled, v / np.sqrt(variance), 0.0)
+        mdb = np.where(controlled, delta0 / np.sqrt(variance), np.inf)
+        hidden = np.where(controlled, delta0 * np.sqrt(np.maximum(1 - r, 0) / r), np.inf)
+    sd, test = 1.0 / whole.weight, np.abs(w).max(axis=1)
+    if one.rows == 2:
+        test = _both(solution, number, v, jac, share, leverage, variance, test)
+    return Residuals(
+        kind=one.kind, unit=one.unit, source=problem.sources[number], rows=problem.rows_of[number],
+        used=use > 0, residual=v * sd, sd=sd, redundancy=r, w=w, whole=test, mdb=mdb * sd,
+        external=hidden, changes=lambda: _changes(problem, solution, number, share),
+    )  # fmt: skip
+
+
+def _changes(problem, solution, number, share):
+    """Largest change (n, m) of a coordinate by a whitened error of one; a bound elsewhere or None.
+
+    Elsewhere: a row moves the reduced unknowns by no more than sqrt(b S^-1 b'), b its part there,
+    in the norm of S, and a point follows these by no more than that times its sd from them.
+    """
+    one, columns = problem.observations[number], problem.model.groups[number].columns
+    jac = np.empty((len(one), one.rows, columns.shape[1]))
+    whole = one if one.use is None else one.using(np.ones(len(one)))
+    whole.fill(solution.state, np.empty(jac.shape[:2]), jac)
+    points = np.unique(problem.layout.points)
+    points = points[points >= 0]
+    own, products = one.ties == ("point",), problem.model.unknowns * max(problem.model.reduced, 1)
+    if not own or jac.shape[0] * jac.shape[1] * products <= EXACTLY:
+        found = np.zeros(jac.shape[0] * jac.shape[1])
+        for part, response in responses(solution, columns, jac):
+            found[part] = np.abs(response[points]).max(axis=0, initial=0.0)
+        return share * found.reshape(jac.shape[:2]), None
+    nearest = np.abs(own_responses(solution, number, jac)).max(axis=2)
+    reduced = solution.leverage(number, jac)
+    sd = np.einsum("nii->ni", solution.block_cofactors)
+    if solution.datum is None:
+        reduced = reduced - own_leverage(solution, number, jac)
+        inverse = solution.inverse_roots
+        sd = sd - np.einsum("nji,nji->ni", inverse, inverse)
+    rest = points[points < problem.model.reduced]
+    of_rest = solution.reduced_blocks(rest[:, None])[:, 0, 0]
+    largest = np.sqrt(max(sd.max(initial=0.0), of_rest.max(initial=0.0)))
+    return share * nearest, share * largest * np.sqrt(np.maximum(reduced, 0.0))
+
+
+def _of_exact(problem, solution, delta0):
+    """Residuals of the observations that hold exactly; several rows of one: the last one counts."""
+    if not problem.exact:
+        return
+    k, sd, changes = pulls(solution)
+    points = np.unique(problem.layout.points)
+    moves = np.abs(changes[points[points >= 0]]).max(axis=0, initial=0.0)
+    levers = [lever(held.conditions, solution.state).ravel() for held in problem.exact]
+    levers = np.concatenate(levers)
+    moves, k, sd = moves * levers, k * levers, sd * levers
+    tested, first = sd > 0, 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        w = np.where(tested, k / sd, 0.0)
+        mdb = np.where(tested, delta0 / sd, np.inf)
+    for held in problem.exact:
+        one, rows = held.observations, held.conditions.rows
+        mine = slice(first, first + len(held.row_of) * rows)
+        first = mine.stop
+        shape = len(one), one.rows
+        parts = []
+        for values in (w, mdb, moves):
+            part = np.zeros(shape)
+            if shape[1] == rows:
+                part[held.row_of] = values[mine].reshape(-1, rows)
+            else:  # a whole rotation: three rows of one
+                part[:] = values[mine].reshape(shape)
+            parts.append(part)
+        none = np.zeros(shape)
+        yield Residuals(
+            kind=one.kind, unit=one.unit, source=held.source, rows=held.rows,
+            used=np.ones(shape[0], dtype=bool), residual=none, sd=none, redundancy=none,
+            w=parts[0], whole=np.abs(parts[0]).max(axis=1), mdb=parts[1],
+            external=np.full(shape, np.inf), exact=True,
+            changes=lambda moves=parts[2]: (moves, None),
         )  # fmt: skip
-    return tuple(tables)
 
 
 def _both(solution, group, v, jac, share, leverage, variance, single):
@@ -104,5 +215,5 @@ def _both(solution, group, v, jac, share, leverage, variance, single):
     square = d * v[:, 0] ** 2 + a * v[:, 1] ** 2 - 2 * between * v[:, 0] * v[:, 1]
     sound = determinant > UNCONTROLLED * np.maximum(a * d, UNCONTROLLED)
     square = np.maximum(square, 0.0) / np.where(sound, determinant, 1.0)
-    one, two = scipy.stats.norm.isf(0.0005), np.sqrt(scipy.stats.chi2.isf(0.001, 2))
+    one, two = -ndtri(0.0005), np.sqrt(chdtri(2, 0.001))
     return np.where(sound, np.sqrt(square) * one / two, single)

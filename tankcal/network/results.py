@@ -4,11 +4,24 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.stats
+import scipy.linalg
+from scipy.special import chdtri, gammaincinv
 
 from tankcal.camera import PARAMETERS
+from tankcal.errors import SolutionError
+from tankcal.gauss_markov.effects import responses
 from tankcal.network.reliability import residuals_of
+from tankcal.observations import KnownUnknowns
 from tankcal.rotations import angle_derivatives, angles_of
+
+
+def correlations(covariance):
+    """Correlation matrix of a covariance (k, k); 0 where a variance is 0, 1 in the diagonal."""
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    size = np.where(sd > 0, sd, np.inf)
+    found = covariance / np.outer(size, size)
+    np.fill_diagonal(found, 1.0)
+    return found
 
 
 @dataclass(frozen=True)
@@ -35,17 +48,24 @@ class GlobalTest:
 def global_test(chi2, dof, confidence=0.95, sides=2):
     """Test of v'Pv against the chi-square distribution, two-sided or (sides=1) upper."""
     tail = (1 - confidence) / sides
-    low = scipy.stats.chi2.ppf(tail, dof) if sides == 2 else 0.0
-    return GlobalTest(chi2, dof, float(low), float(scipy.stats.chi2.isf(tail, dof)), confidence)
+    low = 2 * gammaincinv(dof / 2, tail) if sides == 2 else 0.0
+    return GlobalTest(chi2, dof, float(low), float(chdtri(dof, tail)), confidence)
 
 
 @dataclass(frozen=True)
 class Adjusted:
-    """An adjusted Survey. Covariances are a-priori scaled (variance factor 1) unless said.
+    """An adjusted Survey. All covariances here are a priori: of variance factor 1.
 
     survey    as it was handed in
     problem   the Problem that was solved
     solution  tankcal.gauss_markov.Solution
+
+    One rule for their scale: what goes on to the capacity table is the covariance a priori, from
+    the declared sds, whatever sigma0 came out; the report shows sigma0 and the global test beside
+    it. Only where the user asks for scale "a_posteriori" everything is multiplied by
+    `scale("a_posteriori")`, sigma0 squared, and dof go with it. Never the smaller or larger of the
+    two, never a part of the covariances: a test that is not passed is a doubt about observations or
+    sds, to be cleared there (variance components, data snooping) and not by a factor.
     """
 
     survey: object
@@ -62,6 +82,19 @@ class Adjusted:
         """Degrees of freedom."""
         return self.solution.dof
 
+    def scale(self, choice="a_priori"):
+        """What all covariances are multiplied by: 1 for "a_priori", sigma0^2 for "a_posteriori".
+
+        Raises SolutionError when nothing is redundant: there is no a-posteriori factor then.
+        """
+        if choice == "a_priori":
+            return 1.0
+        if choice != "a_posteriori":
+            raise ValueError(f"scale {choice!r}: a_priori or a_posteriori")
+        if self.dof < 1:
+            raise SolutionError("no a-posteriori variance factor: no observation is redundant")
+        return float(self.solution.variance_factor)
+
     @property
     def xyz_m(self):
         """(points, 3) adjusted coordinates; nan for points that were set aside."""
@@ -75,10 +108,38 @@ class Adjusted:
     def _aside(self):
         return np.array([bool(why) for why in self.problem.set_aside], dtype=bool)
 
+    def effect_of_known_m(self, of, index):
+        """Change (3 points,) of all coordinates by one sd of an unknown known beforehand.
+
+        of     field of State: "scale", "offset_m" (of instruments), "interior", "orientation_rad"
+               or "system_scale"
+        index  place in that field: the number of the instrument; for "interior"
+               problem.interior_of[photo, number of the parameter]
+
+        x, y, z of the first point, then of the next. With the value known beforehand larger by its
+        sd, the adjusted coordinates are larger by this; column column' is its part of their
+        covariance. Zeros for an unknown that was not weighted (fixed ones, free ones).
+        """
+        problem, solution = self.problem, self.solution
+        columns = problem.layout.points.ravel()
+        found = np.zeros(len(columns))
+        for number, one in enumerate(problem.observations):
+            if not isinstance(one, KnownUnknowns) or one.of != of:
+                continue
+            for row in np.flatnonzero(one.index == index):
+                group = problem.model.groups[number].columns[row : row + 1]
+                jac = solution.jacobians[number][row : row + 1]
+                _, response = next(responses(solution, group, jac))
+                found += np.append(response[:, 0], 0.0)[columns]
+        return found
+
     def covariance_m2(self, points=None):
         """Full covariance (3k, 3k) of chosen points (numbers), of all when None; fixed ones: 0."""
         columns = self.problem.layout.points
-        columns = (columns if points is None else columns[np.asarray(points)]).ravel()
+        return self._cofactors((columns if points is None else columns[np.asarray(points)]).ravel())
+
+    def _cofactors(self, columns):
+        """Cofactors (k, k) of unknowns, 0 for those that are fixed."""
         if (columns >= 0).all():
             return self.solution.cofactors(columns)
         whole = np.zeros((len(columns), len(columns)))
@@ -107,7 +168,7 @@ class Adjusted:
     @property
     def point_sd_m(self):
         """(points, 3) standard deviations."""
-        return np.sqrt(np.einsum("nii->ni", self.point_covariances_m2))
+        return np.sqrt(np.maximum(np.einsum("nii->ni", self.point_covariances_m2), 0.0))
 
     @cached_property
     def photos(self):
@@ -122,6 +183,31 @@ class Adjusted:
         turn[:, 3:, 3:] = angle_derivatives(rotation)
         covariance = turn @ q @ turn.transpose(0, 2, 1)
         return self.problem.centre_m + self._state.photo_xyz_m, angles_of(rotation), covariance
+
+    def photo_and_camera(self, photo):
+        """Names (k,) and covariance (k, k) of a photo's six elements and its camera's parameters.
+
+        x, y, z in m, omega, phi, kappa in rad, then the parameters that are adjusted. Fixed
+        elements have variance 0. See `correlations`.
+        """
+        layout, places = self.problem.layout, self.problem.interior_of[photo]
+        interior = layout.interior[places]
+        names = [name for name, column in zip(PARAMETERS, interior, strict=True) if column >= 0]
+        columns = np.concatenate([layout.photos[photo], interior[interior >= 0]])
+        turn = np.eye(len(columns))
+        turn[3:6, 3:6] = angle_derivatives(self._state.rotation[photo : photo + 1])[0]
+        covariance = turn @ self._cofactors(columns) @ turn.T
+        return ("x", "y", "z", "omega", "phi", "kappa", *names), covariance
+
+    def photo_covariance(self, photos=None):
+        """Covariance (6k, 6k) of x, y, z, omega, phi, kappa of chosen photos, of all when None."""
+        layout = self.problem.layout.photos
+        chosen = np.arange(len(layout)) if photos is None else np.asarray(photos)
+        turn = np.zeros((len(chosen), 6, 6))
+        turn[:, :3, :3] = np.eye(3)
+        turn[:, 3:, 3:] = angle_derivatives(self._state.rotation[chosen])
+        turn = scipy.linalg.block_diag(*turn)
+        return turn @ self._cofactors(layout[chosen].ravel()) @ turn.T
 
     def camera(self, photo=0):
         """{parameter: value} and covariance (k, k) of those adjusted, as a photo has them."""

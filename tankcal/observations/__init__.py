@@ -8,6 +8,7 @@ from tankcal.observations.coordinates import (
     PlumbLines,
     SystemCoordinates,
 )
+from tankcal.observations.held import HeldOrientation, as_conditions, exact_rows, lever
 from tankcal.observations.photographs import ImageCoordinates, PhotoOrientation, PhotoRotation
 from tankcal.observations.sights import (
     Azimuths,
@@ -24,6 +25,7 @@ __all__ = [
     "Directions",
     "Distances",
     "HeightDifferences",
+    "HeldOrientation",
     "HorizontalAngles",
     "ImageCoordinates",
     "KnownUnknowns",
@@ -36,4 +38,7 @@ __all__ = [
     "State",
     "SystemCoordinates",
     "VerticalAngles",
+    "as_conditions",
+    "exact_rows",
+    "lever",
 ]

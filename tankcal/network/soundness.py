@@ -1,0 +1,45 @@
+"""What is determined on paper only: an sd so large that the linear model does not hold."""
+
+import numpy as np
+
+from tankcal.errors import SolutionError
+from tankcal.network.datum import in_words, unobserved
+
+WORTHLESS = 0.1  # sd over the principal distance, or over the extent of the survey
+HANGING = 0.03  # see datum.UNFELT: what holds the survey so weakly, noise alone can hold
+
+
+def refuse_worthless_cameras(survey, problem, solution):
+    """Raise SolutionError when the network does not determine a principal distance c."""
+    columns = problem.layout.interior[problem.interior_of[:, 0]]
+    columns, photo = np.unique(columns, return_index=True)
+    columns, photo = columns[columns >= 0], photo[columns >= 0]
+    if not len(columns):
+        return
+    unit = np.zeros((problem.model.reduced, len(columns)))
+    unit[columns, np.arange(len(columns))] = 1.0
+    sd = np.sqrt(np.sum(solution.nearly.whitened(unit) ** 2, axis=0))
+    value = solution.state.interior[problem.interior_of[photo, 0]]
+    for i in np.flatnonzero(~(sd < WORTHLESS * np.abs(value)))[:1]:
+        camera = survey.cameras[survey.photos.camera[photo[i]]].name
+        raise SolutionError(
+            f"c of {camera} is not determined: its sd would be {sd[i]:.2g} mm; c and the distances "
+            "of the photos can hardly be told apart: fix c or give it a standard deviation, or add "
+            "photos that are nearer, farther or aslant"
+        )
+
+
+def doubts(adjusted):
+    """Sentences on points whose sd is above a tenth of the survey's extent."""
+    sd = np.nanmax(adjusted.point_sd_m, axis=1)
+    extent = np.linalg.norm(np.ptp(adjusted.xyz_m[np.isfinite(adjusted.xyz_m[:, 0])], axis=0))
+    return tuple(
+        f"point {adjusted.survey.points[i]} is hardly determined (sd {sd[i]:.2g} m)"
+        for i in np.flatnonzero(sd > WORTHLESS * extent)
+    )
+
+
+def hanging_datum(problem):
+    """Words on a datum that hangs on next to nothing, "" when it does not."""
+    free = unobserved(problem, HANGING)
+    return f"; {in_words(free, problem)}" if free.shape[1] else ""
