@@ -64,6 +64,7 @@ class Parts:
     covariance_m2: np.ndarray | None = None
     extra_files: dict = field(default_factory=dict)  # name: text or bytes, folder form only
     beside: dict = field(default_factory=dict)  # name: bytes, in the folder or beside the workbook
+    registers: dict = field(default_factory=dict)  # "cameras": {name: {key: value}}
 
 
 def job_parts(
@@ -237,6 +238,13 @@ def write_folder(folder, parts):
         with open(folder / f"{name}.csv", "w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, delimiter=separator)
             writer.writerows([_csv_cell(cell, decimal) for cell in row] for row in rows)
+    for register, entries in parts.registers.items():
+        settings = {
+            f'{register}."{name}".{key}': value
+            for name, given in entries.items()
+            for key, value in given.items()
+        }
+        (folder / f"{register}.toml").write_text(toml_text(settings), encoding="utf-8")
     if parts.covariance_m2 is not None:
         names = np.array([row[0] for row in parts.tables["points"][1:]])
         np.savez(folder / "points_cov.npz", covariance_m2=parts.covariance_m2, points=names)
@@ -294,6 +302,14 @@ def write_book(path, parts):
         _write_sheet(book.add_worksheet("job"), rows)
         for name, table in parts.tables.items():
             _write_sheet(book.add_worksheet(name), table)
+        for register, entries in parts.registers.items():
+            rows = [[register[:-1], "key", "value"]]
+            rows += [
+                [name, key, _book_cell(value)]
+                for name, given in entries.items()
+                for key, value in given.items()
+            ]
+            _write_sheet(book.add_worksheet(register), rows)
     return path
 
 
@@ -301,6 +317,8 @@ def _book_cell(value):
     """A list as the text of a cell: 700; 850, or 0-0.3; 2.1-2.4 for pairs."""
     if not isinstance(value, list):
         return value
+    if all(isinstance(one, str) for one in value):
+        return "; ".join(value)
     return "; ".join("-".join(map(repr, v)) if isinstance(v, list) else repr(v) for v in value)
 
 
@@ -322,11 +340,11 @@ def assert_same_job(one, other):
 
 def _assert_same(one, other, name):
     assert type(one) is type(other), name
-    if isinstance(one, np.ndarray):
+    if isinstance(one, np.ndarray | float):
         np.testing.assert_allclose(one, other, rtol=1e-15)  # a workbook keeps 16 digits
     elif dataclasses.is_dataclass(one):
         for part in dataclasses.fields(one):
-            if part.name not in ("rows", "row"):
+            if part.name not in ("rows", "row", "file", "sheet"):
                 values = (getattr(one, part.name), getattr(other, part.name))
                 _assert_same(*values, f"{name}.{part.name}")
     elif isinstance(one, tuple):

@@ -20,7 +20,7 @@ from spoilt import FORMS, places, problems_of, settings_place, table_file, write
 from tankcal.errors import InputError
 from tankcal.job import Job, load
 from tankcal.job.contract import KINDS
-from tankcal.job.tables import TABLES
+from tankcal.job.tables import TANK_TABLES
 
 # key, bad value, words that the message must hold
 BAD_SETTINGS = [
@@ -57,10 +57,10 @@ BAD_SETTINGS = [
     ("table.rule", "API", "not available in this version"),
     ("material.e_gpa", 206000, "from 40 to 500"),
     ("material.expansion_per_k", 11, "at most 0.0001"),
-    ("adjustment.datum", "inner", "not available in this version"),
+    ("adjustment.datum", "iner", "did you mean inner?"),
     ("adjustment.scale", "posterior", "a_posteriori"),
     ("adjustment.snooping", "perhaps", "true or false"),
-    ("adjustment.camera.default", "camera free", "not available in this version"),
+    ("adjustment.camera.default", "free", "'camera free'"),
     ("certificate.date_of_issue", "soon", "a date such as"),
     ("certificate.numbr", "x", "unknown key"),
 ]
@@ -310,9 +310,8 @@ def test_decimal_commas_among_separators(tmp_path):
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("targets.csv", "not available in this version"),
-        ("image_points.csv", "not available in this version"),
-        ("cameras.toml", "not available in this version"),
+        ("fiducials.csv", "not available in this version"),
+        ("image_pionts.csv", "did you mean image_points.csv?"),
         ("Points.csv", "did you mean points.csv?"),
         ("notes.csv", "points.csv, courses.csv, bottom.csv, deadwood.csv, uncertainty.csv"),
     ],
@@ -330,9 +329,9 @@ def test_files_that_do_not_belong(tmp_path, name, words):
 
 def test_sheets_that_do_not_belong(tmp_path):
     parts = job_parts()
-    parts.tables |= {"Sheet1": [["x"]], "targets": [["name"]], "# notes": [["kept"]]}
+    parts.tables |= {"Sheet1": [["x"]], "fiducials": [["name"]], "# notes": [["kept"]]}
     problems = problems_of(write_book(tmp_path / "job.xlsx", parts))
-    assert places(problems) == [("job.xlsx", None, None), ("sheet targets", None, None)]
+    assert places(problems) == [("job.xlsx", None, None), ("sheet fiducials", None, None)]
     assert "unknown sheet 'Sheet1'" in problems[0].expected
 
 
@@ -342,7 +341,7 @@ def test_all_problems_of_a_run_come_together(tmp_path):
     parts.tables["points"][5][2] = "NaN"
     parts.tables["courses"][2][2] = -8.0
     parts.tables["uncertainty"][1][2] = "m"
-    parts.extra_files["targets.csv"] = "point\n"
+    parts.extra_files["fiducials.csv"] = "point\n"
     problems = problems_of(write_folder(tmp_path / "job", parts))
     assert sorted(places(problems), key=str) == sorted(
         [
@@ -352,7 +351,7 @@ def test_all_problems_of_a_run_come_together(tmp_path):
             ("points.csv", 6, "y_m"),
             ("courses.csv", 3, "thickness_mm"),
             ("uncertainty.csv", 2, "unit"),
-            ("targets.csv", None, None),
+            ("fiducials.csv", None, None),
         ],
         key=str,
     )
@@ -501,7 +500,7 @@ BITS += [b"<", b">", b"<c/>", b' r="-1"', b"&#0;", b"<f/>", b"{", b"'''", b"#", 
 
 @QUICK
 @given(
-    st.sampled_from(["job.toml", *(f"{table}.csv" for table in TABLES), "points_cov.npz"]),
+    st.sampled_from(["job.toml", *(f"{table}.csv" for table in TANK_TABLES), "points_cov.npz"]),
     byte_changes(),
 )
 def test_any_bytes_in_a_folder(name, change):

@@ -6,10 +6,20 @@ from pathlib import Path
 import openpyxl
 import pytest
 from job_builder import SETTINGS, assert_same_job, job_parts, write_folder
+from survey_builder import survey_parts
 
 from tankcal.errors import InputError
 from tankcal.job import load
-from tankcal.job.contract import COLUMNS, INPUTS, KEYS, KINDS, TABLES_OF_KIND
+from tankcal.job.contract import (
+    COLUMNS,
+    INPUTS,
+    KEYS,
+    KINDS,
+    REGISTER_KEYS,
+    REGISTERS_OF_SURVEY,
+    SURVEYS,
+    TABLES_OF_KIND,
+)
 from tankcal.starter import write_starter
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "job-format.md"
@@ -47,7 +57,7 @@ def assert_written(starter, kind):
     assert f'\nkind = "{kind}"' in text
     settings = tomllib.loads(text)
     for section, fields in KEYS.items():
-        suiting = [field for field in fields if field.suits(kind)]
+        suiting = [field for field in fields if field.suits(kind) and not field.of_survey]
         assert list(settings.get(section, {})) == [field.name for field in suiting]
         assert all(field.note in text for field in suiting)
     for table in TABLES_OF_KIND[kind]:
@@ -60,6 +70,77 @@ def assert_written(starter, kind):
 def test_another_kind_is_refused(tmp_path):
     with pytest.raises(ValueError, match="found 'cube'; expected one of vertical, horizontal"):
         write_starter(tmp_path / "starter", "cube")
+
+
+@pytest.mark.parametrize("survey", SURVEYS)
+def test_a_starter_for_a_survey(tmp_path, survey):
+    write_starter(tmp_path / "starter", survey=survey)
+    starter = tmp_path / "starter"
+    tables = [*SURVEYS[survey], "courses", "bottom", "deadwood", "uncertainty"]
+    registers = REGISTERS_OF_SURVEY[survey]
+    names = ["job.toml", "job.xlsx", *(f"{table}.csv" for table in tables)]
+    names += [f"{register}.toml" for register in registers]
+    assert sorted(path.name for path in starter.iterdir()) == sorted(names)
+    settings = tomllib.loads((starter / "job.toml").read_text(encoding="utf-8"))
+    assert {"datum", "datum_points", "refraction"} <= settings["adjustment"].keys()
+    has_photos = survey == "photos"
+    assert ("camera" in settings["adjustment"]) == has_photos
+    assert ("fixed_photo" in settings["adjustment"]) == has_photos
+    for register in registers:
+        text = (starter / f"{register}.toml").read_text(encoding="utf-8")
+        fields = [field.name for field in REGISTER_KEYS[register]]
+        assert list(tomllib.loads(text)[register]["NAME"]) == fields
+    for table in SURVEYS[survey]:
+        text = (starter / f"{table}.csv").read_text(encoding="utf-8")
+        assert text.splitlines()[-1].split(",") == [field.name for field in COLUMNS[table]]
+        assert all(f"# {field.name}: {field.note}" in text for field in COLUMNS[table])
+    book = openpyxl.load_workbook(starter / "job.xlsx")
+    assert book.sheetnames == ["read me", "job", *registers, *tables]
+
+
+@pytest.mark.parametrize("name", ["", "job.xlsx"])
+@pytest.mark.parametrize("survey", SURVEYS)
+def test_an_empty_survey_is_told_like_missing_points(tmp_path, survey, name):
+    write_starter(tmp_path / "starter", survey=survey)
+    with pytest.raises(InputError) as caught:
+        load(tmp_path / "starter" / name)
+    told = [problem for problem in caught.value.problems if problem.column not in BLANKS]
+    assert sorted(problem.file.split()[-1] for problem in told) == sorted(
+        ["points.csv", "courses.csv"] if name == "" else ["points", "courses"]
+    )
+
+
+def test_a_starter_of_a_survey_filled_in(tmp_path):
+    starter = tmp_path / "starter"
+    write_starter(starter, survey="photos")
+    job_of_points = write_folder(tmp_path / "job", job_parts())
+    for name in ("job.toml", "courses.csv"):
+        (starter / name).write_bytes((job_of_points / name).read_bytes())
+    text = (starter / "cameras.toml").read_text(encoding="utf-8")
+    text = text.replace('\nc_mm = ""', "\nc_mm = 100.0").replace("[cameras.NAME]", "[cameras.UMK]")
+    text = text.replace('format_mm = ""', "format_mm = [180, 130]")
+    text = text.replace('convention = ""', 'convention = "correction_added"')
+    (starter / "cameras.toml").write_text(text, encoding="utf-8")
+    rows = {
+        "photos": ["F1,UMK" + "," * 16],
+        "image_points": [f"F1,{name},{x},10.5,,,5,5,," for x, name in enumerate("ABCD")],
+    }
+    for table, lines in rows.items():
+        with open(starter / f"{table}.csv", "a", encoding="utf-8") as file:
+            width = len(COLUMNS[table])
+            file.writelines(
+                ",".join([*line.split(","), *[""] * width][:width]) + "\n" for line in lines
+            )
+    job = load(starter)
+    assert (job.measurements.photos[0].camera, job.warnings) == ("UMK", ())
+    assert job.measurements.image_points.point == tuple("ABCD")
+
+
+def test_another_survey_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="found 'laser'; expected one of photos, total-station"):
+        write_starter(tmp_path / "starter", survey="laser")
+    with pytest.raises(ValueError, match="of kind mesh has no survey"):
+        write_starter(tmp_path / "starter", "mesh", "photos")
 
 
 def test_a_directory_that_holds_something_is_left_alone(starter, tmp_path):
@@ -164,6 +245,27 @@ def test_the_documentation_names_every_key_column_and_choice():
                 assert choice in text
     for name, known in INPUTS.items():
         assert f"| `{name}` | `{known.unit}` |" in text
+
+
+def test_the_documentation_names_the_keys_of_cameras_and_instruments():
+    text = DOCS.read_text(encoding="utf-8")
+    for register, fields in REGISTER_KEYS.items():
+        assert f"{register}.toml" in text
+        for field in fields:
+            assert f"`{field.name}`" in text, field.name
+            assert all(choice in text for choice in field.choices)
+
+
+def test_the_camera_of_the_documentation_is_one(tmp_path):
+    text = DOCS.read_text(encoding="utf-8").split('```\n[cameras."UMK 10/1318"]')[1].split("```")[0]
+    folder = write_folder(tmp_path / "job", survey_parts(tank=False))
+    (folder / "cameras.toml").write_text(
+        '[cameras."UMK 10/1318"]' + text + "s_K1 = 1e-9\n[cameras.D]" + text + "s_K1 = 1e-9\n"
+        "pixel_um = 25.0\n",
+        encoding="utf-8",
+    )
+    camera = load(folder, only="adjustment").measurements.cameras[0].camera
+    assert (camera.name, camera.values[3]) == ("UMK 10/1318", 1.1e-7)
 
 
 def documented(language):

@@ -3,15 +3,17 @@
 import re
 from dataclasses import dataclass
 
+import numpy as np
+
 from tankcal.job.contract import (
     COLUMNS,
     KEYS,
     KINDS,
     LATER_KEYS,
-    LATER_SECTIONS,
     OPEN_SECTIONS,
+    REGISTER_KEYS,
 )
-from tankcal.job.fields import Field, Refused, is_blank, read_value
+from tankcal.job.fields import MAX_NAME, NUMBER, Field, Refused, is_blank, read_value
 from tankcal.job.tables import nearest
 
 
@@ -32,14 +34,21 @@ class ColumnValues:
         """The values of a column; a list of None when the column is not given."""
         return self.columns[name] or [None] * len(self.rows)
 
+    def numbers(self, name):
+        """(n,) the values of a column of numbers, nan where there is none."""
+        return np.array(self.of(name), dtype=float)
+
     @property
     def is_empty(self):
         """Has it no row at all, not even one that cannot be read?"""
         return not self.rows and not self.skipped
 
 
-def read_settings(raw, log):
-    """{section: {key: value}} with None for what is blank, missing or bad (told to `log`)."""
+def read_settings(raw, log, is_whole=True):
+    """{section: {key: value}} with None for what is blank, missing or bad (told to `log`).
+
+    is_whole  False: nothing of it is required
+    """
     kind = kind_of(raw)
     for section, entries in raw.settings.items():
         _refuse_unknown(raw.settings_file, section, entries, raw.sections.get(section), log)
@@ -53,8 +62,54 @@ def read_settings(raw, log):
         values[section] = {
             field.name: None
             if is_foreign
-            else _setting(raw.settings_file, section, field, given.get(field.name), kind, log)
+            else _setting(
+                raw.settings_file,
+                f"{section}.{field.name}",
+                field,
+                given.get(field.name),
+                kind,
+                log,
+                is_whole and field.is_required(kind),
+            )
             for field in (*fields, *_own_fields(section, fields, given))
+        }
+    return values
+
+
+def read_register(raw, name, log):
+    """{name: {key: value}} of cameras or instruments, with None for what is blank, missing or bad.
+
+    An entry in which nothing is filled in counts as not there.
+    """
+    register = raw.registers.get(name)
+    if register is None:
+        return {}
+    fields, values = REGISTER_KEYS[name], {}
+    known = [field.name for field in fields]
+    for owner, entries in register.entries.items():
+        if all(is_blank(value.raw) for value in entries.values()):
+            continue
+        row = register.rows[owner]
+        try:
+            read_value(Field(owner, "name", ""), owner)
+        except Refused as refusal:
+            log.problem(register.file, str(refusal), row, owner)
+        for key, value in entries.items():
+            if key not in known:
+                expected = f"unknown key{nearest(key, known)}"
+                log.problem(register.file, expected, value.row, f"{owner}.{key}")
+        values[owner] = {
+            field.name: _setting(
+                register.file,
+                f"{owner}.{field.name}",
+                field,
+                entries.get(field.name),
+                None,
+                log,
+                field.required,
+                row,
+            )
+            for field in fields
         }
     return values
 
@@ -77,13 +132,13 @@ def _only_for(field, kind):
 
 def _refuse_unknown(file, section, entries, section_row, log):
     later = "not available in this version of tankcal; remove it or set it to 0"
-    if section not in KEYS and section not in LATER_SECTIONS:
+    if section not in KEYS:
         log.problem(file, f"unknown section{nearest(section, KEYS)}", section_row, f"[{section}]")
         return
-    known = [field.name for field in KEYS.get(section, ())]
+    known = [field.name for field in KEYS[section]]
     for key, value in entries.items():
         name = f"{section}.{key}"
-        if section in LATER_SECTIONS or key in LATER_KEYS.get(section, ()):
+        if key in LATER_KEYS.get(section, ()):
             if not is_blank(value.raw) and value.raw not in (0, []):
                 log.problem(file, later, value.row, name)
         elif key not in known and not _is_own(section, key, known):
@@ -106,13 +161,13 @@ def _is_own(section, key, known):
     return section in OPEN_SECTIONS and plain is not None and not nearest(key, known)
 
 
-def _setting(file, section, field, value, kind, log):
-    name = f"{section}.{field.name}"
+def _setting(file, name, field, value, kind, log, is_required, row=None):
+    """The value of one key; row: where its section begins, for a message that it is missing."""
     if value is None or (is_blank(value.raw) and value.raw not in field.choices):
-        if field.is_required(kind):
+        if is_required:
             found = "missing" if value is None else "blank"
-            row = None if value is None else value.row
-            log.problem(file, f"{found}; expected {field.wanted()}", row, name)
+            place = row if value is None else value.row
+            log.problem(file, f"{found}; expected {field.wanted()}", place, name)
         return None
     if not field.suits(kind):
         if not _says_nothing(value):
@@ -150,19 +205,39 @@ def _column(table, field, log):
     filled = field.required or field.in_full
     if not field.required and all(is_blank(raw) for raw in raws):
         return None
-    values = []
-    for row, raw in zip(table.row_numbers, raws, strict=True):
-        value = None
+    values, read = _plain_numbers(field, raws, table.decimal), {}
+    for place, raw in enumerate(raws):
+        if values[place] is not None:
+            continue
         if is_blank(raw):
             if filled:
+                row = table.row_numbers[place]
                 log.problem(table.file, f"blank; expected {field.expectation()}", row, field.name)
+        elif type(raw) is str and raw in read:
+            values[place] = read[raw]  # names and choices come again and again
         else:
             try:
-                value = read_value(field, raw, table.decimal)
+                values[place] = read[raw] = read_value(field, raw, table.decimal)
             except Refused as refusal:
-                log.problem(table.file, str(refusal), row, field.name)
-        values.append(value)
+                log.problem(table.file, str(refusal), table.row_numbers[place], field.name)
     return values
+
+
+def _plain_numbers(field, raws, decimal):
+    """The sound numbers among the texts of a long column, None for all else."""
+    if field.kind != "number" or decimal != ".":
+        return [None] * len(raws)
+    is_number = NUMBER.fullmatch
+    values = np.array(
+        [
+            float(raw) if type(raw) is str and len(raw) <= MAX_NAME and is_number(raw) else np.nan
+            for raw in raws
+        ]
+    )
+    sound = (values >= field.low) & (values <= field.high) & np.isfinite(values)
+    if field.above_low:
+        sound &= values > field.low
+    return [value if good else None for value, good in zip(values.tolist(), sound, strict=True)]
 
 
 def settings_place(raw, section, key):

@@ -15,13 +15,18 @@ from tankcal.job.tables import BadCell, nearest, shown
 MAX_TEXT = 300
 MAX_NAME = 64
 MAX_LIST = 50  # numbers or pairs
+MAX_NAMES = 5000
 NAME_RULE = "a letter, digit or underscore first, then letters, digits, spaces or _ - . ( ) / #"
 TANK_ID_RULE = "letters, digits, spaces or _ - . ( ), no .. and no . or - first"
 
-_NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
+NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
 _NAME = re.compile(r"\w[\w .()/#-]*")
 _TANK_ID = re.compile(r"(?!.*\.\.)[\w(][\w .()-]*")
 _MESH_FILE = re.compile(r"(?!.*\.\.)\w[\w .()-]*\.(stl|obj|ply|off)", re.IGNORECASE)
+_DMS = re.compile(
+    r"([+-]?)([0-9]{1,3})(?:[ \t]*[°º][ \t]*|[ \t]+|-)([0-9]{1,2})(?:"
+    r"(?:[ \t]*['′’][ \t]*|[ \t]+|-)([0-9]{1,2}(?:[.,][0-9]{0,9})?)[ \t]*(?:\"|″|”|''|′′)?|['′’]?)"
+)
 _PAIR = re.compile(r"\s*([0-9.]+)\s*[-–]\s*([0-9.]+)\s*")
 _ISO_DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 
@@ -36,15 +41,17 @@ class Field:
 
     name       as written in the file, with its unit
     kind       "number", "text", "name", "tank id", "choice", "flag", "date", "mesh file",
-               "numbers" (several of them) or "ranges" (pairs of numbers)
+               "numbers" (several of them), "ranges" (pairs of numbers), "names" (several of them)
+               or "dms" (an angle in degrees, minutes and seconds; read as degrees)
     note       one line for the person who fills it in
     required   must be there and filled in, for every kind of tank in `kinds`
     kinds      the kinds of tank that it is for; (): all
     required_for  kinds of tank for which it is required though `required` is not set
     low, high  bounds of a number, both allowed unless `above_low`: then low itself is not
-    choices    what a choice may be
+    choices    what a choice may be; of a number, words that may stand in its place
     in_full    an optional column that is filled in for every row, or for none
     start      what the starter job has there
+    of_survey  of use only where observations are adjusted
     """
 
     name: str
@@ -59,6 +66,7 @@ class Field:
     start: str = ""
     kinds: tuple[str, ...] = ()
     required_for: tuple[str, ...] = ()
+    of_survey: bool = False
 
     def suits(self, tank_kind):
         """Is it for tanks of this kind? Of a kind that is not known (None), nothing is refused."""
@@ -75,7 +83,10 @@ class Field:
         if self.kind == "choice":
             return " or ".join(repr(choice) for choice in self.choices)
         if self.kind == "number":
-            return "a number" + self._bounds()
+            words = "".join(f", or {choice!r}" for choice in self.choices)
+            return "a number" + self._bounds() + words
+        if self.kind == "dms":
+            return f"degrees, minutes and seconds such as 123 04 05.6{self._bounds(' degrees')}"
         if self.kind == "numbers":
             return f"numbers{self._bounds()}, such as 700; 850 (in job.toml also [700, 850])"
         return {
@@ -85,6 +96,7 @@ class Field:
             "flag": "true or false",
             "date": "a date such as 2024-05-31",
             "ranges": "pairs such as 0-0.3; 2.1-2.4 (in job.toml also [[0, 0.3], [2.1, 2.4]])",
+            "names": 'names such as P7; P9 (in job.toml also ["P7", "P9"])',
             "mesh file": "the plain name of a .stl, .obj, .ply or .off file, in the job's folder",
         }[self.kind]
 
@@ -93,13 +105,15 @@ class Field:
         is_plain = self.kind in ("text", "name", "tank id")
         return self.note if is_plain else f"{self.note} ({self.expectation()})"
 
-    def _bounds(self):
+    def _bounds(self, unit=""):
         if self.low == -self.high and self.high >= 1e5:  # bounds that only keep nonsense out
             return ""
         if math.isinf(self.high):
             return f" above {self.low:g}" if self.above_low else f" of {self.low:g} or more"
         if self.above_low:
-            return f" above {self.low:g}, at most {self.high:g}"
+            return f" above {self.low:g}, at most {self.high:g}{unit}"
+        if unit:
+            return f", from {self.low:g} to {self.high:g}{unit}"
         return f" from {self.low:g} to {self.high:g}"
 
 
@@ -123,11 +137,15 @@ def read_value(field, raw, decimal=None):
         "date": _read_date,
         "numbers": _read_numbers,
         "ranges": _read_ranges,
+        "names": _read_names,
+        "dms": _read_dms,
     }.get(field.kind, _read_text)
     return reader(field, raw, decimal)
 
 
 def _read_number(field, raw, decimal):
+    if field.choices and isinstance(raw, str) and raw.strip() in field.choices:
+        return raw.strip()
     if isinstance(raw, str):
         value = _number_of_text(field, raw, decimal)
     elif isinstance(raw, int | float) and not isinstance(raw, bool):
@@ -137,7 +155,8 @@ def _read_number(field, raw, decimal):
     if not math.isfinite(value):
         raise Refused(f"found {shown(raw)}; expected {field.expectation()}, not NaN or infinite")
     if value > field.high or value < field.low or (field.above_low and value == field.low):
-        raise Refused(f"found {shown(raw)}; expected {field.expectation()}{_other_unit(field)}")
+        hint = _other_unit(field, value)
+        raise Refused(f"found {shown(raw)}; expected {field.expectation()}{hint}")
     return value
 
 
@@ -147,15 +166,15 @@ def _number_of_text(field, raw, decimal):
     if len(text) > MAX_NAME:
         raise Refused(f"found {shown(raw)}; expected {wanted}")
     plain = text.replace(",", ".") if decimal != "." else text
-    is_number = _NUMBER.fullmatch(plain) is not None
+    is_number = NUMBER.fullmatch(plain) is not None
     if decimal is None:
         hint = ", stored as a number (no quotation marks, no text cell)" if is_number else ""
         raise Refused(f"found the text {shown(raw)}; expected {wanted}{hint}")
     if is_number and not (decimal == "," and "." in text):
         return float(plain)
-    if decimal == "." and _NUMBER.fullmatch(text.replace(",", ".")):
+    if decimal == "." and NUMBER.fullmatch(text.replace(",", ".")):
         hint = " with a decimal point; for decimal commas see [csv] decimal in job.toml"
-    elif decimal == "," and _NUMBER.fullmatch(text):
+    elif decimal == "," and NUMBER.fullmatch(text):
         hint = " with a decimal comma, as [csv] decimal in job.toml says"
     else:
         hint = ""
@@ -179,9 +198,13 @@ def _kind_of(raw):
     return ""
 
 
-def _other_unit(field):
+def _other_unit(field, value):
     if "_per_" in field.name:
         return ""
+    if field.name.endswith("_deg") and field.high < abs(value) <= field.high * 10 / 9:
+        return " (is it in gon?)"
+    if field.name.startswith("zenith_") and value > field.high:
+        return " (in the second face? give the mean of both)"
     unit = {"_m": "metres", "_mm": "millimetres"}.get("_" + field.name.rpartition("_")[2])
     return f" (in {unit}: is it in another unit?)" if unit else ""
 
@@ -257,6 +280,39 @@ def _read_numbers(field, raw, _decimal):
     except Refused as refusal:
         found = str(refusal).partition("; expected")[0]
         raise Refused(f"{found}; expected {field.expectation()}") from None
+
+
+def _read_names(field, raw, _decimal):
+    """Tuple of texts of a list, of a text such as P7; P9, or of one number that is a name."""
+    parts = raw.split(";") if isinstance(raw, str) else raw if isinstance(raw, list) else [raw]
+    if len(parts) > MAX_NAMES:
+        raise Refused(f"{len(parts)} of them; expected at most {MAX_NAMES}")
+    text = Field(field.name, "text", field.note)
+    names = []
+    for part in parts:
+        if is_blank(part) or isinstance(part, dict | list):
+            raise Refused(f"found {shown(raw)}; expected {field.expectation()}")
+        names.append(_read_text(text, part, None))
+    return tuple(names)
+
+
+def _read_dms(field, raw, _decimal):
+    """Degrees of a text such as 123 04 05.6, 123-04-05.6 or 123°04'05.6\"; negative: -0 30 00."""
+    wanted = field.expectation()
+    if not isinstance(raw, str):
+        raise Refused(f"found {_kind_of(raw)}{shown(raw)}; expected the text of {wanted}")
+    match = _DMS.fullmatch(raw.replace("\u00a0", " ").strip())
+    if match is None:
+        raise Refused(f"found {shown(raw)}; expected {wanted}")
+    sign, degrees, minutes, seconds = match.groups()
+    seconds = float((seconds or "0").replace(",", "."))  # a thousands mark it cannot be
+    if int(minutes) >= 60 or seconds >= 60:
+        raise Refused(f"found {shown(raw)}; expected {wanted}, minutes and seconds below 60")
+    value = (int(degrees) * 3600 + int(minutes) * 60 + seconds) / 3600
+    value = -value if sign == "-" else value
+    if not field.low <= value <= field.high:
+        raise Refused(f"found {shown(raw)}; expected {wanted}")
+    return value
 
 
 def _read_ranges(field, raw, _decimal):

@@ -9,17 +9,18 @@ from tankcal.job.tables import (
     COVARIANCE_FILE,
     LATER_TABLES,
     MAX_FILE_BYTES,
+    REGISTERS,
     SEPARATORS,
     SETTINGS_FILE,
     TABLES,
     RawJob,
+    Register,
     Value,
     make_table,
     nearest,
     read_bytes,
 )
 
-LATER_FILES = ("cameras.toml", "instruments.toml")
 MAX_SETTINGS_BYTES = 1_000_000
 MAX_SETTINGS_LINE = 4000  # characters
 DECIMALS = (".", ",")
@@ -57,6 +58,12 @@ def read_folder(folder, log):
             is_readable = data is not None and marks is not None
             tables[table] = read_csv(name, data, *marks, log) if is_readable else None
     covariance = content(COVARIANCE_FILE) if COVARIANCE_FILE in names else None
+    registers = {}
+    for register in REGISTERS:
+        name = f"{register}.toml"
+        if name in names:
+            data = content(name, MAX_SETTINGS_BYTES)
+            registers[register] = None if data is None else read_register(name, data, log)
     return RawJob(
         folder.resolve().name,
         folder,
@@ -66,6 +73,7 @@ def read_folder(folder, log):
         tables,
         covariance,
         tuple(files),
+        registers,
     )
 
 
@@ -80,7 +88,7 @@ def _refuse_unknown_files(names, log):
         stem, _, ending = name.lower().rpartition(".")
         if name.startswith((".", "~")) or name in known:
             continue
-        if (stem in LATER_TABLES and ending == "csv") or name.lower() in LATER_FILES:
+        if stem in LATER_TABLES and ending == "csv":
             log.problem(name, "not available in this version of tankcal: remove the file")
         elif ending == "csv":
             listed = ", ".join(known)
@@ -113,15 +121,47 @@ def _lines(text):
 
 def read_toml(file, data, log):
     """({section: {key: Value}}, {section: row}) of a TOML file, or (None, {}) when unreadable."""
+    parsed = _parsed(file, data, log)
+    return (None, {}) if parsed is None else _flatten(file, *parsed, log)
+
+
+def read_register(file, data, log):
+    """Register of cameras.toml or instruments.toml, or None after telling `log` what is wrong."""
+    parsed = _parsed(file, data, log)
+    if parsed is None:
+        return None
+    content, rows = parsed
+    register = file.rpartition(".")[0]
+    entries, places = {}, {}
+    for section, inside in content.items():
+        if section != register or not isinstance(inside, dict):
+            expected = f"stands outside; expected sections such as [{register}.NAME]"
+            log.problem(file, expected, rows.get(section), section)
+            continue
+        for name, given in inside.items():
+            where = re.sub(r"[\s\"']", "", f"{register}.{name}")
+            if not isinstance(given, dict):
+                expected = f"stands in no [{register}.NAME]; expected inside one"
+                log.problem(file, expected, rows.get(where), name)
+                continue
+            entries[name] = {
+                key: Value(value, rows.get(f"{where}.{key}")) for key, value in given.items()
+            }
+            places[name] = rows.get(where)
+    return Register(file, entries, places)
+
+
+def _parsed(file, data, log):
+    """(content, row of each section and 'section.key') of a TOML file, or None when unreadable."""
     text = decode(file, data, log)
     if text is None:
-        return None, {}
+        return None
     for number, line in enumerate(_lines(text), 1):
         if len(line) > MAX_SETTINGS_LINE:
             log.problem(file, f"a line of more than {MAX_SETTINGS_LINE} characters", number)
-            return None, {}
+            return None
     try:
-        data = tomllib.loads(text)
+        return tomllib.loads(text), _toml_rows(text)
     except (ValueError, RecursionError) as error:
         line = re.search(r"at line (\d+)", str(error))
         reason = re.sub(r"\s*\(at .*\)$", "", str(error))
@@ -129,8 +169,7 @@ def read_toml(file, data, log):
             reason = "too deeply nested"
         place = int(line[1]) if line else None
         log.problem(file, f'cannot be read: {reason}; expected lines such as key = "text"', place)
-        return None, {}
-    return _flatten(file, data, _toml_rows(text), log)
+        return None
 
 
 def _toml_rows(text):

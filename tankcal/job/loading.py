@@ -4,33 +4,57 @@ from pathlib import Path
 
 from tankcal.job.attached import read_mesh_file
 from tankcal.job.checks import check_all
+from tankcal.job.checks.common import has_survey
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.covariance import read_covariance
-from tankcal.job.entries import kind_of, read_columns, read_settings
+from tankcal.job.entries import kind_of, read_columns, read_register, read_settings
 from tankcal.job.folder import read_folder
-from tankcal.job.making import make_job
+from tankcal.job.making import make_frame, make_job
+from tankcal.job.measuring import make_measurements
 from tankcal.job.sheets import expected_sheets, read_workbook
-from tankcal.job.tables import COVARIANCE_FILE, SETTINGS_FILE, TABLES, Log
+from tankcal.job.tables import (
+    COVARIANCE_FILE,
+    REGISTERS,
+    SETTINGS_FILE,
+    SURVEY_TABLES,
+    TABLES,
+    TANK_TABLES,
+    Log,
+)
 
 
-def load(path):
+def load(path, only=None):
     """The Job in a folder, in the folder of a job.toml, or in a workbook (.xlsx).
 
-    Raises InputError with every problem of the input, each with its file, row and column.
+    only  "adjustment": the survey alone is needed. Of the rest what is there is read and its values
+          are checked one by one; Job.tank, survey, datum and table are None where they are not
+          whole, and the parts of the tank (points, bottom, deadwood, ...) are left out
+
+    Raises InputError with every problem of the input, each with its file, row and column;
+    ValueError for another `only`.
     """
+    if only not in (None, "adjustment"):
+        raise ValueError(f"found only = {only!r}; expected 'adjustment'")
     log = Log()
     raw = _read(Path(path), log)
     if raw is None:
         log.stop_if_problems()
-    tables = _read_tables(raw, log)
-    values = read_settings(raw, log) if raw.settings is not None else None
-    check_all(values, tables, raw, log)
-    covariance = _covariance(raw, tables["points"], log)
-    mesh = None
-    if values is not None and values["mesh"]["file"] is not None:
+    is_whole = only is None
+    tables = _read_tables(raw, is_whole, log)
+    registers = {name: read_register(raw, name, log) for name in REGISTERS}
+    values = read_settings(raw, log, is_whole) if raw.settings is not None else None
+    check_all(values, tables, registers, raw, is_whole, log)
+    covariance, mesh, measurements = None, None, None
+    if is_whole:
+        covariance = _covariance(raw, tables["points"], log)
+    if is_whole and values is not None and values["mesh"]["file"] is not None:
         mesh = read_mesh_file(raw.folder, values["mesh"]["file"], log)
     log.stop_if_problems()
-    return make_job(raw, values, tables, covariance, mesh, tuple(log.warnings))
+    if has_survey(tables):
+        measurements = make_measurements(values, tables, registers)
+    if not is_whole:
+        return make_frame(raw, values, tables, measurements, tuple(log.warnings))
+    return make_job(raw, values, tables, covariance, mesh, measurements, tuple(log.warnings))
 
 
 def _read(path, log):
@@ -50,28 +74,45 @@ def _read(path, log):
     return None
 
 
-def _read_tables(raw, log):
-    """{name: ColumnValues}, None for a table that is missing, cannot be read or does not belong."""
+def _read_tables(raw, is_whole, log):
+    """{name: ColumnValues}, None for a table that is missing, cannot be read or does not belong.
+
+    A table of a survey that is there but empty is None, too.
+    """
     kind = kind_of(raw)
+    allowed = None if kind is None else TABLES_OF_KIND[kind]
+    if kind is not None and "points" in allowed:
+        allowed += SURVEY_TABLES
     tables = {}
     for name in TABLES:
         table = raw.tables.get(name)
-        if kind is not None and name not in TABLES_OF_KIND[kind]:
-            if table is not None and (table.rows or table.skipped):
+        is_empty = table is None or not (table.rows or table.skipped)
+        if allowed is not None and name not in allowed:
+            if not is_empty:
                 log.problem(table.file, f"not for a tank of kind {kind}; remove the table")
             tables[name] = None
             continue
-        tables[name] = None if table is None else read_columns(name, table, log)
-        if name not in raw.tables and name in REQUIRED_TABLES.get(kind, ()):
-            log.problem(raw.file_of(name), _missing(raw, name))
+        if table is None or (is_empty and name not in TANK_TABLES):
+            tables[name] = None
+        else:
+            tables[name] = read_columns(name, table, log)
+    if is_whole:
+        _tell_missing_tables(raw, tables, kind, log)
     return tables
+
+
+def _tell_missing_tables(raw, tables, kind, log):
+    for name in REQUIRED_TABLES.get(kind, ()):
+        if name not in raw.tables and not (name == "points" and has_survey(tables)):
+            log.problem(raw.file_of(name), _missing(raw, name))
 
 
 def _missing(raw, name):
     if raw.file_of(name).startswith("sheet "):
         return f"missing sheet; {expected_sheets()}"
     needed = ", ".join(field.name for field in COLUMNS[name] if field.required)
-    return f"missing file; expected one with the columns {needed}"
+    instead = ", or the files of a survey, such as distances.csv" if name == "points" else ""
+    return f"missing file; expected one with the columns {needed}{instead}"
 
 
 def _covariance(raw, points, log):

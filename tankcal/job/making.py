@@ -1,5 +1,7 @@
 """From checked values to a `Job`: SI units, defaults, one dataclass for each part."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from tankcal.job.checks import bottom_form
@@ -27,39 +29,50 @@ from tankcal.job.model import (
 )
 
 
-def make_job(raw, values, tables, covariance, mesh, warnings):
+def make_job(raw, values, tables, covariance, mesh, measurements, warnings):
     """The Job of values and tables without problems.
 
-    covariance  (3n, 3n) m2 or None; mesh  ((name, SHA-256, size), bytes) or None
+    covariance    (3n, 3n) m2 or None; mesh  ((name, SHA-256, size), bytes) or None
+    measurements  Measurements or None
     """
-    tank = dict(values["tank"])
-    sizes = {name: tank.pop(name) for name in tank.copy() if name.startswith("nominal_")}
-    id, kind = tank.pop("id"), tank.pop("kind")
-    adjustment = values["adjustment"]
+    kind = values["tank"]["kind"]
     points = _points(tables["points"], covariance)
-    files = raw.files if mesh is None else (*raw.files, mesh[0])
-    return Job(
-        tank=Tank(id, kind, details=_given(tank), **sizes),
-        survey=_survey(values["survey"]),
-        datum=_datum(values["datum"], kind, points),
-        table=_table(values["table"]),
-        material=_material(values["material"]),
-        courses=_courses(tables["courses"]) if kind == "vertical" else (),
+    has_points = points is not None or measurements is not None
+    frame = make_frame(raw, values, tables, measurements, warnings, has_points)
+    files = frame.files if mesh is None else (*frame.files, InputFile(*mesh[0]))
+    return replace(
+        frame,
         points=points,
         inputs=_inputs(tables["uncertainty"]),
-        certificate=_given(values["certificate"]),
-        snooping=adjustment["snooping"] is not False,
-        scale=adjustment["scale"] or "a_priori",
-        files=tuple(InputFile(*file) for file in files),
-        warnings=warnings,
-        source=raw.source,
-        switches=Switches(**_given(values["corrections"])),
+        files=files,
         bottom=_bottom(values, tables["bottom"]),
         deadwood=_deadwood(tables["deadwood"]),
         roof=_roof(values["roof"]),
-        horizontal=_horizontal(values["horizontal"], points) if kind == "horizontal" else None,
+        horizontal=_horizontal(values["horizontal"], has_points) if kind == "horizontal" else None,
         sphere=_sphere(values["sphere"]) if kind == "sphere" else None,
         mesh=_mesh(values["mesh"], mesh[1]) if kind == "mesh" else None,
+    )
+
+
+def make_frame(raw, values, tables, measurements, warnings, has_points=True):
+    """The Job without the parts of its tank: what can be made of a job that may not be whole."""
+    adjustment, kind = values["adjustment"], values["tank"]["kind"]
+    return Job(
+        tank=_tank(values["tank"]),
+        survey=_survey(values["survey"]),
+        datum=_datum(values["datum"], kind, has_points),
+        table=_table(values["table"]),
+        material=_material(values["material"]),
+        courses=_courses(tables["courses"]) if kind == "vertical" else (),
+        points=None,
+        certificate=_given(values["certificate"]),
+        snooping=adjustment["snooping"] is not False,
+        scale=adjustment["scale"] or "a_priori",
+        files=tuple(InputFile(*file) for file in raw.files),
+        warnings=warnings,
+        source=raw.source,
+        switches=Switches(**_given(values["corrections"])),
+        measurements=measurements,
     )
 
 
@@ -67,16 +80,31 @@ def _given(values):
     return {key: value for key, value in values.items() if value is not None}
 
 
+def _tank(values):
+    """The Tank; None where its name or kind is not known."""
+    if values["id"] is None or values["kind"] is None:
+        return None
+    sizes = {name: value for name, value in values.items() if name.startswith("nominal_")}
+    texts = {name: value for name, value in values.items() if name not in (*sizes, "id", "kind")}
+    return Tank(values["id"], values["kind"], details=_given(texts), **sizes)
+
+
 def _survey(values):
+    if values["date"] is None:
+        return None
     return Survey(**{**values, "side": values["side"] or "inside"})
 
 
-def _datum(values, kind, points):
-    has_own_frame = kind in ("horizontal", "sphere") and points is None
+def _datum(values, kind, has_points):
+    if kind is None and not _given(values):
+        return None
+    has_own_frame = kind in ("horizontal", "sphere") and not has_points
     return Datum(**{**values, "bottom_z_m": 0.0 if has_own_frame else values["bottom_z_m"]})
 
 
 def _table(values):
+    if values["reference_temperature_c"] is None:
+        return None
     given = _given(values) | {"language": "en"}
     litres = given.pop("max_interpolation_error_l", None)
     return TableSpec(
@@ -96,6 +124,8 @@ def _material(values):
 
 
 def _courses(table):
+    if table is None:
+        return ()
     columns = (table.of(name) for name in ("course", "height_m", "thickness_mm", "paint_mm"))
     return tuple(
         Course(name, height_m, thickness_mm / 1000, (paint_mm or 0.0) / 1000)
@@ -150,7 +180,7 @@ def _roof(values):
     return None if values["mass_kg"] is None else Roof(**values)
 
 
-def _horizontal(values, points):
+def _horizontal(values, has_points):
     width, height = (values[name] or values["diameter_m"] for name in ("width_m", "height_m"))
     length, dip, tilt = (values[name] for name in ("length_m", "dip_from_a_m", "tilt_mm_per_m"))
     azimuth = values["azimuth_deg"]
@@ -160,7 +190,7 @@ def _horizontal(values, points):
         _end(values, "end_b"),
         width,
         height,
-        tilt=None if points is not None else (tilt or 0.0) / 1000,
+        tilt=None if has_points else (tilt or 0.0) / 1000,
         roll_rad=float(np.radians(values["roll_deg"] or 0.0)),
         dip_from_a_m=length / 2 if dip is None else dip,
         dip_direction=values["dip_direction"] or "plumb",

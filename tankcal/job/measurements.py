@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tankcal.network import Camera
+from tankcal.network.survey import Camera
 
 
 @dataclass(frozen=True)
@@ -164,6 +164,7 @@ class Readings:
     horizontal     (n,) True: a horizontal distance
     temperature_c  (n,) nan where not given              target_height_m  (n,) 0 where not given
     check     (n,) True: compared, not adjusted
+    sheet     what messages call the table when it stands in a workbook; else ""
     """
 
     table: str
@@ -180,11 +181,12 @@ class Readings:
     temperature_c: np.ndarray | None = None
     target_height_m: np.ndarray | None = None
     rows: tuple = ()
+    sheet: str = ""
 
     @property
     def file(self):
-        """Name of its file, for messages."""
-        return f"{self.table}.csv"
+        """Name of its file, or of its sheet in a workbook, for messages."""
+        return self.sheet or f"{self.table}.csv"
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tankcal.job.measurements import Measurements
+
 
 @dataclass(frozen=True)
 class Tank:
@@ -127,6 +129,9 @@ class Points:
     sd_m        (n, 3) standard deviations, or None: not given (estimated from residuals)
     section     (n,) text or None: given section name
     generatrix  (n,) text or None
+    causes      named causes that the covariance contains (`surveys.Cause`): covariance = the rest
+                + sum of column column', their columns over the coordinates of these points
+    from_adjustment  True: adjusted from a survey; the covariance has the scale that it should have
     """
 
     names: tuple
@@ -136,6 +141,8 @@ class Points:
     section: tuple
     generatrix: tuple
     rows: tuple
+    causes: tuple = ()
+    from_adjustment: bool = False
 
 
 @dataclass(frozen=True)
@@ -292,18 +299,20 @@ class InputFile:
 class Job:
     """A checked job, all in SI; `load` makes it, `tankcal.run` computes it.
 
-    courses     vertical tanks, from the bottom up; else ()
-    points      None where none were surveyed (never for a vertical tank)
-    bottom      of a vertical tank
-    deadwood    in the order of the file
-    roof        None: no floating roof
+    tank, survey, datum, table  None only in a job that is read for its adjustment alone
+    courses       vertical tanks, from the bottom up; else ()
+    points        as handed in; None where there are none: sizes or a survey stand in their place
+    bottom        of a vertical tank
+    deadwood      in the order of the file
+    roof          None: no floating roof
     horizontal, sphere, mesh  None for the other kinds
+    measurements  the survey that the points are to be adjusted from, or None
     """
 
-    tank: Tank
-    survey: Survey
-    datum: Datum
-    table: TableSpec
+    tank: Tank | None
+    survey: Survey | None
+    datum: Datum | None
+    table: TableSpec | None
     material: Material
     courses: tuple[Course, ...]
     points: Points | None
@@ -321,3 +330,4 @@ class Job:
     horizontal: Horizontal | None = None
     sphere: Sphere | None = None
     mesh: Mesh | None = None
+    measurements: Measurements | None = None

@@ -14,9 +14,12 @@ from itertools import zip_longest
 from tankcal.job.tables import (
     COVARIANCE_FILE,
     LATER_TABLES,
+    REGISTERS,
     TABLES,
+    TANK_TABLES,
     BadCell,
     RawJob,
+    Register,
     Value,
     make_table,
     nearest,
@@ -64,17 +67,23 @@ def read_workbook(path, log):
     if SETTINGS_SHEET not in tables:
         log.problem(f"sheet {SETTINGS_SHEET}", "missing sheet; " + expected_sheets())
     elif tables[SETTINGS_SHEET] is not None:
-        settings, sections = _settings(tables[SETTINGS_SHEET], log)
+        settings, sections = _settings(tables[SETTINGS_SHEET], "section", log)
     files = ((path.name, hashlib.sha256(data).hexdigest(), len(data)),)
     wanted = {name: tables[name] for name in TABLES if name in tables}
     place = f"sheet {SETTINGS_SHEET}"
-    return RawJob(path.name, path.parent, place, settings, sections, wanted, None, files)
+    registers = {
+        name: _register(tables[name], owner, log)
+        for name, owner in REGISTERS.items()
+        if name in tables
+    }
+    return RawJob(path.name, path.parent, place, settings, sections, wanted, None, files, registers)
 
 
 def expected_sheets():
     """One phrase that names the sheets of a workbook."""
     return (
-        f"a workbook has the sheets {SETTINGS_SHEET}, {', '.join(TABLES)} (the last three optional)"
+        f"a workbook has the sheets {SETTINGS_SHEET}, {', '.join(TANK_TABLES)} (the last three"
+        " optional), or those of a survey in place of the points"
     )
 
 
@@ -209,7 +218,7 @@ def _is_ignored(title):
 
 def _known_sheets(file, cells, log):
     """{name: rows} of the sheets that a job has; the others are told to `log`."""
-    known = (SETTINGS_SHEET, *TABLES)
+    known = (SETTINGS_SHEET, *TABLES, *REGISTERS)
     sheets = {}
     for title, rows in cells.items():
         name = title.strip().lower()
@@ -219,7 +228,7 @@ def _known_sheets(file, cells, log):
             log.problem(file, f"two sheets are called {shown(name)}; expected one")
         elif name in known:
             sheets[name] = rows
-        elif name in LATER_TABLES or name in ("cameras", "instruments"):
+        elif name in LATER_TABLES:
             log.problem(f"sheet {name}", "not available in this version of tankcal: remove it")
         elif name == COVARIANCE_FILE.rpartition(".")[0]:
             log.problem(f"sheet {name}", "a full covariance needs the job as a folder")
@@ -236,15 +245,26 @@ def _checked_width(name, rows, log):
         yield number, cells[:MAX_COLUMNS]
 
 
-def _settings(table, log):
-    """({section: {key: Value}}, {section: row}) of the sheet job, or (None, {})."""
-    unknown = [heading for heading in table.headings if heading not in SETTINGS_HEADINGS]
-    missing = [heading for heading in SETTINGS_HEADINGS[:3] if heading not in table.headings]
+def _register(table, owner, log):
+    """Register of the sheet cameras or instruments, or None."""
+    if table is None:
+        return None
+    entries, rows = _settings(table, owner, log)
+    return None if entries is None else Register(table.file, entries, rows)
+
+
+def _settings(table, owner, log):
+    """({section: {key: Value}}, {section: row}) of a sheet of settings, or (None, {}).
+
+    owner  heading of the column of sections: "section", "camera" or "instrument"
+    """
+    wanted = (owner, *SETTINGS_HEADINGS[1:])
+    unknown = [heading for heading in table.headings if heading not in wanted]
+    missing = [heading for heading in wanted[:3] if heading not in table.headings]
     for heading in unknown:
         log.problem(
             table.file,
-            f"unknown column{nearest(heading, SETTINGS_HEADINGS)}; expected section, key, value"
-            " and note",
+            f"unknown column{nearest(heading, wanted)}; expected {owner}, key, value and note",
             table.heading_row,
             heading,
         )
@@ -252,15 +272,18 @@ def _settings(table, log):
         log.problem(table.file, "missing column", table.heading_row, heading)
     if missing:
         return None, {}
-    place = [table.headings.index(heading) for heading in SETTINGS_HEADINGS[:3]]
+    place = [table.headings.index(heading) for heading in wanted[:3]]
     settings, sections = {}, {}
     for row, cells in zip(table.row_numbers, table.rows, strict=True):
         section, key, value = (cells[position] for position in place)
         if key is None and value is None:
             continue  # a row that only names a section or carries a note
+        if owner != "section" and isinstance(section, int | float):
+            section = f"{section:.15g}"  # a camera called 1
         if not isinstance(section, str) or not isinstance(key, str):
-            expected = "a value without section or key; expected both, such as tank and id"
-            column = "key" if isinstance(section, str) else "section"
+            expected = f"a value without {owner} or key; expected both"
+            expected += ", such as tank and id" if owner == "section" else ""
+            column = "key" if isinstance(section, str) else owner
             log.problem(table.file, expected, row, column)
             continue
         section = section.strip("[] ")

@@ -11,12 +11,15 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 
-TABLES = ("points", "courses", "bottom", "deadwood", "uncertainty")
-LATER_TABLES = (
-    *("targets", "photos", "image_points", "fiducials", "control", "check"),
-    *("setups", "distances", "slope_distances", "directions", "zenith_angles", "azimuths"),
-    *("horizontal_angles", "vertical_angles", "height_differences", "plumb_lines"),
+TANK_TABLES = ("points", "courses", "bottom", "deadwood", "uncertainty")
+SURVEY_TABLES = (
+    *("targets", "photos", "image_points", "control", "check", "setups", "distances"),
+    *("slope_distances", "directions", "zenith_angles", "azimuths", "horizontal_angles"),
+    *("vertical_angles", "height_differences", "plumb_lines"),
 )
+TABLES = TANK_TABLES + SURVEY_TABLES
+LATER_TABLES = ("fiducials",)
+REGISTERS = {"cameras": "camera", "instruments": "instrument"}  # and what each one lists
 SETTINGS_FILE = "job.toml"
 COVARIANCE_FILE = "points_cov.npz"
 
@@ -38,8 +41,9 @@ def shown(value):
 
 def nearest(word, known):
     """' (did you mean x?)' when one of the known words is close to `word`, else ''."""
-    close = difflib.get_close_matches(str(word)[:80].lower(), [*known], n=1, cutoff=0.6)
-    return f" (did you mean {close[0]}?)" if close else ""
+    spelt = {one.lower(): one for one in known}
+    close = difflib.get_close_matches(str(word)[:80].lower(), [*spelt], n=1, cutoff=0.6)
+    return f" (did you mean {spelt[close[0]]}?)" if close else ""
 
 
 def _printable(text):
@@ -117,14 +121,27 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Register:
+    """Cameras or instruments as read.
+
+    entries  {name: {key: Value}}        rows  {name: row, None where it is not known}
+    """
+
+    file: str
+    entries: dict
+    rows: dict
+
+
+@dataclass(frozen=True)
 class RawJob:
-    """A job as read. A table that is there but cannot be read is None (its problem is told).
+    """A job as read. A table or register that is there but cannot be read is None (this is told).
 
     settings    {section: {key: Value}}, or None: unreadable
     sections    {section: row}
     covariance  bytes of points_cov.npz, or None
     files       (name, SHA-256, bytes) of each file read
     folder      Path of the folder of job.toml or of the workbook
+    registers   {"cameras" or "instruments": Register}
     """
 
     source: str
@@ -135,10 +152,13 @@ class RawJob:
     tables: dict
     covariance: bytes | None = None
     files: tuple = field(default=())
+    registers: dict = field(default_factory=dict)
 
     def file_of(self, table):
         """Name of the table's file or sheet in messages, whether it is there or not."""
-        return f"sheet {table}" if self.settings_file.startswith("sheet ") else f"{table}.csv"
+        if self.settings_file.startswith("sheet "):
+            return f"sheet {table}"
+        return f"{table}.toml" if table in REGISTERS else f"{table}.csv"
 
 
 def read_bytes(path, log, limit=MAX_FILE_BYTES):

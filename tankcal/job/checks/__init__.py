@@ -5,7 +5,7 @@ missing or bad stays silent: what is wrong with them has been told already.
 """
 
 from tankcal.job.checks.bottom import bottom_form, check_bottom
-from tankcal.job.checks.common import extent_of, has_rows
+from tankcal.job.checks.common import extent_of, has_rows, has_survey, has_wall_points
 from tankcal.job.checks.courses import check_courses
 from tankcal.job.checks.deadwood import check_deadwood
 from tankcal.job.checks.geometry import check_cylinder, check_scan
@@ -15,16 +15,26 @@ from tankcal.job.checks.points import check_points
 from tankcal.job.checks.roof import check_roof
 from tankcal.job.checks.settings import check_settings
 from tankcal.job.checks.steps import check_steps
+from tankcal.job.checks.survey import check_survey
 from tankcal.job.entries import kind_of
 
 __all__ = ["bottom_form", "check_all"]
 
 
-def check_all(values, tables, raw, log):
+def check_all(values, tables, registers, raw, is_whole, log):
     """All checks that the readable parts allow.
 
-    values  of the settings, or None: unreadable; tables  {name: ColumnValues, or None: not there}
+    values     of the settings, or None: unreadable
+    tables     {name: ColumnValues, or None: not there}
+    registers  {"cameras" or "instruments": {name: {key: value}}}
+    is_whole   False: the survey alone is asked for, whatever there is of the tank
     """
+    if is_whole:
+        _check_tank(values, tables, raw, log)
+    check_survey(values, tables, registers, raw, is_whole, log)
+
+
+def _check_tank(values, tables, raw, log):
     kind = kind_of(raw)
     points, inputs = tables["points"], tables["uncertainty"]
     extent = None
@@ -32,7 +42,8 @@ def check_all(values, tables, raw, log):
         extent = extent_of(values, tables, kind)
         check_steps(values["table"], extent, raw, log)
         check_settings(values, tables, extent, kind, raw, log)
-    if points is not None and (kind == "vertical" or has_rows(points)):
+    needs_points = kind == "vertical" and not has_survey(tables)
+    if points is not None and (needs_points or has_rows(points)):
         check_points(points, log)
     if values is not None:
         _check_of_kind(values, tables, extent, kind, raw, log)
@@ -52,8 +63,8 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
     elif has_rows(points):
         check_scan(points, values, kind, raw, log)
     if kind == "horizontal":
-        check_horizontal(values, has_rows(points), raw, log)
+        check_horizontal(values, has_wall_points(tables), raw, log)
     if kind == "sphere":
-        check_sphere(values, has_rows(points), raw, log)
+        check_sphere(values, has_wall_points(tables), raw, log)
     if tables["deadwood"] is not None:
         check_deadwood(tables["deadwood"], extent, log)

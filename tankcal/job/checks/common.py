@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.job.contract.observations import READINGS
 from tankcal.job.entries import settings_place
 from tankcal.job.fields import is_blank
 
@@ -23,6 +24,16 @@ def is_not_given(raw, section, key):
 def has_rows(table):
     """Does the table exist, with at least one row, be it readable or not?"""
     return table is not None and not table.is_empty
+
+
+def has_survey(tables):
+    """Are there observations to be adjusted, readable or not?"""
+    return any(has_rows(tables[name]) for name in ("image_points", *READINGS))
+
+
+def has_wall_points(tables):
+    """Does the wall come from points, handed in or to be adjusted?"""
+    return has_rows(tables["points"]) or has_survey(tables)
 
 
 def refuse_repeated(table, column, log):
@@ -71,11 +82,11 @@ def extent_of(values, tables, kind):
     if kind == "vertical":
         return _of_vertical(values, tables["bottom"])
     if kind == "horizontal":
-        return _of_horizontal(values["horizontal"], values, has_rows(tables["points"]))
+        return _of_horizontal(values["horizontal"], values, has_wall_points(tables))
     if kind == "sphere":
         diameter = values["sphere"]["diameter_m"] or values["tank"]["nominal_diameter_m"]
         area = None if diameter is None else np.pi / 4 * diameter**2
-        return _lying(diameter, 0.0, area, values, has_rows(tables["points"]))
+        return _lying(diameter, 0.0, area, values, has_wall_points(tables))
     return Extent()
 
 

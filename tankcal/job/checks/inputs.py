@@ -1,7 +1,7 @@
 """uncertainty.csv: each input once, in its own unit, of a credible size, and of use here."""
 
 from tankcal.job.checks.bottom import bottom_form
-from tankcal.job.checks.common import has_rows, loads_the_shell, refuse_repeated
+from tankcal.job.checks.common import has_wall_points, loads_the_shell, refuse_repeated
 from tankcal.job.contract import INPUTS
 
 
@@ -39,7 +39,7 @@ def _useless(values, tables, kind):
     elif kind == "horizontal":
         rules |= _rules_of_horizontal(values, tables)
     elif kind == "sphere":
-        rules |= _rules_of_wall(values["sphere"], values, has_rows(tables["points"]))
+        rules |= _rules_of_wall(values["sphere"], values, has_wall_points(tables))
     return useless | {name: why for name, why in rules.items() if why}
 
 
@@ -68,7 +68,7 @@ def _rules_of_vertical(values, tables):
 
 
 def _rules_of_horizontal(values, tables):
-    given, has_points = values["horizontal"], has_rows(tables["points"])
+    given, has_points = values["horizontal"], has_wall_points(tables)
     leans = has_points or (given["tilt_mm_per_m"] and values["corrections"]["tilt"] is not False)
     all_flat = given["end_a"] == given["end_b"] == "flat"
     switched_off = values["corrections"]["tilt"] is False

@@ -1,6 +1,6 @@
 """Settings that hang together: heights of the datum, the survey's liquid, densities, points."""
 
-from tankcal.job.checks.common import has_rows, is_not_given, loads_the_shell, tell
+from tankcal.job.checks.common import has_wall_points, is_not_given, loads_the_shell, tell
 
 MAX_DIP_OFFSET_M = 1.0
 LIGHT_KG_M3, HEAVY_KG_M3 = 500, 2000  # of the liquids that tanks are calibrated for
@@ -51,7 +51,7 @@ def _check_dip_plate(values, tables, kind, raw, log):
 def _bottoms_z(values, tables, kind):
     """Heights at which a bottom is known to lie, m, in the frame of the points."""
     if kind in ("horizontal", "sphere"):
-        return [] if has_rows(tables["points"]) else [0.0]
+        return [] if has_wall_points(tables) else [0.0]
     if values["datum"]["bottom_z_m"] is None:
         return []
     surveyed = [] if tables["bottom"] is None else tables["bottom"].of("z_m")

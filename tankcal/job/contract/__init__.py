@@ -3,16 +3,20 @@
 `docs/job-format.md` says the same for people, and the starter job is written from these lists.
 """
 
-from tankcal.job.contract.columns import COLUMNS
+from tankcal.job.contract.columns import COLUMNS as TANK_COLUMNS
 from tankcal.job.contract.inputs import INPUTS
 from tankcal.job.contract.keys import KEYS as COMMON_KEYS
 from tankcal.job.contract.kinds import KINDS
+from tankcal.job.contract.observations import COLUMNS as SURVEY_COLUMNS
+from tankcal.job.contract.observations import SURVEYS
 from tankcal.job.contract.parts import KEYS as PART_KEYS
+from tankcal.job.contract.registers import OF_PHOTOS, REGISTER_KEYS, REGISTERS_OF_SURVEY
 
 SECTIONS = (
     *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "bottom", "roof"),
-    *("corrections", "material", "adjustment", "certificate", "csv"),
+    *("corrections", "material", "adjustment", "adjustment.camera", "certificate", "csv"),
 )
+COLUMNS = TANK_COLUMNS | SURVEY_COLUMNS
 KEYS = {section: (COMMON_KEYS | PART_KEYS)[section] for section in SECTIONS}
 
 REQUIRED_TABLES = {"vertical": ("points", "courses")}
@@ -24,11 +28,7 @@ TABLES_OF_KIND = {
 }
 
 OPEN_SECTIONS = ("certificate",)  # hold text fields of the user's own, too
-LATER_SECTIONS = ("adjustment.camera",)
-LATER_KEYS = {
-    "table": ("rule", "minimum_delivery_m"),
-    "adjustment": ("datum", "datum_points", "fixed_photo", "image_sd_um", "refraction"),
-}
+LATER_KEYS = {"table": ("rule", "minimum_delivery_m")}
 
 __all__ = [
     "COLUMNS",
@@ -36,8 +36,11 @@ __all__ = [
     "KEYS",
     "KINDS",
     "LATER_KEYS",
-    "LATER_SECTIONS",
+    "OF_PHOTOS",
     "OPEN_SECTIONS",
+    "REGISTERS_OF_SURVEY",
+    "REGISTER_KEYS",
     "REQUIRED_TABLES",
+    "SURVEYS",
     "TABLES_OF_KIND",
 ]

@@ -1,6 +1,7 @@
 """The keys of job.toml that every kind of tank has, or most of them."""
 
 from tankcal.job.contract.kinds import KINDS, VERTICAL, WITH_POINTS
+from tankcal.job.contract.registers import CAMERA_SETTINGS
 from tankcal.job.fields import Field
 
 
@@ -215,6 +216,49 @@ ADJUSTMENT = (
         kinds=WITH_POINTS,
         choices=("a_priori", "a_posteriori"),
     ),
+    Field(
+        "datum",
+        "choice",
+        "what holds the frame of the adjusted points: control, fixed_photo, minimal or inner;"
+        " blank: control",
+        kinds=WITH_POINTS,
+        choices=("control", "fixed_photo", "minimal", "inner"),
+        of_survey=True,
+    ),
+    Field(
+        "datum_points",
+        "names",
+        "points that carry the datum minimal or inner: P7; P9:xy; P3:z; blank: chosen",
+        kinds=WITH_POINTS,
+        of_survey=True,
+    ),
+    Field(
+        "fixed_photo",
+        "name",
+        "the photo that holds the datum fixed_photo",
+        kinds=WITH_POINTS,
+        of_survey=True,
+    ),
+    Field(
+        "image_sd_um",
+        "number",
+        "standard deviation of image coordinates that carry none, micrometres",
+        kinds=WITH_POINTS,
+        low=0,
+        above_low=True,
+        high=1e4,
+        of_survey=True,
+    ),
+    Field(
+        "refraction",
+        "number",
+        "coefficient of refraction for zenith and vertical angles and slope distances, such as"
+        " 0.13; blank: neither curvature nor refraction",
+        kinds=WITH_POINTS,
+        low=-5,
+        high=5,
+        of_survey=True,
+    ),
 )
 CERTIFICATE = (
     _text("number", "number of the certificate"),
@@ -249,6 +293,7 @@ KEYS = {
     "table": TABLE,
     "material": MATERIAL,
     "adjustment": ADJUSTMENT,
+    "adjustment.camera": CAMERA_SETTINGS,
     "certificate": CERTIFICATE,
     "csv": CSV,
 }

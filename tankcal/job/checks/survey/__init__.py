@@ -1,0 +1,63 @@
+"""Does the survey make sense, as far as its files alone can tell?
+
+What only the adjustment can tell (a swapped point, an undetermined one, a datum that is missing or
+in excess) is told after it.
+"""
+
+from tankcal.job.checks.common import has_rows, has_survey, tell
+from tankcal.job.checks.survey.cameras import check_cameras
+from tankcal.job.checks.survey.datum import check_datum
+from tankcal.job.checks.survey.doubtful import check_doubtful
+from tankcal.job.checks.survey.files import SurveyFiles
+from tankcal.job.checks.survey.held import check_held
+from tankcal.job.checks.survey.images import check_images
+from tankcal.job.checks.survey.instruments import check_instruments
+from tankcal.job.checks.survey.known import check_known
+from tankcal.job.checks.survey.names import check_names
+from tankcal.job.checks.survey.readings import check_readings
+from tankcal.job.contract import KEYS
+from tankcal.job.tables import SURVEY_TABLES
+
+__all__ = ["check_survey"]
+
+
+def check_survey(values, tables, registers, raw, is_whole, log):
+    """All checks of the survey's files that the readable parts allow.
+
+    is_whole  False: the survey alone is asked for, so that it must be there
+    """
+    if not has_survey(tables):
+        _tell_nothing_to_adjust(values, tables, raw, is_whole, log)
+        return
+    if is_whole and has_rows(tables["points"]):
+        expected = "given beside a survey; expected one of them: a survey's points are adjusted"
+        log.problem(tables["points"].file, expected)
+    told = frozenset((problem.file, problem.row) for problem in log.problems)
+    files = SurveyFiles(values, tables, registers, raw, log, told)
+    check_cameras(files)
+    check_instruments(files)
+    check_images(files)
+    check_readings(files)
+    check_known(files)
+    check_names(files)
+    check_held(files)
+    check_datum(files)
+    check_doubtful(files)
+
+
+def _tell_nothing_to_adjust(values, tables, raw, is_whole, log):
+    is_unreadable = any(name in raw.tables and raw.tables[name] is None for name in SURVEY_TABLES)
+    if is_unreadable:
+        return
+    if not is_whole:
+        expected = "nothing to adjust; expected image points, distances or other observations"
+        log.problem(raw.settings_file, expected)
+        return
+    expected = "without effect: the job has no observations that could be adjusted"
+    for name in SURVEY_TABLES:
+        if tables[name] is not None:
+            log.warning(tables[name].file, expected)
+    for section in ("adjustment", "adjustment.camera"):
+        for field in KEYS[section]:
+            if field.of_survey and values is not None and values[section][field.name] is not None:
+                tell(log.warning, raw, section, field.name, expected)

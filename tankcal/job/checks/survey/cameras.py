@@ -1,0 +1,177 @@
+"""cameras.toml and [adjustment.camera]: format, form of the distortion, what is adjusted."""
+
+import numpy as np
+
+from tankcal.job.cameras import (
+    ASSUMED_CONVENTION,
+    affinity_of,
+    format_of,
+    is_adjusted,
+    parameters_of,
+)
+from tankcal.job.checks.common import tell
+from tankcal.job.contract.registers import PARAMETER_KEYS, SECOND_NAMES, sd_key
+
+SAME_SIZE = 0.01
+CREDIBLE_LENGTHS = (0.1, 100)  # principal distance, in diagonals of the format
+DOUBTFUL_DISTORTION, IMPOSSIBLE_DISTORTION = 0.1, 0.5  # at the corner, part of the radius
+
+
+def check_cameras(files):
+    """Each camera by itself, and with the settings of [adjustment.camera]."""
+    settings = None if files.values is None else files.values["adjustment.camera"]
+    if settings is not None:
+        _refuse_two_names(files, settings)
+        _refuse_two_blocks(files, settings)
+    for name, given in files.registers["cameras"].items():
+        is_sound = _check_format(files, name, given)
+        _check_affinity(files, name, given)
+        if settings is not None:
+            parameters = parameters_of(given, settings)
+            _check_convention(files, name, given, parameters)
+            _check_states(files, name, parameters)
+        if is_sound:
+            _check_sizes(files, name, given)
+
+
+def _refuse_two_names(files, settings):
+    for name, second in SECOND_NAMES.items():
+        if settings[name] is not None and settings[second] is not None:
+            expected = f"given beside {name}; expected one of them: they are the same parameter"
+            tell(files.log.problem, files.raw, "adjustment.camera", second, expected)
+
+
+def _refuse_two_blocks(files, settings):
+    """One unknown of the whole block cannot be declared with two values."""
+    cameras = {
+        name: parameters_of(given, settings) for name, given in files.registers["cameras"].items()
+    }
+    for same in zip(*cameras.values(), strict=True):
+        if same[0].scope != "block" or same[0].state != "weighted":
+            continue
+        for name, parameter in zip(cameras, same, strict=True):
+            if (parameter.value or 0.0, parameter.sd) != (same[0].value or 0.0, same[0].sd):
+                expected = (
+                    f"of another value or standard deviation than {next(iter(cameras))!r} has;"
+                    f" expected the same: adjustment.camera.{parameter.setting} is block weighted"
+                )
+                files.tell_key(files.log.problem, "cameras", name, parameter.key, expected)
+
+
+def _check_format(files, name, given):
+    """Returns whether the format is known."""
+
+    def problem(key, expected):
+        files.tell_key(files.log.problem, "cameras", name, key, expected)
+
+    for key, allowed in (("format_mm", (2,)), ("format_px", (2,)), ("pixel_um", (1, 2))):
+        if given[key] is not None and len(given[key]) not in allowed:
+            problem(key, f"{len(given[key])} numbers; expected two, such as [6000, 4000]")
+            return False
+    has_mm, has_px, has_pixel = (
+        files.is_given("cameras", name, key) for key in ("format_mm", "format_px", "pixel_um")
+    )
+    if not has_mm and not has_px:
+        problem("format_mm", "missing; expected [width, height], or format_px with pixel_um")
+        return False
+    if has_px and not has_mm and not has_pixel:
+        problem("pixel_um", "missing beside format_px; expected the size of a pixel, micrometres")
+        return False
+    size, pixel = format_of(given)
+    if size is None:
+        return False  # what is wrong is told
+    if given["format_px"] is not None:
+        if any(number != round(number) for number in given["format_px"]):
+            problem("format_px", "expected whole numbers of pixels")
+        of_pixels = np.array(given["format_px"]) * pixel
+        if np.any(np.abs(of_pixels / size - 1) > SAME_SIZE):
+            expected = f"format_px times pixel_um is {of_pixels[0]:g} x {of_pixels[1]:g} mm;"
+            problem("format_mm", f"{expected} expected the same, or one of the three left out")
+            return False
+    return True
+
+
+def _check_affinity(files, name, given):
+    form = given["affinity"]
+    for first, second in SECOND_NAMES.items():
+        for one, other in ((first, second), (sd_key(first), sd_key(second))):
+            if given[one] is not None and given[other] is not None:
+                expected = f"given beside {one}; expected one of them: they are the same parameter"
+                files.tell_key(files.log.problem, "cameras", name, other, expected)
+        if given[second] and affinity_of(given) != "b1_b2":
+            expected = f"given with affinity = {form}; expected {first}, or affinity = b1_b2"
+            files.tell_key(files.log.problem, "cameras", name, second, expected)
+        if given[first] and not files.is_given("cameras", name, "affinity"):
+            expected = f"missing beside {first}; expected the form: both_y, both_x or b1_b2"
+            files.tell_key(files.log.problem, "cameras", name, "affinity", expected)
+
+
+def _check_convention(files, name, given, parameters):
+    if files.is_given("cameras", name, "convention"):
+        return
+    lens = [parameter for parameter in parameters if parameter.name[0] in "KPAB"]
+    with_value = [one.key for one in lens if one.value and one.name[0] in "KP"]
+    if with_value:
+        expected = (
+            f"missing beside {', '.join(with_value)}; expected correction_added,"
+            " correction_subtracted or distortion_of_ideal: sources differ in sign"
+        )
+        files.tell_key(files.log.problem, "cameras", name, "convention", expected)
+    elif any(parameter.value or is_adjusted(parameter) for parameter in lens):
+        expected = f"missing; K, P and the affinity are taken as {ASSUMED_CONVENTION}"
+        files.tell_key(files.log.warning, "cameras", name, "convention", expected)
+
+
+def _check_states(files, name, parameters):
+    unused = []
+    for parameter in parameters:
+        section = f"adjustment.camera.{parameter.setting}"
+        asked = f"{parameter.scope} {parameter.state}"
+        if parameter.scope == "off":
+            _warn_held(files, name, parameter)
+        elif parameter.state == "weighted" and parameter.sd is None:
+            if not files.is_given("cameras", name, parameter.sd_key):
+                expected = f"missing; expected it above 0, for the parameter is {asked}"
+                files.tell_key(files.log.problem, "cameras", name, parameter.sd_key, expected)
+        elif parameter.sd == 0 and parameter.is_own and _asks_free(files, parameter):
+            expected = f"found 0, which holds it, but {section} says free; expected one of them"
+            files.tell_key(files.log.problem, "cameras", name, parameter.sd_key, expected)
+        elif parameter.sd and parameter.state != "weighted":
+            unused.append(parameter)
+    if unused:
+        keys = ", ".join(parameter.sd_key for parameter in unused)
+        example = f'{unused[0].setting} = "{unused[0].scope} weighted"'
+        expected = f"without effect, not weighted ({keys}); [adjustment.camera] {example} uses it"
+        files.tell_key(files.log.warning, "cameras", name, unused[0].sd_key, expected)
+
+
+def _asks_free(files, parameter):
+    value = files.values["adjustment.camera"][parameter.setting]
+    return value is not None and value.endswith("free")
+
+
+def _warn_held(files, name, parameter):
+    if parameter.value and parameter.is_own:
+        expected = f"adjustment.camera.{parameter.setting} is off; it is held at this value"
+        files.tell_key(files.log.warning, "cameras", name, parameter.key, expected)
+
+
+def _check_sizes(files, name, given):
+    """Principal distance and radial distortion of a credible size for the format."""
+    radius = float(np.hypot(*format_of(given)[0])) / 2
+    low, high = CREDIBLE_LENGTHS
+    c = given["c_mm"]
+    if c is not None and not low * 2 * radius <= c <= high * 2 * radius:
+        expected = f"found {c:g} with a format of {2 * radius:.4g} mm across: in another unit?"
+        files.tell_key(files.log.warning, "cameras", name, "c_mm", expected)
+    keys = [PARAMETER_KEYS[f"K{number}"][0] for number in range(1, 5)]
+    parts = [abs(given[key] or 0.0) * radius ** (2 * n) for n, key in enumerate(keys, 1)]
+    worst = int(np.argmax(parts))
+    if parts[worst] > DOUBTFUL_DISTORTION:
+        is_problem = parts[worst] > IMPOSSIBLE_DISTORTION
+        to = files.log.problem if is_problem else files.log.warning
+        expected = (
+            f"moves the corner of the image by {100 * parts[worst]:.3g} % of its radius; expected"
+            " less: of another unit than millimetres, or of normalised coordinates?"
+        )
+        files.tell_key(to, "cameras", name, keys[worst], expected)

@@ -1,0 +1,138 @@
+"""What can be told from the files alone of wrong units and swapped coordinates."""
+
+import numpy as np
+
+from tankcal.job.checks.common import has_rows
+from tankcal.job.checks.survey.gon import check_gon
+from tankcal.job.checks.survey.places import places_of
+from tankcal.job.contract.observations import ANGLES, READINGS
+
+# column of sds: (largest that all may have without a doubt, what it then looks like)
+TINY = {
+    "s_mm": (0.005, "millimetres: is it in metres?"),
+    "s_arcsec": (0.01, "seconds of arc: is it in degrees or gon?"),
+    "sx_um": (0.05, "micrometres: is it in millimetres?"),
+    "sy_um": (0.05, "micrometres: is it in millimetres?"),
+    "sx_mm": (0.005, "millimetres: is it in metres?"),
+    "sy_mm": (0.005, "millimetres: is it in metres?"),
+    "sz_mm": (0.005, "millimetres: is it in metres?"),
+}
+MUCH_LARGER = 200  # distances in parts of the survey's extent
+THOUSANDFOLD = (500, 2000)  # distances in parts of those between known points
+MIN_OF_OTHERS = 4  # points that tell where the survey is
+FAR, NEAR = 20, 5  # times the usual distance from the middle
+MISFIT, FIT = 0.10, 0.02  # of a measured distance
+MIN_MISFIT_M = 1.0
+
+
+def check_doubtful(files):
+    """Standard deviations, distances, control and angles that look wrong."""
+    for name in ("image_points", "control", "check", *READINGS):
+        if has_rows(files.tables[name]):
+            _warn_tiny_sds(files, name, files.tables[name])
+    places = places_of(files)
+    if has_rows(files.tables["distances"]):
+        _check_distances(files, places)
+    if has_rows(files.tables["control"]):
+        _warn_swapped(files, places)
+    if any(has_rows(files.tables[name]) for name in ANGLES):
+        check_gon(files, places)
+
+
+def _warn_tiny_sds(files, name, table):
+    for column, (limit, what) in TINY.items():
+        if table.columns.get(column) is None:
+            continue
+        sd = table.numbers(column)
+        given = sd[sd > 0]
+        if len(given) and given.max() < limit:
+            expected = f"at most {given.max():g}; expected {what}"
+            files.log.warning(table.file, expected, None, column)
+
+
+def _check_distances(files, places):
+    """Distances that only fit the known points, or the tank, in millimetres."""
+    table = files.tables["distances"]
+    distance = table.numbers("distance_m")
+    distance = distance[~np.isnan(distance)]
+    if not len(distance):
+        return
+    typical, extent, of = float(np.median(distance)), places.extent_m, "the known points"
+    if extent is None and files.values is not None:
+        sizes = [files.values["tank"][f"nominal_{name}_m"] for name in ("diameter", "height")]
+        extent, of = None if None in sizes else float(np.hypot(*sizes)), "the tank"
+    ratio = _ratio_to_known(places)
+    found = ""
+    if extent and typical > MUCH_LARGER * extent:
+        found = f"half of them are above {typical:.4g} m, but {of} extend over {extent:.4g} m"
+    elif THOUSANDFOLD[0] < ratio < THOUSANDFOLD[1]:
+        found = f"those between known points are {ratio:.4g} times what follows from coordinates"
+    if found:
+        expected = f"{found}; expected metres: in millimetres?"
+        files.log.problem(table.file, expected, None, "distance_m")
+
+
+def _ratio_to_known(places):
+    """Median ratio of measured distances between known points to computed ones; 0: none."""
+    ratios = []
+    for point, measured in places.measured.items():
+        for other, distance, is_horizontal in measured:
+            if point in places.of and other in places.of:
+                use = slice(0, 2) if is_horizontal else slice(0, 3)
+                computed = np.linalg.norm((places.of[point] - places.of[other])[use])
+                if computed > 0:
+                    ratios.append(distance / computed)
+    return float(np.median(ratios)) if ratios else 0.0
+
+
+def _warn_swapped(files, places):
+    """Control points that lie with the others, or fit their distances, once x and y are swapped."""
+    control = files.tables["control"]
+    for row, point, system in zip(
+        control.rows, control.of("point"), control.of("system"), strict=True
+    ):
+        if system is not None or point not in places.of:
+            continue
+        evidence = _far_unless_swapped(point, places) or _misfit_unless_swapped(point, places)
+        if evidence:
+            files.log.warning(control.file, f"{evidence}: x and y swapped?", row, "x_m")
+
+
+def _far_unless_swapped(point, places):
+    here = places.of[point][:2]
+    others = np.array([place[:2] for name, place in places.of.items() if name != point])
+    others = others[~np.isnan(others).any(axis=1)] if len(others) else others
+    if np.isnan(here).any() or len(others) < MIN_OF_OTHERS:
+        return ""
+    middle = np.median(others, axis=0)
+    usual = float(np.median(np.hypot(*(others - middle).T)))
+    far, swapped = (float(np.hypot(*(place - middle))) for place in (here, here[::-1]))
+    if far > FAR * usual and swapped < NEAR * usual:
+        return (
+            f"{point!r} is {far:.4g} m from the middle of the other known points, which lie"
+            f" {usual:.3g} m from it as a rule; with x and y swapped {swapped:.3g} m"
+        )
+    return ""
+
+
+def _misfit_unless_swapped(point, places):
+    """Distances to two points or more that do not fit, but all of them do with x and y swapped."""
+    here = places.of[point]
+    misfits, others = [], set()
+    for other, distance, is_horizontal in places.measured.get(point, ()):
+        use = slice(0, 2) if is_horizontal else slice(0, 3)
+        ends = (here[use], here[[1, 0, 2]][use], places.of.get(other, np.full(3, np.nan))[use])
+        as_given, swapped = (float(np.linalg.norm(end - ends[2])) for end in ends[:2])
+        if np.isfinite(as_given):
+            others.add(other)
+            misfits.append((abs(as_given - distance), abs(swapped - distance), distance))
+    if len(others) < 2:
+        return ""
+    bad = sum(one > max(MISFIT * distance, MIN_MISFIT_M) for one, _, distance in misfits)
+    if 2 * bad > len(misfits) and all(two < FIT * distance for _, two, distance in misfits):
+        worst = max(misfits)
+        return (
+            f"{point!r} misses the measured distances to other known points by up to"
+            f" {worst[0]:.3g} m; with x and y swapped it fits them"
+        )
+    return ""

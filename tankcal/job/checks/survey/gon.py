@@ -1,0 +1,141 @@
+"""Angles in gon given as degrees, or the other way round, where the files alone show it.
+
+Two kinds of evidence. Reciprocal sights: azimuths there and back differ by half a circle, zenith
+angles add up to half a circle. Known points: the angle between them follows from coordinates.
+"""
+
+import numpy as np
+
+from tankcal.job.checks.common import has_rows
+from tankcal.job.contract.observations import ANGLES
+
+HALF_CIRCLE = {"deg": 180.0, "gon": 200.0}
+OTHER = {"deg": "gon", "gon": "deg"}
+IN_WORDS = {"deg": "degrees", "gon": "gon"}
+OF_RECIPROCAL = 2.0  # degrees or gon; the two half circles are 20 apart
+OF_KNOWN_DEG = 1.0
+MIN_SIGHTS = 3
+SAME_HEIGHT_M = 0.1  # of instrument and target: else zenith angles there and back do not add up
+MIN_TURN_DEG = 20.0  # below it the two units differ by less than 2 degrees
+
+
+def check_gon(files, places):
+    """A problem for each column of angles that fits the other unit, and not its own."""
+    for name, angle in ANGLES.items():
+        table = files.tables[name]
+        if not has_rows(table):
+            continue
+        for unit in HALF_CIRCLE:
+            column = f"{angle}_{unit}"
+            if table.columns.get(column) is None:
+                continue
+            values = table.numbers(column)
+            level = np.where(_is_level(files, name, table), values, np.nan)
+            expected = _reciprocal(name, _sights(files, name, table, level), unit)
+            expected = expected or _known(name, _sights(files, name, table, values), unit, places)
+            if expected:
+                files.log.problem(table.file, expected, None, column)
+
+
+def _sights(files, name, table, values):
+    """Rows (at, from or set, to, value) of a table of angles, those without a problem."""
+    if "setup" in table.columns:
+        setups = files.tables["setups"]
+        if not has_rows(setups):
+            return []
+        stations = dict(zip(setups.of("setup"), setups.of("station"), strict=True))
+        at = [stations.get(setup) for setup in table.of("setup")]
+        sets = table.of("set") if name == "directions" else [None] * len(at)
+        origin = list(zip(table.of("setup"), sets, strict=True))
+    elif name == "horizontal_angles":
+        at, origin = table.of("at"), table.of("from")
+    else:
+        at, origin = table.of("from"), [None] * len(values)
+    return [
+        row
+        for row in zip(at, origin, table.of("to"), values.tolist(), strict=True)
+        if None not in (row[0], row[2]) and np.isfinite(row[3])
+    ]
+
+
+def _is_level(files, name, table):
+    """(n,) Is the target as high above its mark as the instrument is?"""
+    setups = files.tables["setups"]
+    if name != "zenith_angles" or not has_rows(setups):
+        return np.ones(len(table.rows), dtype=bool)
+    heights = dict(zip(setups.of("setup"), setups.of("instrument_height_m"), strict=True))
+    instrument = np.array([heights.get(setup) or 0.0 for setup in table.of("setup")])
+    target = np.nan_to_num(table.numbers("target_height_m"))
+    return np.abs(instrument - target) < SAME_HEIGHT_M
+
+
+def _reciprocal(name, sights, unit):
+    """Half a circle, as sights there and back give it, against that of the column's unit."""
+    if name not in ("azimuths", "zenith_angles"):
+        return ""
+    value = {(at, to): angle for at, _, to, angle in sights}
+    pairs = [(value[ends], value[ends[::-1]]) for ends in value if ends[::-1] in value]
+    if name == "azimuths":
+        halves = [abs(there - back) for there, back in pairs if there > back]
+    else:
+        halves = [there + back for there, back in pairs]
+    if not halves:
+        return ""
+    half, other = float(np.median(halves)), OTHER[unit]
+    if abs(half - HALF_CIRCLE[other]) > OF_RECIPROCAL:
+        return ""
+    return (
+        f"sights there and back make {half:.2f} as half a circle, which is {IN_WORDS[other]};"
+        f" expected {IN_WORDS[unit]}, or the column in {other}"
+    )
+
+
+def _known(name, sights, unit, places):
+    """Angles between points of known coordinates: do they fit in the other unit only?"""
+    if name in ("zenith_angles", "vertical_angles"):
+        return ""
+    turns = _turns(name, sights, places)
+    if len(turns) < MIN_SIGHTS:
+        return ""
+    observed, computed = np.array(turns).T
+    misfit = {}
+    for tried in HALF_CIRCLE:
+        turn = observed * 180.0 / HALF_CIRCLE[tried]
+        misfit[tried] = float(np.median(np.abs((turn - computed + 180.0) % 360.0 - 180.0)))
+    other = OTHER[unit]
+    if misfit[other] > OF_KNOWN_DEG or misfit[unit] < 5 * max(misfit[other], 0.2):
+        return ""
+    return (
+        f"between points of known coordinates the angles miss by {misfit[unit]:.2g} degrees (the"
+        f" middle one), but by {misfit[other]:.2g} when they are {IN_WORDS[other]}; expected"
+        f" {IN_WORDS[unit]}, or the column in {other}"
+    )
+
+
+def _turns(name, sights, places):
+    """(observed in the column's unit, computed in degrees) of angles between known points."""
+    turns, zero = [], {}
+    for at, origin, to, value in sights:
+        azimuth = _azimuth_deg(places, at, to)
+        if azimuth is None:
+            continue
+        if name == "azimuths":
+            turns.append((value, azimuth))
+        elif name == "horizontal_angles":
+            start = _azimuth_deg(places, at, origin)
+            if start is not None:
+                turns.append((value, azimuth - start))
+        else:
+            first, start = zero.setdefault(origin, (value, azimuth))
+            turns.append((value - first, azimuth - start))
+    return [turn for turn in turns if abs(turn[0]) > MIN_TURN_DEG]
+
+
+def _azimuth_deg(places, at, to):
+    one, other = places.of.get(at), places.of.get(to)
+    if one is None or other is None:
+        return None
+    dx, dy = (other - one)[:2]
+    if not np.isfinite(dx + dy) or (dx == 0 and dy == 0):
+        return None
+    return float(np.degrees(np.arctan2(dx, dy)))

@@ -1,0 +1,62 @@
+"""instruments.toml, setups.csv, and who uses them."""
+
+import numpy as np
+
+from tankcal.job.checks.common import has_rows, refuse_repeated
+from tankcal.job.checks.survey.files import refuse_undefined
+
+DOUBTFUL_CORRECTION = 0.01
+TAKEN_FROM_SETUPS = ("slope_distances", "directions", "zenith_angles")
+
+
+def check_instruments(files):
+    """Instruments complete and used; set-ups named once, and those that are named defined."""
+    for name, given in files.registers["instruments"].items():
+        _check_instrument(files, name, given)
+    setups, instruments = files.tables["setups"], files.registers["instruments"]
+    if setups is not None:
+        refuse_repeated(setups, "setup", files.log)
+        refuse_undefined(files, setups, "instrument", instruments, "instruments")
+    defined = () if setups is None else dict.fromkeys(setups.of("setup"))
+    for table in TAKEN_FROM_SETUPS:
+        if has_rows(files.tables[table]):
+            refuse_undefined(files, files.tables[table], "setup", defined, "setups")
+    distances = files.tables["distances"]
+    if has_rows(distances):
+        refuse_undefined(files, distances, "instrument", instruments, "instruments")
+        _check_temperatures(files, distances, instruments)
+
+
+def _check_instrument(files, name, given):
+    correction, expansion = given["correction"], given["expansion_per_k"]
+    if correction is not None and abs(correction) > DOUBTFUL_CORRECTION:
+        expected = f"found {correction:g}, {1e6 * correction:.0f} ppm; expected a plain ratio"
+        files.tell_key(files.log.warning, "instruments", name, "correction", expected)
+    if expansion and not files.is_given("instruments", name, "certified_temperature_c"):
+        expected = "missing beside expansion_per_k; expected the temperature of the certificate"
+        files.tell_key(files.log.problem, "instruments", name, "certified_temperature_c", expected)
+
+
+def _check_temperatures(files, distances, instruments):
+    """Every reading of a tape that expands has a temperature, and no other one."""
+    temperature = distances.numbers("temperature_c")
+    expands = np.array(
+        [
+            bool((instruments.get(name) or {}).get("expansion_per_k"))
+            for name in distances.of("instrument")
+        ]
+    )
+    for told, expected in (
+        (
+            expands & np.isnan(temperature),
+            "blank in {n} rows of a tape with expansion_per_k; they are not corrected",
+        ),
+        (
+            ~expands & ~np.isnan(temperature) & files.sound(distances),
+            "without effect in {n} rows: the instrument has no expansion_per_k",
+        ),
+    ):
+        if told.any():
+            row = distances.rows[int(np.argmax(told))]
+            count = int(told.sum())
+            files.log.warning(distances.file, expected.format(n=count), row, "temperature_c")

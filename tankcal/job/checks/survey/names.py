@@ -1,0 +1,78 @@
+"""One point in two spellings: P1, p1, P 1, P-1, P01."""
+
+import re
+
+from tankcal.job.checks.common import has_rows
+from tankcal.job.contract.observations import READINGS
+
+KNOWN = (("control", "point"), ("check", "point"), ("targets", "point"), ("setups", "station"))
+
+
+def _columns():
+    """(table, column) of every name of a point that is observed."""
+    yield "image_points", "point"
+    for name in READINGS:
+        for column in ("at", "from", "to"):
+            yield name, column
+
+
+def observed_names(files):
+    """{name: number of rows} of the points that observations name, stations among them."""
+    counts = {}
+    for name, column in (*_columns(), ("setups", "station")):
+        table = files.tables[name]
+        if has_rows(table) and column in table.columns:
+            for point in table.of(column):
+                counts[point] = counts.get(point, 0) + 1
+    return counts
+
+
+def all_points(files):
+    """Names of all points of the survey, in the order of its files."""
+    counts = observed_names(files)
+    for name, column in KNOWN:
+        if has_rows(files.tables[name]):
+            counts |= dict.fromkeys(files.tables[name].of(column), 1)
+    return [name for name in counts if name is not None]
+
+
+def plain(name):
+    """What two spellings of one name have in common: P1 for p1, P 1, P-1, P_01."""
+    text = re.sub(r"[\s_.\-/#()]+", "-", name.casefold())
+    text = re.sub(r"(?<=[^\W\d])-(?=\d)|(?<=\d)-(?=[^\W\d])", "", text)
+    return re.sub(r"(?<!\d)0+(?=\d)", "", text).strip("-")
+
+
+def check_names(files):
+    """Spellings that look like one point: a problem where one of them stands there once only.
+
+    A point in one row alone cannot be determined; in more rows it may well be another point.
+    """
+    places = {}
+    for name, column in (*KNOWN, *_columns()):
+        table = files.tables[name]
+        if has_rows(table) and column in table.columns:
+            for row, point in zip(table.rows, table.of(column), strict=True):
+                if point is not None:
+                    first = places.setdefault(point, [table.file, row, column, 0])
+                    first[3] += 1
+    alike = {}
+    for point in places:
+        alike.setdefault(plain(point), []).append(point)
+    for spellings in alike.values():
+        if len(spellings) > 1:
+            _tell(files, sorted(spellings, key=lambda point: -places[point][3]), places)
+
+
+def _tell(files, spellings, places):
+    most, *others = spellings
+    for point in others:
+        file, row, column, count = places[point]
+        rows = "1 row" if count == 1 else f"{count} rows"
+        other = "1 row" if places[most][3] == 1 else f"{places[most][3]} rows"
+        found = f"{point!r} stands in {rows}, {most!r} in {other}"
+        if count == 1:
+            expected = f"{found}; expected one spelling of one point, or another name"
+            files.log.problem(file, expected, row, column)
+        else:
+            files.log.warning(file, f"{found}: one point in two spellings?", row, column)

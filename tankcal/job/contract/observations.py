@@ -1,0 +1,267 @@
+"""The columns of the tables of a survey: photographs, angles, distances, levels, control."""
+
+from tankcal.job.fields import Field
+
+ANGLE_UNITS = ("deg", "gon", "dms")
+FULL_CIRCLE = {"deg": 360, "gon": 400, "dms": 360}
+USE = Field(
+    "use",
+    "choice",
+    "check: compared with the adjustment, not adjusted; blank: adjust",
+    choices=("adjust", "check"),
+)
+
+
+def _name(name, note, required=True):
+    return Field(name, "name", note, required=required)
+
+
+def _number(name, note, low, high, required=False, above_low=False):
+    return Field(name, "number", note, required=required, low=low, high=high, above_low=above_low)
+
+
+def _coordinates(required=False):
+    return tuple(
+        _number(
+            f"{axis}_m",
+            f"coordinate {axis}, metres{'' if required else '; blank: not known'}",
+            -1e8,
+            1e8,
+            required,
+        )
+        for axis in "xyz"
+    )
+
+
+def _angle(name, note, circles=(0, 1)):
+    """One angle in three units; circles: its bounds, in parts of the full circle."""
+    words = {
+        "deg": "degrees",
+        "gon": "gon",
+        "dms": "degrees, minutes and seconds: 123 04 05.6",
+    }
+    return tuple(
+        Field(
+            f"{name}_{unit}",
+            "dms" if unit == "dms" else "number",
+            f"{note}, {words[unit]}",
+            low=circles[0] * FULL_CIRCLE[unit],
+            high=circles[1] * FULL_CIRCLE[unit],
+        )
+        for unit in ANGLE_UNITS
+    )
+
+
+def _sd_mm(of):
+    note = f"standard deviation of {of}, millimetres; 0: held exactly"
+    return _number("s_mm", note, 0, 1e6, required=True)
+
+
+_S_ARCSEC = _number(
+    "s_arcsec", "standard deviation, seconds of arc; 0: held exactly", 0, 1e6, required=True
+)
+_SETUP = _name("setup", "the set-up, as in setups.csv")
+_TARGET_HEIGHT = _number(
+    "target_height_m", "target above the mark of the point, metres; blank: 0", -50, 50
+)
+_INSTRUMENT = _name("instrument", "the instrument, as in instruments.toml", required=False)
+
+
+def _known_points():
+    return tuple(
+        _number(
+            f"s{axis}_mm",
+            f"standard deviation of {axis}, millimetres; blank: an approximation only; 0: held",
+            0,
+            1e7,
+        )
+        for axis in "xyz"
+    )
+
+
+TARGETS = (
+    _name("point", "name of the target, once in the file"),
+    _name("section", "name of the ring of targets that it belongs to", required=False),
+    _name("generatrix", "name of the vertical line of targets", required=False),
+    _number("z_m", "its nominal height in the frame of the survey, metres", -1e8, 1e8),
+    _number(
+        "offset_mm", "from the wall to the centre of the target, millimetres; blank: 0", -500, 500
+    ),
+)
+PHOTOS = (
+    _name("photo", "name of the photo, once in the file"),
+    _name("camera", "the camera, as in cameras.toml"),
+    *(
+        _number(
+            f"{axis}_m", f"{axis} of the projection centre, metres; blank: not known", -1e8, 1e8
+        )
+        for axis in "xyz"
+    ),
+    *(
+        field
+        for angle in ("omega", "phi", "kappa")
+        for field in _angle(angle, f"rotation {angle}; blank: not known", (-1, 1))
+    ),
+    *(
+        _number(
+            f"s{axis}_m",
+            f"standard deviation of {axis}, metres; blank: an approximation only; 0: held",
+            0,
+            1e6,
+        )
+        for axis in "xyz"
+    ),
+    *(
+        _number(
+            f"s_{angle}_{unit}",
+            f"standard deviation of {angle}, {words}; blank: an approximation only; 0: held",
+            0,
+            FULL_CIRCLE[unit],
+        )
+        for angle in ("omega", "phi", "kappa")
+        for unit, words in (("deg", "degrees"), ("gon", "gon"))
+    ),
+)
+IMAGE_POINTS = (
+    _name("photo", "the photo, as in photos.csv"),
+    _name("point", "the point; a repeated row is a repeated reading"),
+    _number("x_mm", "image coordinate to the right of the middle, millimetres", -1e4, 1e4),
+    _number("y_mm", "image coordinate above the middle, millimetres", -1e4, 1e4),
+    _number("column_px", "or: column, pixels; the centre of the first one is 0", -1e6, 1e6),
+    _number(
+        "line_px", "line, pixels, counted downwards; the centre of the first one is 0", -1e6, 1e6
+    ),
+    _number("sx_um", "standard deviation of x_mm, micrometres", 0, 1e5, above_low=True),
+    _number("sy_um", "standard deviation of y_mm, micrometres", 0, 1e5, above_low=True),
+    _number("s_px", "standard deviation of column and line, pixels", 0, 1e4, above_low=True),
+    USE,
+)
+CONTROL = (
+    _name("point", "name of the point, once in each system"),
+    *_coordinates(),
+    *_known_points(),
+    _name("system", "another coordinate system, by name; blank: that of the survey", False),
+    USE,
+)
+CHECK = CONTROL[:-1]
+SETUPS = (
+    _name("setup", "name of the set-up, once in the file"),
+    _name("station", "the point that the instrument stands over"),
+    _INSTRUMENT,
+    _number("instrument_height_m", "above the station's mark, metres; blank: 0", -50, 50),
+)
+DISTANCES = (
+    _name("from", "one end"),
+    _name("to", "the other end"),
+    _number("distance_m", "as read, metres", 0, 1e6, True, True),
+    _sd_mm("the distance"),
+    Field(
+        "kind",
+        "choice",
+        "spatial (from point to point) or horizontal; blank: spatial",
+        choices=("spatial", "horizontal"),
+    ),
+    _INSTRUMENT,
+    _number("temperature_c", "of the tape, degrees Celsius; blank: no correction", -60, 90),
+    USE,
+)
+SLOPE_DISTANCES = (
+    _SETUP,
+    _name("to", "the point"),
+    _number("distance_m", "as read, metres", 0, 1e6, True, True),
+    _sd_mm("the distance"),
+    _TARGET_HEIGHT,
+    USE,
+)
+DIRECTIONS = (
+    _SETUP,
+    _name("set", "set of directions within the set-up, with a zero of its own", False),
+    _name("to", "the point"),
+    *_angle("direction", "as read, clockwise", (-1, 1)),
+    _S_ARCSEC,
+    _TARGET_HEIGHT,
+    USE,
+)
+ZENITH_ANGLES = (
+    _SETUP,
+    _name("to", "the point"),
+    *_angle("zenith", "from the zenith down", (0, 0.5)),
+    _S_ARCSEC,
+    _TARGET_HEIGHT,
+    USE,
+)
+AZIMUTHS = (
+    _name("from", "where it was observed"),
+    _name("to", "the point"),
+    *_angle("azimuth", "clockwise from +y", (-1, 1)),
+    _S_ARCSEC,
+    USE,
+)
+HORIZONTAL_ANGLES = (
+    _name("at", "where it was observed"),
+    _name("from", "the point that it counts from"),
+    _name("to", "the point that it counts to, clockwise"),
+    *_angle("angle", "from one to the other, clockwise", (-1, 1)),
+    _S_ARCSEC,
+    USE,
+)
+VERTICAL_ANGLES = (
+    _name("from", "where it was observed"),
+    _name("to", "the point"),
+    *_angle("angle", "above the horizon", (-0.25, 0.25)),
+    _S_ARCSEC,
+    USE,
+)
+HEIGHT_DIFFERENCES = (
+    _name("from", "one end"),
+    _name("to", "the other end"),
+    _number("dz_m", "height of the second above the first, metres", -1e5, 1e5, True),
+    _sd_mm("the difference"),
+    USE,
+)
+PLUMB_LINES = (
+    _name("from", "one point of a vertical line"),
+    _name("to", "another point of it"),
+    _sd_mm("their offset in x and in y"),
+    USE,
+)
+
+COLUMNS = {
+    "targets": TARGETS,
+    "photos": PHOTOS,
+    "image_points": IMAGE_POINTS,
+    "control": CONTROL,
+    "check": CHECK,
+    "setups": SETUPS,
+    "distances": DISTANCES,
+    "slope_distances": SLOPE_DISTANCES,
+    "directions": DIRECTIONS,
+    "zenith_angles": ZENITH_ANGLES,
+    "azimuths": AZIMUTHS,
+    "horizontal_angles": HORIZONTAL_ANGLES,
+    "vertical_angles": VERTICAL_ANGLES,
+    "height_differences": HEIGHT_DIFFERENCES,
+    "plumb_lines": PLUMB_LINES,
+}
+ANGLES = {
+    "directions": "direction",
+    "zenith_angles": "zenith",
+    "azimuths": "azimuth",
+    "horizontal_angles": "angle",
+    "vertical_angles": "angle",
+}
+READINGS = (
+    *("distances", "slope_distances", "directions", "zenith_angles", "azimuths"),
+    *("horizontal_angles", "vertical_angles", "height_differences", "plumb_lines"),
+)
+# tables of each usual kind of survey; those of the other kind may be added
+SURVEYS = {
+    "photos": (
+        *("photos", "image_points", "targets", "control", "check", "distances"),
+        *("height_differences", "plumb_lines"),
+    ),
+    "total-station": (
+        *("setups", "directions", "zenith_angles", "slope_distances", "targets", "control"),
+        *("check", "distances", "height_differences"),
+    ),
+}

@@ -1,0 +1,177 @@
+"""The keys of cameras.toml, instruments.toml and [adjustment.camera]."""
+
+from tankcal.camera import AFFINITIES, CONVENTIONS
+from tankcal.job.fields import Field
+from tankcal.network.survey import STATES
+
+FREE = "free"
+INSTRUMENT_KINDS = ("tape", "edm", "total_station", "theodolite", "level")
+# name in cameras.toml and largest magnitude of each parameter, by its name in tankcal.camera
+PARAMETER_KEYS = {
+    "c": ("c_mm", 1e5),
+    "x0": ("x0_mm", 1e4),
+    "y0": ("y0_mm", 1e4),
+    "K1": ("K1_mm-2", 1.0),
+    "K2": ("K2_mm-4", 1.0),
+    "K3": ("K3_mm-6", 1.0),
+    "K4": ("K4_mm-8", 1.0),
+    "P1": ("P1_mm-1", 1.0),
+    "P2": ("P2_mm-1", 1.0),
+    "P3": ("P3_mm-2", 1.0),
+    "P4": ("P4_mm-4", 1.0),
+    "A": ("A", 0.1),
+    "B": ("B", 0.1),
+}
+SECOND_NAMES = {"A": "b1", "B": "b2"}  # of the form b1_b2
+_NOTES = {
+    "c": "principal distance, millimetres",
+    "x0": "principal point, to the right of the middle of the format, millimetres",
+    "y0": "principal point, above the middle of the format, millimetres",
+    "A": "affinity, in the form of the key affinity",
+    "B": "affinity, in the form of the key affinity",
+    "b1": "in place of A, of the form b1_b2",
+    "b2": "in place of B, of the form b1_b2",
+}
+
+
+def _note(name):
+    kind = "radial" if name.startswith("K") else "decentring"
+    return _NOTES.get(name, f"{kind} distortion {name}")
+
+
+def _value(name, key=None):
+    own_key, largest = PARAMETER_KEYS[name]
+    low = 0 if name == "c" else -largest
+    return Field(
+        key or own_key,
+        "number",
+        _note(key or name),
+        required=name == "c",
+        low=low,
+        high=largest,
+        above_low=name == "c",
+    )
+
+
+def sd_key(name):
+    """Key of the standard deviation of a parameter, in the unit of its value."""
+    return f"s_{name}_mm" if name in ("c", "x0", "y0") else f"s_{name}"
+
+
+def _sd(name, of=None):
+    note = f"standard deviation of {name}, in the unit of its value; 0: held"
+    return Field(sd_key(name), "number", note, low=0, high=PARAMETER_KEYS[of or name][1])
+
+
+CAMERA = (
+    Field(
+        "format_mm",
+        "numbers",
+        "width and height of the image, millimetres: [180, 130]",
+        low=0,
+        above_low=True,
+        high=1000,
+    ),
+    Field(
+        "format_px",
+        "numbers",
+        "or columns and lines of the image, with pixel_um: [6000, 4000]",
+        low=0,
+        above_low=True,
+        high=1e6,
+    ),
+    Field(
+        "pixel_um",
+        "numbers",
+        "size of a pixel, micrometres: 3.9, or across and down [3.9, 3.9]",
+        low=0,
+        above_low=True,
+        high=1000,
+    ),
+    *(_value(name) for name in PARAMETER_KEYS),
+    *(_value(name, key) for name, key in SECOND_NAMES.items()),
+    *(_sd(name) for name in PARAMETER_KEYS),
+    *(_sd(key, name) for name, key in SECOND_NAMES.items()),
+    Field(
+        "affinity",
+        "choice",
+        "form of the affinity: both_y, both_x or b1_b2; blank: b1_b2",
+        choices=tuple(AFFINITIES),
+    ),
+    Field(
+        "radial_balance_mm",
+        "number",
+        "radius without radial distortion, of the balanced form, millimetres; blank: 0",
+        low=0,
+        high=1000,
+    ),
+    Field(
+        "convention",
+        "choice",
+        "what K and P do: correction_added, correction_subtracted or distortion_of_ideal; needed"
+        " with any of them",
+        choices=tuple(CONVENTIONS),
+    ),
+)
+INSTRUMENT = (
+    Field("kind", "text", f"{', '.join(INSTRUMENT_KINDS)}, or another one", required=True),
+    Field("certificate", "text", "number of its certificate; printed when given"),
+    Field(
+        "certified_temperature_c",
+        "number",
+        "temperature that the certificate is for, degrees Celsius",
+        low=-60,
+        high=90,
+    ),
+    Field("tension_n", "number", "pull of a tape, newtons; printed", low=0, high=1000),
+    Field("expansion_per_k", "number", "thermal expansion of a tape, 1/K", low=0, high=1e-4),
+    Field(
+        "correction",
+        "number",
+        "of the scale: true = reading (1 + correction); blank: 0",
+        low=-0.1,
+        high=0.1,
+    ),
+    Field(
+        "correction_mm",
+        "number",
+        "added to each reading, millimetres; blank: 0",
+        low=-1e4,
+        high=1e4,
+    ),
+    Field(
+        "u_scale_ppm",
+        "number",
+        "standard uncertainty of the scale, ppm; free: an unknown; blank: 0",
+        low=0,
+        high=1e5,
+        choices=(FREE,),
+    ),
+    Field(
+        "u_offset_mm",
+        "number",
+        "standard uncertainty of the offset, millimetres; free: an unknown; blank: 0",
+        low=0,
+        high=1e4,
+        choices=(FREE,),
+    ),
+)
+SCOPES_AND_STATES = (
+    "off",
+    *(f"{scope} {state}" for scope in ("camera", "block", "photo") for state in STATES),
+)
+
+
+def _override(name, note):
+    return Field(name, "choice", note, choices=SCOPES_AND_STATES, of_survey=True)
+
+
+CAMERA_SETTINGS = (
+    _override("default", "of c x0 y0 K1 K2 K3 P1 P2 and the affinity; blank: camera free"),
+    *(_override(name, _note(name)) for name in PARAMETER_KEYS),
+    *(_override(key, _note(key)) for key in SECOND_NAMES.values()),
+)
+
+REGISTER_KEYS = {"cameras": CAMERA, "instruments": INSTRUMENT}
+REGISTERS_OF_SURVEY = {"photos": ("cameras", "instruments"), "total-station": ("instruments",)}
+OF_PHOTOS = ("fixed_photo", "image_sd_um")  # keys of [adjustment] that need photographs

@@ -1,0 +1,223 @@
+"""From the checked tables of a survey to `Measurements`: SI units, one array for each column."""
+
+import numpy as np
+
+from tankcal.job.cameras import image_coordinates, image_frames, make_camera
+from tankcal.job.contract.observations import ANGLES, READINGS
+from tankcal.job.contract.registers import FREE, INSTRUMENT_KINDS
+from tankcal.job.datum import AXES, datum_point
+from tankcal.job.measurements import (
+    AdjustmentSettings,
+    ImageReadings,
+    Instrument,
+    KnownPoints,
+    Measurements,
+    NominalTank,
+    Photo,
+    Readings,
+    Setup,
+    Targets,
+)
+
+ARCSEC = np.pi / 180 / 3600
+RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "dms": np.pi / 180}
+PRINTED = ("certificate", "tension_n")
+
+
+def make_measurements(values, tables, registers):
+    """Measurements of settings, tables and registers without problems.
+
+    values     {section: {key: value}}
+    tables     {name: ColumnValues or None}
+    registers  {"cameras" or "instruments": {name: {key: value}}}
+    """
+    cameras = tuple(
+        make_camera(name, given, values["adjustment.camera"])
+        for name, given in registers["cameras"].items()
+    )
+    images = _image_points(tables["image_points"], tables["photos"], registers["cameras"])
+    return Measurements(
+        settings=_settings(values["adjustment"]),
+        cameras=cameras,
+        photos=_photos(tables["photos"], images),
+        image_points=images,
+        control=_known_points(tables["control"]),
+        check=_known_points(tables["check"], check=True),
+        targets=_targets(tables["targets"]),
+        instruments=tuple(
+            _instrument(name, given) for name, given in registers["instruments"].items()
+        ),
+        setups=_setups(tables["setups"]),
+        readings=tuple(
+            _readings(name, tables[name]) for name in READINGS if _has_rows(tables[name])
+        ),
+        nominal=_nominal(values),
+    )
+
+
+def _has_rows(table):
+    return table is not None and len(table.rows) > 0
+
+
+def _settings(given):
+    sd = given["image_sd_um"]
+    return AdjustmentSettings(
+        datum=given["datum"] or "control",
+        datum_points=tuple(datum_point(text) for text in given["datum_points"] or ()),
+        fixed_photo=given["fixed_photo"],
+        image_sd_mm=None if sd is None else sd / 1000,
+        snooping=given["snooping"] is not False,
+        scale=given["scale"] or "a_priori",
+        refraction=given["refraction"],
+    )
+
+
+def _nominal(values):
+    tank, sizes = values["tank"], ("nominal_diameter_m", "nominal_height_m")
+    if tank["kind"] != "vertical" or None in (tank[name] for name in sizes):
+        return None
+    diameter, height = (tank[name] for name in sizes)
+    return NominalTank(diameter / 2, height, values["datum"]["bottom_z_m"])
+
+
+def _check(table):
+    return np.array([use == "check" for use in table.of("use")], dtype=bool)
+
+
+def angle_in_rad(table, name):
+    """(n,) rad of an angle that is given in one of its units in each row; nan: in none."""
+    found = np.full(len(table.rows), np.nan)
+    for unit, factor in RADIANS.items():
+        column = f"{name}_{unit}"
+        if table.columns.get(column) is not None:
+            given = table.numbers(column) * factor
+            found = np.where(np.isnan(given), found, given)
+    return found
+
+
+def _photos(table, images):
+    """The photos that have image points; one without any is told by the checks."""
+    if not _has_rows(table):
+        return ()
+    seen = set() if images is None else set(images.photo)
+    angles = ("omega", "phi", "kappa")
+    values = np.column_stack(
+        [table.numbers(f"{axis}_m") for axis in AXES] + [angle_in_rad(table, a) for a in angles]
+    )
+    sd = np.column_stack(
+        [table.numbers(f"s{axis}_m") for axis in AXES]
+        + [angle_in_rad(table, f"s_{a}") for a in angles]
+    )
+    named = zip(table.of("photo"), table.of("camera"), values, sd, table.rows, strict=True)
+    return tuple(Photo(*row) for row in named if row[0] in seen)
+
+
+def _image_points(table, photos, cameras):
+    if not _has_rows(table):
+        return None
+    size, pixel = image_frames(table, photos, cameras)
+    sd = np.column_stack([table.numbers("sx_um"), table.numbers("sy_um")]) / 1000
+    return ImageReadings(
+        photo=tuple(table.of("photo")),
+        point=tuple(table.of("point")),
+        xy_mm=image_coordinates(table, size, pixel),
+        sd_mm=np.where(np.isnan(sd), table.numbers("s_px")[:, None] * pixel, sd),
+        check=_check(table),
+        rows=table.rows,
+        file=table.file,
+    )
+
+
+def _known_points(table, check=False):
+    if not _has_rows(table):
+        return None
+    return KnownPoints(
+        point=tuple(table.of("point")),
+        xyz_m=np.column_stack([table.numbers(f"{axis}_m") for axis in AXES]),
+        sd_m=np.column_stack([table.numbers(f"s{axis}_mm") for axis in AXES]) / 1000,
+        system=tuple(table.of("system")),
+        check=np.ones(len(table.rows), dtype=bool) if check else _check(table),
+        rows=table.rows,
+        file=table.file,
+    )
+
+
+def _targets(table):
+    if not _has_rows(table):
+        return None
+    return Targets(
+        point=tuple(table.of("point")),
+        section=tuple(table.of("section")),
+        generatrix=tuple(table.of("generatrix")),
+        z_m=table.numbers("z_m"),
+        offset_m=np.nan_to_num(table.numbers("offset_mm")) / 1000,
+        rows=table.rows,
+    )
+
+
+def _instrument(name, given):
+    kind = given["kind"].lower().replace(" ", "_").replace("-", "_")
+    scale, offset = given["u_scale_ppm"], given["u_offset_mm"]
+    details = {key: given[key] for key in PRINTED if given[key] is not None}
+    return Instrument(
+        name=name,
+        kind=kind if kind in INSTRUMENT_KINDS else "other",
+        correction=given["correction"] or 0.0,
+        correction_m=(given["correction_mm"] or 0.0) / 1000,
+        certified_temperature_c=given["certified_temperature_c"],
+        expansion_per_k=given["expansion_per_k"] or 0.0,
+        u_scale=np.nan if scale == FREE else (scale or 0.0) / 1e6,
+        u_offset_m=np.nan if offset == FREE else (offset or 0.0) / 1000,
+        details=details if kind in INSTRUMENT_KINDS else {"kind": given["kind"]} | details,
+    )
+
+
+def _setups(table):
+    if not _has_rows(table):
+        return ()
+    names = ("setup", "station", "instrument", "instrument_height_m")
+    return tuple(
+        Setup(name, station, instrument, height or 0.0, row)
+        for name, station, instrument, height, row in zip(
+            *(table.of(column) for column in names), table.rows, strict=True
+        )
+    )
+
+
+def _readings(name, table):
+    """Readings of one table; what a table does not have stays as Readings has it."""
+    value, sd = _values(name, table)
+    optional = {}
+    start = "from"
+    if "setup" in table.columns:
+        optional["setup"] = tuple(table.of("setup"))
+    if name == "horizontal_angles":
+        start, optional["origin"] = "at", tuple(table.of("from"))
+    if name == "directions":
+        optional["set"] = tuple(table.of("set"))
+    if name == "distances":
+        optional["instrument"] = tuple(table.of("instrument"))
+        optional["horizontal"] = np.array([kind == "horizontal" for kind in table.of("kind")])
+        optional["temperature_c"] = table.numbers("temperature_c")
+    if "target_height_m" in table.columns:
+        optional["target_height_m"] = np.nan_to_num(table.numbers("target_height_m"))
+    return Readings(
+        table=name,
+        value=value,
+        sd=sd,
+        start=tuple(table.of(start) if start in table.columns else [None] * len(value)),
+        end=tuple(table.of("to")),
+        check=_check(table),
+        rows=table.rows,
+        sheet=table.file if table.file.startswith("sheet ") else "",
+        **optional,
+    )
+
+
+def _values(name, table):
+    if name in ANGLES:
+        return angle_in_rad(table, ANGLES[name]), table.numbers("s_arcsec") * ARCSEC
+    sd = table.numbers("s_mm") / 1000
+    if name == "plumb_lines":
+        return np.zeros(len(sd)), sd
+    return table.numbers("dz_m" if name == "height_differences" else "distance_m"), sd
