@@ -5,6 +5,9 @@
 >>> result = tankcal.run(job)
 >>> result.capacity                                   # the capacity table, one row a height
 
+>>> job = tankcal.load("survey", only="adjustment")   # measurements without a tank
+>>> tankcal.adjust_job(job).xyz_m                     # adjusted points, with their covariance
+
 Names are resolved when they are first used, so importing tankcal loads nothing heavy.
 """
 
@@ -16,6 +19,7 @@ _ROOM_OF = {
     "load": "job",
     "Job": "job",
     "run": "chain",
+    "adjust_job": "chain",
     "Result": "chain",
     "write": "outputs",
     "TankcalError": "errors",

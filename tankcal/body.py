@@ -9,8 +9,64 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.uncertainty import Source
+from tankcal.uncertainty import Source, factor_of
 from tankcal.volumes import ShellVolume
+
+OWN_SCALE = "instrument_scale"  # kind of a cause that stands for the input "scale"
+LEAST_SHARE = 1e-6  # rounding of the share that a named cause has in the covariance
+
+
+@dataclass(frozen=True)
+class Factor:
+    """One cause of what a survey leaves uncertain, over what the survey gave.
+
+    kind        "points", "form", "own_form", or what a named cause is ("instrument_scale")
+    columns     (f, c) factor of the covariance of a shell's features or of a solid's inputs
+    dof, u, unit, type, note  as in `uncertainty.Source`
+    """
+
+    kind: str
+    columns: np.ndarray
+    dof: float = np.inf
+    u: float | None = None
+    unit: str | None = None
+    type: str = "A"
+    note: str = ""
+
+    def source(self, columns_m3):
+        """The `Source` of (rows, c) columns that its own columns make in a table."""
+        return Source(
+            self.kind, columns_m3, self.dof, self.u, self.unit, type=self.type, note=self.note
+        )
+
+
+def survey_factors(covariance, dof=np.inf, causes=(), effects=()):
+    """`Factor`s of what a survey leaves uncertain: the points, then every named cause.
+
+    covariance  (f, f) of all causes together: the rest L L' + sum of e e' over the effects
+    dof         degrees of freedom of the covariance
+    causes      with name, what, u, unit (`surveys.Cause`); effects: (f,) of one u of each
+
+    With F F' the covariance and e = F a the rest is F (I - A A') F', which is never negative.
+    Raises ValueError for effects that are larger than the covariance.
+    """
+    whole = factor_of(covariance)
+    if len(causes) == 0:
+        return (Factor("points", whole, dof),)
+    shares = whole.T @ np.column_stack(effects) / np.sum(whole**2, axis=0)[:, None]
+    turn, size, _ = np.linalg.svd(shares)
+    if size.max(initial=0.0) > 1 + LEAST_SHARE:
+        raise ValueError("a named cause is larger than the covariance that contains it")
+    left = np.ones(len(turn))
+    left[: len(size)] = np.sqrt(np.maximum(1 - size**2, 0.0))
+    rest = whole @ (turn * left)
+    return (
+        Factor("points", rest[:, left > 0], dof),
+        *(
+            Factor(cause.what, effect[:, None], np.inf, cause.u, cause.unit, "B", cause.name)
+            for cause, effect in zip(causes, effects, strict=True)
+        ),
+    )
 
 
 @dataclass(frozen=True)
@@ -18,9 +74,9 @@ class ShellPart:
     """The shell of courses as a part; it has nothing below the bottom of its first course.
 
     volume           inside, at the table's temperature
-    factors          what the survey leaves uncertain: (kind, (f, c) factor of the covariance of the
-                     shell's features, degrees of freedom) of the points and of the form between
-                     them, common to all courses ("form") or of each course ("own_form")
+    factors          what the survey leaves uncertain about the shell's features: of the points, of
+                     causes that they share, and of the form between them, common to all courses
+                     ("form") or of each course ("own_form")
     scale            of horizontal lengths, by temperature; expansion_per_k its coefficient
     stretch          of heights, by temperature; 1 where heights are not corrected
     bearing          which of the inputs "plate_thickness", "paint", "shell_temperature" and
@@ -28,7 +84,7 @@ class ShellPart:
     """
 
     volume: ShellVolume
-    factors: tuple[tuple[str, np.ndarray, float], ...]
+    factors: tuple[Factor, ...]
     scale: float
     expansion_per_k: float
     stretch: float = 1.0
@@ -73,14 +129,10 @@ class ShellPart:
         if not self.factors:
             return ()
         wet = np.maximum(levels_m, 0.0)
-        factors = [factor for _, factor, _ in self.factors]
-        columns = self.volume.integrated(wet, np.hstack(factors))
-        ends = np.cumsum([factor.shape[1] for factor in factors])[:-1]
+        columns = self.volume.integrated(wet, np.hstack([one.columns for one in self.factors]))
+        ends = np.cumsum([one.columns.shape[1] for one in self.factors])[:-1]
         parts = np.split(columns, ends, axis=1)
-        return tuple(
-            Source(kind, part, dof)
-            for (kind, _, dof), part in zip(self.factors, parts, strict=True)
-        )
+        return tuple(one.source(part) for one, part in zip(self.factors, parts, strict=True))
 
 
 @dataclass(frozen=True)
@@ -91,7 +143,7 @@ class SolidPart:
     scale            of its lengths by temperature; expansion_per_k its coefficient; warmed whether
                      a temperature was given
     surveyed         names of the inputs of the solid that a survey of its wall gave; () without one
-    survey_factor    (len(surveyed), c) factor of their covariance; survey_dof of its noise
+    factors          what that survey leaves uncertain about them
     unused           names of the solid's inputs that have no meaning in this job
     """
 
@@ -100,8 +152,7 @@ class SolidPart:
     expansion_per_k: float = 0.0
     warmed: bool = False
     surveyed: tuple[str, ...] = ()
-    survey_factor: np.ndarray | None = None
-    survey_dof: float = np.inf
+    factors: tuple[Factor, ...] = ()
     unused: tuple[str, ...] = ()
 
     def volume_m3(self, levels_m):
@@ -129,7 +180,7 @@ class SolidPart:
             return own
         found = self.solid.derivatives(levels_m)
         by_survey = np.column_stack([found[name] for name in self.surveyed])
-        return (Source("points", by_survey @ self.survey_factor, self.survey_dof), *own)
+        return (*(one.source(by_survey @ one.columns) for one in self.factors), *own)
 
 
 @dataclass(frozen=True)
@@ -163,14 +214,20 @@ class Body:
         return sum(part.area_m2(levels_m) for part in self.parts)
 
     def undeclared(self):
-        """Names of the inputs that move the volume of the full tank and have no declared u."""
+        """Names of the inputs that move the volume of the full tank and have no declared u.
+
+        The scale of an instrument that was adjusted along stands for the scale of the survey.
+        """
         top = np.array([self.highest_m])
         moved = {}
         for part in self.parts:
             for name, derivative in part.derivatives(top).items():
                 moved[name] = moved.get(name, 0.0) + np.abs(derivative).max()
-        declared = {one.name for one in self.declared}
-        return tuple(name for name, size in moved.items() if size > 0 and name not in declared)
+        known = {one.name for one in self.declared}
+        factors = [one for part in self.parts for one in getattr(part, "factors", ())]
+        if any(one.kind == OWN_SCALE for one in factors):
+            known.add("scale")
+        return tuple(name for name, size in moved.items() if size > 0 and name not in known)
 
     def sources(self, levels_m):
         """One `Source` for each cause of uncertainty: the parts' own, then what was declared."""

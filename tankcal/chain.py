@@ -19,14 +19,15 @@ from tankcal.dips import (
     proportional_parts,
     table_heights,
 )
-from tankcal.doubts import incomplete
-from tankcal.errors import HeightError, Problem
+from tankcal.doubts import incomplete, of_adjustment, refuse_undetermined
+from tankcal.errors import HeightError, InputError, Problem
 from tankcal.job import Job
 from tankcal.meshes import parse_mesh
 from tankcal.scan import Scan, scanned
 from tankcal.service import shell_factor, shell_temperature_c
+from tankcal.surveys import Adjustment, adjust_survey, wall_points
 from tankcal.tanks import body_of, critical_zone, shell_volume, zero_height
-from tankcal.wall import Wall, find_wall, warnings_of
+from tankcal.wall import Wall, among_themselves, find_wall, warnings_of
 
 MILLIMETRE, PARTS = 0.001, 10  # of a step of the tables that proportional parts are for
 NOMINAL_MISS = 0.05  # of the nominal volume, from which on one of the two is in doubt
@@ -36,6 +37,7 @@ NOMINAL_MISS = 0.05  # of the nominal volume, from which on one of the two is in
 class Result:
     """Everything that a job gave; `capacity` is the table as a DataFrame.
 
+    job          as it was computed: the points are in it, too, where they came from an adjustment
     wall         the surveyed wall of a vertical tank (`wall.Wall`); None for other kinds
     scan         what points say of a lying cylinder or a sphere (`scan.Scan`), else None
     body         the tank as the sum of its parts, with all corrections that are on (`body.Body`)
@@ -44,6 +46,7 @@ class Result:
     proportional_parts  what millimetres add to a row, zone by zone; () for no centimetre table
     corrections  each with its size at the top row
     by_density   {density kg/m3: (rows,) volumes}: the same table for other densities
+    adjustment   the adjusted survey (`surveys.Adjustment`); None where points were handed in
     """
 
     job: Job
@@ -57,6 +60,7 @@ class Result:
     corrections: tuple[Correction, ...]
     by_density: dict
     warnings: tuple[Problem, ...]
+    adjustment: Adjustment | None = None
 
     def __repr__(self):
         top = self.at(self.table.height_m[-1])
@@ -131,16 +135,21 @@ class Result:
 
 
 def run(job, progress=None):
-    """Compute a job: wall and axis, parts of the tank, capacity table with its covariance.
+    """Compute a job: adjusted points, wall and axis, parts of the tank, table with covariance.
 
     progress  called with a line of text as each step begins
-    Raises InputError when a course is left with too few points, SolutionError when there is no
-    wall, TypeError for anything but a `Job`.
+    Raises InputError when a course is left with too few points, SolutionError when the survey does
+    not determine the points, the vertical or the scale or when there is no wall, TypeError for
+    anything but a `Job`.
     """
-    if not isinstance(job, Job):
-        raise TypeError(f"found {type(job).__name__}; expected a Job: run(tankcal.load(path))")
+    _refuse_other(job, "run")
+    if job.tank is None:
+        raise InputError(Problem("job.toml", "no tank: only its survey can be adjusted"))
     tell = progress or (lambda text: None)
-    survey = _survey(job, tell)
+    adjustment = None
+    if job.measurements is not None:
+        job, adjustment = _adjusted(job, tell)
+    survey = _survey(job, tell, _dof(adjustment))
     wall = survey if isinstance(survey, Wall) else None
     tell("integrating volumes")
     body = body_of(job, survey)
@@ -176,23 +185,64 @@ def run(job, progress=None):
         by_density=_by_density(job, survey, levels),
         warnings=(
             *job.warnings,
+            *(
+                ()
+                if adjustment is None
+                else (*adjustment.warnings, *of_adjustment(job, adjustment))
+            ),
             *(warnings_of(job, wall) if wall is not None else ()),
             *incomplete(job, body.undeclared()),
             *_against_nominal(job, table),
         ),
+        adjustment=adjustment,
     )
 
 
-def _survey(job, tell):
+def adjust_job(job, progress=None):
+    """Adjust the survey of a job, whether it has a tank or not: a `surveys.Adjustment`.
+
+    progress  called with a line of text as each step begins
+    Raises InputError when nothing was measured, SolutionError when the measurements do not
+    determine the points, TypeError for anything but a `Job`.
+    """
+    _refuse_other(job, "adjust_job")
+    if job.measurements is None:
+        raise InputError(Problem("job.toml", "no measurements: there is nothing to adjust"))
+    return adjust_survey(job.measurements, progress or (lambda text: None))
+
+
+def _refuse_other(job, name):
+    if not isinstance(job, Job):
+        raise TypeError(f"found {type(job).__name__}; expected a Job: {name}(tankcal.load(path))")
+
+
+def _adjusted(job, tell):
+    """The job with the points of its adjusted survey, and the adjustment."""
+    if job.points is not None and not job.points.from_adjustment:
+        expected = "given beside a survey; expected one of them: the points are adjusted from it"
+        raise InputError(Problem("points.csv", expected))
+    adjustment = adjust_survey(job.measurements, tell)
+    refuse_undetermined(adjustment.datum)
+    points = wall_points(adjustment, job.measurements, job.survey.side)
+    return replace(job, points=among_themselves(points)), adjustment
+
+
+def _dof(adjustment):
+    """Degrees of freedom of the covariance of the points: finite where residuals scaled it."""
+    scaled = adjustment is not None and adjustment.cov_scale != 1.0
+    return float(adjustment.redundancy) if scaled else np.inf
+
+
+def _survey(job, tell, dof):
     """What was surveyed: a wall of courses, a mesh, the scan of another wall; None: sizes alone."""
     if job.tank.kind == "vertical":
-        return find_wall(job, tell)
+        return find_wall(job, tell, dof)
     if job.mesh is not None:
         tell(f"checking the mesh {job.mesh.file}")
         return parse_mesh(job.mesh.file, job.mesh.data, job.mesh.unit_m)
     if job.points is not None:
         tell(f"fitting the wall to {len(job.points.names)} points")
-        return scanned(job)
+        return scanned(job, dof)
     return None
 
 

@@ -4,10 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.body import Factor, survey_factors
 from tankcal.cylinders import lying_cylinder
+from tankcal.doubts import noise_is_estimated, origin_of
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.primitives import fit_sphere
-from tankcal.uncertainty import factor_of
+from tankcal.sections import covariance_of
 
 FAR = 5.0  # robust standard deviations: a point further off is not of the wall
 MOST_ROUNDS = 30
@@ -20,54 +22,65 @@ class Scan:
 
     names        of the inputs that they give: "diameter", and "tilt" of a lying cylinder
     values       (len(names),) of the surface as surveyed
-    factor       (len(names), c) factor of their covariance; dof of the points' noise
+    factors      what the points leave uncertain about them (`body.Factor`)
     accepted     (m,) indices of the points that were used
     residuals_m  (n,) of all points, outwards positive; noise_m their standard deviation
     """
 
     names: tuple[str, ...]
     values: np.ndarray
-    factor: np.ndarray
-    dof: float
+    factors: tuple[Factor, ...]
     accepted: np.ndarray
     residuals_m: np.ndarray
     noise_m: float
 
 
-def scanned(job):
+def scanned(job, dof=np.inf):
     """`Scan` of the points of a lying cylinder or a sphere; points far off are left out.
 
     Rounds of fit and test: a point over 5 robust standard deviations off is not used, until
-    nothing changes. Without snooping every point is used.
+    nothing changes. Without snooping every point is used. dof: degrees of freedom of the points'
+    covariance, where it was given. A full covariance is the fit's weight and its propagation.
     Raises InputError when the points make no such solid.
     """
-    points = job.points
-    variances = np.ones(points.xyz_m.size) if points.sd_m is None else points.sd_m.ravel() ** 2
-    if points.covariance_m2 is not None:
-        variances = points.covariance_m2.diagonal()
-    given = points.sd_m is not None or points.covariance_m2 is not None
-    scaled = not given or job.scale == "a_posteriori"
-    chosen = np.ones(len(points.names), dtype=bool)
+    chosen = np.ones(len(job.points.names), dtype=bool)
     for _ in range(MOST_ROUNDS):
-        try:
-            fit, names, values, cofactor, residuals = _fitted(job, variances, chosen)
-        except SolutionError as error:
-            raise InputError(Problem("points.csv", f"the points make no wall: {error}")) from error
+        fit, names, values, cofactor, residuals = _told(job, job.points.xyz_m, chosen)
         now = _near(residuals, chosen) if job.snooping else chosen
         if np.array_equal(now, chosen):
             break
         chosen = now
-    variance_factor = fit.variance_factor if scaled else 1.0
+    factor = 1.0
+    if noise_is_estimated(job):
+        factor, dof = fit.variance_factor, float(fit.dof)
+    causes = job.points.causes
+    effects = [_effect(job, chosen, cause.column_m) for cause in causes]
     used = residuals[chosen]
     return Scan(
         names,
         values,
-        factor_of(cofactor * variance_factor),
-        float(fit.dof) if scaled else np.inf,
+        survey_factors(cofactor * factor, dof, causes, effects),
         np.flatnonzero(chosen),
         residuals,
         float(np.sqrt(used @ used / max(fit.dof, 1))),
     )
+
+
+def _effect(job, chosen, column_m):
+    """Change of the values when all points move by a column: half the difference of two fits."""
+    moved = column_m.reshape(-1, 3)
+    there, back = (
+        np.array(_told(job, job.points.xyz_m + way * moved, chosen)[2]) for way in (1, -1)
+    )
+    return (there - back) / 2
+
+
+def _told(job, xyz_m, chosen):
+    try:
+        return _fitted(job, xyz_m, chosen)
+    except SolutionError as error:
+        problem = Problem(origin_of(job.points), f"the points make no wall: {error}")
+        raise InputError(problem) from error
 
 
 def _near(residuals, chosen):
@@ -75,10 +88,18 @@ def _near(residuals, chosen):
     return np.abs(residuals) <= FAR * max(spread, 1e-6)
 
 
-def _fitted(job, variances, chosen):
+def _covariance(points, chosen):
+    """Of the chosen points: (3m,) variances, or (3m, 3m) and positive definite."""
+    if points.covariance_m2 is not None:
+        return covariance_of(np.flatnonzero(chosen), points.covariance_m2)
+    if points.sd_m is None:
+        return np.ones(3 * chosen.sum())
+    return points.sd_m[chosen].ravel() ** 2
+
+
+def _fitted(job, xyz, chosen):
     """Fit, names, values, their cofactor matrix, and the residuals of all points."""
-    xyz = job.points.xyz_m
-    own = variances.reshape(-1, 3)[chosen].ravel()
+    own = _covariance(job.points, chosen)
     if job.sphere is not None:
         ball = fit_sphere(xyz[chosen], own)
         residuals = np.linalg.norm(xyz - ball.centre_m, axis=1) - ball.radius_m

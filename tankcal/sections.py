@@ -22,6 +22,7 @@ from tankcal.outlines import (
 from tankcal.quadrature import panels
 
 RING_GAP, RING_SPREAD = 0.10, 0.15  # of the course height: between rings, within one ring
+LEAST_SD_M = 1e-6  # added to a full covariance that is singular
 HIGHEST_DEGREE, MOST_AMPLIFICATION = 2, 6.0  # of the sd of a mean radius, at an end of a course
 
 
@@ -175,6 +176,24 @@ def _is_ring(height_m, azimuth_rad, tall_m):
     gaps = np.diff(ordered, append=ordered[0] + 2 * np.pi)
     level = np.ptp(height_m) <= RING_SPREAD * tall_m
     return level and len(ordered) >= 5 and gaps.max() < 2 * np.pi / 3
+
+
+def coordinates_of(points):
+    """(3k,) places of the coordinates of points (k,) among all coordinates."""
+    return (3 * np.asarray(points)[:, None] + np.arange(3)).ravel()
+
+
+def covariance_of(points, covariance_m2):
+    """(3k, 3k) covariance of points (k,) out of that of all; a dense one is positive definite."""
+    index = coordinates_of(points)
+    if scipy.sparse.issparse(covariance_m2):
+        return covariance_m2[index][:, index]
+    block = covariance_m2[np.ix_(index, index)]
+    try:
+        np.linalg.cholesky(block)
+    except np.linalg.LinAlgError:  # a fixed point, or a free network
+        block = block + LEAST_SD_M**2 * np.eye(len(index))
+    return block
 
 
 def slide(xyz_m, slope, z_m):

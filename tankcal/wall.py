@@ -1,19 +1,34 @@
 """From surveyed points to the sections of the shell: wall and axis, covariance, form, outlines."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse
 
-from tankcal.doubts import ADVISED_POINTS, FEWEST_POINTS, doubts, weak_sections
-from tankcal.errors import InputError, Problem
+from tankcal.doubts import (
+    ADVISED_POINTS,
+    FEWEST_POINTS,
+    doubts,
+    noise_is_estimated,
+    origin_of,
+    vague_points,
+    vague_vertical,
+    weak_sections,
+)
+from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.form import Form
 from tankcal.outlines import polar
-from tankcal.sections import Section, fit_section, group_by_height, group_by_name, sample_of
+from tankcal.sections import (
+    Section,
+    coordinates_of,
+    covariance_of,
+    fit_section,
+    group_by_height,
+    group_by_name,
+    sample_of,
+)
 from tankcal.shell import Shell, course_of, find_shell
 from tankcal.spectrum import estimate_form
-
-LEAST_SD_M = 1e-6  # added to a full covariance that is singular
 
 
 @dataclass(frozen=True)
@@ -24,6 +39,7 @@ class Wall:
     joints_m       (courses + 1,) heights of the joints above the bottom, along the vertical
     accepted       (m,) indices of the accepted points in job.points
     covariance_m2  (3m, 3m) of the accepted points, sparse or dense
+    noise_dof      degrees of freedom of that covariance's scale
     form           what the points tell of the form between them (`spectrum.Form`)
     sections       from the bottom up
     """
@@ -32,46 +48,63 @@ class Wall:
     joints_m: np.ndarray
     accepted: np.ndarray
     covariance_m2: object
+    noise_dof: float
     form: Form
     sections: tuple[Section, ...]
 
 
-def find_wall(job, tell):
+def find_wall(job, tell, dof=np.inf):
     """The wall, its axis and its sections, from the points of a job.
 
     tell  called with a line of text as each step begins
+    dof   degrees of freedom of the points' covariance, where it was given
     Raises InputError when a course is left with too few points, SolutionError when there is no
     wall.
     """
     tell(f"separating the wall from clutter in {len(job.points.names)} points")
     heights = np.cumsum([0.0] + [course.height_m for course in job.courses])
-    shell = find_shell(
-        job.points.xyz_m,
-        job.datum.bottom_z_m + heights,
-        job.tank.nominal_diameter_m / 2,
-        sd_m=radial_sds(job.points),
-        snooping=job.snooping,
-    )
+    sds, estimated = radial_sds(job.points), noise_is_estimated(job)
+    shell = _shell(job, heights, sds)
     accepted = np.flatnonzero(shell.reason == "")
     joints = heights / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
     tell(f"fitting sections through {len(accepted)} points of the wall")
     groups = _groups(job, shell, accepted, joints)
     given = _given_covariance(job.points, accepted)
-    factor = (shell.noise_m / _median_sd(job.points)) ** 2 if noise_is_estimated(job) else 1.0
+    factor = (shell.noise_m / _median_sd(sds)) ** 2 if estimated else 1.0
     samples = [sample_of(*one) for one in _to_fit(job, shell, accepted, groups, given)]
     form = estimate_form(samples, factor)
-    covariance = given * factor
+    covariance = given if factor == 1.0 else given * factor  # it may be half a gigabyte
     to_fit = _to_fit(job, shell, accepted, groups, covariance)
     sections = tuple(fit_section(*one, form) for one in to_fit)
-    return Wall(shell, joints, accepted, covariance, form, sections)
+    noise_dof = shell.noise_dof if estimated else dof
+    return Wall(shell, joints, accepted, covariance, noise_dof, form, sections)
+
+
+def _shell(job, heights, sds):
+    try:
+        return find_shell(
+            job.points.xyz_m,
+            job.datum.bottom_z_m + heights,
+            job.tank.nominal_diameter_m / 2,
+            sd_m=sds,
+            snooping=job.snooping,
+        )
+    except SolutionError as error:
+        if job.points.from_adjustment:
+            hint = "and bottom_z_m; targets.csv tells points of the wall from others"
+            raise SolutionError(f"{error}, {hint}") from error
+        raise
 
 
 def warnings_of(job, wall):
     """What a sound survey of a sound wall hardly has."""
     groups = [section.group for section in wall.sections]
+    sds = radial_sds(job.points)
     return (
         *weak_sections(job, groups, _azimuths(job, wall.shell, wall.accepted)),
-        *doubts(job, wall.shell, wall.sections, radial_sds(job.points)),
+        *doubts(job, wall.shell, wall.sections, sds),
+        *vague_points(job.points, wall.accepted, sds),
+        *vague_vertical(job.points),
     )
 
 
@@ -85,11 +118,11 @@ def _groups(job, shell, wall, joints):
         groups = group_by_name(names, height, lambda z: course_of(z, joints), azimuth, joints)
     else:
         groups = group_by_height(height, azimuth, course_of(height, joints), joints)
-    _refuse_weak(groups, job.courses, height)
+    _refuse_weak(groups, job.courses, height, points)
     return groups
 
 
-def _refuse_weak(groups, courses, height):
+def _refuse_weak(groups, courses, height, points):
     """Raise InputError for sections of too few points or too tall, and courses without any."""
     problems = []
     for group in groups:
@@ -111,7 +144,7 @@ def _refuse_weak(groups, courses, height):
         if index not in seen
     ]
     if problems:
-        raise InputError([Problem("points.csv", text) for text in problems])
+        raise InputError([Problem(origin_of(points), text) for text in problems])
 
 
 def _azimuths(job, shell, wall):
@@ -119,6 +152,32 @@ def _azimuths(job, shell, wall):
     xyz = job.points.xyz_m[wall]
     axis = np.array(shell.axis_m) + np.outer(xyz[:, 2] - shell.z_m, shell.slope)
     return polar(xyz[:, :2] - axis, 0.0, 0.0)[0]
+
+
+def among_themselves(points):
+    """Adjusted points with the covariance that they have among themselves.
+
+    C' = S C S + s2 D D',  S = I - D D',  D an orthonormal basis of their common shift and their
+    turn about the vertical, s2 the mean variance that is left. No volume depends on these, and a
+    datum that holds one photo or one point gives them whatever variance it has: sections fitted
+    with it would depend on that choice. Columns of causes go along.
+    """
+    x, y, _ = (points.xyz_m - points.xyz_m.mean(axis=0)).T
+    motions = np.zeros((len(x), 3, 4))
+    motions[:, :, :3] = np.eye(3)
+    motions[:, 0, 3], motions[:, 1, 3] = -y, x
+    basis = np.linalg.qr(motions.reshape(-1, 4))[0]
+    given = points.covariance_m2
+    spread = given @ basis
+    across = spread - 0.5 * basis @ (basis.T @ spread)
+    left = np.trace(given) - 2 * np.sum(basis * across)
+    across -= 0.5 * max(left, 0.0) / (len(basis) - 4) * basis
+    change = np.hstack([basis, across]) @ np.hstack([across, basis]).T
+    causes = tuple(
+        replace(cause, column_m=cause.column_m - basis @ (basis.T @ cause.column_m))
+        for cause in points.causes
+    )
+    return replace(points, covariance_m2=np.subtract(given, change, out=change), causes=causes)
 
 
 def radial_sds(points):
@@ -132,29 +191,16 @@ def radial_sds(points):
     return np.sqrt(variances[:, :2].mean(axis=1))
 
 
-def _median_sd(points):
+def _median_sd(sds):
     """Median standard deviation of the points in plan; one metre when the file gives none."""
-    sds = radial_sds(points)
     return 1.0 if sds is None else float(np.median(sds))
-
-
-def noise_is_estimated(job):
-    """Whether the points' covariance is scaled by what their residuals say."""
-    points = job.points
-    given = points.sd_m is not None or points.covariance_m2 is not None
-    return not given or job.scale == "a_posteriori"
 
 
 def _given_covariance(points, wall):
     """(3m, 3m) as in the file; one metre for every coordinate when the file gives none."""
     if points.covariance_m2 is not None:
-        index = (3 * wall[:, None] + np.arange(3)).ravel()
-        given = points.covariance_m2[np.ix_(index, index)]
-        try:
-            np.linalg.cholesky(given)
-        except np.linalg.LinAlgError:  # a fixed point, or a free network
-            given = given + LEAST_SD_M**2 * np.eye(len(index))
-        return given
+        index = coordinates_of(wall)
+        return points.covariance_m2[np.ix_(index, index)]
     if points.sd_m is not None:
         return scipy.sparse.diags_array(points.sd_m[wall].ravel() ** 2).tocsr()
     return scipy.sparse.eye_array(3 * len(wall), format="csr")
@@ -167,15 +213,9 @@ def _to_fit(job, shell, accepted, groups, covariance):
         (
             group,
             xyz[group.members],
-            _block(covariance, group),
+            covariance_of(group.members, covariance),
             shell.slope,
             job.datum.bottom_z_m + group.height_m,
         )
         for group in groups
     ]
-
-
-def _block(covariance, group):
-    """Covariance of the coordinates of one group."""
-    index = (3 * group.members[:, None] + np.arange(3)).ravel()
-    return covariance[index][:, index]

@@ -7,7 +7,7 @@ import pytest
 from jacobians import assert_derivative
 from shapes import azimuths, ring, section_of
 
-from tankcal.body import Body, ShellPart, SolidPart
+from tankcal.body import Body, Factor, ShellPart, SolidPart
 from tankcal.courses import course_shape
 from tankcal.solids import Sphere
 from tankcal.uncertainty import Source
@@ -140,7 +140,7 @@ def test_what_the_survey_of_a_solid_gave_is_a_source_and_no_longer_an_input():
     levels = np.array([5.0, 19.0])
     plain = sphere()
     found = SolidPart(
-        Sphere(20.0), surveyed=("diameter",), survey_factor=np.array([[0.001]]), survey_dof=8.0
+        Sphere(20.0), surveyed=("diameter",), factors=(Factor("points", np.array([[0.001]]), 8.0),)
     )
     assert "diameter" not in found.derivatives(levels)
     (points,) = found.sources(levels)

@@ -369,7 +369,7 @@ def test_a_scan_gives_diameter_and_tilt_of_a_lying_tank(tmp_path):
     points = scanned_points(2.4, 0.01, np.random.default_rng(3))
     found = result_of(tmp_path / "job", kind="horizontal", settings=SCANNED, extra_points=points)
     solid = found.body.parts[0].solid
-    sds = np.linalg.norm(found.scan.factor, axis=1)
+    sds = np.linalg.norm(found.scan.factors[0].columns, axis=1)
     assert abs(solid.width_m - 2.4) < 3 * sds[0]
     assert abs(solid.tilt - 0.01) < 3 * sds[1]
     # theory: the mean of 400 radii of 2 mm, twice; allowing for an uneven spread

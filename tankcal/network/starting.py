@@ -1,31 +1,32 @@
-"""Approximate values, unasked: photos by resection, points by intersection, one from the other."""
+"""Approximate values, unasked: for photos, points and circles, from whatever was observed.
 
-from dataclasses import dataclass, replace
+What is known for certain (control, fixed or weighted photos) grows first: photos by resection,
+points by intersection, stations and points in plan, heights. Then come values that are only
+approximate (nominal coordinates), in a frame of their own where enough is common to turn it. Last
+come local frames: photos by relative orientation, set-ups from their own readings.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 
-from tankcal.camera import corrected
-from tankcal.errors import SolutionError
-from tankcal.network.resection import (
-    Pose,
-    bearings,
-    candidates,
-    intersected,
-    refined,
-    resected,
-)
+from tankcal.network.clues import Clues, grown
+from tankcal.network.frames import in_plan
+from tankcal.network.growing import SURE, sights_of, with_points
+from tankcal.network.known import certain, hinted
+from tankcal.network.loose import with_locals
+from tankcal.network.mending import contradictions, guessed, mended, photo_error
+from tankcal.network.pieces import BAD_JOINT, joint
+from tankcal.network.plan import plan_of
+from tankcal.network.polar import oriented
+from tankcal.network.unstarted import hanging, refuse_missing
 
-ENOUGH = 4  # points from which a photo's place is unambiguous
-DECIDED = 0.5  # how much better than the next a pose of three points must fit the tie points
-WORST_ERROR = 0.02  # median error over c of a pose that is believed: 2 mm at c = 100 mm
-
-
-@dataclass(frozen=True)
-class Sight:
-    """Ideal image points over c (n, 2) of a photo, and the points they show (n,)."""
-
-    point: np.ndarray
-    ideal: np.ndarray
+TRIALS = 3  # with other samples, while the images contradict what was found
+ODDS = 0.05  # share of photos and known points that may be at odds with the images
+KEPT_ERROR = 0.05  # error over c of a given photo beyond which its values are found anew
+MOSTLY = 0.5  # share of given photos that must agree with one another for any to be believed
+KEPT_SHARE = 0.05  # of the extent: given values farther from what was found are replaced
+ENOUGH = 3  # places common to two frames
 
 
 def on_tank(generatrix, generatrices, z_m, radius_m, offset_m=0.0):
@@ -35,125 +36,154 @@ def on_tank(generatrix, generatrices, z_m, radius_m, offset_m=0.0):
     return np.column_stack([r * np.sin(azimuth), r * np.cos(azimuth), z_m])
 
 
-def approximate(survey, seed=0):
-    """The Survey with start values for all photos and points that had none (nan).
+def approximate(survey, seed=0, wall=None):
+    """The Survey with start values for all points, photos and direction sets that had none (nan).
 
-    Points with coordinates (control, nominal geometry) give the photos that see at least four of
-    them, these give the points that two of them see, and so on; a photo with three known points
-    waits for others to decide which of its poses it is. Raises SolutionError naming what is left.
+    wall  Wall on which the points lie, in the survey's frame; it decides between the poses of a
+          photo that sees three known points. None: found from the known points, where they lie so
+
+    Given values that contradict the image points are replaced as well, unless they are fixed or
+    observed. Raises SolutionError naming everything that is left, and why.
     """
-    rng, photos = np.random.default_rng(seed), survey.photos
-    xyz = np.array(survey.xyz_m, dtype=float)
-    given = np.isfinite(xyz).all(axis=1)
-    centre = np.nanmean(xyz, axis=0) if given.any() else np.zeros(3)
-    xyz = xyz - centre
-    place = np.array(photos.xyz_m, dtype=float) - centre
-    rotation = np.array(photos.rotation, dtype=float)
-    done = np.isfinite(place).all(axis=1) & np.isfinite(rotation).all(axis=(1, 2))
-    sights = [_sight(survey, photo) for photo in range(len(photos.names))]
-    for needed in (ENOUGH + 2, ENOUGH, 3):
-        progress = True
-        while progress and not done.all():
-            progress = False
-            for photo in np.flatnonzero(~done):
-                pose = _pose(xyz, sights[photo], needed, rng)
-                if pose is None and needed == 3:
-                    pose = _pose_by_ties(xyz, photo, sights, place, rotation, done)
-                if pose is not None:
-                    place[photo], rotation[photo] = pose.xyz_m, pose.rotation
-                    done[photo] = progress = True
-            xyz = _more_points(xyz, given, sights, place, rotation, done)
-            if progress and needed == 3:
-                break
-    xyz = _more_points(xyz, given, sights, place, rotation, done)
-    _refuse(survey, xyz, done, sights)
+    sure, hints = certain(survey), hinted(survey)
+    if _complete(survey, hints.piece):
+        return survey
+    centre = _centre(sure, hints)
+    sure, hints = sure.shifted(-centre), hints.shifted(-centre)
+    if wall is not None:
+        wall = replace(wall, centre_m=wall.centre_m - centre[:2])
+    found = []
+    for trial in range(TRIALS):
+        clues = Clues(
+            survey,
+            sights_of(survey),
+            plan_of(survey),
+            wall,
+            np.random.default_rng([seed, trial]),
+        )
+        piece, reasons = _found(clues, sure, hints)
+        known = np.isfinite(sure.piece.xyz_m).all(axis=1)
+        missing = float(np.mean(~piece.oriented)) if len(piece.oriented) else 0.0
+        odds = missing + contradictions(clues.sights, piece, known)
+        found.append((odds, trial, piece, reasons))
+        if odds < ODDS:
+            break
+    _, _, piece, reasons = min(found, key=lambda one: one[:2])
+    return _filled(clues, piece, sure, hints, centre, reasons)
+
+
+def _found(clues, sure, hints):
+    """A Piece with all that could be found, and sentences about what did not join."""
+    piece, reasons = sure.piece, []
+    for least in (SURE, 3):  # photos that see few known points are better placed by other photos
+        piece = grown(clues, piece, least)
+        piece = _with_hints(clues, piece, sure, hints, least)
+        piece, reasons = with_locals(clues, piece, hints.piece.place_m, least)
+    soft = hints.piece.known & ~np.isfinite(sure.piece.xyz_m).any(axis=1)
+    piece = with_points(clues.sights, replace(piece, by_photos=piece.by_photos | soft))
+    piece = mended(clues.sights, piece, sure.piece.oriented, clues.rng, clues.wall)
+    return guessed(clues.sights, piece), reasons
+
+
+def _complete(survey, given):
+    """Whether every start value is there and no photo contradicts its image points."""
+    if np.isnan(survey.xyz_m).any() or np.isnan(survey.sets).any():
+        return False
+    if survey.photos is None:
+        return True
+    if not given.oriented.all():
+        return False
+    errors = [photo_error(sight, given, i) for i, sight in enumerate(sights_of(survey))]
+    return bool(np.all(np.nan_to_num(errors) < KEPT_ERROR))
+
+
+def _centre(sure, hints):
+    """Middle (3,) of what is known, each axis on its own."""
+    places = np.vstack([one for known in (sure, hints)
+                        for one in (known.piece.xyz_m, known.piece.place_m)])  # fmt: skip
+    count = np.isfinite(places).sum(axis=0)
+    return np.nansum(places, axis=0) / np.maximum(count, 1)
+
+
+def _with_hints(clues, piece, sure, hints, least):
+    """The Piece with what approximate values add, joined by common places or taken as they are."""
+    if _all_found(piece) or hints.nothing:
+        return piece
+    if (piece.known.sum() + piece.oriented.sum()) >= ENOUGH:
+        own = grown(clues, _credible(clues, hints.without(sure).piece), least)
+        common = (own.known & piece.known).sum() + (own.oriented & piece.oriented).sum()
+        motion = joint(own, piece, clues.rng) if common >= ENOUGH else None
+        if motion is not None and motion.misfit_m < BAD_JOINT * piece.extent:
+            joined = piece.filled_from(own.moved(motion))
+            return grown(clues, with_points(clues.sights, joined), least)
+    merged = _credible(clues, piece.filled_from(hints.piece), piece.oriented)
+    return grown(clues, merged, least)
+
+
+def _credible(clues, piece, held=False):
+    """The Piece without photos whose image points contradict its points and other photos.
+
+    held  (photos,) True for those that stay whatever their image points say
+
+    Where most are wrong the others may only seem right: then all go.
+    """
+    given = piece.oriented & ~np.asarray(held)
+    left = given.copy()
+    while left.any():
+        piece = _without(piece, given & ~left)
+        trial, photos = with_points(clues.sights, piece), np.flatnonzero(left)
+        errors = np.array([photo_error(clues.sights[i], trial, i) for i in photos])
+        bad = errors > KEPT_ERROR
+        if not bad.any():
+            break
+        order = np.argsort(-np.nan_to_num(errors, nan=np.inf))
+        left[photos[order[: max(1, bad.sum() // 2)]]] = False
+        if left.sum() < MOSTLY * given.sum():
+            left[:] = False
+    return _without(piece, given & ~left)
+
+
+def _without(piece, photos):
+    """The Piece without photos (photos,) that are True."""
     return replace(
-        survey,
-        xyz_m=xyz + centre,
-        photos=replace(photos, xyz_m=place + centre, rotation=rotation),
+        piece,
+        place_m=np.where(photos[:, None], np.nan, piece.place_m),
+        rotation=np.where(photos[:, None, None], np.nan, piece.rotation),
     )
 
 
-def _sight(survey, photo):
-    images = survey.image_points
-    mine = images.photo == photo
-    if images.use is not None:
-        mine &= images.use > 0
-    camera = survey.cameras[survey.photos.camera[photo]]
-    ideal = corrected(images.xy_mm[mine], camera.values, camera.form) / camera.values[0]
-    return Sight(images.point[mine], ideal)
+def _all_found(piece):
+    return piece.known.all() and piece.oriented.all()
 
 
-def _pose(xyz, sight, needed, rng):
-    """The Pose of a photo that sees at least `needed` known points, or None."""
-    known = np.isfinite(xyz[sight.point]).all(axis=1)
-    if known.sum() < needed:
+def _filled(clues, piece, sure, hints, centre, reasons):
+    """The Survey with the start values, given ones kept where they agree with what was found."""
+    survey, given = clues.survey, hints.piece
+    xyz = np.where(np.isfinite(sure.piece.xyz_m), sure.piece.xyz_m, piece.xyz_m)
+    off = np.linalg.norm(given.xyz_m - xyz, axis=1)
+    keep = np.isfinite(given.xyz_m) & ~(off > KEPT_SHARE * piece.extent)[:, None]
+    xyz = np.where(keep, given.xyz_m, xyz)
+    zeros = oriented(clues.plan, xyz[:, :2])[: len(survey.sets)]
+    sets = np.where(np.isfinite(survey.sets), survey.sets, zeros)
+    if np.isnan(xyz[:, :2]).any():
+        _, apart = in_plan(clues.plan, xyz[:, :2], xyz[:, 2], clues.rng)
+        reasons = reasons + [
+            hanging(survey, local.known, np.isfinite(xyz[:, 0])) for local in apart
+        ]
+    xyz = refuse_missing(survey, clues.sights, xyz, piece, sets, reasons)
+    xyz = np.where(keep, survey.xyz_m, xyz + centre)
+    if survey.fixed is not None:
+        xyz = np.where(survey.fixed & np.isfinite(survey.xyz_m), survey.xyz_m, xyz)
+    return replace(survey, xyz_m=xyz, photos=_photos(survey, piece, given, centre), sets=sets)
+
+
+def _photos(survey, piece, given, centre):
+    """The Photos with start values; those that were given and stayed are not touched."""
+    photos = survey.photos
+    if photos is None:
         return None
-    points, ideal = xyz[sight.point[known]], sight.ideal[known]
-    if known.sum() == 3:
-        return None
-    pose = resected(points, ideal, rng)
-    if pose is None or pose.error > WORST_ERROR:
-        return None
-    return pose
-
-
-def _pose_by_ties(xyz, photo, sights, place, rotation, done):
-    """The Pose of a photo with three known points, decided by rays that it shares with others."""
-    sight = sights[photo]
-    known = np.isfinite(xyz[sight.point]).all(axis=1)
-    if known.sum() != 3:
-        return None
-    points, ideal = xyz[sight.point[known]], sight.ideal[known]
-    centres, rotations = candidates(points, ideal)
-    misses = [
-        _miss(centre, turn, photo, sights, place, rotation, done)
-        for centre, turn in zip(centres, rotations, strict=True)
-    ]
-    order = np.argsort(misses)
-    if not len(order) or (len(order) > 1 and misses[order[0]] > DECIDED * misses[order[1]]):
-        return None
-    return refined(points, ideal, Pose(centres[order[0]], rotations[order[0]], 0.0))
-
-
-def _miss(centre, turn, photo, sights, place, rotation, done):
-    """Median sine by which rays of a pose pass those of other photos to the same points."""
-    mine, found = sights[photo], []
-    for other in np.flatnonzero(done):
-        _, i, j = np.intersect1d(mine.point, sights[other].point, return_indices=True)
-        if not len(i):
-            continue
-        here = bearings(mine.ideal[i]) @ turn
-        there = bearings(sights[other].ideal[j]) @ rotation[other]
-        base = place[other] - centre
-        plane = np.cross(base / np.linalg.norm(base), there)
-        length = np.maximum(np.linalg.norm(plane, axis=1), 1e-6)
-        found.append(np.abs(np.sum(plane * here, axis=1)) / length)
-    return float(np.median(np.concatenate(found))) if found else np.inf
-
-
-def _more_points(xyz, given, sights, place, rotation, done):
-    """Coordinates with what the photos that are known say about the points that were not given."""
-    photos = [photo for photo in np.flatnonzero(done)]
-    if not photos:
-        return xyz
-    owner = np.concatenate([sights[photo].point for photo in photos])
-    rays = [bearings(sights[photo].ideal) @ rotation[photo] for photo in photos]
-    centres = [np.tile(place[photo], (len(sights[photo].point), 1)) for photo in photos]
-    found, count = intersected(np.vstack(centres), np.vstack(rays), owner, len(xyz))
-    better = ~given & np.isfinite(found).all(axis=1) & (count > 1)
-    return np.where(better[:, None], found, xyz)
-
-
-def _refuse(survey, xyz, done, sights):
-    """Raise when a photo, or a point that something observes, has no start."""
-    seen = np.unique(np.concatenate([sight.point for sight in sights]))
-    missing = seen[~np.isfinite(xyz[seen]).all(axis=1)]
-    if done.all() and not len(missing):
-        return
-    told = []
-    for photo in np.flatnonzero(~done):
-        known = np.isfinite(xyz[sights[photo].point]).all(axis=1).sum()
-        told.append(f"photo {survey.photos.names[photo]} ({known} known points)")
-    told += [f"point {survey.points[point]}" for point in missing[:10]]
-    raise SolutionError("no approximate values for " + ", ".join(told))
+    stayed = (piece.place_m == given.place_m).all(axis=1)
+    held = np.zeros((len(stayed), 4), dtype=bool) if photos.fixed is None else photos.fixed
+    place = np.where(stayed[:, None] | held[:, :3], photos.xyz_m, piece.place_m + centre)
+    rotation = np.where(held[:, 3, None, None], photos.rotation, piece.rotation)
+    return replace(photos, xyz_m=place, rotation=rotation)

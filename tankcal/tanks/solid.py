@@ -77,8 +77,9 @@ def _of_scan(scan, scale):
     lengths = np.array([scale if name == "diameter" else 1.0 for name in scan.names])
     return {
         "surveyed": scan.names,
-        "survey_factor": lengths[:, None] * scan.factor,
-        "survey_dof": scan.dof,
+        "factors": tuple(
+            replace(one, columns=lengths[:, None] * one.columns) for one in scan.factors
+        ),
     }
 
 

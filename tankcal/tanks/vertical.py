@@ -2,19 +2,19 @@
 
 import numpy as np
 
-from tankcal.body import Body, ShellPart
+from tankcal.body import Body, Factor, ShellPart, survey_factors
 from tankcal.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
 from tankcal.courses import course_shape
 from tankcal.fittings import floating_roof
 from tankcal.hydrostatics import liquid_head
 from tankcal.measured import Above, measured_bottom
 from tankcal.outlines import FULL_TURN
+from tankcal.sections import coordinates_of
 from tankcal.tanks.furniture import deadwood_part
 from tankcal.tanks.thermal import is_warmed, thermal_scale
 from tankcal.terrain import Footprint
 from tankcal.uncertainty import factor_of
 from tankcal.volumes import ShellVolume
-from tankcal.wall import noise_is_estimated
 
 FOOTPRINT = 360  # azimuths of the outline that a bottom is computed over
 
@@ -194,14 +194,18 @@ def _shell(job, wall, switches, uncertain):
 def _factors(job, wall, volume):
     """What the survey leaves uncertain about the features of the shell: points, and form."""
     jacobian = _features_by_points(volume, wall.sections, wall.covariance_m2.shape[0])
-    points = factor_of(jacobian @ (wall.covariance_m2 @ jacobian.T))
+    covariance = jacobian @ (wall.covariance_m2 @ jacobian.T)
+    causes, index = job.points.causes, coordinates_of(wall.accepted)
+    effects = [jacobian @ cause.column_m[index] for cause in causes]
     common = volume.form_m2
-    found = (
-        ("points", points, wall.shell.noise_dof if noise_is_estimated(job) else np.inf),
-        ("form", factor_of(common @ common.T), wall.form.common_dof),
-        ("own_form", volume.own_form_m2, wall.form.own_dof),
+    form = (
+        Factor("form", factor_of(common @ common.T), wall.form.common_dof),
+        Factor("own_form", volume.own_form_m2, wall.form.own_dof),
     )
-    return tuple(one for one in found if one[0] == "points" or one[1].shape[1])
+    return (
+        *survey_factors(covariance, wall.noise_dof, causes, effects),
+        *(one for one in form if one.columns.shape[1]),
+    )
 
 
 def _bearing(job, switches):
@@ -226,7 +230,7 @@ def _features_by_points(volume, sections, coordinates):
         for section in sections:
             if section.group.course != index:
                 continue
-            columns = (3 * section.group.members[:, None] + np.arange(3)).ravel()
+            columns = coordinates_of(section.group.members)
             for level in section.levels:
                 part = by_parameters[:, start : start + len(level.by_points)]
                 start += part.shape[1]

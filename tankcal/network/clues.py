@@ -1,0 +1,114 @@
+"""How a piece of a survey grows by everything that was observed: photos, angles, tapes, levels."""
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from tankcal.network.frames import in_plan
+from tankcal.network.growing import Wall, grown_by_photos, wall_of
+from tankcal.network.heights import with_heights
+from tankcal.network.lateration import laid_out
+from tankcal.network.pieces import empty, joint
+from tankcal.network.plan import Plan
+from tankcal.network.polar import improved_in_plan
+from tankcal.observations import HeightDifferences, Sights
+
+
+@dataclass(frozen=True)
+class Clues:
+    """Everything that was observed, as the search for start values needs it."""
+
+    survey: object
+    sights: tuple
+    plan: Plan
+    wall: Wall
+    rng: np.random.Generator
+
+    @property
+    def points(self):
+        return len(self.survey.points)
+
+    @property
+    def silent(self):
+        """True when nothing but photos (and coordinates) was observed."""
+        kinds = (Sights, HeightDifferences)
+        return not any(isinstance(one, kinds) for one in self.survey.observations)
+
+
+def grown(clues, piece, least, free=False):
+    """The Piece with all that follows from it, by photos and by set-ups, in turn.
+
+    least  known points that a photo must see
+    free   whether plan and heights may start in a frame of their own when nothing of them is known
+    """
+    while True:
+        before = np.isfinite(piece.xyz_m).sum() + piece.oriented.sum()
+        piece = _by_tapes(clues, _surveyed(clues, piece, free), free)
+        wall = clues.wall or wall_of(piece.xyz_m)
+        piece = grown_by_photos(clues.sights, piece, clues.rng, wall, least)
+        if np.isfinite(piece.xyz_m).sum() + piece.oriented.sum() == before:
+            return piece
+
+
+def _surveyed(clues, piece, free):
+    """The Piece with what angles, distances and levels say."""
+    if clues.silent:
+        return piece
+    xyz = _by_readings(clues, piece.xyz_m, free)
+    new = np.isfinite(xyz) & ~np.isfinite(piece.xyz_m)
+    if not new.any():
+        return piece
+    if np.isfinite(xyz[:, 2]).any():  # once more, with blunders outvoted
+        xy = improved_in_plan(clues.plan, xyz[:, :2], xyz[:, 2], ~new[:, 0])
+        first = np.where(new[:, 2], np.nan, xyz[:, 2])
+        if not np.isfinite(first).any():
+            first[np.flatnonzero(new[:, 2])[0]] = xyz[np.flatnonzero(new[:, 2])[0], 2]
+        better = with_heights(clues.survey, clues.plan, np.column_stack([xy, first]), False)
+        xyz = np.where(np.isfinite(better), better, xyz)
+    return replace(piece, xyz_m=xyz, by_photos=piece.by_photos & ~new.any(axis=1))
+
+
+def _by_readings(clues, xyz, free):
+    """Coordinates (points, 3) with all that plan and heights give, in turn."""
+    for _ in range(3):
+        before = np.isfinite(xyz).sum()
+        if free or np.isfinite(xyz[:, 0]).any():
+            xy, _ = in_plan(clues.plan, xyz[:, :2], xyz[:, 2], clues.rng)
+            xyz = np.column_stack([xy, xyz[:, 2]])
+        xyz = with_heights(clues.survey, clues.plan, xyz, free)
+        if np.isfinite(xyz).sum() == before:
+            break
+    return xyz
+
+
+def _by_tapes(clues, piece, free):
+    """The Piece with points that hang on it by spatial distances alone."""
+    plan, known = clues.plan, piece.known
+    straight = ~plan.flat & (plan.rise == 0) & ~(known[plan.start] & known[plan.end])
+    if not straight.any() or not (free or known.any()) or len(plan.station):
+        return piece
+    start, end, length = plan.start[straight], plan.end[straight], plan.length[straight]
+    firm = np.unique(np.concatenate([start, end]))
+    firm = firm[known[firm]]
+    sides = np.array(list(combinations(firm, 2)), dtype=int).reshape(-1, 2)
+    between = np.linalg.norm(piece.xyz_m[sides[:, 0]] - piece.xyz_m[sides[:, 1]], axis=1)
+    ties = np.concatenate([start, sides[:, 0]]), np.concatenate([end, sides[:, 1]])
+    for points, places in laid_out(*ties, np.concatenate([length, between]), 3, clues.rng):
+        motions = []
+        for mirror in ([1, 1, 1], [1, 1, -1]):
+            own = _told(clues, points, places * mirror)
+            motions.append((joint(own, piece, clues.rng), own))
+        motions = [one for one in motions if one[0] is not None]
+        if motions:
+            motion, own = min(motions, key=lambda one: one[0].misfit_m)
+            return piece.filled_from(own.moved(motion))
+        if free and not known.any():
+            return piece.filled_from(own)
+    return piece
+
+
+def _told(clues, points, places):
+    piece = empty(clues.points, len(clues.sights))
+    piece.xyz_m[points], piece.by_photos[points] = places, False
+    return piece

@@ -1,0 +1,155 @@
+"""Places from nothing but distances: shortest ways give all distances, these give the places.
+
+Classical scaling of the matrix of shortest ways, then Gauss-Newton (damped) on the distances that
+were measured. Source: Torgerson 1952; Shang et al. 2003 (MDS-MAP).
+"""
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components, shortest_path
+
+MOST = 400  # points of one network by distances only
+TRIES = 12
+STEPS = 80
+UNFOLDING = 10
+MISFIT = 0.01  # of the lengths, that most of them must keep
+LOOSE = 1e-5  # singular value, over the largest, of a motion that no distance feels
+FLAT = 1e-2  # neighbours thinner than that share of their extent lie on a line or in a plane
+
+
+def laid_out(low, high, length, dims, rng):
+    """Networks by distances: yields points (k,) and places (k, dims) of each rigid one.
+
+    low, high, length  (n,) points and m        dims  2 or 3
+
+    Places come in a frame of their own, and may be mirrored. Points that could be folded over,
+    because their neighbours lie on a line (in a plane), are left out.
+    """
+    points, ends = np.unique(np.concatenate([low, high]), return_inverse=True)
+    a, b = ends[: len(low)], ends[len(low) :]
+    graph = coo_array((length, (a, b)), shape=(len(points),) * 2)
+    count, label = connected_components(graph, directed=False)
+    for one in range(count):
+        nodes = np.flatnonzero(label == one)
+        if not dims < len(nodes) <= MOST:
+            continue
+        nodes = _well_tied(nodes, a, b, dims)
+        rows = np.isin(a, nodes) & np.isin(b, nodes)
+        if len(nodes) <= dims:
+            continue
+        place = np.full(len(points), -1)
+        place[nodes] = np.arange(len(nodes))
+        found = _solved(place[a[rows]], place[b[rows]], length[rows], len(nodes), dims, rng)
+        if found is not None:
+            firm = _firm(found, place[a[rows]], place[b[rows]], dims)
+            yield points[nodes[firm]], found[firm]
+
+
+def _well_tied(nodes, a, b, dims):
+    """Nodes that keep at least `dims` distances to one another."""
+    while True:
+        inside = np.isin(a, nodes) & np.isin(b, nodes)
+        count = np.bincount(np.concatenate([a[inside], b[inside]]), minlength=nodes.max() + 1)
+        kept = nodes[count[nodes] >= dims]
+        if len(kept) == len(nodes) or not len(kept):
+            return kept
+        nodes = kept
+
+
+def _solved(a, b, length, n, dims, rng):
+    """Places (n, dims) that keep the distances, or None."""
+    graph = coo_array((length, (a, b)), shape=(n, n)).tocsr()
+    ways = shortest_path(graph, directed=False)
+    if not np.isfinite(ways).all():
+        return None
+    middle = np.eye(n) - 1 / n
+    values, vectors = np.linalg.eigh(-0.5 * middle @ ways**2 @ middle)
+    start = vectors[:, -dims:] * np.sqrt(np.maximum(values[-dims:], 0.0))
+    for trial in range(TRIES):
+        shake = 0.0 if not trial else 0.3 * np.median(length)
+        xyz = _adjusted(start + shake * rng.normal(size=start.shape), a, b, length)
+        xyz = _unfolded(xyz, a, b, length)
+        off = np.abs(np.linalg.norm(xyz[a] - xyz[b], axis=1) - length)
+        keep = np.sort(off / length)[min(len(off) - 1, int(0.8 * len(off)))]
+        if keep < MISFIT:
+            return xyz if _rigid(xyz, a, b) else None
+    return None
+
+
+def _unfolded(xyz, a, b, length):
+    """Places after those that stand on the wrong side were put where their neighbours want them."""
+    for _ in range(UNFOLDING):
+        off = np.abs(np.linalg.norm(xyz[a] - xyz[b], axis=1) - length) / length
+        worst = np.array([np.median(off[(a == i) | (b == i)]) for i in range(len(xyz))])
+        node = int(np.argmax(worst))
+        if worst[node] < MISFIT:
+            break
+        near = np.concatenate([b[a == node], a[b == node]])
+        away = np.concatenate([length[a == node], length[b == node]])
+        middle = xyz[near].mean(axis=0)
+        rows = 2 * (xyz[near] - middle)
+        right = np.sum((xyz[near] - middle) ** 2, axis=1) - away**2
+        moved = xyz.copy()
+        moved[node] = middle + np.linalg.lstsq(rows, right - right.mean(), rcond=None)[0]
+        moved = _adjusted(moved, a, b, length)
+        new = np.abs(np.linalg.norm(moved[a] - moved[b], axis=1) - length) / length
+        if not new.sum() < off.sum():
+            break
+        xyz = moved
+    return xyz
+
+
+def _rows(xyz, a, b):
+    """Derivatives (n, points dims) of distances, and the distances (n,)."""
+    d = xyz[a] - xyz[b]
+    s = np.maximum(np.linalg.norm(d, axis=1), 1e-12)
+    jac = np.zeros((len(a), *xyz.shape))
+    rows = np.arange(len(a))
+    jac[rows, a] = d / s[:, None]
+    jac[rows, b] = -d / s[:, None]
+    return jac.reshape(len(a), -1), s
+
+
+def _adjusted(xyz, a, b, length):
+    """Places after damped Gauss-Newton steps, weights falling off beyond the median misfit."""
+    damping = 1e-3
+    for _ in range(STEPS):
+        jac, s = _rows(xyz, a, b)
+        off = s - length
+        scale = max(3 * float(np.median(np.abs(off))), 1e-9 * float(length.max()))
+        cost = float(np.sum(np.log1p((off / scale) ** 2)))
+        weight = 1 / (1 + (off / scale) ** 2)
+        normal = (jac * weight[:, None]).T @ jac
+        step = -np.linalg.solve(
+            normal + damping * np.eye(len(normal)), jac.T @ (weight * off)
+        ).reshape(xyz.shape)
+        new = np.linalg.norm((xyz + step)[a] - (xyz + step)[b], axis=1) - length
+        if float(np.sum(np.log1p((new / scale) ** 2))) < cost:
+            xyz, damping = xyz + step, max(damping / 5, 1e-9)
+            if np.abs(step).max() < 1e-9 * length.max():
+                break
+        else:
+            damping *= 10
+            if damping > 1e6:
+                break
+    return xyz
+
+
+def _rigid(xyz, a, b):
+    n, dims = xyz.shape
+    singular = np.linalg.svd(_rows(xyz, a, b)[0], compute_uv=False)
+    needed = n * dims - dims * (dims + 1) // 2
+    return len(singular) >= needed and singular[needed - 1] > LOOSE * singular[0]
+
+
+def _firm(xyz, a, b, dims):
+    """(n,) True for points that cannot be folded over the line or plane of their neighbours."""
+    n = len(xyz)
+    firm = np.ones(n, dtype=bool)
+    if n <= dims + 1:
+        return firm  # folding a triangle or a tetrahedron only mirrors it
+    for node in range(n):
+        near = np.concatenate([b[a == node], a[b == node]])
+        spread = np.linalg.svd(xyz[near] - xyz[near].mean(axis=0), compute_uv=False)
+        firm[node] = len(spread) >= dims and spread[dims - 1] > FLAT * spread[0]
+    return firm

@@ -1,0 +1,90 @@
+"""Local frames of photos that nothing known reaches, and how they join what is known."""
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from tankcal.network.aligning import aligned
+from tankcal.network.clues import grown
+from tankcal.network.growing import grown_by_photos
+from tankcal.network.known import certain
+from tankcal.network.pairing import blind_piece
+from tankcal.network.pieces import BAD_JOINT, joint
+
+
+def with_locals(clues, piece, places, least):
+    """The Piece with local frames of what is left, and sentences about those that do not join.
+
+    places  (photos, 3) projection centres that were given, nan where none was
+    """
+    if not np.isfinite(piece.xyz_m[:, 0]).any() or not np.isfinite(piece.xyz_m[:, 2]).any():
+        piece = grown(clues, piece, least, free=not piece.oriented.any())
+    tried, loose, reasons = piece.oriented.copy(), [], []
+    while not tried.all():
+        own, why = blind_piece(clues.sights, ~tried, clues.points, clues.rng)
+        if own is None:
+            reasons.append(why)
+            break
+        piece, loose = _attached(clues, piece, [*loose, own], least)
+        tried |= own.oriented | piece.oriented
+    if loose and not (piece.oriented.any() or (piece.known & ~_held(clues.survey)).any()):
+        own = max(loose, key=lambda one: one.oriented.sum())
+        motion = aligned(clues.survey, own, piece.xyz_m, places)
+        piece = grown(clues, piece.filled_from(own.moved(motion)), least)
+        piece, loose = _attached(clues, piece, [one for one in loose if one is not own], least)
+    reasons += [_apart(clues.survey, own, piece) for own in loose]
+    return grown(clues, piece, least, free=not np.isfinite(piece.xyz_m[:, 0]).any()), reasons
+
+
+def _attached(clues, piece, loose, least):
+    """The Piece with all loose ones that share enough with it or one another, and the others."""
+    loose = [_stretched(clues, one) for one in loose]
+    while True:
+        for own in loose:
+            joined = _joined(clues, own, piece)
+            if joined is not None:
+                piece = grown(clues, joined, least)
+                loose = [one for one in loose if one is not own]
+                break
+        else:
+            pairs = ((a, b, _joined(clues, a, b)) for a, b in combinations(loose, 2))
+            first, second, joined = next((one for one in pairs if one[2]), (None,) * 3)
+            if joined is None:
+                return piece, loose
+            joined = grown_by_photos(clues.sights, joined, clues.rng, least=least)
+            rest = [one for one in loose if one is not first and one is not second]
+            loose = [*rest, _stretched(clues, joined)]
+
+
+def _joined(clues, own, onto):
+    """The Piece `onto` with what another one adds, or None when too little is common."""
+    motion = joint(own, onto, clues.rng)
+    if motion is None or motion.misfit_m > BAD_JOINT * max(own.extent * motion.scale, 1e-9):
+        return None
+    return onto.filled_from(own.moved(motion))
+
+
+def _held(survey):
+    return np.isfinite(certain(survey).piece.xyz_m).any(axis=1)
+
+
+def _stretched(clues, piece):
+    """The Piece with the scale that distances give it."""
+    plan, known = clues.plan, piece.known
+    use = known[plan.start] & known[plan.end] & ~plan.flat
+    computed = np.linalg.norm(piece.xyz_m[plan.end[use]] - piece.xyz_m[plan.start[use]], axis=1)
+    good = computed > 0
+    if not good.any():
+        return piece
+    scale = float(np.median(plan.length[use][good] / computed[good]))
+    return replace(piece, xyz_m=scale * piece.xyz_m, place_m=scale * piece.place_m)
+
+
+def _apart(survey, own, piece):
+    names = [survey.photos.names[i] for i in np.flatnonzero(own.oriented & ~piece.oriented)]
+    common = int((own.known & piece.known).sum())
+    return (
+        f"photos {', '.join(names[:10])} hang together, but share only {common} known points with "
+        "the rest: 3 that do not lie on a line are needed"
+    )

@@ -1,0 +1,171 @@
+"""Pieces of a survey, with points and photos known in one frame, and how two of them are joined.
+
+    X_onto = scale R X + shift
+
+Three points, or one photo and a further place, fix it; many triples are tried and the one wins that
+most places agree with. Source: Umeyama 1991 (similarity of point sets); Fischler & Bolles 1981.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+TRIPLES = 200
+BAD_JOINT = 0.05  # misfit of a joint, as a share of the extent, beyond which it is none
+FLAT = 0.02  # height over length below which three places lie on a line
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What is known in one frame; nan where nothing is.
+
+    xyz_m      (points, 3)           by_photos  (points,) True: photos may improve it
+    place_m    (photos, 3)           rotation   (photos, 3, 3)
+    """
+
+    xyz_m: np.ndarray
+    by_photos: np.ndarray
+    place_m: np.ndarray
+    rotation: np.ndarray
+
+    @property
+    def known(self):
+        """(points,) True where all three coordinates are known."""
+        return np.isfinite(self.xyz_m).all(axis=1)
+
+    @property
+    def oriented(self):
+        """(photos,) True where place and rotation are known."""
+        return np.isfinite(self.place_m).all(axis=1) & np.isfinite(self.rotation).all(axis=(1, 2))
+
+    @property
+    def extent(self):
+        """Diagonal of the box around all that is known, m."""
+        places = np.vstack([self.xyz_m[self.known], self.place_m[self.oriented]])
+        return float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
+
+    def moved(self, motion):
+        """The piece after a Motion."""
+        return replace(
+            self,
+            xyz_m=motion.of(self.xyz_m),
+            place_m=motion.of(self.place_m),
+            rotation=self.rotation @ motion.rotation.T,
+        )
+
+    def filled_from(self, other):
+        """The piece, with what only the other one (in the same frame) knows."""
+        photos = self.oriented
+        return replace(
+            self,
+            xyz_m=np.where(np.isfinite(self.xyz_m), self.xyz_m, other.xyz_m),
+            by_photos=np.where(self.known, self.by_photos, other.by_photos),
+            place_m=np.where(photos[:, None], self.place_m, other.place_m),
+            rotation=np.where(photos[:, None, None], self.rotation, other.rotation),
+        )
+
+
+@dataclass(frozen=True)
+class Motion:
+    """X_onto = scale rotation X + shift_m; `misfit_m` is what most of the common places keep."""
+
+    rotation: np.ndarray
+    shift_m: np.ndarray
+    scale: float
+    misfit_m: float
+
+    def of(self, xyz_m):
+        """Places (n, 3) after the motion."""
+        return self.scale * xyz_m @ self.rotation.T + self.shift_m
+
+
+def empty(points, photos):
+    """A Piece that knows nothing."""
+    return Piece(
+        np.full((points, 3), np.nan),
+        np.ones(points, dtype=bool),
+        np.full((photos, 3), np.nan),
+        np.full((photos, 3, 3), np.nan),
+    )
+
+
+def joint(piece, onto, rng):
+    """The Motion that brings a piece onto another by points and photos that both know, or None."""
+    points, photos = piece.known & onto.known, piece.oriented & onto.oriented
+    here = np.vstack([piece.xyz_m[points], piece.place_m[photos]])
+    there = np.vstack([onto.xyz_m[points], onto.place_m[photos]])
+    motions = _by_triples(here, there, rng)
+    turns = onto.rotation[photos].transpose(0, 2, 1) @ piece.rotation[photos]
+    motions += [_turned(turn, here, there, piece.place_m[photos][i], onto.place_m[photos][i])
+                for i, turn in enumerate(turns)]  # fmt: skip
+    motions = [one for one in motions if one is not None]
+    if not motions:
+        return None
+    best = min(motions, key=lambda one: one.misfit_m)
+    return _polished(best, here, there)
+
+
+def similarity(here, there, weight=None):
+    """Motion of places (n, 3), not in line, onto others by (weighted) least squares."""
+    w = np.ones(len(here)) if weight is None else weight
+    w = w / w.sum()
+    a, b = w @ here, w @ there
+    p, q = here - a, there - b
+    u, singular, v = np.linalg.svd((q * w[:, None]).T @ p)
+    side = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ v))])
+    rotation = (u * side) @ v
+    scale = float(singular @ side / np.sum(w[:, None] * p * p))
+    return _judged(rotation, b - scale * rotation @ a, scale, here, there)
+
+
+def _judged(rotation, shift, scale, here, there):
+    off = np.linalg.norm(scale * here @ rotation.T + shift - there, axis=1)
+    place = min(len(off) - 1, len(off) // 2 + 1)
+    return Motion(rotation, shift, scale, float(np.partition(off, place)[place]))
+
+
+def _by_triples(here, there, rng):
+    """Motions by triples of common places."""
+    n = len(here)
+    if n < 3:
+        return []
+    triples = rng.integers(0, n, (TRIPLES, 3)) if n > 5 else np.array(
+        [(i, j, k) for i in range(n) for j in range(i + 1, n) for k in range(j + 1, n)]
+    )  # fmt: skip
+    found = []
+    for triple in triples:
+        sides = here[triple[1:]] - here[triple[0]]
+        extent = max(np.sum(sides**2, axis=1).max(), np.sum((sides[1] - sides[0]) ** 2))
+        if np.linalg.norm(np.cross(*sides)) > FLAT * extent:
+            motion = similarity(here[triple], there[triple])
+            found.append(_judged(motion.rotation, motion.shift_m, motion.scale, here, there))
+    return found
+
+
+def _turned(turn, here, there, centre, onto):
+    """The Motion with a known rotation that brings one place onto another; scale from the rest."""
+    before = np.linalg.norm(here - centre, axis=1)
+    after = np.linalg.norm(there - onto, axis=1)
+    apart = before > 1e-6 * max(before.max(initial=0.0), 1e-30)
+    scale = float(np.median(after[apart] / before[apart])) if apart.any() else 1.0
+    if not scale > 0:
+        return None
+    return _judged(turn, onto - scale * turn @ centre, scale, here, there)
+
+
+def _polished(motion, here, there):
+    """The Motion by all places, weights falling off beyond its misfit."""
+    if len(here) < 3:
+        return motion
+    for _ in range(5):
+        off = np.linalg.norm(motion.of(here) - there, axis=1)
+        weight = 1 / (1 + (off / max(2 * motion.misfit_m, 1e-12)) ** 2)
+        spread = np.linalg.svd((here - np.average(here, axis=0, weights=weight))
+                               * np.sqrt(weight)[:, None], compute_uv=False)  # fmt: skip
+        if spread[1] < FLAT * spread[0]:
+            return motion
+        found = similarity(here, there, weight)
+        if not found.misfit_m < motion.misfit_m * (1 - 1e-6):
+            break
+        motion = found
+    return motion

@@ -1,0 +1,82 @@
+"""What is left without a start value, in words."""
+
+import numpy as np
+
+from tankcal.errors import SolutionError
+from tankcal.observations import Distances, HeightDifferences, VerticalAngles
+
+LISTED = 10
+
+
+def refuse_missing(survey, sights, xyz_m, piece, sets, reasons):
+    """Coordinates (points, 3) without gaps; points that nothing determines stand in the middle.
+
+    Those have too few observations for an adjustment, too, which sets them aside by name. Raises
+    SolutionError when a photo, a point that something determines, or a circle has no start.
+    """
+    hopeless = _hopeless(survey)
+    missing = np.isnan(xyz_m) & ~hopeless[:, None]
+    told = []
+    known = np.isfinite(xyz_m).all(axis=1)
+    for photo in np.flatnonzero(~piece.oriented):
+        count = known[sights[photo].point].sum()
+        told.append(f"photo {survey.photos.names[photo]} ({count} known points)")
+    whole = np.flatnonzero(missing[:, :2].any(axis=1))
+    told += _listed("point", [survey.points[i] for i in whole])
+    flat = np.isfinite(xyz_m[:, :2]).all(axis=1) & np.isnan(xyz_m[:, 2])
+    level = np.flatnonzero(flat if (flat & ~hopeless).any() else flat & ~hopeless)
+    if not told:
+        told += _listed("orientation of direction set", list(np.flatnonzero(np.isnan(sets)) + 1))
+    sentences = ["no approximate values for " + ", ".join(told)] if told else []
+    if len(level):
+        sentences.append(_no_heights(survey, level))
+    if sentences:
+        raise SolutionError("; ".join(sentences + [one for one in reasons if one]))
+    middle = np.nanmean(xyz_m, axis=0) if known.any() else np.zeros(3)
+    return np.where(np.isnan(xyz_m), middle, xyz_m)
+
+
+def hanging(survey, local, known):
+    """A sentence about points (points,) of a local frame in plan that joins no known ones."""
+    names = [str(survey.points[i]) for i in np.flatnonzero(local & ~known)]
+    some = ", ".join(names[:LISTED]) + (", ..." if len(names) > LISTED else "")
+    common = int((local & known).sum())
+    return (
+        f"points {some} hang together, but share only {common} known point{'s' * (common != 1)} "
+        "with the rest: 2 are needed, or 1 and an azimuth"
+    )
+
+
+def _listed(what, names):
+    more = [f"{len(names) - LISTED} more"] if len(names) > LISTED else []
+    return [f"{what} {name}" for name in names[:LISTED]] + more
+
+
+def _no_heights(survey, level):
+    names = ", ".join(str(survey.points[i]) for i in level[:LISTED])
+    names += ", ..." if len(level) > LISTED else ""
+    kinds = (HeightDifferences, VerticalAngles)
+    observed = any(isinstance(one, kinds) and len(one) for one in survey.observations)
+    spatial = any(isinstance(one, Distances) and not one.horizontal for one in survey.observations)
+    why = "no zenith angle, vertical angle or levelled height difference was observed"
+    if observed:
+        why = "they hang on no point with a known z"
+    end = "; distances are taken as spatial ones unless kind = horizontal" if spatial else ""
+    return f"the heights (z) of {names} are not determined: {why}; give their z as control{end}"
+
+
+def _hopeless(survey):
+    """(points,) True where fewer than three values speak of a point."""
+    count = np.zeros(len(survey.points), dtype=int)
+    images = survey.image_points
+    if images is not None:
+        seen = images.point if images.use is None else images.point[images.use > 0]
+        count += 2 * np.bincount(seen, minlength=len(count))
+    for one in survey.observations:
+        for name in one.ties:
+            point = getattr(one, name)
+            point = point if one.use is None else point[one.use > 0]
+            count += one.rows * np.bincount(point, minlength=len(count))
+    if survey.fixed is not None:
+        count += survey.fixed.sum(axis=1)
+    return count < 3

@@ -1,0 +1,164 @@
+"""A survey adjusted: from the measurements as they were read to points with their covariance."""
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.surveys.causes import causes_of
+from tankcal.surveys.checks import check_points, check_readings
+from tankcal.surveys.cleaning import searched
+from tankcal.surveys.diagnoses import MIRROR, diagnosed
+from tankcal.surveys.frames import framed
+from tankcal.surveys.gathering import gather, named_in
+from tankcal.surveys.results import Adjustment
+from tankcal.surveys.rows import gone_with_their_points, readings_of
+from tankcal.surveys.screening import gross_readings, swapped_at_start
+from tankcal.surveys.spelling import names_alike, same_place
+from tankcal.surveys.starts import mirrored_targets, started
+from tankcal.surveys.trials import likely_mistake, photos_that_do_not_fit
+
+SUSPICIOUS = 4.0  # sigma0 above which whole files are doubted
+LOST = 0.2  # share of the readings set aside, above which they are
+TRIED = 25  # iterations of a survey that is only supposed
+FILES = ("image_points.csv", "photos.csv", "control.csv")  # first in the list of readings
+
+
+def adjust_survey(measurements, tell=None):
+    """Adjust everything that was measured on site: the Adjustment of job.Measurements.
+
+    tell  tell(text) is called with what is being done
+
+    Raises InputError for what cannot be meant, SolutionError (in words, with a likely cause where
+    one is found) when the survey does not determine what is asked for.
+    """
+    tell = tell or (lambda text: None)
+    try:
+        search, gathered, frame = _adjusted(measurements, tell)
+    except SolutionError as error:
+        tell("looking for what is wrong")
+        told = _why_not(measurements, str(error))
+        if not told:
+            raise
+        raise SolutionError("\n".join([str(error), *map(str, told)])) from error
+    tell("working out what the residuals say")
+    return _complete(search, gathered, frame, measurements)
+
+
+def _adjusted(measurements, tell, snooping=None, most=100):
+    """Searched, Gathered and Frame of measurements."""
+    gathered = gather(measurements)
+    if not gathered.survey.points:
+        raise InputError(Problem("job.toml", "the survey has no observations to be adjusted"))
+    tell(f"finding approximate values of {len(gathered.survey.points)} points")
+    survey = started(gathered, measurements)
+    swapped = swapped_at_start(survey, gathered.known)
+    if swapped:
+        raise SolutionError("\n".join(map(str, swapped)))
+    frame = framed(survey, gathered, measurements.settings)
+    tell(f"adjusting {_count(frame.survey)} observations")
+    wanted = measurements.settings.snooping if snooping is None else snooping
+    gross = gross_readings(frame.survey) if wanted else None
+    options = {**frame.options, "max_iterations": most}
+    return searched(frame.survey, options, gross), gathered, frame
+
+
+def _tried(measurements, snooping=False):
+    """network.Adjusted and Gathered of measurements that are only supposed."""
+    search, gathered, _ = _adjusted(measurements, lambda text: None, snooping, TRIED)
+    return search.adjusted, gathered
+
+
+def _why_not(measurements, message):
+    """Problem rows that may explain why a survey could not be adjusted."""
+    if "datum defect" in message or MIRROR in message:
+        return []
+    lost = photos_that_do_not_fit(measurements, message, _tried)
+    return lost or likely_mistake(measurements, np.inf, _tried)
+
+
+def _count(survey):
+    images = 0 if survey.image_points is None else 2 * len(survey.image_points.point)
+    return images + sum(len(one) * one.rows for one in survey.observations)
+
+
+def _complete(search, gathered, frame, measurements):
+    """The Adjustment of what was adjusted."""
+    adjusted = search.adjusted
+    scale, warnings = _cov_scale(adjusted, measurements.settings)
+    warnings = [*gathered.warnings, *frame.warnings, *search.warnings, *warnings]
+    readings, groups = readings_of(adjusted, gathered.traces)
+    readings += gone_with_their_points(adjusted, search.removed, gathered.traces)
+    removed = sorted((one for one in readings if one.removed), key=lambda one: -abs(one.w))
+    readings += check_readings(adjusted, gathered.checks, scale)
+    readings = _in_order(readings)
+    there = np.flatnonzero(np.isfinite(adjusted.xyz_m).all(axis=1))
+    names = tuple(adjusted.survey.points[i] for i in there)
+    late = {i: why for i, why in enumerate(adjusted.problem.set_aside) if why}
+    warnings += [_lost(measurements, adjusted.survey.points[i], why) for i, why in late.items()]
+    warnings += _doubts(adjusted, readings, groups, gathered, measurements)
+    known = gathered.known
+    acting = frame.held
+    if measurements.settings.datum == "control":
+        acting = np.isfinite(known.xyz_m) & np.isfinite(known.sd_m)
+    return Adjustment(
+        names=names,
+        xyz_m=adjusted.xyz_m[there],
+        covariance_m2=scale * adjusted.point_covariances_m2[there],
+        fixed=adjusted.problem.layout.points[there] < 0,
+        aside=(*gathered.aside, *late.values()),
+        adjusted=adjusted,
+        readings=tuple(readings),
+        removed=tuple(removed),
+        groups=groups,
+        datum=frame.report,
+        check_points=check_points(adjusted, measurements, known, acting, scale),
+        causes=causes_of(adjusted, there, scale),
+        cov_scale=scale,
+        sigma0=adjusted.sigma0,
+        observations=adjusted.solution.rows,
+        unknowns=adjusted.solution.unknowns,
+        redundancy=adjusted.dof,
+        iterations=adjusted.solution.iterations,
+        rounds=search.rounds,
+        warnings=tuple(warnings),
+    )
+
+
+def _lost(measurements, name, why):
+    """Problem of a point that the search for blunders left with too few readings."""
+    file, row = named_in(measurements, name)
+    return Problem(file, f"{why} left after the search for blunders", row)
+
+
+def _doubts(adjusted, readings, groups, gathered, measurements):
+    """Problem rows: what the result says about mistakes in the input."""
+    found = diagnosed(adjusted, readings, groups, gathered.known)
+    found += names_alike(gathered.lost, adjusted.survey.points) + same_place(adjusted)
+    found += mirrored_targets(adjusted.xyz_m, adjusted.survey.points, measurements)
+    removed = sum(one.removed for one in readings)
+    if adjusted.sigma0 > SUSPICIOUS or removed > LOST * max(len(readings), 1):
+        try:
+            sigma0 = _tried(measurements)[0].sigma0 if removed else adjusted.sigma0
+        except SolutionError:
+            sigma0 = np.inf
+        found += likely_mistake(measurements, sigma0, _tried)
+    return found
+
+
+def _in_order(readings):
+    """Readings by file, then row, in the order in which they stand there."""
+    files = {one.file for one in readings}
+    files = [one for one in FILES if one in files] + sorted(files - set(FILES))
+    rank = {name: i for i, name in enumerate(files)}
+    of = np.array([rank[one.file] for one in readings])
+    row = np.array([-1 if one.row is None else one.row for one in readings])
+    return [readings[i] for i in np.lexsort((row, of)).tolist()]
+
+
+def _cov_scale(adjusted, settings):
+    """Variance factor of the covariances that go on, and what is to be said about it."""
+    if settings.scale != "a_posteriori":
+        return 1.0, []
+    if adjusted.dof > 0 and adjusted.sigma0 > 0:
+        return adjusted.sigma0**2, []
+    text = "nothing is redundant: covariances keep the a-priori scale"
+    return 1.0, [Problem("job.toml", text, None, "adjustment.scale")]

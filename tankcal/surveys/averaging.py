@@ -1,0 +1,106 @@
+"""Repeated readings become one: weighted means, and whether their scatter is what was declared.
+
+With weights p = 1/s2 of the readings of one value:   mean = sum(p l) / sum(p),   s2 = 1 / sum(p),
+chi2 = sum(p (l - mean)2) with one degree of freedom fewer than readings. The adjustment of the
+means gives the same unknowns and covariance as that of all readings. Source: Koch 1999, section 3.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.stats
+
+from tankcal.errors import Problem
+
+LEVEL = 0.001  # of the tests of scatter, for all readings of a file together
+
+
+@dataclass(frozen=True)
+class Averages:
+    """Means of n different values, in the order of their first readings.
+
+    value, sd  (n, m)             first  (n,) number of the first reading
+    repeats    (n,)               chi2   (n, m) scatter of the readings, in their sds
+    """
+
+    value: np.ndarray
+    sd: np.ndarray
+    first: np.ndarray
+    repeats: np.ndarray
+    chi2: np.ndarray
+
+
+def averaged(label, value, sd, *, angle=False):
+    """The Averages of readings that have the same label.
+
+    label      (n,) whole numbers       value, sd  (n,) or (n, m)
+    angle      True: a full turn (rad) is no difference
+
+    Readings that are fixed (sd 0) stay as they are, each on its own.
+    """
+    n = len(label)
+    value, sd = (np.asarray(a, dtype=float).reshape(n, -1) for a in (value, sd))
+    fixed = (sd == 0).any(axis=1)
+    label = np.where(fixed, np.max(label, initial=0) + 1 + np.arange(n), label)
+    _, first, group, repeats = np.unique(
+        label, return_index=True, return_inverse=True, return_counts=True
+    )
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    first, group, repeats = first[order], rank[group], repeats[order]
+    away = value - value[first][group]
+    if angle:
+        away -= 2 * np.pi * np.round(away / (2 * np.pi))
+    weight = 1.0 / np.where(sd > 0, sd, 1.0) ** 2
+    total, mean, chi2 = (np.zeros((len(first), value.shape[1])) for _ in range(3))
+    np.add.at(total, group, weight)
+    np.add.at(mean, group, weight * away)
+    mean /= total
+    np.add.at(chi2, group, weight * (away - mean[group]) ** 2)
+    mean_sd = np.where((repeats == 1)[:, None], sd[first], 1.0 / np.sqrt(total))
+    return Averages(value[first] + mean, mean_sd, first, repeats, chi2)
+
+
+def scatter_warnings(averages, name_of, file, rows):
+    """Problem rows for repeated readings that scatter other than their sds say.
+
+    averages  Averages       name_of  name_of(i) -> the i-th value in words
+    rows      (readings,) of the file, or ()
+
+    Each value is tested, at a level that errs for one file in a thousand; and all values together.
+    """
+    dof = (averages.repeats - 1)[:, None] * np.ones(averages.chi2.shape[1], dtype=int)
+    tested = int(np.count_nonzero(dof))
+    if not tested:
+        return []
+    limit = scipy.stats.chi2.isf(LEVEL / tested, np.maximum(dof, 1))
+    ratio = np.where(dof > 0, averages.chi2 / limit, 0.0).max(axis=1)
+    found = []
+    for i in np.argsort(-ratio)[:5]:
+        if ratio[i] > 1:
+            share = np.sqrt((averages.chi2[i] / dof[i]).max())
+            row = rows[averages.first[i]] if len(rows) else None
+            found.append(
+                Problem(
+                    file,
+                    f"the {averages.repeats[i]} readings of {name_of(i)} scatter {share:.1f} "
+                    "times as much as their standard deviations say",
+                    row,
+                )
+            )
+    return found + _of_all(averages.chi2.sum(), int(dof.sum()), file, bool(found))
+
+
+def _of_all(chi2, dof, file, told):
+    share = np.sqrt(chi2 / dof)
+    high, low = scipy.stats.chi2.isf([LEVEL / 2, 1 - LEVEL / 2], dof)
+    if low <= chi2 <= high or (told and chi2 > high):
+        return []
+    return [
+        Problem(
+            file,
+            f"all repeated readings together scatter {share:.2f} times as much as their standard "
+            f"deviations say ({dof} degrees of freedom)",
+        )
+    ]

@@ -1,0 +1,245 @@
+"""What holds the frame of a survey: the choice of a datum, and what it is worth."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy.linalg
+
+from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.network.assembly import assemble
+from tankcal.network.datum import directions, in_words, unobserved
+from tankcal.observations import ControlCoordinates
+from tankcal.surveys.results import DatumReport
+
+AXES = "xyz"
+SHARE = 1e-6  # of a way of moving in a combination, below which it is not in it
+STILL = 1e-9  # motion of all unknowns over the largest, below which nothing moves
+WEAK = 1e-6  # smallest pivot of held coordinates over the largest, below which they hold too little
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A survey with its datum.
+
+    survey    to be adjusted          options   of network.adjust: datum, over
+    report    DatumReport             held      (points, 3) True: control that holds the datum
+    warnings  tuple of Problem
+    """
+
+    survey: object
+    options: dict
+    report: DatumReport
+    held: np.ndarray
+    warnings: tuple = field(default=())
+
+
+def framed(survey, gathered, settings):
+    """The Frame of a survey with start values; raises SolutionError when the datum is missing."""
+    bare = without_control(survey, gathered)
+    problem = assemble(bare)
+    free = _free(problem)
+    choose = {"control": _control, "minimal": _minimal, "fixed_photo": _photo, "inner": _inner}
+    chosen, options, held, names, warnings = choose[settings.datum](
+        survey, bare, problem, free, gathered, settings
+    )
+    known = _known_frame(chosen, bare, gathered, settings, held, options)
+    undetermined = _free(assemble(known)) if free.shape[1] else free
+    report = DatumReport(
+        choice=settings.datum,
+        defect=free.shape[1],
+        words=in_words(free, problem).split(";")[0] if free.shape[1] else "",
+        held=tuple(names),
+        vertical=not _moves(undetermined, (3, 4)),
+        scale=not _moves(undetermined, (6,)),
+    )
+    return Frame(chosen, options, report, held, tuple(warnings))
+
+
+def _free(problem):
+    """Ways (7, d) in which something can move that nothing observes.
+
+    A rotation about a line on which everything lies (heights alone, all at one place) moves
+    nothing: it is none of them.
+    """
+    found = unobserved(problem)
+    if not found.shape[1]:
+        return found
+    moves = directions(problem.layout, problem.state) @ found
+    _, size, ways = np.linalg.svd(moves, full_matrices=False)
+    return found @ ways[size > STILL * max(size.max(), 1e-9)].T
+
+
+def without_control(survey, gathered):
+    """The survey without control in its own frame, weighted or fixed."""
+    observations = tuple(
+        replace(one, use=np.zeros(len(one))) if isinstance(one, ControlCoordinates) else one
+        for one in survey.observations
+    )
+    kept = tuple(one for one in observations if one.use is None or one.use.any())
+    return replace(survey, observations=kept, fixed=gathered.idle)
+
+
+def _moves(combinations, ways):
+    """Whether some combination (7, d) has a part of one of the ways."""
+    if not combinations.shape[1]:
+        return False
+    share = np.sum(np.linalg.qr(combinations)[0] ** 2, axis=1)
+    return bool((share[list(ways)] > SHARE).any())
+
+
+def _known_frame(chosen, bare, gathered, settings, held, options):
+    """The survey with that part of its datum which somebody knows: declared, not only assumed."""
+    declared = np.isfinite(gathered.known.xyz_m) & np.isfinite(gathered.known.sd_m)
+    if settings.datum == "control":
+        return chosen
+    if settings.datum == "fixed_photo":
+        return bare
+    if settings.datum == "inner":
+        held = np.zeros_like(declared)
+        over = options.get("over")
+        if over is not None and declared[over].all() and len(over) > 2:
+            held[over] = True
+    return replace(bare, fixed=gathered.idle | (held & declared))
+
+
+def _control(survey, bare, problem, free, gathered, settings):
+    """All control coordinates act as they were given."""
+    known = gathered.known
+    acting = np.isfinite(known.xyz_m) & np.isfinite(known.sd_m)
+    missing = _free(assemble(survey)) if free.shape[1] else free
+    if missing.shape[1]:
+        raise SolutionError(in_words(missing, assemble(survey)))
+    return survey, {}, acting & (known.sd_m == 0), _named(survey, acting), []
+
+
+def _minimal(survey, bare, problem, free, gathered, settings):
+    """As many control coordinates as the defect are held, far apart unless they are named."""
+    d, warnings = free.shape[1], []
+    none = np.zeros((len(survey.points), 3), dtype=bool)
+    if not d:
+        return bare, {}, none, (), [_nothing_left("minimal")]
+    rows = _motions(problem, free)
+    if settings.datum_points:
+        wanted = np.flatnonzero(_wanted(survey, settings))
+    else:
+        declared = np.isfinite(gathered.known.xyz_m) & ~gathered.idle
+        candidates = declared if declared.any() else ~gathered.idle
+        wanted = _spread(rows, np.flatnonzero(candidates), d)
+    held = none.copy()
+    held.ravel()[wanted] = True
+    rank = _rank(rows[wanted])
+    if rank < d:
+        raise SolutionError(
+            f"{in_words(free, problem).split(';')[0]}; the {len(wanted)} coordinates held "
+            f"({', '.join(_named(survey, held))}) fix {rank} of {d}: name others in datum_points, "
+            "add control or choose datum = inner"
+        )
+    if len(wanted) > d:
+        text = (
+            f"{len(wanted)} coordinates are held where {d} would do: the others strain the network"
+        )
+        warnings.append(Problem("job.toml", text, None, "adjustment.datum_points"))
+    xyz = np.where(held & np.isfinite(gathered.known.xyz_m), gathered.known.xyz_m, survey.xyz_m)
+    chosen = replace(bare, xyz_m=xyz, fixed=bare.fixed | held)
+    return chosen, {}, held, _named(survey, held), warnings
+
+
+def _photo(survey, bare, problem, free, gathered, settings):
+    """One photo keeps its place and its directions."""
+    names = () if survey.photos is None else survey.photos.names
+    name = settings.fixed_photo or (names[0] if names else None)
+    if name not in names:
+        raise InputError(
+            Problem(
+                "job.toml", f"{name} is no photo of this survey", None, "adjustment.fixed_photo"
+            )
+        )
+    fixed = survey.photos.fixed.copy()
+    fixed[names.index(name)] = True
+    chosen = replace(bare, photos=replace(survey.photos, fixed=fixed))
+    left = _free(assemble(chosen))
+    if left.shape[1]:
+        raise SolutionError(in_words(left, problem))
+    warnings = []
+    if free.shape[1] < 6:
+        text = (
+            f"photo {name} is held in 6 ways where {free.shape[1]} would do, the others are "
+            "determined by observations: the photo strains the network"
+        )
+        warnings.append(Problem("job.toml", text, None, "adjustment.fixed_photo"))
+    held = np.zeros((len(survey.points), 3), dtype=bool)
+    return chosen, {}, held, (f"photo {name}",), warnings
+
+
+def _inner(survey, bare, problem, free, gathered, settings):
+    """Chosen points keep their places on the whole."""
+    held = np.zeros((len(survey.points), 3), dtype=bool)
+    if not free.shape[1]:
+        return bare, {}, held, (), [_nothing_left("inner")]
+    if settings.datum_points:
+        over = np.flatnonzero(_wanted(survey, settings).any(axis=1))
+    else:
+        over = np.flatnonzero(np.isfinite(gathered.known.xyz_m).all(axis=1))
+        over = over if len(over) > 2 else np.arange(len(survey.points))
+    rank = _rank(
+        _motions(problem, free).reshape(-1, 3, free.shape[1])[over].reshape(-1, free.shape[1])
+    )
+    if rank < free.shape[1]:
+        raise SolutionError(
+            f"{in_words(free, problem).split(';')[0]}; inner constraints over {len(over)} points "
+            f"fix {rank} of {free.shape[1]}: take more points, not all on one line"
+        )
+    known = gathered.known.xyz_m
+    xyz = np.where(np.isfinite(known), known, survey.xyz_m)
+    names = tuple(survey.points[i] for i in over) if len(over) < len(survey.points) else ("all",)
+    return replace(bare, xyz_m=xyz), {"datum": "inner", "over": over}, held, names, []
+
+
+def _nothing_left(choice):
+    text = f"observations determine the frame already: nothing is left for datum = {choice}"
+    return Problem("job.toml", text, None, "adjustment.datum")
+
+
+def _motions(problem, free):
+    """Change (3 points, d) of all coordinates by what is free, each way scaled to size one."""
+    layout = problem.layout
+    ways = np.vstack([directions(layout, problem.state), np.zeros(7)])[layout.points.ravel()] @ free
+    size = np.sqrt(np.mean(ways**2, axis=0))
+    return ways / np.where(size > 0, size, 1.0)
+
+
+def _spread(rows, candidates, d):
+    """d of the candidates that hold the free ways best: largest volume, one after the other."""
+    _, _, order = scipy.linalg.qr(rows[candidates].T, mode="economic", pivoting=True)
+    return np.sort(candidates[order[:d]])
+
+
+def _rank(rows):
+    if not len(rows):
+        return 0
+    values = np.linalg.svd(rows, compute_uv=False)
+    return int(np.sum(values > WEAK * np.sqrt(len(rows))))
+
+
+def _wanted(survey, settings):
+    """(points, 3) the coordinates that `datum_points` names."""
+    found = np.zeros((len(survey.points), 3), dtype=bool)
+    missing = []
+    for name, axes in settings.datum_points:
+        if name in survey.points:
+            found[survey.points.index(name), [AXES.index(axis) for axis in axes]] = True
+        else:
+            missing.append(
+                Problem("job.toml", f"{name} is no adjusted point", None, "adjustment.datum_points")
+            )
+    if missing:
+        raise InputError(missing)
+    return found
+
+
+def _named(survey, mask):
+    """Names with axes of the coordinates of a mask (points, 3)."""
+    return tuple(
+        f"{survey.points[i]}:{''.join(AXES[k] for k in np.flatnonzero(mask[i]))}"
+        for i in np.flatnonzero(mask.any(axis=1))
+    )

@@ -1,0 +1,103 @@
+"""Points that cannot be adjusted, and coordinates that no observation touches."""
+
+import numpy as np
+
+from tankcal.errors import Problem
+from tankcal.observations import (
+    Azimuths,
+    ControlCoordinates,
+    Directions,
+    Distances,
+    HeightDifferences,
+    HorizontalAngles,
+    PlumbLines,
+    SystemCoordinates,
+)
+
+IN_PLAN = (Azimuths, Directions, HorizontalAngles, PlumbLines)
+
+
+def left_out(survey):
+    """{point: why} of the points that have too few observations."""
+    plan, height, rows, rays, measured = _counts(survey)
+    held = np.zeros((len(survey.points), 3), dtype=bool) if survey.fixed is None else survey.fixed
+    plan_held, height_held = held[:, :2].sum(axis=1), held[:, 2]
+    in_plan, in_height = plan > 0, height > 0
+    needed = 2 * in_plan + in_height
+    have = rows + plan_held * in_plan + height_held * in_height
+    poor = (have < needed) | (in_plan & (plan + plan_held < 2)) | ~measured
+    return {
+        survey.points[i]: _why(survey.points[i], rays[i], rows[i], needed[i], measured[i])
+        for i in np.flatnonzero(poor)
+    }
+
+
+def _why(name, rays, rows, needed, measured):
+    if not measured:
+        return f"point {name} is not measured"
+    if rays == 1 and rows == 2:
+        return f"point {name} has one ray"
+    return f"point {name} has too few observations: {rows} for {needed} coordinates"
+
+
+def sorted_out(survey):
+    """(points, 3) True where nothing touches a coordinate, and warnings that say so."""
+    plan, height, _, _, _ = _counts(survey)
+    idle = np.column_stack([plan == 0, plan == 0, height == 0])
+    warnings = []
+    for columns, what in ((slice(0, 2), "x and y"), (slice(2, 3), "z")):
+        names = [survey.points[i] for i in np.flatnonzero(idle[:, columns].all(axis=1))]
+        if names:
+            shown = ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
+            verb = "keep" if len(names) > 1 else "keeps"
+            warnings.append(
+                Problem(
+                    "job.toml",
+                    f"no observation says anything about {what} of {shown}: {len(names)} points "
+                    f"{verb} the value that was given, or 0",
+                    None,
+                    "adjustment",
+                )
+            )
+    return idle, warnings
+
+
+def _counts(survey):
+    """Rows that speak about plan, height and all of each point; its rays; whether measured."""
+    n = len(survey.points)
+    plan, height, rows = np.zeros((3, n), dtype=int)
+    rays, measured = np.zeros(n, dtype=int), np.zeros(n, dtype=bool)
+    images = survey.image_points
+    if images is not None:
+        rays = np.bincount(images.point, minlength=n)
+        measured |= rays > 0
+        for counter in (plan, height, rows):
+            counter += 2 * rays
+    for one in survey.observations:
+        in_plan, in_height = _speaks(one)
+        for name in one.ties:
+            count = one.rows * np.bincount(getattr(one, name), minlength=n)
+            if isinstance(one, ControlCoordinates):
+                _add_control(one, plan, height, rows)
+                continue
+            plan += count * in_plan
+            height += count * in_height
+            rows += count
+            measured |= (count > 0) & (not isinstance(one, SystemCoordinates))
+    return plan, height, rows, rays, measured
+
+
+def _speaks(one):
+    """Whether observations say something about the plan, about heights."""
+    if isinstance(one, HeightDifferences):
+        return False, True
+    if isinstance(one, IN_PLAN) or (isinstance(one, Distances) and one.horizontal):
+        return True, False
+    return True, True
+
+
+def _add_control(one, plan, height, rows):
+    flat = one.axis < 2
+    np.add.at(plan, one.point[flat], 1)
+    np.add.at(height, one.point[~flat], 1)
+    np.add.at(rows, one.point, 1)
