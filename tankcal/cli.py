@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import tankcal
-from tankcal.errors import InputError, Problem, TankcalError
+from tankcal.errors import InputError, Problem, SolutionError, TankcalError
 
 DESCRIPTION = """\
 tankcal calibrates storage tanks: from surveyed points of the wall to the capacity
@@ -20,6 +20,10 @@ a new tank, step by step:
   tankcal run my-tank           compute it; the results are in my-tank/results
   tankcal run my-tank/job.xlsx  the same, from the workbook
   tankcal lint table.csv        look for mistakes in any capacity table
+
+photographs, distances, angles and levels instead of surveyed points:
+  tankcal new my-tank --survey photos          (or total-station) write such a job
+  tankcal run my-tank --only adjustment        adjust the survey; no tank is needed
 
 exit status: 0 done; 2 the input must be mended (one line per problem: file, row, column, what was
 expected; earlier results stay as they were); 3 the survey has no sound solution.
@@ -68,23 +72,7 @@ def _parser():
     parser.add_argument("--version", action="version", version=f"tankcal {tankcal.__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    run = commands.add_parser(
-        "run",
-        help="compute a job and write its results",
-        description="Read and check a job, compute it, and write the results, all or nothing: "
-        "record.json, points.csv, sections.csv, capacity.csv, capacity.xlsx, report.ipynb, "
-        "certificate.pdf, working-papers.pdf, report.pdf (both) and report.html.",
-    )
-    run.add_argument("job", metavar="JOB", help="a job folder, its job.toml, or a job workbook")
-    run.add_argument(
-        "--out",
-        metavar="DIR",
-        help="where to write (default: results in the job's folder, or NAME-results beside "
-        "NAME.xlsx); earlier results there are replaced",
-    )
-    run.add_argument("--quiet", action="store_true", help="no progress, only problems")
-    run.set_defaults(command=_run)
-
+    _add_run(commands)
     new = commands.add_parser(
         "new",
         help="write an empty job to fill in",
@@ -97,6 +85,11 @@ def _parser():
         choices=("vertical", "horizontal", "sphere", "mesh"),
         default="vertical",
         help="kind of tank (default: vertical)",
+    )
+    new.add_argument(
+        "--survey",
+        choices=("photos", "total-station"),
+        help="with files for photographs or total-station readings, in place of surveyed points",
     )
     new.set_defaults(command=_new)
 
@@ -111,6 +104,39 @@ def _parser():
 
     _add_lint(commands)
     return parser
+
+
+def _add_run(commands):
+    run = commands.add_parser(
+        "run",
+        help="compute a job and write its results",
+        description="Read and check a job, compute it, and write the results, all or nothing: "
+        "record.json, points.csv, sections.csv, capacity.csv, capacity.xlsx, report.ipynb, "
+        "certificate.pdf, working-papers.pdf, report.pdf (both) and report.html. An adjusted "
+        "survey adds points_cov.npz, photos.csv, cameras.csv, groups.csv and residuals.csv.",
+        epilog="exit status: 0 done; 2 the input must be mended; 3 no sound solution, or, with "
+        "--strict, the global test of the adjustment failed. Then nothing is written.",
+    )
+    run.add_argument("job", metavar="JOB", help="a job folder, its job.toml, or a job workbook")
+    run.add_argument(
+        "--out",
+        metavar="DIR",
+        help="where to write (default: results in the job's folder, or NAME-results beside "
+        "NAME.xlsx); earlier results there are replaced",
+    )
+    run.add_argument(
+        "--only",
+        choices=("adjustment",),
+        help="stop after the adjustment of the survey; no tank is needed, and adjustment.xlsx "
+        "takes the place of capacity.xlsx",
+    )
+    run.add_argument(
+        "--strict",
+        action="store_true",
+        help="write nothing when the global test of the adjustment fails (exit status 3)",
+    )
+    run.add_argument("--quiet", action="store_true", help="no progress, only problems")
+    run.set_defaults(command=_run)
 
 
 def _add_lint(commands):
@@ -147,7 +173,9 @@ def _positive(text):
 
 def _run(options):
     source = Path(options.job)
-    _compute(source, Path(options.out) if options.out else _default_out(source), options.quiet)
+    out = Path(options.out) if options.out else _default_out(source)
+    compute = _adjust if options.only == "adjustment" else _compute
+    compute(source, out, options.quiet, options.strict)
 
 
 def _default_out(source):
@@ -162,7 +190,7 @@ def _demo(options):
     _compute(shipped("examples") / "silva-1995", Path(options.out), options.quiet)
 
 
-def _compute(source, out, quiet):
+def _compute(source, out, quiet, strict=False):
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: a second thread costs time
     from tankcal import outputs
 
@@ -171,19 +199,86 @@ def _compute(source, out, quiet):
     job = tankcal.load(source)
     outputs.refuse_foreign(out)
     result = tankcal.run(job, show.step)
+    adjustment = getattr(result, "adjustment", None)
+    if strict:
+        _refuse_failed(adjustment)
     paths = outputs.write(result, out, show.part)
     show.end()
-    for warning in result.warnings:
-        print(f"tankcal: warning: {warning}", file=sys.stderr)
+    _warn(result.warnings)
+    if adjustment is not None:
+        print(_summary(adjustment))
     top = result.at(result.table.height_m[-1])
     points = ""
     if result.accepted is not None:
         accepted = len(result.accepted)
-        points = f", {accepted} points of the wall, {len(job.points.names) - accepted} rejected"
+        surveyed = len(result.job.points.names)
+        points = f", {accepted} points of the wall, {surveyed - accepted} rejected"
     print(
         f"{job.tank.id}: {top.value_m3:.3f} m3 at {result.table.height_m[-1]:.3f} m, "
         f"U = {top.U_m3:.3f} m3 (k = {top.k:.2f}){points}"
     )
+    _list(out, paths)
+
+
+def _adjust(source, out, quiet, strict):
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from tankcal import outputs
+
+    show = _Progress(quiet)
+    show.step(f"reading {source}")
+    job = tankcal.load(source, only="adjustment")
+    outputs.refuse_foreign(out)
+    adjustment = tankcal.adjust_job(job, show.step)
+    if strict:
+        _refuse_failed(adjustment)
+    paths = outputs.write_adjustment(job, adjustment, out, show.part)
+    show.end()
+    _warn(dict.fromkeys((*job.warnings, *adjustment.warnings)))
+    print(_summary(adjustment))
+    _list(out, paths)
+
+
+def _refuse_failed(adjustment):
+    """Raise when there is an adjustment and its global test failed."""
+    if adjustment is None or adjustment.redundancy <= 0:
+        return
+    test = adjustment.adjusted.test()
+    if not test.passed:
+        raise SolutionError(
+            f"the global test of the adjustment failed: v'Pv = {test.chi2:.1f}, expected "
+            f"{test.low:.1f} to {test.high:.1f} ({test.dof} degrees of freedom, sigma0 = "
+            f"{adjustment.sigma0:.3f}); nothing was written (--strict)"
+        )
+
+
+def _summary(adjustment):
+    """One line: how well the survey fits, and how good its points are."""
+    from tankcal.network.quality import precision
+
+    test, sigma0 = "nothing redundant, not tested", ""
+    if adjustment.redundancy > 0:
+        passed = adjustment.adjusted.test().passed
+        test = f"global test {'passed' if passed else 'FAILED'}"
+        sigma0 = f"sigma0 = {adjustment.sigma0:.3f}, "
+    removed = len({(one.kind, one.ids, one.row) for one in adjustment.removed})
+    free = ~adjustment.fixed.all(axis=1)
+    mean = ""
+    if free.any():
+        found = precision(adjustment.xyz_m[free], adjustment.covariance_m2[free])
+        mean = f", mean sd {1000 * found.mean_sd_m:.3g} mm"
+    return (
+        f"adjustment: {sigma0}redundancy {adjustment.redundancy}, {test}, "
+        f"{_counted(removed, 'observation')} set aside, "
+        f"{_counted(len(adjustment.names), 'point')}{mean}"
+    )
+
+
+def _warn(warnings):
+    for warning in warnings:
+        print(f"tankcal: warning: {warning}", file=sys.stderr)
+
+
+def _list(out, paths):
     print(f"results in {out}:")
     for path in paths:
         print(f"  {path}")
@@ -193,7 +288,8 @@ def _new(options):
     from tankcal.starter import write_starter
 
     directory = Path(options.directory)
-    write_starter(directory, options.kind)
+    survey = {} if options.survey is None else {"survey": options.survey}
+    write_starter(directory, options.kind, **survey)
     print(f"wrote {directory}: fill in job.toml and the CSV files, or job.xlsx instead, then")
     print(f"  tankcal run {directory}     or     tankcal run {directory / 'job.xlsx'}")
 

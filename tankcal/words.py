@@ -63,3 +63,145 @@ def choice_sentence(words, choice):
     return sentence(
         words, "choices", choice["code"], value.replace(".", mark) if is_number else value
     )
+
+
+NAMED_INPUTS = ("deadwood", "instrument_scale", "instrument_offset")
+
+
+def input_name(words, row):
+    """The name of an input of the budget; some have that of an item or instrument beside it."""
+    name = sentence(words, "inputs", row["input"])
+    return f"{name}: {row['note']}" if row["input"] in NAMED_INPUTS and row["note"] else name
+
+
+# ---- what the record says of an adjustment: the same sentences on paper and in the workbook
+
+MOST_NAMES = 12  # that a sentence lists
+
+
+def group_name(words, group):
+    """A group of observations in words: "Distances (tape 1)", "Zenith angles"."""
+    known, name = words["observed"], group["name"]
+    if name in known:
+        return known[name]
+    kind = known.get(group["kind"], group["kind"])
+    return f"{kind} ({name})" if name else kind
+
+
+def observation_name(words, reading):
+    """What a reading is: some kinds are told apart by their files, such as zenith angles."""
+    known, kind = words["observations"], reading["kind"]
+    return known.get(reading["file"].removesuffix(".csv"), known.get(kind, kind))
+
+
+def global_test_sentence(words, adjustment):
+    """What the global test says, with its bounds."""
+    bounds = adjustment["chi2_bounds"]
+    if bounds is None:
+        return words["texts"]["test_none"]
+    verdict = "above" if adjustment["chi2"] > bounds[1] else "below"
+    low, high, chi2 = (_fixed(words, value, 1) for value in (*bounds, adjustment["chi2"]))
+    return words["texts"][f"test_{'passed' if adjustment['passed'] else verdict}"].format(
+        low=low,
+        high=high,
+        statistic=chi2,
+        dof=adjustment["redundancy"],
+        confidence=percent(words, adjustment["confidence"]),
+    )
+
+
+def scale_sentence(words, adjustment):
+    """Which variance factor the covariances bear."""
+    factor = _fixed(words, adjustment["cov_scale"], 3)
+    return words["texts"][f"scale_{adjustment['scale']}"].format(factor=factor)
+
+
+def snooping_sentence(words, adjustment):
+    """How blunders were searched, and how many observations were set aside."""
+    if not adjustment["snooping"]:
+        return words["texts"]["snooping_off"]
+    removed = {(row["kind"], tuple(row["ids"]), row["row"]) for row in adjustment["removed"]}
+    return words["texts"]["snooping_on"].format(
+        critical=_fixed(words, adjustment["critical_w"], 2),
+        rounds=adjustment["rounds"],
+        removed=len(removed),
+    )
+
+
+def datum_sentences(words, adjustment):
+    """What holds the frame, and what depends on that choice."""
+    datum, texts = adjustment["datum"], words["texts"]
+    found = [texts[f"datum_{datum['choice']}"].format(held=listed(words, datum["held"]))]
+    if datum["defect"]:
+        words_of_defect = datum["words"].split(";")[0].rstrip(".")
+        found.append(texts["datum_defect"].format(words=words_of_defect))
+        by_control = "_control" if datum["choice"] == "control" else ""
+        found.append(texts[f"datum_dependent{by_control}"])
+    for what in ("vertical", "scale"):
+        found.append(texts[f"{what}_{'observed' if datum[what] else 'not_observed'}"])
+    return found
+
+
+def verdict_sentences(words, adjustment):
+    """A sentence for each group of observations that is not what was declared."""
+    return [
+        words["texts"][f"group_{row['verdict']}"].format(
+            group=group_name(words, row),
+            **{key: factor_text(words, row[name]) for key, name in _FACTORS.items()},
+        )
+        for row in adjustment["groups"]
+        if row["verdict"] in ("worse", "better")
+    ]
+
+
+_FACTORS = {"factor": "factor", "low": "factor_low", "high": "factor_high"}
+
+
+def method_line(words, adjustment):
+    """What was measured, how many points, sigma0: one line for a certificate."""
+    parts = []
+    if adjustment["photos"]:
+        cameras = listed(words, dict.fromkeys(row["camera"] for row in adjustment["photos"]))
+        photographs = words["observed"]["photographs"]
+        parts.append(f"{len(adjustment['photos'])} {photographs} ({cameras})")
+    groups = [row for row in adjustment["groups"] if row["kind"] != "weighted unknown"]
+    for row in sorted(groups, key=lambda row: row["kind"] != "image coordinate"):
+        name = group_name(words, row)
+        parts.append(f"{row['count']} {name[:1].lower()}{name[1:]}")
+    sigma0 = adjustment["sigma0"]
+    return words["texts"]["method_of_survey"].format(
+        observed=", ".join(parts),
+        points=len(adjustment["points"]),
+        sigma="–" if sigma0 is None else _fixed(words, sigma0, 2),
+    )
+
+
+def listed(words, names):
+    """The first names, and how many more there are; "P7:xyz" is P7."""
+    names = [str(name).removesuffix(":xyz") for name in names]
+    if names == ["all"]:
+        return words["texts"]["all_points"]
+    if len(names) <= MOST_NAMES:
+        return ", ".join(names)
+    more, first = len(names) - MOST_NAMES, ", ".join(names[:MOST_NAMES])
+    return words["texts"]["and_more"].format(names=first, more=more)
+
+
+def as_sentence(text):
+    """A text of the record with a capital letter and a full stop."""
+    return text[:1].upper() + text[1:].rstrip(".") + "."
+
+
+def percent(words, share):
+    """A share in percent, in the reader's style."""
+    text = f"{100 * share:.6g}".replace(".", words["language"]["decimal"])
+    return f"{text}\N{NO-BREAK SPACE}%"
+
+
+def factor_text(words, value):
+    """A factor of standard deviations."""
+    return _fixed(words, value, 2 if value < 10 else 1)
+
+
+def _fixed(words, value, decimals):
+    return f"{value:.{decimals}f}".replace(".", words["language"]["decimal"])

@@ -18,7 +18,14 @@ def test_help_shows_the_way_for_a_new_tank(capsys):
         main(["--help"])
     assert stop.value.code == 0
     text = capsys.readouterr().out
-    for word in ("tankcal new", "tankcal run", "demo", "exit status", "job.xlsx"):
+    for word in (
+        "tankcal new",
+        "tankcal run",
+        "demo",
+        "exit status",
+        "job.xlsx",
+        "--only adjustment",
+    ):
         assert word in text
 
 

@@ -14,7 +14,8 @@ ANY_VALUE = 2.5
 
 def promised_choices():
     """(code, value) of every choice that docs/record-format.md promises."""
-    paragraph = re.sub(r"\s+", " ", FORMAT.split("Choice codes and their values:")[1])
+    paragraph = FORMAT.split("Choice codes and their values:")[1].split("\n## ")[0]
+    paragraph = re.sub(r"\s+", " ", paragraph)
     promised = []
     for code, values in re.findall(r"`(\w+)` \(([^)]*)\)", paragraph):
         texts = re.findall(r'"([^"]+)"', values)

@@ -15,6 +15,13 @@ def record_of(result):
     return record_of(result)
 
 
+def record_of_adjustment(job, adjustment):
+    """The record of a job whose survey was only adjusted (`surveys.Adjustment`)."""
+    from tankcal.record.making import record_of_adjustment
+
+    return record_of_adjustment(job, adjustment)
+
+
 def save(record, path):
     """Write a record as UTF-8 JSON."""
     text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))

@@ -8,9 +8,19 @@ import scipy
 
 import tankcal
 from tankcal.record import FORMAT
+from tankcal.record.adjustment import adjustment_of
 from tankcal.record.parts import bottom_of, deadwood_of, roof_of, solid_of
-from tankcal.record.survey import courses_of, points_of, rejected_of, sections_of, shell_of
+from tankcal.record.survey import (
+    adjustment_in,
+    courses_of,
+    points_of,
+    points_of_adjustment,
+    rejected_of,
+    sections_of,
+    shell_of,
+)
 from tankcal.record.table import (
+    adjustment_choices,
     budget_of,
     capacity_of,
     choices_of,
@@ -23,17 +33,10 @@ from tankcal.record.table import (
 
 def record_of(result):
     """The record of a `chain.Result`: a dict of plain numbers, texts and lists."""
+    adjustment = adjustment_in(result)
     return _plain(
         {
-            "format": FORMAT,
-            "tankcal": tankcal.__version__,
-            "versions": {
-                "python": platform.python_version(),
-                "numpy": np.__version__,
-                "scipy": scipy.__version__,
-            },
-            "files": [asdict(file) for file in result.job.files],
-            "job": _job(result.job),
+            **_beginning(result.job),
             "shell": shell_of(result),
             "points": points_of(result),
             "rejected": rejected_of(result),
@@ -51,26 +54,75 @@ def record_of(result):
             "roof": roof_of(result),
             "budget": budget_of(result),
             "choices": choices_of(result),
-            "warnings": [
-                {"file": w.file, "row": w.row, "column": w.column, "text": w.expected}
-                for w in result.warnings
-            ],
-            "adjustment": None,
+            "warnings": _warnings(result.warnings),
+            "adjustment": adjustment
+            and adjustment_of(adjustment, getattr(result.job, "measurements", None)),
             "deliveries": None,
             "monte_carlo": None,
         }
     )
 
 
-def _job(job):
+def record_of_adjustment(job, adjustment):
+    """The record of a survey that was only adjusted: what a tank has is null or empty."""
+    measurements = getattr(job, "measurements", None)
+    return _plain(
+        {
+            **_beginning(job),
+            **dict.fromkeys(_OF_A_TANK),
+            **{key: [] for key in _LISTS_OF_A_TANK},
+            "points": points_of_adjustment(adjustment),
+            "choices": [
+                {"code": code, "value": value}
+                for code, value in adjustment_choices(adjustment, measurements).items()
+            ],
+            "warnings": _warnings(dict.fromkeys((*job.warnings, *adjustment.warnings))),
+            "adjustment": adjustment_of(adjustment, measurements),
+        }
+    )
+
+
+_OF_A_TANK = (
+    "shell", "capacity", "interpolation", "proportional_parts", "gross", "solid", "bottom", "roof",
+    "deliveries", "monte_carlo",
+)  # fmt: skip
+_LISTS_OF_A_TANK = (
+    "rejected", "sections", "courses", "densities", "corrections", "deadwood", "budget",
+)  # fmt: skip
+
+
+def _beginning(job):
     return {
-        "tank": asdict(job.tank),
-        "survey": asdict(job.survey),
-        "datum": asdict(job.datum),
-        "table": asdict(job.table),
-        "material": asdict(job.material),
+        "format": FORMAT,
+        "tankcal": tankcal.__version__,
+        "versions": {
+            "python": platform.python_version(),
+            "numpy": np.__version__,
+            "scipy": scipy.__version__,
+        },
+        "files": [asdict(file) for file in job.files],
+        "job": _job(job),
+    }
+
+
+def _warnings(problems):
+    return [
+        {"file": w.file, "row": w.row, "column": w.column, "text": w.expected} for w in problems
+    ]
+
+
+def _job(job):
+    parts = {
+        "tank": job.tank,
+        "survey": job.survey,
+        "datum": job.datum,
+        "table": job.table,
+        "material": job.material,
+        "corrections": job.switches,
+    }
+    return {
+        **{name: None if part is None else asdict(part) for name, part in parts.items()},
         "courses": [asdict(course) for course in job.courses],
-        "corrections": asdict(job.switches),
         "certificate": job.certificate,
         "source": job.source,
     }

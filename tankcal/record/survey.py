@@ -32,8 +32,47 @@ def shell_of(result):
     }
 
 
+def adjustment_in(result):
+    """The `surveys.Adjustment` that the points come from; None where they were handed in."""
+    return getattr(result, "adjustment", None)
+
+
 def points_of(result):
-    """Every surveyed point, used or not."""
+    """Every surveyed point, used or not; of an adjusted survey every adjusted point."""
+    adjustment = adjustment_in(result)
+    rows = _points_of_tank(result)
+    if adjustment is None:
+        return rows
+    of_tank = {row["point"]: row for row in rows}
+    adjusted = points_of_adjustment(adjustment)
+    names = {row["point"] for row in adjusted}
+    own = ("x_m", "y_m", "z_m", "cov_m2")  # of the target itself, not of the wall behind it
+    return [
+        {**row, **of_tank.get(row["point"], {}), **{key: row[key] for key in own}}
+        for row in adjusted
+    ] + [row for row in rows if row["point"] not in names]
+
+
+def points_of_adjustment(adjustment):
+    """Every adjusted point with its covariance, in their order; nothing of a tank."""
+    return [
+        {
+            "point": name,
+            **_coordinates(xyz),
+            "cov_m2": covariance,
+            "course": None,
+            "section": None,
+            "generatrix": None,
+            "residual_m": None,
+            "used": False,
+        }
+        for name, xyz, covariance in zip(
+            adjustment.names, adjustment.xyz_m, adjustment.covariance_m2, strict=True
+        )
+    ]
+
+
+def _points_of_tank(result):
     if result.wall is None:
         return _points_of_scan(result) if result.scan is not None else []
     job, shell = result.job, result.wall.shell

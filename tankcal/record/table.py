@@ -6,7 +6,14 @@ import numpy as np
 
 from tankcal.chain import PARTS
 from tankcal.dips import dip_label
+from tankcal.network.cleaning import CRITICAL
+from tankcal.record.survey import adjustment_in
 from tankcal.snooping import CRITICAL_W
+
+SIGHTS = {  # of a total station, a theodolite or a level: a tape beside photographs is none
+    "direction", "horizontal angle", "vertical angle", "zenith angle", "azimuth",
+    "height difference", "slope distance",
+}  # fmt: skip
 
 
 def capacity_of(result):
@@ -125,7 +132,28 @@ def choices_of(result):
         "expansion": "given" if job.material.expansion_given else "default",
         "not_in_budget": list(result.body.undeclared()),
     }
+    adjustment = adjustment_in(result)
+    if adjustment is not None:
+        values = adjustment_choices(adjustment, getattr(job, "measurements", None)) | values
     return [{"code": code, "value": value} for code, value in values.items()]
+
+
+def adjustment_choices(adjustment, measurements):
+    """{code: value} of what was assumed when the survey was adjusted."""
+    settings = getattr(measurements, "settings", None)
+    kinds = {group.kind for group in adjustment.groups}
+    photographs = "image coordinate" in kinds
+    others = kinds & SIGHTS
+    test = "none"
+    if adjustment.redundancy > 0:
+        test = "passed" if adjustment.adjusted.test().passed else "failed"
+    return {
+        "survey": "both" if photographs and others else "photographs" if photographs else "sights",
+        "adjustment_datum": adjustment.datum.choice,
+        "adjustment_snooping": CRITICAL if getattr(settings, "snooping", True) else "off",
+        "adjustment_test": test,
+        "adjustment_scale": getattr(settings, "scale", "a_priori"),
+    }
 
 
 def _shell_choices(job, result):
@@ -134,7 +162,7 @@ def _shell_choices(job, result):
     roof = job.roof and job.roof.weighing
     return {
         "bottom": job.bottom.form if job.switches.bottom else "off",
-        "covariance": _covariance_choice(job),
+        "covariance": _covariance_choice(job) if adjustment_in(result) is None else "adjusted",
         "course_of_points": "section" if any(job.points.section) else "height",
         "shape": _one_or_mixed(section.outline.kind for section in wall.sections),
         "between_sections": _between_sections(result),

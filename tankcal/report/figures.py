@@ -25,10 +25,10 @@ STYLE = {
     "grid.color": "#c3cad2",
     "lines.linewidth": 0.9,
 }
-_INK, _RED = "#1f4e79", "#b03a2e"
-_WIDTH = 6.5
+INK, RED = "#1f4e79", "#b03a2e"
+WIDTH = 6.5
 _TURN = (-4, 364)  # degrees: points at north are not cut off
-_MANY = 500  # points in a panel: from here on their picture is smaller than their outlines
+MANY = 500  # points in a panel: from here on their picture is smaller than their outlines
 
 
 def residuals(paper, most=8):
@@ -40,14 +40,14 @@ def residuals(paper, most=8):
 
 def _residual_panels(paper, sections, limit_mm):
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(_WIDTH, 0.72 * len(sections) + 0.55))
+        figure = Figure(figsize=(WIDTH, 0.72 * len(sections) + 0.55))
         axes = figure.subplots(len(sections), 1, sharex=True, squeeze=False)[:, 0]
         for ax, section in zip(axes, sections, strict=True):
             residual_mm = 1e3 * np.array(section["residual_m"])
             azimuth = section["azimuth_deg"]
             if len(azimuth) <= 72:
-                ax.vlines(azimuth, 0, residual_mm, color=_INK, linewidth=0.8)
-            ax.plot(azimuth, residual_mm, "o", color=_INK, markersize=2.2, **_light(azimuth))
+                ax.vlines(azimuth, 0, residual_mm, color=INK, linewidth=0.8)
+            ax.plot(azimuth, residual_mm, "o", color=INK, markersize=2.2, **_light(azimuth))
             ax.axhline(0, color="#445566", linewidth=0.5)
             ax.set(xlim=_TURN, ylim=(-limit_mm, limit_mm), xticks=range(0, 361, 45))
             ax.grid(True)
@@ -55,7 +55,7 @@ def _residual_panels(paper, sections, limit_mm):
             ax.set_title(title, loc="left", fontsize=8, pad=2, parse_math=False)
         axes[-1].set_xlabel(paper.word("axes.azimuth"))
         figure.supylabel(paper.word("axes.residual"), fontsize=8.5, x=0.005)
-        _margins(figure, left=0.55, right=0.12, bottom=0.42, top=0.2, hspace=0.5)
+        set_margins(figure, left=0.55, right=0.12, bottom=0.42, top=0.2, hspace=0.5)
     return figure
 
 
@@ -65,7 +65,11 @@ def polar_factor(paper):
     largest = max(max(_deviations(s), default=0.0) / s["radius_m"] for s in sections)
     if largest <= 0:
         return 1
-    wanted = 0.25 / largest
+    return round_factor(0.25 / largest)
+
+
+def round_factor(wanted):
+    """The largest of 1, 2, 5 times a power of ten that is at most `wanted`, and at least 1."""
     power = 10.0 ** floor(log10(wanted))
     return max(1, round(power * max(step for step in (1, 2, 5) if step * power <= wanted)))
 
@@ -81,7 +85,7 @@ def _polar_panels(paper, sections, factor):
     across = 3
     down = ceil(len(sections) / across)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(_WIDTH, 2.0 * down))
+        figure = Figure(figsize=(WIDTH, 2.0 * down))
         axes = figure.subplots(down, across, squeeze=False).ravel()
         turn = np.linspace(0, 2 * np.pi, 361)
         for ax, section in zip(axes, sections, strict=False):
@@ -89,11 +93,11 @@ def _polar_panels(paper, sections, factor):
             outline = section["outline"]
             line = _enlarged(section, outline["azimuth_deg"], _outline_deviation(section), factor)
             closed = np.concatenate([line, line[:, :1]], axis=1)
-            ax.plot(*closed, color=_INK)
+            ax.plot(*closed, color=INK)
             points = _enlarged(section, section["azimuth_deg"], section["residual_m"], factor)
             few = points.shape[1] <= 200  # many would hide the outline: smaller, and below it
             style = {"markersize": 2.2, "zorder": 3} if few else {"markersize": 1.0, "zorder": 1}
-            ax.plot(*points, ".", color=_RED, **style, **_light(points[0]))
+            ax.plot(*points, ".", color=RED, **style, **_light(points[0]))
             ax.set(aspect="equal", xlim=(-1.32, 1.32), ylim=(-1.32, 1.32))
             title = "\n".join(_section_title(paper, section))
             ax.text(0, 0, title, ha="center", va="center", fontsize=8, parse_math=False)
@@ -127,7 +131,7 @@ def deviation_map(paper):
     residual_mm = [1e3 * r for section in record["sections"] for r in section["residual_m"]]
     limit = max(map(abs, residual_mm), default=0.0) or 1.0
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(_WIDTH, 3.1))
+        figure = Figure(figsize=(WIDTH, 3.1))
         ax = figure.subplots()
         size = 14 if len(azimuth) <= 300 else 6
         if len(azimuth) > 3000:  # no room for edges: grey behind the points shows the white ones
@@ -155,19 +159,19 @@ def capacity_curves(paper):
     height_m = capacity["height_m"]
     litres_per_cm = 10.0 * np.array(capacity["area_m2"], dtype=float)  # 1 m2 is 10 L/cm
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(_WIDTH, 2.7))
+        figure = Figure(figsize=(WIDTH, 2.7))
         left, right = figure.subplots(1, 2)
-        left.plot(height_m, litres_per_cm, color=_INK)
+        left.plot(height_m, litres_per_cm, color=INK)
         left.set_ylabel(paper.word("axes.litres_per_cm"))
         left.ticklabel_format(useOffset=False)
-        right.plot(height_m, capacity["U_m3"], color=_INK)
+        right.plot(height_m, capacity["U_m3"], color=INK)
         right.set_ylabel(paper.word("axes.U_m3"))
         right.set_ylim(bottom=0)
         for ax in (left, right):
             ax.set_xlabel(paper.word("axes.height"))
             ax.set_xlim(height_m[0], height_m[-1])
             ax.grid(True)
-        _margins(figure, left=0.65, right=0.12, bottom=0.42, top=0.08, wspace=0.3)
+        set_margins(figure, left=0.65, right=0.12, bottom=0.42, top=0.08, wspace=0.3)
     return figure
 
 
@@ -176,16 +180,16 @@ def budget_bars(paper):
     budget = paper.record["budget"]
     names = [paper.input_name(row) for row in budget]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(_WIDTH, 0.24 * len(budget) + 0.6))
+        figure = Figure(figsize=(WIDTH, 0.24 * len(budget) + 0.6))
         ax = figure.subplots()
-        ax.barh(range(len(budget)), [100 * row["share"] for row in budget], color=_INK, height=0.6)
+        ax.barh(range(len(budget)), [100 * row["share"] for row in budget], color=INK, height=0.6)
         ax.set_yticks(range(len(budget)), names, parse_math=False)
         ax.invert_yaxis()
         ax.set_xlabel(paper.word("axes.share"))
         ax.set_xlim(0, 100)
         ax.grid(True, axis="x")
         ax.set_axisbelow(True)
-        _margins(figure, left=2.9, right=0.2, bottom=0.42, top=0.05)
+        set_margins(figure, left=2.9, right=0.2, bottom=0.42, top=0.05)
     return figure
 
 
@@ -198,7 +202,7 @@ def _groups(sections, most):
 
 def _light(points):
     """Very many points are drawn as a picture inside the figure."""
-    return {"rasterized": len(points) > _MANY}
+    return {"rasterized": len(points) > MANY}
 
 
 def _section_title(paper, section):
@@ -209,7 +213,7 @@ def _section_title(paper, section):
     ]
 
 
-def _margins(figure, left, right, bottom, top, **spaces):
+def set_margins(figure, left, right, bottom, top, **spaces):
     """Margins in inches."""
     width, height = figure.get_size_inches()
     figure.subplots_adjust(

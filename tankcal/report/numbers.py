@@ -1,7 +1,7 @@
 """Numbers as they are printed: one function for the digits, one for the units."""
 
 from dataclasses import dataclass
-from math import floor, isfinite, log10
+from math import floor, isfinite, log10, pi
 
 from tankcal.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
 from tankcal.errors import TankcalError
@@ -39,6 +39,13 @@ UNITS = {
     "1/K": Unit("1/K"),
     "percent": Unit("%"),
     "share": Unit("%", 1e2),
+    "ppm": Unit("ppm"),
+    "um": Unit("µm"),
+    "image mm": Unit("mm"),  # image coordinates are in millimetres in the record, too
+    "image um": Unit("µm", 1e3),
+    "rad deg": Unit("°", 180 / pi),
+    "rad arcsec": Unit("″", 648000 / pi),
+    "deg arcsec": Unit("″", 3600.0),
     "L/cm": Unit("L/cm", 10.0),  # an area of 1 m2 holds 10 litres per centimetre
 }
 

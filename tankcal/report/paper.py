@@ -12,7 +12,7 @@ from tankcal.errors import TankcalError
 from tankcal.record import load
 from tankcal.report import blocks, numbers
 from tankcal.uncertainty import height_decimals, row_decimals
-from tankcal.words import choice_sentence, load_words
+from tankcal.words import choice_sentence, input_name, load_words, percent
 
 _DECIMALS_OF_PARTS = {"m": 4, "m3": 4, "mm/m": 2, "mm": 2, "deg": 2, "kg/m3": 1}
 _SPACE = "\N{NO-BREAK SPACE}"
@@ -32,6 +32,7 @@ class Column:
     words     group of words that a code is looked up in
     heading   key of another heading
     nothing   what is printed for a value that does not exist
+    align     one of blocks.ALIGNMENTS; None: text to the left, numbers by their decimal marks
     """
 
     key: str
@@ -44,6 +45,7 @@ class Column:
     words: str | None = None
     heading: str | None = None
     nothing: str = numbers.NOTHING
+    align: str | None = None
 
 
 class Paper:
@@ -51,7 +53,8 @@ class Paper:
 
     def __init__(self, path):
         self.record = load(path)
-        self.words = load_words(self.record["job"]["table"]["language"])
+        table = self.record["job"]["table"] or {}  # a survey alone has none
+        self.words = load_words(table.get("language") or "en")
         self.mark = self.words["language"]["decimal"]
 
     # ---- words and numbers
@@ -82,16 +85,16 @@ class Paper:
         return f"{text}{_SPACE}{shown.symbol}" if shown.symbol else text
 
     def input_name(self, row):
-        """The name of an input of the budget; an item of the deadwood has its own beside it."""
-        name = self.words["inputs"].get(row["input"], row["input"])
-        return f"{name}: {row['note']}" if row["input"] == "deadwood" and row["note"] else name
+        """The name of an input of the budget."""
+        return input_name(self.words, row)
 
     def coverage(self):
         """The coverage probability in percent."""
-        return self._percent(self.record["job"]["table"]["coverage_probability"])
+        return self.percent(self.record["job"]["table"]["coverage_probability"])
 
-    def _percent(self, share):
-        return f"{100 * share:.6g}".replace(".", self.mark) + f"{_SPACE}%"
+    def percent(self, share):
+        """A share in percent."""
+        return percent(self.words, share)
 
     def choices(self, code=None):
         """One sentence for each choice of the record, or for that with the given code."""
@@ -105,8 +108,7 @@ class Paper:
 
     def document(self, part):
         """The start of the part: title, author, running head with the notice, page numbers."""
-        certificate = self.record["job"]["certificate"]
-        tank = f"{self.word('page.tank')} {self.record['job']['tank']['id']}"
+        certificate, tank = self.record["job"]["certificate"], self.subject()
         number = certificate.get("number")
         left = f"{self.word('page.number')} {number}" if number else ""
         return blocks.document(
@@ -123,7 +125,22 @@ class Paper:
     def date(self):
         """The date that the document bears: of issue when given, else of the survey (ISO)."""
         job = self.record["job"]
-        return str(job["certificate"].get("date_of_issue") or job["survey"]["date"])
+        return str(job["certificate"].get("date_of_issue") or (job["survey"] or {}).get("date", ""))
+
+    def subject(self):
+        """What the papers are about: the tank, or the survey alone by the name of its job."""
+        tank = self.record["job"]["tank"]
+        if tank is None:
+            return f"{self.word('page.survey')} {self.record['job']['source']}"
+        return f"{self.word('page.tank')} {tank['id']}"
+
+    def subtitle(self, part):
+        """The line below the title of a part."""
+        tank = self.record["job"]["tank"]
+        if self.record["capacity"] is None:
+            name = self.record["job"]["source"] if tank is None else self.subject()
+            return self.word("titles.adjustment_subtitle", value=name)
+        return self.word(f"titles.{part}", value=self.word(f"kinds.{tank['kind']}"))
 
     def heading(self, name, level=1):
         """The heading `headings.<name>`."""
@@ -166,7 +183,7 @@ class Paper:
             [self.word(f"table_headings.{c.heading or c.key}"), numbers.unit(c.unit).symbol]
             for c in columns
         ]
-        align = ["left" if _is_text(column) else "decimal" for column in columns]
+        align = [c.align or ("left" if _is_text(c) else "decimal") for c in columns]
         cells = [list(row) for row in zip(*texts, strict=True)]
         caption = self.word(f"captions.{name}", **values)
         if across:

@@ -13,10 +13,11 @@ from tankcal.workbook.papers import (
     budget_sheet,
     corrections_sheet,
     courses_sheet,
-    points_sheet,
     provenance_sheet,
 )
 from tankcal.workbook.parts import densities_sheet, inside_sheet, proportional_parts_sheet
+from tankcal.workbook.points import points_sheet
+from tankcal.workbook.survey import adjustment_sheet, cameras_sheet, observations_sheet
 
 
 def write(record, path):
@@ -25,19 +26,39 @@ def write(record, path):
     Raises TankcalError when no words are shipped in the language of the job, OSError when the file
     cannot be written.
     """
-    words = load_words(record["job"]["table"].get("language") or "en")
+    words = load_words((record["job"]["table"] or {}).get("language") or "en")
     with Book(path, record) as book:
-        certificate_sheet(book, record, words)
-        rows = capacity_sheet(book, record)
-        proportional_parts_sheet(book, record)
-        densities_sheet(book, record)
-        dip_sheet(book, record)
-        inside_sheet(book, record, words)
-        if record["courses"]:
-            courses_sheet(book, record, words)
-        corrections_sheet(book, record, words)
-        if record["points"]:
-            points_sheet(book, record, words)
-        budget_sheet(book, record, words)
-        provenance_sheet(book, record, words)
-        charts_sheet(book, rows)
+        if record["capacity"]:
+            _sheets_of_tank(book, record, words)
+        else:
+            _sheets_of_survey(book, record, words)
+
+
+def _sheets_of_tank(book, record, words):
+    certificate_sheet(book, record, words)
+    rows = capacity_sheet(book, record)
+    proportional_parts_sheet(book, record)
+    densities_sheet(book, record)
+    dip_sheet(book, record)
+    inside_sheet(book, record, words)
+    if record["courses"]:
+        courses_sheet(book, record, words)
+    corrections_sheet(book, record, words)
+    if record["points"]:
+        points_sheet(book, record, words)
+    if record["adjustment"]:
+        adjustment_sheet(book, record, words)
+        observations_sheet(book, record, words)
+        cameras_sheet(book, record, words)
+    budget_sheet(book, record, words)
+    provenance_sheet(book, record, words)
+    charts_sheet(book, rows)
+
+
+def _sheets_of_survey(book, record, words):
+    """A survey that was only adjusted: no table, nothing that follows from one."""
+    adjustment_sheet(book, record, words)
+    points_sheet(book, record, words)
+    observations_sheet(book, record, words)
+    cameras_sheet(book, record, words)
+    provenance_sheet(book, record, words)

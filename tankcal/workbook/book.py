@@ -26,7 +26,8 @@ _OPENINGS = {"sort": True, "autofilter": True, "format_columns": True, "format_r
 class Column:
     """One column of a table: heading with its unit, cells from the top down, and their look.
 
-    digits  decimals of all cells, or a list with those of each cell, or None: text
+    digits  decimals of all cells, or a list with those of each cell, or None: text; in place of a
+            number of decimals a number format of Excel
     """
 
     heading: str
@@ -37,7 +38,9 @@ class Column:
 
 
 def number_format(digits, percent=False):
-    """The Excel number format with so many decimals."""
+    """The Excel number format with so many decimals; a format stays as it is."""
+    if isinstance(digits, str):
+        return digits
     return "0" + ("." + "0" * digits if digits else "") + (" %" if percent else "")
 
 
@@ -67,18 +70,22 @@ class Book:
             },
         )
         self._formats = {}
-        self.tank = record["job"]["tank"]["id"]
-        certificate = record["job"]["certificate"]
+        job = record["job"]
+        self.subject = f"Tank {job['tank']['id']}" if job["tank"] else f"Survey {job['source']}"
+        what = "Capacity table of tank" if record["capacity"] else "Adjustment of the survey:"
+        name = job["tank"]["id"] if job["tank"] else job["source"]
+        survey_date = job["survey"] and job["survey"]["date"]
+        certificate = job["certificate"]
         self.notice = str(certificate.get("notice") or "")
         self._made_by = f"tankcal {record['tankcal']}"
         self._number = certificate.get("number") or ""
         self._file.set_properties(
             {
-                "title": f"Capacity table of tank {self.tank}",
+                "title": f"{what} {name}",
                 "subject": self.notice,
                 "author": str(certificate.get("laboratory") or ""),
                 "comments": f"Written by {self._made_by}",
-                "created": _date(certificate.get("date_of_issue"), record["job"]["survey"]["date"]),
+                "created": _date(certificate.get("date_of_issue"), survey_date),
             }
         )
 
@@ -110,14 +117,14 @@ class Book:
         sheet.center_horizontally()
         sheet.set_margins(left=0.6, right=0.6, top=0.8, bottom=0.75)
         sheet.set_header(
-            f"&L&9 Tank {header_text(self.tank)}&C&9&B {header_text(self.notice)}&R&9 {name}"
+            f"&L&9 {header_text(self.subject)}&C&9&B {header_text(self.notice)}&R&9 {name}"
         )
         number = f"Certificate {header_text(self._number)}" if self._number else ""
         sheet.set_footer(f"&L&9 {self._made_by}&C&9 {number}&R&9 Page &P of &N")
         sheet.protect("", _OPENINGS)
         sheet.set_row(0, 24)
         sheet.write_string(0, 0, title, self.format(bold=True, font_size=15, font_color=ACCENT))
-        line = " · ".join(part for part in (f"Tank {self.tank}", self.notice, subtitle) if part)
+        line = " · ".join(part for part in (self.subject, self.notice, subtitle) if part)
         sheet.write_string(1, 0, line, self.format(font_color=MUTED))
         return sheet
 
@@ -151,6 +158,13 @@ class Book:
         sheet.set_row(row, _LINE_PT * _lines(text, sum(widths)))
         sheet.merge_range(row, 0, row, len(widths) - 1, "", self.format(**look))
         sheet.write_string(row, 0, text[:_LONGEST_CELL], self.format(**look))
+
+    def paragraph_in(self, sheet, row, column, text, widths):
+        """A wrapped text from one column over those of these widths, at its left."""
+        sheet.set_row(row, _LINE_PT * _lines(text, sum(widths)))
+        look = self.format(text_wrap=True, align="left")
+        sheet.merge_range(row, column, row, column + len(widths) - 1, "", look)
+        sheet.write_string(row, column, text[:_LONGEST_CELL], look)
 
     def table(self, sheet, row, name, columns, muted=(), autofilter=False):
         """An Excel table with its headings in `row`; returns the number of its last row.

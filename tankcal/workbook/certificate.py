@@ -1,7 +1,7 @@
 """The sheet Certificate: what was calibrated, the main result, and what was assumed."""
 
 from tankcal.uncertainty import decimals_for, height_decimals
-from tankcal.words import choice_sentence, sentence
+from tankcal.words import choice_sentence, method_line, sentence
 from tankcal.workbook.book import ACCENT, MUTED, number_format
 
 _WIDTHS = (36, 20, 24, 14, 14)
@@ -65,9 +65,10 @@ def _certificate(record, words):
 def _survey(record, words):
     """(label, value, number format or None) of the survey and of what the table refers to."""
     job = record["job"]
-    survey, table = job["survey"], job["table"]
+    survey, table, adjustment = job["survey"], job["table"], record["adjustment"]
     lines = (
         ("survey_date", survey["date"], None),
+        ("survey_method", adjustment and method_line(words, adjustment), None),
         ("survey_side", sentence(words, "sides", survey["side"]), None),
         ("shell_temperature", survey["shell_temperature_c"], '0.0 "°C"'),
         ("reference_temperature", table["reference_temperature_c"], '0.0 "°C"'),

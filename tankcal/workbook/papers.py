@@ -1,7 +1,7 @@
 """The working papers: courses, corrections, points, uncertainty budget, choices and provenance."""
 
 from tankcal.uncertainty import decimals_for
-from tankcal.words import choice_sentence, sentence
+from tankcal.words import choice_sentence, input_name, sentence
 from tankcal.workbook.book import Column, in_mm
 
 _HEAD_ROW = 3
@@ -20,11 +20,6 @@ def _digits(rows, key, default=4):
 def _digits_of_size(rows, key, significant=4):
     """Decimals of each row so that its value `key` has so many significant digits."""
     return [decimals_for(abs(row[key]), significant) if row[key] else 0 for row in rows]
-
-
-def _or_empty(value):
-    """The value, or an empty cell where most rows have none."""
-    return "" if value is None else value
 
 
 def _write_table(book, sheet, row, name, columns, **more):
@@ -167,45 +162,6 @@ def corrections_sheet(book, record, words):
         book.put(sheet, last + below, 2, value, num_format=shown)
 
 
-def points_sheet(book, record, words):
-    """Every surveyed point with its residual, and why it was rejected when it was."""
-    rows = record["points"]
-    rejected = {row["point"]: row for row in record["rejected"]}
-    of_rejected = [rejected.get(row["point"], {}) for row in rows]
-    residual = [
-        row["residual_m"] if row["used"] else out.get("residual_m")
-        for row, out in zip(rows, of_rejected, strict=True)
-    ]
-    reason = [
-        sentence(words, "reasons", out["reason"]) if "reason" in out else "" for out in of_rejected
-    ]
-    sheet = book.sheet(
-        "Points and residuals",
-        "Points and residuals",
-        f"{len(rows)} points surveyed, {sum(row['used'] for row in rows)} accepted; "
-        "residual from the circle of the section (or the wall of a solid), outwards positive",
-        landscape=True,
-    )
-    columns = [
-        Column("Point", _of(rows, "point"), None, 12),
-        Column("Course", _of(rows, "course"), None, 9),
-        Column("Section", _of(rows, "section"), None, 10),
-        Column("x (m)", _of(rows, "x_m"), 4, 14),
-        Column("y (m)", _of(rows, "y_m"), 4, 14),
-        Column("z (m)", _of(rows, "z_m"), 4, 12),
-        Column("Residual (mm)", [in_mm(value) for value in residual], 1, 12),
-        Column("Used", _of(rows, "used"), None, 8),
-        Column("Reason", reason, None, 48),
-        Column("w", [_or_empty(out.get("w")) for out in of_rejected], 1, 8),
-        Column("Row in the file", [_or_empty(out.get("row")) for out in of_rejected], 0, 10),
-    ]
-    _set_widths(book, sheet, columns)
-    muted = [index for index, row in enumerate(rows) if not row["used"]]
-    _write_table(book, sheet, _HEAD_ROW, "points", columns, muted=muted, autofilter=True)
-    sheet.freeze_panes(_HEAD_ROW + 1, 1)
-    sheet.repeat_rows(_HEAD_ROW)
-
-
 def budget_sheet(book, record, words):
     """The uncertainty budget of the top row of the table."""
     rows, capacity = record["budget"], record["capacity"]
@@ -217,7 +173,7 @@ def budget_sheet(book, record, words):
     )
     digits = decimals_for(capacity["u_m3"][-1]) + 1
     columns = [
-        Column("Input", [_input_name(words, row) for row in rows], None, 34),
+        Column("Input", [input_name(words, row) for row in rows], None, 34),
         Column("u of the input", _of(rows, "u"), _digits(rows, "u"), 12),
         Column("Unit", _of(rows, "unit"), None, 8),
         Column("Type", _of(rows, "type"), None, 7),
@@ -257,11 +213,6 @@ def budget_sheet(book, record, words):
         book.put(sheet, last + below, 0, label, bold=True)
         book.put(sheet, last + below, 1, capacity[key][-1], num_format=shown, bold=True)
     sheet.freeze_panes(_HEAD_ROW + 1, 0)
-
-
-def _input_name(words, row):
-    name = sentence(words, "inputs", row["input"])
-    return f"{name}: {row['note']}" if row["input"] == "deadwood" and row["note"] else name
 
 
 def provenance_sheet(book, record, words):

@@ -1,0 +1,206 @@
+"""The CSV files: tables of the record in metres, millimetres and degrees, one row a thing."""
+
+import numpy as np
+import pandas as pd
+
+from tankcal.job.covariance import MAX_POINTS
+
+IN_SMALL_UNITS = {"mm": ("um", 1e3), "m": ("mm", 1e3), "rad": ("arcsec", 648000 / np.pi)}
+IN_LARGE_UNITS = {"rad": ("deg", 180 / np.pi)}
+FILES = (
+    "points.csv",
+    "points_cov.npz",
+    "sections.csv",
+    "capacity.csv",
+    "photos.csv",
+    "cameras.csv",
+    "groups.csv",
+    "residuals.csv",
+)
+
+
+def write_tables(record, directory):
+    """Write every table of the record that has rows, as CSV."""
+    tables = {
+        "points": points_table(record),
+        "sections": _sections_table(record),
+        "capacity": _capacity_table(record),
+    }
+    if record["adjustment"]:
+        tables |= {
+            "photos": pd.DataFrame(record["adjustment"]["photos"]),
+            "cameras": cameras_table(record["adjustment"]),
+            "groups": _groups_table(record["adjustment"]),
+            "residuals": residuals_table(record["adjustment"]),
+        }
+    for name, table in tables.items():
+        if len(table):
+            style = "%.6f" if name in ("points", "sections", "capacity") else "%.12g"
+            table.to_csv(
+                directory / f"{name}.csv", index=False, float_format=style, lineterminator="\n"
+            )
+
+
+def write_covariance(adjustment, directory):
+    """Write points_cov.npz: the full covariance of all points, as a job reads it.
+
+    Of more points than a job may have with a full covariance there is none; the covariance of each
+    point by itself is in the record.
+    """
+    if len(adjustment.names) <= MAX_POINTS:
+        np.savez(
+            directory / "points_cov.npz",
+            covariance_m2=adjustment.full_covariance_m2(),
+            points=np.array(adjustment.names, dtype=str),
+        )
+
+
+def points_table(record):
+    """Every point with its sds; of an adjusted survey also rays and error ellipsoid at 95 %."""
+    reason = {row["point"]: row["reason"] for row in record["rejected"]}
+    of_tank = record["capacity"] is not None
+    adjusted = {row["point"]: row for row in (record["adjustment"] or {}).get("points", [])}
+    rows = []
+    for row in record["points"]:
+        one = {key: row[key] for key in ("point", "x_m", "y_m", "z_m")} | _sds_mm(row["cov_m2"])
+        if adjusted:
+            one |= _of_adjustment(adjusted.get(row["point"]))
+        if of_tank:
+            one |= {
+                "course": row["course"],
+                "section": row["section"],
+                "generatrix": row["generatrix"],
+                "residual_mm": _in_mm(row["residual_m"]),
+                "used": "yes" if row["used"] else "no",
+                "reason": reason.get(row["point"], ""),
+            }
+        rows.append(one)
+    return pd.DataFrame(rows)
+
+
+def _of_adjustment(point):
+    if point is None:
+        return {}
+    a, b, c = point["ellipsoid_m"]
+    return {
+        "kind": point["kind"],
+        "rays": point["rays"],
+        "fixed": "".join(axis for axis, held in zip("xyz", point["fixed"], strict=True) if held),
+        "spherical_sd_mm": _in_mm(point["spherical_sd_m"]),
+        "quadratic_sd_mm": _in_mm(point["quadratic_sd_m"]),
+        "ellipsoid95_a_mm": _in_mm(a),
+        "ellipsoid95_b_mm": _in_mm(b),
+        "ellipsoid95_c_mm": _in_mm(c),
+        "ellipsoid95_azimuth_deg": point["ellipsoid_azimuth_deg"],
+        "ellipsoid95_elevation_deg": point["ellipsoid_elevation_deg"],
+    }
+
+
+def _in_mm(value_m):
+    return None if value_m is None else 1000 * value_m
+
+
+def _sections_table(record):
+    return pd.DataFrame(record["sections"]).drop(
+        columns=["points", "azimuth_deg", "residual_m", "outline", "modes"], errors="ignore"
+    )
+
+
+def _capacity_table(record):
+    """Rows in metres and cubic metres; further columns only where the job asks for them."""
+    capacity, spec = record["capacity"], record["job"]["table"]
+    if capacity is None:
+        return pd.DataFrame()
+    columns = {key: capacity[key] for key in ("height_m", "volume_m3", "u_m3", "k", "U_m3")}
+    if spec["height_unit"] != "m":
+        columns["dip"] = capacity["dip"]
+    for other in record["densities"]:
+        columns[f"volume_m3_at_{other['density_kg_m3']:g}_kg_m3"] = other["volume_m3"]
+    if not all(capacity["for_use"]):
+        columns["for_use"] = ["yes" if good else "no" for good in capacity["for_use"]]
+    return pd.DataFrame(columns)
+
+
+def _sds_mm(covariance):
+    diagonal = [None] * 3 if covariance is None else [covariance[i][i] for i in range(3)]
+    return {
+        f"s{axis}_mm": None if variance is None else 1000 * variance**0.5
+        for axis, variance in zip("xyz", diagonal, strict=True)
+    }
+
+
+def cameras_table(adjustment):
+    """One row a parameter: value, sd, effect at the edge of the image, correlations."""
+    rows = []
+    for camera in adjustment["cameras"]:
+        for i, name in enumerate(camera["parameters"]):
+            row = {
+                "camera": camera["camera"],
+                "photos": " ".join(camera["photos"] or []),
+                "parameter": name,
+                "value": camera["values"][i],
+                "sd": camera["sds"][i],
+                "unit": camera["units"][i],
+                "scope": camera["scopes"][i],
+                "state": camera["states"][i],
+                "edge_um": camera["edge_um"][i],
+            }
+            if name in camera["free"]:
+                its = camera["correlation"][camera["free"].index(name)]
+                row |= {f"r_{other}": r for other, r in zip(camera["free"], its, strict=True)}
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _groups_table(adjustment):
+    """One row a group; sd and rms in um, mm or arcsec."""
+    rows = []
+    for group in adjustment["groups"]:
+        unit, factor = IN_SMALL_UNITS.get(group["unit"], (group["unit"], 1.0))
+        small = {
+            key: None if group[key] is None else factor * group[key]
+            for key in ("sd_smallest", "sd_largest", "rms")
+        }
+        rows.append({**group, **small, "unit": unit})
+    return pd.DataFrame(rows)
+
+
+def residuals_table(adjustment):
+    """One row a reading: value in mm, m or degrees; residual, sd and mdb in um, mm or arcsec."""
+    readings = adjustment["residuals"]
+    width = max((len(row["ids"]) for row in readings), default=0)
+    rows = []
+    for row in readings:
+        large, of_value = IN_LARGE_UNITS.get(row["unit"], (row["unit"], 1.0))
+        small, factor = IN_SMALL_UNITS.get(row["unit"], (row["unit"], 1.0))
+        rows.append(
+            {
+                "kind": row["kind"],
+                **{f"id_{i + 1}": one for i, one in enumerate(_padded(row["ids"], width))},
+                "element": row["element"],
+                "value": _times(row["value"], of_value),
+                "value_unit": large,
+                **{key: _times(row[key], factor) for key in ("residual", "sd", "mdb")},
+                "unit": small,
+                "redundancy": row["redundancy"],
+                "w": row["w"],
+                "tau": row["tau"],
+                "effect_mm": _in_mm(row["effect_m"]),
+                "controlled": "yes" if row["controlled"] else "no",
+                "removed": "yes" if row["removed"] else "no",
+                "check": "yes" if row["check"] else "no",
+                "repeats": row["repeats"],
+                "file": row["file"],
+                "row": row["row"],
+            }
+        )
+    table = pd.DataFrame(rows)
+    return table.astype({"row": "Int64"}) if len(table) else table
+
+
+def _times(value, factor):
+    return None if value is None else value * factor
+
+
+def _padded(ids, width):
+    return [*ids, *[""] * (width - len(ids))]

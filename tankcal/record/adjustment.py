@@ -1,0 +1,165 @@
+"""The part of the record that says how the survey was adjusted, and how good that is."""
+
+from dataclasses import asdict
+
+import numpy as np
+import scipy.stats
+
+from tankcal.network.cleaning import CRITICAL
+from tankcal.network.reliability import UNCONTROLLED, tau_limit
+from tankcal.record.adjusted import (
+    adjusted_points_of,
+    cameras_of,
+    instruments_of,
+    photos_of,
+    precision_of,
+    systems_of,
+)
+
+CONFIDENCE = 0.95  # of the global test and of the intervals of variance factors
+ALPHA, POWER = 0.001, 0.80  # of the tests of single readings
+CHECKABLE = 1.0  # a group with less redundancy says next to nothing about its variance
+
+
+def adjustment_of(adjustment, measurements=None):
+    """Statistics, groups, readings, instruments, cameras, photos, points of an `Adjustment`.
+
+    measurements  `job.Measurements` that it was made from: settings, formats of the images
+    """
+    settings = getattr(measurements, "settings", None)
+    return {
+        **_statistics(adjustment, settings),
+        "datum": asdict(adjustment.datum),
+        "groups": [_group(group, adjustment) for group in adjustment.groups],
+        "removed": [_reading(reading) for reading in adjustment.removed],
+        "residuals": [_reading(reading) for reading in adjustment.readings],
+        "cameras": cameras_of(adjustment, measurements),
+        "photos": photos_of(adjustment),
+        "instruments": instruments_of(adjustment, measurements),
+        "systems": systems_of(adjustment),
+        "setups": [
+            {
+                "setup": one.name,
+                "station": one.station,
+                "instrument": one.instrument,
+                "height_m": one.height_m,
+            }
+            for one in getattr(measurements, "setups", ())
+        ],
+        "points": adjusted_points_of(adjustment, measurements),
+        "precision": precision_of(adjustment),
+        "check_points": _check_points(adjustment.check_points),
+        "causes": [
+            {"name": cause.name, "what": cause.what, "u": cause.u, "unit": cause.unit}
+            for cause in adjustment.causes
+        ],
+        "aside": list(adjustment.aside),
+    }
+
+
+def _statistics(adjustment, settings):
+    test = adjustment.adjusted.test(CONFIDENCE)
+    redundant = adjustment.redundancy > 0
+    return {
+        "sigma0": adjustment.sigma0,
+        "observations": adjustment.observations,
+        "unknowns": adjustment.unknowns,
+        "redundancy": adjustment.redundancy,
+        "iterations": adjustment.iterations,
+        "rounds": adjustment.rounds,
+        "chi2": test.chi2,
+        "chi2_bounds": [test.low, test.high] if redundant else None,
+        "confidence": CONFIDENCE,
+        "passed": bool(test.passed) if redundant else None,
+        "cov_scale": adjustment.cov_scale,
+        "scale": getattr(settings, "scale", "a_priori"),
+        "snooping": getattr(settings, "snooping", True),
+        "critical_w": CRITICAL,
+        "critical_tau": tau_limit(ALPHA, adjustment.redundancy)
+        if adjustment.redundancy > 1
+        else None,
+        "alpha": ALPHA,
+        "power": POWER,
+    }
+
+
+def _reading(reading):
+    """One reading; what is infinite (nothing controls it) is null in the record."""
+    row = asdict(reading)
+    row["ids"] = list(reading.ids)
+    row["controlled"] = bool(reading.check or reading.redundancy > UNCONTROLLED)
+    return row
+
+
+def _group(group, adjustment):
+    """A group with the 95 % interval of its true sd over the declared one, and what follows."""
+    row = asdict(group)
+    low = high = None
+    if group.redundancy > UNCONTROLLED and np.isfinite(group.factor):
+        tail = (1 - CONFIDENCE) / 2
+        square = group.factor**2 * group.redundancy
+        low, high = (
+            float(np.sqrt(square / scipy.stats.chi2.ppf(p, group.redundancy)))
+            for p in (1 - tail, tail)
+        )
+    return {
+        **row,
+        "factor_low": low,
+        "factor_high": high,
+        "verdict": _verdict(group, low, high),
+        **_declared(group, adjustment),
+    }
+
+
+def _verdict(group, low, high):
+    if low is None:
+        return "not_controlled"
+    if group.redundancy < CHECKABLE:
+        return "hardly_controlled"
+    if low > 1:
+        return "worse"
+    return "better" if high < 1 else "as_declared"
+
+
+def _declared(group, adjustment):
+    """Smallest and largest declared sd; of one group among several of its kind the mean sd."""
+    same = [one for one in adjustment.groups if (one.kind, one.unit) == (group.kind, group.unit)]
+    if len(same) > 1:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = group.rms / group.factor * np.sqrt(group.count / np.float64(group.redundancy))
+        return {"sd_smallest": mean, "sd_largest": mean}
+    sd = [
+        one.sd
+        for one in adjustment.readings
+        if (one.kind, one.unit) == (group.kind, group.unit) and not (one.check or one.removed)
+    ]
+    return {"sd_smallest": min(sd, default=None), "sd_largest": max(sd, default=None)}
+
+
+def _check_points(found):
+    if found is None:
+        return None
+    axes = ("x", "y", "z")
+    return {
+        "points": [
+            {
+                "point": name,
+                **{f"d{axis}_m": value for axis, value in zip(axes, difference, strict=True)},
+                **{f"s{axis}_m": value for axis, value in zip(axes, sd, strict=True)},
+                "size_m": float(np.sqrt(np.nansum(np.square(difference)))),
+                "largest_w": _largest(difference, sd),
+            }
+            for name, difference, sd in zip(
+                found.names, found.difference_m, found.sd_m, strict=True
+            )
+        ],
+        "r_xyz_m": found.r_xyz_m,
+        "largest_m": found.largest_m,
+        "mean_m": found.mean_m,
+    }
+
+
+def _largest(difference, sd):
+    """Largest difference in its own sds; None where no sd is known."""
+    known = np.isfinite(difference) & np.isfinite(sd) & (np.asarray(sd) > 0)
+    return float(np.max(np.abs(difference[known] / sd[known]))) if known.any() else None

@@ -1,0 +1,18 @@
+"""What the pages of the adjustment share: chapters, and long tables cut short."""
+
+MOST_ROWS = 50  # of a table; how many there are in all is said beside it
+MOST_CAMERAS = 12  # sets of camera parameters that are shown
+SMALL_UNITS = {"mm": "image um", "m": "mm", "rad": "rad arcsec"}  # of residuals
+LARGE_UNITS = {"mm": "image mm", "m": "m", "rad": "rad deg"}  # of what was observed
+
+
+def chapter(paper, name, found):
+    """A heading of level 2 with its blocks; nothing where there are none."""
+    return [paper.heading(name, 2), *found] if found else []
+
+
+def with_note(paper, block, shown, rows):
+    """The table of the rows shown, and a sentence when there are more."""
+    if len(rows) <= len(shown):
+        return [block]
+    return [block, paper.paragraph("only_worst", shown=len(shown), all=len(rows))]

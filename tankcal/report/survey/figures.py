@@ -1,0 +1,281 @@
+"""The figures of the adjustment: plan with error ellipses, residuals of the photos, test values."""
+
+from math import ceil
+
+import matplotlib
+import numpy as np
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+
+from tankcal.report.figures import INK, MANY, RED, STYLE, WIDTH, round_factor, set_margins
+
+MOST_PHOTOS = 12
+MOST_NAMES = 60  # places whose names are written in the plan
+MOST_AT_A_PLACE = 4  # names beside one place
+LARGEST_ELLIPSE = 0.04  # of the plan
+SAME_PLACE = 0.015  # of the plan
+PLAN_POINTS = 300  # typographic points that the plan measures
+_GREY = "#445566"
+_MARKS = {"control": ("^", INK), "check": ("s", "#6b4c9a"), "station": ("D", "#2e7d32")}
+
+
+def plan_factor(paper):
+    """How many times larger than the plan its ellipses are drawn: 1, 2 or 5 times 10^n."""
+    points = paper.record["adjustment"]["points"]
+    largest = max((one["ellipse_m"][0] for one in points), default=0.0)
+    return round_factor(LARGEST_ELLIPSE * _extent(paper) / largest) if largest > 0 else 1
+
+
+def _places(paper):
+    """{point: (x, y)}, m."""
+    return {row["point"]: (row["x_m"], row["y_m"]) for row in paper.record["points"]}
+
+
+def _extent(paper):
+    """Size of the plan, m."""
+    photos = [(one["x_m"], one["y_m"]) for one in paper.record["adjustment"]["photos"]]
+    xy = np.array([*_places(paper).values(), *photos])
+    return float(np.ptp(xy, axis=0).max()) or 1.0
+
+
+def plan_name(paper):
+    """Name of the caption: of very many points only the weakest have an ellipse."""
+    return "plan_many" if len(paper.record["adjustment"]["points"]) > MANY else "plan"
+
+
+def plan(paper):
+    """The network from above: points with their error ellipses, stations, photos, distances."""
+    adjustment, places = paper.record["adjustment"], _places(paper)
+    points = adjustment["points"]
+    xy = np.array([places[one["point"]] for one in points])
+    origin = np.floor(xy.min(axis=0) / 1000) * 1000 if np.abs(xy).max() > 1e5 else np.zeros(2)
+    factor = plan_factor(paper)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, 5.6))
+        ax = figure.subplots()
+        _lines(ax, adjustment, places, origin)
+        many = {"rasterized": len(points) > MANY}
+        _ellipses(ax, points, xy - origin, factor)
+        _marks(ax, paper, points, xy - origin, many)
+        _photos(ax, paper, adjustment["photos"], origin)
+        ax.set_aspect("equal")
+        ax.autoscale_view()
+        ax.margins(0.06)
+        ax.set_xlabel(_axis(paper, "x", origin[0]))
+        ax.set_ylabel(_axis(paper, "y", origin[1]))
+        ax.grid(True)
+        ax.set_axisbelow(True)
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=5, frameon=False)
+        set_margins(figure, left=0.65, right=0.1, bottom=0.75, top=0.08)
+    return figure
+
+
+def _ellipses(ax, points, xy, factor):
+    """Error ellipses, of very many points those of the weakest."""
+    axes = np.array([one["ellipse_m"] for one in points])
+    weakest = np.argsort(-axes[:, 0], kind="stable")[:MANY]
+    turn = 90 - np.array([points[i]["ellipse_azimuth_deg"] for i in weakest])
+    size = 2 * factor * axes[weakest]
+    ellipses = EllipseCollection(
+        size[:, 0], size[:, 1], turn, units="xy", offsets=xy[weakest], transOffset=ax.transData,
+        facecolors="none", edgecolors=RED, linewidths=0.6,
+    )  # fmt: skip
+    ax.add_collection(ellipses)
+
+
+def _axis(paper, axis, origin):
+    text = paper.word(f"axes.{axis}")
+    return f"{text} − {origin:.0f} m" if origin else text
+
+
+def _lines(ax, adjustment, places, origin):
+    """Distances and sights between points, thin, where there are not too many to see any."""
+    station = {one["setup"]: one["station"] for one in adjustment["setups"]}
+    ends = set()
+    for row in adjustment["residuals"]:
+        if row["kind"] not in ("image coordinate", "plumb line") and len(row["ids"]) > 1:
+            start = station.get(row["ids"][0], row["ids"][0])
+            ends.add((start, row["ids"][-1]))
+    ends = {pair for pair in ends if pair[0] in places and pair[1] in places}
+    if len(ends) > MANY:
+        return
+    for start, end in sorted(ends):
+        (x0, y0), (x1, y1) = places[start], places[end]
+        ax.plot(
+            [x0 - origin[0], x1 - origin[0]], [y0 - origin[1], y1 - origin[1]],
+            color="#9aa5b1", linewidth=0.4, zorder=1,
+        )  # fmt: skip
+
+
+def _marks(ax, paper, points, xy, many):
+    kinds = np.array([one["kind"] for one in points])
+    plain = kinds == "point"
+    ax.plot(*xy[plain].T, ".", color=_GREY, markersize=2, zorder=3,
+            label=paper.word("plan.point"), **many)  # fmt: skip
+    for kind, (mark, colour) in _MARKS.items():
+        own = kinds == kind
+        if own.any():
+            ax.plot(*xy[own].T, mark, color=colour, markersize=3.5, zorder=4,
+                    label=paper.word(f"plan.{kind}"))  # fmt: skip
+    _names(ax, points, xy, _extent(paper), plan_factor(paper))
+
+
+def _names(ax, points, xy, extent, factor):
+    """Names beside the ellipses, outwards; points above one another share a line."""
+    middle = xy.mean(axis=0)
+    for numbers in _at_one_place(points, xy, SAME_PLACE * extent):
+        names = [points[n]["point"] for n in numbers[:MOST_AT_A_PLACE]]
+        more = [f"+{len(numbers) - MOST_AT_A_PLACE}"] if len(numbers) > MOST_AT_A_PLACE else []
+        away = xy[numbers[0]] - middle
+        right, up = away[0] >= 0, away[1] >= 0
+        ellipse = factor * max(points[n]["ellipse_m"][0] for n in numbers)
+        clear = 2 + 0.75 * PLAN_POINTS * ellipse / extent
+        ax.annotate(
+            ", ".join([*names, *more])[:60], xy[numbers[0]], textcoords="offset points",
+            xytext=(clear if right else -clear, clear if up else -clear), fontsize=6, color=_GREY,
+            ha="left" if right else "right", va="bottom" if up else "top", zorder=5,
+            parse_math=False,
+        )  # fmt: skip
+
+
+def _at_one_place(points, xy, near):
+    """Lists of the numbers of points that share a name tag; of too many places the stations."""
+    groups, places = [], np.zeros((0, 2))
+    for number, place in enumerate(xy):
+        away = np.linalg.norm(places - place, axis=1)
+        if len(away) and away.min() < near:
+            groups[int(away.argmin())].append(number)
+        elif len(groups) == MOST_NAMES:
+            return [[n] for n, one in enumerate(points) if one["kind"] == "station"]
+        else:
+            groups.append([number])
+            places = np.vstack([places, place])
+    return groups
+
+
+def _photos(ax, paper, photos, origin):
+    if not photos:
+        return
+    xy = np.array([[one["x_m"], one["y_m"]] for one in photos]) - origin
+    ax.plot(*xy.T, "v", color="white", markeredgecolor=INK, markersize=6, zorder=4,
+            label=paper.word("plan.photo"))  # fmt: skip
+    if len(photos) <= MOST_NAMES:
+        for photo, place in zip(photos, xy, strict=True):
+            ax.annotate(
+                photo["photo"], place, xytext=(5, 4), textcoords="offset points", fontsize=7,
+                color=INK, parse_math=False,
+            )  # fmt: skip
+
+
+def distributions(paper):
+    """Histogram of w against the normal distribution, and of the redundancy numbers."""
+    rows = [
+        row for row in paper.record["adjustment"]["residuals"]
+        if not row["removed"] and not row["check"]
+    ]  # fmt: skip
+    w = np.array([row["w"] for row in rows if row["controlled"] and row["w"] is not None])
+    redundancy = np.array([row["redundancy"] for row in rows if row["redundancy"] is not None])
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, 2.5))
+        left, right = figure.subplots(1, 2)
+        edges = np.arange(-5, 5.01, 0.5 if len(w) < 400 else 0.25)
+        left.hist(np.clip(w, -4.99, 4.99), edges, color="#9db8d2", edgecolor="white", linewidth=0.4)
+        x = np.linspace(-5, 5, 201)
+        step = edges[1] - edges[0]
+        left.plot(x, len(w) * step * np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color=RED)
+        left.set_xlim(-5, 5)
+        left.set_xlabel(paper.word("axes.w"))
+        left.set_ylabel(paper.word("axes.readings"))
+        right.hist(redundancy, np.arange(0, 1.01, 0.05), color="#9db8d2", edgecolor="white",
+                   linewidth=0.4)  # fmt: skip
+        right.set_xlim(0, 1)
+        right.set_xlabel(paper.word("axes.redundancy"))
+        for ax in (left, right):
+            ax.grid(True, axis="y")
+            ax.set_axisbelow(True)
+        set_margins(figure, left=0.6, right=0.12, bottom=0.42, top=0.08, wspace=0.2)
+    return figure
+
+
+def shown_photos(paper):
+    """The photos whose residuals are drawn: all, or those that fit worst, in their order."""
+    photos = [one for one in paper.record["adjustment"]["photos"] if one["points"]]
+    worst = sorted(photos, key=lambda one: -(one["rms_mm"] or 0.0))[:MOST_PHOTOS]
+    names = {one["photo"] for one in worst}
+    return [one for one in photos if one["photo"] in names]
+
+
+def vectors_factor(paper):
+    """How many times larger than the image its residuals are drawn."""
+    size = [np.abs(v).max(initial=0.0) for _, v, _ in _image_residuals(paper).values()]
+    half = max(_half(paper))
+    return round_factor(0.4 * half / max(size)) if max(size, default=0.0) > 0 else 1
+
+
+def photo_residuals(paper):
+    """Residuals of the image points as vectors, one panel a photo; crosses were set aside."""
+    photos, of_photo = shown_photos(paper), _image_residuals(paper)
+    factor, half = vectors_factor(paper), _half(paper)
+    across = 4
+    down = ceil(len(photos) / across)
+    shape = half[1] / half[0]
+    height = WIDTH / across * shape + 0.22
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, down * height))
+        axes = figure.subplots(down, across, squeeze=False).ravel()
+        for ax, photo in zip(axes, photos, strict=False):
+            xy, v, aside = of_photo[photo["photo"]]
+            ax.add_patch(
+                matplotlib.patches.Rectangle(
+                    (-half[0], -half[1]), 2 * half[0], 2 * half[1], fill=False, linewidth=0.5,
+                    edgecolor=_GREY,
+                )
+            )  # fmt: skip
+            ends = xy + factor * v
+            many = {"rasterized": len(xy) > MANY}
+            ax.plot(
+                [xy[:, 0], ends[:, 0]], [xy[:, 1], ends[:, 1]], color=INK, linewidth=0.6, **many
+            )
+            ax.plot(*xy.T, ".", color=INK, markersize=1.6, **many)
+            ax.plot(*aside.T, "x", color=RED, markersize=3.5, markeredgewidth=0.8)
+            ax.set(aspect="equal", xlim=(-1.03 * half[0], 1.03 * half[0]),
+                   ylim=(-1.03 * half[1], 1.03 * half[1]))  # fmt: skip
+            rms = paper.number(photo["rms_mm"], "image um", decimals=1)
+            title = paper.word("axes.photo", photo=photo["photo"], rms=rms)
+            ax.set_title(title, fontsize=8, pad=2, parse_math=False)
+        for ax in axes:
+            ax.axis("off")
+        figure.subplots_adjust(
+            left=0.005, right=0.995, bottom=0.005, top=1 - 0.18 / (down * height), wspace=0.04,
+            hspace=0.22 / (height - 0.22),
+        )  # fmt: skip
+    return figure
+
+
+def _half(paper):
+    """Half width and height of the largest image, mm."""
+    edges = [camera["edge_mm"] for camera in paper.record["adjustment"]["cameras"]]
+    return np.maximum(np.max(edges, axis=0), 1e-6)
+
+
+def _image_residuals(paper):
+    """{photo: (xy (n, 2), residuals (n, 2), xy set aside (m, 2))}, mm, of the photos shown."""
+    wanted = {one["photo"] for one in shown_photos(paper)}
+    values, residuals, used = {}, {}, {}
+    for row in paper.record["adjustment"]["residuals"]:
+        if row["kind"] == "image coordinate" and row["ids"][0] in wanted and not row["check"]:
+            key = (row["ids"][0], row["ids"][1], row["row"])
+            axis = "xy".index(row["element"])
+            values.setdefault(key, [0.0, 0.0])[axis] = row["value"]
+            residuals.setdefault(key, [0.0, 0.0])[axis] = row["residual"] or 0.0
+            used[key] = used.get(key, True) and not row["removed"]
+    found = {}
+    for photo in wanted:
+        keys = [key for key in values if key[0] == photo]
+        kept = [key for key in keys if used[key]]
+        found[photo] = (
+            np.array([values[key] for key in kept]).reshape(-1, 2),
+            np.array([residuals[key] for key in kept]).reshape(-1, 2),
+            np.array([values[key] for key in keys if not used[key]]).reshape(-1, 2),
+        )
+    return found
