@@ -190,8 +190,14 @@ def _demo(options):
     _compute(shipped("examples") / "silva-1995", Path(options.out), options.quiet)
 
 
+def _prepare_for_small_work():
+    """A second BLAS thread costs time with small matrices, a compiler with small surveys."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.setdefault("TANKCAL_COMPILED", "patient")
+
+
 def _compute(source, out, quiet, strict=False):
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: a second thread costs time
+    _prepare_for_small_work()
     from tankcal import outputs
 
     show = _Progress(quiet)
@@ -199,7 +205,7 @@ def _compute(source, out, quiet, strict=False):
     job = tankcal.load(source)
     outputs.refuse_foreign(out)
     result = tankcal.run(job, show.step)
-    adjustment = getattr(result, "adjustment", None)
+    adjustment = result.adjustment
     if strict:
         _refuse_failed(adjustment)
     paths = outputs.write(result, out, show.part)
@@ -221,7 +227,7 @@ def _compute(source, out, quiet, strict=False):
 
 
 def _adjust(source, out, quiet, strict):
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    _prepare_for_small_work()
     from tankcal import outputs
 
     show = _Progress(quiet)
@@ -295,7 +301,7 @@ def _new(options):
 
 
 def _lint(options):
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    _prepare_for_small_work()
     from tankcal.linter import Nominal, lint
 
     if options.nominal_diameter is not None and options.nominal_height is None:

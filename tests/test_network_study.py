@@ -1,20 +1,25 @@
-"""Statistics of the network by simulation: coverage, normalised errors, power of the test."""
+"""Statistics of whole surveys by simulation: do intervals and covariances hold the truth?
 
-from dataclasses import replace
+Each simulated survey has its own scale error of its tape or distance meter, drawn from the sd that
+is declared for it. Truth: the probabilities that the intervals and tests are made for.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 import scipy.stats
-from networks import CONTROL_SD_M, IMAGE_SD_MM, TAPE_SD_M, photographed
+from networks import CONTROL_SD_M, IMAGE_SD_MM, TAPE_SD_M, by_total_station, photographed
 
 from tankcal.network import Instrument, adjust
 from tankcal.observations import KnownUnknowns
 
-TAPE_SCALE_SD = 1e-4
+TAPE_SCALE_SD, METER_SCALE_SD = 1e-4, 2e-5
+INSIDE = scipy.stats.norm.isf(0.025)
 
 
 def redrawn(exact, rng, scale_sd=TAPE_SCALE_SD):
-    """The survey with new errors; its one tape has a scale error of its own."""
+    """The survey by photographs with new errors; its one tape has a scale error of its own."""
     control, tapes = exact.observations
     images = exact.image_points
     scale = rng.normal(0, scale_sd)
@@ -35,79 +40,163 @@ def redrawn(exact, rng, scale_sd=TAPE_SCALE_SD):
     )
 
 
-def coverage(surveys, seed=0):
-    """Share of 95 % intervals that hold the truth, and chi-square of normalised errors, of points.
+def redrawn_station(exact, rng, scale_sd=METER_SCALE_SD):
+    """The survey by total station with new errors and a scale error of its distance meter."""
+    found = []
+    for one in exact.observations:
+        value = one.value + rng.normal(size=len(one)) * one.sd
+        if one.kind == "distance":
+            value = value + one.value * rng.normal(0, scale_sd)
+            one = replace(one, instrument=np.zeros(len(one), dtype=int))
+        found.append(replace(one, value=value))
+    return replace(
+        exact, observations=tuple(found), instruments=(Instrument("meter", scale_sd=scale_sd),)
+    )
 
-    Also of the mean radius of the lowest ring.
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of survey: an exact one that starts at the truth, how to draw errors, how to adjust.
+
+    rings  (rings, points) of the wall, for mean radii
     """
-    exact, truth = photographed(noise=0.0)
+
+    exact: object
+    draw: object
+    datum: str
+    rings: np.ndarray
+
+    def drawn(self, rng):
+        """A Survey with errors."""
+        return self.draw(self.exact, rng)
+
+    def adjusted(self, survey):
+        """Its adjustment."""
+        return adjust(survey, datum=self.datum)
+
+
+def kinds(name):
+    """The Kind "photographs" (tape, control) or "total station" (free network)."""
+    if name == "photographs":
+        exact, truth = photographed(noise=0.0)
+        exact = replace(exact, xyz_m=truth.xyz_m)
+        return Kind(exact, redrawn, "control", np.arange(48).reshape(4, 12))
+    exact, truth = by_total_station(noise=0.0)
     exact = replace(exact, xyz_m=truth.xyz_m)
-    rng, ring = np.random.default_rng(seed), np.arange(12)
-    unit = truth.xyz_m[ring] * [1, 1, 0]
-    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
-    inside, radius, chi2, count = 0, 0, 0.0, 0
+    return Kind(exact, redrawn_station, "inner", np.arange(24).reshape(3, 8))
+
+
+@dataclass(frozen=True)
+class Study:
+    """Shares of 95 % intervals that hold the truth, and quantities with known distributions.
+
+    points, radii  share of coordinates, of mean radii of rings
+    whole          (surveys,) e' Q^-1 e of all coordinates, chi-square of `rank`
+    sums           (surveys,) v'Pv, chi-square of dof
+    """
+
+    points: float
+    radii: float
+    whole: np.ndarray
+    rank: int
+    sums: np.ndarray
+    dof: int
+
+
+def study(name, surveys, seed=0):
+    """The Study of so many surveys."""
+    kind, rng = kinds(name), np.random.default_rng(seed)
+    true = kind.exact.xyz_m
+    to_radius = _radii(true, kind.rings)
+    inside, radii, whole, sums = [], [], [], []
     for _ in range(surveys):
-        found = adjust(redrawn(exact, rng))
-        error = found.xyz_m - truth.xyz_m
-        normalised = error / found.point_sd_m
-        inside += np.count_nonzero(np.abs(normalised) < 1.959964)
-        count += normalised.size
-        blocks = found.point_covariances_m2
-        chi2 += np.einsum("ni,nij,nj->", error, np.linalg.inv(blocks), error)
-        a = (unit / 12).ravel()
-        sd = np.sqrt(a @ found.covariance_m2(ring) @ a)
-        radius += abs(a @ error[ring].ravel()) < 1.959964 * sd
-    return inside / count, radius / surveys, chi2 / count
+        found = kind.adjusted(kind.drawn(rng))
+        error, covariance = (found.xyz_m - true).ravel(), found.covariance_m2()
+        sd = np.sqrt(np.diag(covariance))
+        inside.append(np.mean(np.abs(error) < INSIDE * sd))
+        sd = np.sqrt(np.einsum("ri,ij,rj->r", to_radius, covariance, to_radius))
+        radii.append(np.mean(np.abs(to_radius @ error) < INSIDE * sd))
+        size = np.sqrt(np.diag(covariance))
+        values, axes = np.linalg.eigh(covariance / np.outer(size, size))
+        felt = values > 1e-9 * values[-1]
+        whole.append(np.sum((axes.T @ (error / size))[felt] ** 2 / values[felt]))
+        sums.append(found.solution.chi2)
+    return Study(
+        float(np.mean(inside)), float(np.mean(radii)), np.array(whole), int(felt.sum()),
+        np.array(sums), found.dof,
+    )  # fmt: skip
+
+
+def _radii(xyz, rings):
+    """(rings, 3 points) derivatives of the mean radius of each ring by all coordinates."""
+    away = xyz * [1, 1, 0]
+    unit = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+    found = np.zeros((len(rings), *xyz.shape))
+    for row, ring in zip(found, rings, strict=True):
+        row[ring] = unit[ring] / len(ring)
+    return found.reshape(len(rings), -1)
+
+
+def told(figure, name, done):
+    """Show what a study found, and how likely its chi-squares are."""
+    surveys = len(done.whole)
+    likely = [
+        scipy.stats.kstest(values, scipy.stats.chi2(dof).cdf).pvalue
+        for values, dof in ((done.whole, done.rank), (done.sums, done.dof))
+    ]
+    figure(
+        f"{surveys} surveys, {name}",
+        f"coverage of coordinates {done.points:.4f}, of radii {done.radii:.4f}; mean e'Q^-1 e /"
+        f" rank {done.whole.mean() / done.rank:.4f} (p {likely[0]:.2f}), mean v'Pv / dof"
+        f" {done.sums.mean() / done.dof:.4f} (p {likely[1]:.2f})",
+    )
+    return likely
+
+
+def within(values, dof, sds=3.5):
+    """Is the mean of chi-squares as it should be, within so many of its sds?"""
+    return abs(values.mean() - dof) < sds * np.sqrt(2 * dof / len(values))
+
+
+NAMES = ("photographs", "total station")
 
 
 @pytest.mark.study
-def test_intervals_cover_at_full_size(figure):
-    points, radius, chi2 = coverage(1000)
-    figure("1000 surveys: coverage of points, of a mean radius, chi2 per coordinate",
-           f"{points:.4f}, {radius:.4f}, {chi2:.4f}")  # fmt: skip
-    assert 0.935 < points < 0.965
-    assert 0.935 < radius < 0.965
-    assert chi2 == pytest.approx(1, abs=0.03)
+@pytest.mark.parametrize("name", NAMES)
+def test_intervals_cover_at_full_size(name, figure):
+    done = study(name, 1000)
+    likely = told(figure, name, done)
+    assert 0.935 < done.points < 0.965
+    assert 0.935 < done.radii < 0.965
+    assert within(done.whole, done.rank)
+    assert within(done.sums, done.dof)
+    assert min(likely) > 1e-3
 
 
-def test_intervals_cover(figure):
-    points, radius, chi2 = coverage(50)
-    figure("50 surveys: coverage of points, of a mean radius, chi2 per coordinate",
-           f"{points:.4f}, {radius:.4f}, {chi2:.4f}")  # fmt: skip
-    assert 0.92 < points < 0.98
-    assert 0.84 < radius <= 1.0
-    assert chi2 == pytest.approx(1, abs=0.15)
+@pytest.mark.parametrize("name", NAMES)
+def test_intervals_cover(name, figure):
+    done = study(name, 50)
+    likely = told(figure, name, done)
+    assert 0.92 < done.points < 0.98
+    assert 0.88 < done.radii <= 1.0
+    assert within(done.whole, done.rank)
+    assert within(done.sums, done.dof)
+    assert min(likely) > 1e-3
 
 
-def power(surveys, seed=1):
-    """Share of surveys in which a blunder of the minimal detectable size is found."""
-    exact, truth = photographed(noise=0.0)
-    exact = replace(exact, xyz_m=truth.xyz_m)
-    rng = np.random.default_rng(seed)
-    tables = adjust(redrawn(exact, rng)).residuals
-    table = next(t for t in tables if t.source == "image points")
-    found = 0
-    rows = rng.choice(np.flatnonzero(table.redundancy[:, 0] > 0.2), surveys)
-    for row in rows:
-        survey = redrawn(exact, rng)
-        images, xy = survey.image_points, survey.image_points.xy_mm.copy()
-        xy[table.rows[row], 0] += table.mdb[row, 0]
-        bad = replace(survey, image_points=replace(images, xy_mm=xy))
-        tested = next(t for t in adjust(bad).residuals if t.source == "image points")
-        found += abs(tested.w[row, 0]) > scipy.stats.norm.isf(0.0005)
-    return found / surveys
-
-
-@pytest.mark.study
-def test_baarda_power_at_full_size(figure):
-    """Closed form: 0.80 at the minimal detectable bias (0.1 %, 80 %)."""
-    found = power(2500)
-    figure("2500 blunders of the minimal detectable size: found", f"{found:.4f}")
-    assert found == pytest.approx(0.80, abs=0.02)
-
-
-def test_baarda_power():
-    assert power(125) == pytest.approx(0.80, abs=0.11)
+def test_a_scale_error_that_is_not_declared_is_not_covered(figure):
+    """Property: the study has teeth. With the tape's u_scale left out the radii miss the truth."""
+    kind, rng = kinds("photographs"), np.random.default_rng(0)
+    to_radius, missed = _radii(kind.exact.xyz_m, kind.rings), []
+    for _ in range(20):
+        survey = redrawn(kind.exact, rng, scale_sd=5e-3)
+        blind = replace(survey, instruments=(Instrument("tape"),))
+        found = adjust(blind)
+        error = to_radius @ (found.xyz_m - kind.exact.xyz_m).ravel()
+        sd = np.sqrt(np.einsum("ri,ij,rj->r", to_radius, found.covariance_m2(), to_radius))
+        missed.append(np.mean(np.abs(error) > INSIDE * sd))
+    figure("radii missed when a scale error is not declared", f"{np.mean(missed):.2f}")
+    assert np.mean(missed) > 0.3
 
 
 def test_a_known_scale_is_one_observation():

@@ -115,5 +115,8 @@ def test_what_cannot_be_found_is_named():
     survey, truth = photographed()
     known = np.full_like(truth.xyz_m, np.nan)
     known[:2] = truth.xyz_m[:2]
+    images = survey.image_points
+    alone = replace(images, use=(images.photo == 0) * 1.0)
+    start = replace(unknown_photos(survey), xyz_m=known, image_points=alone, observations=())
     with pytest.raises(SolutionError, match=r"no approximate values for photo S0 \(. known poi"):
-        approximate(replace(unknown_photos(survey), xyz_m=known))
+        approximate(start)

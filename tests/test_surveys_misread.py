@@ -8,7 +8,7 @@ from surveyed import by_instruments, by_photographs, changed, known, told
 
 @pytest.fixture(scope="module")
 def photos():
-    return by_photographs()[0]
+    return by_photographs(photos=6)[0]
 
 
 @pytest.fixture(scope="module")
@@ -29,9 +29,10 @@ def test_all_control_swapped(photos):
     assert "control.csv: all coordinates fit once x and y are swapped" in text
 
 
-def test_all_distances_in_feet(photos):
-    text = told(changed(photos, "distances", value=photos.readings[0].value / 0.3048))
-    assert "feet" in text
+def test_all_distances_in_feet(stations):
+    table = stations.readings[2]
+    text = told(changed(stations, "slope_distances", value=table.value / 0.3048))
+    assert "slope_distances.csv: the distances fit once they are taken for feet" in text
 
 
 @pytest.mark.parametrize(
@@ -52,10 +53,15 @@ def test_all_angles_in_the_other_unit(stations):
 
 
 def test_all_photos_mirrored(photos):
-    """Control in one plane allows the tank in a mirror: the targets tell; else the images do."""
+    """A mirrored tank: whether images or control are to blame, nobody can tell; both are named."""
     images = replace(photos.image_points, xy_mm=photos.image_points.xy_mm * [1, -1])
-    turned = replace(photos, image_points=images)
-    text = told(turned)
-    assert "mirror" in text
-    text = told(replace(turned, control=on_four_sides()))
+    text = told(replace(photos, image_points=images, control=on_four_sides()))
     assert "image_points.csv: its image points fit once the image is mirrored" in text
+
+
+def test_targets_tell_a_mirrored_tank(photos):
+    """Generatrices numbered the other way round: the adjusted points are their mirror image."""
+    targets = photos.targets
+    other = tuple(str((13 - int(name)) % 12 + 1) for name in targets.generatrix)
+    text = told(replace(photos, targets=replace(targets, generatrix=other)))
+    assert "targets.csv, generatrix: the adjusted points are a mirror image" in text

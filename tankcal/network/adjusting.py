@@ -9,12 +9,13 @@ from tankcal.network.soundness import hanging_datum, refuse_worthless_cameras
 from tankcal.observations import PlumbLines
 
 
-def adjust(survey, *, datum="control", over=None, tolerance=1e-4, max_iterations=100):
+def adjust(survey, *, datum="control", over=None, photo=None, tolerance=1e-4, max_iterations=100):
     """Least squares of all observations of a Survey.
 
     datum      "control": whatever is known of points and photos must fix it; "inner": what is not
                fixed is chosen so that the points keep their places on the whole (free network)
     over       (k,) points that take part in the inner constraints, None: all
+    photo      number of the photo that takes part in their place; None: points do
     tolerance  of the last step, see tankcal.gauss_markov.solve
 
     Returns an Adjusted. Raises SolutionError when something is not determined: a datum defect in
@@ -24,7 +25,7 @@ def adjust(survey, *, datum="control", over=None, tolerance=1e-4, max_iterations
     if datum == "inner":
         free = unobserved(problem)
         if free.shape[1]:
-            problem = held(problem, over, free)
+            problem = held(problem, over, free, photo)
     elif any(isinstance(one, PlumbLines) for one in survey.observations):
         _refuse_defect(problem)  # a plumb line that is not quite plumb would hide one
     try:

@@ -98,8 +98,8 @@ def unobserved(problem, unfelt=UNFELT, fixed=True):
         if fixed and len(sharp):
             felt.append(np.linalg.qr(sharp, mode="r"))
             square += np.sum(sharp**2, axis=0)
-    moving = square > 0  # a levelled line without plan coordinates knows no turn about Z
-    size = np.sqrt(square[moving])
+    moving = (square > 0) | whole.any(axis=0)  # heights at one place know no turn about Z
+    size = np.sqrt(np.where(square > 0, square, 1.0))[moving]
     _, singular, vectors = np.linalg.svd(np.vstack(felt)[:, moving] / size)
     rank = int(np.sum(singular > unfelt))
     free = np.zeros((7, len(size) - rank))
@@ -208,15 +208,20 @@ def _axis(combination, problem):
     )
 
 
-def held(problem, over, combinations):
-    """The Problem with a datum by inner constraints over chosen points.
+def held(problem, over, combinations, photo=None):
+    """The Problem with a datum by inner constraints over chosen points, or over one photo.
 
     over          (k,) points that take part, or None: all
     combinations  (7, d) from `unobserved`
+    photo         number of the photo that is moved and turned as little as can be, in place of the
+                  points; None: the points take part
     """
     layout, mask = problem.layout, np.zeros(problem.model.unknowns + 1)
-    members = slice(None) if over is None else np.asarray(over)
-    mask[layout.points[members].ravel()] = 1.0
+    if photo is None:
+        members = slice(None) if over is None else np.asarray(over)
+        mask[layout.points[members].ravel()] = 1.0
+    else:
+        mask[layout.photos[photo]] = 1.0
 
     def free(state):
         return directions(layout, state) @ combinations

@@ -41,10 +41,10 @@ class Known:
 
 
 def certain(survey):
-    """Known places that are fixed or observed."""
+    """Known places that are fixed or observed, of points that something was measured to."""
     xyz = np.full((len(survey.points), 3), np.nan)
     if survey.fixed is not None:
-        xyz = np.where(survey.fixed, survey.xyz_m, xyz)
+        xyz = np.where(survey.fixed & _measured(survey)[:, None], survey.xyz_m, xyz)
     for one in survey.observations:
         if isinstance(one, ControlCoordinates):
             used = np.ones(len(one), dtype=bool) if one.use is None else one.use > 0
@@ -75,11 +75,22 @@ def _photos_observed(survey):
 
 
 def hinted(survey):
-    """All start values that were given, whatever they are worth."""
-    photos = survey.photos
+    """All start values that were given, whatever they are worth, of points measured to."""
+    photos, xyz = survey.photos, np.where(_measured(survey)[:, None], survey.xyz_m, np.nan)
     if photos is None:
-        return Known(_piece(survey.xyz_m, np.zeros((0, 3)), np.zeros((0, 3, 3))))
-    return Known(_piece(survey.xyz_m, photos.xyz_m, photos.rotation))
+        return Known(_piece(xyz, np.zeros((0, 3)), np.zeros((0, 3, 3))))
+    return Known(_piece(xyz, photos.xyz_m, photos.rotation))
+
+
+def _measured(survey):
+    """(points,) True for points that an image or an observation speaks of."""
+    found = np.zeros(len(survey.points), dtype=bool)
+    if survey.image_points is not None:
+        found[survey.image_points.point] = True
+    for one in survey.observations:
+        for name in one.ties:
+            found[getattr(one, name)] = True
+    return found
 
 
 def _piece(xyz_m, place_m, rotation):

@@ -160,15 +160,11 @@ def _photo(survey, bare, problem, free, gathered, settings):
     left = _free(assemble(chosen))
     if left.shape[1]:
         raise SolutionError(in_words(left, problem))
-    warnings = []
-    if free.shape[1] < 6:
-        text = (
-            f"photo {name} is held in 6 ways where {free.shape[1]} would do, the others are "
-            "determined by observations: the photo strains the network"
-        )
-        warnings.append(Problem("job.toml", text, None, "adjustment.fixed_photo"))
     held = np.zeros((len(survey.points), 3), dtype=bool)
-    return chosen, {}, held, (f"photo {name}",), warnings
+    if free.shape[1] < 6:  # observations determine the rest: holding that, too, would strain them
+        number = names.index(name)
+        return bare, {"datum": "inner", "photo": number}, held, (f"photo {name}",), []
+    return chosen, {}, held, (f"photo {name}",), []
 
 
 def _inner(survey, bare, problem, free, gathered, settings):

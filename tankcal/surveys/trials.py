@@ -16,26 +16,31 @@ from tankcal.surveys.readings import ANGLES
 BETTER = 0.2  # share of sigma0 that may be left by what explains a survey
 SOUND = 5.0  # sigma0 of a survey that fits, where there is no sigma0 to compare with
 CERTAIN = 2.0  # sigma0 after which nothing else is tried
+ALIKE = 1.5  # times the smallest sigma0, within which suppositions explain as much
+MIRRORS = ("control.csv", "image_points.csv")  # mistakes that cannot always be told apart
 RELEASED_M = 0.001  # sd of fixed control while it is looked for swapped coordinates
 MOST = 12  # photos that are left out one after the other
 
 
 def likely_mistake(measurements, sigma0, run):
-    """Problem rows: the common mistake that explains best why a survey does not fit, or none.
+    """Problem rows: the common mistakes that explain best why a survey does not fit, or none.
 
     sigma0  without data snooping, inf when the survey could not be adjusted
     run     run(measurements) -> (network.Adjusted, Gathered), without data snooping
     """
-    best, told = min(BETTER * sigma0, SOUND if np.isinf(sigma0) else np.inf), []
+    limit = min(BETTER * sigma0, SOUND if np.isinf(sigma0) else np.inf)
+    explained = []
     for problem, changed in _suppositions(measurements):
+        if problem.file not in MIRRORS and any(found < CERTAIN for found, _ in explained):
+            break
         try:
             found = run(changed)[0].sigma0
         except (SolutionError, InputError):
             continue
-        if found < best:
-            best, told = found, [problem]
-        if found < CERTAIN:
-            break
+        if found < limit:
+            explained.append((found, problem))
+    best = min((found for found, _ in explained), default=np.inf)
+    told = [problem for found, problem in explained if found < ALIKE * best]
     return told or _swapped(measurements, run)
 
 
