@@ -100,8 +100,8 @@ def test_what_is_adjusted_of_a_camera(survey):
     [
         ({}, {}, 0, "camera", "free", 100.12),
         ({"default": "block free"}, {}, 0, "block", "free", 100.12),
-        ({"default": "block free"}, {"K4_mm-8": 1e-18}, 6, "off", "free", 1e-18),
-        ({"default": "off"}, {}, 0, "off", "free", 100.12),
+        ({"default": "block free"}, {"K4_mm-8": 1e-18}, 6, "camera", "fixed", 1e-18),
+        ({"default": "off"}, {}, 0, "camera", "fixed", 100.12),
         ({"c": "photo free"}, {}, 0, "photo", "free", 100.12),
         ({"c": "camera weighted"}, {"s_c_mm": 0.01}, 0, "camera", "weighted", 100.12),
         ({}, {"s_c_mm": 0.0}, 0, "camera", "fixed", 100.12),

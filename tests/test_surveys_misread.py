@@ -59,8 +59,9 @@ def test_all_photos_mirrored(photos):
     assert "image_points.csv: its image points fit once the image is mirrored" in text
 
 
-def test_targets_tell_a_mirrored_tank(photos):
+def test_targets_tell_a_mirrored_tank():
     """Generatrices numbered the other way round: the adjusted points are their mirror image."""
+    photos = by_photographs()[0]
     targets = photos.targets
     other = tuple(str((13 - int(name)) % 12 + 1) for name in targets.generatrix)
     text = told(replace(photos, targets=replace(targets, generatrix=other)))

@@ -104,16 +104,24 @@ def make_camera(name, given, settings):
         affinity=affinity_of(given),
         radial_balance_mm=given["radial_balance_mm"] or 0.0,
     )
+    roles = [_role(parameter) for parameter in parameters]
     camera = Camera(
         values=np.array([parameter.value or 0.0 for parameter in parameters]),
         form=form,
         sd=np.array([np.nan if parameter.sd is None else parameter.sd for parameter in parameters]),
-        scope=tuple(parameter.scope for parameter in parameters),
-        state=tuple(parameter.state for parameter in parameters),
+        scope=tuple(scope for scope, _ in roles),
+        state=tuple(state for _, state in roles),
         name=name,
     )
     format_mm, pixel_mm = format_of(given)
     return CameraSetup(camera, format_mm, pixel_mm)
+
+
+def _role(parameter):
+    """(scope, state) for network.Camera, which drops what is off: a value that is kept is fixed."""
+    if parameter.scope == "off" and parameter.value:
+        return "camera", "fixed"
+    return parameter.scope, parameter.state
 
 
 def image_frames(table, photos, cameras):

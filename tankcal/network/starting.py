@@ -162,8 +162,10 @@ def _filled(clues, piece, sure, hints, centre, reasons):
     xyz = np.where(np.isfinite(sure.piece.xyz_m), sure.piece.xyz_m, piece.xyz_m)
     off = np.linalg.norm(given.xyz_m - xyz, axis=1)
     keep = np.isfinite(given.xyz_m) & ~(off > KEPT_SHARE * piece.extent)[:, None]
-    xyz = np.where(keep, given.xyz_m, xyz)
+    untouched = keep | (np.isfinite(survey.xyz_m) & np.isnan(given.xyz_m))
+    xyz = np.where(untouched, survey.xyz_m - centre, xyz)
     zeros = oriented(clues.plan, xyz[:, :2])[: len(survey.sets)]
+    zeros = np.where(clues.plan.at[: len(zeros)] < 0, 0.0, zeros)  # nothing was read on these
     sets = np.where(np.isfinite(survey.sets), survey.sets, zeros)
     if np.isnan(xyz[:, :2]).any():
         _, apart = in_plan(clues.plan, xyz[:, :2], xyz[:, 2], clues.rng)
@@ -171,7 +173,7 @@ def _filled(clues, piece, sure, hints, centre, reasons):
             hanging(survey, local.known, np.isfinite(xyz[:, 0])) for local in apart
         ]
     xyz = refuse_missing(survey, clues.sights, xyz, piece, sets, reasons)
-    xyz = np.where(keep, survey.xyz_m, xyz + centre)
+    xyz = np.where(untouched, survey.xyz_m, xyz + centre)
     if survey.fixed is not None:
         xyz = np.where(survey.fixed & np.isfinite(survey.xyz_m), survey.xyz_m, xyz)
     return replace(survey, xyz_m=xyz, photos=_photos(survey, piece, given, centre), sets=sets)
