@@ -65,6 +65,7 @@ class Problem:
     interior_of: np.ndarray
     exact: tuple = ()
     points: tuple = ()
+    photos: tuple = ()
 
     def name_of_point(self, point):
         """Name of a point."""
@@ -106,6 +107,7 @@ def assemble(survey):
     return Problem(
         model, state, layout, tuple(groups), tuple(sources), tuple(rows_of),
         centre, set_aside, eliminated, table, exact, survey.points,
+        () if survey.photos is None else survey.photos.names,
     )  # fmt: skip
 
 

@@ -186,8 +186,8 @@ def in_words(combinations, problem=None):
     if len(pure) < d:
         rest = d - len(pure)
         mixed = [WAYS[i] for i in range(7) if 1e-6 < share[i] <= 1 - 1e-6]
-        axis = _axis(combinations, problem) if d == 1 and problem is not None else ""
-        parts.append(axis or f"{rest} combination{'s' * (rest > 1)} of {', '.join(mixed)}")
+        about = "" if problem is None else _about_what_stays(combinations, problem)
+        parts.append(about or f"{rest} combination{'s' * (rest > 1)} of {', '.join(mixed)}")
     listed = parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
     verb = "is" if d == 1 else "are"
     return (
@@ -196,16 +196,42 @@ def in_words(combinations, problem=None):
     )
 
 
-def _axis(combination, problem):
-    """Words on a rotation about a line through points of the survey, "" when it is none."""
-    size = np.linalg.norm(_of_places(problem.state.xyz_m) @ combination[:, 0], axis=1)
-    used = ~_idle(problem)[id(problem.layout.points)][:, 0]
-    still = np.flatnonzero(used & (size < 1e-3 * size[used].max()))
-    if len(still) < 2:
-        return ""
-    return "the rotation about the line through points " + ", ".join(
-        problem.name_of_point(int(i)) for i in still[:4]
+def _about_what_stays(combinations, problem):
+    """Words on turning and stretching about what keeps its place, "" when nothing does."""
+    turns, stretches = (
+        np.linalg.matrix_rank(combinations[rows], tol=1e-6 * np.abs(combinations[rows]).max())
+        if np.abs(combinations[rows]).max() > 1e-9 * np.abs(combinations).max()
+        else 0
+        for rows in (slice(3, 6), slice(6, 7))
     )
+    if turns + stretches != combinations.shape[1]:
+        return ""
+    still, count = _staying(combinations, problem)
+    if not count:
+        return ""
+    if turns == 1 and not stretches and count > 1:
+        return f"the rotation about the line through {still}"
+    what = ["", "the rotation", "two rotations", "three rotations"][turns]
+    both = " and ".join(filter(None, [what, "the scale" * stretches]))
+    return f"{both} about {still}"
+
+
+def _staying(combinations, problem):
+    """Names of the points and photos that no combination (7, d) moves, in words, and how many."""
+    used = ~_idle(problem)[id(problem.layout.points)][:, 0]
+    xyz = np.vstack([problem.state.xyz_m[used], problem.state.photo_xyz_m])
+    size = np.linalg.norm(_of_places(xyz) @ combinations, axis=(1, 2))
+    points = np.flatnonzero(used)
+    still = np.flatnonzero(size < 1e-3 * size.max())
+    found = [
+        _plural("point", [problem.name_of_point(int(points[i])) for i in still if i < len(points)]),
+        _plural("photo", [problem.photos[i - len(points)] for i in still if i >= len(points)]),
+    ]
+    return " and ".join(filter(None, found)), len(still)
+
+
+def _plural(what, names):
+    return f"{what}{'s' * (len(names) > 1)} {', '.join(names[:4])}" if names else ""
 
 
 def held(problem, over, combinations, photo=None):

@@ -7,6 +7,7 @@ from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.instruments import TAKEN_FROM_SETUPS
 from tankcal.job.contract.observations import ANGLE_UNITS, ANGLES, READINGS
 
+BY_CHANCE = 0.1  # share of the rows: coarse readings repeat themselves
 MOST_REPEATED = 3  # rows that a warning names
 
 
@@ -72,7 +73,7 @@ def _refuse_same_ends(files, name, table):
 
 
 def _warn_copies(files, table):
-    """Rows that are the same to the last digit, one warning for a file."""
+    """Rows that are the same to the last digit, more than chance brings; one warning for a file."""
     raw = files.raw.tables[files_name(table)]
     first, copies = {}, []
     for row, cells in zip(raw.row_numbers, raw.rows, strict=True):
@@ -82,7 +83,7 @@ def _warn_copies(files, table):
             continue
         if before != row:
             copies.append((row, before))
-    if not copies:
+    if len(copies) <= BY_CHANCE * len(raw.rows):
         return
     shown = ", ".join(f"{row} as {before}" for row, before in copies[:MOST_REPEATED])
     more = " and more" if len(copies) > MOST_REPEATED else ""
