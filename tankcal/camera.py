@@ -14,8 +14,8 @@ and the distortion of a point (x, y), with r2 = x2 + y2, is the sum of
 Three conventions say which point that is, and on which side it stands:
 
     distortion_of_ideal    x = x0 + xi + d(xi)               OpenCV, AICON
-    correction_added       (x - x0) + d(x - x0) = xi         Silva 39
-    correction_subtracted  (x - x0) - d(x - x0) = xi         Pessoa 10, DBAT
+    correction_added       (x - x0) + d(x - x0) = xi         Silva 39, DBAT
+    correction_subtracted  (x - x0) - d(x - x0) = xi         Pessoa 10
 
 The last two are solved for the measured coordinate x, so every convention is a function of the
 unknowns and the misclosure is always "computed minus measured", in the image as it was measured.

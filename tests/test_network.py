@@ -116,7 +116,7 @@ def test_small_jobs_do_not_wait_for_a_compiler(monkeypatch):
     """Arrays until there is enough work; what is large from the start is compiled at once."""
     room = tankcal.compiled
     monkeypatch.setattr(room, "available", lambda: True)
-    monkeypatch.setattr(room, "_asked_for", lambda: "")
+    monkeypatch.setattr(room, "_asked_for", lambda: "patient")
     monkeypatch.setattr(room, "_worked", 0)
     assert not any(room.worthwhile(1500) for _ in range(100))
     assert not room.worthwhile()

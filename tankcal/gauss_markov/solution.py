@@ -131,6 +131,8 @@ class Solution:
 
     def reduced_blocks(self, columns):
         """Cofactors (n, k, k) of groups (n, k) of reduced unknowns; anything where one is -1."""
+        if not self.plan.reduced:
+            return np.zeros((*columns.shape, columns.shape[1]))
         own = self.reduced_cofactors[columns[:, :, None], columns[:, None, :]]
         return own if self.datum is None else self._in_datum(own, columns, columns)
 

@@ -190,7 +190,7 @@ class _Work:
             dense = np.zeros((n, m, nr + 1))
             columns = np.broadcast_to(batch.columns[:, None, :], jac.shape)
             dense[np.arange(n)[:, None, None], np.arange(m)[:, None], columns] = jac
-            rows.append(dense.reshape(n * m, -1)[:, :nr] * scale)
+            rows.append(dense.reshape(n * m, dense.shape[-1])[:, :nr] * scale)
         rows, pull = np.vstack(rows), None
         if tangent is not None:
             outer, rows = tangent.split(rows.T)

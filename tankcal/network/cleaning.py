@@ -66,9 +66,9 @@ def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, *
     if robust and _worst(adjusted).max(initial=0) > limit:
         survey, rounds = _robust(survey, adjusted, critical, options)
         adjusted = adjust(survey, **options)
-    seen = {}
+    seen, back = {}, {}
     for _ in range(max_rounds):
-        uses, changed = _verdict(adjusted, _limit(adjusted, critical, test))
+        uses, changed = _verdict(adjusted, _limit(adjusted, critical, test), back)
         for table in _tables(adjusted):
             seen.update(_quantities(table))
         if not changed:
@@ -171,8 +171,11 @@ def _robust(survey, adjusted, critical, options):
     return with_use(survey, shares), turn + 2
 
 
-def _verdict(adjusted, critical):
-    """The shares that the residuals ask for, and whether they differ from those there are."""
+def _verdict(adjusted, critical, back):
+    """The shares that the residuals ask for, and whether they differ from those there are.
+
+    back  {source: rows} that came back before: they do so once only, else the search could circle
+    """
     survey = adjusted.survey
     shares, worst = _shares(survey), 0.0
     tables = _tables(adjusted)
@@ -185,6 +188,9 @@ def _verdict(adjusted, critical):
         if table.source == "image points":
             goes &= _largest_of_each(survey.image_points.point[table.rows], np.where(goes, away, 0))
         comes = ~table.used & (away < critical) if worst <= critical else np.zeros_like(goes)
+        before = back.setdefault(table.source, set())
+        comes &= ~np.isin(table.rows, list(before))
+        before.update(table.rows[comes].tolist())
         shares[table.source][table.rows[goes]] = 0.0
         shares[table.source][table.rows[comes]] = 1.0
         changed |= bool(goes.any() or comes.any())
