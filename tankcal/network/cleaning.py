@@ -28,6 +28,8 @@ class Cleaned:
     removed   tuple of Removed              rounds   adjustments that this took
     suspects  tuple of Removed: what holds exactly (and is never set aside) but disagreed with all
               others in the first adjustment; what was removed may be their victim
+    needed    tuple of Removed: what disagrees like a blunder, but was kept because without it
+              something would not be determined
     """
 
     adjusted: object
@@ -35,6 +37,7 @@ class Cleaned:
     removed: tuple
     rounds: int
     suspects: tuple = ()
+    needed: tuple = ()
 
 
 @dataclass(frozen=True)
@@ -61,20 +64,35 @@ def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, *
     if test not in ("w", "tau"):
         raise ValueError(f"test {test!r}: w or tau")
     adjusted, rounds = adjust(survey, **options), 1
-    limit = _limit(adjusted, critical, test)
-    suspects = _suspects(adjusted, limit)
-    if robust and _worst(adjusted).max(initial=0) > limit:
-        survey, rounds = _robust(survey, adjusted, critical, options)
-        adjusted = adjust(survey, **options)
-    seen, back = {}, {}
+    suspects = _suspects(adjusted, _limit(adjusted, critical, test))
+    if robust and _worst(adjusted).max(initial=0) > _limit(adjusted, critical, test):
+        try:
+            thinner, rounds = _robust(survey, adjusted, critical, options)
+            adjusted, survey = adjust(thinner, **options), thinner
+        except SolutionError:
+            rounds += 1  # too much went at once: one by one then
+    seen, back, needed, few = {}, {}, {}, False
     for _ in range(max_rounds):
-        uses, changed = _verdict(adjusted, _limit(adjusted, critical, test), back)
+        before = _shares(survey)
+        uses, changed = _verdict(adjusted, _limit(adjusted, critical, test), back, needed, few)
         for table in _tables(adjusted):
             seen.update(_quantities(table))
         if not changed:
-            return Cleaned(adjusted, survey, _removed(survey, seen), rounds, suspects)
-        survey = with_use(started(survey, adjusted), uses)
-        adjusted, rounds = adjust(survey, **options), rounds + 1
+            kept = _listed(survey, seen, needed)
+            return Cleaned(adjusted, survey, _removed(survey, seen), rounds, suspects, kept)
+        rounds += 1
+        try:
+            thinner = with_use(started(survey, adjusted), uses)
+            adjusted, survey, few = adjust(thinner, **options), thinner, False
+        except SolutionError:
+            goes = {
+                source: np.flatnonzero((was > 0) & (uses[source] == 0))
+                for source, was in before.items()
+            }
+            if few or sum(map(len, goes.values())) == 1:
+                for source, rows in goes.items():
+                    needed.setdefault(source, set()).update(rows.tolist())
+            few = True
     raise SolutionError(f"data snooping did not come to rest in {max_rounds} rounds")
 
 
@@ -171,20 +189,25 @@ def _robust(survey, adjusted, critical, options):
     return with_use(survey, shares), turn + 2
 
 
-def _verdict(adjusted, critical, back):
+def _verdict(adjusted, critical, back, needed, few):
     """The shares that the residuals ask for, and whether they differ from those there are.
 
-    back  {source: rows} that came back before: they do so once only, else the search could circle
+    back    {source: rows} that came back before: they do so once only, else the search could circle
+    needed  {source: rows} that stay whatever they say
+    few     True: only what is furthest off goes
     """
     survey = adjusted.survey
     shares, worst = _shares(survey), 0.0
-    tables = _tables(adjusted)
-    for table in tables:
-        worst = max(worst, float(table.whole[table.used].max(initial=0)))
+    tables, at_once = _tables(adjusted), 1.0 if few else AT_ONCE
+    may = [
+        table.used & ~np.isin(table.rows, list(needed.get(table.source, ()))) for table in tables
+    ]
+    for table, mine in zip(tables, may, strict=True):
+        worst = max(worst, float(table.whole[mine].max(initial=0)))
     changed = False
-    for table in tables:
+    for table, mine in zip(tables, may, strict=True):
         away = table.whole
-        goes = table.used & (away > max(critical, AT_ONCE * worst))
+        goes = mine & (away > critical) & (away >= at_once * worst)
         if table.source == "image points":
             goes &= _largest_of_each(survey.image_points.point[table.rows], np.where(goes, away, 0))
         comes = ~table.used & (away < critical) if worst <= critical else np.zeros_like(goes)
@@ -212,10 +235,16 @@ def _quantities(table):
 
 def _removed(survey, seen):
     """Every observation that is set aside, with the last test quantity it had, the worst first."""
+    gone = {source: np.flatnonzero(share == 0) for source, share in _shares(survey).items()}
+    return _listed(survey, seen, {source: rows.tolist() for source, rows in gone.items()})
+
+
+def _listed(survey, seen, rows_of):
+    """Removed for each of {source: rows}, the worst first."""
     kinds = {number: one.kind for number, one in enumerate(survey.observations)}
     found = [
-        Removed(kinds.get(source, "image coordinate"), source, int(row), seen.get((source, row), 0))
-        for source, share in _shares(survey).items()
-        for row in np.flatnonzero(share == 0).tolist()
+        Removed(kinds.get(source, "image coordinate"), source, row, seen.get((source, row), 0))
+        for source, rows in rows_of.items()
+        for row in rows
     ]
     return tuple(sorted(found, key=lambda one: -one.w))

@@ -38,7 +38,8 @@ class Residuals:
     w           (n, m) test quantity; of those set aside: of the difference to what the others say
     whole       (n,) test quantity of the observation with all its values: |w|, or the root of what
                 v'Pv would lose without it, brought to the critical value of w (0.1 %)
-    mdb         (n, m) minimal detectable bias; inf where nothing controls the observation
+    mdb         (n, m) minimal detectable bias; inf where nothing controls the observation; of those
+                set aside: what it would be with them, r = 1 / (1 + leverage)
     external    (n, m) effect of a blunder of that size on the adjusted quantities, in their sds
     effect_m    (n, m) largest change of any coordinate of any point by a bias of mdb in this value,
                 in the datum of the adjustment; 0 for those set aside. In large surveys (rows times
@@ -122,7 +123,9 @@ def _table(problem, solution, number, delta0):
     controlled = variance > UNCONTROLLED
     with np.errstate(divide="ignore", invalid="ignore"):
         w = np.where(controlled, v / np.sqrt(variance), 0.0)
-        mdb = np.where(controlled, delta0 / np.sqrt(variance), np.inf)
+        mdb = np.where(
+            controlled, delta0 * np.where(share > 0, 1 / variance, variance) ** 0.5, np.inf
+        )
         hidden = np.where(controlled, delta0 * np.sqrt(np.maximum(1 - r, 0) / r), np.inf)
     sd, test = 1.0 / whole.weight, np.abs(w).max(axis=1)
     if one.rows == 2:

@@ -30,9 +30,14 @@ def refuse_worthless_cameras(survey, problem, solution):
 
 
 def doubts(adjusted):
-    """Sentences on points whose sd is above a tenth of the survey's extent."""
-    sd = np.nanmax(adjusted.point_sd_m, axis=1)
-    extent = np.linalg.norm(np.ptp(adjusted.xyz_m[np.isfinite(adjusted.xyz_m[:, 0])], axis=0))
+    """Sentences on points whose sd is above a tenth of the survey's extent.
+
+    The extent is four times the median distance of the points from their median place: a point that
+    went astray does not stretch it.
+    """
+    sd, xyz = np.max(adjusted.point_sd_m, axis=1), adjusted.xyz_m
+    there = xyz[np.isfinite(xyz).all(axis=1)]
+    extent = 4 * np.median(np.linalg.norm(there - np.median(there, axis=0), axis=1))
     return tuple(
         f"point {adjusted.survey.points[i]} is hardly determined (sd {sd[i]:.2g} m)"
         for i in np.flatnonzero(sd > WORTHLESS * extent)

@@ -3,6 +3,8 @@
 import numpy as np
 
 from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.network.cleaning import CRITICAL
+from tankcal.network.soundness import doubts
 from tankcal.surveys.causes import causes_of
 from tankcal.surveys.checks import check_points, check_readings
 from tankcal.surveys.cleaning import searched
@@ -15,9 +17,9 @@ from tankcal.surveys.screening import gross_readings, swapped_at_start
 from tankcal.surveys.spelling import names_alike, same_place
 from tankcal.surveys.starts import mirrored_targets, started
 from tankcal.surveys.trials import likely_mistake, photos_that_do_not_fit
+from tankcal.surveys.victims import SOME, one_sided, set_aside, wrong_control
 
 SUSPICIOUS = 4.0  # sigma0 above which whole files are doubted
-LOST = 0.2  # share of the readings set aside, above which they are
 TRIED = 25  # iterations of a survey that is only supposed
 FILES = ("image_points.csv", "photos.csv", "control.csv")  # first in the list of readings
 
@@ -72,7 +74,7 @@ def _why_not(measurements, message):
     if "datum defect" in message or MIRROR in message:
         return []
     lost = photos_that_do_not_fit(measurements, message, _tried)
-    return lost or likely_mistake(measurements, np.inf, _tried)
+    return lost or likely_mistake(measurements, np.inf, np.inf, _tried)
 
 
 def _count(survey):
@@ -94,6 +96,7 @@ def _complete(search, gathered, frame, measurements):
     names = tuple(adjusted.survey.points[i] for i in there)
     late = {i: why for i, why in enumerate(adjusted.problem.set_aside) if why}
     warnings += [_lost(measurements, adjusted.survey.points[i], why) for i, why in late.items()]
+    warnings += [_kept(one, gathered.traces) for one in search.needed if one.w > CRITICAL]
     warnings += _doubts(adjusted, readings, groups, gathered, measurements)
     known = gathered.known
     acting = frame.held
@@ -123,6 +126,16 @@ def _complete(search, gathered, frame, measurements):
     )
 
 
+def _kept(one, traces):
+    """Problem of a reading that disagrees, but cannot be spared."""
+    trace = traces[one.source]
+    text = (
+        f"{one.kind} {'-'.join(trace.ids[one.row])} disagrees with the others (w = {one.w:.1f}), "
+        "and was kept: without it something would not be determined"
+    )
+    return Problem(trace.file, text, trace.rows[one.row])
+
+
 def _lost(measurements, name, why):
     """Problem of a point that the search for blunders left with too few readings."""
     file, row = named_in(measurements, name)
@@ -133,14 +146,20 @@ def _doubts(adjusted, readings, groups, gathered, measurements):
     """Problem rows: what the result says about mistakes in the input."""
     found = diagnosed(adjusted, readings, groups, gathered.known)
     found += names_alike(gathered.lost, adjusted.survey.points) + same_place(adjusted)
+    found += [Problem("job.toml", text, None, "adjustment") for text in doubts(adjusted)]
     found += mirrored_targets(adjusted.xyz_m, adjusted.survey.points, measurements)
-    removed = sum(one.removed for one in readings)
-    if adjusted.sigma0 > SUSPICIOUS or removed > LOST * max(len(readings), 1):
+    gone = set_aside(adjusted.survey)
+    told = one_sided(readings, gathered.known)
+    found += told
+    if adjusted.sigma0 > SUSPICIOUS or told or gone > SOME * len(readings):
         try:
-            sigma0 = _tried(measurements)[0].sigma0 if removed else adjusted.sigma0
+            sigma0 = _tried(measurements)[0].sigma0 if gone else adjusted.sigma0
         except SolutionError:
             sigma0 = np.inf
-        found += likely_mistake(measurements, sigma0, _tried)
+        if adjusted.sigma0 > SUSPICIOUS or told:
+            found += likely_mistake(measurements, sigma0, gone, _tried)
+        else:
+            found += wrong_control(measurements, gone, _tried)
     return found
 
 

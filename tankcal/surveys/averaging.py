@@ -21,6 +21,9 @@ class Averages:
 
     value, sd  (n, m)             first  (n,) number of the first reading
     repeats    (n,)               chi2   (n, m) scatter of the readings, in their sds
+    group      (readings,) number of the value that each belongs to
+    away       (readings, m) reading minus mean, in sds of the reading
+    share      (readings, m) of its weight in that of all readings of the value
     """
 
     value: np.ndarray
@@ -28,6 +31,9 @@ class Averages:
     first: np.ndarray
     repeats: np.ndarray
     chi2: np.ndarray
+    group: np.ndarray
+    away: np.ndarray
+    share: np.ndarray
 
 
 def averaged(label, value, sd, *, angle=False):
@@ -57,15 +63,37 @@ def averaged(label, value, sd, *, angle=False):
     np.add.at(total, group, weight)
     np.add.at(mean, group, weight * away)
     mean /= total
-    np.add.at(chi2, group, weight * (away - mean[group]) ** 2)
+    off = np.sqrt(weight) * (away - mean[group])
+    np.add.at(chi2, group, off**2)
     mean_sd = np.where((repeats == 1)[:, None], sd[first], 1.0 / np.sqrt(total))
-    return Averages(value[first] + mean, mean_sd, first, repeats, chi2)
+    share = weight / total[group]
+    return Averages(value[first] + mean, mean_sd, first, repeats, chi2, group, off, share)
+
+
+def torn_apart(label, averages):
+    """Labels (readings,) with which values that one reading alone contradicts are not averaged.
+
+    Of three readings or more, that scatter more than they may, and not so once the worst is gone:
+    each then goes into the adjustment on its own, where the search for blunders finds the worst.
+    """
+    dof = averages.repeats - 1
+    limit, without = (
+        scipy.stats.chi2.isf(LEVEL / max(np.count_nonzero(dof), 1), np.maximum(dof - i, 1))[:, None]
+        for i in (0, 1)
+    )
+    single = np.minimum(averages.share, 0.999)
+    left = averages.chi2[averages.group] - averages.away**2 / (1 - single)
+    agree = (left <= without[averages.group]).all(axis=1)
+    torn = (averages.chi2 > limit).any(axis=1) & (dof > 1)
+    torn &= np.bincount(averages.group, weights=agree, minlength=len(dof)) > 0
+    own = np.max(label, initial=0) + 1 + np.arange(len(label))
+    return np.where(torn[averages.group], own, label)
 
 
 def scatter_warnings(averages, name_of, file, rows):
     """Problem rows for repeated readings that scatter other than their sds say.
 
-    averages  Averages       name_of  name_of(i) -> the i-th value in words
+    averages  Averages       name_of  name_of(k) -> in words, the value that reading k is of
     rows      (readings,) of the file, or ()
 
     Each value is tested, at a level that errs for one file in a thousand; and all values together.
@@ -79,12 +107,12 @@ def scatter_warnings(averages, name_of, file, rows):
     found = []
     for i in np.argsort(-ratio)[:5]:
         if ratio[i] > 1:
-            share = np.sqrt((averages.chi2[i] / dof[i]).max())
-            row = rows[averages.first[i]] if len(rows) else None
+            share, first = np.sqrt((averages.chi2[i] / dof[i]).max()), averages.first[i]
+            row = rows[first] if len(rows) else None
             found.append(
                 Problem(
                     file,
-                    f"the {averages.repeats[i]} readings of {name_of(i)} scatter {share:.1f} "
+                    f"the {averages.repeats[i]} readings of {name_of(first)} scatter {share:.1f} "
                     "times as much as their standard deviations say",
                     row,
                 )

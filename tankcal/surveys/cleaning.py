@@ -14,12 +14,14 @@ class Searched:
     """An adjusted survey after the search for blunders.
 
     adjusted  network.Adjusted       removed   tuple of network.cleaning.Removed
-    rounds    adjustments            warnings  tuple of Problem
+    rounds    adjustments            needed    tuple of network.cleaning.Removed that were kept
+    warnings  tuple of Problem
     """
 
     adjusted: object
     removed: tuple
     rounds: int
+    needed: tuple = ()
     warnings: tuple = ()
 
 
@@ -35,7 +37,9 @@ def searched(survey, options, gross=None):
     except SolutionError as error:
         adjusted = adjust(survey, **options)
         text = f"{error}: nothing was set aside, blunders may be in the result"
-        return Searched(adjusted, (), 1, (Problem("job.toml", text, None, "adjustment.snooping"),))
+        return Searched(
+            adjusted, (), 1, (), (Problem("job.toml", text, None, "adjustment.snooping"),)
+        )
     again = _readmitted(found, gross)
     if again is not None:
         try:
@@ -44,8 +48,8 @@ def searched(survey, options, gross=None):
             second = found
         if _lost(second.adjusted).sum() < _lost(found.adjusted).sum():
             rounds = found.rounds + second.rounds
-            return Searched(second.adjusted, second.removed, rounds)
-    return Searched(found.adjusted, found.removed, found.rounds)
+            return Searched(second.adjusted, second.removed, rounds, second.needed)
+    return Searched(found.adjusted, found.removed, found.rounds, found.needed)
 
 
 def _without(survey, options, gross):

@@ -230,7 +230,7 @@ def _control(control, points, warnings):
         first = means.first
         trace = _control_trace(control, row[first], axis[first], means.repeats)
         warnings += scatter_warnings(
-            means, lambda i: " ".join((*trace.ids[i], *trace.element[i])), control.file,
+            means, lambda k: f"{control.point[row[k]]} {'xyz'[axis[k]]}", control.file,
             [control.rows[i] for i in row] if control.rows else (),
         )  # fmt: skip
         yield (
@@ -290,7 +290,7 @@ def _images(measurements, points, order, warnings):
     first = rows[means.first]
     trace = _image_trace(images, first, means.repeats, cameras)
     warnings += scatter_warnings(
-        means, lambda i: f"point {trace.ids[i][1]} in photo {trace.ids[i][0]}", images.file,
+        means, lambda k: "point {1} in photo {0}".format(*trace.ids[means.group[k]]), images.file,
         [images.rows[i] for i in rows] if images.rows else (),
     )  # fmt: skip
     used = ImagePoints(point[first], photo[first], means.value, means.sd)

@@ -13,7 +13,7 @@ from tankcal.observations import (
     PlumbLines,
     VerticalAngles,
 )
-from tankcal.surveys.averaging import averaged, scatter_warnings
+from tankcal.surveys.averaging import averaged, scatter_warnings, torn_apart
 
 EARTH_RADIUS_M = 6_371_000.0
 ANGLES = ("directions", "zenith_angles", "azimuths", "horizontal_angles", "vertical_angles")
@@ -155,17 +155,14 @@ def observed(table, bend, warnings):
         rows = np.flatnonzero(use & (table.horizontal == horizontal))
         if len(rows):
             width = 2 if table.table == "plumb_lines" else 1
-            means = averaged(
-                _labels(table, rows),
-                np.tile(table.value[rows, None], width),
-                np.tile(table.sd[rows, None], width),
-                angle=table.table in ANGLES,
-            )
-            mine = [table.rows[i] for i in rows] if table.rows else ()
+            label, angle = _labels(table, rows), table.table in ANGLES
+            value, sd = (np.tile(a[rows, None], width) for a in (table.value, table.sd))
+            means = averaged(label, value, sd, angle=angle)
             warnings += scatter_warnings(
-                means, lambda i, r=rows, m=means: "-".join(table.ids[r[m.first[i]]]),
-                table.file, mine,
+                means, lambda k, r=rows: "-".join(table.ids[r[k]]), table.file,
+                [table.rows[i] for i in rows] if table.rows else (),
             )  # fmt: skip
+            means = averaged(torn_apart(label, means), value, sd, angle=angle)
             first = rows[means.first]
             yield (
                 _made(table, first, means.value, means.sd, bend),

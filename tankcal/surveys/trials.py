@@ -10,22 +10,23 @@ import numpy as np
 
 from tankcal.camera import corrected
 from tankcal.errors import InputError, Problem, SolutionError
-from tankcal.surveys.diagnoses import MIRROR, mirrored_fits, swapped_points
+from tankcal.surveys.diagnoses import MIRROR, mirrored_fits
 from tankcal.surveys.readings import ANGLES
+from tankcal.surveys.victims import wrong_control, wrong_scales
 
 BETTER = 0.2  # share of sigma0 that may be left by what explains a survey
 SOUND = 5.0  # sigma0 of a survey that fits, where there is no sigma0 to compare with
 CERTAIN = 2.0  # sigma0 after which nothing else is tried
 ALIKE = 1.5  # times the smallest sigma0, within which suppositions explain as much
 MIRRORS = ("control.csv", "image_points.csv")  # mistakes that cannot always be told apart
-RELEASED_M = 0.001  # sd of fixed control while it is looked for swapped coordinates
 MOST = 12  # photos that are left out one after the other
 
 
-def likely_mistake(measurements, sigma0, run):
+def likely_mistake(measurements, sigma0, gone, run):
     """Problem rows: the common mistakes that explain best why a survey does not fit, or none.
 
     sigma0  without data snooping, inf when the survey could not be adjusted
+    gone    number of values that data snooping set aside, inf likewise
     run     run(measurements) -> (network.Adjusted, Gathered), without data snooping
     """
     limit = min(BETTER * sigma0, SOUND if np.isinf(sigma0) else np.inf)
@@ -41,7 +42,10 @@ def likely_mistake(measurements, sigma0, run):
             explained.append((found, problem))
     best = min((found for found, _ in explained), default=np.inf)
     told = [problem for found, problem in explained if found < ALIKE * best]
-    return told or _swapped(measurements, run)
+    return told or [
+        *wrong_scales(measurements, sigma0, run),
+        *wrong_control(measurements, gone, run),
+    ]
 
 
 def _suppositions(measurements):
@@ -80,19 +84,6 @@ def _times(measurements, tables, factor):
         for one in measurements.readings
     )
     return replace(measurements, readings=readings)
-
-
-def _swapped(measurements, run):
-    """Swapped coordinates among fixed control: it is released for once."""
-    control = measurements.control
-    if control is None or not (control.sd_m == 0).any():
-        return []
-    released = replace(control, sd_m=np.where(control.sd_m == 0, RELEASED_M, control.sd_m))
-    try:
-        adjusted, gathered = run(replace(measurements, control=released), snooping=True)
-    except (SolutionError, InputError):
-        return []
-    return swapped_points(adjusted.survey.points, adjusted.xyz_m, gathered.known)
 
 
 def photos_that_do_not_fit(measurements, message, run):

@@ -1,0 +1,206 @@
+"""Are the readings that were set aside blunders, or victims of something wrong that was kept?
+
+A search for blunders believes the majority and what is held fixed. Of single blunders it leaves
+their traces everywhere; where it took far more readings of one thing (a point with known
+coordinates, a photo, an instrument) than of all others, that thing is told:
+
+    P(k or more of n | p) < 0.001 / number of things,   p = (K + 1) / (N + 2)
+
+with k of its n values set aside and K of the N values of everything else.
+"""
+
+from collections import defaultdict
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import betainc
+
+from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.job.measurements import Instrument
+from tankcal.observations import ControlCoordinates
+from tankcal.surveys.diagnoses import swapped_points
+
+LEVEL = 0.001
+MANY = 0.12  # share of all values set aside, above which these are hardly single blunders
+SOME = 0.02  # share above which what is held fixed is doubted for once
+FEWER = 0.5  # share of the values set aside that may be left by what explains them
+RELEASED_M = 0.001  # sd of fixed control while it is doubted
+SCALED = 6.0  # sds that a scale must differ from one
+LISTED = 4
+
+
+def one_sided(readings, known):
+    """Problem rows on things that lost many more of their values than everything else.
+
+    readings  Reading rows              known  Known control
+    """
+    used = [one for one in readings if not one.check and one.file != "cameras.toml"]
+    things = defaultdict(list)
+    for one in used:
+        for thing in _things(one, known):
+            things[thing].append(one)
+    total, gone = len(used), sum(one.removed for one in used)
+    if not gone:
+        return []
+    found = []
+    for (file, name), mine in things.items():
+        n, k = len(mine), sum(one.removed for one in mine)
+        p = (gone - k + 1) / (total - n + 2)
+        if k > 2 and k < gone + (n < total) and betainc(k, n - k + 1, p) < LEVEL / len(things):
+            found.append((k / n, Problem(file, _far_more(name, k, n, known), known.row.get(name))))
+    found.sort(key=lambda pair: -pair[0])
+    return [*_lost_control(used), *(one for _, one in found[:LISTED]), *_many(gone, total)]
+
+
+def _things(one, known):
+    """(file, name) of what a value hangs on."""
+    if one.kind == "image coordinate":
+        yield one.file, f"photo {one.ids[0]}"
+    for name in dict.fromkeys(one.ids):
+        if name in known.row and one.kind != "control coordinate":
+            yield "control.csv", name
+
+
+def _far_more(name, k, n, known):
+    if name in known.row:
+        return (
+            f"{k} of the {n} values measured to point {name} were set aside, far more than of "
+            "other points: its coordinates may be wrong, not the readings"
+        )
+    return (
+        f"{k} of the {n} values of {name} were set aside, far more than of others: look at the "
+        "whole of it"
+    )
+
+
+def _lost_control(readings):
+    """Known coordinates that were set aside."""
+    gone = [
+        one
+        for one in readings
+        if one.removed and one.kind == "control coordinate" and np.isfinite(one.residual)
+    ]
+    return [
+        Problem(
+            one.file,
+            f"{one.element} of {one.ids[0]} was set aside: given as {one.value:.4f} (sd "
+            f"{one.sd:.4f}), and the readings put it at {one.value + one.residual:.4f}",
+            one.row,
+            f"{one.element}_m",
+        )
+        for one in gone[: 2 * LISTED]
+    ]
+
+
+def _many(gone, total):
+    if gone < 3 or gone <= MANY * total:
+        return []
+    text = (
+        f"{gone} of {total} values ({100 * gone / total:.0f} %) were set aside: more than single "
+        "blunders explain; doubt what is held fixed, a scale, or the standard deviations first"
+    )
+    return [Problem("job.toml", text, None, "adjustment.snooping")]
+
+
+def set_aside(survey):
+    """Number of values that the survey of an adjustment leaves out."""
+    images = survey.image_points
+    count = 0 if images is None or images.use is None else 2 * int(np.sum(images.use == 0))
+    return count + sum(
+        one.rows * int(np.sum(one.use == 0)) for one in survey.observations if one.use is not None
+    )
+
+
+def wrong_control(measurements, gone, run):
+    """Problem rows when far less must be set aside once control is not held fixed.
+
+    gone  number of values set aside now, inf when there was no adjustment
+    run   run(measurements, snooping=True) -> (network.Adjusted, Gathered)
+    """
+    control = measurements.control
+    if control is None or not (control.sd_m == 0).any():
+        return []
+    released = replace(control, sd_m=np.where(control.sd_m == 0, RELEASED_M, control.sd_m))
+    try:
+        adjusted, gathered = run(replace(measurements, control=released), snooping=True)
+    except (SolutionError, InputError):
+        return []
+    swapped = swapped_points(adjusted.survey.points, adjusted.xyz_m, gathered.known)
+    if swapped or set_aside(adjusted.survey) > FEWER * gone:
+        return swapped
+    return _released(adjusted, gathered.known)
+
+
+def _released(adjusted, known):
+    """Problem rows of released coordinates that were set aside."""
+    found = []
+    for one in adjusted.survey.observations:
+        if not isinstance(one, ControlCoordinates) or one.use is None:
+            continue
+        for i in np.flatnonzero((one.use == 0) & (one.sd == RELEASED_M)):
+            name, axis = adjusted.survey.points[one.point[i]], "xyz"[one.axis[i]]
+            here = adjusted.xyz_m[one.point[i], one.axis[i]]
+            text = (
+                f"{axis} of {name} is held fixed at {one.value[i]:.4f}, and the readings put it at "
+                f"{here:.4f}; were it not held, far fewer readings would be set aside: it may be "
+                "wrong, or another value that is held"
+            )
+            found.append(Problem("control.csv", text, known.row.get(name), f"{axis}_m"))
+    return found[:LISTED]
+
+
+def wrong_scales(measurements, sigma0, run):
+    """Problem rows on instruments whose distances fit once they may have a scale of their own.
+
+    sigma0  of the whole survey, nothing set aside
+    run     run(measurements) -> (network.Adjusted, Gathered), without data snooping
+    """
+    found = []
+    for name, freed in _freed(measurements):
+        try:
+            adjusted, _ = run(freed)
+        except (SolutionError, InputError):
+            continue
+        names = [one.name for one in adjusted.survey.instruments]
+        if name not in names:
+            continue  # it measured no distance
+        i = names.index(name)
+        scale = float(adjusted.solution.state.scale[i])
+        column = adjusted.problem.layout.scale[i : i + 1]
+        sd = np.sqrt(float(adjusted.solution.cofactors(column)[0, 0]))
+        sure = abs(scale) > SCALED * max(adjusted.sigma0, 1.0) * sd
+        if sure and adjusted.sigma0 < FEWER * sigma0:
+            text = (
+                f"the distances of {name} fit once they may all be {1e6 * scale:+.0f} ppm off "
+                f"(standard uncertainty {1e6 * sd:.0f} ppm): look at its certificate, its unit and "
+                "its u_scale_ppm"
+            )
+            found.append((adjusted.sigma0, Problem("instruments.toml", text, None, name)))
+    return [problem for _, problem in sorted(found, key=lambda pair: pair[0])][:1]
+
+
+def _freed(measurements):
+    """Pairs (name, measurements) with the scale of one instrument free; readings without one are
+    taken for those of one instrument that bears the name of their file."""
+    for tool in measurements.instruments:
+        if np.isfinite(tool.u_scale):
+            others = tuple(one for one in measurements.instruments if one is not tool)
+            freed = (*others, replace(tool, u_scale=np.nan))
+            yield tool.name, replace(measurements, instruments=freed)
+    for table in measurements.readings:
+        if table.table == "distances" and None in (table.instrument or (None,)):
+            names = tuple(one or table.file for one in table.instrument or (None,) * len(table.end))
+            yield (
+                table.file,
+                replace(
+                    measurements,
+                    instruments=(
+                        *measurements.instruments,
+                        Instrument(table.file, "other", u_scale=np.nan),
+                    ),
+                    readings=tuple(
+                        replace(one, instrument=names) if one is table else one
+                        for one in measurements.readings
+                    ),
+                ),
+            )
