@@ -17,7 +17,8 @@ from tankcal.network.reliability import tau_limit
 CRITICAL = 3.29  # two-sided normal, 0.1 %
 HUBER_ROUNDS, ROUNDS = 5, 25
 HUBER, DANISH = 2.0, 3.0
-AT_ONCE = 0.6  # all whose test quantity is above this share of the largest go together
+AT_ONCE = 0.6  # those whose test quantity is above this share of the largest go together
+RETURNS = 3  # times that one observation may come back
 
 
 @dataclass(frozen=True)
@@ -192,39 +193,73 @@ def _robust(survey, adjusted, critical, options):
 def _verdict(adjusted, critical, back, needed, few):
     """The shares that the residuals ask for, and whether they differ from those there are.
 
-    back    {source: rows} that came back before: they do so once only, else the search could circle
+    back    {source: {row: times}} that came back before: `RETURNS` times, else the search could
+            circle
     needed  {source: rows} that stay whatever they say
     few     True: only what is furthest off goes
     """
-    survey = adjusted.survey
-    shares, worst = _shares(survey), 0.0
-    tables, at_once = _tables(adjusted), 1.0 if few else AT_ONCE
+    shares, tables = _shares(adjusted.survey), _tables(adjusted)
     may = [
         table.used & ~np.isin(table.rows, list(needed.get(table.source, ()))) for table in tables
     ]
-    for table, mine in zip(tables, may, strict=True):
-        worst = max(worst, float(table.whole[mine].max(initial=0)))
-    changed = False
-    for table, mine in zip(tables, may, strict=True):
-        away = table.whole
-        goes = mine & (away > critical) & (away >= at_once * worst)
-        if table.source == "image points":
-            goes &= _largest_of_each(survey.image_points.point[table.rows], np.where(goes, away, 0))
-        comes = ~table.used & (away < critical) if worst <= critical else np.zeros_like(goes)
-        before = back.setdefault(table.source, set())
-        comes &= ~np.isin(table.rows, list(before))
-        before.update(table.rows[comes].tolist())
-        shares[table.source][table.rows[goes]] = 0.0
-        shares[table.source][table.rows[comes]] = 1.0
-        changed |= bool(goes.any() or comes.any())
-    return shares, changed
+    off = [np.where(mine, table.whole, 0.0) for table, mine in zip(tables, may, strict=True)]
+    worst = max((float(one.max(initial=0)) for one in off), default=0.0)
+    least = max(critical, (1.0 if few else AT_ONCE) * worst)
+    goes = [(one > critical) & (one >= least) for one in off]
+    goes = _one_of_each_point(adjusted.survey, tables, goes)
+    comes = _coming_back(tables, critical, back) if worst <= critical else goes
+    for table, out, into in zip(tables, goes, comes, strict=True):
+        shares[table.source][table.rows[into]] = 1.0
+        shares[table.source][table.rows[out]] = 0.0
+    return shares, any(one.any() for one in (*goes, *comes))
 
 
-def _largest_of_each(owner, value):
-    """True where a value is the largest of its owner's."""
-    largest = np.zeros(owner.max(initial=-1) + 1)
-    np.maximum.at(largest, owner, value)
-    return value >= largest[owner]
+def _one_of_each_point(survey, tables, goes):
+    """Masks of what goes, at most one of each point: the others may only follow its blunder."""
+    points, counts = len(survey.points), np.zeros(len(survey.points), dtype=int)
+    tied = []
+    for table in tables:
+        of = survey.image_points
+        of = of if table.source == "image points" else survey.observations[table.source]
+        ties = ("point",) if of is survey.image_points else of.ties
+        tied.append([np.asarray(getattr(of, name))[table.rows] for name in ties])
+        for owner in tied[-1]:
+            counts += np.bincount(owner, minlength=points)
+    largest, owners = np.zeros(points + 1), []
+    for table, owner, out in zip(tables, tied, goes, strict=True):
+        rarest = np.full(len(table.rows), points)
+        if owner:
+            owner = np.array(owner)
+            rarest = np.take_along_axis(owner, np.argmin(counts[owner], axis=0)[None], 0)[0]
+        owners.append(rarest)
+        np.maximum.at(largest, rarest[out], table.whole[out])
+    largest[points] = 0.0  # what belongs to no point goes at once
+    return [
+        out & (table.whole >= largest[owner])
+        for table, out, owner in zip(tables, goes, owners, strict=True)
+    ]
+
+
+def _coming_back(tables, critical, back):
+    """Masks of what agrees after all: all of it the first time, later one by one."""
+    times = [
+        np.array([back.get(table.source, {}).get(row, 0) for row in table.rows.tolist()], dtype=int)
+        for table in tables
+    ]
+    agrees = [~table.used & (table.whole < critical) for table in tables]
+    comes = [one & (n == 0) for one, n in zip(agrees, times, strict=True)]
+    if not any(one.any() for one in comes):
+        again = [
+            np.where(one & (n < RETURNS), table.whole, np.inf)
+            for table, one, n in zip(tables, agrees, times, strict=True)
+        ]
+        nearest = min((float(one.min(initial=np.inf)) for one in again), default=np.inf)
+        comes = [(one == nearest) & np.isfinite(one) for one in again]
+    for table, one in zip(tables, comes, strict=True):
+        mine = back.setdefault(table.source, {})
+        for row in table.rows[one].tolist():
+            mine[row] = mine.get(row, 0) + 1
+    return comes
 
 
 def _quantities(table):

@@ -46,7 +46,7 @@ def one_sided(readings, known):
     for (file, name), mine in things.items():
         n, k = len(mine), sum(one.removed for one in mine)
         p = (gone - k + 1) / (total - n + 2)
-        if k > 2 and k < gone + (n < total) and betainc(k, n - k + 1, p) < LEVEL / len(things):
+        if k > 2 and n < total and betainc(k, n - k + 1, p) < LEVEL / len(things):
             found.append((k / n, Problem(file, _far_more(name, k, n, known), known.row.get(name))))
     found.sort(key=lambda pair: -pair[0])
     return [*_lost_control(used), *(one for _, one in found[:LISTED]), *_many(gone, total)]

@@ -1,0 +1,173 @@
+"""What is wrong and was kept: held control, a scale; and a search that keeps what it found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from surveyed import by_instruments, by_photographs, changed, known, table, told
+
+from tankcal.job.measurements import Measurements
+from tankcal.surveys import adjust_survey
+from tankcal.surveys.averaging import averaged, torn_apart
+
+TRUTH = by_photographs(photos=6)[1].xyz_m, by_instruments()[1].xyz_m
+
+
+@pytest.fixture(scope="module")
+def stations():
+    return by_instruments()[0]
+
+
+@pytest.fixture(scope="module")
+def photos():
+    return by_photographs(photos=6)[0]
+
+
+def held(measurements, number=0, error_m=0.0, sd_m=0.0):
+    """Measurements with control held fixed, x of one point wrong."""
+    control = measurements.control
+    xyz = TRUTH[measurements.image_points is None][[int(name[1:]) for name in control.point]]
+    xyz[number, 0] += error_m
+    sd = np.full_like(control.sd_m, sd_m)
+    return replace(measurements, control=replace(control, xyz_m=xyz, sd_m=sd))
+
+
+@pytest.mark.parametrize("error_m", [0.02, 0.1, 2.0])
+def test_a_station_held_at_a_wrong_place_is_named(stations, error_m):
+    """Good readings are set aside until the rest agrees with it: sigma0 alone would pass."""
+    text = told(held(stations, error_m=error_m))
+    name = stations.control.point[0]
+    given = TRUTH[1][int(name[1:]), 0]
+    assert f"x of {name} is held fixed at {given + error_m:.4f}" in text
+    there = float(text.split("the readings put it at ")[1].split(";")[0])
+    assert there == pytest.approx(given, abs=0.02)  # the station then hangs on few readings
+
+
+def test_a_control_point_of_photographs_held_at_a_wrong_place(photos):
+    """Fixed control 50 mm off: its rays are set aside, and it is said whose they are."""
+    name = photos.control.point[0]
+    text = told(held(photos, error_m=0.05))
+    assert f"values measured to point {name} were set aside" in text
+    assert f"x of {name} is held fixed" in text
+
+
+def test_sound_control_is_not_doubted(stations, photos):
+    for measurements in (stations, photos):
+        text = told(held(measurements))
+        assert "held fixed" not in text
+        assert "set aside" not in text
+
+
+def test_blunders_alone_do_not_bring_control_into_doubt(stations):
+    """One reading in ten wrong by twenty sds, the control right: only the readings are listed."""
+    slopes = next(one for one in stations.readings if one.table == "slope_distances")
+    value = slopes.value.copy()
+    value[::10] += 20 * slopes.sd[::10]
+    found = adjust_survey(changed(held(stations), "slope_distances", value=value))
+    assert {one.row for one in found.removed} == set(range(2, len(value) + 2, 10))
+    assert not [str(one) for one in found.warnings if "held" in str(one)]
+
+
+def test_weighted_control_that_gives_way_to_a_tape_is_told(stations):
+    """The only scale is that of a tape 0.2 % long: coordinates of control go; both are named."""
+    plan = next(one for one in stations.readings if one.table == "directions")
+    slopes = next(one for one in stations.readings if one.table == "slope_distances")
+    places = {one.name: one.station for one in stations.setups}
+    truth = by_instruments(noise=0.0)[1].xyz_m
+    start = [places[name] for name in slopes.setup][::3]
+    end = list(slopes.end)[::3]
+    a, b = (truth[[int(name[1:]) for name in names]] for names in (start, end))
+    length = 1.002 * np.linalg.norm(b - a, axis=1)
+    length += np.random.default_rng(3).normal(0, 0.001, len(length))
+    tapes = table("distances", length, 0.001, start, end, instrument=(None,) * len(end))
+    zeniths = next(one for one in stations.readings if one.table == "zenith_angles")
+    found = adjust_survey(replace(stations, readings=(plan, zeniths, tapes)))
+    text = "\n".join(map(str, found.warnings))
+    assert "was set aside: given as" in text
+    scale = float(text.split("may all be ")[1].split(" ppm")[0])
+    assert scale == pytest.approx(2000, abs=150)
+
+
+def test_held_heights_that_contradict_a_line_of_levels():
+    """Closed form: 0 and 1.05 m are held, 1.000 m was levelled between them."""
+    start, end = ["A", "A", "A", "M"], ["B", "B", "M", "B"]
+    nowhere = [[np.nan, np.nan, 0.0], [np.nan, np.nan, 1.05]]
+    text = told(
+        Measurements(
+            control=known(["A", "B"], nowhere, 0.0),
+            readings=(table("height_differences", [1.0, 1.001, 0.5, 0.5], 0.001, start, end),),
+        )
+    )
+    assert "3 of 3 values (100 %) were set aside" in text
+    assert "is held fixed at" in text
+
+
+def test_a_search_keeps_what_it_found_when_a_step_fails(photos):
+    """Without the only two distances nothing gives the scale: one of them stays, and is named."""
+    settings = replace(photos.settings, datum="fixed_photo", fixed_photo=photos.photos[0].name)
+    table_of = photos.readings[0]
+    value = table_of.value.copy()
+    value[1] += 0.5
+    few = {name: getattr(table_of, name)[:2] for name in ("start", "end", "rows", "instrument")} | {
+        "sd": table_of.sd[:2],
+        "check": table_of.check[:2],
+        "value": value[:2],
+    }
+    images = photos.image_points
+    points = np.array(images.point)
+    rays = {name: int(np.sum(points == name)) for name in images.point}
+    wrong = [i for i, name in enumerate(images.point) if rays[name] > 3][::20]
+    xy = images.xy_mm.copy()
+    xy[wrong] += 0.5
+    blundered = replace(
+        changed(photos, "distances", **few),
+        control=None,
+        image_points=replace(images, xy_mm=xy),
+        settings=settings,
+    )
+    found = adjust_survey(blundered)
+    gone = {one.row for one in found.removed if one.file == "image_points.csv"}
+    assert gone == {i + 2 for i in wrong}
+    assert sum(one.file == "distances.csv" for one in found.removed) == 1
+    assert not [str(one) for one in found.warnings if "nothing was set aside" in str(one)]
+
+
+def test_one_bad_reading_of_three_is_found_without_any_other():
+    """Closed form: two distances fix a point, each read three times, one of the six 1 m off."""
+    xyz = {"A": (0.0, 0.0), "B": (10.0, 0.0), "C": (5.0, 8.0)}
+    start, end = ["A", "A", "A", "B", "B", "B"], ["C"] * 6
+    value = [np.hypot(5, 8) + e for e in (1.0, 1e-4, -1e-4, 0.0, 2e-4, -2e-4)]
+    control = known(
+        ["A", "B", "C"], [[*xyz["A"], 0], [*xyz["B"], 0], [5.0, 7.9, 0]],
+        [[0, 0, 0], [0, 0, 0], [np.nan, np.nan, 0]],
+    )  # fmt: skip
+    tapes = table("distances", value, 0.001, start, end, horizontal=np.ones(6, dtype=bool))
+    found = adjust_survey(
+        Measurements(control=control, readings=(replace(tapes, instrument=(None,) * 6),))
+    )
+    assert [one.row for one in found.removed] == [2]
+    assert found.xyz_m[found.names.index("C")] == pytest.approx([5, 8, 0], abs=3e-4)
+    assert any("the 3 readings of A-C scatter" in str(one) for one in found.warnings)
+
+
+def test_only_values_that_one_reading_contradicts_are_torn_apart():
+    """Closed form: of four values one has a wild reading, one scatters, one is a pair."""
+    value = [0, 1, -1, 0, 0, 90, 0, 30, -30, 0, 50]
+    label = np.array([0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3])
+    means = averaged(label, np.array(value, dtype=float), np.ones(11))
+    torn = torn_apart(label, means)
+    assert len(set(torn[3:6].tolist())) == 3
+    assert np.array_equal(torn[:3], label[:3])
+    assert np.array_equal(torn[6:], label[6:])
+
+
+def test_the_detectable_bias_of_what_was_set_aside_is_that_with_it(stations):
+    """Property: nearly the figure that the sound reading has in the adjustment with it."""
+    sound = {(one.file, one.row): one for one in adjust_survey(stations).readings}
+    slopes = next(one for one in stations.readings if one.table == "slope_distances")
+    i = max(range(len(slopes.value)), key=lambda i: sound[slopes.file, i + 2].redundancy)
+    value = slopes.value.copy()
+    value[i] += 0.2
+    other = adjust_survey(changed(stations, "slope_distances", value=value)).removed
+    assert [one.row for one in other] == [i + 2]
+    assert other[0].mdb == pytest.approx(sound[slopes.file, i + 2].mdb, rel=1e-3)
