@@ -206,7 +206,7 @@ def _verdict(adjusted, critical, back, needed, few):
     worst = max((float(one.max(initial=0)) for one in off), default=0.0)
     least = max(critical, (1.0 if few else AT_ONCE) * worst)
     goes = [(one > critical) & (one >= least) for one in off]
-    goes = _one_of_each_point(adjusted.survey, tables, goes)
+    goes = _one_of_each_point(adjusted, tables, goes)
     comes = _coming_back(tables, critical, back) if worst <= critical else goes
     for table, out, into in zip(tables, goes, comes, strict=True):
         shares[table.source][table.rows[into]] = 1.0
@@ -214,30 +214,33 @@ def _verdict(adjusted, critical, back, needed, few):
     return shares, any(one.any() for one in (*goes, *comes))
 
 
-def _one_of_each_point(survey, tables, goes):
+def _one_of_each_point(adjusted, tables, goes):
     """Masks of what goes, at most one of each point: the others may only follow its blunder."""
-    points, counts = len(survey.points), np.zeros(len(survey.points), dtype=int)
-    tied = []
+    survey = adjusted.survey
+    n, tied = len(survey.points), []
     for table in tables:
-        of = survey.image_points
-        of = of if table.source == "image points" else survey.observations[table.source]
-        ties = ("point",) if of is survey.image_points else of.ties
+        images = table.source == "image points"
+        of = survey.image_points if images else survey.observations[table.source]
+        ties = ("point",) if images else of.ties
         tied.append([np.asarray(getattr(of, name))[table.rows] for name in ties])
-        for owner in tied[-1]:
-            counts += np.bincount(owner, minlength=points)
-    largest, owners = np.zeros(points + 1), []
-    for table, owner, out in zip(tables, tied, goes, strict=True):
-        rarest = np.full(len(table.rows), points)
-        if owner:
-            owner = np.array(owner)
-            rarest = np.take_along_axis(owner, np.argmin(counts[owner], axis=0)[None], 0)[0]
-        owners.append(rarest)
-        np.maximum.at(largest, rarest[out], table.whole[out])
-    largest[points] = 0.0  # what belongs to no point goes at once
-    return [
-        out & (table.whole >= largest[owner])
-        for table, out, owner in zip(tables, goes, owners, strict=True)
-    ]
+    counts = sum((np.bincount(one, minlength=n) for owners in tied for one in owners), np.zeros(n))
+    counts[(adjusted.problem.layout.points < 0).all(axis=1)] = np.inf  # fixed points follow nothing
+    off = np.concatenate([np.where(o, t.whole, 0.0) for t, o in zip(tables, goes, strict=True)])
+    alone = n + np.arange(len(off))  # what belongs to no point
+    parts, first = [], 0
+    for table, owners in zip(tables, tied, strict=True):
+        mine = alone[first : first + len(table.rows)]
+        first += len(table.rows)
+        if owners:
+            owners = np.array(owners)
+            mine = np.take_along_axis(owners, np.argmin(counts[owners], axis=0)[None], 0)[0]
+        parts.append(mine)
+    owner = np.concatenate(parts)
+    order = np.lexsort((-off, owner))
+    largest = np.zeros(len(off), dtype=bool)
+    largest[order[np.append(True, np.diff(owner[order]) > 0)]] = True
+    cuts = np.cumsum([len(table.rows) for table in tables])[:-1]
+    return [out & one for out, one in zip(goes, np.split(largest, cuts), strict=True)]
 
 
 def _coming_back(tables, critical, back):

@@ -17,13 +17,17 @@ from tankcal.observations import HeightDifferences, Sights
 
 @dataclass(frozen=True)
 class Clues:
-    """Everything that was observed, as the search for start values needs it."""
+    """Everything that was observed, as the search for start values needs it.
+
+    trial  number of the attempt: other samples are drawn in another one
+    """
 
     survey: object
     sights: tuple
     plan: Plan
     wall: Wall
     rng: np.random.Generator
+    trial: int = 0
 
     @property
     def points(self):

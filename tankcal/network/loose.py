@@ -22,7 +22,7 @@ def with_locals(clues, piece, places, least):
         piece = grown(clues, piece, least, free=not piece.oriented.any())
     tried, loose, reasons = piece.oriented.copy(), [], []
     while not tried.all():
-        own, why = blind_piece(clues.sights, ~tried, clues.points, clues.rng)
+        own, why = blind_piece(clues.sights, ~tried, clues.points, clues.rng, clues.trial)
         if own is None:
             reasons.append(why)
             break

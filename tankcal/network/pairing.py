@@ -20,15 +20,16 @@ BAD_PAIR = 0.01  # error, rad, beyond which two photos are not taken of the same
 RIVAL = 2.0  # misfit of the third photo below which another pose of the pair is as good
 
 
-def blind_piece(sights, waiting, points, rng):
+def blind_piece(sights, waiting, points, rng, seed=0):
     """A Piece in a frame of its own from photos that wait, with all that follows from them.
 
     waiting  (photos,) True for those of which one at least must start it
     points   number of points
+    seed     of the samples from which two photos are set up
 
     Returns the Piece, or None, and a sentence that says why not.
     """
-    hypotheses = _hypotheses(sights, waiting, points, rng)
+    hypotheses = _hypotheses(sights, waiting, points, seed)
     if not hypotheses:
         return None, f"no two of these photos share {COMMON} points seen from different places"
     judged = [(*_judged(sights, piece, rng), pair, piece) for pair, piece in hypotheses]
@@ -46,12 +47,12 @@ def blind_piece(sights, waiting, points, rng):
     return grown_by_photos(sights, piece, rng, least=ENOUGH), ""
 
 
-def _hypotheses(sights, waiting, points, rng):
+def _hypotheses(sights, waiting, points, seed):
     """Pairs of photos with Pieces of their two photos and common points, the most hopeful first."""
     found = []
     for first, second in _pairs(sights, waiting, points):
         _, i, j = np.intersect1d(sights[first].point, sights[second].point, return_indices=True)
-        poses = relative_poses(sights[first].ideal[i], sights[second].ideal[j], rng)
+        poses = relative_poses(sights[first].ideal[i], sights[second].ideal[j], seed)
         for pose in poses:
             if pose.error > BAD_PAIR or pose.parallax < NARROW_RAD:
                 continue

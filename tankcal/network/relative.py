@@ -8,6 +8,7 @@ orientation; Hartley & Zisserman 2004, ch. 9 (decomposition).
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -51,12 +52,23 @@ class Pair:
     parallax: float
 
 
-def relative_poses(first, second, rng):
+def relative_poses(first, second, seed):
     """Pairs that fit ideal image points over c (n, 2) of two photos, n at least 6, the best first.
 
-    More than one is returned when they fit (nearly) equally well, as those of a plane may do.
+    More than one is returned when they fit (nearly) equally well, as those of a plane may do. What
+    was found is remembered: a survey that does not fit is tried again and again in other ways.
+
+    seed  of the samples that are tried
     """
-    n = len(first)
+    images = (np.ascontiguousarray(one, dtype=float).tobytes() for one in (first, second))
+    return list(_remembered(*images, seed))
+
+
+@lru_cache(maxsize=256)
+def _remembered(*images_and_seed):
+    *images, seed = images_and_seed
+    first, second = (np.frombuffer(one).reshape(-1, 2) for one in images)
+    n, rng = len(first), np.random.default_rng(seed)
     judges = rng.choice(n, JUDGES, replace=False) if n > JUDGES else np.arange(n)
     f1, f2 = bearings(first[judges]), bearings(second[judges])
     fives = np.argsort(rng.random((FIVES, len(f1))), axis=1)[:, :5]

@@ -60,6 +60,7 @@ def approximate(survey, seed=0, wall=None):
             plan_of(survey),
             wall,
             np.random.default_rng([seed, trial]),
+            trial,
         )
         piece, reasons = _found(clues, sure, hints)
         known = np.isfinite(sure.piece.xyz_m).all(axis=1)

@@ -1,5 +1,7 @@
 """A survey adjusted: from the measurements as they were read to points with their covariance."""
 
+from functools import partial
+
 import numpy as np
 
 from tankcal.errors import InputError, Problem, SolutionError
@@ -15,11 +17,12 @@ from tankcal.surveys.results import Adjustment
 from tankcal.surveys.rows import gone_with_their_points, readings_of
 from tankcal.surveys.screening import gross_readings, swapped_at_start
 from tankcal.surveys.spelling import names_alike, same_place
-from tankcal.surveys.starts import mirrored_targets, started
+from tankcal.surveys.starts import mirrored_targets, started, started_like
 from tankcal.surveys.trials import likely_mistake, photos_that_do_not_fit
-from tankcal.surveys.victims import SOME, one_sided, set_aside, wrong_control
+from tankcal.surveys.victims import SOME, one_sided, set_aside, undecided, wrongly_held
 
 SUSPICIOUS = 4.0  # sigma0 above which whole files are doubted
+LOST = 0.2  # share of the readings set aside, above which they are
 TRIED = 25  # iterations of a survey that is only supposed
 FILES = ("image_points.csv", "photos.csv", "control.csv")  # first in the list of readings
 
@@ -45,13 +48,14 @@ def adjust_survey(measurements, tell=None):
     return _complete(search, gathered, frame, measurements)
 
 
-def _adjusted(measurements, tell, snooping=None, most=100):
-    """Searched, Gathered and Frame of measurements."""
+def _adjusted(measurements, tell, snooping=None, most=100, like=None):
+    """Searched, Gathered and Frame of measurements; like: network.Adjusted that is close to it."""
     gathered = gather(measurements)
     if not gathered.survey.points:
         raise InputError(Problem("job.toml", "the survey has no observations to be adjusted"))
     tell(f"finding approximate values of {len(gathered.survey.points)} points")
-    survey = started(gathered, measurements)
+    survey = None if like is None else started_like(like, gathered, measurements)
+    survey = survey or started(gathered, measurements)
     swapped = swapped_at_start(survey, gathered.known)
     if swapped:
         raise SolutionError("\n".join(map(str, swapped)))
@@ -63,9 +67,9 @@ def _adjusted(measurements, tell, snooping=None, most=100):
     return searched(frame.survey, options, gross), gathered, frame
 
 
-def _tried(measurements, snooping=False):
+def _tried(measurements, snooping=False, like=None):
     """network.Adjusted and Gathered of measurements that are only supposed."""
-    search, gathered, _ = _adjusted(measurements, lambda text: None, snooping, TRIED)
+    search, gathered, _ = _adjusted(measurements, lambda text: None, snooping, TRIED, like)
     return search.adjusted, gathered
 
 
@@ -74,7 +78,11 @@ def _why_not(measurements, message):
     if "datum defect" in message or MIRROR in message:
         return []
     lost = photos_that_do_not_fit(measurements, message, _tried)
-    return lost or likely_mistake(measurements, np.inf, np.inf, _tried)
+    return (
+        lost
+        or likely_mistake(measurements, np.inf, _tried)
+        or wrongly_held(measurements, np.inf, np.inf, _tried)
+    )
 
 
 def _count(survey):
@@ -97,6 +105,7 @@ def _complete(search, gathered, frame, measurements):
     late = {i: why for i, why in enumerate(adjusted.problem.set_aside) if why}
     warnings += [_lost(measurements, adjusted.survey.points[i], why) for i, why in late.items()]
     warnings += [_kept(one, gathered.traces) for one in search.needed if one.w > CRITICAL]
+    warnings += undecided(adjusted, search.removed, gathered.traces)
     warnings += _doubts(adjusted, readings, groups, gathered, measurements)
     known = gathered.known
     acting = frame.held
@@ -151,16 +160,18 @@ def _doubts(adjusted, readings, groups, gathered, measurements):
     gone = set_aside(adjusted.survey)
     told = one_sided(readings, gathered.known)
     found += told
-    if adjusted.sigma0 > SUSPICIOUS or told or gone > SOME * len(readings):
+    misread = adjusted.sigma0 > SUSPICIOUS or gone > LOST * len(readings)
+    if not (misread or told or gone > SOME * len(readings)):
+        return found
+    close = partial(_tried, like=adjusted)
+    sigma0 = adjusted.sigma0
+    if gone:
         try:
-            sigma0 = _tried(measurements)[0].sigma0 if gone else adjusted.sigma0
+            sigma0 = close(measurements)[0].sigma0
         except SolutionError:
             sigma0 = np.inf
-        if adjusted.sigma0 > SUSPICIOUS or told:
-            found += likely_mistake(measurements, sigma0, gone, _tried)
-        else:
-            found += wrong_control(measurements, gone, _tried)
-    return found
+    explained = likely_mistake(measurements, sigma0, _tried) if misread else []
+    return found + (explained or wrongly_held(measurements, sigma0, gone, close))
 
 
 def _in_order(readings):

@@ -37,6 +37,29 @@ def started(gathered, measurements):
     raise failure
 
 
+def started_like(adjusted, gathered, measurements):
+    """The survey started from another one that was adjusted; None when it lacks something.
+
+    Points and photos are those of the same names; sets of directions stand in the same order.
+    """
+    survey, other = gathered.survey, adjusted.survey
+    number = {name: i for i, name in enumerate(other.points)}
+    state, sets = adjusted.solution.state, survey.sets
+    if not set(survey.points) <= set(number) or len(sets) != len(state.orientation_rad):
+        return None
+    xyz = adjusted.xyz_m[[number[name] for name in survey.points]]
+    if not np.isfinite(xyz).all():
+        return None
+    photos = survey.photos
+    if photos is not None:
+        if other.photos is None or photos.names != other.photos.names:
+            return None
+        place = adjusted.problem.centre_m + state.photo_xyz_m
+        photos = replace(photos, xyz_m=place, rotation=state.rotation)
+    found = replace(survey, xyz_m=xyz, photos=photos, sets=state.orientation_rad)
+    return finished(found, gathered, measurements)
+
+
 def _trusted(survey, known, settings):
     """Control as observations, for start values only, where the datum does not let it act."""
     point, axis = np.nonzero(np.isfinite(known))

@@ -12,7 +12,6 @@ from tankcal.camera import corrected
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.surveys.diagnoses import MIRROR, mirrored_fits
 from tankcal.surveys.readings import ANGLES
-from tankcal.surveys.victims import wrong_control, wrong_scales
 
 BETTER = 0.2  # share of sigma0 that may be left by what explains a survey
 SOUND = 5.0  # sigma0 of a survey that fits, where there is no sigma0 to compare with
@@ -22,11 +21,10 @@ MIRRORS = ("control.csv", "image_points.csv")  # mistakes that cannot always be 
 MOST = 12  # photos that are left out one after the other
 
 
-def likely_mistake(measurements, sigma0, gone, run):
+def likely_mistake(measurements, sigma0, run):
     """Problem rows: the common mistakes that explain best why a survey does not fit, or none.
 
     sigma0  without data snooping, inf when the survey could not be adjusted
-    gone    number of values that data snooping set aside, inf likewise
     run     run(measurements) -> (network.Adjusted, Gathered), without data snooping
     """
     limit = min(BETTER * sigma0, SOUND if np.isinf(sigma0) else np.inf)
@@ -41,11 +39,7 @@ def likely_mistake(measurements, sigma0, gone, run):
         if found < limit:
             explained.append((found, problem))
     best = min((found for found, _ in explained), default=np.inf)
-    told = [problem for found, problem in explained if found < ALIKE * best]
-    return told or [
-        *wrong_scales(measurements, sigma0, run),
-        *wrong_control(measurements, gone, run),
-    ]
+    return [problem for found, problem in explained if found < ALIKE * best]
 
 
 def _suppositions(measurements):

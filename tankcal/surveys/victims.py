@@ -17,6 +17,7 @@ from scipy.special import betainc
 
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.measurements import Instrument
+from tankcal.network.separability import alternatives
 from tankcal.observations import ControlCoordinates
 from tankcal.surveys.diagnoses import swapped_points
 
@@ -27,6 +28,7 @@ FEWER = 0.5  # share of the values set aside that may be left by what explains t
 RELEASED_M = 0.001  # sd of fixed control while it is doubted
 SCALED = 6.0  # sds that a scale must differ from one
 LISTED = 4
+TESTED = 60  # readings set aside of which it is asked whether others might have been
 
 
 def one_sided(readings, known):
@@ -102,6 +104,39 @@ def _many(gone, total):
     return [Problem("job.toml", text, None, "adjustment.snooping")]
 
 
+def undecided(adjusted, removed, traces):
+    """Problem rows of readings set aside in whose place others might have been.
+
+    removed  tuple of network.cleaning.Removed, the worst first        traces  {source: Trace}
+    """
+    found = []
+    for one in removed[:TESTED]:
+        others = alternatives(adjusted, one.source, one.row)
+        if others:
+            names = [_named(traces[source], source, row) for source, row in others[:LISTED]]
+            more = ", ..." if len(others) > LISTED else ""
+            text = (
+                f"{_named(traces[one.source], one.source, one.row)} was set aside, but it may as "
+                f"well be {' or '.join(names)}{more} that is wrong: the readings cannot tell"
+            )
+            trace = traces[one.source]
+            found.append(Problem(trace.file, text, trace.rows[one.row]))
+    if len(found) > LISTED:
+        text = f"of {len(found) - LISTED} more readings set aside the same is true"
+        found[LISTED:] = [Problem("job.toml", text, None, "adjustment.snooping")]
+    return found
+
+
+def _named(trace, source, row):
+    """A reading in words."""
+    ids = trace.ids[row]
+    if source == "image points":
+        return f"point {ids[1]} in photo {ids[0]}"
+    of = "control coordinate" if trace.file == "control.csv" else trace.table.replace("_", " ")
+    names = "-".join(ids)
+    return f"{of.removesuffix('s') or 'value'} {names} {trace.element[row][0]}".strip()
+
+
 def set_aside(survey):
     """Number of values that the survey of an adjustment leaves out."""
     images = survey.image_points
@@ -111,12 +146,19 @@ def set_aside(survey):
     )
 
 
-def wrong_control(measurements, gone, run):
-    """Problem rows when far less must be set aside once control is not held fixed.
+def wrongly_held(measurements, sigma0, gone, run):
+    """Problem rows on scales and fixed control without which the survey fits.
 
-    gone  number of values set aside now, inf when there was no adjustment
-    run   run(measurements, snooping=True) -> (network.Adjusted, Gathered)
+    sigma0  without data snooping, inf when the survey could not be adjusted
+    gone    number of values that data snooping set aside, inf likewise
+    run     run(measurements, snooping=False) -> (network.Adjusted, Gathered)
     """
+    scales = [] if np.isinf(sigma0) else _wrong_scales(measurements, sigma0, run)
+    return [*scales, *_wrong_control(measurements, gone, run)]
+
+
+def _wrong_control(measurements, gone, run):
+    """Problem rows when far less must be set aside once control is not held fixed."""
     control = measurements.control
     if control is None or not (control.sd_m == 0).any():
         return []
@@ -149,12 +191,8 @@ def _released(adjusted, known):
     return found[:LISTED]
 
 
-def wrong_scales(measurements, sigma0, run):
-    """Problem rows on instruments whose distances fit once they may have a scale of their own.
-
-    sigma0  of the whole survey, nothing set aside
-    run     run(measurements) -> (network.Adjusted, Gathered), without data snooping
-    """
+def _wrong_scales(measurements, sigma0, run):
+    """Problem rows on instruments whose distances fit once they may have a scale of their own."""
     found = []
     for name, freed in _freed(measurements):
         try:
