@@ -2,7 +2,7 @@
 
 With unit rays f1 and f2 to one point, the first photo at the origin, the second at b with rotation
 R, the rays and the base lie in a plane: f2' R [b]x f1 = 0. Five points give up to ten matrices
-E = R [b]x; many fives are tried and the one that most points agree with wins, points on a plane
+E = R [b]x; many fives are tried and the one that points agree with best wins, points on a plane
 included. Source: Stewenius, Engels & Nister 2006, Recent developments on direct relative
 orientation; Hartley & Zisserman 2004, ch. 9 (decomposition).
 """
@@ -42,7 +42,7 @@ _EVEN[[0, 2, 1], [2, 1, 0], [1, 0, 2]] = -1.0
 class Pair:
     """Two photos: the second one's rotation (3, 3) and place (3,), of length 1, from the first.
 
-    error     angle between rays and epipolar planes that more than half of the points keep, rad
+    error     misfit: geometric mean of the angles between rays and epipolar planes, rad
     parallax  median angle between two rays to a point, rad
     """
 
@@ -75,7 +75,7 @@ def _remembered(*images_and_seed):
     matrices = essential_matrices(f1[fives], f2[fives])
     if not len(matrices):
         return []
-    errors = _agreed(epipolar_errors(matrices, f1, f2))
+    errors = _misfit(epipolar_errors(matrices, f1, f2))
     found, rough = [], []
     for best in np.argsort(errors)[:TRIED]:
         if found and errors[best] > WORSE * max(found[0].error, FLOOR):
@@ -139,11 +139,14 @@ def epipolar_errors(matrices, f1, f2):
     return off / np.sqrt(np.maximum(square, 1e-30))
 
 
-def _agreed(errors):
-    """The error (k,) that more than half of the points keep, beyond the five of a sample."""
-    n = errors.shape[1]
-    place = min(n - 1, n // 2 + 2)
-    return np.partition(errors, place, axis=1)[:, place]
+def _misfit(errors):
+    """Geometric mean (k,) of the errors (k, n), the five smallest left out: any five fit exactly.
+
+    A blunder counts the same wherever the truth lies; of few points, a wrong pose that many happen
+    to agree with does not win against one that all agree with but for noise.
+    """
+    others = np.partition(errors, 4, axis=1)[:, 5:]
+    return np.exp(np.mean(np.log(others**2 + FLOOR**2), axis=1) / 2)
 
 
 def _decomposed(matrix, f1, f2):
@@ -190,7 +193,7 @@ def _refined(rotation, base, f1, f2):
         moved = moved / np.linalg.norm(moved)
         cross = np.cross(np.eye(3), moved)
         matrix = turn @ -cross
-        found = float(_agreed(epipolar_errors(matrix[None], f1, f2))[0])
+        found = float(_misfit(epipolar_errors(matrix[None], f1, f2))[0])
         if not found < error:
             break
         rotation, base, error = turn, moved, found

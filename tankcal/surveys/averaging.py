@@ -45,7 +45,7 @@ def averaged(label, value, sd, *, angle=False):
     Readings that are fixed (sd 0) stay as they are, each on its own.
     """
     n = len(label)
-    value, sd = (np.asarray(a, dtype=float).reshape(n, -1) for a in (value, sd))
+    value, sd = (np.asarray(a, dtype=float).reshape(n, -1 if n else 1) for a in (value, sd))
     fixed = (sd == 0).any(axis=1)
     label = np.where(fixed, np.max(label, initial=0) + 1 + np.arange(n), label)
     _, first, group, repeats = np.unique(
