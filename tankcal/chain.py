@@ -20,7 +20,7 @@ from tankcal.dips import (
     table_heights,
 )
 from tankcal.doubts import incomplete, of_adjustment, refuse_undetermined
-from tankcal.errors import HeightError, InputError, Problem
+from tankcal.errors import HeightError, InputError, Problem, SolutionError
 from tankcal.job import Job
 from tankcal.meshes import parse_mesh
 from tankcal.scan import Scan, scanned
@@ -30,6 +30,7 @@ from tankcal.tanks import body_of, critical_zone, shell_volume, zero_height
 from tankcal.wall import Wall, among_themselves, find_wall, warnings_of
 
 MILLIMETRE, PARTS = 0.001, 10  # of a step of the tables that proportional parts are for
+TOLD = 10  # warnings of the adjustment that are told when there is no wall
 NOMINAL_MISS = 0.05  # of the nominal volume, from which on one of the two is in doubt
 
 
@@ -149,7 +150,13 @@ def run(job, progress=None):
     adjustment = None
     if job.measurements is not None:
         job, adjustment = _adjusted(job, tell)
-    survey = _survey(job, tell, _dof(adjustment))
+    try:
+        survey = _survey(job, tell, _dof(adjustment))
+    except SolutionError as error:
+        if adjustment is None or not adjustment.warnings:
+            raise
+        told = map(str, adjustment.warnings[:TOLD])
+        raise SolutionError("\n".join([str(error), *told])) from error
     wall = survey if isinstance(survey, Wall) else None
     tell("integrating volumes")
     body = body_of(job, survey)

@@ -479,9 +479,10 @@ def test_control_far_away_unless_swapped(tmp_path):
     assert warnings_of(tmp_path / "sound", parts) == []
     row = parts.tables["control"][2]
     row[1:3] = row[1:3][::-1]
-    (warning,) = warnings_of(tmp_path, parts)
-    assert warning.startswith("control.csv, row 3, x_m: 'W2' is ")
-    assert warning.endswith("x and y swapped?")
+    problem = problem_of(tmp_path, parts)
+    assert (problem.file, problem.row, problem.column) == ("control.csv", 3, "x_m")
+    assert problem.expected.startswith("'W2' is ")
+    assert problem.expected.endswith("x and y swapped?")
 
 
 def test_control_that_fits_its_distances_when_swapped(tmp_path):

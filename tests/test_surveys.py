@@ -143,7 +143,7 @@ def repeated(measurements, times, scatter, rng):
 
 
 def test_averaging_is_adjusting_all_readings(photos):
-    """Property: the same unknowns and covariance; v'Pv differs by the scatter within the means."""
+    """Property: the same unknowns, covariance, sum of squares, redundancy and global test."""
     measurements = repeated(photos[0], 3, 1.0, np.random.default_rng(5))
     means = adjust_survey(replace(measurements, settings=AdjustmentSettings(snooping=False)))
     survey, images = means.adjusted.survey, measurements.image_points
@@ -153,6 +153,7 @@ def test_averaging_is_adjusting_all_readings(photos):
     of = survey.observations[1]
     single = replace(
         survey,
+        repeated={},
         image_points=replace(
             survey.image_points, point=point, photo=photo, xy_mm=images.xy_mm, sd_mm=images.sd_mm
         ),
@@ -168,7 +169,13 @@ def test_averaging_is_adjusting_all_readings(photos):
     alone = adjust(single)
     assert alone.xyz_m == pytest.approx(means.adjusted.xyz_m, abs=1e-8)
     assert alone.point_covariances_m2 == pytest.approx(means.covariance_m2, rel=1e-6, abs=1e-13)
-    assert alone.dof - means.redundancy == len(images.photo) * 2 * 2 // 3 + 8
+    within = len(images.photo) * 2 * 2 // 3 + 8
+    assert means.adjusted.solution.dof + within == alone.dof == means.redundancy
+    assert means.adjusted.chi2 == pytest.approx(alone.chi2, rel=1e-6)
+    assert means.sigma0 == pytest.approx(alone.sigma0, rel=1e-6)
+    assert means.observations == alone.solution.rows
+    redundancy = sum(one.redundancy for one in means.groups)
+    assert redundancy == pytest.approx(means.redundancy, abs=1e-6)
     first = next(one for one in means.readings if one.file == "distances.csv")
     assert (first.repeats, first.row) == (2, 2)
     assert not any("scatter" in problem.expected for problem in means.warnings)

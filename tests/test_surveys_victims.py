@@ -160,14 +160,15 @@ def test_one_bad_reading_of_three_is_found_without_any_other():
 
 
 def test_only_values_that_one_reading_contradicts_are_torn_apart():
-    """Closed form: of four values one has a wild reading, one scatters, one is a pair."""
+    """Closed form: of four values one has a wild reading, one scatters, one is a pair apart."""
     value = [0, 1, -1, 0, 0, 90, 0, 30, -30, 0, 50]
     label = np.array([0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3])
     means = averaged(label, np.array(value, dtype=float), np.ones(11))
     torn = torn_apart(label, means)
     assert len(set(torn[3:6].tolist())) == 3
+    assert torn[9] != torn[10]
     assert np.array_equal(torn[:3], label[:3])
-    assert np.array_equal(torn[6:], label[6:])
+    assert np.array_equal(torn[6:9], label[6:9])
 
 
 def test_the_detectable_bias_of_what_was_set_aside_is_that_with_it(stations):
@@ -202,7 +203,8 @@ def test_of_three_rays_nobody_can_tell_the_wrong_one():
     mine = found.removed[0].row - 2
     assert {row for _, row in alternatives(found.adjusted, 0, mine)} == {0, 1, 2} - {mine}
     text = "\n".join(map(str, found.warnings))
-    assert f"azimuth {'ABC'[mine]}-P was set aside, but it may as well be azimuth" in text
+    named = f"azimuth {'ABC'[mine]}-P (row {mine + 2})"
+    assert f"{named} was set aside, but it may as well be azimuth" in text
 
 
 def test_whatever_may_be_wrong_instead_explains_it_as_well():

@@ -75,12 +75,35 @@ class Adjusted:
     @property
     def sigma0(self):
         """A-posteriori root of the variance factor; nan when nothing is redundant."""
-        return float(np.sqrt(self.solution.variance_factor))
+        return float(np.sqrt(self.variance_factor))
+
+    @property
+    def variance_factor(self):
+        """v'Pv over the redundancy, both with the scatter of repeated readings; nan without."""
+        return self.chi2 / self.dof if self.dof > 0 else np.nan
+
+    @property
+    def chi2(self):
+        """v'Pv, with the scatter of repeated readings about their means."""
+        return self.solution.chi2 + self.within[0]
+
+    @cached_property
+    def within(self):
+        """Chi-square of repeated readings about their means, and its degrees of freedom."""
+        found = np.zeros(2)
+        sources = zip(
+            self.problem.sources, self.problem.observations, self.problem.rows_of, strict=True
+        )
+        for source, one, rows in sources:
+            if source in self.survey.repeated:
+                use = np.ones(len(one)) if one.use is None else np.asarray(one.use) > 0
+                found += [use @ part[rows] for part in self.survey.repeated[source]]
+        return float(found[0]), round(found[1])
 
     @property
     def dof(self):
-        """Degrees of freedom."""
-        return self.solution.dof
+        """Degrees of freedom, those of repeated readings among them."""
+        return self.solution.dof + self.within[1]
 
     def scale(self, choice="a_priori"):
         """What all covariances are multiplied by: 1 for "a_priori", sigma0^2 for "a_posteriori".
@@ -93,7 +116,7 @@ class Adjusted:
             raise ValueError(f"scale {choice!r}: a_priori or a_posteriori")
         if self.dof < 1:
             raise SolutionError("no a-posteriori variance factor: no observation is redundant")
-        return float(self.solution.variance_factor)
+        return float(self.variance_factor)
 
     @property
     def xyz_m(self):
@@ -224,4 +247,4 @@ class Adjusted:
 
     def test(self, confidence=0.95, sides=2):
         """The GlobalTest of the whole adjustment."""
-        return global_test(self.solution.chi2, self.dof, confidence, sides)
+        return global_test(self.chi2, self.dof, confidence, sides)

@@ -107,6 +107,9 @@ class Survey:
     sets          (s,) start azimuths of the zeros of the direction sets, rad
     instruments   tuple of Instrument
     systems       tuple of System
+    repeated      {source: (chi-square (n,), degrees of freedom (n,))}: scatter of the readings that
+                  were averaged into each observation; it counts in sigma0 and in the redundancy as
+                  if they had been adjusted one by one. Sources as Residuals name them
     """
 
     points: tuple
@@ -119,6 +122,7 @@ class Survey:
     sets: np.ndarray = field(default_factory=lambda: np.zeros(0))
     instruments: tuple = ()
     systems: tuple = ()
+    repeated: dict = field(default_factory=dict)
 
     def with_sds(self, factors):
         """The survey with the sds of groups multiplied; factors {source: factor}, see Residuals."""

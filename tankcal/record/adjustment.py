@@ -98,10 +98,8 @@ def _group(group, adjustment):
     if group.redundancy > UNCONTROLLED and np.isfinite(group.factor):
         tail = (1 - CONFIDENCE) / 2
         square = group.factor**2 * group.redundancy
-        low, high = (
-            float(np.sqrt(square / scipy.stats.chi2.ppf(p, group.redundancy)))
-            for p in (1 - tail, tail)
-        )
+        bounds = scipy.stats.chi2.ppf([1 - tail, tail], group.redundancy)
+        low, high = (float(np.sqrt(square / one)) if one > 0 else None for one in bounds)
     return {
         **row,
         "factor_low": low,
@@ -112,7 +110,7 @@ def _group(group, adjustment):
 
 
 def _verdict(group, low, high):
-    if low is None:
+    if low is None and high is None:
         return "not_controlled"
     if group.redundancy < CHECKABLE:
         return "hardly_controlled"

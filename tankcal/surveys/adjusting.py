@@ -8,9 +8,9 @@ from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.network.cleaning import CRITICAL
 from tankcal.network.soundness import doubts
 from tankcal.surveys.causes import causes_of
-from tankcal.surveys.checks import check_points, check_readings
+from tankcal.surveys.checks import check_points, check_readings, disagreeing
 from tankcal.surveys.cleaning import searched
-from tankcal.surveys.diagnoses import MIRROR, diagnosed
+from tankcal.surveys.diagnoses import MIRROR, diagnosed, mirrored_photos
 from tankcal.surveys.frames import framed
 from tankcal.surveys.gathering import gather, named_in
 from tankcal.surveys.results import Adjustment
@@ -22,7 +22,6 @@ from tankcal.surveys.trials import likely_mistake, photos_that_do_not_fit
 from tankcal.surveys.victims import SOME, one_sided, set_aside, undecided, wrongly_held
 
 SUSPICIOUS = 4.0  # sigma0 above which whole files are doubted
-LOST = 0.2  # share of the readings set aside, above which they are
 TRIED = 25  # iterations of a survey that is only supposed
 FILES = ("image_points.csv", "photos.csv", "control.csv")  # first in the list of readings
 
@@ -105,12 +104,16 @@ def _complete(search, gathered, frame, measurements):
     late = {i: why for i, why in enumerate(adjusted.problem.set_aside) if why}
     warnings += [_lost(measurements, adjusted.survey.points[i], why) for i, why in late.items()]
     warnings += [_kept(one, gathered.traces) for one in search.needed if one.w > CRITICAL]
-    warnings += undecided(adjusted, search.removed, gathered.traces)
-    warnings += _doubts(adjusted, readings, groups, gathered, measurements)
+    causes = _causes(adjusted, readings, gathered, measurements)
+    warnings = [*causes, *warnings, *_doubts(adjusted, readings, groups, gathered, measurements)]
+    if not causes:
+        warnings += undecided(adjusted, search.removed, gathered.traces)
     known = gathered.known
     acting = frame.held
     if measurements.settings.datum == "control":
         acting = np.isfinite(known.xyz_m) & np.isfinite(known.sd_m)
+    checked = check_points(adjusted, measurements, known, acting, scale)
+    warnings += disagreeing(checked, measurements.check)
     return Adjustment(
         names=names,
         xyz_m=adjusted.xyz_m[there],
@@ -122,11 +125,11 @@ def _complete(search, gathered, frame, measurements):
         removed=tuple(removed),
         groups=groups,
         datum=frame.report,
-        check_points=check_points(adjusted, measurements, known, acting, scale),
+        check_points=checked,
         causes=causes_of(adjusted, there, scale),
         cov_scale=scale,
         sigma0=adjusted.sigma0,
-        observations=adjusted.solution.rows,
+        observations=adjusted.solution.rows + adjusted.within[1],
         unknowns=adjusted.solution.unknowns,
         redundancy=adjusted.dof,
         iterations=adjusted.solution.iterations,
@@ -157,21 +160,27 @@ def _doubts(adjusted, readings, groups, gathered, measurements):
     found += names_alike(gathered.lost, adjusted.survey.points) + same_place(adjusted)
     found += [Problem("job.toml", text, None, "adjustment") for text in doubts(adjusted)]
     found += mirrored_targets(adjusted.xyz_m, adjusted.survey.points, measurements)
+    return found
+
+
+def _causes(adjusted, readings, gathered, measurements):
+    """Problem rows: what is wrong with the whole rather than with single readings."""
     gone = set_aside(adjusted.survey)
     told = one_sided(readings, gathered.known)
-    found += told
-    misread = adjusted.sigma0 > SUSPICIOUS or gone > LOST * len(readings)
-    if not (misread or told or gone > SOME * len(readings)):
-        return found
-    close = partial(_tried, like=adjusted)
-    sigma0 = adjusted.sigma0
+    if not (told or adjusted.sigma0 > SUSPICIOUS or gone > SOME * len(readings)):
+        return []
+    close, sigma0 = partial(_tried, like=adjusted), adjusted.sigma0
     if gone:
         try:
             sigma0 = close(measurements)[0].sigma0
         except SolutionError:
             sigma0 = np.inf
-    explained = likely_mistake(measurements, sigma0, _tried) if misread else []
-    return found + (explained or wrongly_held(measurements, sigma0, gone, close))
+    suspicious = sigma0 > SUSPICIOUS and (told or adjusted.sigma0 > SUSPICIOUS)
+    suspicious = suspicious and not mirrored_photos(adjusted)
+    misread = likely_mistake(measurements, sigma0, _tried) if suspicious else []
+    if misread:
+        raise SolutionError("\n".join(["the readings do not fit together", *map(str, misread)]))
+    return wrongly_held(measurements, sigma0, gone, close) + told
 
 
 def _in_order(readings):

@@ -73,8 +73,8 @@ def averaged(label, value, sd, *, angle=False):
 def torn_apart(label, averages):
     """Labels (readings,) with which values that one reading alone contradicts are not averaged.
 
-    Of three readings or more, that scatter more than they may, and not so once the worst is gone:
-    each then goes into the adjustment on its own, where the search for blunders finds the worst.
+    They scatter more than they may, and not so once the worst is gone: each then goes into the
+    adjustment on its own, where the search for blunders finds the worst.
     """
     dof = averages.repeats - 1
     limit, without = (
@@ -84,7 +84,7 @@ def torn_apart(label, averages):
     single = np.minimum(averages.share, 0.999)
     left = averages.chi2[averages.group] - averages.away**2 / (1 - single)
     agree = (left <= without[averages.group]).all(axis=1)
-    torn = (averages.chi2 > limit).any(axis=1) & (dof > 1)
+    torn = (averages.chi2 > limit).any(axis=1) & (dof > 0)
     torn &= np.bincount(averages.group, weights=agree, minlength=len(dof)) > 0
     own = np.max(label, initial=0) + 1 + np.arange(len(label))
     return np.where(torn[averages.group], own, label)

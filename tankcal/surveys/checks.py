@@ -2,10 +2,14 @@
 
 import numpy as np
 
+from tankcal.errors import Problem
 from tankcal.network import ImagePoints
 from tankcal.network.quality import compared
 from tankcal.observations import ImageCoordinates
 from tankcal.surveys.results import CheckPoints, Reading
+
+DISAGREE = 4.0  # sds by which a check point may differ
+LISTED = 10  # check points that are told
 
 
 def check_readings(adjusted, checks, cov_scale):
@@ -21,6 +25,28 @@ def check_readings(adjusted, checks, cov_scale):
         for part, rows in parts:
             found += _rows(adjusted, part, rows, trace, cov_scale)
     return found
+
+
+def disagreeing(found, table):
+    """Problem rows of check points that differ more than their uncertainty allows.
+
+    found  CheckPoints or None        table  job.KnownPoints of check.csv, or None
+    """
+    problems = []
+    if found is None or table is None:
+        return problems
+    for name, difference, sd in zip(found.names, found.difference_m, found.sd_m, strict=True):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            away = np.nan_to_num(np.abs(difference) / sd, posinf=0.0)
+        if name in table.point and away.max() > DISAGREE:
+            k = int(away.argmax())
+            text = (
+                f"{'xyz'[k]} of {name} differs by {1e3 * difference[k]:+.1f} mm from the adjusted "
+                f"point, {away[k]:.1f} times its standard deviation of {1e3 * sd[k]:.1f} mm"
+            )
+            row = table.rows[table.point.index(name)] if table.rows else None
+            problems.append(Problem(table.file, text, row, f"{'xyz'[k]}_m"))
+    return problems[:LISTED]
 
 
 def _rows(adjusted, one, rows, trace, cov_scale):

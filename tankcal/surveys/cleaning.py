@@ -56,6 +56,7 @@ def _without(survey, options, gross):
     """network.Cleaned of a survey: first without some readings, then with these set aside."""
     thin = replace(
         survey,
+        repeated={},
         observations=tuple(
             one.taken(~gross[number]) if number in gross else one
             for number, one in enumerate(survey.observations)

@@ -52,6 +52,9 @@ def framed(survey, gathered, settings):
         vertical=not _moves(undetermined, (3, 4)),
         scale=not _moves(undetermined, (6,)),
     )
+    if free.shape[1] and not report.scale and settings.datum != "control":
+        text = "nothing that was measured gives the scale: it is that of what holds the datum"
+        warnings = [*warnings, Problem("job.toml", text, None, "adjustment.datum")]
     return Frame(chosen, options, report, held, tuple(warnings))
 
 

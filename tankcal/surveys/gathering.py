@@ -19,6 +19,8 @@ from tankcal.surveys.readings import (
     table_of,
 )
 
+TOLD = 10  # points left out that are told one by one
+
 
 @dataclass(frozen=True)
 class Gathered:
@@ -70,7 +72,7 @@ def gather(measurements):
     excluded = _unmeasured(measurements, found.survey.points, excluded)
     where = {name: named_in(measurements, name) for name in excluded}
     idle, warnings = sorted_out(found.survey)
-    warnings += [Problem(*where[name][:1], text, where[name][1]) for name, text in excluded.items()]
+    warnings += _of_excluded(excluded, where)
     fixed = idle if found.survey.fixed is None else found.survey.fixed | idle
     return replace(
         found,
@@ -80,6 +82,18 @@ def gather(measurements):
         aside=tuple(excluded.values()),
         warnings=(*found.warnings, *warnings),
     )
+
+
+def _of_excluded(excluded, where):
+    """Problem rows of points left out {name: why}; of many, the first ones and how many more."""
+    found = [Problem(where[name][0], text, where[name][1]) for name, text in excluded.items()]
+    if len(found) <= TOLD:
+        return found
+    names = ", ".join(list(excluded)[TOLD - 1 :][:TOLD])
+    more = len(found) - TOLD + 1
+    text = f"{more} more points are left out for want of observations: {names}"
+    text += ", ..." if more > TOLD else ""
+    return [*found[: TOLD - 1], Problem("job.toml", text, None, "adjustment")]
 
 
 def _unmeasured(measurements, points, excluded):
@@ -143,6 +157,7 @@ def _gathered(measurements, excluded):
         fixed=fixed, image_points=images, photos=photos, cameras=cameras,
         observations=tuple(observations), sets=np.full(len(numbers.sets), np.nan),
         instruments=_instruments(measurements, numbers), systems=systems,
+        repeated={source: one.repeated for source, one in traces.items()},
     )  # fmt: skip
     return Gathered(survey, traces, tuple(checks), known, None, {}, (), tuple(warnings))
 
@@ -229,6 +244,7 @@ def _control(control, points, warnings):
         means = averaged(3 * point + axis, value, sd)
         first = means.first
         trace = _control_trace(control, row[first], axis[first], means.repeats)
+        trace = replace(trace, scatter=means.chi2.sum(axis=1))
         warnings += scatter_warnings(
             means, lambda k: f"{control.point[row[k]]} {'xyz'[axis[k]]}", control.file,
             [control.rows[i] for i in row] if control.rows else (),
@@ -289,6 +305,7 @@ def _images(measurements, points, order, warnings):
     means = averaged(photo[rows] * len(points) + point[rows], images.xy_mm[rows], sd[rows])
     first = rows[means.first]
     trace = _image_trace(images, first, means.repeats, cameras)
+    trace = replace(trace, scatter=means.chi2.sum(axis=1))
     warnings += scatter_warnings(
         means, lambda k: "point {1} in photo {0}".format(*trace.ids[means.group[k]]), images.file,
         [images.rows[i] for i in rows] if images.rows else (),

@@ -74,12 +74,15 @@ def _counts(survey):
         for counter in (plan, height, rows):
             counter += 2 * rays
     for one in survey.observations:
+        if isinstance(one, ControlCoordinates):
+            _add_control(one, plan, height, rows)
+            continue
+        if not one.ties:
+            continue
         in_plan, in_height = _speaks(one)
+        _, lines = np.unique([getattr(one, name) for name in one.ties], axis=1, return_index=True)
         for name in one.ties:
-            count = one.rows * np.bincount(getattr(one, name), minlength=n)
-            if isinstance(one, ControlCoordinates):
-                _add_control(one, plan, height, rows)
-                continue
+            count = one.rows * np.bincount(getattr(one, name)[lines], minlength=n)
             plan += count * in_plan
             height += count * in_height
             rows += count

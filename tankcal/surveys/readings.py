@@ -1,6 +1,6 @@
 """Tables of distances, angles and levels as observations between numbered points."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,6 +29,7 @@ class Trace:
     group    (n,) names of the groups whose sds are judged together ("tape 1")
     element  (n,) tuples, a name for each value: ("x", "y"); ("",) where there is only one
     table    as job.Readings name it; "" for everything else
+    scatter  (n,) chi-square of the readings that were averaged, about their mean; None: none were
     """
 
     file: str
@@ -38,6 +39,14 @@ class Trace:
     group: tuple
     element: tuple
     table: str = ""
+    scatter: np.ndarray | None = None
+
+    @property
+    def repeated(self):
+        """(chi-square (n,), degrees of freedom (n,)) of the readings that were averaged."""
+        scatter = np.zeros(len(self.rows)) if self.scatter is None else self.scatter
+        values = np.array([len(one) for one in self.element], dtype=int)
+        return scatter, (np.asarray(self.repeats) - 1) * values
 
 
 @dataclass(frozen=True)
@@ -166,7 +175,7 @@ def observed(table, bend, warnings):
             first = rows[means.first]
             yield (
                 _made(table, first, means.value, means.sd, bend),
-                _trace(table, first, means.repeats),
+                replace(_trace(table, first, means.repeats), scatter=means.chi2.sum(axis=1)),
             )
 
 

@@ -34,7 +34,8 @@ def readings_of(adjusted, traces):
         for name, unit in dict.fromkeys(zip(names, units, strict=True)):
             mine = (names == name) & (np.array(units, dtype=object) == unit)
             groups.setdefault((table.kind, name, unit), []).append((table, mine))
-    return found, tuple(_group(*key, parts) for key, parts in groups.items())
+    repeated = adjusted.survey.repeated
+    return found, tuple(_group(*key, parts, repeated) for key, parts in groups.items())
 
 
 def gone_with_their_points(adjusted, removed, traces):
@@ -135,9 +136,13 @@ def _known_names(adjusted, one):
     return names, elements, units, "cameras.toml"
 
 
-def _group(kind, name, unit, parts):
+def _group(kind, name, unit, parts, repeated):
     """The GroupOfReadings of parts (table, mask of its rows)."""
     used = [mine & table.used for table, mine in parts]
+    scatter = np.zeros(2)
+    for (table, _), mine in zip(parts, used, strict=True):
+        if table.source in repeated:
+            scatter += [part[table.rows[mine]].sum() for part in repeated[table.source]]
     residual, sd, share = (
         np.concatenate(
             [
@@ -148,10 +153,10 @@ def _group(kind, name, unit, parts):
         for field in ("residual", "sd", "redundancy")
     )
     count = sum(int(mine.sum()) * table.residual.shape[1] for table, mine in parts)
-    redundancy = float(share.sum())
+    redundancy = float(share.sum() + scatter[1])
     factor = factor_sd = np.nan
     if redundancy > UNCONTROLLED and (sd > 0).all():
-        factor = float(np.sqrt(np.sum((residual / sd) ** 2) / redundancy))
+        factor = float(np.sqrt((np.sum((residual / sd) ** 2) + scatter[0]) / redundancy))
         factor_sd = float(1.0 / np.sqrt(2.0 * redundancy))
     rms = float(np.sqrt(np.mean(residual**2))) if len(residual) else np.nan
     return GroupOfReadings(

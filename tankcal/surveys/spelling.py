@@ -11,6 +11,8 @@ from tankcal.errors import Problem
 LEVEL = 0.001  # of the test whether two points are one
 RARELY = 3  # rays or readings of the point that is doubted, at most
 NEAR = 6.0  # median sds within which other points are looked for
+CLOSE = 0.05  # of the extent of the survey: what lies within reach must be closer together
+TRIED = 2000  # pairs, the nearest first
 TOLD = 10
 
 
@@ -39,38 +41,42 @@ def same_place(adjusted):
     """Problem rows for pairs of points that are one point, as far as the adjustment can tell.
 
     They lie together within their sds, never occur in the same photo or from the same station, and
-    one of them was rarely observed.
+    one of them was rarely observed. Nothing is said of a survey whose sds are not small against it.
     """
-    survey = adjusted.survey
-    there = np.flatnonzero(np.isfinite(adjusted.xyz_m).all(axis=1))
+    survey, xyz, found = adjusted.survey, adjusted.xyz_m, []
+    there = np.flatnonzero(np.isfinite(xyz).all(axis=1))
     if len(there) < 2:
-        return []
-    xyz = adjusted.xyz_m[there]
-    size = np.sqrt(np.einsum("nii->n", adjusted.point_covariances_m2[there]))
-    near = scipy.spatial.cKDTree(xyz).query_pairs(NEAR * max(float(np.median(size)), 1e-6))
-    found = []
-    if not near:
         return found
+    size = np.sqrt(np.einsum("nii->n", adjusted.point_covariances_m2[there]))
+    reach = NEAR * max(float(np.median(size)), 1e-6)
+    if reach > CLOSE * np.linalg.norm(np.ptp(xyz[there], axis=0)):
+        return found
+    pairs = scipy.spatial.cKDTree(xyz[there]).query_pairs(reach, output_type="ndarray")
+    pairs = there[pairs]
     seen = _views(survey)
-    for i, j in sorted(near):
-        pair = there[i], there[j]
-        few, many = sorted(pair, key=lambda point: len(seen[point]))
-        together = {view for view, _ in seen[few]} & {view for view, _ in seen[many]}
-        if len(seen[few]) > RARELY or together or not _together(adjusted, few, many):
+    count = np.array([len(one) for one in seen])
+    pairs = np.take_along_axis(pairs, np.argsort(count[pairs], axis=1, kind="stable"), axis=1)
+    pairs = pairs[count[pairs[:, 0]] <= RARELY]
+    apart = np.linalg.norm(xyz[pairs[:, 0]] - xyz[pairs[:, 1]], axis=1)
+    for i in np.argsort(apart, kind="stable")[:TRIED]:
+        few, many = pairs[i].tolist()
+        if {view for view, _ in seen[few]} & {view for view, _ in seen[many]}:
             continue
-        away = 1e3 * np.linalg.norm(adjusted.xyz_m[few] - adjusted.xyz_m[many])
+        if not _together(adjusted, xyz[few] - xyz[many], few, many):
+            continue
         text = (
-            f"points {survey.points[few]} and {survey.points[many]} lie {away:.1f} mm apart, "
-            "within their standard deviations, and no photo or station shows both: one point "
-            "under two names?"
+            f"points {survey.points[few]} and {survey.points[many]} lie {1e3 * apart[i]:.1f} mm "
+            "apart, within their standard deviations, and no photo or station shows both: one "
+            "point under two names?"
         )
         found.append(Problem("job.toml", text))
-    return found[:TOLD]
+        if len(found) == TOLD:
+            break
+    return found
 
 
-def _together(adjusted, a, b):
-    """Whether two points lie together within their covariance."""
-    difference = adjusted.xyz_m[a] - adjusted.xyz_m[b]
+def _together(adjusted, difference, a, b):
+    """Whether two points, a difference (3,) apart, lie together within their covariance."""
     q = adjusted.covariance_m2([a, b])
     q = q[:3, :3] + q[3:, 3:] - q[:3, 3:] - q[3:, :3]
     floor = 1e-12 * np.eye(3)

@@ -5,6 +5,7 @@ again, without data snooping. The one that brings sigma0 down most is told; noth
 """
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -12,12 +13,13 @@ from tankcal.camera import corrected
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.surveys.diagnoses import MIRROR, mirrored_fits
 from tankcal.surveys.readings import ANGLES
+from tankcal.surveys.victims import ALIKE
 
 BETTER = 0.2  # share of sigma0 that may be left by what explains a survey
 SOUND = 5.0  # sigma0 of a survey that fits, where there is no sigma0 to compare with
 CERTAIN = 2.0  # sigma0 after which nothing else is tried
-ALIKE = 1.5  # times the smallest sigma0, within which suppositions explain as much
-MIRRORS = ("control.csv", "image_points.csv")  # mistakes that cannot always be told apart
+HORIZONTAL = ("directions", "horizontal_angles", "azimuths")
+EXCHANGED = 7  # control points of which each two are exchanged
 MOST = 12  # photos that are left out one after the other
 
 
@@ -29,31 +31,51 @@ def likely_mistake(measurements, sigma0, run):
     """
     limit = min(BETTER * sigma0, SOUND if np.isinf(sigma0) else np.inf)
     explained = []
-    for problem, changed in _suppositions(measurements):
-        if problem.file not in MIRRORS and any(found < CERTAIN for found, _ in explained):
+    for suppositions in (_mirrored, _exchanged, _in_other_units):
+        for problem, changed in suppositions(measurements):
+            try:
+                found = run(changed)[0].sigma0
+            except (SolutionError, InputError):
+                continue
+            if found < limit:
+                explained.append((found, problem))
+        if any(found < CERTAIN for found, _ in explained):
             break
-        try:
-            found = run(changed)[0].sigma0
-        except (SolutionError, InputError):
-            continue
-        if found < limit:
-            explained.append((found, problem))
     best = min((found for found, _ in explained), default=np.inf)
     return [problem for found, problem in explained if found < ALIKE * best]
 
 
-def _suppositions(measurements):
-    """Pairs (Problem, measurements as they would be without that mistake)."""
-    control, images = measurements.control, measurements.image_points
-    if control is not None:
-        swapped = replace(
-            control, xyz_m=control.xyz_m[:, [1, 0, 2]], sd_m=control.sd_m[:, [1, 0, 2]]
-        )
-        text = "all coordinates fit once x and y are swapped"
-        yield Problem("control.csv", text), replace(measurements, control=swapped)
-    if images is not None:
-        turned = replace(images, xy_mm=images.xy_mm * [-1.0, 1.0])
-        yield Problem("image_points.csv", MIRROR), replace(measurements, image_points=turned)
+def _mirrored(measurements):
+    """Pairs (Problem, measurements as they would be without that mistake): a world in a mirror.
+
+    Which of these it is cannot always be told.
+    """
+    yield from _of_control(measurements)
+    yield from _of_images(measurements)
+    for one in measurements.readings:
+        if one.table in HORIZONTAL:
+            text = "the angles fit once they are taken for those of a circle read anticlockwise"
+            yield Problem(one.file, text), _times(measurements, [one.table], -1.0)
+
+
+def _exchanged(measurements):
+    """The same of two control points that bear one another's names."""
+    control = measurements.control
+    names = [] if control is None else list(control.point)
+    if not 2 < len(names) <= EXCHANGED or measurements.image_points is not None:
+        return  # photographs start too slowly for that many trials
+    for i, j in combinations(range(len(names)), 2):
+        if control.system[i] == control.system[j]:
+            order = np.arange(len(names))
+            order[[i, j]] = j, i
+            text = f"all fits once {names[i]} and {names[j]} are exchanged"
+            changed = replace(control, xyz_m=control.xyz_m[order], sd_m=control.sd_m[order])
+            row = control.rows[j] if control.rows else None
+            yield Problem("control.csv", text, row, "point"), replace(measurements, control=changed)
+
+
+def _in_other_units(measurements):
+    """The same of a file in another unit."""
     tables = measurements.readings
     angles = [one.table for one in tables if one.table in ANGLES]
     for factor, what in ((0.9, "gon read as degrees"), (1 / 0.9, "degrees read as gon")):
@@ -66,10 +88,55 @@ def _suppositions(measurements):
             text = f"the angles fit once they are taken for {what}"
             yield Problem(f"{table}.csv", text), _times(measurements, [table], factor)
     for table in ("distances", "slope_distances"):
-        if any(one.table == table for one in tables):
+        if any(one.table == table for one in tables) and _scale_is_known(measurements, table):
             for factor, what in ((0.3048, "feet"), (0.001, "millimetres")):
                 text = f"the distances fit once they are taken for {what}"
                 yield Problem(f"{table}.csv", text), _times(measurements, [table], factor)
+
+
+def _of_control(measurements):
+    """x and y of control exchanged, in all systems, then in one of several."""
+    control = measurements.control
+    if control is None:
+        return
+    of = np.array([name or "" for name in control.system], dtype=object)
+    for system in (None, *sorted(set(of.tolist()))):
+        mine = np.ones(len(of), dtype=bool) if system is None else of == system
+        if system is None or not mine.all():
+            xyz, sd = control.xyz_m.copy(), control.sd_m.copy()
+            xyz[mine], sd[mine] = xyz[mine][:, [1, 0, 2]], sd[mine][:, [1, 0, 2]]
+            of_system = "" if not system else f" of system {system}"
+            text = f"all coordinates{of_system} fit once x and y are swapped"
+            changed = replace(control, xyz_m=xyz, sd_m=sd)
+            yield Problem("control.csv", text), replace(measurements, control=changed)
+
+
+def _of_images(measurements):
+    """Images mirrored, of all cameras, then of one of several."""
+    images = measurements.image_points
+    if images is None:
+        return
+    camera_of = {one.name: one.camera for one in measurements.photos}
+    of = np.array([camera_of.get(name, "") for name in images.photo], dtype=object)
+    for camera in (None, *sorted(set(of.tolist()))):
+        mine = np.ones(len(of), dtype=bool) if camera is None else of == camera
+        if camera is None or not mine.all():
+            xy = np.where(mine[:, None], images.xy_mm * [-1.0, 1.0], images.xy_mm)
+            text = MIRROR if camera is None else f"camera {camera}: {MIRROR}"
+            changed = replace(images, xy_mm=xy)
+            yield Problem("image_points.csv", text), replace(measurements, image_points=changed)
+
+
+def _scale_is_known(measurements, table):
+    """Whether distances of a table cannot fit in any unit: their scale and that of control hold."""
+    free = {one.name for one in measurements.instruments if np.isnan(one.u_scale)}
+    setups = {one.name: one.instrument for one in measurements.setups}
+    of = [one for one in measurements.readings if one.table == table]
+    others = any("distances" in one.table for one in measurements.readings if one.table != table)
+    acting = measurements.control is not None and measurements.settings.datum == "control"
+    return (acting or others) and not any(
+        free & ({setups[name] for name in one.setup} | set(one.instrument)) for one in of
+    )
 
 
 def _times(measurements, tables, factor):

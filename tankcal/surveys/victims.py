@@ -27,6 +27,7 @@ SOME = 0.02  # share above which what is held fixed is doubted for once
 FEWER = 0.5  # share of the values set aside that may be left by what explains them
 RELEASED_M = 0.001  # sd of fixed control while it is doubted
 SCALED = 6.0  # sds that a scale must differ from one
+ALIKE = 1.5  # times the smallest sigma0, within which suppositions explain as much
 LISTED = 4
 TESTED = 60  # readings set aside of which it is asked whether others might have been
 
@@ -59,7 +60,7 @@ def _things(one, known):
     if one.kind == "image coordinate":
         yield one.file, f"photo {one.ids[0]}"
     for name in dict.fromkeys(one.ids):
-        if name in known.row and one.kind != "control coordinate":
+        if name in known.row and not one.kind.startswith("control coordinate"):
             yield "control.csv", name
 
 
@@ -80,7 +81,7 @@ def _lost_control(readings):
     gone = [
         one
         for one in readings
-        if one.removed and one.kind == "control coordinate" and np.isfinite(one.residual)
+        if one.removed and one.kind.startswith("control coordinate") and np.isfinite(one.residual)
     ]
     return [
         Problem(
@@ -133,8 +134,9 @@ def _named(trace, source, row):
     if source == "image points":
         return f"point {ids[1]} in photo {ids[0]}"
     of = "control coordinate" if trace.file == "control.csv" else trace.table.replace("_", " ")
-    names = "-".join(ids)
-    return f"{of.removesuffix('s') or 'value'} {names} {trace.element[row][0]}".strip()
+    where = "" if trace.rows[row] is None else f" (row {trace.rows[row]})"
+    names = " ".join(filter(None, ["-".join(ids), trace.element[row][0]]))
+    return f"{of.removesuffix('s') or 'value'} {names}{where}"
 
 
 def set_aside(survey):
@@ -153,8 +155,9 @@ def wrongly_held(measurements, sigma0, gone, run):
     gone    number of values that data snooping set aside, inf likewise
     run     run(measurements, snooping=False) -> (network.Adjusted, Gathered)
     """
-    scales = [] if np.isinf(sigma0) else _wrong_scales(measurements, sigma0, run)
-    return [*scales, *_wrong_control(measurements, gone, run)]
+    found = [] if np.isinf(sigma0) else _wrong_scales(measurements, sigma0, run)
+    found += [] if np.isinf(sigma0) else _wrong_cameras(measurements, sigma0, run)
+    return [*found, *_wrong_control(measurements, gone, run)]
 
 
 def _wrong_control(measurements, gone, run):
@@ -214,7 +217,52 @@ def _wrong_scales(measurements, sigma0, run):
                 "its u_scale_ppm"
             )
             found.append((adjusted.sigma0, Problem("instruments.toml", text, None, name)))
-    return [problem for _, problem in sorted(found, key=lambda pair: pair[0])][:1]
+    return _best(found)
+
+
+def _best(found):
+    """Problem rows of pairs (sigma0, Problem) that explain as much as the best."""
+    best = min((sigma0 for sigma0, _ in found), default=np.inf)
+    return [problem for sigma0, problem in found if sigma0 < ALIKE * best]
+
+
+def _wrong_cameras(measurements, sigma0, run):
+    """Problem rows on fixed principal distances without which the images fit."""
+    found = []
+    for number, one in enumerate(measurements.cameras):
+        camera = one.camera
+        if camera.scope[0] not in ("off", "photo") and camera.state[0] == "free":
+            continue
+        free = replace(
+            camera, scope=("camera", *camera.scope[1:]), state=("free", *camera.state[1:])
+        )
+        cameras = list(measurements.cameras)
+        cameras[number] = replace(one, camera=free)
+        try:
+            adjusted, _ = run(replace(measurements, cameras=tuple(cameras)))
+        except (SolutionError, InputError):
+            continue
+        names = [known.name for known in adjusted.survey.cameras]
+        if camera.name not in names or adjusted.sigma0 > FEWER * sigma0:
+            continue
+        c, sd = _principal_distance(adjusted, names.index(camera.name))
+        if abs(c - camera.values[0]) > SCALED * max(adjusted.sigma0, 1.0) * sd:
+            text = (
+                f"the images fit once c may be {c:.3f} mm (standard uncertainty {sd:.3f} mm) in "
+                f"place of {camera.values[0]:.3f} mm"
+            )
+            found.append((adjusted.sigma0, Problem("cameras.toml", text, None, camera.name)))
+    return _best(found)
+
+
+def _principal_distance(adjusted, camera):
+    """c of a camera and its sd, mm."""
+    problem = adjusted.problem
+    photo = int(np.flatnonzero(adjusted.survey.photos.camera == camera)[0])
+    place = problem.interior_of[photo, 0]
+    column = problem.layout.interior[place]
+    sd = 0.0 if column < 0 else float(adjusted.solution.cofactors(np.array([column]))[0, 0]) ** 0.5
+    return float(adjusted.solution.state.interior[place]), sd
 
 
 def _freed(measurements):

@@ -21,6 +21,7 @@ MUCH_LARGER = 200  # distances in parts of the survey's extent
 THOUSANDFOLD = (500, 2000)  # distances in parts of those between known points
 MIN_OF_OTHERS = 4  # points that tell where the survey is
 FAR, NEAR = 20, 5  # times the usual distance from the middle
+VERY_FAR = 1000  # the same, beyond any doubt
 MISFIT, FIT = 0.10, 0.02  # of a measured distance
 MIN_MISFIT_M = 1.0
 
@@ -31,10 +32,12 @@ def check_doubtful(files):
         if has_rows(files.tables[name]):
             _warn_tiny_sds(files, name, files.tables[name])
     places = places_of(files)
-    if has_rows(files.tables["distances"]):
-        _check_distances(files, places)
+    for name in ("distances", "slope_distances"):
+        if has_rows(files.tables[name]):
+            _check_distances(files, places, files.tables[name])
     if has_rows(files.tables["control"]):
-        _warn_swapped(files, places)
+        _check_size(files, places)
+        _tell_swapped(files, places)
     if any(has_rows(files.tables[name]) for name in ANGLES):
         check_gon(files, places)
 
@@ -50,18 +53,45 @@ def _warn_tiny_sds(files, name, table):
             files.log.warning(table.file, expected, None, column)
 
 
-def _check_distances(files, places):
-    """Distances that only fit the known points, or the tank, in millimetres."""
-    table = files.tables["distances"]
-    distance = table.numbers("distance_m")
-    distance = distance[~np.isnan(distance)]
-    if not len(distance):
+def _check_size(files, places):
+    """Control that lies much further apart than the tank is large."""
+    size, known = _tank_size_m(files), np.array(list(places.of.values())).reshape(-1, 3)
+    known = known[~np.isnan(known).any(axis=1)]
+    if size is None or len(known) < MIN_OF_OTHERS:
         return
-    typical, extent, of = float(np.median(distance)), places.extent_m, "the known points"
-    if extent is None and files.values is not None:
-        sizes = [files.values["tank"][f"nominal_{name}_m"] for name in ("diameter", "height")]
-        extent, of = None if None in sizes else float(np.hypot(*sizes)), "the tank"
-    ratio = _ratio_to_known(places)
+    usual = float(np.median(np.linalg.norm(known - np.median(known, axis=0), axis=1)))
+    if usual > MUCH_LARGER * size:
+        expected = (
+            f"the known points lie {usual:.4g} m from their middle as a rule, and the tank measures"
+            f" {size:.4g} m; expected metres: in millimetres?"
+        )
+        files.log.problem(files.tables["control"].file, expected, None, "x_m")
+
+
+def _tank_size_m(files):
+    """Nominal diagonal of the tank, or None."""
+    if files.values is None:
+        return None
+    sizes = [files.values["tank"][f"nominal_{name}_m"] for name in ("diameter", "height")]
+    return None if None in sizes else float(np.hypot(*sizes))
+
+
+def _check_distances(files, places, table):
+    """Distances that only fit the known points, the tank or one another in millimetres."""
+    distance = table.numbers("distance_m")
+    there = ~np.isnan(distance)
+    if not there.any():
+        return
+    typical, extent, of = float(np.median(distance[there])), places.extent_m, "the known points"
+    for i in np.flatnonzero(there & (distance > MUCH_LARGER * typical)):
+        expected = (
+            f"found {distance[i]:.4g} m where half of the distances are below {typical:.4g} m; "
+            "expected metres: in millimetres?"
+        )
+        files.log.problem(table.file, expected, table.rows[i], "distance_m")
+    if extent is None:
+        extent, of = _tank_size_m(files), "the tank"
+    ratio = _ratio_to_known(places) if table is files.tables["distances"] else 0.0
     found = ""
     if extent and typical > MUCH_LARGER * extent:
         found = f"half of them are above {typical:.4g} m, but {of} extend over {extent:.4g} m"
@@ -85,29 +115,33 @@ def _ratio_to_known(places):
     return float(np.median(ratios)) if ratios else 0.0
 
 
-def _warn_swapped(files, places):
-    """Control points that lie with the others, or fit their distances, once x and y are swapped."""
+def _tell_swapped(files, places):
+    """Control points that lie with the others, or fit their distances, once x and y are swapped.
+
+    Refused where the others lie a thousand times closer together.
+    """
     control = files.tables["control"]
     for row, point, system in zip(
         control.rows, control.of("point"), control.of("system"), strict=True
     ):
         if system is not None or point not in places.of:
             continue
+        certain = _far_unless_swapped(point, places, VERY_FAR, 2)
+        if certain:
+            files.log.problem(control.file, f"{certain}: x and y swapped?", row, "x_m")
+            continue
         evidence = _far_unless_swapped(point, places) or _misfit_unless_swapped(point, places)
         if evidence:
             files.log.warning(control.file, f"{evidence}: x and y swapped?", row, "x_m")
 
 
-def _far_unless_swapped(point, places):
+def _far_unless_swapped(point, places, times=FAR, of_others=MIN_OF_OTHERS):
     here = places.of[point][:2]
-    others = np.array([place[:2] for name, place in places.of.items() if name != point])
-    others = others[~np.isnan(others).any(axis=1)] if len(others) else others
-    if np.isnan(here).any() or len(others) < MIN_OF_OTHERS:
+    count, middle, usual = places.where_others_lie(point)
+    if np.isnan(here).any() or count < of_others:
         return ""
-    middle = np.median(others, axis=0)
-    usual = float(np.median(np.hypot(*(others - middle).T)))
     far, swapped = (float(np.hypot(*(place - middle))) for place in (here, here[::-1]))
-    if far > FAR * usual and swapped < NEAR * usual:
+    if far > times * usual > 0 and swapped < NEAR * usual:
         return (
             f"{point!r} is {far:.4g} m from the middle of the other known points, which lie"
             f" {usual:.3g} m from it as a rule; with x and y swapped {swapped:.3g} m"

@@ -78,6 +78,12 @@ def refuse_undefined(files, table, column, defined, where):
 
 
 def tell_rows(to, table, is_told, column, expected):
-    """Tell log.problem or log.warning the same of each row where `is_told` (n,) is True."""
+    """Tell log.problem or log.warning the same of each row where `is_told` (n,) is True.
+
+    Once only where all rows of several lack the column.
+    """
+    if len(is_told) > 1 and np.all(is_told) and table.columns.get(column) is None:
+        to(table.file, f"the column is missing or {expected.removeprefix('given ')}", None, column)
+        return
     for place in np.flatnonzero(is_told):
         to(table.file, expected, table.rows[place], column)

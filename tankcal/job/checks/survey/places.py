@@ -1,10 +1,13 @@
 """Where things are before anything is adjusted: known coordinates, distances between them."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from tankcal.job.checks.common import has_rows
+
+MANY = 100  # points
 
 
 @dataclass(frozen=True)
@@ -19,6 +22,33 @@ class Places:
     of: dict
     measured: dict
     extent_m: float | None
+
+    def where_others_lie(self, name):
+        """How many other points there are, their middle (2,), and how far from it they lie.
+
+        Of many points all count: one does not move their median.
+        """
+        names, xy = self._in_plan
+        if len(xy) > MANY:
+            return self._middle
+        return _middle_of(xy[[other != name for other in names]])
+
+    @cached_property
+    def _middle(self):
+        return _middle_of(self._in_plan[1])
+
+    @cached_property
+    def _in_plan(self):
+        xy = np.array([place[:2] for place in self.of.values()]).reshape(-1, 2)
+        there = ~np.isnan(xy).any(axis=1)
+        return [name for name, one in zip(self.of, there, strict=True) if one], xy[there]
+
+
+def _middle_of(xy):
+    if not len(xy):
+        return 0, np.zeros(2), 0.0
+    middle = np.median(xy, axis=0)
+    return len(xy), middle, float(np.median(np.hypot(*(xy - middle).T)))
 
 
 def places_of(files):
