@@ -28,7 +28,7 @@ GON = ((0.9, "gon read as degrees"), (1 / 0.9, "degrees read as gon"))
 LEFT = 0.05  # what the factor may leave of the scatter of a station's angles
 TOLD = 10  # diagnoses of one kind that are listed
 TRIMMED = 0.97  # sigma0 that a search for blunders at 0.1 % alone may leave of 1 (it takes 0.6 %)
-LOST = 0.5  # share of a photo's points set aside, above which the photo itself is doubted
+LOST = 0.2  # share of a photo's points set aside, above which the photo itself is doubted
 MIRRORED = 0.2  # share of its error that a photo may keep when it is mirrored
 
 

@@ -27,6 +27,7 @@ SOME = 0.02  # share above which what is held fixed is doubted for once
 FEWER = 0.5  # share of the values set aside that may be left by what explains them
 RELEASED_M = 0.001  # sd of fixed control while it is doubted
 SCALED = 6.0  # sds that a scale must differ from one
+SOUND = 2.0  # sigma0 of a survey that fits, where there is none to compare with
 ALIKE = 1.5  # times the smallest sigma0, within which suppositions explain as much
 LISTED = 4
 TESTED = 60  # readings set aside of which it is asked whether others might have been
@@ -155,8 +156,11 @@ def wrongly_held(measurements, sigma0, gone, run):
     gone    number of values that data snooping set aside, inf likewise
     run     run(measurements, snooping=False) -> (network.Adjusted, Gathered)
     """
-    found = [] if np.isinf(sigma0) else _wrong_scales(measurements, sigma0, run)
-    found += [] if np.isinf(sigma0) else _wrong_cameras(measurements, sigma0, run)
+    found = []
+    if np.isfinite(gone):
+        limit = FEWER * sigma0 if np.isfinite(sigma0) else SOUND
+        found += _wrong_scales(measurements, limit, run)
+        found += _wrong_cameras(measurements, limit, run)
     return [*found, *_wrong_control(measurements, gone, run)]
 
 
@@ -194,7 +198,7 @@ def _released(adjusted, known):
     return found[:LISTED]
 
 
-def _wrong_scales(measurements, sigma0, run):
+def _wrong_scales(measurements, limit, run):
     """Problem rows on instruments whose distances fit once they may have a scale of their own."""
     found = []
     for name, freed in _freed(measurements):
@@ -210,7 +214,7 @@ def _wrong_scales(measurements, sigma0, run):
         column = adjusted.problem.layout.scale[i : i + 1]
         sd = np.sqrt(float(adjusted.solution.cofactors(column)[0, 0]))
         sure = abs(scale) > SCALED * max(adjusted.sigma0, 1.0) * sd
-        if sure and adjusted.sigma0 < FEWER * sigma0:
+        if sure and adjusted.sigma0 < limit:
             text = (
                 f"the distances of {name} fit once they may all be {1e6 * scale:+.0f} ppm off "
                 f"(standard uncertainty {1e6 * sd:.0f} ppm): look at its certificate, its unit and "
@@ -226,7 +230,7 @@ def _best(found):
     return [problem for sigma0, problem in found if sigma0 < ALIKE * best]
 
 
-def _wrong_cameras(measurements, sigma0, run):
+def _wrong_cameras(measurements, limit, run):
     """Problem rows on fixed principal distances without which the images fit."""
     found = []
     for number, one in enumerate(measurements.cameras):
@@ -243,7 +247,7 @@ def _wrong_cameras(measurements, sigma0, run):
         except (SolutionError, InputError):
             continue
         names = [known.name for known in adjusted.survey.cameras]
-        if camera.name not in names or adjusted.sigma0 > FEWER * sigma0:
+        if camera.name not in names or adjusted.sigma0 > limit:
             continue
         c, sd = _principal_distance(adjusted, names.index(camera.name))
         if abs(c - camera.values[0]) > SCALED * max(adjusted.sigma0, 1.0) * sd:
