@@ -15,6 +15,7 @@ from tankcal.observations import Azimuths, HeightDifferences, PlumbLines
 from tankcal.rotations import turned
 
 STEPS = 30
+FAR = 5.0  # largest step of the logarithm of the scale
 KNOWS = (PlumbLines, HeightDifferences, Azimuths)
 
 
@@ -24,7 +25,9 @@ def aligned(survey, piece, known, place_m):
     known    (points, 3) coordinates of the frame, nan where not known
     place_m  (photos, 3) projection centres, nan where not known
     """
-    middle = np.nanmean(np.vstack([piece.xyz_m, piece.place_m]), axis=0)
+    places = np.vstack([piece.xyz_m, piece.place_m])
+    count = np.isfinite(places).sum(axis=0)
+    middle = np.nansum(places, axis=0) / np.maximum(count, 1)
     clues = _Clues(survey, piece, known, place_m)
     if not len(clues.misfits(np.eye(3), np.zeros(3), 1.0)):
         return Motion(np.eye(3), np.zeros(3), 1.0, 0.0)
@@ -115,4 +118,4 @@ def _settled(clues, rotation, shift):
 
 def _stepped(rotation, shift, scale, step, size):
     turn = turned(rotation[None], step[None, :3])[0]
-    return turn, shift + size * step[3:6], scale * np.exp(step[6])
+    return turn, shift + size * step[3:6], scale * np.exp(np.clip(step[6], -FAR, FAR))

@@ -83,8 +83,11 @@ def _stretched(clues, piece):
 
 def _apart(survey, own, piece):
     names = [survey.photos.names[i] for i in np.flatnonzero(own.oriented & ~piece.oriented)]
-    common = int((own.known & piece.known).sum())
+    common, some = int((own.known & piece.known).sum()), ", ".join(names[:10])
+    if common > 3:
+        why = f"but the {common} points that they share with the rest do not fit"
+        return f"photos {some} hang together, {why}"
     return (
-        f"photos {', '.join(names[:10])} hang together, but share only {common} known points with "
-        "the rest: 3 that do not lie on a line are needed"
+        f"photos {some} hang together, but share only {common} known points with the rest: 3 that "
+        "do not lie on a line, and more to tell their positions apart, are needed"
     )

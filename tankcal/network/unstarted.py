@@ -20,7 +20,8 @@ def refuse_missing(survey, sights, xyz_m, piece, sets, reasons):
     known = np.isfinite(xyz_m).all(axis=1)
     for photo in np.flatnonzero(~piece.oriented):
         count = known[sights[photo].point].sum()
-        told.append(f"photo {survey.photos.names[photo]} ({count} known points)")
+        few = ", which several positions explain" if count == 3 else ""
+        told.append(f"photo {survey.photos.names[photo]} ({count} known points{few})")
     whole = np.flatnonzero(missing[:, :2].any(axis=1))
     told += _listed("point", [survey.points[i] for i in whole])
     flat = np.isfinite(xyz_m[:, :2]).all(axis=1) & np.isnan(xyz_m[:, 2])
@@ -41,6 +42,11 @@ def hanging(survey, local, known):
     names = [str(survey.points[i]) for i in np.flatnonzero(local & ~known)]
     some = ", ".join(names[:LISTED]) + (", ..." if len(names) > LISTED else "")
     common = int((local & known).sum())
+    if common > 1:
+        return (
+            f"points {some} may stand on either side of the line through the known ones: give one "
+            "of them approximate coordinates (in control.csv, standard deviations blank)"
+        )
     return (
         f"points {some} hang together, but share only {common} known point{'s' * (common != 1)} "
         "with the rest: 2 are needed, or 1 and an azimuth"
