@@ -115,7 +115,7 @@ def _add_run(commands):
         "certificate.pdf, working-papers.pdf, report.pdf (both) and report.html. An adjusted "
         "survey adds points_cov.npz, photos.csv, cameras.csv, groups.csv and residuals.csv.",
         epilog="exit status: 0 done; 2 the input must be mended; 3 no sound solution, or, with "
-        "--strict, the global test of the adjustment failed. Then nothing is written.",
+        "--strict, the adjustment is in doubt. Then nothing is written.",
     )
     run.add_argument("job", metavar="JOB", help="a job folder, its job.toml, or a job workbook")
     run.add_argument(
@@ -133,7 +133,8 @@ def _add_run(commands):
     run.add_argument(
         "--strict",
         action="store_true",
-        help="write nothing when the global test of the adjustment fails (exit status 3)",
+        help="write nothing when the global test of the adjustment fails, or when what was set "
+        "aside as a blunder may not be the one (exit status 3)",
     )
     run.add_argument("--quiet", action="store_true", help="no progress, only problems")
     run.set_defaults(command=_run)
@@ -245,7 +246,11 @@ def _adjust(source, out, quiet, strict):
 
 
 def _refuse_failed(adjustment):
-    """Raise when there is an adjustment and its global test failed."""
+    """Raise when there is an adjustment that is in doubt, or whose global test failed."""
+    if adjustment is not None and adjustment.doubts:
+        raise SolutionError(
+            "\n".join([*map(str, adjustment.doubts), "nothing was written (--strict)"])
+        )
     if adjustment is None or adjustment.redundancy <= 0:
         return
     test = adjustment.adjusted.test()

@@ -9,7 +9,7 @@ from networks import tank_points
 from tankcal.camera import Form, measured
 from tankcal.errors import SolutionError
 from tankcal.network import Camera, ImagePoints, Photos, Survey, adjust
-from tankcal.network.soundness import doubts
+from tankcal.network.soundness import hardly_determined
 from tankcal.observations import ControlCoordinates, Distances
 from tankcal.rotations import looking
 
@@ -131,7 +131,7 @@ def test_photos_from_one_place_place_no_points():
         found = adjust(survey)
     except SolutionError:
         return
-    assert "point P1 is hardly determined" in " ".join(doubts(found))
+    assert "point P1 is hardly determined" in " ".join(hardly_determined(found))
 
 
 def test_a_camera_without_c_is_refused():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from surveyed import by_instruments, by_photographs, changed, known, table, told
 
+from tankcal.cli import main
 from tankcal.job.measurements import Measurements
 from tankcal.network import adjust
 from tankcal.network.cleaning import with_use
@@ -203,6 +204,7 @@ def test_of_three_rays_nobody_can_tell_the_wrong_one():
     mine = found.removed[0].row - 2
     assert {row for _, row in alternatives(found.adjusted, 0, mine)} == {0, 1, 2} - {mine}
     text = "\n".join(map(str, found.warnings))
+    assert any("as well be" in str(one) for one in found.doubts)
     named = f"azimuth {'ABC'[mine]}-P (row {mine + 2})"
     assert f"{named} was set aside, but it may as well be azimuth" in text
 
@@ -220,3 +222,21 @@ def test_whatever_may_be_wrong_instead_explains_it_as_well():
             again = adjust(with_use(found.adjusted.survey, {0: uses})).test().chi2
             assert ((0, row) in likely) == (again - best < APART)
     assert not any("as well be" in str(one) for one in found.warnings)
+
+
+def test_strict_refuses_what_is_in_doubt(tmp_path, capsys):
+    """The first of two readings of a line, or the second: nobody knows."""
+    (tmp_path / "job.toml").write_text("[adjustment]\n")
+    (tmp_path / "control.csv").write_text(
+        "point,x_m,y_m,z_m,sx_mm,sy_mm,sz_mm\nA,0,0,0,0,0,0\nB,10,0,0,0,0,0\nC,5,7.9,0,,,0\n"
+    )
+    (tmp_path / "distances.csv").write_text(
+        "from,to,distance_m,s_mm,kind\nA,C,9.434,1,horizontal\nB,C,9.434,1,horizontal\n"
+        "B,C,9.734,1,horizontal\n"
+    )
+    command = ["run", str(tmp_path), "--only", "adjustment", "--quiet", "--strict"]
+    assert main(command) == 3
+    error = capsys.readouterr().err
+    assert "it may as well be distance B-C" in error
+    assert "nothing was written (--strict)" in error
+    assert not (tmp_path / "results").exists()

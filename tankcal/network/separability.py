@@ -28,10 +28,11 @@ def alternatives(adjusted, source, row):
     The likeliest first. Empty where the survey tells them apart.
     """
     problem, solution = adjusted.problem, adjusted.solution
-    number = problem.sources.index(source)
+    of_source = [k for k, one in enumerate(problem.sources) if one == source]
+    number = next((k for k in of_source if row in problem.rows_of[k]), None)
+    if number is None:
+        return []  # its points are no longer adjusted
     mine = np.flatnonzero(problem.rows_of[number] == row)
-    if not len(mine):
-        return []
     whole = problem.observations[number].taken(mine)
     whole = whole.using(np.ones(1))
     e = np.empty((1, whole.rows))

@@ -29,7 +29,7 @@ def refuse_worthless_cameras(survey, problem, solution):
         )
 
 
-def doubts(adjusted):
+def hardly_determined(adjusted):
     """Sentences on points whose sd is above a tenth of the survey's extent.
 
     The extent is four times the median distance of the points from their median place: a point that

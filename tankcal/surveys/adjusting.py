@@ -6,7 +6,7 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.network.cleaning import CRITICAL
-from tankcal.network.soundness import doubts
+from tankcal.network.soundness import hardly_determined
 from tankcal.surveys.causes import causes_of
 from tankcal.surveys.checks import check_points, check_readings, disagreeing
 from tankcal.surveys.cleaning import searched
@@ -23,6 +23,7 @@ from tankcal.surveys.victims import SOME, one_sided, set_aside, undecided, wrong
 
 SUSPICIOUS = 4.0  # sigma0 above which whole files are doubted
 TRIED = 25  # iterations of a survey that is only supposed
+IMAGES = ("image_points.csv", "job.toml")
 FILES = ("image_points.csv", "photos.csv", "control.csv")  # first in the list of readings
 
 
@@ -104,10 +105,11 @@ def _complete(search, gathered, frame, measurements):
     late = {i: why for i, why in enumerate(adjusted.problem.set_aside) if why}
     warnings += [_lost(measurements, adjusted.survey.points[i], why) for i, why in late.items()]
     warnings += [_kept(one, gathered.traces) for one in search.needed if one.w > CRITICAL]
-    causes = _causes(adjusted, readings, gathered, measurements)
-    warnings = [*causes, *warnings, *_doubts(adjusted, readings, groups, gathered, measurements)]
-    if not causes:
-        warnings += undecided(adjusted, search.removed, gathered.traces)
+    doubts = _causes(adjusted, readings, gathered, measurements)
+    undone = [] if doubts else undecided(adjusted, search.removed, gathered.traces)
+    doubts += [one for one in undone if one.file not in IMAGES]  # one ray more or less: a warning
+    diagnoses = _diagnoses(adjusted, readings, groups, gathered, measurements)
+    warnings = [*doubts, *warnings, *diagnoses, *undone]
     known = gathered.known
     acting = frame.held
     if measurements.settings.datum == "control":
@@ -134,7 +136,8 @@ def _complete(search, gathered, frame, measurements):
         redundancy=adjusted.dof,
         iterations=adjusted.solution.iterations,
         rounds=search.rounds,
-        warnings=tuple(warnings),
+        warnings=tuple(dict.fromkeys(warnings)),
+        doubts=tuple(doubts),
     )
 
 
@@ -154,11 +157,11 @@ def _lost(measurements, name, why):
     return Problem(file, f"{why} left after the search for blunders", row)
 
 
-def _doubts(adjusted, readings, groups, gathered, measurements):
+def _diagnoses(adjusted, readings, groups, gathered, measurements):
     """Problem rows: what the result says about mistakes in the input."""
     found = diagnosed(adjusted, readings, groups, gathered.known)
     found += names_alike(gathered.lost, adjusted.survey.points) + same_place(adjusted)
-    found += [Problem("job.toml", text, None, "adjustment") for text in doubts(adjusted)]
+    found += [Problem("job.toml", text, None, "adjustment") for text in hardly_determined(adjusted)]
     found += mirrored_targets(adjusted.xyz_m, adjusted.survey.points, measurements)
     return found
 

@@ -143,6 +143,8 @@ class Adjustment:
     sigma0         a posteriori; nan: no redundancy
     observations, unknowns, redundancy, iterations, rounds (adjustments by data snooping)
     warnings       tuple of Problem
+    doubts         those of the warnings that put the whole result in doubt: what was set aside may
+                   be the victim of what was kept, or another reading may be wrong in its place
     """
 
     names: tuple
@@ -165,6 +167,7 @@ class Adjustment:
     iterations: int
     rounds: int
     warnings: tuple = ()
+    doubts: tuple = ()
 
     def full_covariance_m2(self, names=None):
         """(3k, 3k) covariance of chosen points, all when None, scaled like the others."""
