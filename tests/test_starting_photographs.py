@@ -243,7 +243,7 @@ def test_the_wall_decides_between_the_poses_of_three_points():
             ),
             cameras=(replace(survey.cameras[0], values=truth.interior),),
         )  # fmt: skip
-        with pytest.raises(SolutionError, match=r"photo S \(3 known points, which several positions explain\)"):
+        with pytest.raises(SolutionError, match=r"photo S \(3 known points, which several"):
             approximate(alone)
         try:
             found = approximate(alone, wall=Wall(np.zeros(2), 6.5))
