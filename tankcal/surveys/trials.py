@@ -16,7 +16,7 @@ from tankcal.surveys.readings import ANGLES
 from tankcal.surveys.victims import ALIKE
 
 BETTER = 0.2  # share of sigma0 that may be left by what explains a survey
-SOUND = 5.0  # sigma0 of a survey that fits, where there is no sigma0 to compare with
+SOUND = 5.0  # sigma0 of a survey that fits, if not well: a single blunder makes more of it
 CERTAIN = 2.0  # sigma0 after which nothing else is tried
 HORIZONTAL = ("directions", "horizontal_angles", "azimuths")
 EXCHANGED = 7  # control points of which each two are exchanged
@@ -29,7 +29,7 @@ def likely_mistake(measurements, sigma0, run):
     sigma0  without data snooping, inf when the survey could not be adjusted
     run     run(measurements) -> (network.Adjusted, Gathered), without data snooping
     """
-    limit = min(BETTER * sigma0, SOUND if np.isinf(sigma0) else np.inf)
+    limit = min(BETTER * sigma0, SOUND)
     explained = []
     for suppositions in (_mirrored, _exchanged, _in_other_units):
         for problem, changed in suppositions(measurements):
