@@ -720,3 +720,25 @@ def assert_job_or_problems(path, only=None):
     except InputError as error:
         problems = error.problems
     assert all(len(str(problem).splitlines()) == 1 for problem in problems)
+
+
+def test_one_distance_in_millimetres(tmp_path):
+    parts = survey_parts()
+    row = parts.tables["distances"][1]
+    parts.tables["distances"] += [list(row) for _ in range(3)]
+    parts.tables["distances"][-1][2] *= 1000
+    told = problems_of(write_folder(tmp_path / "job", parts))
+    (problem,) = (one for one in told if one.row == 7)
+    assert (problem.file, problem.column) == ("distances.csv", "distance_m")
+    assert "half of the distances are below" in problem.expected
+
+
+def test_a_column_that_all_rows_lack_is_told_once(tmp_path):
+    parts = survey_parts()
+    at = parts.tables["image_points"][0].index("y_mm")
+    for row in parts.tables["image_points"]:
+        del row[at]
+    told = problems_of(write_folder(tmp_path / "job", parts))
+    (problem,) = (one for one in told if one.column == "y_mm")
+    assert (problem.file, problem.row) == ("image_points.csv", None)
+    assert problem.expected.startswith("the column is missing or blank")

@@ -2,8 +2,12 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from surveyed import by_instruments, by_photographs, changed, known, told
+
+from tankcal.errors import SolutionError
+from tankcal.surveys import adjust_survey
 
 
 @pytest.fixture(scope="module")
@@ -66,3 +70,67 @@ def test_targets_tell_a_mirrored_tank():
     other = tuple(str((13 - int(name)) % 12 + 1) for name in targets.generatrix)
     text = told(replace(photos, targets=replace(targets, generatrix=other)))
     assert "targets.csv, generatrix: the adjusted points are a mirror image" in text
+
+
+def test_a_circle_read_anticlockwise(stations):
+    """The same as a mirrored tank: control or the circle, both are named."""
+    table = next(one for one in stations.readings if one.table == "directions")
+    with pytest.raises(SolutionError, match="do not fit together") as told_:
+        adjust_survey(changed(stations, "directions", value=-table.value))
+    assert "directions.csv: the angles fit once they are taken for those of a circle read anti" in (
+        str(told_.value)
+    )
+
+
+def test_two_control_points_exchanged(stations):
+    control = stations.control
+    xyz = control.xyz_m[[1, 0, 2]]
+    text = told(replace(stations, control=replace(control, xyz_m=xyz)))
+    a, b = control.point[:2]
+    assert f"control.csv, row 3, point: all fits once {a} and {b} are exchanged" in text
+
+
+def test_a_further_system_with_x_and_y_swapped(stations):
+    """Simulation: the wall's points, turned by a right angle, as a system of its own."""
+    truth = by_instruments()[1].xyz_m
+    number = list(range(0, 24, 3))  # at several heights: in a plane, a mirror is a turn
+    names = [f"P{i}" for i in number]
+    there = truth[number] @ np.array([[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1]]) + [50, 20, 3]
+    own = stations.control
+    for columns, swapped in (([0, 1, 2], False), ([1, 0, 2], True)):
+        both = replace(
+            own,
+            point=(*own.point, *names),
+            xyz_m=np.vstack([own.xyz_m, there[:, columns]]),
+            sd_m=np.vstack([own.sd_m, np.full((8, 3), 0.001)]),
+            system=(*own.system, *["plant"] * 8),
+            check=np.zeros(len(own.point) + 8, dtype=bool),
+            rows=tuple(range(2, len(own.point) + 10)),
+        )
+        text = told(replace(stations, control=both))
+        wanted = "control.csv: all coordinates of system plant fit once x and y are swapped"
+        assert (wanted in text) == swapped
+
+
+def test_one_camera_of_two_mirrored(photos):
+    """The images of one camera upside down: the camera is named."""
+    second = replace(photos.cameras[0], camera=replace(photos.cameras[0].camera, name="other"))
+    of = {one.name: "other" if i % 2 else "camera" for i, one in enumerate(photos.photos)}
+    pictures = tuple(replace(one, camera=of[one.name]) for one in photos.photos)
+    images = photos.image_points
+    flip = np.array([of[name] == "other" for name in images.photo])[:, None]
+    mirrored = replace(images, xy_mm=np.where(flip, images.xy_mm * [1, -1], images.xy_mm))
+    both = replace(
+        photos, cameras=(photos.cameras[0], second), photos=pictures, image_points=mirrored
+    )
+    assert "its image points fit once the image is mirrored" in told(both)
+
+
+def test_distances_whose_scale_is_free_are_not_taken_for_feet(stations):
+    """With a scale of their own they fit in any unit: nothing may be concluded."""
+    tool = replace(stations.instruments[0], u_scale=np.nan)
+    table = next(one for one in stations.readings if one.table == "directions")
+    wrong = changed(stations, "directions", value=table.value + np.arange(len(table.value)) * 0.01)
+    text = told(replace(wrong, instruments=(tool,)))
+    assert "feet" not in text
+    assert "millimetres" not in text

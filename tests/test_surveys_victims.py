@@ -240,3 +240,49 @@ def test_strict_refuses_what_is_in_doubt(tmp_path, capsys):
     assert "it may as well be distance B-C" in error
     assert "nothing was written (--strict)" in error
     assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.parametrize("factor", [0.97, 1.4])
+def test_a_fixed_principal_distance_that_is_wrong_is_named(photos, factor):
+    """A dense net of control on the wall: c follows from the images."""
+    setup = photos.cameras[0]
+    truth = setup.camera.values[0]
+    values = setup.camera.values.copy()
+    values[0] *= factor
+    fixed = replace(setup.camera, values=values, state=("fixed", *setup.camera.state[1:]))
+    cameras = (replace(setup, camera=fixed),)
+    text = told(replace(photos, cameras=cameras, photos=photos.photos))
+    found = float(text.split("the images fit once c may be ")[1].split(" mm")[0])
+    assert found == pytest.approx(truth, rel=2e-3)
+    assert f"in place of {values[0]:.3f} mm" in text
+
+
+def test_a_check_point_that_disagrees_is_told(stations):
+    name, place = "P0", TRUTH[1][0] + [0.0, 0.05, 0.0]
+    text = told(replace(stations, check=known([name], [place], 0.001, file="check.csv")))
+    assert "check.csv, row 2, y_m: y of P0 differs by -" in text
+    sound = replace(stations, check=known([name], [TRUTH[1][0]], 0.001, file="check.csv"))
+    assert "check.csv" not in told(sound)
+
+
+def test_two_sets_of_one_station_are_one_ray(stations):
+    """Property: a point seen twice from one station only is left out by name, not adjusted."""
+    plan = next(one for one in stations.readings if one.table == "directions")
+    height = next(one for one in stations.readings if one.table == "zenith_angles")
+    twice = replace(
+        plan,
+        value=np.append(plan.value, plan.value + 1e-6),
+        sd=np.tile(plan.sd, 2),
+        start=plan.start * 2,
+        end=plan.end * 2,
+        setup=plan.setup * 2,
+        set=("1",) * len(plan.end) + ("2",) * len(plan.end),
+        check=np.tile(plan.check, 2),
+        rows=tuple(range(2, 2 * len(plan.end) + 2)),
+    )
+    lone = [name for name in plan.end if plan.end.count(name) == 1]
+    assert lone
+    found = adjust_survey(replace(stations, readings=(twice, height)))
+    assert not set(lone) & set(found.names)
+    text = "\n".join(map(str, found.warnings))
+    assert f"point {lone[0]} has too few observations" in text

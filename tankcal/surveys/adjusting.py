@@ -22,6 +22,7 @@ from tankcal.surveys.trials import likely_mistake, photos_that_do_not_fit
 from tankcal.surveys.victims import SOME, one_sided, set_aside, undecided, wrongly_held
 
 SUSPICIOUS = 4.0  # sigma0 above which whole files are doubted
+SEVERAL = 0.05  # share of the values set aside, above which they are as well
 TRIED = 25  # iterations of a survey that is only supposed
 IMAGES = ("image_points.csv", "job.toml")
 FILES = ("image_points.csv", "photos.csv", "control.csv")  # first in the list of readings
@@ -178,9 +179,9 @@ def _causes(adjusted, readings, gathered, measurements):
             sigma0 = close(measurements)[0].sigma0
         except SolutionError:
             sigma0 = np.inf
-    suspicious = sigma0 > SUSPICIOUS and (told or adjusted.sigma0 > SUSPICIOUS)
-    suspicious = suspicious and not mirrored_photos(adjusted)
-    misread = likely_mistake(measurements, sigma0, _tried) if suspicious else []
+    bad = told or adjusted.sigma0 > SUSPICIOUS or gone > SEVERAL * len(readings)
+    bad = bad and sigma0 > SUSPICIOUS and not mirrored_photos(adjusted)
+    misread = likely_mistake(measurements, sigma0, _tried) if bad else []
     if misread:
         raise SolutionError("\n".join(["the readings do not fit together", *map(str, misread)]))
     return wrongly_held(measurements, sigma0, gone, close) + told

@@ -80,9 +80,9 @@ def refuse_undefined(files, table, column, defined, where):
 def tell_rows(to, table, is_told, column, expected):
     """Tell log.problem or log.warning the same of each row where `is_told` (n,) is True.
 
-    Once only where all rows of several lack the column.
+    Once only where several do because the table has no such column, or nothing in it.
     """
-    if len(is_told) > 1 and np.all(is_told) and table.columns.get(column) is None:
+    if np.count_nonzero(is_told) > 1 and table.columns.get(column) is None:
         to(table.file, f"the column is missing or {expected.removeprefix('given ')}", None, column)
         return
     for place in np.flatnonzero(is_told):
