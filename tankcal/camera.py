@@ -32,6 +32,8 @@ from tankcal.imaging import distort, image_point, undistorted_by
 
 NEWTON_ROUNDS = 50
 PARAMETERS = ("c", "x0", "y0", "K1", "K2", "K3", "K4", "P1", "P2", "P3", "P4", "A", "B")
+_UNITS = ("mm", "mm", "mm", "mm-2", "mm-4", "mm-6", "mm-8", "mm-1", "mm-1", "mm-2", "mm-4", "", "")
+UNITS = dict(zip(PARAMETERS, _UNITS, strict=True))
 CONVENTIONS = {"distortion_of_ideal": 0.0, "correction_added": 1.0, "correction_subtracted": -1.0}
 # (dx by A x, dx by A y, dx by B y, dy by B x, dy by B y)
 AFFINITIES = {

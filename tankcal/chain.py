@@ -151,7 +151,7 @@ def run(job, progress=None):
     if job.measurements is not None:
         job, adjustment = _adjusted(job, tell)
     try:
-        survey = _survey(job, tell, _dof(adjustment))
+        survey = _survey(job, tell, np.inf if adjustment is None else adjustment.dof)
     except SolutionError as error:
         if adjustment is None or not adjustment.warnings:
             raise
@@ -232,12 +232,6 @@ def _adjusted(job, tell):
     refuse_undetermined(adjustment.datum)
     points = wall_points(adjustment, job.measurements, job.survey.side)
     return replace(job, points=among_themselves(points)), adjustment
-
-
-def _dof(adjustment):
-    """Degrees of freedom of the covariance of the points: finite where residuals scaled it."""
-    scaled = adjustment is not None and adjustment.cov_scale != 1.0
-    return float(adjustment.redundancy) if scaled else np.inf
 
 
 def _survey(job, tell, dof):

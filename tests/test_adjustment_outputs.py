@@ -28,7 +28,7 @@ from tankcal.report.document import blocks_of
 from tankcal.report.notebook import execute, joined
 from tankcal.report.paper import Paper
 from tankcal.report.survey import figures, readings, results, statistics
-from tankcal.surveys.results import GroupOfReadings
+from tankcal.surveys.results import Adjustment, GroupOfReadings
 from tankcal.words import load_words, verdict_sentences
 
 HARD_NAME = "_1 #2 (a)/b"
@@ -241,10 +241,12 @@ def test_what_was_measured_with_is_in_the_record(only):
 def made(covariance_m2, cov_scale=1.0, redundancy=10):
     """Something with the fields of an Adjustment that the points are made of."""
     survey = SimpleNamespace(image_points=None)
-    return SimpleNamespace(
+    found = SimpleNamespace(
         names=("A",), covariance_m2=np.array([covariance_m2]), fixed=np.zeros((1, 3), dtype=bool),
         adjusted=SimpleNamespace(survey=survey), cov_scale=cov_scale, redundancy=redundancy,
     )  # fmt: skip
+    found.dof = Adjustment.dof.fget(found)
+    return found
 
 
 def test_error_ellipsoid_and_ellipse_in_closed_form():

@@ -7,9 +7,10 @@ import pytest
 from surveyed import by_instruments, by_photographs, changed, told
 
 from tankcal.job.measurements import AdjustmentSettings
+from tankcal.network.pieces import similarity
 from tankcal.rotations import from_angles
 from tankcal.surveys import adjust_survey
-from tankcal.surveys.fits import plan_fit, similarity
+from tankcal.surveys.fits import plan_fit
 from tankcal.surveys.spelling import alike
 
 
@@ -139,6 +140,6 @@ def test_frames_are_brought_together():
     mirrored, worst = plan_fit(xyz, xyz[:4], (xyz[:4] * [-1, 1, 1]) @ turn.T)
     assert worst < 1e-12
     assert mirrored == pytest.approx((xyz * [-1, 1, 1]) @ turn.T)
-    rotation, _, scale = similarity(xyz, 2 * xyz @ from_angles(0.3, 1, 2).T + 5)
-    assert rotation == pytest.approx(from_angles(0.3, 1, 2))
-    assert scale == pytest.approx(2)
+    motion = similarity(xyz, 2 * xyz @ from_angles(0.3, 1, 2).T + 5)
+    assert motion.rotation == pytest.approx(from_angles(0.3, 1, 2))
+    assert motion.scale == pytest.approx(2)

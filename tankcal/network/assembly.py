@@ -8,7 +8,7 @@ from tankcal.errors import SolutionError
 from tankcal.gauss_markov import Group, Model
 from tankcal.network.columns import eliminated_points, layout_of
 from tankcal.network.naming import in_words, name_of, name_of_exact
-from tankcal.network.survey import SCOPES
+from tankcal.network.survey import FEWEST, SCOPES
 from tankcal.observations import (
     ControlCoordinates,
     ImageCoordinates,
@@ -117,23 +117,16 @@ def _groups(observations, layout):
 
 def _set_aside(survey):
     """For each point, why it cannot be determined; an empty string when it can."""
-    images, count = survey.image_points, np.zeros(len(survey.points), dtype=int)
-    rays = np.zeros_like(count)
+    images = survey.image_points
+    if images is not None:
+        _refuse_poor_photos(survey)
+    bad = survey.values_of_points() < FEWEST
+    if not bad.any():
+        return ("",) * len(bad)
+    rays = np.zeros(len(bad), dtype=int)
     if images is not None:
         seen = images.point if images.use is None else images.point[images.use > 0]
-        rays += np.bincount(seen, minlength=len(count))
-        _refuse_poor_photos(survey)
-    count += 2 * rays
-    for one in survey.observations:
-        for name in one.ties:
-            point = getattr(one, name)
-            point = point if one.use is None else point[one.use > 0]
-            count += one.rows * np.bincount(point, minlength=len(count))
-    if survey.fixed is not None:
-        count += survey.fixed.sum(axis=1)
-    bad = count < 3
-    if not bad.any():
-        return ("",) * len(count)
+        rays += np.bincount(seen, minlength=len(bad))
     what = np.where(rays == 1, "has one ray", "has too few observations")
     names = zip(survey.points, what, bad, strict=True)
     return tuple(f"point {name} {why}" if poor else "" for name, why, poor in names)

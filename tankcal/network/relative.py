@@ -60,14 +60,13 @@ def relative_poses(first, second, seed):
 
     seed  of the samples that are tried
     """
-    images = (np.ascontiguousarray(one, dtype=float).tobytes() for one in (first, second))
-    return list(_remembered(*images, seed))
+    first, second = (np.ascontiguousarray(one, dtype=float).tobytes() for one in (first, second))
+    return list(_remembered(first, second, seed))
 
 
 @lru_cache(maxsize=256)
-def _remembered(*images_and_seed):
-    *images, seed = images_and_seed
-    first, second = (np.frombuffer(one).reshape(-1, 2) for one in images)
+def _remembered(first, second, seed):
+    first, second = (np.frombuffer(one).reshape(-1, 2) for one in (first, second))
     n, rng = len(first), np.random.default_rng(seed)
     judges = rng.choice(n, JUDGES, replace=False) if n > JUDGES else np.arange(n)
     f1, f2 = bearings(first[judges]), bearings(second[judges])

@@ -7,6 +7,7 @@ import numpy as np
 from tankcal.camera import PARAMETERS, Form
 
 SCOPES = ("off", "block", "camera", "photo")
+FEWEST = 3  # values that speak of a point that can be determined
 STATES = ("free", "weighted", "fixed")
 DEFAULT_SCOPE = tuple("off" if name in ("K4", "P3", "P4") else "camera" for name in PARAMETERS)
 
@@ -123,6 +124,19 @@ class Survey:
     instruments: tuple = ()
     systems: tuple = ()
     repeated: dict = field(default_factory=dict)
+
+    def values_of_points(self):
+        """(points,) how many values, fixed coordinates among them, speak of each point."""
+        count, images = np.zeros(len(self.points), dtype=int), self.image_points
+        if images is not None:
+            seen = images.point if images.use is None else images.point[images.use > 0]
+            count += 2 * np.bincount(seen, minlength=len(count))
+        for one in self.observations:
+            for name in one.ties:
+                point = getattr(one, name)
+                point = point if one.use is None else point[one.use > 0]
+                count += one.rows * np.bincount(point, minlength=len(count))
+        return count if self.fixed is None else count + self.fixed.sum(axis=1)
 
     def with_sds(self, factors):
         """The survey with the sds of groups multiplied; factors {source: factor}, see Residuals."""

@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.errors import SolutionError
+from tankcal.network.survey import FEWEST
 from tankcal.observations import Distances, HeightDifferences, VerticalAngles
 
 LISTED = 10
@@ -14,7 +15,7 @@ def refuse_missing(survey, sights, xyz_m, piece, sets, reasons):
     Those have too few observations for an adjustment, too, which sets them aside by name. Raises
     SolutionError when a photo, a point that something determines, or a circle has no start.
     """
-    hopeless = _hopeless(survey)
+    hopeless = survey.values_of_points() < FEWEST
     missing = np.isnan(xyz_m) & ~hopeless[:, None]
     told = []
     known = np.isfinite(xyz_m).all(axis=1)
@@ -69,20 +70,3 @@ def _no_heights(survey, level):
         why = "they hang on no point with a known z"
     end = "; distances are taken as spatial ones unless kind = horizontal" if spatial else ""
     return f"the heights (z) of {names} are not determined: {why}; give their z as control{end}"
-
-
-def _hopeless(survey):
-    """(points,) True where fewer than three values speak of a point."""
-    count = np.zeros(len(survey.points), dtype=int)
-    images = survey.image_points
-    if images is not None:
-        seen = images.point if images.use is None else images.point[images.use > 0]
-        count += 2 * np.bincount(seen, minlength=len(count))
-    for one in survey.observations:
-        for name in one.ties:
-            point = getattr(one, name)
-            point = point if one.use is None else point[one.use > 0]
-            count += one.rows * np.bincount(point, minlength=len(count))
-    if survey.fixed is not None:
-        count += survey.fixed.sum(axis=1)
-    return count < 3

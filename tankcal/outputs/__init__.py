@@ -23,7 +23,7 @@ def write(result, directory, progress=None):
     """
     return _write(
         lambda: records.record_of(result),
-        getattr(result, "adjustment", None),
+        result.adjustment,
         "capacity.xlsx",
         directory,
         progress,

@@ -1,33 +1,22 @@
 """The part of the record that lists what was adjusted: points, photos, cameras, instruments."""
 
 import numpy as np
-import scipy.stats
+from scipy.special import fdtri, gammaincinv
 
-from tankcal.camera import PARAMETERS
+from tankcal.camera import PARAMETERS, UNITS
 from tankcal.imaging import distort
+from tankcal.network import correlations
 from tankcal.network.quality import ellipsoid_factor, ellipsoids, precision
 from tankcal.rotations import angle_derivatives, angles_of
 
 ELLIPSE = 0.95  # probability of the ellipses and ellipsoids that are drawn and listed
 PROBABILITIES = (0.20, 0.90, 0.95, 0.99)
-UNITS = dict(
-    zip(
-        PARAMETERS,
-        ("mm", "mm", "mm", "mm-2", "mm-4", "mm-6", "mm-8", "mm-1", "mm-1", "mm-2", "mm-4", "", ""),
-        strict=True,
-    )
-)
 _AXES, _ANGLES = ("x", "y", "z"), ("omega", "phi", "kappa")
-
-
-def _dof(adjustment):
-    """Degrees of freedom of the ellipses: infinite with the a-priori variance factor."""
-    return np.inf if adjustment.cov_scale == 1 else adjustment.redundancy
 
 
 def adjusted_points_of(adjustment, measurements=None):
     """Each adjusted point: what it is, rays, sds, error ellipsoid and ellipse in plan at 95 %."""
-    covariance, dof = np.asarray(adjustment.covariance_m2), _dof(adjustment)
+    covariance, dof = np.asarray(adjustment.covariance_m2), adjustment.dof
     sd = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
     axes, directions = ellipsoids(covariance, ELLIPSE, dof)
     azimuth, elevation = _direction(directions[:, :, 0])
@@ -62,9 +51,9 @@ def _direction(vectors):
 def _ellipses(covariance_m2, dof):
     """Semi-axes (n, 2), largest first, and azimuth of the first, of ellipses in plan."""
     if np.isinf(dof):
-        factor = np.sqrt(scipy.stats.chi2.ppf(ELLIPSE, 2))
+        factor = np.sqrt(2 * gammaincinv(1.0, ELLIPSE))
     else:
-        factor = np.sqrt(2 * scipy.stats.f.ppf(ELLIPSE, 2, dof))
+        factor = np.sqrt(2 * fdtri(2, dof, ELLIPSE))
     values, vectors = np.linalg.eigh(covariance_m2)
     axes = factor * np.sqrt(np.maximum(values[:, ::-1], 0.0))
     return axes, np.degrees(np.arctan2(vectors[:, 0, 1], vectors[:, 1, 1])) % 180
@@ -96,7 +85,7 @@ def precision_of(adjustment):
     free = ~np.asarray(adjustment.fixed).all(axis=1)
     if not free.any():
         return None
-    xyz, dof = np.asarray(adjustment.xyz_m)[free], _dof(adjustment)
+    xyz, dof = np.asarray(adjustment.xyz_m)[free], adjustment.dof
     found = precision(xyz, np.asarray(adjustment.covariance_m2)[free])
     sd = np.sqrt(np.einsum("nii->ni", np.asarray(adjustment.covariance_m2)[free]))
     return {
@@ -202,14 +191,8 @@ def _camera(adjustment, measurements, number, photos, part):
         "edge_um": [_edge_effect(name, values, camera.form, corner) for name in names],
         "free": list(free),
         "covariance": covariance,
-        "correlation": _correlation(covariance),
+        "correlation": correlations(covariance),
     }
-
-
-def _correlation(covariance):
-    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    size = np.where(sd > 0, sd, 1.0)
-    return covariance / np.outer(size, size)
 
 
 def _corner(adjustment, measurements, number, photos):

@@ -3,7 +3,7 @@
 from dataclasses import asdict
 
 import numpy as np
-import scipy.stats
+from scipy.special import gammaincinv
 
 from tankcal.network.cleaning import CRITICAL
 from tankcal.network.reliability import UNCONTROLLED, tau_limit
@@ -98,7 +98,7 @@ def _group(group, adjustment):
     if group.redundancy > UNCONTROLLED and np.isfinite(group.factor):
         tail = (1 - CONFIDENCE) / 2
         square = group.factor**2 * group.redundancy
-        bounds = scipy.stats.chi2.ppf([1 - tail, tail], group.redundancy)
+        bounds = 2 * gammaincinv(group.redundancy / 2, [1 - tail, tail])
         low, high = (float(np.sqrt(square / one)) if one > 0 else None for one in bounds)
     return {
         **row,

@@ -55,8 +55,7 @@ def record_of(result):
             "budget": budget_of(result),
             "choices": choices_of(result),
             "warnings": _warnings(result.warnings),
-            "adjustment": adjustment
-            and adjustment_of(adjustment, getattr(result.job, "measurements", None)),
+            "adjustment": adjustment and adjustment_of(adjustment, result.job.measurements),
             "deliveries": None,
             "monte_carlo": None,
         }

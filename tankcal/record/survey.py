@@ -34,7 +34,7 @@ def shell_of(result):
 
 def adjustment_in(result):
     """The `surveys.Adjustment` that the points come from; None where they were handed in."""
-    return getattr(result, "adjustment", None)
+    return result.adjustment
 
 
 def points_of(result):

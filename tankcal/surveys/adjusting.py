@@ -10,7 +10,7 @@ from tankcal.network.soundness import hardly_determined
 from tankcal.surveys.causes import causes_of
 from tankcal.surveys.checks import check_points, check_readings, disagreeing
 from tankcal.surveys.cleaning import searched
-from tankcal.surveys.diagnoses import MIRROR, diagnosed, mirrored_photos
+from tankcal.surveys.diagnoses import MIRROR, diagnosed
 from tankcal.surveys.frames import framed
 from tankcal.surveys.gathering import gather, named_in
 from tankcal.surveys.results import Adjustment
@@ -24,7 +24,6 @@ from tankcal.surveys.victims import SOME, one_sided, set_aside, undecided, wrong
 SUSPICIOUS = 4.0  # sigma0 above which whole files are doubted
 SEVERAL = 0.05  # share of the values set aside, above which they are as well
 TRIED = 25  # iterations of a survey that is only supposed
-IMAGES = ("image_points.csv", "job.toml")
 FILES = ("image_points.csv", "photos.csv", "control.csv")  # first in the list of readings
 
 
@@ -106,11 +105,15 @@ def _complete(search, gathered, frame, measurements):
     late = {i: why for i, why in enumerate(adjusted.problem.set_aside) if why}
     warnings += [_lost(measurements, adjusted.survey.points[i], why) for i, why in late.items()]
     warnings += [_kept(one, gathered.traces) for one in search.needed if one.w > CRITICAL]
-    doubts = _causes(adjusted, readings, gathered, measurements)
-    undone = [] if doubts else undecided(adjusted, search.removed, gathered.traces)
-    doubts += [one for one in undone if one.file not in IMAGES]  # one ray more or less: a warning
     diagnoses = _diagnoses(adjusted, readings, groups, gathered, measurements)
-    warnings = [*doubts, *warnings, *diagnoses, *undone]
+    doubts = _causes(adjusted, readings, gathered, measurements, diagnoses)
+    rays = []
+    if not doubts:
+        of_images = [one for one in search.removed if one.source == "image points"]
+        others = [one for one in search.removed if one.source != "image points"]
+        doubts = undecided(adjusted, others, gathered.traces)
+        rays = undecided(adjusted, of_images, gathered.traces)  # one more or less: a warning
+    warnings = [*doubts, *warnings, *diagnoses, *rays]
     known = gathered.known
     acting = frame.held
     if measurements.settings.datum == "control":
@@ -167,7 +170,7 @@ def _diagnoses(adjusted, readings, groups, gathered, measurements):
     return found
 
 
-def _causes(adjusted, readings, gathered, measurements):
+def _causes(adjusted, readings, gathered, measurements, diagnoses):
     """Problem rows: what is wrong with the whole rather than with single readings."""
     gone = set_aside(adjusted.survey)
     told = one_sided(readings, gathered.known)
@@ -180,7 +183,7 @@ def _causes(adjusted, readings, gathered, measurements):
         except SolutionError:
             sigma0 = np.inf
     bad = told or adjusted.sigma0 > SUSPICIOUS or gone > SEVERAL * len(readings)
-    bad = bad and sigma0 > SUSPICIOUS and not mirrored_photos(adjusted)
+    bad = bad and sigma0 > SUSPICIOUS and not any(MIRROR in one.expected for one in diagnoses)
     misread = likely_mistake(measurements, sigma0, _tried) if bad else []
     if misread:
         raise SolutionError("\n".join(["the readings do not fit together", *map(str, misread)]))

@@ -8,7 +8,7 @@ means gives the same unknowns and covariance as that of all readings. Source: Ko
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.stats
+from scipy.special import chdtri
 
 from tankcal.errors import Problem
 
@@ -78,7 +78,7 @@ def torn_apart(label, averages):
     """
     dof = averages.repeats - 1
     limit, without = (
-        scipy.stats.chi2.isf(LEVEL / max(np.count_nonzero(dof), 1), np.maximum(dof - i, 1))[:, None]
+        chdtri(np.maximum(dof - i, 1), LEVEL / max(np.count_nonzero(dof), 1))[:, None]
         for i in (0, 1)
     )
     single = np.minimum(averages.share, 0.999)
@@ -86,6 +86,8 @@ def torn_apart(label, averages):
     agree = (left <= without[averages.group]).all(axis=1)
     torn = (averages.chi2 > limit).any(axis=1) & (dof > 0)
     torn &= np.bincount(averages.group, weights=agree, minlength=len(dof)) > 0
+    if not torn.any():
+        return label
     own = np.max(label, initial=0) + 1 + np.arange(len(label))
     return np.where(torn[averages.group], own, label)
 
@@ -102,7 +104,7 @@ def scatter_warnings(averages, name_of, file, rows):
     tested = int(np.count_nonzero(dof))
     if not tested:
         return []
-    limit = scipy.stats.chi2.isf(LEVEL / tested, np.maximum(dof, 1))
+    limit = chdtri(np.maximum(dof, 1), LEVEL / tested)
     ratio = np.where(dof > 0, averages.chi2 / limit, 0.0).max(axis=1)
     found = []
     for i in np.argsort(-ratio)[:5]:
@@ -122,7 +124,7 @@ def scatter_warnings(averages, name_of, file, rows):
 
 def _of_all(chi2, dof, file, told):
     share = np.sqrt(chi2 / dof)
-    high, low = scipy.stats.chi2.isf([LEVEL / 2, 1 - LEVEL / 2], dof)
+    high, low = chdtri(dof, [LEVEL / 2, 1 - LEVEL / 2])
     if low <= chi2 <= high or (told and chi2 > high):
         return []
     return [

@@ -36,17 +36,3 @@ def _plan_fit(points, source, target, side):
         return goal + np.column_stack([w.real, w.imag, d[:, 2]])
 
     return moved(points), float(np.linalg.norm(moved(source) - target, axis=1).max())
-
-
-def similarity(source, target):
-    """Rotation R, shift t and scale m of the best fit target = R source + t, points (k, 3).
-
-    m is the scale that would fit best; R and t are those without scale. Source: Kabsch 1976.
-    """
-    middle, goal = source.mean(axis=0), target.mean(axis=0)
-    a, b = source - middle, target - goal
-    u, singular, vt = np.linalg.svd(b.T @ a)
-    side = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    rotation = (u * side) @ vt
-    scale = float(np.sum(singular * side) / max(np.sum(a * a), 1e-300))
-    return rotation, goal - rotation @ middle, scale

@@ -171,7 +171,9 @@ def observed(table, bend, warnings):
                 means, lambda k, r=rows: "-".join(table.ids[r[k]]), table.file,
                 [table.rows[i] for i in rows] if table.rows else (),
             )  # fmt: skip
-            means = averaged(torn_apart(label, means), value, sd, angle=angle)
+            apart = torn_apart(label, means)
+            if apart is not label:
+                means = averaged(apart, value, sd, angle=angle)
             first = rows[means.first]
             yield (
                 _made(table, first, means.value, means.sd, bend),

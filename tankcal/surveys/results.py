@@ -169,6 +169,11 @@ class Adjustment:
     warnings: tuple = ()
     doubts: tuple = ()
 
+    @property
+    def dof(self):
+        """Degrees of freedom of the covariances: infinite unless residuals scaled them."""
+        return np.inf if self.cov_scale == 1 else float(self.redundancy)
+
     def full_covariance_m2(self, names=None):
         """(3k, 3k) covariance of chosen points, all when None, scaled like the others."""
         wanted = self.names if names is None else names

@@ -4,12 +4,11 @@ from itertools import repeat
 
 import numpy as np
 
-from tankcal.camera import PARAMETERS
+from tankcal.camera import PARAMETERS, UNITS
 from tankcal.network.reliability import UNCONTROLLED
 from tankcal.surveys.results import GroupOfReadings, Reading
 
 TOOLS = {"scale": ("scale", ""), "offset_m": ("offset", "m")}
-DIMENSION = ("mm", "mm", "mm", "mm-2", "mm-4", "mm-6", "mm-8", "mm-1", "mm-1", "mm-2", "mm-4")
 
 
 def readings_of(adjusted, traces):
@@ -132,7 +131,7 @@ def _known_names(adjusted, one):
         of_photo = camera.scope[parameters[0]] == "photo"
         names.append((camera.name, survey.photos.names[photos[0]]) if of_photo else (camera.name,))
         elements.append(PARAMETERS[parameters[0]])
-        units.append(DIMENSION[parameters[0]] if parameters[0] < len(DIMENSION) else "")
+        units.append(UNITS[elements[-1]])
     return names, elements, units, "cameras.toml"
 
 

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import scipy.spatial
-import scipy.stats
+from scipy.special import chdtri
 
 from tankcal.errors import Problem
 
@@ -80,7 +80,7 @@ def _together(adjusted, difference, a, b):
     q = adjusted.covariance_m2([a, b])
     q = q[:3, :3] + q[3:, 3:] - q[:3, 3:] - q[3:, :3]
     floor = 1e-12 * np.eye(3)
-    return difference @ np.linalg.solve(q + floor, difference) < scipy.stats.chi2.isf(LEVEL, 3)
+    return difference @ np.linalg.solve(q + floor, difference) < chdtri(3, LEVEL)
 
 
 def _views(survey):

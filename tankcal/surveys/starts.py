@@ -6,9 +6,11 @@ import numpy as np
 
 from tankcal.errors import Problem, SolutionError
 from tankcal.network import approximate
+from tankcal.network.cleaning import started as started_from
+from tankcal.network.pieces import similarity
 from tankcal.network.starting import on_tank
 from tankcal.observations import ControlCoordinates, Distances, SystemCoordinates
-from tankcal.surveys.fits import plan_fit, similarity, turned_over
+from tankcal.surveys.fits import plan_fit, turned_over
 from tankcal.surveys.readings import bend_per_m
 
 TRUST_M = 0.01  # sd of control while start values are sought
@@ -38,26 +40,17 @@ def started(gathered, measurements):
 
 
 def started_like(adjusted, gathered, measurements):
-    """The survey started from another one that was adjusted; None when it lacks something.
+    """The survey started from another one of the same points and photos that was adjusted.
 
-    Points and photos are those of the same names; sets of directions stand in the same order.
+    None when it is not of the same, or when that one lost a point.
     """
     survey, other = gathered.survey, adjusted.survey
-    number = {name: i for i, name in enumerate(other.points)}
-    state, sets = adjusted.solution.state, survey.sets
-    if not set(survey.points) <= set(number) or len(sets) != len(state.orientation_rad):
+    photos = () if survey.photos is None else survey.photos.names
+    same = survey.points == other.points and len(survey.sets) == len(other.sets)
+    same = same and photos == (() if other.photos is None else other.photos.names)
+    if not same or not np.isfinite(adjusted.xyz_m).all():
         return None
-    xyz = adjusted.xyz_m[[number[name] for name in survey.points]]
-    if not np.isfinite(xyz).all():
-        return None
-    photos = survey.photos
-    if photos is not None:
-        if other.photos is None or photos.names != other.photos.names:
-            return None
-        place = adjusted.problem.centre_m + state.photo_xyz_m
-        photos = replace(photos, xyz_m=place, rotation=state.rotation)
-    found = replace(survey, xyz_m=xyz, photos=photos, sets=state.orientation_rad)
-    return finished(found, gathered, measurements)
+    return finished(started_from(survey, adjusted), gathered, measurements)
 
 
 def _trusted(survey, known, settings):
@@ -190,7 +183,9 @@ def _systems(survey):
                     f"system {system.name}: its transformation needs 3 points with x, y and z "
                     f"that are also measured, {common.sum()} were given"
                 )
-            rotation, shift, _ = similarity(survey.xyz_m[common], theirs[common])
+            here, there = survey.xyz_m[common], theirs[common]
+            rotation = similarity(here, there).rotation
+            shift = there.mean(axis=0) - rotation @ here.mean(axis=0)
             found[number] = replace(system, rotation=rotation, shift_m=shift)
     return tuple(found)
 

@@ -115,10 +115,10 @@ def undecided(adjusted, removed, traces):
     for one in removed[:TESTED]:
         others = alternatives(adjusted, one.source, one.row)
         if others:
-            names = [_named(traces[source], source, row) for source, row in others[:LISTED]]
+            names = [_named(adjusted, traces, *other) for other in others[:LISTED]]
             more = ", ..." if len(others) > LISTED else ""
             text = (
-                f"{_named(traces[one.source], one.source, one.row)} was set aside, but it may as "
+                f"{_named(adjusted, traces, one.source, one.row)} was set aside, but it may as "
                 f"well be {' or '.join(names)}{more} that is wrong: the readings cannot tell"
             )
             trace = traces[one.source]
@@ -129,15 +129,17 @@ def undecided(adjusted, removed, traces):
     return found
 
 
-def _named(trace, source, row):
+def _named(adjusted, traces, source, row):
     """A reading in words."""
+    trace = traces[source]
     ids = trace.ids[row]
     if source == "image points":
         return f"point {ids[1]} in photo {ids[0]}"
-    of = "control coordinate" if trace.file == "control.csv" else trace.table.replace("_", " ")
+    kind = adjusted.survey.observations[source].kind
+    of = trace.table.replace("_", " ") or kind.removesuffix(" of a further system")
     where = "" if trace.rows[row] is None else f" (row {trace.rows[row]})"
     names = " ".join(filter(None, ["-".join(ids), trace.element[row][0]]))
-    return f"{of.removesuffix('s') or 'value'} {names}{where}"
+    return f"{of.removesuffix('s')} {names}{where}"
 
 
 def set_aside(survey):
@@ -159,8 +161,8 @@ def wrongly_held(measurements, sigma0, gone, run):
     found = []
     if np.isfinite(gone):
         limit = FEWER * sigma0 if np.isfinite(sigma0) else SOUND
-        found += _wrong_scales(measurements, limit, run)
-        found += _wrong_cameras(measurements, limit, run)
+        found += _explaining(_with_free_scales(measurements), limit, run)
+        found += _explaining(_with_free_cameras(measurements), limit, run)
     return [*found, *_wrong_control(measurements, gone, run)]
 
 
@@ -198,41 +200,75 @@ def _released(adjusted, known):
     return found[:LISTED]
 
 
-def _wrong_scales(measurements, limit, run):
-    """Problem rows on instruments whose distances fit once they may have a scale of their own."""
+def _explaining(trials, limit, run):
+    """Problem rows of trials with which the survey fits, and that what was set free is sure of.
+
+    trials  (changed measurements, difference), the latter a function of the network.Adjusted: what
+            was set free less what it was held at, its sd, and the Problem that says so; or None
+    """
     found = []
-    for name, freed in _freed(measurements):
+    for changed, difference in trials:
         try:
-            adjusted, _ = run(freed)
+            adjusted, _ = run(changed)
         except (SolutionError, InputError):
             continue
-        names = [one.name for one in adjusted.survey.instruments]
-        if name not in names:
-            continue  # it measured no distance
-        i = names.index(name)
-        scale = float(adjusted.solution.state.scale[i])
-        column = adjusted.problem.layout.scale[i : i + 1]
-        sd = np.sqrt(float(adjusted.solution.cofactors(column)[0, 0]))
-        sure = abs(scale) > SCALED * max(adjusted.sigma0, 1.0) * sd
-        if sure and adjusted.sigma0 < limit:
-            text = (
-                f"the distances of {name} fit once they may all be {1e6 * scale:+.0f} ppm off "
-                f"(standard uncertainty {1e6 * sd:.0f} ppm): look at its certificate, its unit and "
-                "its u_scale_ppm"
-            )
-            found.append((adjusted.sigma0, Problem("instruments.toml", text, None, name)))
-    return _best(found)
-
-
-def _best(found):
-    """Problem rows of pairs (sigma0, Problem) that explain as much as the best."""
+        told = difference(adjusted) if adjusted.sigma0 < limit else None
+        if told is not None:
+            away, sd, problem = told
+            if abs(away) > SCALED * max(adjusted.sigma0, 1.0) * sd:
+                found.append((adjusted.sigma0, problem))
     best = min((sigma0 for sigma0, _ in found), default=np.inf)
     return [problem for sigma0, problem in found if sigma0 < ALIKE * best]
 
 
-def _wrong_cameras(measurements, limit, run):
-    """Problem rows on fixed principal distances without which the images fit."""
-    found = []
+def _sd_of(adjusted, column):
+    return (
+        0.0 if column < 0 else float(adjusted.solution.cofactors(np.array([column]))[0, 0]) ** 0.5
+    )
+
+
+def _scale(name):
+    """What an adjustment says of the free scale of an instrument."""
+
+    def difference(adjusted):
+        names = [one.name for one in adjusted.survey.instruments]
+        if name not in names:
+            return None  # it measured no distance
+        i = names.index(name)
+        scale = float(adjusted.solution.state.scale[i])
+        sd = _sd_of(adjusted, adjusted.problem.layout.scale[i])
+        text = (
+            f"the distances of {name} fit once they may all be {1e6 * scale:+.0f} ppm off "
+            f"(standard uncertainty {1e6 * sd:.0f} ppm): look at its certificate, its unit and "
+            "its u_scale_ppm"
+        )
+        return scale, sd, Problem("instruments.toml", text, None, name)
+
+    return difference
+
+
+def _principal_distance(name, held_mm):
+    """What an adjustment says of the free principal distance of a camera."""
+
+    def difference(adjusted):
+        names = [one.name for one in adjusted.survey.cameras]
+        if name not in names:
+            return None  # it took no photo
+        photo = int(np.flatnonzero(adjusted.survey.photos.camera == names.index(name))[0])
+        place = adjusted.problem.interior_of[photo, 0]
+        c = float(adjusted.solution.state.interior[place])
+        sd = _sd_of(adjusted, adjusted.problem.layout.interior[place])
+        text = (
+            f"the images fit once c may be {c:.3f} mm (standard uncertainty {sd:.3f} mm) in "
+            f"place of {held_mm:.3f} mm"
+        )
+        return c - held_mm, sd, Problem("cameras.toml", text, None, name)
+
+    return difference
+
+
+def _with_free_cameras(measurements):
+    """Trials with the principal distance of one camera free."""
     for number, one in enumerate(measurements.cameras):
         camera = one.camera
         if camera.scope[0] not in ("off", "photo") and camera.state[0] == "free":
@@ -242,55 +278,27 @@ def _wrong_cameras(measurements, limit, run):
         )
         cameras = list(measurements.cameras)
         cameras[number] = replace(one, camera=free)
-        try:
-            adjusted, _ = run(replace(measurements, cameras=tuple(cameras)))
-        except (SolutionError, InputError):
-            continue
-        names = [known.name for known in adjusted.survey.cameras]
-        if camera.name not in names or adjusted.sigma0 > limit:
-            continue
-        c, sd = _principal_distance(adjusted, names.index(camera.name))
-        if abs(c - camera.values[0]) > SCALED * max(adjusted.sigma0, 1.0) * sd:
-            text = (
-                f"the images fit once c may be {c:.3f} mm (standard uncertainty {sd:.3f} mm) in "
-                f"place of {camera.values[0]:.3f} mm"
-            )
-            found.append((adjusted.sigma0, Problem("cameras.toml", text, None, camera.name)))
-    return _best(found)
+        changed = replace(measurements, cameras=tuple(cameras))
+        yield changed, _principal_distance(camera.name, camera.values[0])
 
 
-def _principal_distance(adjusted, camera):
-    """c of a camera and its sd, mm."""
-    problem = adjusted.problem
-    photo = int(np.flatnonzero(adjusted.survey.photos.camera == camera)[0])
-    place = problem.interior_of[photo, 0]
-    column = problem.layout.interior[place]
-    sd = 0.0 if column < 0 else float(adjusted.solution.cofactors(np.array([column]))[0, 0]) ** 0.5
-    return float(adjusted.solution.state.interior[place]), sd
+def _with_free_scales(measurements):
+    """Trials with the scale of one instrument free.
 
-
-def _freed(measurements):
-    """Pairs (name, measurements) with the scale of one instrument free; readings without one are
-    taken for those of one instrument that bears the name of their file."""
+    Readings without one are taken for those of one instrument that bears the name of their file.
+    """
     for tool in measurements.instruments:
         if np.isfinite(tool.u_scale):
             others = tuple(one for one in measurements.instruments if one is not tool)
             freed = (*others, replace(tool, u_scale=np.nan))
-            yield tool.name, replace(measurements, instruments=freed)
+            yield replace(measurements, instruments=freed), _scale(tool.name)
     for table in measurements.readings:
         if table.table == "distances" and None in (table.instrument or (None,)):
             names = tuple(one or table.file for one in table.instrument or (None,) * len(table.end))
-            yield (
-                table.file,
-                replace(
-                    measurements,
-                    instruments=(
-                        *measurements.instruments,
-                        Instrument(table.file, "other", u_scale=np.nan),
-                    ),
-                    readings=tuple(
-                        replace(one, instrument=names) if one is table else one
-                        for one in measurements.readings
-                    ),
-                ),
+            free = Instrument(table.file, "other", u_scale=np.nan)
+            readings = tuple(
+                replace(one, instrument=names) if one is table else one
+                for one in measurements.readings
             )
+            tools = (*measurements.instruments, free)
+            yield replace(measurements, instruments=tools, readings=readings), _scale(table.file)
