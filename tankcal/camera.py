@@ -95,13 +95,13 @@ def balanced_about(interior, form, radius_mm):
     radius_mm 0 gives the plain form.
     """
     side = CONVENTIONS[form.convention]
-    plain = _rescaled(
+    plain = rescaled(
         interior, side, 1 - (side or 1) * _at_balance(interior, form.radial_balance_mm)
     )
     target = Form(form.convention, form.affinity, float(radius_mm))
     s = 1.0
     for _ in range(NEWTON_ROUNDS):
-        found = _rescaled(plain, side, 1 / s)
+        found = rescaled(plain, side, 1 / s)
         wanted = 1 - (side or 1) * _at_balance(found, radius_mm)
         if abs(wanted - s) < 1e-15:
             break
@@ -115,87 +115,16 @@ def _at_balance(interior, radius_mm):
     return float(np.polyval(np.append(np.asarray(interior)[6:2:-1], 0.0), e))
 
 
-def _rescaled(interior, side, s):
-    """Interior parameters when the balanced terms' part 1 - s goes over to c (see above)."""
+def rescaled(interior, side, s):
+    """Interior parameters (13,) of the same camera when a scale s goes over to c.
+
+    side  0: s xi is the ideal point of the same image in place of xi; 1 or -1 (a correction): the
+          equation of the correction is divided by s
+    """
     q = np.array(interior, dtype=float)
-    if side:  # s (x - x0) + ... = xi: divide the equation by s
+    if side:
         q[0] /= s
         q[[3, 4, 5, 6, 7, 8, 11, 12]] /= s
         return q
     powers = np.array([1, 0, 0, -3, -5, -7, -9, -2, -2, -2, -4, -1, -1], dtype=float)
-    return q * s**powers  # s xi is the ideal point of a camera with s c
-
-
-def from_opencv(fx_px, fy_px, cx_px, cy_px, coefficients, pixel_mm, size_px):
-    """Interior parameters (13,), of the plain Form(), and the sides (2,) of a pixel, mm.
-
-    fx_px, fy_px, cx_px, cy_px  the camera matrix
-    coefficients                k1, k2, p1, p2, [k3], in units of the focal length, y downwards
-    pixel_mm                    height of a pixel; the width follows from fx and fy
-    size_px                     (columns, lines) of the image
-
-    The image of tankcal has its origin in the middle, y upwards (Pessoa 1, 2). OpenCV's fx and fy
-    differ after the distortion, as pixels that are not square: exactly so here.
-    """
-    k1, k2, p1, p2, k3 = (*coefficients, 0.0)[:5]
-    c = fy_px * pixel_mm
-    pixel = np.array([c / fx_px, pixel_mm])
-    x0 = (cx_px - (size_px[0] - 1) / 2) * pixel[0]
-    y0 = -(cy_px - (size_px[1] - 1) / 2) * pixel[1]
-    radial = (k1 / c**2, k2 / c**4, k3 / c**6, 0.0)
-    return np.array([c, x0, y0, *radial, p2 / c, -p1 / c, 0, 0, 0, 0]), pixel
-
-
-@dataclass(frozen=True)
-class OpenCV:
-    """A camera as OpenCV writes it: matrix (3, 3) in px, coefficients k1, k2, p1, p2, k3.
-
-    error_px  largest difference of an image point over the frame; 0 but for rounding where OpenCV
-              has all the terms
-    """
-
-    matrix: np.ndarray
-    coefficients: np.ndarray
-    error_px: float
-
-
-def to_opencv(interior, form, pixel_mm, size_px):
-    """The camera that OpenCV would have: exact for the plain form, else fitted over the frame.
-
-    interior  (13,)                    form     its Form
-    pixel_mm  sides (2,) of a pixel    size_px  (columns, lines) of the image
-
-    Least squares of the images of ideal points that cover the frame, no derivatives spared: the
-    model is linear but for fx and fy. See OpenCV.error_px for what is left.
-    """
-    size, pixel = np.array(size_px, dtype=float), np.broadcast_to(pixel_mm, 2).astype(float)
-    half = (size - 1) / 2
-    grid = np.meshgrid(*(np.linspace(-1, 1, 21) * h * p for h, p in zip(half, pixel, strict=True)))
-    seen = np.column_stack([part.ravel() for part in grid])
-    ideal = corrected(seen, interior, form) / interior[0] * [1, -1]
-    place = seen / pixel * [1, -1] + half
-    focal = np.array([interior[0] / pixel[0], interior[0] / pixel[1]])
-    x, y = ideal.T
-    r2, one, zero = x * x + y * y, np.ones_like(x), np.zeros_like(x)
-    powers = [r2, r2**2, r2**3]
-    by_x = np.column_stack([x * r for r in powers] + [2 * x * y, r2 + 2 * x * x])
-    by_y = np.column_stack([y * r for r in powers] + [r2 + 2 * y * y, 2 * x * y])
-    k = np.zeros(5)
-    for _ in range(NEWTON_ROUNDS):
-        along = np.column_stack([x + by_x @ k, zero, one, zero, focal[0] * by_x])
-        down = np.column_stack([zero, y + by_y @ k, zero, one, focal[1] * by_y])
-        a = np.vstack([along, down])
-        full = np.concatenate(
-            [place[:, 0] + focal[0] * (by_x @ k), place[:, 1] + focal[1] * (by_y @ k)]
-        )
-        scale = np.linalg.norm(a, axis=0)
-        found = np.linalg.lstsq(a / scale, full, rcond=None)[0] / scale
-        moved = np.abs(
-            np.append(found[:2] / focal - 1, (found[4:] - k) * scale[4:] / focal[0])
-        ).max()
-        focal, middle, k = found[:2], found[2:4], found[4:]
-        if moved < 1e-14:
-            break
-    image = focal * np.column_stack([x + by_x @ k, y + by_y @ k]) + middle
-    matrix = np.array([[focal[0], 0, middle[0]], [0, focal[1], middle[1]], [0, 0, 1]])
-    return OpenCV(matrix, k[[0, 1, 3, 4, 2]], float(np.abs(image - place).max()))
+    return q * s**powers

@@ -54,6 +54,18 @@ def looking(azimuth_rad, tilt_rad, roll_rad):
     return np.stack([level * ck + above * sk, -level * sk + above * ck, -ahead], axis=-2)
 
 
+def pointing(rotation):
+    """azimuth, tilt, roll (..., 3) in rad of cameras (..., 3, 3): the inverse of `looking`."""
+    right, ahead = rotation[..., 0, :], -rotation[..., 2, :]
+    azimuth = np.arctan2(ahead[..., 0], ahead[..., 1])
+    tilt = np.arcsin(np.clip(ahead[..., 2], -1.0, 1.0))
+    level = looking(azimuth, tilt, np.zeros_like(azimuth))
+    roll = np.arctan2(
+        np.sum(right * level[..., 1, :], axis=-1), np.sum(right * level[..., 0, :], axis=-1)
+    )
+    return np.stack([azimuth, tilt, roll], axis=-1)
+
+
 def turned(rotation, small_rad):
     """Rotation matrices (n, 3, 3) after exp([d]x) R, d = small_rad (n, 3)."""
     d = np.asarray(small_rad, dtype=float)
@@ -115,3 +127,27 @@ def angle_derivatives(rotation):
         [tp * ck, -tp * sk, -one],
     ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def turned_frame(rotation, covariance, turn):
+    """Photos in a frame that is turned against theirs, X' = T X, and what their covariances become.
+
+        R' = R T'        S' = J S J',   J = [D(R') B(R)  0; 0  T]
+
+    with B the small rotation of the camera that a change of its angles is, and D the change of the
+    angles that a small rotation is. D grows without bound towards phi = +-90 deg in the new frame,
+    and with it the variances of omega and kappa; the covariance of the small rotation, B S B',
+    stays what it was: the rotation is as well known as before.
+
+    rotation    (n, 3, 3) R
+    covariance  (n, 6, 6) of omega, phi, kappa, x, y, z
+    turn        (3, 3) T, a rotation matrix
+
+    Returns (n, 3, 3) and (n, 6, 6), of the angles as angles_of gives them (|phi| <= 90 deg); units
+    as they came. Silva 1995, table 1, shows the effect.
+    """
+    after = np.asarray(rotation, dtype=float) @ np.asarray(turn, dtype=float).T
+    jacobian = np.zeros((len(after), 6, 6))
+    jacobian[:, :3, :3] = angle_derivatives(after) @ angle_axes(rotation)
+    jacobian[:, 3:, 3:] = turn
+    return after, jacobian @ np.asarray(covariance, dtype=float) @ jacobian.transpose(0, 2, 1)

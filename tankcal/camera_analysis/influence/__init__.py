@@ -1,0 +1,1 @@
+"""What does a wrong calibration do to a survey?"""

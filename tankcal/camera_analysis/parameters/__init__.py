@@ -1,0 +1,1 @@
+"""Which additional parameters belong in the model of a camera?"""

@@ -1,0 +1,1 @@
+"""Is a product good enough? Check points against a table of limits."""

@@ -1,0 +1,144 @@
+"""Differences at check points: of an adjustment, of a record, or of a table of one's own."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+from tankcal.job.fields import Field, Refused, is_blank, read_value
+from tankcal.job.folder import read_csv
+from tankcal.job.tables import Log, nearest, read_bytes
+
+AXES = "xyz"
+FARTHEST_M = 1e8  # keeps nonsense out
+_POINT = Field("point", "name", "name of the check point", required=True)
+_DIFFERENCES = tuple(f"d{axis}_m" for axis in AXES)
+_PAIRS = tuple((f"{axis}_m", f"{axis}_ref_m") for axis in AXES)
+_NUMBERS = tuple(
+    Field(name, "number", "length, m", low=-FARTHEST_M, high=FARTHEST_M)
+    for name in (*_DIFFERENCES, *(name for pair in _PAIRS for name in pair))
+)
+FORMS = "point, dx_m, dy_m, dz_m or point, x_m, y_m, z_m, x_ref_m, y_ref_m, z_ref_m"
+
+
+@dataclass(frozen=True)
+class Differences:
+    """Product minus truth of n points, m; nan: not known."""
+
+    names: tuple
+    difference_m: np.ndarray
+
+    def of_known_axes(self):
+        """Axes that any point has, and the differences (n, k) along these."""
+        known = np.isfinite(self.difference_m).any(axis=0)
+        return tuple(axis for axis, has in zip(AXES, known, strict=True) if has), (
+            self.difference_m[:, known]
+        )
+
+
+def differences_of(adjustment):
+    """The Differences at the check points of a surveys.Adjustment or of a record (dict).
+
+    A record may be whole or its part "adjustment". Raises InputError when there are none.
+    """
+    if isinstance(adjustment, Mapping):
+        part = adjustment.get("adjustment") or adjustment
+        found = part.get("check_points") if isinstance(part, Mapping) else None
+        rows = found.get("points") if isinstance(found, Mapping) else None
+        if not rows:
+            raise InputError(Problem("record.json", "no check points; expected some to judge by"))
+        values = [[row.get(name) for name in _DIFFERENCES] for row in rows]
+        return Differences(
+            tuple(str(row["point"]) for row in rows), np.array(values, dtype=float).reshape(-1, 3)
+        )
+    found = adjustment.check_points
+    if found is None:
+        raise InputError(Problem("check.csv", "no check points; expected some to judge by"))
+    return Differences(tuple(found.names), np.array(found.difference_m, dtype=float))
+
+
+def read_differences(path, separator=",", decimal="."):
+    """The Differences of a CSV file, with the columns of FORMS; axes may be left out or blank.
+
+    separator, decimal  marks of the file, such as ";" and ","
+
+    Raises InputError with every problem of the file.
+    """
+    path, log = Path(path), Log()
+    data = read_bytes(path, log)
+    table = None if data is None else read_csv(path.name, data, separator, decimal, log)
+    if table is None:
+        log.stop_if_problems()
+    fields = {field.name: field for field in (_POINT, *_NUMBERS)}
+    columns = _columns(table, fields, log)
+    rows = [_row(table, i, columns, fields, log) for i in range(len(table.rows))]
+    _tell_repeated(table, rows, log)
+    if not (table.rows or table.skipped):
+        log.problem(table.file, "no rows; expected check points", table.heading_row)
+    log.stop_if_problems()
+    values = np.array([[row.get(name, np.nan) for name in _DIFFERENCES] for row in rows])
+    return Differences(tuple(row["point"] for row in rows), values)
+
+
+def _columns(table, fields, log):
+    """{heading: place} of the columns that are known; what is wrong with them goes to the log."""
+    columns = {}
+    for place, heading in enumerate(table.headings):
+        if heading in fields:
+            columns[heading] = place
+        else:
+            text = f"unknown column; expected {FORMS}{nearest(heading, fields)}"
+            log.problem(table.file, text, table.heading_row, heading)
+    if "point" not in columns:
+        log.problem(table.file, "missing column; expected the names of points", 1, "point")
+    direct = [name for name in _DIFFERENCES if name in columns]
+    paired = [pair for pair in _PAIRS if any(name in columns for name in pair)]
+    if direct and paired:
+        text = f"differences beside coordinates; expected one of them: {FORMS}"
+        log.problem(table.file, text, table.heading_row, direct[0])
+    for name in (name for pair in paired for name in pair if name not in columns):
+        log.problem(table.file, "missing column beside its pair", table.heading_row, name)
+    if not (direct or paired):
+        log.problem(table.file, f"no differences; expected {FORMS}", table.heading_row)
+    return columns
+
+
+def _row(table, number, columns, fields, log):
+    """{"point": name, "dx_m": ...} of a row; what is wrong with it goes to the log."""
+    given, row = {}, table.row_numbers[number]
+    for name, place in columns.items():
+        raw = table.rows[number][place]
+        if is_blank(raw):
+            if name == "point":
+                log.problem(table.file, "missing; expected the name of the point", row, name)
+            continue
+        try:
+            given[name] = read_value(fields[name], raw, table.decimal)
+        except Refused as refusal:
+            log.problem(table.file, str(refusal), row, name)
+            given[name] = None if name == "point" else np.nan
+    for difference, pair in zip(_DIFFERENCES, _PAIRS, strict=True):
+        both = [name in given for name in pair]
+        if all(both):
+            given[difference] = given[pair[0]] - given[pair[1]]
+        elif any(both):
+            lacking = pair[both.index(False)]
+            if lacking in columns:
+                log.problem(table.file, "missing; expected it beside its pair", row, lacking)
+    if not any(name in given for name in _DIFFERENCES) and not any(
+        name in given for pair in _PAIRS for name in pair
+    ):
+        log.problem(table.file, "no difference in this row; expected one at least", row)
+    return given
+
+
+def _tell_repeated(table, rows, log):
+    seen = {}
+    for row, number in zip(rows, table.row_numbers, strict=True):
+        name = row.get("point")
+        if name in seen and name is not None:
+            text = f"point {name} stands in row {seen[name]} already; expected once"
+            log.problem(table.file, text, number, "point")
+        seen.setdefault(name, number)

@@ -1,0 +1,1 @@
+"""Are two calibrations of a camera the same?"""

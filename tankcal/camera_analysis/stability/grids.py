@@ -1,0 +1,98 @@
+"""Grids of image points at which calibrations of one camera are compared.
+
+Column C and line L, counted from the centre of the first pixel, stand at
+
+    x = (C - (columns - 1) / 2) pixel      y = -(L - (lines - 1) / 2) pixel
+
+Source: Pessoa 2017 (1, 2; grid of section 7 of its method: 46 x 35 points from (50, 50), 100 px
+apart, on 4608 x 3456 px).
+"""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+
+STEPS_ON_LONGEST_SIDE = 46.08  # Pessoa: 4608 px in steps of 100
+MOST_POINTS = 250_000
+_NUMBER = r"([0-9]{1,6}(?:\.[0-9]{1,6})?)"
+_FORM = re.compile(rf"([0-9]{{1,6}})[xX]([0-9]{{1,6}}),{_NUMBER},{_NUMBER},{_NUMBER}")
+EXPECTED = "expected COLUMNSxROWS,FIRST_COLUMN,FIRST_LINE,STEP in pixels, such as 46x35,50,50,100"
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A square grid of image points, row by row from the first line down.
+
+    columns, rows  number of points
+    start_px       (column, line) of its first point
+    step_px        between neighbours, along and down
+    """
+
+    columns: int
+    rows: int
+    start_px: tuple[float, float]
+    step_px: float
+
+    @property
+    def size(self):
+        """Number of points."""
+        return self.columns * self.rows
+
+    @property
+    def places_px(self):
+        """(size, 2) column and line of each point."""
+        column = self.start_px[0] + self.step_px * np.arange(self.columns)
+        line = self.start_px[1] + self.step_px * np.arange(self.rows)
+        return np.column_stack([part.ravel() for part in np.meshgrid(column, line)])
+
+    def image_points_mm(self, format_px, pixel_mm):
+        """(size, 2) the points in the image, mm, x to the right and y up from its middle.
+
+        format_px  (columns, lines)        pixel_mm  (2,) sides of a pixel
+        Raises InputError where the grid leaves the frame.
+        """
+        first = np.array(self.start_px)
+        last = first + self.step_px * np.array([self.columns - 1, self.rows - 1])
+        size = np.array(format_px, dtype=float)
+        if np.any(first < -0.5) or np.any(last > size - 0.5):
+            raise InputError(
+                Problem(
+                    "--grid",
+                    f"columns {first[0]:g} to {last[0]:g}, lines {first[1]:g} to {last[1]:g};"
+                    f" expected all of it on the frame of {size[0]:g} x {size[1]:g} px",
+                )
+            )
+        return (self.places_px - (size - 1) / 2) * pixel_mm * [1, -1]
+
+    def __str__(self):
+        x, y = self.start_px
+        return f"{self.columns}x{self.rows},{x:.9g},{y:.9g},{self.step_px:.9g}"
+
+
+def default_grid(format_px):
+    """Pessoa's grid in the proportions of a frame (columns, lines): exactly his on 4608 x 3456.
+
+    Step = longest side / 46.08, first point half a step from the corner, as many as there is room;
+    a frame narrower than that has one row along its middle.
+    """
+    size = np.array(format_px, dtype=float)
+    step = float(size.max()) / STEPS_ON_LONGEST_SIDE
+    start = np.minimum(step / 2, (size - 1) / 2)
+    columns, rows = np.floor((size - 1 - start) / step + 1e-9).astype(int) + 1
+    return Grid(int(columns), int(rows), tuple(start.tolist()), step)
+
+
+def parse(text):
+    """The Grid of a text such as 46x35,50,50,100; raises InputError for any other text."""
+    match = _FORM.fullmatch(text.replace(" ", "")) if len(text) <= 80 else None
+    if match is None:
+        raise InputError(Problem("--grid", f"found {text[:60]!r}; {EXPECTED}"))
+    columns, rows = int(match[1]), int(match[2])
+    x, y, step = (float(part) for part in match.groups()[2:])
+    if columns * rows == 0 or columns * rows > MOST_POINTS or step == 0:
+        expected = f"found {text[:60]!r}; expected 1 to {MOST_POINTS} points and a step above 0"
+        raise InputError(Problem("--grid", expected))
+    return Grid(columns, rows, (x, y), step)

@@ -1,0 +1,66 @@
+"""The random ground over which a resection compares two calibrations.
+
+A camera looks down from a position; each image point sees the ground at its own height
+
+    Z = low + U(0, 1) range
+
+Only ratios of depths bear on a resection's residuals, not their size. Source: Pessoa 2017, section
+of the method SPR: position (300, 300, 450) m, Z = 200 + U(0, 1) 100 (terrain I) or 20 (terrain II).
+"""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+
+SEED = 1
+_NUMBER = r"(-?[0-9]{1,6}(?:\.[0-9]{1,6})?)"
+_PAIR = re.compile(rf"{_NUMBER},{_NUMBER}")
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """Random ground below a camera.
+
+    position_m  (3,) x, y, z of the projection centre of the first bundle, looking down
+    low_m       lowest height             range_m  of the heights above it; 0: flat
+    """
+
+    position_m: tuple[float, float, float] = (300.0, 300.0, 450.0)
+    low_m: float = 200.0
+    range_m: float = 100.0
+
+    def depths_m(self, points, seed):
+        """(points,) of the ground below the camera; the same for the same seed."""
+        height = self.low_m + np.random.default_rng(seed).random(points) * self.range_m
+        return self.position_m[2] - height
+
+    def object_points_m(self, ideal_mm, c_mm, depth_m):
+        """(n, 3) where the rays of ideal image points (n, 2) meet the ground, depths (n,) below."""
+        along = np.column_stack([ideal_mm / c_mm, np.full(len(ideal_mm), -1.0)])
+        return np.asarray(self.position_m) + along * depth_m[:, None]
+
+
+TERRAINS = {"I": Terrain(), "II": Terrain(range_m=20.0)}
+
+
+def parse_terrain(text):
+    """The Terrain of a text: I, II, or LOW,RANGE in metres; raises InputError for any other."""
+    plain = text.strip()
+    if plain.upper() in TERRAINS:
+        return TERRAINS[plain.upper()]
+    match = _PAIR.fullmatch(plain.replace(" ", "")) if len(plain) <= 40 else None
+    camera_m = Terrain().position_m[2]
+    if match is not None:
+        low, extent = (float(part) for part in match.groups())
+        if extent >= 0 and low + extent < camera_m:
+            return Terrain(low_m=low, range_m=extent)
+    raise InputError(
+        Problem(
+            "--terrain",
+            f"found {text[:60]!r}; expected I, II, or LOW,RANGE in metres with a range of 0 or more"
+            f" and all of it below the camera at {camera_m:g} m, such as 200,100",
+        )
+    )

@@ -1,0 +1,101 @@
+"""Cameras as the text of a file of another program, or of cameras.toml.
+
+What a form cannot express is fitted over the frame and stated with the text.
+"""
+
+from dataclasses import dataclass
+
+from tankcal.conversions import balanced, colmap, filestorage, metashape, pix4d
+from tankcal.conversions.opencv import to_opencv
+from tankcal.conversions.register import as_cameras_toml
+from tankcal.conversions.texts import shown
+from tankcal.errors import InputError, Problem
+
+
+@dataclass(frozen=True)
+class Written:
+    """The text of a camera file.
+
+    text      its content
+    error_px  of each camera, the largest distance of an image point over the frame
+    """
+
+    text: str
+    error_px: tuple[float, ...]
+
+
+def write_camera(kind, cameras, sds=None, radius_mm=0.0):
+    """Written: the text of a file of cameras.
+
+    kind       one of KINDS; files of SINGLE hold one camera
+    cameras    [(name, FramedCamera)]
+    sds        [(13,) or None] of each camera, which only cameras.toml has a place for; or None
+    radius_mm  R0 of "aicon"
+
+    Raises InputError for another kind or number of cameras, SolutionError where the distortion
+    folds the image within the frame.
+    """
+    if kind not in KINDS:
+        expected = f"{shown(kind)} as the kind of file; expected one of {', '.join(KINDS)}"
+        raise InputError(Problem("cameras", expected))
+    if not cameras or (kind in SINGLE and len(cameras) > 1):
+        expected = f"{len(cameras)} cameras; expected one" + ("" if kind in SINGLE else " or more")
+        raise InputError(Problem("cameras", f"{expected} in a file of kind {kind}"))
+    if kind == "cameras.toml":
+        return _register(cameras, sds)
+    if kind == "aicon":
+        return _aicon(cameras, radius_mm)
+    return _WRITERS[kind](cameras)
+
+
+def _register(cameras, sds):
+    sds = [None] * len(cameras) if sds is None else sds
+    entries = [
+        as_cameras_toml(name, one.interior, one.form, one.size_px, one.pixel_mm, sd)
+        for (name, one), sd in zip(cameras, sds, strict=True)
+    ]
+    return Written("\n".join(entries), tuple(one.error_px for _, one in cameras))
+
+
+def _aicon(cameras, radius_mm):
+    camera = cameras[0][1]
+    found = balanced.to_balanced(camera, radius_mm)
+    return Written(balanced.text_of(found, camera), (found.error_px,))
+
+
+def _opencv(cameras):
+    camera = cameras[0][1]
+    found = to_opencv(camera)
+    return Written(filestorage.text_of(found, camera.size_px), (found.error_px,))
+
+
+def _opencv_json(cameras):
+    camera = cameras[0][1]
+    found = to_opencv(camera)
+    return Written(filestorage.json_of(found, camera.size_px), (found.error_px,))
+
+
+def _metashape(cameras):
+    found = metashape.to_metashape(cameras[0][1])
+    return Written(metashape.text_of(found), (found.error_px,))
+
+
+def _colmap(cameras):
+    found = [(name, colmap.to_colmap(camera)) for name, camera in cameras]
+    return Written(colmap.text_of(found), tuple(camera.error_px for _, camera in found))
+
+
+def _pix4d(cameras):
+    found = [(name, pix4d.to_pix4d(camera)) for name, camera in cameras]
+    return Written(pix4d.text_of(found), tuple(camera.error_px for _, camera in found))
+
+
+_WRITERS = {
+    "opencv": _opencv,
+    "opencv-json": _opencv_json,
+    "colmap": _colmap,
+    "metashape": _metashape,
+    "pix4d": _pix4d,
+}
+SINGLE = ("opencv", "opencv-json", "metashape", "aicon")  # one camera a file
+KINDS = ("cameras.toml", *_WRITERS, "aicon")

@@ -1,0 +1,107 @@
+"""Calibrations of a camera without a job: a cameras.toml alone, with the checks of a job."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+from tankcal.job.cameras import make_camera
+from tankcal.job.checks.survey.cameras import check_calibrations
+from tankcal.job.checks.survey.files import SurveyFiles
+from tankcal.job.contract.registers import PARAMETER_KEYS, SECOND_NAMES
+from tankcal.job.entries import read_register
+from tankcal.job.folder import MAX_SETTINGS_BYTES
+from tankcal.job.folder import read_register as raw_register
+from tankcal.job.tables import Log, RawJob, nearest, read_bytes, shown
+
+CAMERAS_FILE = "cameras.toml"
+NO_SETTINGS = dict.fromkeys((*PARAMETER_KEYS, *SECOND_NAMES.values(), "default"))
+
+
+def read_cameras(path, warn=None, in_pixels=True):
+    """CameraSetup of each [cameras.NAME] of a cameras.toml, in the order of the file.
+
+    Its keys are those of a job's (docs/job-format.md), with the size of a pixel: format_px with
+    pixel_um, format_px with format_mm, or format_mm with pixel_um.
+
+    path  of the file, or of a folder with a cameras.toml
+    warn  called with a Problem for each thing that only deserves a look; None: not told
+    in_pixels  False: a format_mm alone will do, as for film
+
+    Raises InputError with every problem of the file.
+    """
+    path, log = Path(path), Log()
+    if path.is_dir():
+        path = path / CAMERAS_FILE
+    values = _values(path, log, in_pixels)
+    log.stop_if_problems()
+    for one in log.warnings if warn else ():
+        warn(one)
+    return tuple(
+        make_camera(name, _with_frame(given), NO_SETTINGS) for name, given in values.items()
+    )
+
+
+def with_pixels(setups, pixel_um):
+    """The CameraSetup of film with pixels of a size, to count in; None: as they are.
+
+    The format becomes a whole number of them.
+    """
+    if pixel_um is None:
+        return tuple(setups)
+    pixel = np.full(2, pixel_um / 1000)
+    return tuple(
+        replace(one, pixel_mm=pixel, format_mm=np.round(one.format_mm / pixel) * pixel)
+        if one.pixel_mm is None
+        else one
+        for one in setups
+    )
+
+
+def choose(setups, names, file=CAMERAS_FILE):
+    """The CameraSetup of the names, in the order of `setups`; all of them without a name.
+
+    file  what messages call the place where they stand
+    Raises InputError for names that are not there, or stand there twice.
+    """
+    known = [setup.camera.name for setup in setups]
+    problems = []
+    for place, name in enumerate(names):
+        if name not in known:
+            expected = f"found {shown(name)}; expected a camera of it{nearest(name, known)}"
+            problems.append(Problem(file, f"{expected}: {_listed(known)}"))
+        elif name in names[:place]:
+            problems.append(Problem(file, f"{shown(name)} was named twice; expected once"))
+    if problems:
+        raise InputError(problems)
+    return tuple(setup for setup in setups if not names or setup.camera.name in names)
+
+
+def _listed(known):
+    return ", ".join(known[:20]) + (f" and {len(known) - 20} more" if len(known) > 20 else "")
+
+
+def _values(path, log, in_pixels):
+    """{name: {key: value}} of the file; what is wrong goes to `log`."""
+    if not path.exists():
+        log.problem(path.name or ".", "not found; expected a file with [cameras.NAME]")
+        return {}
+    data = read_bytes(path, log, MAX_SETTINGS_BYTES)
+    register = None if data is None else raw_register(path.name, data, log, "cameras")
+    if register is None:
+        return {}
+    raw = RawJob(path.stem, path.parent, path.name, {}, {}, {}, registers={"cameras": register})
+    values = read_register(raw, "cameras", log)
+    check_calibrations(SurveyFiles(None, {}, {"cameras": values}, raw, log), in_pixels)
+    if not values and not log.problems:
+        log.problem(path.name, "no camera; expected sections [cameras.NAME]")
+    return values
+
+
+def _with_frame(given):
+    """The keys of a camera with its format in pixels, which the others say."""
+    if given["format_px"] is not None or given["pixel_um"] is None:
+        return given
+    pixels = np.array(given["format_mm"]) / np.broadcast_to(given["pixel_um"], 2) * 1000
+    return given | {"format_px": tuple(np.round(pixels))}

@@ -1,0 +1,86 @@
+"""Distance-dependent distortion: the keys of a camera's focus, and [adjustment] depth_of_field."""
+
+from tankcal.focus import RADIAL
+from tankcal.job.cameras import focus_keys, lens_of
+from tankcal.job.checks.common import tell
+from tankcal.job.contract.registers import PARAMETER_KEYS
+from tankcal.messages import message
+
+NEAREST = 2.0  # focal lengths: nearer no lens of a camera makes an image
+ALIKE = 0.3  # part by which c and the focal length may differ
+BESIDE = ("focus_m", "lens_focal_length_mm")
+
+
+def check_focus(files, name, given):
+    """The keys of one camera: all of them or none, in metres, and no K beside them."""
+
+    def problem(key, expected):
+        files.tell_key(files.log.problem, "cameras", name, key, expected)
+
+    distances, *radial = focus_keys()
+    is_asked = any(files.is_given("cameras", name, key) for key in (distances, *radial))
+    if not is_asked:
+        for key in BESIDE:
+            if given[key] is not None:
+                expected = message(
+                    "no_focus_calibrations",
+                    "without effect: the camera has no focus_calibrations",
+                )
+                files.tell_key(files.log.warning, "cameras", name, key, expected)
+        return
+    for key in (distances, *BESIDE):
+        if not files.is_given("cameras", name, key):
+            problem(key, "missing beside focus_calibrations; expected it above 0")
+    if not any(files.is_given("cameras", name, key) for key in radial):
+        problem(radial[0], "missing; expected K1 at both distances: [1.1e-7, 1.3e-7]")
+    for key in (distances, *radial):
+        if given[key] is not None and len(given[key]) != 2:
+            problem(key, f"{len(given[key])} numbers; expected two, one for each distance")
+    _refuse_beside(files, name, given, problem)
+    _check_sizes(given, distances, problem)
+
+
+def _refuse_beside(files, name, given, problem):
+    for parameter in RADIAL:
+        key = PARAMETER_KEYS[parameter][0]
+        if given[key] is not None:
+            problem(key, "given beside focus_calibrations, from which it follows; expected one")
+    if given["radial_balance_mm"]:
+        problem("radial_balance_mm", "not with focus_calibrations; expected the plain form")
+    if not files.is_given("cameras", name, "convention"):
+        problem("convention", "missing beside focus_calibrations; expected what their K do")
+
+
+def _check_sizes(given, key, problem):
+    distances, focal, c = given[key], given["lens_focal_length_mm"], given["c_mm"]
+    if distances is not None and len(distances) == 2 and distances[0] == distances[1]:
+        problem(key, "twice the same; expected two distances")
+    if focal is None:
+        return
+    if c is not None and abs(focal / c - 1) > ALIKE:
+        expected = f"found {focal:g} with c_mm = {c:g}; expected about the same"
+        problem("lens_focal_length_mm", expected)
+        return
+    for where, values in ((key, distances), ("focus_m", (given["focus_m"],))):
+        for value in values or ():
+            if value is not None and 1000 * value <= NEAREST * focal:
+                expected = f"found {value:g} m, within {NEAREST:g} focal lengths; expected metres"
+                problem(where, f"{expected} from the lens to the object")
+
+
+def check_depth_of_field(files):
+    """[adjustment] depth_of_field with cameras that say nothing of it."""
+    if files.values is None or not files.values["adjustment"]["depth_of_field"]:
+        return
+    cameras = files.registers["cameras"]
+    lacking = [name for name, given in cameras.items() if lens_of(given) is None]
+    if len(lacking) == len(cameras):
+        expected = "true, but no camera has focus_calibrations; expected them in cameras.toml"
+        tell(files.log.problem, files.raw, "adjustment", "depth_of_field", expected)
+    elif lacking:
+        expected = message(
+            "no_depth_of_field",
+            "without effect on camera {cameras}: no focus_calibrations",
+            cameras=lacking,
+        )
+        tell(files.log.warning, files.raw, "adjustment", "depth_of_field", expected)

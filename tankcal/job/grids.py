@@ -1,0 +1,89 @@
+"""The rows of a sheet that count: without comments, and without what a person could not see."""
+
+from bisect import bisect_left
+
+from tankcal.job.excel import MAX_COLUMNS, column_letters
+from tankcal.job.tables import shown
+
+
+def table_rows(place, grid, log):
+    """([(row, cells)] of the heading and the rows below it, number of the first column).
+
+    A first column without a heading is for marks: # switches its row off. It is left out. Cells
+    that are merged, hidden, or beyond the last column are told to `log`, which calls the sheet
+    `place`.
+    """
+    rows = [(number, cells) for number, cells in grid.rows if not _is_comment(cells)]
+    for number, cells in rows:
+        if len(cells) > MAX_COLUMNS:
+            log.problem(place, f"cells beyond column {column_letters(MAX_COLUMNS)}", number)
+            del cells[MAX_COLUMNS:]
+    _tell_merged(place, grid, rows, log)
+    _tell_hidden(place, grid, rows, log)
+    for _, cells in rows:
+        cells.extend([None] * (len(rows[0][1]) - len(cells)))
+    if not rows or not _is_blank(rows[0][1][0]):
+        return rows, 1
+    for number, cells in rows:
+        if not _is_blank(cells[0]):
+            expected = (
+                f"found {shown(cells[0])} in a column without a heading; expected nothing there,"
+                " or # to switch the row off"
+            )
+            log.place_columns(place, {"": "A"})
+            log.problem(place, expected, number, "")
+    return [(number, cells[1:]) for number, cells in rows], 2
+
+
+def placed_columns(rows, first_column):
+    """{heading: letters of its column} of the first of some rows."""
+    headings = rows[0][1] if rows else []
+    return {
+        heading.strip(): column_letters(column)
+        for column, heading in enumerate(headings, first_column)
+        if isinstance(heading, str)
+    }
+
+
+def _is_comment(cells):
+    return isinstance(cells[0], str) and cells[0].lstrip().startswith("#")
+
+
+def _is_blank(cell):
+    return cell is None or (isinstance(cell, str) and not cell.strip())
+
+
+def _tell_merged(place, grid, rows, log):
+    numbers = [number for number, _ in rows]
+    for top, bottom, left, right in grid.merged:
+        nearest_row = bisect_left(numbers, top)
+        if nearest_row < len(numbers) and numbers[nearest_row] <= bottom:
+            cells = f"{column_letters(left)}{top}:{column_letters(right)}{bottom}"
+            expected = f"the cells {cells} are merged; expected one cell for each value: unmerge"
+            log.problem(place, f"{expected} them", top)
+
+
+def _tell_hidden(place, grid, rows, log):
+    hidden = [number for number, _ in rows if number in grid.hidden_rows]
+    expected = "hidden, and not blank; expected rows that show: unhide or delete"
+    for first, last in _runs(hidden):
+        named = "the row is" if first == last else f"the rows {first} to {last} are"
+        log.problem(place, f"{named} {expected} {'it' if first == last else 'them'}", first)
+    for first, last in grid.hidden_columns:
+        if any(cell is not None for _, cells in rows for cell in cells[first - 1 : last]):
+            named = f"column {column_letters(first)}"
+            if last > first:
+                named = f"one of the columns {column_letters(first)} to {column_letters(last)}"
+            expected = "hidden, and not blank; expected columns that show: unhide or delete it"
+            log.problem(place, f"{named} is {expected}")
+
+
+def _runs(numbers):
+    """(first, last) of each run of numbers that follow one another."""
+    runs = []
+    for number in numbers:
+        if runs and number == runs[-1][1] + 1:
+            runs[-1] = (runs[-1][0], number)
+        else:
+            runs.append((number, number))
+    return runs

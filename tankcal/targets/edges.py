@@ -1,0 +1,302 @@
+"""The four edges of a black square to sub-pixels, and the corners where they meet.
+
+Along an edge with t from -1 to 1, at a signed distance d from the straight line through its ends
+(positive towards the inside), a pixel of a blurred photograph has the grey value
+
+    (1 + g t) { hi + (lo - hi) [F((d - e(t)) / s) - B(t) F((d - i) / s)]
+                   + (out - hi) F((-i - d) / s) }
+
+with F the normal distribution, s the blur, e(t) = e0 + e1 t + e2 (t2 - 1/3) the edge, B the blurred
+row of code cells that begins at the distance i, and `out` what lies beyond a quiet zone of one
+cell. i and B are known from the corners and the code: without them a cell that is only a few blurs
+wide drags the edge along. e0, e1, e2, s, hi, lo, g and `out` are found by least squares of the
+pixels themselves, not of interpolated profiles, and i and B renewed until the corners stand still.
+Corners are intersections of two edges: nothing is measured next to a corner, where blur rounds it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.optimize
+from scipy.special import ndtr
+
+CURVED_FROM_PX = 40.0  # a shorter edge is taken as straight: a lens bends it by less than its noise
+BAND_PX = 6.0  # most half-width of the pixels that are used
+CELL_SHARE = 0.95  # of a cell, on either side of the edge
+BEYOND_WEIGHT = 0.02  # of `beyond = high`: what the quiet zone ends in is hardly known
+MOST_ROUNDS = 20
+SAME_PIXELS_FROM = 3  # rounds: else a pixel that comes and goes keeps the corners moving
+NEARLY_STILL_PX = 0.05
+STANDS_STILL_PX, STANDS_STILL = 0.002, 0.1  # px; standard deviations
+MOST_MOVED_PX = 6.0
+SHORTEST_PX = 5.0  # of what is left between the corners' neighbourhoods
+START_BLUR_PX = 1.2
+SHARPEST_PX, SOFTEST_PX = 0.15, 12.0
+_ROOT = np.sqrt(2 * np.pi)
+
+
+class NoEdge(Exception):
+    """No edge could be fitted where one was expected."""
+
+
+@dataclass(frozen=True)
+class Edge:
+    """One fitted edge.
+
+    start, along, inward  (2,) px, first end of the line that it is counted from, unit vectors
+    length_px             of that line
+    curve                 (3,) e0, e1, e2, px
+    cofactor_px2          (3, 3) their covariance; zero where e2 is not an unknown
+    blur_px               s
+    levels                (4,) hi, lo, g, out
+    rms                   of the residuals, grey values
+    """
+
+    start: np.ndarray
+    along: np.ndarray
+    inward: np.ndarray
+    length_px: float
+    curve: np.ndarray
+    cofactor_px2: np.ndarray
+    blur_px: float
+    levels: np.ndarray
+    rms: float
+
+    @property
+    def contrast(self):
+        """White minus black, grey values."""
+        return float(self.levels[0] - self.levels[1])
+
+    def offset(self, place):
+        """Distance of a place (2,) from the edge, its gradient (2,), and its variance, px2."""
+        q = place - self.start
+        t = 2 * (q @ self.along) / self.length_px - 1
+        row = np.array([1.0, t, t * t - 1 / 3])
+        slope = (self.curve[1] + 2 * self.curve[2] * t) * 2 / self.length_px
+        distance = q @ self.inward - row @ self.curve
+        return distance, self.inward - slope * self.along, row @ self.cofactor_px2 @ row
+
+
+def corners_of(image, corners, cells):
+    """Corners (4, 2), their covariances (4, 2, 2) px2 and the four Edges of a marker.
+
+    image    (lines, columns) grey values, float
+    corners  (4, 2) px to a pixel or two, clockwise from the top left as printed
+    cells    (n, n) 0 and 1, as printed, with the black border
+
+    Raises NoEdge.
+    """
+    places, blur = np.asarray(corners, dtype=float), START_BLUR_PX
+    edges, pixels = [None] * 4, [None] * 4
+    for again in range(MOST_ROUNDS):
+        lines = [_line(places, side, len(cells)) for side in range(4)]
+        if again <= SAME_PIXELS_FROM:
+            margin = 2.5 * max(blur, 0.7) + (0.5 if again else 1.5)
+            reach = [_band(line, blur, again > 0) for line in lines]
+            pixels = [
+                _pixels(image, line, margin, band) for line, band in zip(lines, reach, strict=True)
+            ]
+        edges = [
+            _fit(image, lines[side], pixels[side], np.rot90(cells, side)[1], edges[side], blur)
+            for side in range(4)
+        ]
+        blur = float(np.median([edge.blur_px for edge in edges]))
+        meeting = [_meet(edges[k - 1], edges[k], places[k]) for k in range(4)]
+        before, places = places, np.array([place for place, _ in meeting])
+        covariance = np.array([spread for _, spread in meeting])
+        moved = np.abs(places - before).max()
+        if not moved < MOST_MOVED_PX:
+            break
+        sd = np.sqrt(np.trace(covariance, axis1=1, axis2=2).min() / 2)
+        if again > 1 and moved < max(STANDS_STILL_PX, STANDS_STILL * sd):
+            break
+    if not moved < NEARLY_STILL_PX:
+        raise NoEdge("unsteady")
+    return places, covariance + moved**2 * np.eye(2), edges
+
+
+@dataclass(frozen=True)
+class _Line:
+    """The straight line of an edge, and the line that ends the border's cells.
+
+    inner  (2, 2) px, the inner ends of the border's cells     cells  in the edge's length
+    """
+
+    start: np.ndarray
+    along: np.ndarray
+    inward: np.ndarray
+    length: float
+    inner: np.ndarray
+    cells: int
+
+    @property
+    def depths(self):
+        """(2,) px from the edge to `inner`: the width of the border."""
+        return (self.inner - self.start) @ self.inward
+
+
+def _line(corners, side, cells):
+    corners = np.roll(corners, -side, axis=0)
+    start, end = corners[:2]
+    length = float(np.hypot(*(end - start)))
+    if not length > SHORTEST_PX:
+        raise NoEdge("short")
+    along = (end - start) / length
+    inward = np.array([-along[1], along[0]])
+    return _Line(start, along, inward, length, _inner_line(corners, cells), cells)
+
+
+def _fit(image, line, pixels, bits, before, blur):
+    """Edge along a _Line by the pixels (lines, columns); starts where the one `before` ended."""
+    x, y = pixels[1] - line.start[0], pixels[0] - line.start[1]
+    t = x * line.along[0] + y * line.along[1]
+    d = x * line.inward[0] + y * line.inward[1]
+    grey = image[pixels].astype(float)
+    places = (line.inner - line.start) @ line.along
+    columns = np.interp(t, places, (1.0, line.cells - 1.0))
+    depth = np.interp(t, places, line.depths)
+    t = 2 * t / line.length - 1
+    model = _Model(t, d, grey, depth, columns, bits, line.cells / line.length)
+    levels = None if before is None else before.levels
+    solved = model.solved(blur, levels, line.length >= CURVED_FROM_PX)
+    return Edge(line.start, line.along, line.inward, line.length, *solved)
+
+
+def _band(line, blur, is_final):
+    """Half-width of the pixels that are used, px."""
+    wanted = min(3.5 * blur + 0.5 if is_final else BAND_PX, BAND_PX)
+    return max(min(wanted, CELL_SHARE * float(line.depths.min())), 2.0)
+
+
+def _inner_line(corners, count):
+    """(2, 2) images of the inner ends of the border's cells next to the first edge."""
+    p0, p1, p2, p3 = corners
+    # w of the homography of the unit square, from the parallelogram's defect
+    defect = p0 - p1 + p2 - p3
+    g, h = np.linalg.solve(np.column_stack([p1 - p2, p3 - p2]), defect)
+    across, down = p1 - p0 + g * p1, p3 - p0 + h * p3
+    u = np.array([1 / count, 1 - 1 / count])
+    v = 1 / count
+    return (p0 + u[:, None] * across + v * down) / (1 + g * u + h * v)[:, None]
+
+
+def _pixels(image, line, margin, band):
+    """(lines, columns) of the pixels about an edge, without those next to its ends."""
+    margin = min(margin, max(line.length / 4, (line.length - SHORTEST_PX) / 2))
+    ends = line.start + np.outer([0, line.length], line.along)
+    low = np.maximum(np.floor(ends.min(axis=0) - band - 1), 0).astype(int)
+    high = np.ceil(ends.max(axis=0) + band + 1).astype(int)
+    high = np.minimum(high, np.array(image.shape)[::-1] - 1)
+    if (high <= low).any():
+        raise NoEdge("outside")
+    row, column = np.mgrid[low[1] : high[1] + 1, low[0] : high[0] + 1]
+    x, y = column - line.start[0], row - line.start[1]
+    t = x * line.along[0] + y * line.along[1]
+    d = x * line.inward[0] + y * line.inward[1]
+    used = (t >= margin) & (t <= line.length - margin) & (np.abs(d) <= band)
+    if used.sum() < 20:
+        raise NoEdge("short")
+    return row[used], column[used]
+
+
+class _Model:
+    """Grey values of the pixels about an edge, and their derivatives."""
+
+    def __init__(self, t, d, grey, depth, columns, bits, cells_per_px):
+        self.t, self.d, self.grey, self.depth = t, d, grey, depth
+        self.columns, self.bits, self.cells_per_px = columns, bits, cells_per_px
+        self.rows = np.column_stack([np.ones_like(t), t, t * t - 1 / 3])
+
+    def solved(self, blur, levels, is_curved):
+        """curve (3,), its cofactor, blur, levels, rms of the residuals; see Edge."""
+        self.degree = k = 3 if is_curved else 2
+        self.row_of_code = self._row_of_code(blur)
+        if levels is None:
+            levels = self._levels()
+        start = np.concatenate([np.zeros(k), [np.log(blur)], levels])
+        fit = scipy.optimize.least_squares(
+            self.residuals, start, self.jacobian, method="lm", x_scale="jac", max_nfev=60
+        )
+        e, dof = fit.x, len(self.grey) - len(start)
+        blur = float(np.exp(np.clip(e[k], -9, 9)))
+        if dof <= 0 or not SHARPEST_PX < blur < SOFTEST_PX or not np.isfinite(e).all():
+            raise NoEdge("blur")
+        variance = float(2 * fit.cost / dof)
+        cofactor = np.zeros((3, 3))
+        cofactor[:k, :k] = variance * _inverse_normal(fit.jac)[:k, :k]
+        curve = np.append(e[:k], np.zeros(3 - k))
+        return curve, cofactor, blur, e[k + 1 :], np.sqrt(variance)
+
+    def _levels(self):
+        outside, inside = self.grey[self.d < -1], self.grey[self.d > 1]
+        if not (len(outside) and len(inside)):
+            raise NoEdge("short")
+        high, low = np.percentile(outside, 75), np.percentile(inside, 25)
+        return np.array([high, low, 0.0, high])
+
+    def _row_of_code(self, blur):
+        """(n,) the row of code cells next to the border, blurred along it."""
+        s = max(blur, 0.3) * self.cells_per_px
+        steps = ndtr((self.columns[:, None] - np.arange(len(self.bits) + 1)) / s)
+        return (steps[:, :-1] - steps[:, 1:]) @ self.bits
+
+    def _parts(self, e):
+        k = self.degree
+        s = np.exp(np.clip(e[k], -3, 3))
+        z = (self.d - self.rows[:, :k] @ e[:k]) / s
+        inner = (self.d - self.depth) / s
+        outer = (-self.depth - self.d) / s
+        return k, s, z, inner, outer, ndtr(z) - self.row_of_code * ndtr(inner), ndtr(outer)
+
+    def residuals(self, e):
+        """Computed minus measured grey values, and the weak condition on what lies beyond."""
+        k, *_, dark, out = self._parts(e)
+        high, low, gradient, beyond = e[k + 1 :]
+        grey = high + (low - high) * dark + (beyond - high) * out
+        found = (1 + gradient * self.t) * grey - self.grey
+        return np.append(found, BEYOND_WEIGHT * (beyond - high))
+
+    def jacobian(self, e):
+        """(n + 1, parameters) of the residuals."""
+        k, s, z, inner, outer, dark, out = self._parts(e)
+        high, low, gradient, beyond = e[k + 1 :]
+        gain = 1 + gradient * self.t
+        density, of_code, of_outer = (np.exp(-q * q / 2) / _ROOT for q in (z, inner, outer))
+        of_code = self.row_of_code * of_code
+        slope = gain * (low - high)
+        by_blur = (
+            -slope * (density * z - of_code * inner) - gain * (beyond - high) * of_outer * outer
+        )
+        by_edge = -(slope * density / s)[:, None] * self.rows[:, :k]
+        value = high + (low - high) * dark + (beyond - high) * out
+        rows = np.column_stack(
+            [by_edge, by_blur, gain * (1 - dark - out), gain * dark, self.t * value, gain * out]
+        )
+        last = np.zeros(rows.shape[1])
+        last[k + 1], last[-1] = -BEYOND_WEIGHT, BEYOND_WEIGHT
+        return np.vstack([rows, last])
+
+
+def _inverse_normal(jacobian):
+    """(J'J)^-1 with the columns scaled alike."""
+    scale = np.linalg.norm(jacobian, axis=0)
+    if not (scale > 0).all():
+        raise NoEdge("flat")
+    scaled = jacobian / scale
+    normal = scaled.T @ scaled
+    if np.linalg.cond(normal) > 1e12:
+        raise NoEdge("flat")
+    return np.linalg.inv(normal) / np.outer(scale, scale)
+
+
+def _meet(before, after, start):
+    """Intersection (2,) of two edges, and its covariance (2, 2) px2."""
+    place = np.array(start, dtype=float)
+    for _ in range(6):
+        first, second = before.offset(place), after.offset(place)
+        gradient = np.array([first[1], second[1]])
+        if abs(np.linalg.det(gradient)) < 0.05:
+            raise NoEdge("parallel")
+        place = place - np.linalg.solve(gradient, [first[0], second[0]])
+    spread = np.linalg.inv(gradient)
+    return place, spread @ np.diag([first[2], second[2]]) @ spread.T

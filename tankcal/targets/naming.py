@@ -1,0 +1,114 @@
+"""Names of targets: ids of codes by a list, circles by approximate places."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.job.fields import Field, Refused, is_blank, read_value
+from tankcal.job.folder import read_csv
+from tankcal.job.tables import MAX_FILE_BYTES, read_bytes
+
+ID = Field("id", "number", "number of the code", required=True, low=0, high=1e6)
+POINT = Field("point", "name", "name of the point", required=True)
+NAMES = (ID, POINT)
+PLACES = (
+    Field("photo", "name", "the photo, its file without the ending", required=True),
+    POINT,
+    Field("column_px", "number", "about there, pixels", required=True, low=-1e6, high=1e6),
+    Field("line_px", "number", "about there, pixels", required=True, low=-1e6, high=1e6),
+)
+CORNERS = ("-1", "-2", "-3", "-4")  # top left of the marker as printed, then clockwise
+
+
+def read_names(path, log, suffixes=()):
+    """{id: name} of a CSV file with the columns id and point; what is wrong goes to `log`.
+
+    suffixes  that names get, and must still be names with
+    """
+    names, first = {}, {}
+    for file, row, (number, point) in _rows(path, NAMES, log):
+        if number != int(number):
+            log.problem(file, f"found {number:g}; expected a whole number", row, "id")
+            continue
+        for value, column in ((int(number), "id"), (point, "point")):
+            if (column, value) in first:
+                expected = f"{value!r} stands in row {first[column, value]} already; expected once"
+                log.problem(file, expected, row, column)
+            first.setdefault((column, value), row)
+        try:
+            for suffix in suffixes:
+                read_value(POINT, point + suffix)
+        except Refused as refusal:
+            log.problem(file, f"with its corner {refusal}", row, "point")
+        names[int(number)] = point
+    return names
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a point is about to be found in a photo."""
+
+    point: str
+    place_px: np.ndarray
+
+
+def read_places(path, log):
+    """{photo: [Place]} of a CSV file with photo, point, column_px, line_px."""
+    places, first = {}, {}
+    for file, row, (photo, point, column, line) in _rows(path, PLACES, log):
+        if (photo, point) in first:
+            expected = f"{point!r} stands in row {first[photo, point]} already; expected once"
+            log.problem(file, f"{expected} in photo {photo!r}", row, "point")
+        first.setdefault((photo, point), row)
+        places.setdefault(photo, []).append(Place(point, np.array([column, line])))
+    return places
+
+
+def _rows(path, fields, log):
+    """(file, row, values) of the sound rows."""
+    data = read_bytes(path, log, MAX_FILE_BYTES)
+    table = None if data is None else read_csv(path.name, data, ",", ".", log)
+    if table is None:
+        return
+    lacking = [field for field in fields if field.name not in table.headings]
+    for field in lacking:
+        expected = f"missing column; expected {field.wanted()}"
+        log.problem(table.file, expected, table.heading_row, field.name)
+    if lacking:
+        return
+    places = [table.headings.index(field.name) for field in fields]
+    for row, cells in zip(table.row_numbers, table.rows, strict=True):
+        values = []
+        for field, place in zip(fields, places, strict=True):
+            try:
+                if is_blank(cells[place]):
+                    raise Refused(f"blank; expected {field.expectation()}")
+                values.append(read_value(field, cells[place], table.decimal))
+            except Refused as refusal:
+                log.problem(table.file, str(refusal), row, field.name)
+        if len(values) == len(fields):
+            yield table.file, row, values
+
+
+def by_places(circles, places, reach_px):
+    """([(point, Circle)], [(code, Circle)], [points not found]): each circle and place once.
+
+    reach_px  how far a circle may be from its approximate place; a place with two circles within
+              reach, or a circle with two places, is ambiguous
+    """
+    if not circles or not places:
+        return [], [("unnamed", one) for one in circles], [place.point for place in places]
+    middles = np.array([one.centre_px for one in circles])
+    wanted = np.array([place.place_px for place in places])
+    near = np.hypot(*(middles[:, None] - wanted).transpose(2, 0, 1)) <= reach_px
+    per_circle, per_place = near.sum(axis=1), near.sum(axis=0)
+    named, refused = [], []
+    for i, one in enumerate(circles):
+        if per_circle[i] == 0:
+            refused.append(("unnamed", one))
+        elif per_circle[i] > 1 or per_place[near[i]].max() > 1:
+            refused.append(("ambiguous", one))
+        else:
+            named.append((places[int(np.argmax(near[i]))].point, one))
+    lacking = [place.point for place, count in zip(places, per_place, strict=True) if not count]
+    return named, refused, lacking

@@ -1,0 +1,237 @@
+"""Photographs in, image_points.csv out: the whole way, for any number of photos."""
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from tankcal.job.fields import Refused as BadName
+from tankcal.job.tables import Log, shown
+from tankcal.targets.circles import read_circles
+from tankcal.targets.coded import read_coded
+from tankcal.targets.dictionaries import dictionary_of
+from tankcal.targets.found import Refused
+from tankcal.targets.naming import CORNERS, by_places, read_names, read_places
+from tankcal.targets.opencv import opencv
+from tankcal.targets.pictures import ENCODINGS, photo_name, read_picture
+from tankcal.targets.writing import ImagePoint, PhotoReading, check_free, write_image_points
+
+WHAT = ("corners", "centres", "circles")
+CHANCE_TOLD = 1e-4  # that random cells are a code
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What to read.
+
+    what         "corners" of coded targets (name-1 .. name-4), their "centres", or "circles"
+    dictionary   of coded targets, as OpenCV calls it
+    names        path of a CSV file with id and point, or None: the number is the name, and every
+                 id of the dictionary is accepted
+    places       of circles: path of a CSV file with photo, point, column_px, line_px
+    reach_px     of circles: how far one may be from its approximate place
+    smallest_px  least side, or diameter; None: 2.5 px a cell, or 6
+    largest_px   of circles: largest diameter; None: a tenth of the photo
+    bit_errors   cells of a code that may be wrong
+    encoding     one of pictures.ENCODINGS: how grey values stand for light
+    """
+
+    what: str = "corners"
+    dictionary: str = "DICT_5X5_100"
+    names: Path | None = None
+    places: Path | None = None
+    reach_px: float = 15.0
+    smallest_px: float | None = None
+    largest_px: float | None = None
+    bit_errors: int = 0
+    encoding: str = "by_file"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What was read and written.
+
+    photos                  PhotoReadings
+    path, refused_path      files that were written
+    targets, points         how many, over all photos
+    refused                 {reason code: how many}
+    warnings                Problems that stop nothing
+    """
+
+    photos: tuple
+    path: Path
+    refused_path: Path
+    targets: int
+    points: int
+    refused: dict
+    warnings: tuple
+
+
+def read_photographs(paths, out_csv, wanted=None, replace=False, tell=None):
+    """Read targets in photographs and write image_points.csv: a Reading. All or nothing.
+
+    paths    of the pictures; a photo's name is that of its file, without the ending
+    out_csv  path of image_points.csv; what was refused goes to ..._refused.csv beside it
+    wanted   a Wanted
+    replace  whether files that are there may be overwritten
+    tell     function (text, done, total), called before each photo and at the end
+
+    Raises InputError with everything that is wrong with files, names and settings.
+    """
+    wanted, log = wanted or Wanted(), Log()
+    opencv()
+    names, places = _lists(wanted, log)
+    check_free(out_csv, replace, log)
+    titles = _titles(paths, log)
+    photos, encodings = [], Counter()
+    for done, (path, title) in enumerate(titles):
+        if tell:
+            tell(title, done, len(titles))
+        picture = read_picture(path, log, wanted.encoding if wanted.encoding in ENCODINGS else None)
+        if picture is not None:
+            encodings[picture.encoding] += 1
+        if picture is not None and not log.problems:
+            photos.append(_photo(title, picture, wanted, names, places, log))
+    log.stop_if_problems()
+    _warn(photos, wanted, names, log)
+    if encodings["srgb"] and wanted.encoding == "by_file":
+        expected = f"{encodings['srgb']} of JPEG: grey values are taken as sRGB"
+        log.warning("photographs", f"{expected}; where that is wrong, edges are half a pixel off")
+    written = write_image_points(photos, out_csv, replace)
+    if tell:
+        tell("", len(titles), len(titles))
+    return Reading(
+        tuple(photos),
+        *written,
+        sum(len(photo.targets) for photo in photos),
+        sum(len(photo.points) for photo in photos),
+        dict(Counter(one.code for photo in photos for one in photo.refused)),
+        tuple(log.warnings),
+    )
+
+
+def _lists(wanted, log):
+    """({id: name} or None, {photo: [Place]}); what is wrong with the settings goes to `log`."""
+    for value, known, name in (
+        (wanted.what, WHAT, "what"),
+        (wanted.encoding, ENCODINGS, "encoding"),
+    ):
+        if value not in known:
+            log.problem(name, f"found {shown(value)}; expected {' or '.join(known)}")
+    for name in ("reach_px", "smallest_px", "largest_px", "bit_errors"):
+        value = getattr(wanted, name)
+        if value is not None and not 0 <= value < 1e5:
+            log.problem(name, f"found {value:g}; expected a number of 0 or more")
+    if wanted.what == "circles":
+        if wanted.names is not None:
+            log.problem("names", "only for coded targets; circles have `places`")
+        if wanted.places is None:
+            log.problem("places", "missing; circles get their names from approximate places")
+            return None, {}
+        return None, read_places(Path(wanted.places), log)
+    if wanted.places is not None:
+        log.problem("places", "only for circles; coded targets have `names`")
+    known = dictionary_of(wanted.dictionary)
+    if wanted.names is None:
+        return None, {}
+    names = read_names(Path(wanted.names), log, CORNERS if wanted.what == "corners" else ())
+    beyond = [number for number in names if number >= len(known.cells)]
+    if beyond:
+        listed = ", ".join(str(number) for number in beyond[:5])
+        expected = f"found {listed}; expected 0 to {len(known.cells) - 1} of {known.name}"
+        log.problem(Path(wanted.names).name, expected, column="id")
+    return names, {}
+
+
+def _titles(paths, log):
+    """[(path, name of the photo)]; names that cannot be used go to `log`."""
+    found, seen = [], {}
+    for path in map(Path, paths):
+        try:
+            title = photo_name(path)
+        except BadName as refusal:
+            log.problem(path.name, f"as the name of a photo: {refusal}")
+            continue
+        if title in seen:
+            expected = f"the photo {title!r} is {seen[title]} already; expected another file name"
+            log.problem(path.name, expected)
+        seen.setdefault(title, path.name)
+        found.append((path, title))
+    if not seen and not log.problems:
+        log.problem("photographs", "none given")
+    return found
+
+
+def _photo(title, picture, wanted, names, places, log):
+    """PhotoReading of one picture."""
+    if wanted.what == "circles":
+        return _photo_of_circles(title, picture, wanted, places.get(title, []), log)
+    found = read_coded(
+        picture.image, wanted.dictionary, names, wanted.bit_errors, wanted.smallest_px
+    )
+    named = [(one, str(one.id) if names is None else names[one.id]) for one in found.targets]
+    if wanted.what == "centres":
+        points = [ImagePoint(name, one.centre_px, one.centre_sd_px) for one, name in named]
+    else:
+        points = [
+            ImagePoint(name + corner, place, float(sd))
+            for one, name in named
+            for corner, place, sd in zip(CORNERS, one.corners_px, one.sd_px, strict=True)
+        ]
+    targets = tuple(name for _, name in named)
+    if found.doubtful:
+        listed = ", ".join(str(number) for number in found.doubtful[:10])
+        expected = f"ids that would read the same in a mirror, corners exchanged: {listed}"
+        log.warning(title, expected)
+    return PhotoReading(
+        title, found.size_px, picture.orientation, targets, tuple(points), found.refused
+    )
+
+
+def _photo_of_circles(title, picture, wanted, places, log):
+    found = read_circles(picture.image, wanted.smallest_px or 6.0, wanted.largest_px)
+    named, refused, lacking = by_places(found.targets, places, wanted.reach_px)
+    if lacking:
+        listed = ", ".join(repr(name) for name in lacking[:5])
+        expected = f"no circle within {wanted.reach_px:g} px of {len(lacking)} places: {listed}"
+        log.warning(title, expected)
+    points = tuple(ImagePoint(name, one.centre_px, one.sd_px) for name, one in named)
+    refused = [
+        Refused(code, one.centre_px, None, {"half_axis_px": float(one.semi_axes_px[0])})
+        for code, one in refused
+    ]
+    return PhotoReading(
+        title,
+        found.size_px,
+        picture.orientation,
+        tuple(name for name, _ in named),
+        points,
+        (*found.refused, *refused),
+    )
+
+
+def _warn(photos, wanted, names, log):
+    """Tell what deserves a look."""
+    for photo in photos:
+        if not photo.targets:
+            log.warning(photo.photo, "no targets found")
+        if photo.orientation != 1:
+            expected = f"its file asks to be turned (orientation {photo.orientation}); not done"
+            log.warning(photo.photo, f"{expected}: columns and lines are those of the sensor")
+    sizes = Counter(photo.size_px for photo in photos)
+    if len(sizes) > 1:
+        listed = ", ".join(f"{a} x {b} ({count})" for (a, b), count in sizes.most_common(5))
+        log.warning("photographs", f"of several sizes: {listed}; photos of one camera have one")
+    times = Counter(name for photo in photos for name in photo.targets)
+    once = [name for name, count in times.items() if count == 1]
+    if once and len(photos) > 1:
+        listed = ", ".join(repr(name) for name in once[:10])
+        log.warning("photographs", f"targets that are in one photo only: {len(once)}: {listed}")
+    unseen = [name for name in (names or {}).values() if name not in times]
+    if unseen:
+        listed = ", ".join(repr(name) for name in unseen[:10])
+        log.warning(Path(wanted.names).name, f"listed but never read: {len(unseen)}: {listed}")
+    if wanted.what != "circles" and names is None:
+        chance = dictionary_of(wanted.dictionary).chance
+        if chance > CHANCE_TOLD:
+            expected = f"one of {1 / chance:.0f} black frames with anything inside is a code of it"
+            log.warning("dictionary", f"{expected}; give the list of ids that there are")

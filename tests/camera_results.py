@@ -1,0 +1,67 @@
+"""A plugin: results of each kind of the camera's analyses, with names to be shown literally."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from camera_sets import HOSTILE, SMALL, sets
+from networks import CONTROL_SD_M, photographed, tank_points
+from photographed_jobs import by_tape, control_of, measurements, tank_job
+
+from tankcal.camera_analysis.influence import plain as influence_json
+from tankcal.camera_analysis.influence.runs import influence
+from tankcal.camera_analysis.parameters import plain as parameters_json
+from tankcal.camera_analysis.parameters.analysing import analyse_job
+from tankcal.camera_analysis.product import plain as product_json
+from tankcal.camera_analysis.product.checking import check_product
+from tankcal.camera_analysis.product.limits import shipped_limits
+from tankcal.camera_analysis.stability import plain as stability_json
+from tankcal.camera_analysis.stability.comparing import compare
+from tankcal.job.measurements import AdjustmentSettings, Instrument
+
+CONTROL = tuple(f"P{i}" for i in range(1, 48, 6))
+
+
+@pytest.fixture(scope="session")
+def stability():
+    return stability_json.as_json(compare(sets(HOSTILE), "spr", grid=SMALL))
+
+
+@pytest.fixture(scope="session")
+def job(tmp_path_factory):
+    """A small tank photographed from all around, its points measured by tape, too."""
+    survey = photographed(3)[0]
+    control = control_of(survey, CONTROL, tank_points(), CONTROL_SD_M)
+    made = measurements(
+        survey, by_tape(survey, "tape 1"), control=control,
+        settings=AdjustmentSettings(snooping=False),
+        instruments=(Instrument("tape 1", "tape", u_scale=1e-4),),
+    )  # fmt: skip
+    return replace(tank_job(tmp_path_factory.mktemp("tank")), measurements=made)
+
+
+@pytest.fixture(scope="session")
+def parameters(job):
+    return parameters_json.as_json(analyse_job(job)[0])
+
+
+@pytest.fixture(scope="session")
+def run(job):
+    own = job.measurements.cameras[0]
+    other = replace(own, camera=replace(own.camera, name="=cmd", sd=np.full(13, np.nan)))
+    return influence_json.as_json(influence(job, (other,), ("fixed", "weighted")))
+
+
+@pytest.fixture(scope="session")
+def product():
+    rng = np.random.default_rng(3)
+    names = [f"<i>{number}</i>" for number in range(25)]
+    differences = rng.normal([0.2, 0.0, 0.0], 0.15, (25, 3))
+    return product_json.as_json(
+        check_product(differences, names=names, limits=shipped_limits(), expected_sd_m=(0.1,) * 3)
+    )
+
+
+@pytest.fixture(scope="session")
+def results(stability, parameters, run, product):
+    return {one["kind"]: one for one in (stability, parameters, run, product)}

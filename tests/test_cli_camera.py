@@ -1,0 +1,317 @@
+"""`tankcal camera …` as a user meets it: what is printed, exit status, what is refused."""
+
+import hashlib
+import json
+import shutil
+import tomllib
+
+import numpy as np
+import pytest
+
+import tankcal
+from tankcal.cli import main
+from tankcal.languages import LANGUAGES
+from tankcal.shipped import shipped
+
+SEVEN = shipped("examples") / "pessoa-2017" / "cameras.toml"
+PHOTOS = shipped("examples") / "silva-1995-photos"
+FILM = """
+[cameras.longer]
+format_mm = [180, 130]
+c_mm = 100.3
+convention = "correction_added"
+affinity = "both_y"
+s_c = 0.1
+"""
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory):
+    """The record of the shipped photographs, only adjusted."""
+    out = tmp_path_factory.mktemp("run") / "out"
+    assert main(["run", str(PHOTOS), "--only", "adjustment", "--out", str(out), "--quiet"]) == 0
+    return out / "record.json"
+
+
+def run(*arguments):
+    return main(["camera", *map(str, arguments), "--quiet"])
+
+
+def test_compare_prints_a_list_of_pairs(capsys):
+    assert run("compare", SEVEN, "--method", "zrot", "--as-published", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert len(found) == 21
+    assert list(found[0]) == ["a", "b", "method", "figure_px", "similar"]
+    assert found[-1] == {
+        "a": "set6", "b": "set7", "method": "zrot",
+        "figure_px": pytest.approx(9.50, abs=0.025),  # published: Pessoa 2017, table 13
+        "similar": False,
+    }  # fmt: skip
+
+
+def test_names_may_come_after_options(capsys):
+    assert (
+        run("compare", SEVEN, "--method", "rot", "--threshold", "2", "set1", "set2", "--json") == 0
+    )
+    assert [one["a"] for one in json.loads(capsys.readouterr().out)] == ["set1"]
+    with pytest.raises(SystemExit) as stop:
+        run("compare", SEVEN, "--methods", "rot")
+    assert stop.value.code == 2
+    with pytest.raises(SystemExit):
+        main(["run", "job", "another"])
+
+
+def test_compare_film_in_pixels_of_ones_own(tmp_path, capsys):
+    (tmp_path / "film.toml").write_text(FILM + FILM.replace("longer", "again"), encoding="utf-8")
+    assert run("compare", tmp_path / "film.toml", "--json") == 2
+    assert "pixel_um" in capsys.readouterr().err
+    assert run("compare", tmp_path / "film.toml", "--pixel-um", "10", "--json") == 0
+    assert json.loads(capsys.readouterr().out)[0]["figure_px"] == 0
+
+
+def test_compare_chosen_ones_by_another_threshold(capsys):
+    arguments = ("set3", "set7", "--method", "spr", "--terrain", "II", "--threshold", "0.33")
+    assert run("compare", SEVEN, *arguments) == 0
+    printed = capsys.readouterr().out
+    assert "SPR" in printed
+    assert "0.33 px" in printed
+    assert "set1" not in printed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("sett3",), "did you mean set3?"),
+        (("set1",), "1 calibration; expected two or more"),
+        (("--grid", "46x35"), "--grid"),
+        (("--terrain", "III"), "--terrain"),
+        (("--seed", "-3"), "--seed"),
+    ],
+)
+def test_what_cannot_be_compared_is_told(arguments, words, capsys):
+    assert run("compare", SEVEN, *arguments) == 2
+    told = capsys.readouterr()
+    assert words in told.err
+    assert told.out == ""
+
+
+def test_compare_writes_its_papers_and_refuses_foreign_folders(tmp_path, capsys):
+    out = tmp_path / "papers"
+    assert run("compare", SEVEN, "set1", "set2", "--grid", "6x5,300,300,700", "--out", out) == 0
+    names = {path.name for path in out.iterdir()}
+    assert {"camera.json", "pairs.csv", "report.pdf", "report.html", "report.ipynb"} <= names
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("mine", encoding="utf-8")
+    assert run("compare", SEVEN, "--out", tmp_path / "mine") == 2
+    assert "notes.txt" in capsys.readouterr().err
+
+
+def test_parameters_of_a_record(record, capsys):
+    assert run("parameters", record, "--json", "--alpha", "0.1") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["kind"] == "parameters"
+    assert found["alpha"] == 0.1
+    assert [one["name"] for one in found["parameters"]][:3] == ["c", "x0", "y0"]
+    assert found["with_all"] is None
+    assert run("parameters", record) == 0
+    assert "Nothing was adjusted again" in " ".join(capsys.readouterr().out.split())
+
+
+def in_spanish(folder):
+    """The shipped photographs as a job that asks for papers in Spanish."""
+    job = shutil.copytree(PHOTOS, folder / "job")
+    text = (job / "job.toml").read_text(encoding="utf-8")
+    written = text.replace("[table]", '[table]\nlanguage = "es"')
+    (job / "job.toml").write_text(written, encoding="utf-8")
+    return job
+
+
+def test_tables_are_in_the_language_that_the_job_asks_for(tmp_path, capsys):
+    job = in_spanish(tmp_path)
+    assert run("parameters", job, "--no-trials") == 0
+    assert "Grados de libertad" in capsys.readouterr().out
+    assert run("parameters", job, "--no-trials", "--language", "pt-BR") == 0
+    assert "Graus de liberdade" in capsys.readouterr().out
+
+
+def test_tables_are_in_the_language_that_the_record_asks_for(record, tmp_path, capsys):
+    found = json.loads(record.read_text(encoding="utf-8"))
+    found["job"]["table"] = {"language": "pt-BR"}
+    (tmp_path / "record.json").write_text(json.dumps(found), encoding="utf-8")
+    assert run("parameters", tmp_path / "record.json") == 0
+    assert "Graus de liberdade" in capsys.readouterr().out
+    assert run("parameters", record) == 0
+    assert "Degrees of freedom" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("what", ["parameters", "compare", "influence", "check"])
+def test_every_analysis_refuses_a_language_without_words(what, capsys):
+    more = ("--cameras", SEVEN) if what == "influence" else ()
+    with pytest.raises(SystemExit) as stop:
+        run(what, SEVEN, *more, "--language", "fr")
+    assert stop.value.code == 2
+    told = capsys.readouterr().err
+    assert "--language" in told
+    assert "pt-BR" in told
+
+
+def test_parameters_without_photographs(capsys):
+    assert run("parameters", shipped("examples") / "total-station") == 2
+    assert "no photographs" in capsys.readouterr().err
+
+
+def test_several_sets_are_refused_before_the_work(tmp_path, capsys, monkeypatch):
+    job = tmp_path / "job"
+    job.mkdir()
+    for file in PHOTOS.iterdir():
+        if file.is_file():
+            (job / file.name).write_bytes(file.read_bytes())
+    text = (job / "job.toml").read_text(encoding="utf-8")
+    own = '\n[adjustment.camera]\nx0 = "photo free"\n'
+    (job / "job.toml").write_text(text + own, encoding="utf-8")
+    monkeypatch.setattr("tankcal.camera_analysis.parameters.analysing.adjust_job", None)
+    assert run("parameters", job, "--out", tmp_path / "out") == 2
+    assert "there are 11 sets of parameters" in capsys.readouterr().err
+
+
+def test_parameters_of_a_job_without_trials(capsys):
+    assert run("parameters", PHOTOS, "--no-trials", "--json") == 0
+    assert len(json.loads(capsys.readouterr().out)["without"]) > 10
+
+
+def test_influence_of_a_film_camera(tmp_path, capsys):
+    (tmp_path / "cameras.toml").write_text(FILM, encoding="utf-8")
+    arguments = ("--cameras", tmp_path / "cameras.toml", "--states", "fixed", "--json")
+    assert run("influence", PHOTOS, *arguments) == 0
+    found = json.loads(capsys.readouterr().out)
+    labels = [one["label"] for one in found["runs"]]
+    assert labels == ["reference", "longer, fixed"]
+    sigma0 = [one["quality"]["sigma0"] for one in found["runs"]]
+    assert sigma0[1] > 1.05 * sigma0[0]
+    assert found["runs"][1]["volume"]["volume_m3"] == pytest.approx(1249.6, abs=0.5)
+
+
+def test_influence_needs_states_that_are_some():
+    with pytest.raises(SystemExit) as stop:
+        run("influence", PHOTOS, "--cameras", SEVEN, "--states", "held")
+    assert stop.value.code == 2
+
+
+def test_check_of_a_file(tmp_path, capsys):
+    file = tmp_path / "differences.csv"
+    rows = [f"P{i},{0.01 * (i % 3)},{0.02 * (i % 2)},{0.05 + 0.01 * (i % 4)}" for i in range(12)]
+    file.write_text("\n".join(["point,dx_m,dy_m,dz_m", *rows]), encoding="utf-8")
+    assert run("check", file, "--scale", "1000", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["kind"] == "product"
+    assert (
+        {one["scale"] for one in found["table"]["verdicts"]} == {"1000"}
+        if ("verdicts" in (found["table"] or {}))
+        else found["n"] == 12
+    )
+    assert run("check", file, "--scale", "1500") == 2
+    assert "found no scale 1500" in capsys.readouterr().err
+
+
+def test_json_has_codes_in_every_language(tmp_path, capsys):
+    file = tmp_path / "d.csv"
+    file.write_text("point,dx_m\nA,0.01\nB,-0.02\nC,0.005\n", encoding="utf-8")
+    printed = []
+    for language in LANGUAGES:
+        assert run("check", file, "--json", "--language", language) == 0
+        printed.append(capsys.readouterr().out)
+    assert len(set(printed)) == 1
+
+
+def test_check_of_a_record_without_check_points(record, capsys):
+    assert run("check", record) == 2
+    assert "no check points" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("form", ["opencv", "opencv-json", "metashape", "aicon", "colmap", "pix4d"])
+def test_convert_there_and_back(form, tmp_path, capsys):
+    """Property: a camera that another program can hold comes back as the same images."""
+    there, back = tmp_path / f"camera.{form}", tmp_path / "cameras.toml"
+    source = tmp_path / "plain.toml"
+    source.write_text(
+        "[cameras.lens]\nformat_px = [6000, 4000]\npixel_um = 4\nc_mm = 24\nx0_mm = 0.1\n"
+        'K1 = -1e-4\nP1 = 2e-6\nconvention = "distortion_of_ideal"\n',
+        encoding="utf-8",
+    )
+    assert main(["camera", "convert", str(source), "--to", form, "--out", str(there)]) == 0
+    kind = form.removesuffix("-json")
+    sizes = ["--pixel-um", "4", "--size-px", "6000", "4000", "--from", kind]
+    command = ["camera", "convert", str(there), "--to", "cameras.toml", "--out", str(back), *sizes]
+    assert main(command) == 0
+    assert "fitted" not in capsys.readouterr().err
+    both = tmp_path / "both.toml"
+    name = back.read_text(encoding="utf-8").split("\n", 1)[0].split(".")[1].rstrip("]")
+    text = back.read_text(encoding="utf-8").replace(f"cameras.{name}]", "cameras.back]")
+    both.write_text(source.read_text(encoding="utf-8") + text, encoding="utf-8")
+    assert run("compare", both, "--method", "zrot", "--json") == 0
+    assert json.loads(capsys.readouterr().out)[0]["figure_px"] < 1e-9
+
+
+def test_convert_a_record_of_film(record, capsys):
+    assert main(["camera", "convert", str(record), "--to", "cameras.toml"]) == 2
+    assert "--pixel-um" in capsys.readouterr().err
+    arguments = ["camera", "convert", str(record), "--to", "cameras.toml", "--pixel-um", "10"]
+    assert main(arguments) == 0
+    camera = tomllib.loads(capsys.readouterr().out)["cameras"]["UMK"]
+    (kept,) = json.loads(record.read_text(encoding="utf-8"))["adjustment"]["cameras"]
+    assert camera["c_mm"] == kept["values"][0]  # every digit of what the record holds
+    adjusted = tankcal.adjust_job(tankcal.load(PHOTOS, only="adjustment")).adjusted
+    assert camera["c_mm"] == pytest.approx(adjusted.camera(0)[0]["c"], rel=1e-12)
+    assert camera["s_K3"] > 0
+
+
+def test_convert_keeps_a_file_that_is_there(tmp_path, capsys):
+    target = tmp_path / "kept.xml"
+    target.write_text("mine", encoding="utf-8")
+    arguments = ["camera", "convert", str(SEVEN), "--name", "set1", "--to", "metashape"]
+    assert main([*arguments, "--out", str(target)]) == 2
+    assert "exists" in capsys.readouterr().err
+    assert target.read_text(encoding="utf-8") == "mine"
+    arguments[4] = "set9"
+    assert main(arguments) == 2
+    assert "expected one of set1, set2" in capsys.readouterr().err
+
+
+def test_targets_of_a_photograph(tmp_path, capsys):
+    cv2 = pytest.importorskip("cv2", reason="no OpenCV here: pip install 'tankcal[images]'")
+    from tankcal.targets import target_image
+
+    image = np.full((300, 300), 200, dtype=np.uint8)
+    image[100:205, 80:185] = target_image("DICT_5X5_100", 17, 105, 0)
+    blurred = cv2.GaussianBlur(image, None, 1.0)
+    cv2.imwrite(str(tmp_path / "P1.png"), blurred)
+    out = tmp_path / "image_points.csv"
+    assert run("read", tmp_path / "P1.png", "--out", out) == 0
+    assert "1 target, 4 image points in 1 photo; refused: 0" in capsys.readouterr().out
+    rows = out.read_text(encoding="utf-8").splitlines()
+    assert rows[0].startswith("photo,point,column_px,line_px")
+    first = rows[1].split(",")
+    assert first[:2] == ["P1", "17-1"]
+    assert [float(value) for value in first[2:4]] == pytest.approx([79.5, 99.5], abs=0.02)
+    assert run("read", tmp_path / "P1.png", "--out", out) == 2
+    assert "is there already" in capsys.readouterr().err
+    cv2.imwrite(str(tmp_path / "P2.jpg"), blurred)
+    assert run("read", tmp_path / "P2.jpg", "--out", out, "--replace") == 0
+    assert "taken as sRGB" in capsys.readouterr().err
+
+
+def test_papers_say_what_they_were_made_from(tmp_path):
+    out = tmp_path / "papers"
+    assert run("compare", SEVEN, "set1", "set2", "--grid", "6x5,300,300,700", "--out", out) == 0
+    found = json.loads((out / "camera.json").read_text(encoding="utf-8"))["made_from"]
+    digest = hashlib.sha256(SEVEN.read_bytes()).hexdigest()
+    assert found["files"] == [{"file": "cameras.toml", "sha256": digest}]
+    assert digest in (out / "report.html").read_text(encoding="utf-8")
+
+
+def test_check_of_a_file_as_excel_writes_it_in_brazil(tmp_path, capsys):
+    file = tmp_path / "d.csv"
+    file.write_text("point;dx_m\nA;0,01\nB;-0,02\nC;0,005\n", encoding="utf-8")
+    assert run("check", file) == 2
+    assert run("check", file, "--separator", ";", "--decimal", ",", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["n"] == 3
