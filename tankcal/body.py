@@ -5,14 +5,17 @@ input that several parts share (a scale, the table's zero) moves all of them at 
 column of the covariance, the sum of their derivatives times its standard uncertainty.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from tankcal.uncertainty import Source, factor_of
+from tankcal.measured import Above
+from tankcal.uncertainty import Source, declared_source, factor_of, grouped
 from tankcal.volumes import ShellVolume
 
 OWN_SCALE = "instrument_scale"  # kind of a cause that stands for the input "scale"
+MEASURED = ("diameter", "length", "end_depth", "dip_position", "plate_thickness")  # at its warmth
+LEVELS = 9  # from empty to full, at which inputs are asked whether they move the volume
 LEAST_SHARE = 1e-6  # rounding of the share that a named cause has in the covariance
 
 
@@ -22,7 +25,7 @@ class Factor:
 
     kind        "points", "form", "own_form", or what a named cause is ("instrument_scale")
     columns     (f, c) factor of the covariance of a shell's features or of a solid's inputs
-    dof, u, unit, type, note  as in `uncertainty.Source`
+    dof, u, unit, type, note, contrasts  as in `uncertainty.Source`
     """
 
     kind: str
@@ -32,11 +35,19 @@ class Factor:
     unit: str | None = None
     type: str = "A"
     note: str = ""
+    contrasts: float = np.inf
 
     def source(self, columns_m3):
         """The `Source` of (rows, c) columns that its own columns make in a table."""
         return Source(
-            self.kind, columns_m3, self.dof, self.u, self.unit, type=self.type, note=self.note
+            self.kind,
+            columns_m3,
+            self.dof,
+            self.u,
+            self.unit,
+            type=self.type,
+            note=self.note,
+            contrasts=self.contrasts,
         )
 
 
@@ -81,6 +92,7 @@ class ShellPart:
     stretch          of heights, by temperature; 1 where heights are not corrected
     bearing          which of the inputs "plate_thickness", "paint", "shell_temperature" and
                      "expansion" were used
+    tilt             of the axis, m/m
     """
 
     volume: ShellVolume
@@ -89,6 +101,7 @@ class ShellPart:
     expansion_per_k: float
     stretch: float = 1.0
     bearing: tuple[str, ...] = ()
+    tilt: float = 0.0
 
     def volume_m3(self, levels_m):
         """(rows,) volume of the shell below each level."""
@@ -99,10 +112,12 @@ class ShellPart:
         return self.volume.area_m2(np.maximum(levels_m, 0.0)) * (np.asarray(levels_m) >= 0)
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} m3 per SI unit.
+        """{input: (rows,)} m3 per SI unit; of "course_heights" (rows, courses), each its own.
 
         "barrel" is the same in all courses, for in a real tank they had one sign. "scale"
-        multiplies the surveyed lengths square to the axis, "datum" lifts the table's zero.
+        multiplies the surveyed lengths square to the axis, "offset" adds to every surveyed radius,
+        "datum" lifts the table's zero. "tilt" leans the shell as surveyed: the horizontal cut is
+        sqrt(1 + m^2) times the one square to the axis.
         """
         wet = np.maximum(levels_m, 0.0)
         features = self.volume.features, self.volume.girth_features, self.volume.scale_features
@@ -120,7 +135,10 @@ class ShellPart:
         return {
             "scale": by_scale,
             "datum": area,
-            "barrel": self.volume.by_barrel_m2(wet).sum(axis=1),
+            "offset": loss,
+            "barrel": self.volume.by_common_barrel_m2(wet),
+            "course_heights": self.volume.by_course_heights_m2(wet),
+            "tilt": volume * self.tilt / (1 + self.tilt**2),
             **{name: of_corrections[name] for name in self.bearing},
         }
 
@@ -164,12 +182,15 @@ class SolidPart:
         return self.solid.area_m2(levels_m)
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} m3 per SI unit: those of the solid, and of its temperature."""
+        """{input: (rows,)} m3 per SI unit: those of the solid as measured, and its temperature."""
         found = self.solid.derivatives(levels_m)
+        found |= {name: self.scale * found[name] for name in MEASURED if name in found}
         if self.warmed:
             by_length = found["scale"] / self.scale
             found["shell_temperature"] = -self.expansion_per_k * by_length
             found["expansion"] = (self.scale - 1) / self.expansion_per_k * by_length
+        if "diameter" in self.surveyed:
+            found["offset"] = 2 * found["diameter"]
         without = {*self.unused, *self.surveyed}
         return {name: one for name, one in found.items() if name not in without}
 
@@ -187,10 +208,13 @@ class SolidPart:
 class Body:
     """The parts of a tank together.
 
-    declared            inputs with name, u (SI), u_as_read, unit, type, distribution, dof, note
+    declared            inputs with name, u (SI), u_as_read, unit, type, distribution, dof, note,
+                        is_default
     lowest_m, highest_m levels between which there is a tank, in the frame of the parts
     kinks_m             levels at which the free surface jumps: joints, edges of what stands or
                         floats inside
+    correlations        (name, name, r) of declared inputs
+    estimates           {name of an input: its value, in the unit it is declared in}
     """
 
     parts: tuple
@@ -198,6 +222,8 @@ class Body:
     lowest_m: float
     highest_m: float
     kinks_m: tuple[float, ...] = ()
+    correlations: tuple = ()
+    estimates: dict = field(default_factory=dict)
 
     @property
     def shell(self):
@@ -213,57 +239,83 @@ class Body:
         """(rows,) derivative of the volume by the level: the free surface."""
         return sum(part.area_m2(levels_m) for part in self.parts)
 
+    def derivatives(self, levels_m):
+        """{input: (rows,) or (rows, c)} of all parts together, m3 per SI unit."""
+        return summed(part.derivatives(levels_m) for part in self.parts)
+
+    def moved_m3(self, levels_m, step_m):
+        """(rows,) volumes when the table's zero stands step_m higher, a number or (rows,).
+
+        What is declared by dips (deadwood, a roof, volumes measured by liquid) goes with the zero.
+        Never below empty; above the top the tank goes on as wide as it is there.
+        """
+        levels = np.asarray(levels_m, dtype=float)
+        return sum(self._moved(part, levels, step_m) for part in self.parts)
+
+    def _moved(self, part, levels_m, step_m):
+        if "datum" not in part.derivatives(levels_m[:1]):
+            return part.volume_m3(levels_m)
+        if isinstance(part, Above):
+            upper = np.maximum(levels_m, part.level_m)
+            lower = np.full(len(levels_m), part.level_m)
+            return self._moved(part.part, upper, step_m) - self._moved(part.part, lower, step_m)
+        moved = levels_m + step_m
+        inside = np.clip(moved, self.lowest_m, self.highest_m)
+        over = np.maximum(moved - self.highest_m, 0.0)
+        volume = part.volume_m3(inside)
+        if not np.any(over):
+            return volume
+        return volume + over * part.area_m2(np.array([self.highest_m]))[0]
+
     def undeclared(self):
-        """Names of the inputs that move the volume of the full tank and have no declared u.
+        """Names of the inputs that move some volume of the tank and have no declared u.
 
         The scale of an instrument that was adjusted along stands for the scale of the survey.
         """
-        top = np.array([self.highest_m])
-        moved = {}
-        for part in self.parts:
-            for name, derivative in part.derivatives(top).items():
-                moved[name] = moved.get(name, 0.0) + np.abs(derivative).max()
+        moved = self.derivatives(np.linspace(self.lowest_m, self.highest_m, LEVELS))
         known = {one.name for one in self.declared}
         factors = [one for part in self.parts for one in getattr(part, "factors", ())]
         if any(one.kind == OWN_SCALE for one in factors):
             known.add("scale")
-        return tuple(name for name, size in moved.items() if size > 0 and name not in known)
+        return tuple(
+            name
+            for name, by in moved.items()
+            if np.abs(by).max(initial=0.0) > 0 and name not in known
+        )
 
     def sources(self, levels_m):
         """One `Source` for each cause of uncertainty: the parts' own, then what was declared."""
-        return self._sources(levels_m, [part.derivatives(levels_m) for part in self.parts])
+        return self._sources(levels_m, self.derivatives(levels_m))
 
     def rows(self, levels_m):
         """(volumes, areas, sources) of a table, each as its own method gives it, at one go.
 
-        The derivative by "datum" is that by the level, so it serves as the area, too.
+        The derivative by "datum" is that by the level, so it serves as the area, too; not that of
+        a part that counts from a level up, which goes with the zero.
         """
         derivatives = [part.derivatives(levels_m) for part in self.parts]
         area = sum(
-            found["datum"] if "datum" in found else part.area_m2(levels_m)
+            found["datum"]
+            if "datum" in found and not isinstance(part, Above)
+            else part.area_m2(levels_m)
             for part, found in zip(self.parts, derivatives, strict=True)
         )
-        return self.volume_m3(levels_m), area, self._sources(levels_m, derivatives)
+        return self.volume_m3(levels_m), area, self._sources(levels_m, summed(derivatives))
 
     def _sources(self, levels_m, derivatives):
         own = [source for part in self.parts for source in part.sources(levels_m)]
-        for one in self.declared:
-            columns = [given[one.name] for given in derivatives if one.name in given]
-            if columns:
-                own.append(_declared_source(one, sum(columns)))
-        return tuple(own)
+        alone = {
+            one.name: declared_source(one, derivatives[one.name], self.estimates.get(one.name))
+            for one in self.declared
+            if one.name in derivatives
+        }
+        return (*own, *grouped(alone, self.correlations))
 
 
-def _declared_source(one, derivative):
-    """The source of a declared input, from the (rows,) derivative by it."""
-    columns = np.asarray(derivative, dtype=float)[:, None] * one.u
-    return Source(
-        one.name,
-        columns,
-        one.dof,
-        one.u_as_read,
-        one.unit,
-        one.type,
-        one.distribution,
-        one.note,
-    )
+def summed(derivatives):
+    """{input: sum} of what several parts give by each input."""
+    total = {}
+    for found in derivatives:
+        for name, by in found.items():
+            total[name] = total[name] + by if name in total else by
+    return total

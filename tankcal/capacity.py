@@ -6,11 +6,14 @@ Source: JCGM 100:2008 5.2, JCGM 102:2011 6.2; degrees of freedom by Welch-Satter
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from tankcal.errors import HeightError
 from tankcal.uncertainty import Source, coverage_factor, effective_dof
+
+SAME_ROW = 1e-9  # of a weight: a dip this near to a row is that row
 
 
 @dataclass(frozen=True)
@@ -43,30 +46,35 @@ class Capacity:
     probability: float
     critical_m: tuple[float, float] | None = None
 
-    @property
+    @cached_property
     def factor_m3(self):
         """(rows, inputs) factor of the covariance of all rows."""
         return np.hstack([np.empty((len(self.height_m), 0)), *(s.columns_m3 for s in self.sources)])
 
-    @property
+    @cached_property
     def u_m3(self):
         """(rows,) standard uncertainty of each volume."""
-        return np.sqrt(np.sum(self.factor_m3**2, axis=1))
+        return np.linalg.norm(self._by_source, axis=1)
 
-    @property
+    @cached_property
     def dof(self):
         """(rows,) effective degrees of freedom, inf where only such inputs contribute."""
-        return self._dof_of([source.columns_m3 for source in self.sources])
+        return effective_dof(self._by_source, self._dof_by_source)
 
-    @property
+    @cached_property
     def k(self):
         """(rows,) coverage factor."""
         return coverage_factor(self.probability, self.dof)
 
-    @property
+    @cached_property
     def U_m3(self):
         """(rows,) expanded uncertainty k u."""
         return self.k * self.u_m3
+
+    @cached_property
+    def _by_source(self):
+        """(rows, sources) standard uncertainty of each volume by each source."""
+        return _norms([source.columns_m3 for source in self.sources], len(self.height_m))
 
     def at(self, height_m):
         """The volume at a dip, interpolated linearly between rows as a gauge does.
@@ -92,31 +100,48 @@ class Capacity:
         return (height_m <= low) | (height_m >= high)
 
     def _combined(self, terms):
-        weights = sum(sign * self._row_weights(height) for height, sign in terms)
+        weights = sum(sign * self.weights([height])[0] for height, sign in terms)
         columns = [(weights @ source.columns_m3)[None, :] for source in self.sources]
-        u = float(np.sqrt(sum(np.sum(column**2) for column in columns)))
-        dof = float(self._dof_of(columns)[0])
+        by_source = _norms(columns, 1)
+        u = float(np.linalg.norm(by_source))
+        dof = float(effective_dof(by_source, self._dof_by_source)[0])
         k = float(coverage_factor(self.probability, dof))
         for_use = bool(np.all(self.for_use([height for height, _ in terms])))
         return Quantity(float(weights @ self.volume_m3), u, dof, k, k * u, for_use)
 
-    def _row_weights(self, height_m):
+    def weights(self, heights_m):
+        """(n, rows) by which the rows give the volumes at n dips: linear between two rows.
+
+        The top of the shell rounded to a millimetre counts as the top. Raises HeightError outside
+        the table.
+        """
+        dips = np.asarray(heights_m, dtype=float)
         first, last = self.height_m[0], self.height_m[-1]
-        if last < height_m <= round(last, 3):
-            height_m = last  # a dip is read to the millimetre, the shell ends a little below it
-        if not first <= height_m <= last:
+        dips = np.where((dips > last) & (dips <= round(last, 3)), last, dips)
+        outside = ~((dips >= first) & (dips <= last))
+        if np.any(outside):
             raise HeightError(
-                f"height {height_m:g} m is outside the capacity table ({first:g} to {last:g} m)"
+                f"height {dips[outside][0]:g} m is outside the capacity table "
+                f"({first:g} to {last:g} m)"
             )
-        upper = min(max(int(np.searchsorted(self.height_m, height_m)), 1), len(self.height_m) - 1)
+        upper = np.clip(np.searchsorted(self.height_m, dips), 1, len(self.height_m) - 1)
         below, above = self.height_m[upper - 1], self.height_m[upper]
-        part = (height_m - below) / (above - below)
-        weights = np.zeros(len(self.height_m))
-        weights[upper - 1], weights[upper] = 1 - part, part
+        part = (dips - below) / (above - below)
+        weights = np.zeros((len(dips), len(self.height_m)))
+        row = np.arange(len(dips))
+        weights[row, upper - 1], weights[row, upper] = 1 - part, part
         return weights
 
-    def _dof_of(self, columns):
-        if not columns:
-            return np.full(len(self.height_m), np.inf)
-        by_source = np.column_stack([np.sqrt(np.sum(c**2, axis=1)) for c in columns])
-        return effective_dof(by_source, [source.dof for source in self.sources])
+    def rows_of(self, height_m):
+        """Numbers of the rows that a dip is read from: its own, or the two that it lies between."""
+        return np.flatnonzero(self.weights([height_m])[0] > SAME_ROW)
+
+    @property
+    def _dof_by_source(self):
+        return [source.dof for source in self.sources]
+
+
+def _norms(columns, rows):
+    """(rows, n) norm of each row of n arrays (rows, c), each with its own c."""
+    norms = [np.sqrt(np.einsum("ij,ij->i", one, one)) for one in columns]
+    return np.reshape(norms, (len(columns), rows)).T

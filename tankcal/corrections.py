@@ -6,8 +6,11 @@ import numpy as np
 
 from tankcal.hydrostatics import STANDARD_GRAVITY
 from tankcal.job import Switches
+from tankcal.messages import message
 from tankcal.tanks import body_of, thermal_scale
 
+INSIDE_PLATE = message("inside_plate", "r_inside = r − t")
+INSIDE_PAINT = message("inside_paint", "r_inside = r − t − paint")
 NONE = Switches(**{field.name: field.name == "tilt" for field in fields(Switches)})
 
 
@@ -64,7 +67,8 @@ def _tilt(job, wall, volume, formula, source):
 def _known(job, survey):
     """(code, whether it bears on the job, formula, source) of each correction, in their order."""
     of_shell = _of_shell(job, survey) if job.tank.kind == "vertical" else ()
-    deadwood = ("deadwood", bool(job.deadwood), "sum of the declared volumes", "ISO 7507-1")
+    declared = message("sum_of_volumes", "sum of the declared volumes")
+    deadwood = ("deadwood", bool(job.deadwood), declared, "ISO 7507-1")
     return [*_of_lengths(job), *of_shell, deadwood]
 
 
@@ -72,39 +76,51 @@ def _of_lengths(job):
     outside = job.survey.side == "outside"
     solid = job.horizontal or job.sphere
     plates = any(c.thickness_m for c in job.courses) or (solid and solid.thickness_m)
-    scale = thermal_scale(job, Switches())
-    lengths = (
-        "all lengths" if job.table.height_expansion or not job.courses else "horizontal lengths"
-    )
     return (
-        ("plate", outside and bool(plates), "r_inside = r - t", "ISO 7507-1"),
+        ("plate", outside and bool(plates), INSIDE_PLATE, "ISO 7507-1"),
         (
             "paint",
             outside and any(c.paint_m for c in job.courses),
-            "r_inside = r - t - paint",
+            INSIDE_PAINT,
             "ISO 7507-1",
         ),
         (
             "temperature",
             job.survey.shell_temperature_c is not None,
-            f"{lengths} times 1 + a (T_ref - T_shell) = {scale:.8f}",
+            _thermal_formula(job),
             "ISO 7507-1",
         ),
     )
 
 
+def _thermal_formula(job):
+    scale = thermal_scale(job, Switches())
+    if job.table.height_expansion or not job.courses:
+        template = "all lengths times 1 + α (T_ref − T_shell) = {scale:.8f}"
+        return message("all_lengths", template, scale=scale)
+    template = "horizontal lengths times 1 + α (T_ref − T_shell) = {scale:.8f}"
+    return message("horizontal_lengths", template, scale=scale)
+
+
 def _of_shell(job, wall):
     survey, table, roof = job.survey, job.table, job.roof
-    head = (
-        f"dr = rho g (h - z) r^2/(E t), g = {STANDARD_GRAVITY} m/s2; "
-        f"table {table.liquid_density_kg_m3:g} kg/m3, survey "
-        f"{survey.liquid_density_kg_m3 or 0:g} kg/m3 to {survey.liquid_level_m or 0:g} m"
+    head = message(
+        "liquid_head",
+        "Δr = ρ g (h − z) r²/(E t), g = {g_m_s2:g} m/s²; table {table_kg_m3:g} kg/m³, survey"
+        " {survey_kg_m3:g} kg/m³ to {level_m:g} m",
+        g_m_s2=STANDARD_GRAVITY,
+        table_kg_m3=table.liquid_density_kg_m3,
+        survey_kg_m3=survey.liquid_density_kg_m3 or 0,
+        level_m=survey.liquid_level_m or 0,
     )
     return (
         (
             "tilt",
             bool(wall.shell.tilt),
-            "horizontal cut: area of the cut square to the axis times sqrt(1 + m^2); contained",
+            message(
+                "horizontal_cut",
+                "horizontal cut: area of the cut square to the axis times √(1 + m²); contained",
+            ),
             "ISO 7507-1",
         ),
         (
@@ -119,12 +135,20 @@ def _of_shell(job, wall):
 
 
 BOTTOM_FORMULAS = {
-    "flat": "none",
-    "leaning": "plane square to the leaning axis of the shell",
-    "cone": "pi r^2 H/3 for a round shell; the shell's own outline is taken",
-    "dish": "pi H (3 r^2 + H^2)/6 for a round shell; the shell's own outline is taken",
-    "points": "volume between the surveyed surface and the plane of the bottom of the shell",
-    "liquid": "measured volumes up to the highest measured level, increments of the shell above it",
+    "flat": "",
+    "leaning": message("leaning_bottom", "plane square to the leaning axis of the shell"),
+    "cone": message("cone_bottom", "π r² H/3 for a round shell; the shell's own outline is taken"),
+    "dish": message(
+        "dish_bottom", "π H (3 r² + H²)/6 for a round shell; the shell's own outline is taken"
+    ),
+    "points": message(
+        "surveyed_bottom",
+        "volume between the surveyed surface and the plane of the bottom of the shell",
+    ),
+    "liquid": message(
+        "measured_bottom",
+        "measured volumes up to the highest measured level, increments of the shell above it",
+    ),
 }
 
 
@@ -133,4 +157,4 @@ def _roof_formula(roof):
         return ""
     if roof.weighing == "vacuum":
         return "-m/rho_ref"
-    return "-m (1 - 1.2/8000)/(rho_ref - 1.2), weighed in air"
+    return message("roof_in_air", "−m (1 − 1.2/8000)/(ρ_ref − 1.2), weighed in air")

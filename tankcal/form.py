@@ -22,6 +22,8 @@ class Form:
     own_m2      of what each course has of its own
     rising_m2   of what grows from the middle of a course, -1 at its bottom to +1 at its top
     common_dof, own_dof   degrees of freedom of the first two
+    common_contrasts, own_contrasts  residuals that they were estimated from, noise and all: more
+                          than the degrees of freedom where much of what they show is noise
     """
 
     common_m2: float = 0.0
@@ -29,6 +31,8 @@ class Form:
     rising_m2: float = 0.0
     common_dof: float = np.inf
     own_dof: float = np.inf
+    common_contrasts: float = np.inf
+    own_contrasts: float = np.inf
 
     @property
     def level_m2(self):

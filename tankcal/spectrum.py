@@ -35,7 +35,7 @@ def estimate_form(samples, noise=1.0):
     evidence = _evidence(courses, noise)
     amplitudes = _most_likely(evidence, np.array([True, len(names) > 1, _rises(courses)]))
     dof = _degrees_of_freedom(evidence, amplitudes, len(names))
-    return Form(*map(float, amplitudes), *map(float, dof))
+    return Form(*map(float, amplitudes), *map(float, dof), *_contrasts(evidence))
 
 
 def _rises(courses):
@@ -54,6 +54,7 @@ class _Evidence:
     columns  free columns, the directions of a common form of amplitude one that are followed
              through all courses, and last the radii
     free     number of the free columns; filled (courses, free) one where a course has fewer
+    counts   (courses,) radii less free columns
     level    covariance of the radii by a form of amplitude one; finer: by the directions that are
              not followed; rising: by a rising form of amplitude one
     """
@@ -64,6 +65,7 @@ class _Evidence:
     level: np.ndarray
     finer: np.ndarray
     rising: np.ndarray
+    counts: np.ndarray
 
 
 def _evidence(courses, noise):
@@ -94,6 +96,7 @@ def _evidence(courses, noise):
         level=_gram(columns[1]) + finer,
         finer=finer,
         rising=_gram(filled(rising, MOST_FOLLOWED)),
+        counts=np.array([len(one) for one in radii]) - counts,
     )
 
 
@@ -220,3 +223,9 @@ def _degrees_of_freedom(evidence, amplitudes, courses):
             slopes.append(factor * size * _misfit(evidence, moved)[1][index])
         found.append(max((slopes[1] - slopes[0]) / (2 * LOG_STEP), 1.0))
     return found
+
+
+def _contrasts(evidence):
+    """Residuals that tell of the common form, one set of them, and of the own form, the others."""
+    common = float(evidence.counts.max())
+    return common, max(float(evidence.counts.sum()) - common, 1.0)

@@ -11,7 +11,7 @@ room count from the bottom of the first course, in metres.
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -38,6 +38,12 @@ class ShellVolume:
         return self.courses[-1].top_m
 
     @property
+    def joint_steps_m2(self):
+        """(courses - 1,) area just below each joint less the area just above it."""
+        polynomials = self._by_height(self.features)
+        return np.array([below.sum() - above[0] for below, above in pairwise(polynomials)])
+
+    @property
     def form_m2(self):
         """(f, modes) effect on the features of one sd of each mode of the common form."""
         return np.vstack([course.upper("by_form_m2") for course in self.courses])
@@ -51,17 +57,17 @@ class ShellVolume:
             factors.append(factor_of(effect @ effect.T))
         return scipy.linalg.block_diag(*factors)
 
-    @property
+    @cached_property
     def features(self):
         """(f,) the products that every volume is a sum of, m2."""
         return np.concatenate([course.upper("products_m2") for course in self.courses])
 
-    @property
+    @cached_property
     def girth_features(self):
         """(f,) what the features lose by metre of inset, m."""
         return np.concatenate([course.upper("girths_m") for course in self.courses])
 
-    @property
+    @cached_property
     def scale_features(self):
         """(f,) derivative of the features by a scale of the surveyed lengths, m2."""
         return np.concatenate([course.upper("by_scale_m2") for course in self.courses])
@@ -116,16 +122,24 @@ class ShellVolume:
         barrels of u = 4 mm and one section at mid-height are 145 ppm of the volume of 8 courses of
         radius 6.5 m: 2 u / (3 R sqrt(8)).
         """
-        polynomials = []
-        for index, course in enumerate(self.courses):
-            powers = _height_polynomials(course.degree)
-            missed = np.array([0.0, 4.0, -4.0])  # the unit barrel, less what is shown of it
-            missed[: course.degree + 1] -= powers @ course.barrel
-            girth = powers @ np.diag(course.girths_m)
-            polynomial = np.zeros((course.degree + 3, len(self.courses)))
-            polynomial[:, index] = np.convolve(girth, missed)
-            polynomials.append(polynomial)
+        alone = np.eye(len(self.courses))
+        polynomials = [np.outer(*pair) for pair in zip(self._missed_m, alone, strict=True)]
         return self._integral(heights_m, polynomials)
+
+    def by_common_barrel_m2(self, heights_m):
+        """(rows,) derivative of the volume below each height by one barrel of all courses."""
+        return self._integral(heights_m, self._missed_m)
+
+    def by_course_heights_m2(self, heights_m):
+        """(rows, courses) derivative of the volume below each height by the height of each course.
+
+        A higher course lifts every joint above it, which gives the area below the joint in place of
+        the one above. The outlines stay where they were surveyed.
+        """
+        heights = self._inside(heights_m)
+        passed = np.searchsorted([course.bottom_m for course in self.courses[1:]], heights)
+        steps = np.concatenate([[0.0], np.cumsum(self.joint_steps_m2)])
+        return np.tril(steps[:, None] - steps)[passed]
 
     @property
     def barrels_m(self):
@@ -136,6 +150,17 @@ class ShellVolume:
             seen = _height_polynomials(course.degree) @ radii
             found.append(-seen[2] / 4 if course.degree == 2 else np.nan)
         return np.array(found)
+
+    @cached_property
+    def _missed_m(self):
+        """For each course by the powers of t the unseen part of a unit barrel, times the girth."""
+        missed = []
+        for course in self.courses:
+            powers = _height_polynomials(course.degree)
+            unseen = np.array([0.0, 4.0, -4.0])
+            unseen[: course.degree + 1] -= powers @ course.barrel
+            missed.append(np.convolve(powers @ np.diag(course.girths_m), unseen))
+        return missed
 
     def _by_height(self, features):
         """For each course the coefficients of sum l_i(t) l_j(t) features_ij by the powers of t."""
@@ -152,19 +177,18 @@ class ShellVolume:
         Rows cost only what they see: the polynomial of their own course, and a sum of those below.
         """
         heights = self._inside(heights_m)
+        of_courses = self._rows(heights)
+        powers = np.ones((1 + max(map(len, polynomials)), len(heights)))
+        for course, rows in zip(self.courses, of_courses, strict=True):
+            powers[1, rows] = (heights[rows] - course.bottom_m) / course.height_m
+        for power in range(2, len(powers)):
+            np.multiply(powers[power - 1], powers[1], out=powers[power])
         result = np.empty((len(heights), *polynomials[0].shape[1:]))
         below = np.zeros(polynomials[0].shape[1:])
-        for course, rows, polynomial in zip(
-            self.courses, self._rows(heights), polynomials, strict=True
-        ):
-            t = (heights[rows] - course.bottom_m) / course.height_m
-            powers = np.empty((len(t), len(polynomial) + 1))
-            powers[:, 0] = 1.0
-            for power in range(1, powers.shape[1]):
-                np.multiply(powers[:, power - 1], t, out=powers[:, power])
-            divisors = np.arange(1, powers.shape[1]).reshape(-1, *[1] * (polynomial.ndim - 1))
+        for course, rows, polynomial in zip(self.courses, of_courses, polynomials, strict=True):
+            divisors = np.arange(1, len(polynomial) + 1).reshape(-1, *[1] * below.ndim)
             primitive = np.concatenate([below[None], course.height_m * polynomial / divisors])
-            result[rows] = powers @ primitive
+            result[rows] = powers[: len(primitive), rows].T @ primitive
             below = primitive.sum(axis=0)
         return result
 

@@ -53,11 +53,12 @@ class Wall:
     sections: tuple[Section, ...]
 
 
-def find_wall(job, tell, dof=np.inf):
+def find_wall(job, tell, dof=np.inf, form=None):
     """The wall, its axis and its sections, from the points of a job.
 
     tell  called with a line of text as each step begins
     dof   degrees of freedom of the points' covariance, where it was given
+    form  `Form` of the shell where it is known beforehand; None: the points tell it
     Raises InputError when a course is left with too few points, SolutionError when there is no
     wall.
     """
@@ -71,8 +72,9 @@ def find_wall(job, tell, dof=np.inf):
     groups = _groups(job, shell, accepted, joints)
     given = _given_covariance(job.points, accepted)
     factor = (shell.noise_m / _median_sd(sds)) ** 2 if estimated else 1.0
-    samples = [sample_of(*one) for one in _to_fit(job, shell, accepted, groups, given)]
-    form = estimate_form(samples, factor)
+    if form is None:
+        samples = [sample_of(*one) for one in _to_fit(job, shell, accepted, groups, given)]
+        form = estimate_form(samples, factor)
     covariance = given if factor == 1.0 else given * factor  # it may be half a gigabyte
     to_fit = _to_fit(job, shell, accepted, groups, covariance)
     sections = tuple(fit_section(*one, form) for one in to_fit)

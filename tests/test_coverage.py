@@ -100,13 +100,13 @@ FORMS = pytest.mark.parametrize(
 
 @FORMS
 def test_intervals_cover_tanks_with_form_between_the_targets(common, share, figure):
-    check(round(100 * share), common, figure)
+    check(round(50 * share), common, figure)
 
 
 @pytest.mark.study
 @FORMS
 def test_intervals_cover_tanks_with_form_between_the_targets_study(common, share, figure):
-    check(round(10_000 * share), common, figure)
+    check(round(5000 * share), common, figure)
 
 
 BARREL_M = 0.003

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tankcal.uncertainty import coverage_factor, decimals_for, effective_dof, factor_of
+from tankcal.uncertainty import coverage_factor, effective_dof, factor_of
 
 
 def test_a_factor_gives_its_covariance_back_with_its_rank():
@@ -45,25 +45,16 @@ def test_coverage_factor(probability, dof, k):
     assert float(coverage_factor(probability, dof)) == pytest.approx(k, abs=5.1e-3)
 
 
+@pytest.mark.parametrize("probability", [0.1, 0.5, 0.95, 0.9973, 0.9999])
+def test_k_of_many_rows_is_that_of_each(probability):
+    """Second method: row by row without the polynomial, from 1 degree of freedom to 1e18."""
+    dof = np.concatenate([np.linspace(1, 4, 200), np.geomspace(4, 1e18, 500), [np.inf]])
+    rows = coverage_factor(probability, dof)
+    each = [float(coverage_factor(probability, one)) for one in dof]
+    assert rows == pytest.approx(each, rel=1e-14)
+    assert np.array_equal(coverage_factor(probability, dof[:, None]), rows[:, None])
+
+
 def test_a_coverage_probability_must_be_one():
     with pytest.raises(ValueError, match="between 0 and 1"):
         coverage_factor(95, np.inf)
-
-
-@pytest.mark.parametrize(
-    ("u", "decimals"),
-    [
-        (1.27, 1),
-        (0.74, 2),
-        (0.0041, 4),
-        (0.0996, 2),  # rounds up to 0.10
-        (9.96, 0),  # rounds up to 10
-        (35.0, 0),
-        (4100.0, 0),
-        (1.0, 1),
-        (0.0, 6),
-        (float("nan"), 6),
-    ],
-)
-def test_decimals_that_show_two_digits_of_u(u, decimals):
-    assert decimals_for(u) == decimals

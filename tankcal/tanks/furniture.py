@@ -10,5 +10,5 @@ def deadwood_part(items, zero_m):
         [item.bottom_m + zero_m for item in items],
         [item.top_m + zero_m for item in items],
         [item.volume_m3 for item in items],
-        [item.u_m3 or 0.0 for item in items],
+        [item.u_m3 for item in items],
     )

@@ -9,6 +9,7 @@ from tankcal.errors import InputError, Problem
 from tankcal.heads import End
 from tankcal.meshes import mesh_part
 from tankcal.solids import LyingTank, Sphere
+from tankcal.tanks.estimates import estimates_of
 from tankcal.tanks.furniture import deadwood_part
 from tankcal.tanks.thermal import is_warmed, thermal_scale
 
@@ -39,7 +40,15 @@ def solid_body(job, survey, switches):
     if switches.deadwood and job.deadwood:
         parts.append(deadwood_part(job.deadwood, zero))
     edges = {zero + edge for item in job.deadwood for edge in (item.bottom_m, item.top_m)}
-    return Body(tuple(parts), job.inputs, 0.0, solid.top_m, tuple(sorted(edges)))
+    return Body(
+        tuple(parts),
+        job.inputs,
+        0.0,
+        solid.top_m,
+        tuple(sorted(edges)),
+        job.correlations,
+        estimates_of(job),
+    )
 
 
 def solid_zero(job):

@@ -10,8 +10,10 @@ from tankcal.hydrostatics import liquid_head
 from tankcal.measured import Above, measured_bottom
 from tankcal.outlines import FULL_TURN
 from tankcal.sections import coordinates_of
+from tankcal.tanks.estimates import estimates_of
 from tankcal.tanks.furniture import deadwood_part
 from tankcal.tanks.thermal import is_warmed, thermal_scale
+from tankcal.tanks.widened import widened
 from tankcal.terrain import Footprint
 from tankcal.uncertainty import factor_of
 from tankcal.volumes import ShellVolume
@@ -95,6 +97,8 @@ def vertical_body(job, wall, switches, uncertain):
         lowest_m=min(getattr(part, "lowest_m", 0.0) for part in parts),
         highest_m=shell.volume.height_m,
         kinks_m=_kinks(shell, parts, job, zero),
+        correlations=job.correlations,
+        estimates=estimates_of(job),
     )
 
 
@@ -114,7 +118,7 @@ def _on_its_bottom(job, wall, shell, zero, parts):
     if bottom.form == "liquid":
         measured = measured_bottom(bottom.level_m + zero, bottom.volume_m3, bottom.u_m3)
         return [*(Above(part, measured.highest_m) for part in parts), measured]
-    return [*parts, _bottom(job, wall, shell)]
+    return [*parts, widened(_bottom(job, wall, shell), shell)]
 
 
 def _bottom(job, wall, shell):
@@ -153,9 +157,16 @@ def _head(job, shell, zero):
         job.material.e_pa,
         job.table.liquid_density_kg_m3,
         survey_density_kg_m3=survey.liquid_density_kg_m3 or 0.0,
-        survey_level_m=max((survey.liquid_level_m or 0.0) + zero, 0.0),
+        survey_level_m=_survey_level_m(survey, zero),
         scale=shell.scale,
     )
+
+
+def _survey_level_m(survey, zero):
+    """Level of the liquid on the survey day; 0 for the empty tank."""
+    if not survey.liquid_density_kg_m3:
+        return 0.0
+    return max((survey.liquid_level_m or 0.0) + zero, 0.0)
 
 
 def _roof(job, zero):
@@ -188,6 +199,7 @@ def _shell(job, wall, switches, uncertain):
         job.material.expansion_per_k,
         stretch,
         _bearing(job, switches),
+        wall.shell.tilt if switches.tilt else 0.0,
     )
 
 
@@ -197,15 +209,27 @@ def _factors(job, wall, volume):
     covariance = jacobian @ (wall.covariance_m2 @ jacobian.T)
     causes, index = job.points.causes, coordinates_of(wall.accepted)
     effects = [jacobian @ cause.column_m[index] for cause in causes]
-    common = volume.form_m2
-    form = (
-        Factor("form", factor_of(common @ common.T), wall.form.common_dof),
-        Factor("own_form", volume.own_form_m2, wall.form.own_dof),
+    common, form = volume.form_m2, wall.form
+    of_form = (
+        Factor(
+            "form",
+            factor_of(common @ common.T),
+            form.common_dof,
+            contrasts=form.common_contrasts,
+        ),
+        Factor("own_form", volume.own_form_m2, form.own_dof, contrasts=form.own_contrasts),
     )
     return (
         *survey_factors(covariance, wall.noise_dof, causes, effects),
-        *(one for one in form if one.columns.shape[1]),
+        *(one for one in of_form if one.columns.shape[1]),
     )
+
+
+def volume_by_points(job, wall, levels_m):
+    """(rows, 3m) derivative of the shell's volume below levels by the accepted points, m2."""
+    volume = _shell(job, wall, job.switches, False).volume
+    jacobian = _features_by_points(volume, wall.sections, wall.covariance_m2.shape[0])
+    return volume.weights_m(np.maximum(levels_m, 0.0)) @ jacobian
 
 
 def _bearing(job, switches):

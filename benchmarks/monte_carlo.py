@@ -1,0 +1,149 @@
+"""Time, memory and standard errors of the Monte Carlo of a whole capacity table.
+
+    python benchmarks/monte_carlo.py [rows] [seeds]
+
+The last line is the shipped example as `tankcal run` simulates it, with rows of 1 mm; there the
+standard errors of plain draws are those of a normal: u/sqrt(2 N), u sqrt(p q/N) over the density.
+
+9 500 rows of 1 mm of a tank of eight courses, 20 inputs: scale, temperature, offset of the dips,
+bottom, deadwood, a radius for each course, form. The goal: under 2 s and 1 GB on one core, and over
+50 seeds standard errors of u and of both ends of every row no larger than those of 1e6 plain draws.
+"""
+
+import os
+import resource
+import sys
+import time
+from dataclasses import replace
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+from scipy.stats import norm
+
+import tankcal
+from tankcal.distributions import Normal, standard
+from tankcal.monte_carlo import Goal, QuadraticRows, simulate
+from tankcal.shipped import shipped
+from tankcal.simulation import simulate_table
+
+COURSES, RADIUS_M, HEIGHT_M, EXPANSION = 8, 7.1, 9.5, 1.1e-5
+ORDINARY = ("normal",) * 20
+MIXED = ("t", "rectangular", "rectangular", "u-shaped", "triangular", "normal", "normal", "t")
+
+
+def tank(rows, kinds=ORDINARY, factor=1.0):
+    """The model and its inputs; factor multiplies every standard uncertainty.
+
+    V = pi (r_c (1 + s) (1 + a dT))^2 (h + offset) and the rest, to second order.
+    """
+    height = np.linspace(HEIGHT_M / rows, HEIGHT_M, rows)
+    edges = np.linspace(0, HEIGHT_M, COURSES + 1)
+    parts = np.clip(height[:, None] - edges[:-1], 0, HEIGHT_M / COURSES)
+    area, around = np.pi * RADIUS_M**2, 2 * np.pi * RADIUS_M
+    volume, wet = area * height, area * np.minimum(1, height / 0.1)
+    slopes = np.column_stack([2 * volume, 2 * EXPANSION * volume, wet, np.ones(rows)])
+    form = 0.02 * np.cos(np.arange(7) * height[:, None])
+    slopes = np.hstack([slopes, np.minimum(height / 2, 1)[:, None], around * parts, form])
+    pairs = [(0, 0, 1.0, volume), (1, 1, EXPANSION**2, volume), (0, 2, 2.0, wet)]
+    pairs += [(0, 1, 4 * EXPANSION, volume)]
+    for course, part in enumerate(parts.T):
+        pairs += [(5 + course, 5 + course, np.pi, part), (0, 5 + course, 2 * around, part)]
+        pairs += [(1, 5 + course, 2 * EXPANSION * around, part)]
+    hessians = np.zeros((len(pairs), 20, 20))
+    for hessian, (i, j, value, _) in zip(hessians, pairs, strict=True):
+        hessian[i, j] += value / 2
+        hessian[j, i] += value / 2
+    weights = np.column_stack([pair[3] for pair in pairs])
+    sizes = factor * np.array([2e-4, 1.0, 1e-3, 0.05, 0.01] + [1e-3] * 8 + [1.0] * 7)
+    dof = {0: 5.0, 7: 3.0}
+    inputs = [
+        Normal(u) if kind == "normal" else standard(u, kind, dof=dof.get(i, np.inf))
+        for i, (u, kind) in enumerate(zip(sizes, kinds + ORDINARY[len(kinds) :], strict=True))
+    ]
+    return QuadraticRows(volume, slopes, hessians, weights, np.zeros(20)), inputs
+
+
+def scatter(model, inputs, seeds):
+    """(4, seeds, rows) value, u, low and high, then (seeds,) seconds of processor and by clock."""
+    found, spent = [], []
+    for seed in range(seeds):
+        start = time.process_time(), time.perf_counter()
+        one = simulate(model, inputs, goal=Goal(seed=seed))
+        spent.append((time.process_time() - start[0], time.perf_counter() - start[1]))
+        found.append((one.value, one.u, one.low, one.high))
+    return np.array(found).transpose(1, 0, 2), np.array(spent)
+
+
+def plain_errors(model, inputs, rows, draws=1_000_000, sample=200_000, seed=1):
+    """(3, rows) standard errors of u, low and high that so many plain draws of some rows have.
+
+    sqrt((m4/m2^2 - 1)/(4 N)) u, and sqrt(p q/N) dV_p/dp, both from a smaller sample of such draws.
+    """
+    part, generator = model.subset(rows), np.random.default_rng(seed)
+    p = generator.random((sample, len(inputs)))
+    values = part(np.column_stack([one.quantile(p[:, j]) for j, one in enumerate(inputs)]))
+    squares = (values - values.mean(axis=0)) ** 2
+    of_u = squares.std(axis=0) / (2 * np.sqrt(draws * squares.mean(axis=0)))
+    around = np.quantile(values, [0.02, 0.03, 0.97, 0.98], axis=0)
+    ends = np.sqrt(0.025 * 0.975 / draws) * (around[1::2] - around[::2]) / 0.01
+    return np.vstack([of_u, ends])
+
+
+def worst_ratios(found, model, inputs, chosen):
+    """(3,) largest over all rows of sd over the seeds to the standard error of plain draws.
+
+    The latter, by u, is computed for the chosen rows and taken linearly between them.
+    """
+    u = found[1].mean(axis=0)
+    plain = plain_errors(model, inputs, chosen) / u[chosen]
+    every = np.arange(len(u))
+    limit = np.stack([np.interp(every, chosen, one) for one in plain]) * u
+    return (found[1:].std(axis=1, ddof=1) / limit).max(axis=1)
+
+
+def shipped_example(seeds):
+    """(3,) worst ratios of the shipped example's rows, (seeds, 2) seconds, and its rows."""
+    job = tankcal.load(shipped("examples") / "silva-1995")
+    job = replace(job, table=replace(job.table, step_m=0.001))
+    result = tankcal.run(job, simulated=False)
+    parts = (job, result.wall, result.body, result.zero_m, result.table)
+    found, spent = [], []
+    for seed in range(seeds):
+        start = time.process_time(), time.perf_counter()
+        one = simulate_table(*parts, goal=Goal(seed=seed)).found
+        spent.append((time.process_time() - start[0], time.perf_counter() - start[1]))
+        found.append((one.u, one.low, one.high))
+    of_end = np.sqrt(0.025 * 0.975) / norm.pdf(norm.ppf(0.025))
+    plain = np.array([1 / np.sqrt(2), of_end, of_end])[:, None] / np.sqrt(1_000_000)
+    inner = result.table.height_m > 0.02  # next to the empty tank no volume is normal
+    spread = np.std(found, axis=0, ddof=1) / result.table.u_m3
+    return (spread / plain)[:, inner].max(axis=1), np.array(spent), len(result.table.height_m)
+
+
+def main():
+    """Print a line for each mixture of inputs."""
+    rows = int(sys.argv[1]) if len(sys.argv) > 1 else 9500
+    seeds = int(sys.argv[2]) if len(sys.argv) > 2 else 50
+    chosen = np.linspace(0, rows - 1, 20).astype(int)
+    cases = (("normal", ORDINARY, 1.0), ("mixed, t 3 and 5 dof", MIXED, 1.0),
+             ("normal, u x 20", ORDINARY, 20.0))  # fmt: skip
+    runs = [scatter(*tank(rows, kinds, factor), seeds) for _, kinds, factor in cases]
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"{rows} rows, 20 inputs, {seeds} seeds; peak memory {peak:.0f} MB in all")
+    print("standard deviation over the seeds to standard error of 1e6 plain draws, the worst row:")
+    print(f"{'inputs':<22}{'cpu s':>7}{'clock s':>9}{'u':>9}{'low':>9}{'high':>9}")
+    for (name, kinds, factor), (found, spent) in zip(cases, runs, strict=True):
+        show(name, worst_ratios(found, *tank(rows, kinds, factor), chosen), spent)
+    ratios, spent, count = shipped_example(seeds)
+    show(f"example, {count} rows", ratios, spent)
+
+
+def show(name, ratios, spent):
+    """Print one line."""
+    cpu, clock = np.median(spent, axis=0)
+    print(f"{name:<22}{cpu:>7.2f}{clock:>9.2f}" + "".join(f"{r:>9.4f}" for r in ratios))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,169 @@
+"""The law of propagation for several outputs, with few columns: U_y = (J L)(J L)'.
+
+    y = f(x),  J = dy/dx (rows x inputs),  U_x = L L'  (JCGM 100:2008 5.2.2, JCGM 102:2011 6.2)
+
+Nothing of rows x rows is formed unless `covariance` is asked for.
+
+Degrees of freedom (Welch-Satterthwaite, JCGM 100 G.4): inputs that are correlated were found
+together and are one component, whose variance includes their covariances and whose degrees of
+freedom are theirs: Result 2 and section 4.1 of Willink 2007, Metrologia 44, 340. With c' S c of
+a covariance S estimated from nu + 1 sets of readings that is exact, for it is a chi-square of nu.
+Where correlated inputs have unequal degrees of freedom, which that source leaves out, their
+estimates are taken to err together, 1/sqrt(nu) by shares of the variance, never under the least
+of them.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tankcal.gum.inputs import Inputs
+from tankcal.gum.sensitivities import check_sensitivities, outputs_of, sensitivities_of
+from tankcal.uncertainty import coverage_factor, effective_dof
+
+
+@dataclass(frozen=True)
+class Propagation:
+    """Outputs with their uncertainty; one row an output.
+
+    inputs         what went in, n of them
+    values         (rows,) outputs at the estimates, in the unit of the output
+    sensitivities  (rows, n) J, unit of the output by unit of the input
+    """
+
+    inputs: Inputs
+    values: np.ndarray
+    sensitivities: np.ndarray
+
+    @property
+    def factor(self):
+        """(rows, c) J L: the covariance of the outputs is factor factor'."""
+        return np.hstack([np.empty((len(self.values), 0)), *self._columns()])
+
+    @property
+    def u(self):
+        """(rows,) combined standard uncertainty."""
+        return np.sqrt(np.sum(self._group_variances, axis=1))
+
+    @property
+    def covariance(self):
+        """(rows, rows) covariance of the outputs; for a few rows."""
+        factor = self.factor
+        return factor @ factor.T
+
+    @property
+    def correlation(self):
+        """(rows, rows) correlation of the outputs, 0 for an output without uncertainty."""
+        u = self.u
+        inverse = np.divide(1, u, out=np.zeros_like(u), where=u > 0)
+        return np.clip(self.covariance * np.outer(inverse, inverse), -1, 1)
+
+    @property
+    def dof(self):
+        """(rows,) effective degrees of freedom; inf where only such inputs contribute."""
+        dof = [self._group_dof(group) for group in self.inputs.groups]
+        return effective_dof(np.sqrt(self._group_variances), np.stack(dof, axis=1))
+
+    def k(self, probability):
+        """(rows,) coverage factor for that coverage probability, of Student's t."""
+        return coverage_factor(probability, self.dof)
+
+    def expanded(self, probability):
+        """(rows,) expanded uncertainty U = k u."""
+        return self.k(probability) * self.u
+
+    def shares(self):
+        """(rows, n) part of the variance that each input brings, its covariances halved.
+
+        c_i u_i sum_j r_ij c_j u_j / u^2: they add up to 1, and can be negative where inputs are
+        correlated; 0 in a row without uncertainty.
+        """
+        parts = self._parts()
+        variance = np.sum(self._group_variances, axis=1, keepdims=True)
+        return np.divide(parts, variance, out=np.zeros_like(parts), where=variance > 0)
+
+    def combined(self, weights):
+        """The propagation of weights @ outputs, (new rows, rows): sums, differences, deliveries.
+
+        What the outputs have in common cancels or adds up as it must.
+        """
+        weights = np.atleast_2d(weights)
+        return Propagation(self.inputs, weights @ self.values, weights @ self.sensitivities)
+
+    def rows(self, chosen):
+        """The propagation of the chosen rows alone, an index or mask of them."""
+        return Propagation(self.inputs, self.values[chosen], self.sensitivities[chosen])
+
+    def scaled(self, name, factor):
+        """The same with u of every input of the budget line `name` times `factor`."""
+        of_line = [one.line == name for one in self.inputs.inputs]
+        by_input = np.where(of_line, factor, 1.0)
+        return Propagation(self.inputs, self.values, self.sensitivities * by_input)
+
+    def _columns(self):
+        pairs = zip(self.inputs.groups, self.inputs.blocks, strict=True)
+        return [self.sensitivities[:, group] @ block for group, block in pairs]
+
+    @cached_property
+    def _group_variances(self):
+        """(rows, groups) variance that each group of correlated inputs brings."""
+        alone = [len(group) == 1 for group in self.inputs.groups]
+        found = np.empty((len(self.values), len(alone)))
+        single = [group[0] for group in self.inputs.groups if len(group) == 1]
+        found[:, alone] = (self.sensitivities[:, single] * self.inputs.u[single]) ** 2
+        for i in np.flatnonzero(~np.array(alone)):
+            columns = self.sensitivities[:, self.inputs.groups[i]] @ self.inputs.blocks[i]
+            found[:, i] = np.einsum("ij,ij->i", columns, columns)
+        return found
+
+    def _parts(self):
+        """(rows, n) c_i u_i sum_j r_ij c_j u_j."""
+        parts = np.empty_like(self.sensitivities)
+        columns = zip(self.inputs.groups, self.inputs.blocks, self._columns(), strict=True)
+        for group, block, own in columns:
+            parts[:, group] = self.sensitivities[:, group] * (own @ block.T)
+        return parts
+
+    def _group_dof(self, group):
+        """(rows,) degrees of freedom of a group of correlated inputs."""
+        dof = self.inputs.dof[group]
+        if np.all(dof == dof[0]):
+            return np.full(len(self.values), dof[0])
+        parts = self._parts()[:, group]
+        total = np.abs(np.sum(parts, axis=1))
+        best = 1 / np.sqrt(dof.max())
+        further = np.abs(parts) @ (1 / np.sqrt(dof) - best)
+        share = np.divide(further, total, out=np.zeros_like(total), where=total > 0)
+        together = best + share
+        found = np.full(len(total), np.inf)
+        np.divide(1, together**2, out=found, where=together > 0)
+        return np.maximum(found, dof.min())
+
+
+def propagate(model, inputs, sensitivities=None):
+    """Outputs of `model` at the estimates with their uncertainty.
+
+    model          takes (n,) inputs in the order of `inputs`, gives a number or (rows,)
+    inputs         Inputs
+    sensitivities  (rows, n), or a function of the (n,) inputs that gives it; None: found by complex
+                   step or differences. A function is held against differences, an array is not.
+    Raises SolutionError when an output is not finite, the model has a kink or a jump at the
+    estimates, or a sensitivity is wrong; ValueError for shapes that do not fit.
+    """
+    if not len(inputs):
+        raise ValueError("a measurement without inputs has no uncertainty to propagate")
+    x, u, names = inputs.estimates, inputs.u, inputs.names
+    values = outputs_of(model, x)
+    if sensitivities is None:
+        found = sensitivities_of(model, x, u, names)
+    elif callable(sensitivities):
+        found = np.atleast_2d(np.asarray(sensitivities(x), dtype=float))
+        check_sensitivities(model, x, u, found, names)
+    else:
+        found = np.atleast_2d(np.asarray(sensitivities, dtype=float))
+    if found.shape != (len(values), len(inputs)):
+        raise ValueError(f"sensitivities {found.shape}, expected {(len(values), len(inputs))}")
+    if not np.all(np.isfinite(found)):
+        raise ValueError("a sensitivity is not a finite number")
+    return Propagation(inputs, values, found)

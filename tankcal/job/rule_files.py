@@ -1,0 +1,162 @@
+"""Decision rules as files: the shipped ones, and a house rule beside the job.
+
+A rule is a TOML file (docs/job-format.md): [rule] says what it is, each [uncertainty.NAME] is a
+limit of the expanded uncertainty, each [deviation.NAME] one of the deviation from a stated volume.
+"""
+
+from tankcal.job.contract.rules import LIMITS, RULE
+from tankcal.job.entries import read_section
+from tankcal.job.fields import is_blank
+from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
+from tankcal.job.tables import Log, fingerprint, nearest, read_bytes
+from tankcal.rules.model import TANKS, DeviationLimit, Rule, UncertaintyLimit
+from tankcal.shipped import shipped
+
+_FOLDER, _ENDING = "job/rule_tables", ".toml"
+
+
+def shipped_names():
+    """Names of the rules that ship with tankcal, for `shipped_rule`."""
+    return tuple(sorted(path.stem for path in shipped(_FOLDER).glob(f"*{_ENDING}")))
+
+
+def shipped_rule(name):
+    """A Rule that ships with tankcal. Raises ValueError for a name that does not."""
+    if name not in shipped_names():
+        raise ValueError(f"no rule {name!r}; expected one of {', '.join(shipped_names())}")
+    path, log = shipped(_FOLDER) / f"{name}{_ENDING}", Log()
+    rule = parse_rule(path.name, path.read_bytes(), log)
+    log.stop_if_problems()
+    return rule
+
+
+def find_rule(raw, name, log):
+    """(Rule, (file, SHA-256, size) or None) that table.rule names; None after telling `log`.
+
+    raw   RawJob, beside whose settings a house rule lies     name  as the field says: no path
+    The second is None for a rule that ships with tankcal.
+    """
+    if name in shipped_names():
+        return shipped_rule(name), None
+    value = raw.settings["table"]["rule"]
+    path = raw.folder / name
+    is_file_name = name.lower().endswith(_ENDING)
+    if not (is_file_name and path.exists()):
+        missing = "no such file beside the job" if is_file_name else f"found {name!r}"
+        expected = (
+            f"{missing}; expected a .toml file there, or one of {', '.join(shipped_names())}"
+            f"{nearest(name.removesuffix(_ENDING), shipped_names())}"
+        )
+        log.problem(raw.settings_file, expected, value.row, "table.rule")
+        return None
+    data = read_bytes(path, log, MAX_SETTINGS_BYTES)
+    rule = None if data is None else parse_rule(name, data, log)
+    return None if rule is None else (rule, fingerprint(name, data))
+
+
+def parse_rule(file, data, log):
+    """The Rule in the bytes of a TOML file, or None after telling `log` every problem of it."""
+    told = len(log.problems)
+    settings, sections = read_toml(file, data, log)
+    if settings is None:
+        return None
+    given = settings.pop("rule", {})
+    head = read_section(file, "rule", RULE, given, sections.get("rule"), log)
+    limits = {part: [] for part in LIMITS}
+    for section, given in settings.items():
+        part, _, name = section.partition(".")
+        row = sections.get(section)
+        if part not in LIMITS or "." in name:
+            hint = nearest(part, (*LIMITS, "rule"))
+            expected = (
+                f"unknown section; expected [rule], [uncertainty.NAME] or [deviation.NAME]{hint}"
+            )
+            log.problem(file, expected, row, f"[{section}]")
+        elif name:
+            values = read_section(file, section, LIMITS[part], given, row, log)
+            _tell_contradictions(file, part, section, values, given, row, log)
+            limits[part].append((name, values))
+        elif given:
+            expected = f"stands in no limit; expected inside one, such as [{part}.volumes]"
+            log.problem(file, expected, row, f"[{section}]")
+    if len(log.problems) == told and not any(limits.values()):
+        log.problem(file, "no limits; expected sections such as [uncertainty.volumes]")
+    return _rule(head, limits) if len(log.problems) == told else None
+
+
+def _tell_contradictions(file, part, section, values, given, row, log):
+    """A problem for each pair of keys that do not go together, and for unknown kinds of tank."""
+
+    def is_given(key):
+        return key in given and not is_blank(given[key].raw)
+
+    def tell(key, expected):
+        place = given[key].row if key in given else row
+        log.problem(file, expected, place or row, f"{section}.{key}")
+
+    for tank in values["tanks"] or ():
+        if tank not in TANKS:
+            expected = f"found {tank!r}; expected some of {', '.join(TANKS)}{nearest(tank, TANKS)}"
+            tell("tanks", expected)
+    if part == "deviation":
+        if is_given("limit_percent") and is_given("limit_m3"):
+            tell("limit_m3", "stands beside limit_percent; expected one of them")
+        elif not (is_given("limit_percent") or is_given("limit_m3")):
+            tell("limit_percent", "missing; expected limit_percent or limit_m3")
+        return
+    is_delivery = values["of"] == "deliveries"
+    if is_delivery and not is_given("minimum_height_m"):
+        tell("minimum_height_m", "missing; expected the least height of a delivery (a number)")
+    if values["of"] in ("volumes", "capacity"):
+        if is_given("minimum_height_m"):
+            tell("minimum_height_m", "is for deliveries; expected of = 'deliveries' beside it")
+        if not is_given("limit_percent"):
+            tell("limit_percent", "missing; expected a limit in percent")
+
+
+def _rule(head, limits):
+    rule_verified = bool(head["verified"])
+    uncertainty = tuple(
+        UncertaintyLimit(
+            of=values["of"],
+            limit=_part(values["limit_percent"]),
+            relative_to=values["relative_to"] or "itself",
+            minimum_height_m=values["minimum_height_m"],
+            **_shared(name, values, rule_verified),
+        )
+        for name, values in limits["uncertainty"]
+    )
+    deviation = tuple(
+        DeviationLimit(
+            of=values["of"],
+            limit=_part(values["limit_percent"]),
+            limit_m3=values["limit_m3"],
+            side=values["side"] or "both",
+            guard=values["guard"],
+            **_shared(name, values, rule_verified),
+        )
+        for name, values in limits["deviation"]
+    )
+    return Rule(
+        name=head["name"],
+        source=head["source"],
+        verified=all(limit.verified for limit in (*uncertainty, *deviation)),
+        remark=head["remark"] or "",
+        largest_capacity_m3=head["largest_capacity_m3"],
+        uncertainty=uncertainty,
+        deviation=deviation,
+    )
+
+
+def _shared(name, values, rule_verified):
+    verified = values["verified"]
+    return {
+        "name": name,
+        "tanks": values["tanks"] or (),
+        "clause": values["clause"] or "",
+        "verified": rule_verified if verified is None else verified,
+    }
+
+
+def _part(percent):
+    return None if percent is None else percent / 100

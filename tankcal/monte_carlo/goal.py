@@ -1,0 +1,140 @@
+"""What a simulation is to reach, and what it found: estimates with their standard errors.
+
+Source: JCGM 101:2008 7.6, 7.7, 7.9.2 (numerical tolerance), 7.9.4 (batches).
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from scipy.special import ndtri
+
+NAMES = ("value", "u", "low", "high", "shortest_low", "shortest_high")
+SAFETY = 1.3  # a standard error from ten batches is itself known to a quarter
+
+
+@dataclass(frozen=True)
+class Goal:
+    """When to stop.
+
+    probability  of the intervals
+    digits       significant digits of u that count (n_dig of JCGM 101 7.9.2)
+    fraction     of the numerical tolerance that two standard errors may take; 0.2 for a verdict
+                 on the GUM interval (8.2). The ends of the shortest interval may take all of it
+    plain_draws  no standard error of u and of the symmetric ends is to exceed that of so many
+                 plain draws; also the most that are drawn where nothing helps
+    memory       bytes that the draws and rows held at once may take
+    seed         of all draws
+    """
+
+    probability: float = 0.95
+    digits: int = 2
+    fraction: float = 0.2
+    plain_draws: int = 1_000_000
+    memory: int = 256_000_000
+    seed: int = 20080101
+
+    def __post_init__(self):
+        if not 0 < self.probability < 1:
+            raise ValueError(f"coverage probability {self.probability}: expected between 0 and 1")
+        if self.digits < 1 or self.plain_draws < 1 or not self.fraction > 0:
+            raise ValueError("digits, draws and fraction of the tolerance: expected above 0")
+
+    @property
+    def tail(self):
+        """Probability beyond each end of the symmetric interval."""
+        return (1 - self.probability) / 2
+
+
+def numerical_tolerance(u, digits=2):
+    """Half of the last of the significant digits of u (JCGM 101 7.9.2); nan for 0, inf and nan."""
+    u = np.atleast_1d(np.asarray(u, dtype=float))
+    sound = np.isfinite(u) & (u > 0)
+    size = np.where(sound, u, 1.0)
+    exponent = np.floor(np.log10(size)) - digits + 1
+    exponent += np.rint(size / 10.0**exponent) >= 10**digits  # 0.0996 is written 0.10
+    return np.where(sound, 0.5 * 10.0**exponent, np.nan)
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """Estimates of every row, each (rows,) in the rows' unit, and the standard error of each.
+
+    value, u                     mean and standard deviation
+    low, high                    probabilistically symmetric interval (JCGM 101 7.7.2)
+    shortest_low, shortest_high  shortest interval (7.7.3, 7.7.4)
+    se_value ... se_shortest_high  standard errors, from independent batches
+    tolerance  numerical tolerance of u (7.9.2)
+    reached    (rows,) whether two standard errors are within what the goal allows
+    draws      (rows,) evaluations of the model that stand behind a row
+    controlled (rows,) whether the linear part served as control variate
+    probability  of the intervals
+    """
+
+    value: np.ndarray
+    u: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    shortest_low: np.ndarray
+    shortest_high: np.ndarray
+    se_value: np.ndarray
+    se_u: np.ndarray
+    se_low: np.ndarray
+    se_high: np.ndarray
+    se_shortest_low: np.ndarray
+    se_shortest_high: np.ndarray
+    tolerance: np.ndarray
+    reached: np.ndarray
+    draws: np.ndarray
+    controlled: np.ndarray
+    probability: float
+
+    @property
+    def by_volume(self):
+        """{name: (rows,)} everything that stands for each row."""
+        named = ((one.name, getattr(self, one.name)) for one in fields(self))
+        return {name: values for name, values in named if name != "probability"}
+
+
+def allowed(goal, estimates):
+    """(6, rows) standard errors that meet the numerical tolerance; inf where nothing varies."""
+    limit = np.tile(goal.fraction * _tolerance(goal, estimates) / 2, (6, 1))
+    limit[4:] /= goal.fraction  # where the shortest interval lies is ill determined by nature
+    return np.where(np.isfinite(limit), limit, np.inf)
+
+
+def enough(goal, estimates, errors, plain):
+    """(rows,) whether draws may stop: errors meet the tolerance and those of plain draws.
+
+    plain  (3, rows) standard errors that a single plain draw would have, of u and both ends
+    """
+    met = (SAFETY * errors <= allowed(goal, estimates)) | ~np.isfinite(estimates)
+    return np.all(met, axis=0) & no_worse(goal, estimates, errors, plain)
+
+
+def no_worse(goal, estimates, errors, plain):
+    """(rows,) whether u and both ends are as well known as from the plain draws of the goal."""
+    limit = plain / np.sqrt(goal.plain_draws)
+    return np.all((SAFETY * errors[1:4] <= limit) | ~np.isfinite(estimates[1:4]), axis=0)
+
+
+def simulation(goal, estimates, errors, draws, controlled):
+    """The result, complete. estimates, errors  (6, rows) in the order of NAMES."""
+    met = (errors <= allowed(goal, estimates)) | ~np.isfinite(estimates)
+    values = dict(zip(NAMES, estimates, strict=True))
+    deviations = {f"se_{name}": se for name, se in zip(NAMES, errors, strict=True)}
+    return Simulation(
+        **values,
+        **deviations,
+        tolerance=_tolerance(goal, estimates),
+        reached=np.all(met, axis=0),
+        draws=draws,
+        controlled=controlled,
+        probability=goal.probability,
+    )
+
+
+def _tolerance(goal, estimates):
+    """That of u; where u is infinite, that of the width of the interval by that of a normal."""
+    u, low, high = estimates[1:4]
+    spread = (high - low) / (-2 * ndtri(goal.tail))
+    return numerical_tolerance(np.where(np.isfinite(u), u, spread), goal.digits)

@@ -1,0 +1,157 @@
+"""Budgets: line by line for the top row and a delivery, contributions for the others."""
+
+from tankcal.digits import NOTHING, decimals_of, fixed, shortest
+from tankcal.report import blocks
+from tankcal.report.figures import even_groups
+from tankcal.report.numbers import like_its_sd, symbol
+from tankcal.report.paper import Column
+from tankcal.words import name_of_input
+
+ACROSS = 7  # volumes and deliveries beside each other
+USEFUL = 0.995  # of U: an input that would change it less is not worth measuring better
+SMALL = 5e-4  # share of the variance that prints as 0.0 %
+
+
+def top(paper):
+    """The budget of the top row, of the table alone."""
+    capacity, lines = paper.record["capacity"], paper.record["budget"]
+    values = {key: capacity[key][-1] for key in ("u_m3", "k", "U_m3", "dof")}
+    height = paper.height(capacity["height_m"][-1])
+    return [_table(paper, "budget", lines, values, height=height), *_notes(paper, lines)]
+
+
+def first_delivery(paper):
+    """The budget of the first delivery; nothing where there is none."""
+    one = _first_delivery(paper)
+    if one is None:
+        return []
+    table = _table(
+        paper,
+        "budget_delivery",
+        [line for line in one["lines"] if abs(line["share"]) >= SMALL],
+        one,
+        high=paper.height(one["high_m"]),
+        low=paper.height(one["low_m"]),
+        volume=paper.number(one["volume_m3"], "m3", u=one["U_m3"]),
+    )
+    return [table]
+
+
+def _first_delivery(paper):
+    found = (one for one in paper.record.get("budgets", []) if one["low_m"] is not None)
+    return next(found, None)
+
+
+def _table(paper, name, lines, values, /, **places):
+    decimals = decimals_of(values["U_m3"]) + 1
+    u, U = (paper.number(values[key], "m3", u=values["u_m3"]) for key in ("u_m3", "U_m3"))
+    columns = [
+        Column("input"),
+        Column("estimate", align="right"),
+        Column("u", digits=2, align="right"),
+        Column("unit"),
+        Column("how"),
+        Column("dof", align="right"),
+        Column("sensitivity", "m3/unit", digits=3, align="right"),
+        Column("contribution_m3", "m3", decimals=decimals),
+        Column("share", "share", decimals=1),
+    ]
+    k, nu = paper.number(values["k"], decimals=2), _dof(paper, values["dof"])
+    rows = [_line(paper, line) for line in lines]
+    return paper.table(name, rows, columns, u=u, U=U, k=k, nu=nu, **places)
+
+
+def _line(paper, line):
+    """A line of a budget, its words in the language of the paper."""
+    distribution = paper.words["distributions"].get(line["distribution"], line["distribution"])
+    estimate = line.get("estimate")
+    return line | {
+        "input": paper.input_name(line),
+        "estimate": None if estimate is None else like_its_sd(estimate, line["u"], paper.marks),
+        "unit": symbol(line["unit"]),
+        "how": f"{line['type']}, {distribution}",
+        "dof": _dof(paper, line["dof"]),
+    }
+
+
+def _dof(paper, value):
+    return "∞" if value is None else shortest(value, paper.marks, digits=3)
+
+
+def _notes(paper, lines):
+    """What was declared beside the inputs, a sentence each."""
+    texts = [
+        paper.word("texts.input_note", input=paper.input_name(line), note=line["note"])
+        for line in lines
+        if line["note"] and line["note"] not in paper.input_name(line)
+    ]
+    texts += correlations(paper, lines)
+    return [blocks.listing(texts)] if texts else []
+
+
+def correlations(paper, lines):
+    """A sentence for each input that is correlated with others."""
+    found = []
+    for line in lines:
+        pairs = [
+            f"{name_of_input(paper.words, name)}, r = {shortest(r, paper.marks)}"
+            for name, r in line.get("correlations", [])
+        ]
+        if pairs:
+            name = paper.input_name(line)
+            found.append(paper.word("texts.correlated", input=name, others="; ".join(pairs)))
+    return found
+
+
+def others(paper):
+    """Contributions of each input to each stated volume and delivery, some across a table."""
+    budgets = paper.record.get("budgets", [])
+    return [_matrix(paper, group) for group in even_groups(budgets, ACROSS)]
+
+
+def _matrix(paper, budgets):
+    names = [paper.input_name(line) for line in budgets[0]["lines"]]
+    columns = [_contributions(paper, one, names) for one in budgets]
+    totals = [paper.word(f"table_headings.{key}_of_all") for key in ("u", "k", "U")]
+    rows = [list(row) for row in zip([*names, *totals], *columns, strict=True)]
+    heads = [paper.word("table_headings.input"), *(_dips(paper, one) for one in budgets)]
+    align = ["left", *["decimal"] * len(budgets)]
+    caption = paper.word("captions.budget_matrix")
+    return blocks.table(heads, rows, caption, align, paper.marks.decimal)
+
+
+def _contributions(paper, one, names):
+    digits = decimals_of(one["u_m3"])
+    known = {paper.input_name(line): line["contribution_m3"] for line in one["lines"]}
+    texts = [fixed(known.get(name), digits + 1, paper.marks) for name in names]
+    k = fixed(one["k"], 2, paper.marks)
+    u, U = (fixed(one[key], digits, paper.marks) for key in ("u_m3", "U_m3"))
+    return [*texts, u, k, U]
+
+
+def _dips(paper, one):
+    """The head of a column: a dip, and of a delivery below it the one that is subtracted."""
+    below = "" if one["low_m"] is None else f"{paper.marks.minus} {paper.height(one['low_m'], '')}"
+    return [paper.height(one["high_m"], ""), below]
+
+
+def improvements(paper):
+    """What is worth measuring better: U with half the u of an input, the most useful first."""
+    budgets = {"halved_top": paper.record["budget"]}
+    delivery = _first_delivery(paper)
+    if delivery is not None:
+        budgets["halved_delivery"] = delivery["lines"]
+    rows = {}
+    for key, lines in budgets.items():
+        for line in lines:
+            rows.setdefault(paper.input_name(line), {})[key] = line.get("halved")
+    useful = [
+        {"input": name, **row, "least": least}
+        for name, row in rows.items()
+        if (least := min((one for one in row.values() if one is not None), default=1)) < USEFUL
+    ]
+    if not useful:
+        return []
+    columns = [Column(key, "share", decimals=1, nothing=NOTHING) for key in budgets]
+    useful.sort(key=lambda row: row["least"])
+    return [paper.table("improve", useful, [Column("input"), *columns])]

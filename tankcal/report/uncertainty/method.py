@@ -1,0 +1,175 @@
+"""How the uncertainty was found, and from which inputs: sentences and lists."""
+
+from tankcal.report import blocks, numbers
+from tankcal.report.paper import Column
+from tankcal.report.uncertainty.stated import MARK, by_monte_carlo, stated_rows
+
+FROM_SURVEY = (
+    "instrument_scale",
+    "instrument_offset",
+    "points",
+    "form",
+    "own_form",
+    "bottom_points",
+    "bottom_form",
+    "bottom_liquid",
+    "bottom_curve",
+)
+OF_READING = ("interpolation", "rounding")
+
+
+def sentences(paper, mark=MARK):
+    """What U is, how it was propagated, and what Monte Carlo says of it.
+
+    mark  what the rows with Monte Carlo's interval are marked with
+    """
+    capacity = paper.record["capacity"]
+    low, high = (paper.number(of(capacity["k"]), decimals=2) for of in (min, max))
+    one_k = paper.word("texts.k_one", k=low)
+    k = one_k if low == high else paper.word("texts.k_range", low=low, high=high)
+    found = [paper.word("texts.uncertainty", coverage=paper.coverage(), k=k)]
+    if paper.record.get("monte_carlo"):
+        found.append(_simulated(paper, mark))
+    elif paper.record["job"]["table"].get("monte_carlo") is False:
+        found.append(paper.word("texts.monte_carlo_off"))
+    return found
+
+
+def _simulated(paper, mark):
+    simulation = paper.record["monte_carlo"]
+    return paper.word(
+        "texts.simulated",
+        seed=str(simulation["seed"]),
+        draws=draws(paper),
+        drawn=simulation.get("drawn", len(paper.record["capacity"]["volume_m3"])),
+        others=_others(paper, simulation),
+        verdict=verdict(paper, mark),
+    )
+
+
+def _others(paper, simulation):
+    """What became of the rows that were not drawn for; "" where all were."""
+    rows = len(paper.record["capacity"]["volume_m3"])
+    return paper.word("texts.others_follow") if simulation.get("drawn", rows) < rows else ""
+
+
+def draws(paper):
+    """Draws of a row, from the fewest to the most."""
+    drawn = paper.record["monte_carlo"]["rows"]["draws"]
+    low, high = min(drawn), max(drawn)
+    if low == high:
+        return paper.number(low, decimals=0)
+    return paper.word("texts.draws", low=low, high=high)
+
+
+def verdict(paper, mark):
+    """In how many rows the GUM interval is validated, as a sentence."""
+    simulated = by_monte_carlo(paper.record["capacity"])
+    if not any(simulated):
+        return paper.word("texts.validated_all")
+    if all(simulated):
+        return paper.word("texts.validated_none")
+    count = simulated.count(False)
+    return paper.word("texts.validated_some", count=count, all=len(simulated), mark=mark)
+
+
+def inputs(paper):
+    """Labels and texts: inputs of the survey, declared, by default, of a reading, and missing."""
+    lines = budget_lines(paper.record)
+    groups = {"survey": [], "declared": [], "default": [], "reading": []}
+    for line in lines:
+        group = _group(line)
+        said = line | {"is_default": False} if group == "default" else line
+        groups[group].append(_with_u(paper, said))
+    found = [(f"inputs_{name}", "; ".join(texts)) for name, texts in groups.items()]
+    missing = [one for one in paper.record["choices"] if one["code"] == "not_in_budget"]
+    names = [paper.words["inputs"].get(name, name) for one in missing for name in one["value"]]
+    return [*found, ("inputs_missing", "; ".join(names) or paper.word("texts.nothing_missing"))]
+
+
+def budget_lines(record):
+    """The lines of the first budget with what a reading adds; the table's where there is none."""
+    return next((one["lines"] for one in record.get("budgets", [])), record["budget"])
+
+
+def _group(line):
+    if line["input"] in OF_READING:
+        return "reading"
+    if line.get("is_default"):
+        return "default"
+    return "survey" if line["input"] in FROM_SURVEY else "declared"
+
+
+def _with_u(paper, line):
+    name = paper.input_name(line)
+    if line["u"] is None or line["input"] in FROM_SURVEY:
+        return name
+    return paper.word(
+        "texts.input_u",
+        input=name,
+        u=_with_unit(paper, line["u"], line["unit"]),
+        distribution=paper.words["distributions"].get(line["distribution"], line["distribution"]),
+    )
+
+
+def _with_unit(paper, u, unit):
+    """Two digits of an uncertainty, with its unit as the record writes it."""
+    text, shown = paper.number(u, digits=2), numbers.symbol(unit)
+    return f"{text}\N{NO-BREAK SPACE}{shown}" if shown else text
+
+
+def stated_blocks(paper):
+    """The table of the volumes and deliveries that are stated; nothing when there are none."""
+    rows = [_row(paper, row) for row in stated_rows(paper.record)]
+    if not rows:
+        return []
+    unit = paper.record["job"]["table"]["volume_unit"]
+    columns = [
+        Column("high_m", "m", height=True, heading="height_m"),
+        Column("low_m", "m", height=True, heading="down_to"),
+        Column("volume_m3", unit, u="U_m3", least=numbers.unit(unit).least),
+        Column("U_m3", unit, u="U_m3"),
+        Column("k", decimals=2, nothing=""),
+        Column("relative", "share", digits=2, align="right"),
+        Column("remark", nothing=""),
+    ]
+    marked = any(row["by_monte_carlo"] for row in rows)
+    if marked:
+        columns.insert(4, Column("by_monte_carlo", nothing=""))
+    return [paper.table("stated_marked" if marked else "stated", rows, columns)]
+
+
+def _row(paper, row):
+    return row | {
+        "by_monte_carlo": MARK if row["simulated"] else None,
+        "remark": "; ".join(remarks(paper, row)) or None,
+    }
+
+
+def remarks(paper, row):
+    """What is to be said of a stated volume: worst delivery, uneven ends, what was stated, use."""
+    found = []
+    if row["minimum_m"] is not None:
+        height = paper.plain(row["minimum_m"], "m")
+        found.append(paper.word("texts.worst_of", height=height))
+    if row["low_m3"] is not None:
+        unit = paper.record["job"]["table"]["volume_unit"]
+        low, high = (paper.number(row[key], unit, u=row["U_m3"]) for key in ("low_m3", "high_m3"))
+        found.append(paper.word("texts.interval_of", low=low, high=high))
+    if row["stated_m3"] is not None:
+        unit = paper.record["job"]["table"]["volume_unit"]
+        off = row["volume_m3"] - row["stated_m3"]
+        stated, more = (paper.number(one, unit, u=row["U_m3"]) for one in (row["stated_m3"], off))
+        found.append(paper.word("texts.beside_stated", stated=stated, more=more))
+    if not row["for_use"]:
+        found.append(paper.word("texts.not_for_use"))
+    return [*found, row["note"]] if row["note"] else found
+
+
+def blocks_of_method(paper):
+    """The chapter of the certificate."""
+    return [
+        *(blocks.paragraph(text) for text in sentences(paper)),
+        paper.facts(inputs(paper)),
+        *stated_blocks(paper),
+    ]

@@ -1,0 +1,205 @@
+"""The verdict of the job's decision rule: sentences for a certificate, tables for the papers."""
+
+from tankcal.report import blocks, numbers
+from tankcal.report.paper import Column
+
+CERTAIN = 1e-4  # a probability nearer to 0 or 1 is not printed in full
+_LITRES = numbers.unit("m3").least
+
+
+def facts(paper):
+    """Labels and texts: the rule, where it comes from, what it says of the tank."""
+    verdict = paper.record["rule"]
+    rule = verdict["rule"]
+    return [
+        ("rule_name", rule["name"]),
+        ("rule_verdict", paper.word(f"rule_codes.{verdict['code']}")),
+        ("rule_unjudged", ", ".join(verdict["unjudged"])),
+        ("rule_source", rule["source"]),
+        ("rule_verified", paper.word(f"verified.{verdict['verified']}")),
+        ("rule_remark", rule["remark"]),
+        ("rule_largest", _volume(paper, rule["largest_capacity_m3"], 0)),
+        ("rule_tank", paper.word(f"rule_tanks.{verdict['tank']}")),
+        ("rule_capacity", _volume(paper, verdict["capacity_m3"], _LITRES)),
+    ]
+
+
+def sentences(paper):
+    """What became of every limit, a sentence each."""
+    verdict = paper.record["rule"]
+    found = [_of_limit(paper, one) for one in verdict["uncertainty"]]
+    found += [_of_deviation(paper, one) for one in verdict["deviation"]]
+    return [*found, *_by_law(paper)]
+
+
+def _by_law(paper):
+    """How deliveries are judged where Monte Carlo was on, and there is a limit of them."""
+    limits = paper.record["rule"]["uncertainty"]
+    is_bound = any(one["of"] == "deliveries" for one in limits)
+    return [paper.word("texts.by_law_only")] if is_bound and paper.record["monte_carlo"] else []
+
+
+def blocks_of_verdict(paper):
+    """The chapter of the certificate."""
+    found = [paper.facts(facts(paper))]
+    texts = sentences(paper)
+    return [*found, blocks.listing(texts)] if texts else found
+
+
+# ---- limits of the expanded uncertainty
+
+
+def limit_text(paper, one):
+    """What a limit of U says: of what, how much, of what."""
+    height = paper.plain(one["minimum_height_m"], "m") if one["minimum_height_m"] else ""
+    of = paper.word(f"limited.{one['of']}", height=height)
+    if one["limit"] is None:
+        return paper.word("texts.rule_no_limit", of=of)
+    relative_to = paper.word(f"relative_to.{one['relative_to']}")
+    return paper.word(
+        "texts.rule_limit", of=of, limit=paper.percent(one["limit"]), relative_to=relative_to
+    )
+
+
+def _of_limit(paper, one):
+    return paper.word(
+        f"texts.rule_{one['code']}",
+        limit=limit_text(paper, one),
+        place=place_text(paper, one),
+        worst=worst_text(paper, one),
+    )
+
+
+def place_text(paper, one):
+    """From which level and volume, or height of delivery, on a limit is kept; None: nowhere."""
+    if one["from_m"] is None:
+        return None
+    level = paper.height(one["from_m"])
+    if one["from_m3"] is None:
+        return paper.word("texts.from_height", height=level)
+    volume = _volume(paper, one["from_m3"], _LITRES)
+    return paper.word("texts.from_level", level=level, volume=volume)
+
+
+def worst_text(paper, one):
+    """Where U is nearest to the limit or farthest beyond it; None: nothing was judged."""
+    if one["worst_m"] is None:
+        return None
+    ratio = ""
+    if one["worst_ratio"] is not None:
+        relative_to = paper.word(f"relative_to.{one['relative_to']}")
+        ratio = paper.number(one["worst_ratio"], "share", digits=2)
+        ratio = paper.word("texts.worst_ratio", ratio=ratio, relative_to=relative_to)
+    name = "row" if one["worst_low_m"] is None else "delivery"
+    return paper.word(
+        f"texts.worst_{name}",
+        low=paper.height(one["worst_low_m"]),
+        high=paper.height(one["worst_m"]),
+        volume=_volume(paper, one["worst_m3"], _LITRES),
+        U=paper.number(one["worst_U_m3"], "m3", u=one["worst_U_m3"]),
+        ratio=ratio,
+    )
+
+
+def limit_blocks(paper):
+    """The limits of U as a table; nothing when there are none."""
+    rows = [
+        {
+            "limit_of": limit_text(paper, one),
+            "verdict": paper.word(f"limit_codes.{one['code']}"),
+            "from_m": place_text(paper, one),
+            "worst": worst_text(paper, one),
+        }
+        for one in paper.record["rule"]["uncertainty"]
+    ]
+    names = ("limit_of", "verdict", "from_m", "worst")
+    return [paper.table("limits", rows, [Column(name) for name in names])] if rows else []
+
+
+# ---- deviations from stated volumes
+
+
+def _of_deviation(paper, one):
+    return paper.word("texts.rule_deviation", **deviation_texts(paper, one))
+
+
+def deviation_texts(paper, one):
+    """The texts of a deviation by name."""
+    u = one["U_m3"]
+    low = paper.height(one["low_m"])
+    name = "row" if one["low_m"] is None else "delivery"
+    return {
+        "place": paper.word(f"texts.place_{name}", high=paper.height(one["high_m"]), low=low),
+        **{
+            key: paper.number(one[f"{key}_m3"], "m3", u=u)
+            for key in ("volume", "stated", "deviation", "U")
+        },
+        "dips": _dips(paper, one),
+        "limit": paper.word(f"limit_sides.{one['side']}", limit=_room(paper, one)),
+        "guard": paper.word(f"guards.{one['guard']}"),
+        "verdict": paper.word(f"deviation_codes.{one['code']}"),
+        "probability": probability(paper, one["probability"]),
+    }
+
+
+def _dips(paper, one):
+    high = paper.height(one["high_m"])
+    return high if one["low_m"] is None else f"{paper.height(one['low_m'], '')} – {high}"
+
+
+def _room(paper, one):
+    """How far a volume may be from the stated one."""
+    if one["limit"] is None:
+        return paper.plain(one["limit_m3"], numbers.unit("m3").symbol)
+    return paper.word("texts.limit_of_stated", limit=paper.percent(one["limit"]))
+
+
+def probability(paper, share):
+    """A probability in percent; one very near to 0 or 1 as below or above what is printed."""
+    if share > 1 - CERTAIN:
+        return paper.word("texts.more_probable", probability=paper.percent(1 - CERTAIN))
+    if share < CERTAIN:
+        return paper.word("texts.less_probable", probability=paper.percent(CERTAIN))
+    return paper.number(share, "share", decimals=2)
+
+
+def deviation_blocks(paper):
+    """The deviations as a table; nothing when there are none."""
+    rows = [deviation_texts(paper, one) for one in paper.record["rule"]["deviation"]]
+    names = ("volume", "stated", "deviation", "U", "limit", "guard", "verdict", "probability")
+    columns = [Column("dips", heading="deviation_place")]
+    columns += [Column(name, heading=f"deviation_{name}", align=_right(name)) for name in names]
+    return [paper.table("stated_deviations", rows, columns)] if rows else []
+
+
+def _right(name):
+    return "right" if name in ("volume", "stated", "deviation", "U", "probability") else None
+
+
+def clauses(paper):
+    """Where each limit stands, and whether it was read there, a sentence each."""
+    verdict = paper.record["rule"]
+    texts = [(limit_text(paper, one), one) for one in verdict["uncertainty"]]
+    texts += [(deviation_limit_text(paper, one), one) for one in verdict["deviation"]]
+    found = [
+        paper.word(
+            "texts.rule_clause" if one["clause"] else "texts.rule_without_clause",
+            limit=text,
+            clause=one["clause"],
+            verified=paper.word(f"verified.{one['verified']}"),
+        )
+        for text, one in texts
+    ]
+    found = [*dict.fromkeys(found), *_by_law(paper)]
+    return [blocks.listing(found)] if found else []
+
+
+def deviation_limit_text(paper, one):
+    """What a limit of a deviation says."""
+    texts = deviation_texts(paper, one)
+    of = paper.word(f"limited_deviation.{one['of']}")
+    return paper.word("texts.rule_deviation_limit", of=of, limit=texts["limit"])
+
+
+def _volume(paper, value_m3, decimals):
+    return paper.number(value_m3, "m3", decimals=decimals)

@@ -1,0 +1,80 @@
+"""What a decision rule says: limits of the expanded uncertainty, limits of a deviation."""
+
+from dataclasses import dataclass
+
+TANKS = (
+    "vertical_fixed_roof",
+    "vertical_floating_roof",
+    "horizontal",
+    "inclined",
+    "sphere",
+    "other",
+)
+UNCERTAINTY_OF = ("volumes", "capacity", "deliveries")
+DEVIATION_OF = ("volumes", "capacity", "deliveries")
+RELATIVE_TO = ("itself", "capacity")
+SIDES = ("both", "upper", "lower")
+GUARDS = ("none", "U")
+
+
+@dataclass(frozen=True)
+class UncertaintyLimit:
+    """A limit of the expanded uncertainty U.
+
+    name           as the file names it                tanks  kinds it is for; (): all
+    of             "volumes": of every row; "capacity": of the highest row; "deliveries": of all
+                   of at least minimum_height_m
+    limit          U over what `relative_to` names; None: U is to be stated, nothing is limited
+    relative_to    "itself": the row, the capacity, the delivered volume; "capacity"
+    minimum_height_m   of a delivery; None for the others
+    clause         where it stands                     verified  whether it was read there
+    """
+
+    name: str
+    tanks: tuple[str, ...]
+    of: str
+    limit: float | None
+    relative_to: str
+    minimum_height_m: float | None
+    clause: str
+    verified: bool
+
+
+@dataclass(frozen=True)
+class DeviationLimit:
+    """A limit of the deviation of a volume from a stated one.
+
+    of       "volumes": at any dip; "capacity": of the highest row; "deliveries"
+    limit    part of the stated volume                 limit_m3  or an amount; one of them is None
+    side     "both", "upper": only larger volumes are limited, "lower": only smaller ones
+    guard    "none": accepted up to the limit; "U": up to the limit less U (JCGM 106:2012 8.3.2)
+    name, tanks, clause, verified  as of an UncertaintyLimit
+    """
+
+    name: str
+    tanks: tuple[str, ...]
+    of: str
+    limit: float | None
+    limit_m3: float | None
+    side: str
+    guard: str
+    clause: str
+    verified: bool
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One jurisdiction's decision rule.
+
+    source              where the values were read     verified  all of them in the text itself
+    remark              what is to stand beside it; "": nothing
+    largest_capacity_m3 tanks up to which it is for; None: all
+    """
+
+    name: str
+    source: str
+    verified: bool
+    remark: str
+    largest_capacity_m3: float | None
+    uncertainty: tuple[UncertaintyLimit, ...]
+    deviation: tuple[DeviationLimit, ...]

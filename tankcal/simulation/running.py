@@ -1,0 +1,94 @@
+"""The simulation of all rows of a table, and of deliveries between its dips."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tankcal.deliveries import Deliveries, deliveries
+from tankcal.monte_carlo import Goal, Simulation, Verdict, verdict
+from tankcal.simulation.model import Model
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """The interval of each row that counts, (rows,), and the U that it is stated with.
+
+    by_gum  True: volume +- k u; False: Monte Carlo's, where it does not validate that
+    U_m3    of the law of propagation, or the larger distance of Monte Carlo's ends from the volume
+    """
+
+    low_m3: np.ndarray
+    high_m3: np.ndarray
+    by_gum: np.ndarray
+    U_m3: np.ndarray
+
+
+def gum_intervals(table):
+    """`Intervals` of a table that was not simulated."""
+    volume, U = table.volume_m3, table.U_m3
+    return Intervals(volume - U, volume + U, np.full(len(U), True), U)
+
+
+@dataclass(frozen=True)
+class TableSimulation:
+    """What Monte Carlo says of a table and of deliveries from it.
+
+    found, judged  `monte_carlo.Simulation` and `Verdict` of the rows
+    delivered      the `deliveries.Deliveries` that were simulated, too
+    of_deliveries  (Simulation, Verdict) of them
+    curved         pairs of inputs whose second derivatives were kept
+    bent           (rows,) whether the row was simulated with the tank's own volumes, not a parabola
+    drawn          rows that were drawn for; the others of a long table follow their neighbours
+    seed, digits   of all draws; of u that the verdict counts
+    """
+
+    found: Simulation
+    judged: Verdict
+    delivered: Deliveries
+    of_deliveries: tuple[Simulation, Verdict]
+    curved: tuple[tuple[str, str], ...]
+    bent: np.ndarray
+    drawn: int
+    seed: int
+    digits: int
+
+    def intervals(self, table):
+        """`Intervals` of the rows of the table that was simulated."""
+        by_gum = self.judged.validated
+        low = np.where(by_gum, self.judged.low, np.maximum(self.judged.low, 0.0))
+        judged = replace(self.judged, low=low)
+        return Intervals(low, judged.high, by_gum, judged.stated(table.volume_m3, table.U_m3))
+
+
+def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, tell=None):
+    """`TableSimulation` of a `Capacity`.
+
+    job, survey, body, zero_m  what the table was made of, as in `chain.Result`
+    pairs   of dips whose deliveries are simulated as well
+    goal    `monte_carlo.Goal`; the probability is the table's
+    tell    called as tell(text, done, total)
+    Raises HeightError for a dip outside the table.
+    """
+    goal = replace(goal or Goal(), probability=table.probability)
+    telling = tell and (lambda text, done, total: tell("simulating the table", done, total))
+    low, high = np.array(pairs, dtype=float).reshape(-1, 2).T
+    model = Model(job, survey, body, zero_m, table, table.weights(high) - table.weights(low))
+    found = model.simulated(goal, telling)
+    rows, others = (_part(found, part) for part in model.parts)
+    delivered = deliveries(table, low, high)
+    of_delivered = delivered.volume_m3, delivered.u_m3, delivered.dof
+    return TableSimulation(
+        found=rows,
+        judged=verdict(rows, table.volume_m3, table.u_m3, table.dof, digits=goal.digits),
+        delivered=delivered,
+        of_deliveries=(others, verdict(others, *of_delivered, digits=goal.digits)),
+        curved=model.curved.pairs,
+        bent=model.bent[model.parts[0]],
+        drawn=model.drawn,
+        seed=goal.seed,
+        digits=goal.digits,
+    )
+
+
+def _part(found, part):
+    return replace(found, **{name: values[part] for name, values in found.by_volume.items()})

@@ -1,0 +1,124 @@
+"""What is stated of a table beside its rows: budgets, the worst deliveries, a rule's verdict."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.budgets import Budget, budget, reading_sources
+from tankcal.deliveries import WorstDeliveries, worst_deliveries
+from tankcal.errors import InputError, Problem
+from tankcal.rules import Printed, StatedVolume, judge
+
+MINIMA_M = (1.5, 2.0, 3.0)  # of deliveries, where the job names none
+QUARTERS = (0.25, 0.5, 0.75, 1.0)  # of the table, where the job names no dips
+INCLINED = 0.010  # tilt from which a lying tank is an inclined one, m/m
+
+
+@dataclass(frozen=True)
+class Statements:
+    """volumes, deliveries  `Budget`s of dips and of pairs of dips, as the job asks or by default
+    worst  `WorstDeliveries` of each minimum height, ascending
+    """
+
+    volumes: tuple[Budget, ...]
+    deliveries: tuple[Budget, ...]
+    worst: tuple[WorstDeliveries, ...]
+
+    @property
+    def pairs(self):
+        """((low_m, high_m), ...) of the deliveries."""
+        return tuple((one.low_m, one.high_m) for one in self.deliveries)
+
+
+def statements(job, table, largest_interpolation_m3):
+    """`Statements` of a `Capacity` made from a job.
+
+    Volumes at the dips of stated.csv, else at the rows next to the quarters of the table. The
+    deliveries of stated.csv, then of each minimum height the worst one by U over its volume.
+    Raises InputError for a stated dip outside the table.
+    """
+    _refuse_outside(job.stated, table)
+    reading = reading_sources(job.inputs, largest_interpolation_m3)
+    dips = [one.high_m for one in job.stated if one.low_m is None] or _quarters(table)
+    worst = tuple(filter(None, (worst_deliveries(table, one) for one in _minima(job))))
+    pairs = [(one.low_m, one.high_m) for one in job.stated if one.low_m is not None]
+    pairs += [(one.at_minimum.low_m, one.at_minimum.high_m) for one in worst if one.at_minimum]
+    return Statements(
+        volumes=tuple(budget(table, dip, reading=reading) for dip in dips),
+        deliveries=tuple(
+            budget(table, high, low, reading=reading) for low, high in dict.fromkeys(pairs)
+        ),
+        worst=worst,
+    )
+
+
+def verdict_of(job, body, table, intervals, simulation):
+    """`rules.RuleVerdict` of the job's decision rule, with the U that is printed; None without one.
+
+    intervals  `simulation.Intervals` of the rows; simulation  `TableSimulation` or None
+    """
+    if job.rule is None:
+        return None
+    printed = _printed(intervals, simulation)
+    return judge(job.rule, table, _tank(job, body), stated=_stated(job), printed=printed)
+
+
+def _printed(intervals, simulation):
+    """`rules.Printed`: of the rows, and of the deliveries that were simulated."""
+    if simulation is None:
+        return Printed(intervals.U_m3)
+    delivered = simulation.delivered
+    U = delivered.U_m3
+    printed = simulation.of_deliveries[1].stated(delivered.volume_m3, U)
+    factor = np.max(np.divide(printed, U, out=np.ones(len(U)), where=U > 0), initial=1.0)
+    pairs = zip(delivered.low_m.tolist(), delivered.high_m.tolist(), strict=True)
+    of_pairs = dict(zip(pairs, printed.tolist(), strict=True))
+    return Printed(intervals.U_m3, intervals.by_gum, of_pairs, float(factor))
+
+
+def _refuse_outside(stated, table):
+    """Raise InputError for every dip that the table, whose top is the shell's own, lacks."""
+    top = max(round(table.height_m[-1], 3), table.height_m[-1])
+    problems = [
+        Problem(
+            one.file,
+            f"found {dip:g}; expected {table.height_m[0]:g} to {top:g}, the dips of the table",
+            one.row,
+            column,
+        )
+        for one in stated
+        for column, dip in (("low_m", one.low_m), ("high_m", one.high_m))
+        if dip is not None and not table.height_m[0] <= dip <= top
+    ]
+    if problems:
+        raise InputError(problems)
+
+
+def _minima(job):
+    given = job.table.minimum_delivery_m
+    return MINIMA_M if given is None else tuple(sorted(given))
+
+
+def _quarters(table):
+    """Dips of the rows next to the quarters, the top row last; a short table has fewer."""
+    wanted = np.array(QUARTERS) * table.height_m[-1]
+    rows = np.argmin(np.abs(table.height_m[:, None] - wanted), axis=0)
+    return table.height_m[np.unique(rows)].tolist()
+
+
+def _stated(job):
+    """The volumes that an earlier table or a contract states."""
+    return tuple(
+        StatedVolume(one.volume_m3, one.high_m, one.low_m)
+        for one in job.stated
+        if one.volume_m3 is not None
+    )
+
+
+def _tank(job, body):
+    """The kind of tank in the words of the rules; that of a scanned one by its own tilt."""
+    if job.tank.kind == "vertical":
+        return "vertical_fixed_roof" if job.roof is None else "vertical_floating_roof"
+    if job.tank.kind == "horizontal":
+        return "inclined" if abs(body.parts[0].solid.tilt) > INCLINED else "horizontal"
+    return "sphere" if job.tank.kind == "sphere" else "other"

@@ -1,0 +1,54 @@
+"""The values that the declared inputs of a job have, in the units in which they are declared."""
+
+
+def estimates_of(job):
+    """{name of an input: its value}; 0 for what corrects nothing, such as a scale or an offset.
+
+    The temperature is that of the shell, deg C. Without a value: plates or paint that differ from
+    course to course, and what the job does not give.
+    """
+    survey, table, material = job.survey, job.table, job.material
+    given = {
+        **dict.fromkeys(("scale", "datum", "offset", "bottom", "barrel", "deadwood"), 0.0),
+        "surface": 0.0,
+        "plate_thickness": _only([1000 * course.thickness_m for course in job.courses]),
+        "paint": _only([1000 * course.paint_m for course in job.courses]),
+        "shell_temperature": survey.shell_temperature_c,
+        "expansion": material.expansion_per_k,
+        "youngs_modulus": material.e_pa / 1e9,
+        "liquid_density": table.liquid_density_kg_m3,
+        "survey_level": _thousand(survey.liquid_level_m),
+        "survey_density": survey.liquid_density_kg_m3,
+        "roof_mass": job.roof and job.roof.mass_kg,
+        **_of_solid(job),
+    }
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def _of_solid(job):
+    """Sizes of a lying cylinder or a sphere."""
+    lying, solid = job.horizontal, job.horizontal or job.sphere
+    if solid is None:
+        return {}
+    plate = {"plate_thickness": 1000 * solid.thickness_m}
+    if lying is None:
+        return {**plate, "diameter": _thousand(solid.diameter_m)}
+    round_m = lying.width_m if lying.width_m == lying.height_m else None
+    depths = [end.depth_m for end in (lying.end_a, lying.end_b) if end.depth_m]
+    return {
+        **plate,
+        "diameter": _thousand(round_m),
+        "length": _thousand(lying.length_m),
+        "end_depth": _only([1000 * depth for depth in depths]),
+        "tilt": _thousand(lying.tilt),
+        "dip_position": _thousand(lying.dip_from_a_m),
+    }
+
+
+def _only(values):
+    """The value that all have; None where they differ, or there are none."""
+    return values[0] if len(set(values)) == 1 else None
+
+
+def _thousand(value):
+    return None if value is None else 1000 * value
