@@ -1,0 +1,21 @@
+"""Planning a survey: what its table will be worth, before anyone drives to the site.
+
+Names are resolved when they are first used.
+"""
+
+from importlib import import_module
+
+_ROOM_OF = {
+    "Plan": "model",
+    "Prediction": "predicting",
+    "load_plan": "reading",
+    "predict": "predicting",
+}
+
+__all__ = [*_ROOM_OF]
+
+
+def __getattr__(name):
+    if name not in _ROOM_OF:
+        raise AttributeError(f"module 'tankcal.planning' has no attribute {name!r}")
+    return getattr(import_module(f"tankcal.planning.{_ROOM_OF[name]}"), name)

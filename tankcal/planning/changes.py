@@ -1,0 +1,272 @@
+"""Changes of a plan by one item: a station, a tape, a control point, a row, a repeated reading."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tankcal.planning.model import Known, Plan
+from tankcal.planning.rings import around, row_heights_m, tape_of
+
+ITEMS = ("photo_station", "setup", "tape", "control_point", "target_row", "reading")
+IMAGES, SETS = "all image points", "all sets of the total station"  # what is read again
+NEW = "N-"  # what the name of a thing that is added begins with
+MOST_READINGS = 100  # of one thing, as in plan.toml
+CONTROL_SD_M, TAPE_SD_M = 0.002, 0.001  # of what is added where the plan has none to follow
+
+
+@dataclass(frozen=True)
+class Change:
+    """One change of a Plan: what is done to which item, the plan after it, and what it costs.
+
+    action  "add", "drop" or "repeat"      item  of ITEMS     name  of the item
+    cost    of the plan after less of the plan before
+    """
+
+    action: str
+    item: str
+    name: str
+    plan: Plan
+    cost: float
+
+
+def cost_of(plan):
+    """What a Plan costs: the sum of its items times the costs that it states; 0 where none."""
+    count = {
+        "photo_station": len(plan.stations),
+        "photograph": len(plan.photos),
+        "setup": len(plan.setups),
+        "tape": sum(one.table == "distances" for one in plan.ties),
+        "control_point": len(plan.known),
+        "target": len(plan.targets.names),
+        "reading": sum(one.readings - 1 for one in (*plan.photos, *plan.ties))
+        + sum(one.sets - 1 for one in plan.setups),
+    }
+    return float(sum(plan.costs.get(name, 0.0) * number for name, number in count.items()))
+
+
+def changes_of(plan, actions=("add", "drop", "repeat"), items=ITEMS):
+    """Every Change of one item of a Plan."""
+    found = []
+    for item in items:
+        found += [one for one in _OF[item](plan) if one[0] in actions]
+    before = cost_of(plan)
+    return tuple(
+        Change(action, item, name, after, cost_of(after) - before)
+        for action, item, name, after in found
+    )
+
+
+def _stations(plan):
+    for station in plan.stations:
+        left = tuple(one for one in plan.photos if one.station != station)
+        if left or plan.setups:
+            yield "drop", "photo_station", station, replace(plan, photos=left)
+    places = {one.station: one.xyz_m for one in plan.photos}
+    for station, _, place in _between(plan, places):
+        first = next(one for one in plan.photos if one.station == station)
+        like = [one for one in plan.photos if one.station == station]
+        name = f"{NEW}{station}"
+        if any(one.station == name for one in plan.photos):
+            continue
+        turn = _azimuth(plan, place) - _azimuth(plan, first.xyz_m)
+        added = tuple(
+            replace(
+                one, name=f"{name}.{k + 1}", station=name, xyz_m=place,
+                rotation=one.rotation @ _about_z(turn).T,
+            )
+            for k, one in enumerate(like)
+        )  # fmt: skip
+        yield "add", "photo_station", name, replace(plan, photos=(*plan.photos, *added))
+
+
+def _azimuth(plan, place):
+    x, y = place[:2] - plan.shell.axis_m
+    return np.arctan2(x, y)
+
+
+def _about_z(turn):
+    """Rotation (3, 3) that turns places clockwise seen from above."""
+    c, s = np.cos(turn), np.sin(turn)
+    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _between(plan, places):
+    """(name, next name, place (3,)) half-way in azimuth between neighbours of one height.
+
+    places  {name: (3,)}
+    """
+    levels = {}
+    for name, xyz in places.items():
+        levels.setdefault(round(float(xyz[2]), 3), []).append(name)
+    for names in levels.values():
+        names = sorted(names, key=lambda name: _azimuth(plan, places[name]))
+        if len(names) < 2:
+            continue
+        for one, other in zip(names, names[1:] + names[:1], strict=True):
+            here, there = places[one], places[other]
+            gap = (_azimuth(plan, there) - _azimuth(plan, here)) % (2 * np.pi)
+            radius = [np.hypot(*(place[:2] - plan.shell.axis_m)) for place in (here, there)]
+            at = around(plan.shell.axis_m, _azimuth(plan, here) + gap / 2, np.mean(radius))
+            yield one, other, np.array([*at, (here[2] + there[2]) / 2])
+
+
+def _setups(plan):
+    for one in plan.setups:
+        left = tuple(
+            replace(other, sights=tuple(name for name in other.sights if name != one.name))
+            for other in plan.setups
+            if other is not one
+        )
+        if left or plan.photos:
+            yield "drop", "setup", one.name, replace(plan, setups=left)
+    places = {one.name: one.xyz_m for one in plan.setups}
+    for name, other, place in _between(plan, places):
+        like = next(one for one in plan.setups if one.name == name)
+        new = f"{NEW}{name}"
+        if new in places:
+            continue
+        sights = (name, other) if like.sights else ()
+        added = replace(like, name=new, xyz_m=place, sights=sights)
+        beside = tuple(
+            replace(one, sights=(*one.sights, new)) if one.name in sights else one
+            for one in plan.setups
+        )
+        yield "add", "setup", new, replace(plan, setups=(*beside, added))
+
+
+def _tapes(plan):
+    for tie in plan.ties:
+        yield "drop", "tape", tie.name, _without_tie(plan, tie)
+        again = replace(tie, readings=2 * tie.readings)
+        ties = tuple(again if one is tie else one for one in plan.ties)
+        if again.readings <= MOST_READINGS:
+            yield "repeat", "tape", tie.name, replace(plan, ties=ties)
+    yield from _new_tapes(plan)
+
+
+def _without_tie(plan, tie):
+    """The Plan without a tape, and without the marks at its ends that nothing else needs."""
+    left = tuple(one for one in plan.ties if one is not tie)
+    needed = {one.name for one in plan.known}.union(*((one.start, one.end) for one in left))
+    spare = {tie.start, tie.end} - needed
+    extra, facing = (
+        {name: one for name, one in some.items() if name not in spare}
+        for some in (plan.extra, plan.facing)
+    )
+    return replace(plan, ties=left, extra=extra, facing=facing)
+
+
+def _new_tapes(plan):
+    """A tape of each kind, where the plan has none yet: upright over the shell, along a tangent."""
+    like = [one for one in plan.ties if one.table == "distances"]
+    tool = like[0].instrument if like else None
+    sd = min((one.sd_m for one in like), default=TAPE_SD_M)
+    tall = plan.shell.high_m - plan.shell.low_m
+    for kind, length, low in (("vertical", 0.9 * tall, 0.05 * tall), ("horizontal", None, 1.5)):
+        length = plan.shell.radius_m if length is None else length
+        for quarter in range(4):
+            azimuth = 22.5 + 90.0 * quarter
+            name = f"{NEW}{kind[0].upper()}{quarter + 1}"
+            given = {
+                "name": name, "kind": kind, "azimuth_deg": azimuth,
+                "length_m": length, "low_m": min(low, tall / 2), "off_m": None, "s_mm": 1000 * sd,
+                "readings": 1, "instrument": tool,
+            }  # fmt: skip
+            if any(one.name == given["name"] for one in plan.ties):
+                continue
+            tie, ends, out = tape_of(given, plan.shell)
+            after = replace(
+                plan, ties=(*plan.ties, tie), extra=plan.extra | ends,
+                facing=plan.facing | dict.fromkeys(ends, out),
+            )  # fmt: skip
+            yield "add", "tape", tie.name, after
+
+
+def _control(plan):
+    for one in plan.known:
+        left = tuple(other for other in plan.known if other is not one)
+        yield "drop", "control_point", one.name, replace(plan, known=left)
+    sds = [one.sd_m[one.sd_m > 0] for one in plan.known]
+    sd = min((float(one.min()) for one in sds if len(one)), default=CONTROL_SD_M)
+    names = {one.name for one in plan.known}
+    for number in _spread_targets(plan, 8):
+        name = plan.targets.names[number]
+        if name not in names:
+            point = Known(name, plan.targets.xyz_m[number], np.full(3, sd))
+            yield "add", "control_point", name, replace(plan, known=(*plan.known, point))
+
+
+def _spread_targets(plan, count):
+    """Numbers of targets around the shell, at its foot and at its top in turn."""
+    sections = list(dict.fromkeys(plan.targets.section))
+    for k in range(count):
+        row = sections[0] if k % 2 == 0 else sections[-1]
+        members = [i for i, one in enumerate(plan.targets.section) if one == row]
+        yield members[(k * len(members)) // count]
+
+
+def _rows(plan):
+    """Rows of targets dropped, as long as their course keeps one, and one added to each course."""
+    targets = plan.targets
+    for course in dict.fromkeys(targets.course.tolist()):
+        after = _with_row(plan, course)
+        if after is not None:
+            name = f"row in course {plan.job.courses[course].name}"
+            yield "add", "target_row", name, after
+    for name in dict.fromkeys(targets.section):
+        mine = np.array([one == name for one in targets.section])
+        rest = targets.taken(~mine)
+        if set(rest.course) == set(targets.course):
+            gone = set(targets.taken(mine).names)
+            known = tuple(one for one in plan.known if one.name not in gone)
+            ties = tuple(one for one in plan.ties if not {one.start, one.end} & gone)
+            after = replace(plan, targets=rest, known=known, ties=ties)
+            yield "drop", "target_row", f"row {name}", after
+
+
+def _with_row(plan, course):
+    """The Plan with a row more in a course, all its rows at Gauss levels; None: too low for it."""
+    targets = plan.targets
+    mine = targets.course == course
+    rows = sorted({*zip(targets.height_m[mine], np.array(targets.section)[mine], strict=True)})
+    below = sum(one.height_m for one in plan.job.courses[:course])
+    levels, _ = row_heights_m([plan.job.courses[course]], len(rows) + 1, targets.clearance_m)
+    if len(levels) <= len(rows):
+        return None
+    xyz, heights = targets.xyz_m.copy(), targets.height_m.copy()
+    for (height, section), level in zip(rows, levels, strict=False):
+        row = np.array([one == section for one in targets.section])
+        xyz[row, 2] += below + level - height
+        heights[row] = below + level
+    moved = replace(targets, xyz_m=xyz, height_m=heights)
+    last = moved.taken([one == rows[-1][1] for one in moved.section])
+    section, rise = f"{NEW}{len(set(targets.section)) + 1}", levels[-1] - levels[-2]
+    added = replace(
+        last,
+        names=tuple(f"{line}-{section}" for line in last.generatrix),
+        section=(section,) * len(last.names),
+        height_m=last.height_m + rise,
+        xyz_m=last.xyz_m + [0.0, 0.0, rise],
+    )
+    places = dict(zip(moved.names, moved.xyz_m, strict=True))
+    known = tuple(replace(one, xyz_m=places.get(one.name, one.xyz_m)) for one in plan.known)
+    return replace(plan, targets=moved.followed_by(added), known=known)
+
+
+def _readings(plan):
+    if plan.photos and max(one.readings for one in plan.photos) <= MOST_READINGS / 2:
+        photos = tuple(replace(one, readings=2 * one.readings) for one in plan.photos)
+        yield "repeat", "reading", IMAGES, replace(plan, photos=photos)
+    if plan.setups and max(one.sets for one in plan.setups) <= MOST_READINGS / 2:
+        setups = tuple(replace(one, sets=2 * one.sets) for one in plan.setups)
+        yield "repeat", "reading", SETS, replace(plan, setups=setups)
+
+
+_OF = {
+    "photo_station": _stations,
+    "setup": _setups,
+    "tape": _tapes,
+    "control_point": _control,
+    "target_row": _rows,
+    "reading": _readings,
+}

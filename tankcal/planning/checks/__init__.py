@@ -1,0 +1,1 @@
+"""What cannot be meant in a plan: as it is given, where it stands, what it sees."""

@@ -1,0 +1,125 @@
+"""What is given in a plan and cannot be meant: names, keys that belong together, accuracies."""
+
+from tankcal.job.checks.common import is_not_given, refuse_repeated
+from tankcal.job.tables import nearest
+from tankcal.planning.given import PLAN_FILE
+from tankcal.planning.units import warn_of_units
+
+UNFIT = {  # kinds of instruments that cannot be meant
+    "setup_rings": ("tape", "level"),
+    "tapes": ("total_station", "theodolite", "level"),
+}
+
+
+def check_given(values, registers, given, raw, log):
+    """Names that must be defined, keys that belong together, accuracies that are not all zero."""
+    for section, key, register in (
+        ("photo_rings", "camera", "cameras"),
+        ("setup_rings", "instrument", "instruments"),
+        ("tapes", "instrument", "instruments"),
+    ):
+        known = registers[register]
+        for one in given.repeated[section]:
+            if one[key] is not None and one[key] not in known:
+                expected = f"found {one[key]!r}; expected a name of {register}.toml"
+                one.tell(log.problem, key, expected + nearest(one[key], known))
+    _check_kinds(registers["instruments"], given, log)
+    _check_pattern(given.single["pattern"], log)
+    for section in ("photo_rings", "setup_rings"):
+        for one in given.repeated[section]:
+            if len(one.filled & {"distance_m", "radius_m"}) != 1:
+                expected = "expected one of distance_m (from the wall) and radius_m (from the axis)"
+                one.tell(log.problem, "distance_m", expected)
+    _check_obstacles(given, log)
+    _check_tapes(given, log)
+    _check_tables(given, log)
+    _check_accuracies(values, given, raw, log)
+    warn_of_units(given, raw, values, log)
+
+
+def _check_kinds(instruments, given, log):
+    """A tape is no instrument of a set-up, nor a total station a tape."""
+    for section, unfit in UNFIT.items():
+        for one in given.repeated[section]:
+            kind = (instruments.get(one["instrument"]) or {}).get("kind")
+            if kind in unfit:
+                expected = f"{one['instrument']} is a {kind.replace('_', ' ')}; expected "
+                expected += "a tape" if section == "tapes" else "a total station or a theodolite"
+                one.tell(log.problem, "instrument", expected)
+
+
+def _check_pattern(pattern, log):
+    """Heights or levels, and a form that is larger than its part."""
+    if {"levels", "heights_m"} <= pattern.filled:
+        expected = "given together with heights_m; expected one of the two"
+        pattern.tell(log.problem, "levels", expected)
+    whole, common = pattern["form_mm"] or 0.0, pattern["common_form_mm"] or 0.0
+    if common > whole and not pattern.is_refused("form_mm"):
+        expected = f"found {common:g}; it is a part of form_mm: expected at most {whole:g}"
+        pattern.tell(log.problem, "common_form_mm", expected)
+
+
+def _check_obstacles(given, log):
+    needed = {"box": {"from_m": 3, "to_m": 3}, "cylinder": {"axis_m": 2}}
+    numbers = {"box": (), "cylinder": ("radius_m", "low_m", "high_m")}
+    for one in given.repeated["obstacles"]:
+        for key, count in needed.get(one["kind"], {}).items():
+            if not one.is_refused(key) and len(one[key] or ()) != count:
+                one.tell(log.problem, key, f"expected {count} numbers, metres")
+        for key in numbers.get(one["kind"], ()):
+            if key not in one.filled:
+                one.tell(log.problem, key, "missing; expected a number, metres")
+        if None not in (one["low_m"], one["high_m"]) and one["high_m"] <= one["low_m"]:
+            expected = f"found {one['high_m']:g}; expected more than low_m, {one['low_m']:g}"
+            one.tell(log.problem, "high_m", expected)
+        if any(a == b for a, b in zip(one["from_m"] or (), one["to_m"] or (), strict=False)):
+            expected = "in a plane with from_m; expected a corner that differs in x, y and z"
+            one.tell(log.problem, "to_m", expected)
+
+
+def _check_tapes(given, log):
+    seen = set()
+    for one in given.repeated["tapes"]:
+        if one["name"] in seen:
+            one.tell(log.problem, "name", f"found {one['name']!r} again; expected it once")
+        seen.add(one["name"])
+
+
+def _check_tables(given, log):
+    """Ties between two points, control points that stand there once, in one frame."""
+    for table in given.tables.values():
+        if table is None:
+            continue
+        for row, start, end in zip(table.rows, table.of("from"), table.of("to"), strict=True):
+            if start is not None and start == end:
+                expected = f"found {end!r} on both sides; expected two points"
+                log.problem(table.file, expected, row, "to")
+    if given.control is not None:
+        refuse_repeated(given.control, "point", log)
+        for row, system in zip(given.control.rows, given.control.of("system"), strict=True):
+            if system is not None:
+                expected = f"found {system!r}; expected blank: a plan is in the survey's own frame"
+                log.problem(given.control.file, expected, row, "system")
+
+
+def _check_accuracies(values, given, raw, log):
+    """Each ring says how well it measures; not everything may be exact."""
+    has_common = values is None or not is_not_given(raw, "adjustment", "image_sd_um")
+    for one in given.repeated["photo_rings"]:
+        if "s_um" not in one.filled and not has_common:
+            expected = "missing; expected s_um, or adjustment.image_sd_um"
+            one.tell(log.problem, "s_um", expected)
+        elif one["s_um"] == 0:
+            expected = "found 0; an image point cannot be exact: expected micrometres above 0"
+            one.tell(log.problem, "s_um", expected)
+    keys = ("s_direction_arcsec", "s_zenith_arcsec", "s_mm")
+    for one in given.repeated["setup_rings"]:
+        if not one.filled & {*keys}:
+            expected = f"measures nothing; expected at least one of {', '.join(keys)}"
+            log.problem(PLAN_FILE, expected, one.row, one.name)
+        elif not any(one[key] or one.is_refused(key) for key in keys):
+            expected = "an accuracy of zero for everything: expected standard deviations above 0"
+            log.problem(PLAN_FILE, expected, one.row, one.name)
+        if "s_mm" in one.filled and "s_zenith_arcsec" not in one.filled:
+            expected = "missing; slope distances (s_mm) need zenith angles beside them"
+            one.tell(log.problem, "s_zenith_arcsec", expected)

@@ -1,0 +1,87 @@
+"""The covariance of many predicted points, as it acts and not as a matrix that is written out.
+
+What a volume needs of all points together are products with a few columns: Q M comes from the
+reduced normal equations, 3n times d numbers and not 3n times 3n.
+
+Shifts and the turn about the vertical are taken out as `wall.among_themselves` takes them out:
+
+    C' = C - D A' - A D'     D basis of these motions     A = C D - D (D'C D + s2 I) / 2
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse
+
+from tankcal.gauss_markov.effects import covariances
+
+
+@dataclass(frozen=True)
+class PredictedCovariance:
+    """Covariance (3n, 3n) of chosen points of a predicted network, among themselves.
+
+    adjusted  network.Adjusted        points  (n,) numbers of the points there
+    """
+
+    adjusted: object
+    points: np.ndarray
+
+    @property
+    def shape(self):
+        """(3n, 3n)."""
+        return (3 * len(self.points),) * 2
+
+    def __matmul__(self, matrix):
+        """C' matrix, (3n, d)."""
+        return (
+            self._in_frame(matrix)
+            - self._basis @ (self._across.T @ matrix)
+            - (self._across @ (self._basis.T @ matrix))
+        )
+
+    def _in_frame(self, matrix):
+        """C matrix in the datum of the network."""
+        columns = self.adjusted.problem.layout.points[self.points].ravel()
+        found = covariances(self.adjusted.solution, columns, matrix.T)
+        return np.vstack([found, np.zeros((1, found.shape[1]))])[columns]
+
+    @cached_property
+    def _basis(self):
+        """(3n, 4) orthonormal basis of the common shift and the turn about the vertical."""
+        xyz = self.adjusted.xyz_m[self.points]
+        x, y, _ = (xyz - xyz.mean(axis=0)).T
+        motions = np.zeros((len(x), 3, 4))
+        motions[:, :, :3] = np.eye(3)
+        motions[:, 0, 3], motions[:, 1, 3] = -y, x
+        return np.linalg.qr(motions.reshape(-1, 4))[0]
+
+    @cached_property
+    def _across(self):
+        basis = self._basis
+        spread = self._in_frame(basis)
+        across = spread - 0.5 * basis @ (basis.T @ spread)
+        trace = np.einsum("nii->", self.adjusted.point_covariances_m2[self.points])
+        left = trace - 2 * np.sum(basis * across)
+        return across - 0.5 * max(left, 0.0) / (len(basis) - 4) * basis
+
+    def among(self, column):
+        """A column (3n,) of one cause, without the common motions."""
+        return column - self._basis @ (self._basis.T @ column)
+
+    def diagonal(self):
+        """(3n,) variances."""
+        return self.of_each_point().diagonal()
+
+    def written_out(self):
+        """(3n, 3n) dense, for few points."""
+        cross = self._basis @ self._across.T
+        return self.adjusted.covariance_m2(self.points) - cross - cross.T
+
+    def of_each_point(self):
+        """Sparse (3n, 3n): the block of each point, nothing between them."""
+        n = len(self.points)
+        basis, across = (part.reshape(n, 3, 4) for part in (self._basis, self._across))
+        cross = basis @ np.swapaxes(across, 1, 2)
+        block = self.adjusted.point_covariances_m2[self.points] - cross - np.swapaxes(cross, 1, 2)
+        return scipy.sparse.bsr_array((block, np.arange(n), np.arange(n + 1))).tocsr()

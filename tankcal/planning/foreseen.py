@@ -1,0 +1,106 @@
+"""What the run of a planned survey will warn of, and what the plan counts on in vain."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tankcal.doubts import SHOWN, of_adjustment
+from tankcal.errors import Problem
+from tankcal.job.tables import SETTINGS_FILE
+from tankcal.messages import listed, message
+from tankcal.planning.covariance import PredictedCovariance
+from tankcal.planning.given import PLAN_FILE
+from tankcal.tabling import doubts_of_table
+
+
+def foreseen(prediction):
+    """A tuple of Problem: those of the plan, of its network, of the wall and of the table."""
+    tabled = prediction.tabled
+    of_run = (
+        *prediction.predicted.frame.warnings,
+        *of_adjustment(tabled.job, prediction.datum, tabled.job.points.causes),
+        *doubts_of_table(_correlated(tabled), tabled.wall, tabled.made),
+    )
+    return (
+        *prediction.plan.warnings,
+        *_unseen(prediction),
+        *idle_ties(prediction.plan, prediction.points),
+        *_uncontrolled(prediction.reliability),
+        *(replace(one, file=PLAN_FILE) if one.file == SETTINGS_FILE else one for one in of_run),
+    )
+
+
+def _correlated(tabled):
+    """The job of a PredictedTable, its points with all that they have in common."""
+    points, adjusted = tabled.job.points, tabled.covariance.adjusted
+    number = {name: i for i, name in enumerate(adjusted.survey.points)}
+    covariance = PredictedCovariance(adjusted, np.array([number[name] for name in points.names]))
+    return replace(tabled.job, points=replace(points, covariance_m2=covariance))
+
+
+def _unseen(prediction):
+    """Targets that nothing sees."""
+    targets = set(prediction.plan.targets.names)
+    lost = [one.name for one in prediction.undetermined if one.name in targets]
+    if not lost:
+        return ()
+    text = message(
+        "plan_targets_lost",
+        "{count} of {all} targets are not determined, for they are seen from too few places:"
+        " {points}",
+        count=len(lost),
+        all=len(targets),
+        points=listed(lost, SHOWN),
+    )
+    return (Problem(PLAN_FILE, text, column="pattern"),)
+
+
+def idle_ties(plan, points):
+    """Tapes, height differences and plumb lines with an end that is not determined.
+
+    points  PointOutlook of all points
+    """
+    lost = {one.name for one in points if one.undetermined}
+    ties = plan.ties
+    idle = [
+        message("plan_tie_end", "{tie} ({points})", tie=one.name, points=ends)
+        for one in ties
+        if (ends := [end for end in (one.start, one.end) if end in lost])
+    ]
+    if not idle:
+        return ()
+    text = message(
+        "plan_ties_idle",
+        "{count} of {all} tapes, height differences and plumb lines do not count, for an end of"
+        " them is not determined: {ties}",
+        count=len(idle),
+        all=len(ties),
+        ties=listed(idle, SHOWN),
+    )
+    return (Problem(PLAN_FILE, text),)
+
+
+def _uncontrolled(groups):
+    """Kinds of readings (`GroupReliability`) of which nothing controls some or all."""
+    idle = [_of_group(one) for one in groups if one.uncontrolled]
+    if not idle:
+        return ()
+    text = message(
+        "plan_uncontrolled",
+        "nothing controls {groups}: an error there goes unseen into the table",
+        groups=idle,
+    )
+    return (Problem(PLAN_FILE, text),)
+
+
+def _of_group(one):
+    if one.count == 1:
+        template = "the only value of {group} ({points})"
+        return message("plan_only_value", template, group=one.kind, points="-".join(one.of))
+    return message(
+        "plan_some_values",
+        "{uncontrolled} of {count} values of {group}",
+        uncontrolled=one.uncontrolled,
+        count=one.count,
+        group=one.kind,
+    )

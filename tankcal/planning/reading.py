@@ -1,0 +1,265 @@
+"""From a plan's folder to a checked Plan, or to every problem that it has."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+from tankcal.job.attached import Attached
+from tankcal.job.checks import check_tank
+from tankcal.job.checks.survey.cameras import check_cameras
+from tankcal.job.checks.survey.files import SurveyFiles
+from tankcal.job.checks.survey.instruments import check_instruments
+from tankcal.job.entries import (
+    ColumnValues,
+    kind_of,
+    read_columns,
+    read_register,
+    read_setting,
+    read_settings,
+)
+from tankcal.job.fields import NUMBER, is_blank
+from tankcal.job.folder import (
+    MAX_SETTINGS_BYTES,
+    csv_marks,
+    decode,
+    flattened,
+    parsed_toml,
+    read_csv,
+)
+from tankcal.job.folder import read_register as read_register_file
+from tankcal.job.making import make_job
+from tankcal.job.measuring import make_measurements
+from tankcal.job.rule_files import find_rule
+from tankcal.job.tables import (
+    REGISTERS,
+    Log,
+    RawJob,
+    Value,
+    fingerprint,
+    nearest,
+    read_bytes,
+)
+from tankcal.job.tables import (
+    TABLES as JOB_FILES,
+)
+from tankcal.planning.assembling import assembled
+from tankcal.planning.checks.given import check_given
+from tankcal.planning.checks.placed import check_plan
+from tankcal.planning.contract import JOB_TABLES, REPEATED, SINGLE, TABLES, Count
+from tankcal.planning.given import PLAN_FILE, Entry, Given
+
+
+def load_plan(path):
+    """The Plan in a folder, or in the folder of a plan.toml.
+
+    Raises InputError with every problem of the input, each with its file, row and column.
+    """
+    log = Log()
+    folder = _folder(Path(path), log)
+    log.stop_if_problems()
+    raw, given = _read(folder, log)
+    values = read_settings(raw, log)
+    if kind_of(raw) not in (None, "vertical"):
+        expected = "only an upright tank can be planned so far; expected vertical"
+        log.problem(PLAN_FILE, expected, None, "tank.kind")
+    registers = {name: read_register(raw, name, log) for name in REGISTERS}
+    tables = _job_tables(raw, log)
+    given = replace(given, control=tables["control"])
+    _check(raw, values, tables | _measured(given), registers, given, log)
+    log.stop_if_problems()
+    job = _job(raw, values, tables, registers, log)
+    log.stop_if_problems()
+    plan = assembled(job, given, folder.resolve().name)
+    check_plan(plan, given, raw, log)
+    log.stop_if_problems()
+    return replace(plan, given=_with_points(raw), warnings=tuple(log.warnings))
+
+
+def _with_points(raw):
+    """The RawJob with decimal points in its tables, and nothing said of marks: as jobs are made."""
+    settings = {name: entries for name, entries in raw.settings.items() if name != "csv"}
+    tables = {
+        name: replace(table, decimal=".", rows=tuple(map(_in_points, table.rows)))
+        if table is not None and table.decimal == ","
+        else table
+        for name, table in raw.tables.items()
+    }
+    return replace(raw, settings=settings, tables=tables)
+
+
+def _in_points(row):
+    """A row of cells, numbers with decimal points."""
+    numbers = ((cell or "").strip().replace(",", ".") for cell in row)
+    return tuple(
+        number if NUMBER.fullmatch(number) else cell
+        for number, cell in zip(numbers, row, strict=True)
+    )
+
+
+def _folder(path, log):
+    if path.name == PLAN_FILE and path.is_file():
+        return path.parent
+    if not (path / PLAN_FILE).is_file():
+        expected = f"no {PLAN_FILE} there; expected a plan's folder, or its {PLAN_FILE}"
+        log.problem(path.name or ".", expected)
+    return path
+
+
+def _read(folder, log):
+    """RawJob and Given of a plan's folder."""
+    files = []
+
+    def content(name, limit=None):
+        data = read_bytes(folder / name, log, *([] if limit is None else [limit]))
+        if data is not None:
+            files.append(fingerprint(name, data))
+        return data
+
+    data = content(PLAN_FILE, MAX_SETTINGS_BYTES)
+    parsed = None if data is None else parsed_toml(PLAN_FILE, data, log)
+    log.stop_if_problems()
+    text, (whole, rows) = decode(PLAN_FILE, data, log), parsed
+    own = {name: whole.pop(name) for name in (*SINGLE, *REPEATED) if name in whole}
+    settings, sections = flattened(PLAN_FILE, whole, rows, log)
+    single = {name: _single(name, own.get(name, {}), rows, log) for name in SINGLE}
+    repeated = {name: _repeated(name, own.get(name, []), text, log) for name in REPEATED}
+    marks = csv_marks(PLAN_FILE, settings, log)
+    tables, known = {}, [f"{name}.csv" for name in (*JOB_TABLES, *TABLES)]
+    for path in sorted(folder.glob("*.csv")):
+        if path.name not in known:
+            log.problem(path.name, f"unknown file; expected {', '.join(known)}")
+            continue
+        table = content(path.name)
+        is_readable = table is not None and marks is not None
+        tables[path.stem] = (
+            read_csv(path.name, table, *marks, log, PLAN_FILE) if is_readable else None
+        )
+    registers = {}
+    for name in REGISTERS:
+        if (folder / f"{name}.toml").exists():
+            register = content(f"{name}.toml", MAX_SETTINGS_BYTES)
+            if register is not None:
+                registers[name] = read_register_file(f"{name}.toml", register, log)
+    raw = RawJob(
+        folder.resolve().name, folder, PLAN_FILE, settings, sections, tables,
+        files=tuple(files), registers=registers,
+    )  # fmt: skip
+    of_plan = {name: _table(name, tables.get(name), log) for name in TABLES}
+    return raw, Given(single, repeated, of_plan)
+
+
+def _table(name, table, log):
+    """ColumnValues of a table that a job has otherwise, or None."""
+    if table is None:
+        return None
+    values = read_columns(name, table, log, TABLES[name])
+    for field in TABLES[name]:
+        if isinstance(field, Count):
+            for row, count in zip(values.rows, values.of(field.name), strict=True):
+                if not _is_whole(count):
+                    log.problem(values.file, _not_whole(field, count), row, field.name)
+    return values
+
+
+def _single(section, entries, rows, log):
+    if not isinstance(entries, dict):
+        log.problem(PLAN_FILE, f"expected one [{section}]", rows.get(section), section)
+        entries = {}
+    found = {key: rows.get(f"{section}.{key}") for key in entries}
+    return _entry(section, SINGLE[section], entries, rows.get(section), found, log)
+
+
+def _repeated(section, entries, text, log):
+    """[Entry] of the [[section]] of a plan."""
+    if not isinstance(entries, list) or not all(isinstance(one, dict) for one in entries):
+        log.problem(PLAN_FILE, f"expected [[{section}]], in double brackets", None, section)
+        return []
+    found, places = [], _rows_of(section, text)
+    for number, one in enumerate(entries):
+        row, rows = places[number] if number < len(places) else (None, {})
+        name = f"{section}[{number + 1}]"
+        found.append(_entry(name, REPEATED[section], one, row, rows, log))
+    return found
+
+
+def _rows_of(section, text):
+    """[(row, {key: row})] of each [[section]] in the text of a plan, for messages only."""
+    found, rows = [], {}
+    for number, line in enumerate(text.splitlines(), 1):
+        if re.match(r"\s*\[+[^\[\],]+\]+\s*(#|$)", line):
+            rows = {}
+            if re.match(rf"\s*\[\[\s*{section}\s*\]\]", line):
+                found.append((number, rows))
+        elif key := re.match(r"\s*[\"']?(\w+)[\"']?\s*=", line):
+            rows.setdefault(key[1], number)
+    return found
+
+
+def _entry(name, fields, entries, row, rows, log):
+    known = [field.name for field in fields]
+    for key in entries:
+        if key not in known:
+            expected = f"unknown key{nearest(key, known)}"
+            log.problem(PLAN_FILE, expected, rows.get(key) or row, f"{name}.{key}")
+    values = {
+        field.name: read_setting(
+            PLAN_FILE,
+            f"{name}.{field.name}",
+            field,
+            Value(entries[field.name], rows.get(field.name)) if field.name in entries else None,
+            None,
+            log,
+            field.required and bool(entries or name == "pattern"),
+            row,
+        )
+        for field in fields
+    }
+    filled = frozenset(key for key, value in entries.items() if not is_blank(value))
+    found = Entry(name, values, filled, row, rows)
+    for field in fields:
+        if isinstance(field, Count) and not _is_whole(values[field.name]):
+            found.tell(log.problem, field.name, _not_whole(field, values[field.name]))
+    return found
+
+
+def _is_whole(value):
+    return value is None or float(value).is_integer()
+
+
+def _not_whole(field, value):
+    return f"found {value:g}; expected {field.expectation()}"
+
+
+def _job_tables(raw, log):
+    """{name: ColumnValues or None} of all tables that a job can have."""
+    tables = dict.fromkeys(JOB_FILES)
+    for name in JOB_TABLES:
+        if raw.tables.get(name) is not None:
+            tables[name] = read_columns(name, raw.tables[name], log)
+    if "courses" not in raw.tables:
+        log.problem("courses.csv", "missing file; expected the courses of the shell")
+    return tables
+
+
+def _measured(given):
+    """Tables of the plan, and a stand-in that says: image points will be measured."""
+    return given.tables | {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
+
+
+def _check(raw, values, tables, registers, given, log):
+    """What can be told before anything is placed."""
+    check_tank(values, tables, raw, log)
+    files = SurveyFiles(values, tables, registers, raw, log)
+    check_cameras(files)
+    check_instruments(files)
+    check_given(values, registers, given, raw, log)
+
+
+def _job(raw, values, tables, registers, log):
+    """The Job of a plan: its measurements are cameras, instruments, control and settings alone."""
+    rule = values["table"]["rule"]
+    attached = Attached(None, None, None if rule is None else find_rule(raw, rule, log))
+    log.stop_if_problems()
+    measurements = make_measurements(values, tables, registers)
+    tables = tables | {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
+    return make_job(raw, values, tables, attached, measurements, tuple(log.warnings))

@@ -1,0 +1,243 @@
+"""Patterns in one line: rings of stations, rows of targets at Gauss levels, tapes on the wall."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from tankcal.planning.model import Instrumented, Photograph, Shell, Targets, Tie
+from tankcal.quadrature import panels
+from tankcal.rotations import looking
+
+ARCSEC = np.pi / 180 / 3600
+LEVELS, CLEARANCE_M = 2, 0.3
+TOUCH_M = 0.02  # targets nearer than this to one another are one place
+ROUNDING_RAD = 1e-8
+STEEP = np.radians(89.9)  # steeper than this no camera of a ring looks
+
+
+def full_turn(angle_rad):
+    """Angles from 0 to 2 pi; what is a full turn but for rounding is 0."""
+    turned = np.asarray(angle_rad) % (2 * np.pi)
+    return np.where(2 * np.pi - turned < ROUNDING_RAD, 0.0, turned)
+
+
+def around(axis_m, azimuth_rad, radius_m):
+    """(..., 2) places at azimuths, clockwise from +y, and distances from an axis."""
+    azimuth, radius = np.broadcast_arrays(azimuth_rad, radius_m)
+    return np.asarray(axis_m) + radius[..., None] * np.stack(
+        [np.sin(azimuth), np.cos(azimuth)], axis=-1
+    )
+
+
+def joints_of(courses):
+    """(courses + 1,) heights of the joints of courses above the bottom of the lowest, m."""
+    return np.cumsum([0.0] + [course.height_m for course in courses])
+
+
+def row_heights_m(courses, levels, clearance_m):
+    """Heights above the bottom of rows of targets, and the index of the course of each.
+
+    The Gauss levels of every course, moved to the clearance from its welds where they are nearer
+    than that. A course too low for its clearance has one row in the middle.
+    """
+    joints = joints_of(courses)
+    heights, index = [], []
+    for number, (low, high) in enumerate(pairwise(joints)):
+        room = high - low - 2 * clearance_m
+        rows = panels([low, high], levels)[0] if room > 0 else np.array([(low + high) / 2])
+        rows = np.clip(rows, low + min(clearance_m, (high - low) / 2), None)
+        rows = np.unique(np.minimum(rows, max(high - clearance_m, (low + high) / 2)))
+        rows = rows[np.append(True, np.diff(rows) >= TOUCH_M)]
+        heights.append(rows)
+        index.append(np.full(len(rows), number))
+    return np.concatenate(heights), np.concatenate(index)
+
+
+def targets_of(given, shell, courses):
+    """The Targets of a [pattern].
+
+    given    {key: value}, None where blank      shell   Shell      courses  of the job
+    """
+    clearance = _or(given["weld_clearance_mm"], 1000 * CLEARANCE_M) / 1000
+    joints = joints_of(courses)
+    if given["heights_m"]:
+        rows = np.sort(given["heights_m"])
+        course = np.searchsorted(joints[1:-1], rows, side="right")
+    else:
+        levels = int(_or(given["levels"], LEVELS))
+        rows, course = row_heights_m(courses, levels, clearance)
+    n = int(given["generatrices"])
+    azimuth = np.radians(_or(given["first_azimuth_deg"], 0.0)) + 2 * np.pi * np.arange(n) / n
+    welds = np.radians(given["weld_azimuths_deg"] or [])
+    azimuth = _beside(azimuth, welds, clearance / shell.radius_m)
+    offset = _or(given["offset_mm"], 0.0) / 1000
+    row, line = (index.ravel() for index in np.indices((len(rows), n)))
+    side = 1.0 if shell.outside else -1.0
+    plates = np.array([plate_m(one, shell.outside) for one in courses])
+    radius = shell.radius_m + (plates - plates[0])[course]
+    out = np.zeros((len(row), 3))
+    out[:, :2] = side * around((0.0, 0.0), azimuth[line], 1.0)
+    xyz = np.column_stack(
+        [
+            around(shell.axis_m, azimuth[line], radius[row] + side * offset),
+            shell.low_m + rows[row],
+        ]
+    )
+    weld = np.radians(_or(given["reference_weld_deg"], 0.0))
+    return Targets(
+        names=tuple(f"{g + 1}-{s + 1}" for s, g in zip(row, line, strict=True)),
+        section=tuple(str(s + 1) for s in row),
+        generatrix=tuple(str(g + 1) for g in line),
+        course=course[row],
+        height_m=rows[row],
+        arc_m=full_turn(azimuth[line] - weld) * shell.radius_m,
+        xyz_m=xyz,
+        outwards=out,
+        offset_m=offset,
+        clearance_m=clearance,
+        welds_rad=tuple(welds.tolist()),
+    )
+
+
+def _beside(azimuth, welds, clearance):
+    """Azimuths moved away from welds, to the clearance (rad) on the nearer side."""
+    for weld in welds:
+        off = np.angle(np.exp(1j * (azimuth - weld)))
+        side = np.where(off < 0, -1.0, 1.0)
+        azimuth = np.where(np.abs(off) < clearance, weld + side * clearance, azimuth)
+    return azimuth
+
+
+def _stands(given, shell):
+    """(azimuth, place (3,), station, height) of each stand of a ring, height by height."""
+    n = int(given["stations"])
+    azimuth = np.radians(_or(given["start_azimuth_deg"], 0.0)) + 2 * np.pi * np.arange(n) / n
+    for level, height in enumerate(given["heights_m"]):
+        plan = around(shell.axis_m, azimuth, ring_radius_m(given, shell))
+        for i in range(n):
+            yield azimuth[i], np.array([*plan[i], shell.low_m + height]), i, level
+
+
+def ring_radius_m(given, shell):
+    """Distance of a ring's stations from the axis; `distance_m` counts from the wall."""
+    if given["radius_m"] is not None:
+        return given["radius_m"]
+    return shell.radius_m + (given["distance_m"] if shell.outside else -given["distance_m"])
+
+
+def photographs_of(given, number, shell, image_sd_mm, place):
+    """The Photographs of one [[photo_rings]], the `number`th."""
+    found = []
+    sd = image_sd_mm if given["s_um"] is None else given["s_um"] / 1000
+    height = _or(given["aim_height_m"], (shell.high_m - shell.low_m) / 2)
+    radius = ring_radius_m(given, shell)
+    far = radius - shell.radius_m if shell.outside else radius + shell.radius_m
+    for azimuth, xyz, i, level in _stands(given, shell):
+        station = f"R{number}-{i + 1}" + (f"-{level + 1}" if len(given["heights_m"]) > 1 else "")
+        tilt = np.arctan2(shell.low_m + height - xyz[2], max(far, 1e-9))
+        exposures = [
+            (turn, roll)
+            for turn in given["directions_deg"] or [0.0]
+            for roll in given["rolls_deg"] or [0.0]
+            for _ in range(int(_or(given["photographs"], 1)))
+        ]
+        for k, (turn, roll) in enumerate(exposures):
+            ahead = azimuth + np.pi + np.radians(turn)
+            found.append(
+                Photograph(
+                    name=f"{station}.{k + 1}" if len(exposures) > 1 else station,
+                    station=station,
+                    camera=given["camera"],
+                    xyz_m=xyz,
+                    rotation=looking(ahead, np.clip(tilt, -STEEP, STEEP), np.radians(roll)),
+                    sd_mm=sd,
+                    readings=int(_or(given["readings"], 1)),
+                    place=place,
+                )
+            )
+    return found
+
+
+def setups_of(given, number, shell, place):
+    """The set-ups of one [[setup_rings]], the `number`th."""
+    found = []
+    stands = list(_stands(given, shell))
+    names = [f"T{number}-{i + 1}" + (f"-{k + 1}" if k else "") for _, _, i, k in stands]
+    for at, (_, xyz, _, level) in enumerate(stands):
+        ring = [name for name, stand in zip(names, stands, strict=True) if stand[3] == level]
+        found.append(
+            Instrumented(
+                name=names[at],
+                instrument=given["instrument"],
+                xyz_m=xyz,
+                direction_sd_rad=_scaled(given["s_direction_arcsec"], ARCSEC),
+                zenith_sd_rad=_scaled(given["s_zenith_arcsec"], ARCSEC),
+                distance_sd_m=_scaled(given["s_mm"], 1e-3),
+                sets=int(_or(given["sets"], 1)),
+                sights=() if given["sights"] is False else _neighbours(ring, names[at]),
+                place=place,
+            )
+        )
+    return found
+
+
+def _neighbours(ring, name):
+    at = ring.index(name)
+    beside = (ring[at - 1], ring[(at + 1) % len(ring)])
+    return tuple(one for one in dict.fromkeys(beside) if one != name)
+
+
+def tape_of(given, shell):
+    """The Tie of one [[tapes]], {name: (3,)} of its two ends, and the way (3,) that they face.
+
+    A vertical tape hangs beside the wall; a horizontal one lies along a tangent outside, within
+    the tank along a chord whose ends are as far off the wall.
+    """
+    azimuth, length = np.radians(given["azimuth_deg"]), given["length_m"]
+    side = 1.0 if shell.outside else -1.0
+    radius = shell.radius_m + side * _or(given["off_m"], 0.1)
+    if given["kind"] == "horizontal" and not shell.outside:
+        radius = np.sqrt(max(radius**2 - (length / 2) ** 2, 0.0))
+    middle, low = around(shell.axis_m, azimuth, radius), shell.low_m + given["low_m"]
+    if given["kind"] == "vertical":
+        ends = np.array([[*middle, low], [*middle, low + length]])
+    else:
+        half = np.array([np.cos(azimuth), -np.sin(azimuth), 0.0]) * length / 2
+        ends = np.array([*middle, low]) + np.array([-half, half])
+    names = f"{given['name']}a", f"{given['name']}b"
+    tie = Tie(
+        given["name"], "distances", *names, given["s_mm"] / 1000,
+        instrument=given["instrument"], readings=int(_or(given["readings"], 1)),
+    )  # fmt: skip
+    out = side * np.array([np.sin(azimuth), np.cos(azimuth), 0.0])
+    return tie, dict(zip(names, ends, strict=True)), out
+
+
+def plate_m(course, outside):
+    """What lies between the nominal inside radius and the observer: plate and paint, or nothing."""
+    return course.thickness_m + course.paint_m if outside else 0.0
+
+
+def shell_of(job, given):
+    """The Shell of a job and a [pattern]: that of its lowest course, with its plate where outside.
+
+    Courses with other plates have their targets further in or out (`targets_of`).
+    """
+    outside = job.survey.side == "outside"
+    plate = plate_m(job.courses[0], outside)
+    low = job.datum.bottom_z_m
+    return Shell(
+        axis_m=np.array([_or(given["axis_x_m"], 0.0), _or(given["axis_y_m"], 0.0)]),
+        radius_m=job.tank.nominal_diameter_m / 2 + plate,
+        low_m=low,
+        high_m=low + sum(course.height_m for course in job.courses),
+        outside=outside,
+    )
+
+
+def _or(value, default):
+    return default if value is None else value
+
+
+def _scaled(value, factor):
+    return None if value is None else value * factor

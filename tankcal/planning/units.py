@@ -1,0 +1,109 @@
+"""What a plan says in another unit than was meant, as far as its size tells. Nothing is refused."""
+
+import numpy as np
+
+from tankcal.job.checks.common import tell, tiny_sd
+from tankcal.job.checks.survey.doubtful import TINY
+from tankcal.messages import listed, message
+from tankcal.planning.given import PLAN_FILE
+from tankcal.planning.model import Box
+
+FAR_M = 1000.0  # from the wall: what stands further off hides nothing
+SHOWN = 5  # obstacles in a message
+LOOSE = 0.05  # of the volume: a limit that every survey meets
+OF_RINGS = {"photo_rings": {"s_um": "um"}, "tapes": {"s_mm": "mm"}}
+OF_RINGS["setup_rings"] = {
+    "s_direction_arcsec": "arcsec",
+    "s_zenith_arcsec": "arcsec",
+    "s_mm": "mm",
+}
+
+
+def warn_of_units(given, raw, values, log):
+    """Standard deviations that are tiny in their unit, a limit that looks like percent."""
+    common = None if values is None else values["adjustment"]["image_sd_um"]
+    if common and common < TINY["um"]:
+        tell(log.warning, raw, "adjustment", "image_sd_um", tiny_sd("um", common))
+    for section, units in OF_RINGS.items():
+        for one in given.repeated[section]:
+            for key, unit in units.items():
+                if one[key] and one[key] < TINY[unit]:
+                    one.tell(log.warning, key, tiny_sd(unit, one[key]))
+    for table in given.tables.values():
+        sds = np.empty(0) if table is None else table.numbers("s_mm")
+        if (sds > 0).any() and sds[sds > 0].max() < TINY["mm"]:
+            log.warning(table.file, tiny_sd("mm", sds[sds > 0].max()), None, "s_mm")
+    limit = given.single["limits"]
+    if (limit["relative_u"] or 0.0) > LOOSE:
+        text = message(
+            "plan_limit_loose",
+            "found {share:g}, which is {percent:.3g} % of the volume: was it meant in percent?"
+            " 0.2 % is 0.002",
+            share=limit["relative_u"],
+            percent=100 * limit["relative_u"],
+        )
+        limit.tell(log.warning, "relative_u", text)
+
+
+def warn_of_places(plan, given, log):
+    """Obstacles that are nowhere near, tapes that do not hang on the shell."""
+    shell = plan.shell
+    heights = [shell.low_m, shell.high_m]
+    heights += [one.xyz_m[2] for one in (*plan.photos, *plan.setups)]
+    far = []
+    for one in plan.obstacles:
+        low, high = (float(np.ravel(end)[-1]) for end in (one.low_m, one.high_m))
+        away = _off_m(one, shell)
+        if away > FAR_M or low > max(heights) or high < min(heights):
+            far.append(_told(one.name, away, low, high))
+    if far:
+        text = message(
+            "plan_obstacles_far",
+            "hide nothing, for the shell stands at z = {bottom_m:.6g} to {top_m:.6g} m:"
+            " {obstacles}; are they in the frame of the survey, in metres?",
+            bottom_m=float(shell.low_m),
+            top_m=float(shell.high_m),
+            obstacles=listed(far, SHOWN),
+        )
+        log.warning(PLAN_FILE, text, given.repeated["obstacles"][0].row, "obstacles")
+    for entry in given.repeated["tapes"]:
+        _warn_of_tape(plan, entry, log)
+
+
+def _told(name, away_m, low_m, high_m):
+    return message(
+        "plan_obstacle_place",
+        "{obstacle} ({away_m:.6g} m from the wall, z {low_m:.6g} to {high_m:.6g} m)",
+        obstacle=name,
+        away_m=away_m,
+        low_m=low_m,
+        high_m=high_m,
+    )
+
+
+def _off_m(obstacle, shell):
+    """How far an obstacle stands from the wall in plan; 0 where it reaches it."""
+    if isinstance(obstacle, Box):
+        low, high = obstacle.low_m[:2], obstacle.high_m[:2]
+        away = np.hypot(*(np.clip(shell.axis_m, low, high) - shell.axis_m))
+    else:
+        away = np.hypot(*(obstacle.axis_m - shell.axis_m)) - obstacle.radius_m
+    return max(float(away) - shell.radius_m, 0.0)
+
+
+def _warn_of_tape(plan, entry, log):
+    """A tape whose ends are further off the wall than the tank is wide, or above the shell."""
+    shell = plan.shell
+    ends = np.array([plan.extra[f"{entry['name']}{end}"] for end in "ab"])
+    off = np.abs(np.hypot(*(ends[:, :2] - shell.axis_m).T) - shell.radius_m).max()
+    above = ends[:, 2].max() - shell.high_m
+    if off > shell.radius_m or above > 0:
+        text = message(
+            "plan_tape_off",
+            "the ends of {tape} are up to {off_m:.1f} m from the wall and {above_m:+.1f} m from the"
+            " top of the shell: can it hang there?",
+            tape=entry["name"],
+            off_m=float(off),
+            above_m=float(above),
+        )
+        log.warning(PLAN_FILE, text, entry.row, entry.name)

@@ -1,0 +1,115 @@
+"""From what was surveyed to the capacity table: rows, their volumes and what makes them uncertain.
+
+The wall may be that of an adjusted survey or that of a survey that is only planned.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.body import Body
+from tankcal.capacity import Capacity
+from tankcal.dips import (
+    HEIGHT_STEPS_M,
+    LADDERS_M,
+    Straightness,
+    choose_rows,
+    interpolation_errors,
+    table_heights,
+)
+from tankcal.doubts import against_nominal, not_in_u
+from tankcal.tanks import body_of, critical_zone, zero_height
+from tankcal.wall import warnings_of
+
+
+@dataclass(frozen=True)
+class Tabled:
+    """A tank with its capacity table.
+
+    body          the tank as the sum of its parts (`body.Body`)
+    zero_m        level of the table's zero: dip 0 in the frame of the parts
+    levels_m      (rows,) levels of the rows there
+    kinks_m       dips between empty and full at which the area jumps
+    table         `capacity.Capacity`
+    straightness  how far linear interpolation between the rows is from the exact volume
+    """
+
+    body: Body
+    zero_m: float
+    levels_m: np.ndarray
+    kinks_m: np.ndarray
+    table: Capacity
+    straightness: Straightness
+
+    @property
+    def top_m(self):
+        """Dip of the full tank."""
+        return self.body.highest_m - self.zero_m
+
+    def volume_m3(self, dips_m):
+        """(n,) exact volumes at dips."""
+        return _exact(self.body, self.zero_m)(dips_m)
+
+
+def tabled(job, survey, tell=lambda text: None):
+    """The `Tabled` of a job.
+
+    survey  its `wall.Wall`, `scan.Scan` or mesh, None where sizes alone tell of the tank
+    tell    called with a line of text as each step begins
+    """
+    tell("integrating volumes")
+    body = body_of(job, survey)
+    zero = zero_height(job, survey)
+    tell("propagating the covariance to every row of the table")
+    top = body.highest_m - zero
+    kinks = np.unique([kink - zero for kink in body.kinks_m if 0 < kink - zero < top])
+    exact = _exact(body, zero)
+    heights = _rows(job.table, exact, top, kinks)
+    levels = _levels(heights, zero, body)
+    volumes, areas, sources = body.rows(levels)
+    table = Capacity(
+        height_m=heights,
+        volume_m3=volumes,
+        area_m2=areas,
+        sources=sources,
+        probability=job.table.coverage_probability,
+        critical_m=critical_zone(job),
+    )
+    straightness = interpolation_errors(exact, heights, kinks)
+    return Tabled(body, zero, levels, kinks, table, straightness)
+
+
+def doubts_of_table(job, wall, made):
+    """Warnings of a wall (None: there is none) and of the `Tabled` that was made of it."""
+    return (
+        *(() if wall is None else warnings_of(job, wall)),
+        *not_in_u(made.body.undeclared()),
+        *against_nominal(job.tank, made.table.volume_m3[-1]),
+    )
+
+
+def _exact(body, zero_m):
+    """Function from dips to exact volumes."""
+    return lambda dips_m: body.volume_m3(_levels(dips_m, zero_m, body))
+
+
+def _levels(heights_m, zero_m, body):
+    """Levels of dips in the frame of the parts; the top is the top, whatever its last bit is."""
+    return np.minimum(heights_m + zero_m, body.highest_m)
+
+
+def _rows(spec, exact, top_m, kinks_m):
+    """Dips of the rows: by the step asked for, or by the bound on linear interpolation."""
+    step = spec.step_m
+    if step is None and spec.height_unit != "m":
+        step = float(HEIGHT_STEPS_M[spec.height_unit])
+    if spec.max_interpolation_error_m3 is not None:
+        return choose_rows(
+            exact,
+            top_m,
+            spec.max_interpolation_error_m3,
+            kinks_m,
+            step_m=step,
+            ladder_m=LADDERS_M[spec.height_unit],
+        ).height_m
+    return table_heights(step, top_m, spec.fine_step_m, spec.fine_zones)
