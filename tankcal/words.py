@@ -2,11 +2,20 @@
 
 import tomllib
 
+from tankcal.digits import NOTHING, Marks, fixed, shortest
 from tankcal.errors import TankcalError
+from tankcal.languages import DEFAULT
+from tankcal.messages import filled
 from tankcal.shipped import shipped
 
 
-def load_words(language="en"):
+def language_of(record):
+    """The language that the job of a record asks for."""
+    table = record["job"]["table"] or {}  # a survey alone has none
+    return table.get("language") or DEFAULT
+
+
+def load_words(language=DEFAULT):
     """The words of one language: {group: {code: template, or {value: template}}}.
 
     Raises TankcalError when no words are shipped in that language.
@@ -20,24 +29,22 @@ def load_words(language="en"):
     return tomllib.loads(known[language].read_text(encoding="utf-8"))
 
 
-class _Number(float):
-    """A number that a plain {value} shows with six significant digits at most."""
-
-    def __format__(self, spec):
-        return super().__format__(spec or ".6g")
+def marks_of(words):
+    """What stands between the digits of numbers in this language (digits.Marks)."""
+    return Marks(**words["language"]["marks"])
 
 
 def sentence(words, group, code, value=None):
     """What `code` (with `value`) of the record says, as a sentence of `words[group]`.
 
-    A template may use {value}: a list comes as its items joined by ", ", a number that has no
-    format of its own with up to six digits. A table of templates is
-    looked up by the value as text, then "none" for null or an empty list, then "other". A code or
-    value without words comes back as "code: value", for an assumption is never hidden.
+    A template may use {value}: a list comes as its items joined by ", ", a number with up to six
+    digits. A table of templates is looked up by the value as text, then "none" for null or an empty
+    list, then "other". A code or value without words comes back as "code: value", for an assumption
+    is never hidden.
     """
     if isinstance(value, list | tuple):
         value = ", ".join(str(item) for item in value) or None
-    shown = _Number(value) if isinstance(value, float) else value
+    shown = shortest(value, marks_of(words)) if isinstance(value, float) else value
     template = words.get(group, {}).get(code)
     if isinstance(template, dict):
         key = "none" if value is None else str(value)
@@ -49,29 +56,115 @@ def sentence(words, group, code, value=None):
 
 def choice_sentence(words, choice):
     """One choice {code, value} of the record as a sentence, its numbers in the reader's style."""
-    value = choice["value"]
-    if choice["code"] == "coverage":
-        value = f"{100 * value:.6g}\N{NO-BREAK SPACE}%"
+    code, value = choice["code"], choice["value"]
+    if code == "coverage":
+        value = percent(words, value)
     elif isinstance(value, int | float):
-        value = f"{value:.3g}"
+        digits = 6 if code in _DECLARED else 3
+        value = shortest(value, marks_of(words), digits=digits)
     elif isinstance(value, list):
-        return sentence(
-            words, "choices", choice["code"], [words["inputs"].get(name, name) for name in value]
-        )
-    mark = words["language"]["decimal"]
-    is_number = any(sign.isdigit() for sign in value)
-    return sentence(
-        words, "choices", choice["code"], value.replace(".", mark) if is_number else value
+        value = [words["inputs"].get(name, name) for name in value]
+    return sentence(words, "choices", code, value)
+
+
+# ---- texts that the record has in English, with a code and the values in them
+
+MESSAGES = ("warnings", "formulas", "datum")  # groups of their templates
+
+
+def message_sentence(words, text, code, values):
+    """A text of the record in the reader's language; as it is where its code has no words."""
+    template = next((words[one][code] for one in MESSAGES if code in words.get(one, {})), None)
+    if template is None:
+        return text
+    named = {key: _named(words, key, value) for key, value in values.items()}
+    return filled(
+        template,
+        named,
+        number=lambda value, form: _number(value, form, marks_of(words)),
+        said=lambda one: message_sentence(words, one["text"], one["code"], one["values"]),
     )
+
+
+def in_language(words, record):
+    """A record whose texts are in the reader's language, as far as it says them by a code."""
+    adjustment, corrections = record["adjustment"], record["corrections"]
+    return {
+        **record,
+        "warnings": [_said(words, one, "text") for one in record["warnings"]],
+        "corrections": [_said(words, one, "formula", "formula_") for one in corrections],
+        "adjustment": adjustment and _adjustment_in_language(words, adjustment),
+        "rule": record.get("rule") and _rule_in_language(words, record),
+    }
+
+
+def _adjustment_in_language(words, adjustment):
+    left_out = [_said(words, one, "text") for one in adjustment.get("left_out", [])]
+    return {
+        **adjustment,
+        "datum": _said(words, adjustment["datum"], "words", "words_"),
+        "aside": [one["text"] for one in left_out] or adjustment["aside"],
+    }
+
+
+def _rule_in_language(words, record):
+    """The verdict with the texts of a shipped rule; those of a laboratory's own file stay."""
+    rule, texts = record["rule"], words.get("rule_texts", {})
+    return {**rule, "rule": {**rule["rule"], **texts.get(record["job"]["table"]["rule"], {})}}
+
+
+def _said(words, row, key, of=""):
+    """A row of the record with the text in `key`; one of an older record has no code."""
+    code, values = row.get(f"{of}code"), row.get(f"{of}values", {})
+    return {**row, key: message_sentence(words, row[key], code, values)}
+
+
+def _number(value, form, marks):
+    """A number in a form of Python, ".1f", ".3g", "+g" or "" for a count, with these marks."""
+    sign = "+" if form.startswith("+") and value > 0 else ""
+    digits = form.strip("+.fg")
+    if form.endswith("g"):
+        return sign + shortest(value, marks, digits=int(digits or 6))
+    return sign + fixed(value, int(digits or 0), marks)
+
+
+def _named(words, key, value):
+    """Codes among the values of a message as their names."""
+    if key == "kind":
+        known = words["observations"]  # some by the table that they stand in
+        return known.get(value, known.get(f"{value.replace(' ', '_')}s", value))
+    if key in ("group", "of_group"):
+        name = words["observed"].get(value, value)
+        return name[:1].lower() + name[1:]
+    if key == "inputs":
+        return "; ".join(name_of_input(words, one) for one in value)
+    if key == "entries":  # of [certificate]
+        labels = words["page"] | words["labels"]
+        return "; ".join(labels.get(one, one) for one in value)
+    return value
+
+
+_DECLARED = ("head",)  # choices whose number the job gave: it is not rounded
 
 
 NAMED_INPUTS = ("deadwood", "instrument_scale", "instrument_offset")
 
 
 def input_name(words, row):
-    """The name of an input of the budget; some have that of an item or instrument beside it."""
-    name = sentence(words, "inputs", row["input"])
-    return f"{name}: {row['note']}" if row["input"] in NAMED_INPUTS and row["note"] else name
+    """The name of an input of the budget; a default is marked as such.
+
+    Some have the name of their item or instrument beside it.
+    """
+    shared = row["input"] == "deadwood" and row["unit"] == "%"
+    name = name_of_input(words, "deadwood_share" if shared else row["input"])
+    if row["input"] in NAMED_INPUTS and row["note"] and not shared:
+        name = f"{name}: {row['note']}"
+    return words["texts"]["default_input"].format(input=name) if row.get("is_default") else name
+
+
+def name_of_input(words, code):
+    """An input by its code; correlated ones are one, "a & b"."""
+    return " & ".join(words["inputs"].get(one, one) for one in code.split(" & "))
 
 
 # ---- what the record says of an adjustment: the same sentences on paper and in the workbook
@@ -105,7 +198,7 @@ def global_test_sentence(words, adjustment):
         low=low,
         high=high,
         statistic=chi2,
-        dof=adjustment["redundancy"],
+        dof=_fixed(words, adjustment["redundancy"]),
         confidence=percent(words, adjustment["confidence"]),
     )
 
@@ -123,8 +216,8 @@ def snooping_sentence(words, adjustment):
     removed = {(row["kind"], tuple(row["ids"]), row["row"]) for row in adjustment["removed"]}
     return words["texts"]["snooping_on"].format(
         critical=_fixed(words, adjustment["critical_w"], 2),
-        rounds=adjustment["rounds"],
-        removed=len(removed),
+        rounds=_fixed(words, adjustment["rounds"]),
+        removed=_fixed(words, len(removed)),
     )
 
 
@@ -163,16 +256,16 @@ def method_line(words, adjustment):
     if adjustment["photos"]:
         cameras = listed(words, dict.fromkeys(row["camera"] for row in adjustment["photos"]))
         photographs = words["observed"]["photographs"]
-        parts.append(f"{len(adjustment['photos'])} {photographs} ({cameras})")
+        parts.append(f"{photographs} ({cameras}): {_fixed(words, len(adjustment['photos']))}")
     groups = [row for row in adjustment["groups"] if row["kind"] != "weighted unknown"]
     for row in sorted(groups, key=lambda row: row["kind"] != "image coordinate"):
         name = group_name(words, row)
-        parts.append(f"{row['count']} {name[:1].lower()}{name[1:]}")
+        parts.append(f"{name[:1].lower()}{name[1:]}: {_fixed(words, row['count'])}")
     sigma0 = adjustment["sigma0"]
     return words["texts"]["method_of_survey"].format(
         observed=", ".join(parts),
-        points=len(adjustment["points"]),
-        sigma="–" if sigma0 is None else _fixed(words, sigma0, 2),
+        points=_fixed(words, len(adjustment["points"])),
+        sigma=NOTHING if sigma0 is None else _fixed(words, sigma0, 2),
     )
 
 
@@ -194,8 +287,7 @@ def as_sentence(text):
 
 def percent(words, share):
     """A share in percent, in the reader's style."""
-    text = f"{100 * share:.6g}".replace(".", words["language"]["decimal"])
-    return f"{text}\N{NO-BREAK SPACE}%"
+    return f"{shortest(100 * share, marks_of(words))}\N{NO-BREAK SPACE}%"
 
 
 def factor_text(words, value):
@@ -203,5 +295,5 @@ def factor_text(words, value):
     return _fixed(words, value, 2 if value < 10 else 1)
 
 
-def _fixed(words, value, decimals):
-    return f"{value:.{decimals}f}".replace(".", words["language"]["decimal"])
+def _fixed(words, value, decimals=0):
+    return fixed(value, decimals, marks_of(words))

@@ -31,6 +31,7 @@ SETTINGS = {
     "datum.bottom_z_m": 0.0,
     "table.step_m": 0.01,
     "table.reference_temperature_c": 20.0,
+    "table.monte_carlo": False,  # a second a run; tests of it set it
 }
 
 OF_KIND = {
@@ -105,7 +106,7 @@ def job_parts(
     jitter           part of the point spacing by which azimuths scatter (uniform, plus or minus)
     centre, tilt     x and y of the axis at the bottom, m, and its slopes dx/dz, dy/dz
     extra_points     rows (name, x_m, y_m, z_m)
-    uncertainty      rows (input, u, unit)
+    uncertainty      rows (input, u, unit), or with type, distribution, dof
     settings         {dotted key: value}; None removes the key
     kind             "vertical", "horizontal" (2.4 x 10 m, flat ends), "sphere" (20 m), "mesh": the
                      others have no courses, and no points but the extra_points
@@ -143,7 +144,7 @@ def job_parts(
     if kind == "vertical":
         tables["courses"] = _courses(heights, thickness_mm, paint_mm)
     for name, columns, its_rows in (
-        ("uncertainty", "input u unit", uncertainty),
+        ("uncertainty", "input u unit type distribution dof", uncertainty),
         ("bottom", "x_m y_m z_m s_mm", bottom),
         ("bottom", "level_m volume_m3 u_m3", bottom_volumes),
         ("deadwood", "name bottom_m top_m volume_m3 u_m3", deadwood),

@@ -196,3 +196,23 @@ def survey_parts(settings=None, tank=True):
     parts.tables |= _tables()
     parts.registers = registers
     return parts
+
+
+MARKS = {"1": [-84.0, -59.0], "2": [84.0, -59.0], "3": [84.0, 59.0], "4": [-84.0, 59.0]}
+
+
+def read_on_comparator(parts):
+    """The same with marks in the photos of the film camera, and a flat film in the other one.
+
+    The comparator's zero is the middle of the photo, so that image coordinates stay what they are.
+    """
+    parts.registers["cameras"]["UMK 10/1318"] |= {f"marks.{k}": xy for k, xy in MARKS.items()}
+    parts.tables["fiducials"] = [["photo", "mark", "x_mm", "y_mm", "s_um"]] + [
+        [photo, mark, *xy, 2.0 if mark == "1" else None]
+        for photo in ("F1", "F2", "F3")
+        for mark, xy in MARKS.items()
+    ]
+    parts.tables["film"] = [["camera", "photo", "x_mm", "y_mm", "height_um"]] + [
+        ["D", None, x, y, 0.0] for x, y in ((-13.0, -9.0), (13.0, -9.0), (-13.0, 9.0), (13.0, 9.0))
+    ]
+    return parts

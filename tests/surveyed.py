@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from messages_told import lines
 from networks import by_total_station, photographed
 
 from tankcal.errors import SolutionError
@@ -156,6 +157,6 @@ def places(adjustment, truth):
 def told(measurements):
     """All that the adjustment has to say: its warnings, or its error."""
     try:
-        return "\n".join(str(one) for one in adjust_survey(measurements).warnings)
+        return "\n".join(lines(adjust_survey(measurements).warnings))
     except SolutionError as error:
         return str(error)

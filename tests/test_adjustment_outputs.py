@@ -131,7 +131,7 @@ def whole(job):
     """(result, folder) of the whole chain; of the papers the blocks of both parts, as JSON."""
     result = tankcal.run(tankcal.load(job))
 
-    def build(record_path, folder, progress):
+    def build(record_path, folder, *_):
         lacks = [part for part, value in records.load(record_path).items() if not value]
         notebook = execute(joined(record_path.name, lacks), folder)
         for part in ("certificate", "working-papers"):
@@ -385,11 +385,11 @@ def test_the_workbook_of_a_tank_has_the_sheets_beside_its_own(whole):
     book = openpyxl.load_workbook(whole[1] / "capacity.xlsx")
     assert {"Adjustment", "Observations", "Cameras and photos", "Capacity"} <= {*book.sheetnames}
     certificate = [cell.value for row in book["Certificate"] for cell in row]
-    assert any("8 photographs (UMK)" in str(value) for value in certificate)
+    assert any("photographs (UMK): 8" in str(value) for value in certificate)
 
 
 def test_very_many_readings_are_cut_to_the_worst(only, tmp_path, monkeypatch):
-    monkeypatch.setattr(workbook.survey, "MOST_ROWS", 20)
+    monkeypatch.setattr(workbook.observations, "MOST_ROWS", 20)
     workbook.write(only[0], tmp_path / "adjustment.xlsx")
     sheet = openpyxl.load_workbook(tmp_path / "adjustment.xlsx")["Observations"]
     assert sheet.max_row == 4 + 20
@@ -425,7 +425,7 @@ def test_the_papers_of_a_tank_begin_with_the_adjustment(whole):
     text = (folder / "working-papers.pdf").read_text(encoding="utf-8")
     assert text.index("The adjustment") < text.index("The shell")
     certificate = (folder / "certificate.pdf").read_text(encoding="utf-8")
-    assert "8 photographs (UMK)" in certificate
+    assert "photographs (UMK): 8" in certificate
     assert "points adjusted, σ₀ =" in certificate
     assert "The points were determined from photographs" in certificate
     assert "their full covariance matrix from the adjustment" in certificate
@@ -492,7 +492,7 @@ def test_coordinates_of_a_large_frame_stay_readable(only):
         row["x_m"], row["y_m"] = row["x_m"] + 683_000.0, row["y_m"] + 7_460_000.0
     paper.record["adjustment"]["photos"] = []
     assert (
-        "− 7459000 m"
+        "− 7459000\N{NO-BREAK SPACE}m"
         in paper.figure(figures.plan(paper), "plan", factor=1, probability="95 %").data["svg"]
     )
 
@@ -558,9 +558,7 @@ def test_strict_writes_nothing_when_the_global_test_fails(doubtful, capsys):
 
 def test_strict_holds_for_the_whole_run(doubtful, monkeypatch, capsys):
     adjustment = adjust_job(tankcal.load(doubtful))
-    monkeypatch.setattr(
-        tankcal, "run", lambda job, tell: SimpleNamespace(adjustment=adjustment), raising=False
-    )
+    monkeypatch.setattr(tankcal, "run", lambda *job, **told: SimpleNamespace(adjustment=adjustment))
     assert main(["run", str(doubtful), "--strict", "--quiet"]) == 3
     assert "the global test of the adjustment failed" in capsys.readouterr().err
     assert not (doubtful / "results").exists()

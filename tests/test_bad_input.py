@@ -53,8 +53,16 @@ BAD_SETTINGS = [
     ("table.step_m", 1e-5, "rows in the table"),
     ("table.coverage_probability", 95, "from 0.5 to 0.9999"),
     ("table.liquid_density_kg_m3", 0.85, "in g/cm3?"),
-    ("table.minimum_delivery_m", 2.0, "not available in this version"),
-    ("table.rule", "API", "not available in this version"),
+    ("table.minimum_delivery_m", 20.0, "at most the height of the tank, 9.5 m"),
+    ("table.minimum_delivery_m", 0, "above 0"),
+    ("table.minimum_delivery_m", [1.5, 2, 1.5], "expected it once"),
+    ("table.minimum_delivery_m", "1,5", "such as 700; 850"),
+    ("table.rule", "API", "or one of france_2003, france_2003_alcohol"),
+    ("table.rule", "oiml_r17", "(did you mean oiml_r71?)"),
+    ("table.rule", "house.toml", "no such file beside the job"),
+    ("table.rule", "../house.toml", "found '../house.toml'"),
+    ("table.rule", True, "truth value"),
+    ("table.monte_carlo", "perhaps", "true or false"),
     ("material.e_gpa", 206000, "from 40 to 500"),
     ("material.expansion_per_k", 11, "at most 0.0001"),
     ("adjustment.datum", "iner", "did you mean inner?"),
@@ -123,10 +131,44 @@ BAD_CELLS = [
     ("uncertainty", 2, "u", -5.0, "or more"),
     ("uncertainty", 2, "u", 5e5, "at most 10000 ppm"),
     ("uncertainty", 2, "unit", "mm", "expected 'ppm' for scale"),
-    ("uncertainty", 2, "dof", 0.0, "above 0"),
+    ("uncertainty", 2, "dof", 0.5, "1 or more"),
     ("uncertainty", 2, "type", "C", "'A' or 'B'"),
     ("uncertainty", 2, "distribution", "flat", "rectangular"),
     ("uncertainty", 3, "input", "scale", "already, in row 2"),
+    ("uncertainty", 2, "u", "nan", "expected a number"),
+    ("uncertainty", 2, "u", "5,5", "expected a number"),
+    ("uncertainty", 2, "u", None, "blank"),
+    ("uncertainty", 2, "u_is", "half-width", "did you mean half_width?"),
+    ("uncertainty", 3, "u_is", None, "expected scale or sd"),
+    ("uncertainty", 3, "u_is", "standard", "expected scale or sd"),
+    ("uncertainty", 3, "u_is", "half_width", "expected scale or sd"),
+    ("uncertainty", 3, "dof", None, "expected the degrees of freedom"),
+    ("uncertainty", 3, "dof", 2.0, "expected above 2"),
+    ("uncertainty", 4, "distribution", None, "normal has no half-width"),
+    ("uncertainty", 4, "u", 1e3, "a standard uncertainty of 577.35 kg/m3"),
+    ("uncertainty", 4, "k", 2.0, "or u_is = expanded beside it"),
+    ("uncertainty", 5, "k", None, "expected the coverage factor"),
+    ("uncertainty", 5, "k", 0.95, "from 1 to 20"),
+    ("uncertainty", 5, "k", 95.0, "from 1 to 20"),
+    ("uncertainty", 5, "distribution", "rectangular", "expected normal or a blank"),
+    ("correlations", 2, "r", 1.2, "a number from -1 to 1"),
+    ("correlations", 2, "r", "NaN", "expected a number"),
+    ("correlations", 2, "r", "0,5", "expected a number"),
+    ("correlations", 2, "r", None, "blank"),
+    ("correlations", 2, "input", "wind", "expected 'scale'"),
+    ("correlations", 2, "with", "rounding", "expected 'scale'"),
+    ("correlations", 2, "with", "scale", "expected another input"),
+    ("correlations", 2, "with", "paint", "expected an input of"),
+    ("correlations", 3, "with", "scale", "already, in row 2"),
+    ("stated", 2, "high_m", 95.0, "expected at most 9.5, the top of the tank"),
+    ("stated", 2, "high_m", None, "blank"),
+    ("stated", 2, "high_m", "9,0", "expected a number"),
+    ("stated", 2, "high_m", -1.0, "above 0"),
+    ("stated", 2, "low_m", 9.0, "expected a dip below high_m = 9"),
+    ("stated", 2, "low_m", 9.2, "expected a dip below high_m = 9"),
+    ("stated", 2, "volume_m3", 0.0, "above 0"),
+    ("stated", 2, "volume_m3", 929e3, "the tank between low_m and high_m holds about 929.1 m3"),
+    ("stated", 3, "volume_m3", 119e3, "the whole tank holds about 1261 m3, expected m3"),
 ]
 
 
@@ -145,6 +187,9 @@ def full_parts(**changes):
         "table.fine_step_m": 0.001,
         "table.fine_zones": [[0.0, 0.3], [2.1, 2.4]],
         "table.max_interpolation_error_l": 5.0,
+        "table.rule": "oiml_r71",
+        "table.minimum_delivery_m": [1.0, 2.5],
+        "table.monte_carlo": False,
         "corrections.tilt": False,
         "bottom.form": "points",
     } | changes.pop("settings", {})
@@ -158,9 +203,22 @@ def full_parts(**changes):
         **changes,
     )
     parts.tables["uncertainty"] = [
-        ["input", "u", "unit", "type", "distribution", "dof", "note"],
-        ["scale", 5.0, "ppm", "B", "normal", None, "certificate"],
-        ["datum", 1.0, "mm", "A", "t", 9.0, None],
+        ["input", "u", "unit", "u_is", "k", "type", "distribution", "dof", "note"],
+        ["scale", 5.0, "ppm", "standard", None, "B", "normal", None, "certificate"],
+        ["datum", 1.0, "mm", "sd", None, "A", "t", 9.0, None],
+        ["liquid_density", 2.0, "kg/m3", "half_width", None, "B", "rectangular", None, None],
+        ["offset", 1.0, "mm", "expanded", 2.0, "B", "normal", 50.0, None],
+    ]
+    parts.tables["correlations"] = [
+        ["input", "with", "r"],
+        ["scale", "liquid_density", 0.5],
+        ["liquid_density", "offset", -0.25],
+    ]
+    parts.tables["stated"] = [
+        ["high_m", "low_m", "volume_m3", "note"],
+        [9.0, 2.0, 928.5, "contract"],
+        [9.0, None, 1193.8, None],
+        [4.5, 0.0, None, None],
     ]
     return parts
 
@@ -310,7 +368,7 @@ def test_decimal_commas_among_separators(tmp_path):
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("fiducials.csv", "not available in this version"),
+        ("fiducial.csv", "did you mean fiducials.csv?"),
         ("image_pionts.csv", "did you mean image_points.csv?"),
         ("Points.csv", "did you mean points.csv?"),
         ("notes.csv", "points.csv, courses.csv, bottom.csv, deadwood.csv, uncertainty.csv"),
@@ -329,9 +387,9 @@ def test_files_that_do_not_belong(tmp_path, name, words):
 
 def test_sheets_that_do_not_belong(tmp_path):
     parts = job_parts()
-    parts.tables |= {"Sheet1": [["x"]], "fiducials": [["name"]], "# notes": [["kept"]]}
+    parts.tables |= {"Sheet1": [["x"]], "points_cov": [["name"]], "# notes": [["kept"]]}
     problems = problems_of(write_book(tmp_path / "job.xlsx", parts))
-    assert places(problems) == [("job.xlsx", None, None), ("sheet fiducials", None, None)]
+    assert places(problems) == [("job.xlsx", None, None), ("sheet points_cov", None, None)]
     assert "unknown sheet 'Sheet1'" in problems[0].expected
 
 
@@ -341,7 +399,7 @@ def test_all_problems_of_a_run_come_together(tmp_path):
     parts.tables["points"][5][2] = "NaN"
     parts.tables["courses"][2][2] = -8.0
     parts.tables["uncertainty"][1][2] = "m"
-    parts.extra_files["fiducials.csv"] = "point\n"
+    parts.extra_files["fiducial.csv"] = "point\n"
     problems = problems_of(write_folder(tmp_path / "job", parts))
     assert sorted(places(problems), key=str) == sorted(
         [
@@ -351,7 +409,7 @@ def test_all_problems_of_a_run_come_together(tmp_path):
             ("points.csv", 6, "y_m"),
             ("courses.csv", 3, "thickness_mm"),
             ("uncertainty.csv", 2, "unit"),
-            ("fiducials.csv", None, None),
+            ("fiducial.csv", None, None),
         ],
         key=str,
     )

@@ -11,8 +11,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from job_builder import job_parts, write_book, write_folder
-from spoilt import FORMS, places, problems_of, table_file, write
-from survey_builder import WALL, survey_parts
+from messages_told import lines
+from spoilt import FORMS, places, problems_of, settings_place, table_file, write
+from survey_builder import WALL, read_on_comparator, survey_parts
 
 from tankcal.errors import InputError
 from tankcal.job import Job, load
@@ -211,7 +212,7 @@ def problem_of(tmp_path, parts, **load_options):
 
 def warnings_of(tmp_path, parts):
     """The warnings of a folder that loads, as lines."""
-    return [str(warning) for warning in load(write_folder(tmp_path / "job", parts)).warnings]
+    return lines(load(write_folder(tmp_path / "job", parts)).warnings)
 
 
 def test_points_and_a_survey_are_one_too_many(tmp_path):
@@ -247,15 +248,16 @@ def test_what_is_of_a_survey_is_without_effect_beside_points(tmp_path):
     parts = job_parts(settings={"adjustment.datum": "inner", "adjustment.camera.c": "off"})
     parts.tables["control"] = survey_parts().tables["control"]
     warnings = warnings_of(tmp_path, parts)
+    keys = ("adjustment.datum", "adjustment.camera.c")
+    rows = [settings_place("folder", parts, key)[1] for key in keys]
     assert [warning.split(":")[0] for warning in warnings] == [
         "control.csv",
-        "job.toml, row 19, adjustment.datum",
-        "job.toml, row 22, adjustment.camera.c",
+        *(f"job.toml, row {row}, {key}" for row, key in zip(rows, keys, strict=True)),
     ]
 
 
 def test_a_mesh_takes_no_survey(tmp_path):
-    parts = survey_parts(tank=False)
+    parts = read_on_comparator(survey_parts(tank=False))
     parts.settings = {"tank.id": "M", "tank.kind": "mesh", "mesh.file": "a.stl", "mesh.unit": "m"}
     parts.settings |= {"survey.date": "2024-05-31", "table.reference_temperature_c": 20.0}
     parts.settings["table.step_m"] = 0.1
@@ -280,6 +282,19 @@ def test_a_file_that_others_need(tmp_path, missing, file, words):
     problems = problems_of(write_folder(tmp_path / "job", parts))
     (problem,) = [problem for problem in problems if problem.file == file]
     assert words in problem.expected
+
+
+@pytest.mark.parametrize("is_missing", [True, False])
+def test_photographs_without_any_image_point(tmp_path, is_missing):
+    parts = survey_parts()
+    if is_missing:
+        del parts.tables["image_points"]
+    else:
+        del parts.tables["image_points"][1:]
+    problem = problem_of(tmp_path, parts)
+    assert str(problem) == (
+        "image_points.csv: no rows; expected the image points of photo 'F1' and 3 more photos"
+    )
 
 
 def test_an_unknown_name_is_told_once_for_all_its_rows(tmp_path):
@@ -558,11 +573,11 @@ def test_directions_between_known_points(tmp_path, factor):
     [
         (
             lambda parts: parts.tables["distances"].append(parts.tables["distances"][1][:]),
-            "distances.csv, row 5: 1 rows are the same as another one to the last digit (row 5 as",
+            "distances.csv, row 5: 1 rows are the same as another one to the last digit (rows 5",
         ),
         (
             lambda parts: parts.tables["directions"].append(["2", "b", "W1", 10.0, 3.0]),
-            "set-up '2', set 'b' has directions to one point only",
+            "set-up 2, set b has directions to one point only",
         ),
         (
             lambda parts: parts.tables["check"].append(["W1", 0.0, 6.5, 1.0]),
@@ -570,13 +585,13 @@ def test_directions_between_known_points(tmp_path, factor):
         ),
         (
             lambda parts: parts.tables["check"].append(["Z9", 0.0, 6.5, 1.0]),
-            "1 point ('Z9') is observed nowhere; it bears on nothing",
+            "observed nowhere, so that they bear on nothing: Z9",
         ),
         (
             lambda parts: parts.tables["targets"].extend(
                 [["Z8"] + [None] * 4, ["Z9"] + [None] * 4]
             ),
-            "2 points ('Z8', 'Z9') are observed nowhere; they are left out",
+            "observed nowhere and left out: Z8, Z9",
         ),
         (
             lambda parts: spoil(parts, "distances", 4, "temperature_c", 20.0),
@@ -663,14 +678,12 @@ def test_a_sheet_of_cameras_of_another_form(tmp_path):
     assert {problem.file for problem in problems} == {"sheet cameras"}
 
 
-def test_fiducials_are_not_available(tmp_path):
+def test_a_table_of_which_no_row_can_be_read(tmp_path):
     parts = survey_parts()
-    parts.extra_files["fiducials.csv"] = "photo\n"
+    parts.extra_files["azimuths.csv"] = "from,to,azimuth_deg,s_arcsec\nS1,S2\n"
+    del parts.tables["azimuths"]
     problem = problem_of(tmp_path, parts)
-    assert (problem.file, "not available in this version" in problem.expected) == (
-        "fiducials.csv",
-        True,
-    )
+    assert (problem.file, problem.row) == ("azimuths.csv", 2)
 
 
 CELLS = st.one_of(
@@ -687,7 +700,7 @@ PLACE = st.tuples(st.sampled_from(SURVEY_TABLES), st.integers(1, 40), st.integer
 @QUICK
 @given(st.lists(PLACE, min_size=1, max_size=4), st.booleans())
 def test_any_cells_in_a_survey(changes, tank):
-    parts = survey_parts(tank=tank)
+    parts = read_on_comparator(survey_parts(tank=tank))
     for table, row, column, value in changes:
         rows = parts.tables[table]
         cells = rows[1 + row % (len(rows) - 1)]

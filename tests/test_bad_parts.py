@@ -6,6 +6,7 @@ The truth of these tests is the property itself: what was spoilt, and where, is 
 import numpy as np
 import pytest
 from job_builder import job_parts, write_folder
+from messages_told import lines
 from spoilt import FORMS, places, problems_of, settings_place, table_file, write
 
 from tankcal.job import load
@@ -55,6 +56,7 @@ SETTINGS_OF_VERTICAL = [
         "corrections.head",
     ),
     ({"corrections.plate": "off"}, "corrections.plate", "true or false"),
+    ({"certificate.date_of_issue": "2024-05-30"}, "certificate.date_of_issue", "before the survey"),
     ({"corrections.plates": True}, "corrections.plates", "did you mean plate?"),
     ({"survey.liquid_level_m": 3.0}, "survey.liquid_density_kg_m3", "the liquid's density"),
     (
@@ -530,6 +532,7 @@ WARNINGS = [
 def test_what_is_only_doubtful(tmp_path, changes, column):
     job = load(write_folder(tmp_path / "job", job_parts(**changes)))
     assert [warning.column for warning in job.warnings] == [column]
+    assert len(lines(job.warnings)) == 1
 
 
 @pytest.mark.parametrize("changes", [{"tilt_mm_per_m": 60.0, "dip_from_a_m": 5.0}, {"roll_deg": 5}])
@@ -537,6 +540,7 @@ def test_what_is_only_doubtful_of_a_horizontal_cylinder(tmp_path, changes):
     settings = {f"horizontal.{name}": value for name, value in changes.items()}
     job = load(write_folder(tmp_path / "job", job_parts(kind="horizontal", settings=settings)))
     assert [warning.column for warning in job.warnings] == [f"horizontal.{next(iter(changes))}"]
+    assert len(lines(job.warnings)) == 1
 
 
 def test_all_problems_of_the_parts_come_together(tmp_path):

@@ -62,6 +62,19 @@ def test_a_delivery_cancels_what_both_dips_share():
     assert table(scale=([1.9], np.inf)).delivery(2.0, 7.0).u_m3 == pytest.approx(1.0)
 
 
+def test_rows_at_once_are_as_each_dip_by_itself():
+    """Second method: the single reading, of sources with many columns, one, and none at a row."""
+    rng = np.random.default_rng(1)
+    many = Source("points", rng.normal(size=(11, 7)), 4.0)
+    one = Source("scale", (HEIGHTS / 9.5 - 1)[:, None], 2.5)
+    found = replace(table(), sources=(many, one, Source("datum", np.ones((11, 1)))))
+    each = [found.at(height) for height in HEIGHTS]
+    for name in ("u_m3", "dof", "k", "U_m3"):
+        expected = [getattr(quantity, name) for quantity in each]
+        assert getattr(found, name) == pytest.approx(expected, rel=1e-13), name
+    assert np.sum(found.factor_m3**2, axis=1) == pytest.approx(found.u_m3**2, rel=1e-13)
+
+
 def test_between_rows_the_table_is_read_linearly():
     found = table(points=([1.0], np.inf)).at(1.3)
     assert found.value_m3 == pytest.approx(169.0)

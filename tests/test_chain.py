@@ -167,7 +167,7 @@ def test_progress_is_told(tmp_path):
     write_job(tmp_path / "job")
     steps = []
     run(tankcal.load(tmp_path / "job"), steps.append)
-    assert len(steps) == 4
+    assert len(steps) == 5
 
 
 def simulate(result, surveys):
@@ -203,18 +203,18 @@ def scatter_over_prediction(result, surveys):
 
 
 def test_the_propagated_sd_is_the_scatter_of_simulated_surveys(example_result, figure):
-    """1000 surveys of the example: the ratio of sds has a standard error of 2.2 %."""
-    ratio = scatter_over_prediction(example_result, 1000)
-    figure("scatter of 1000 simulated surveys over the propagated sd", f"{ratio:.4f}")
-    assert abs(ratio - 1) < 3 / np.sqrt(2 * 1000)
+    """100 surveys of the example: the ratio of sds has a standard error of 7 %."""
+    ratio = scatter_over_prediction(example_result, 100)
+    figure("scatter of 100 simulated surveys over the propagated sd", f"{ratio:.4f}")
+    assert abs(ratio - 1) < 3 / np.sqrt(2 * 100)
 
 
 @pytest.mark.study
 def test_the_propagated_sd_is_the_scatter_of_simulated_surveys_study(example_result, figure):
-    """20 000 surveys of the example: the ratio of sds within 2 %."""
-    ratio = scatter_over_prediction(example_result, 20_000)
-    figure("scatter of 20 000 simulated surveys over the propagated sd", f"{ratio:.4f}")
-    assert ratio == pytest.approx(1.0, abs=0.02)
+    """5000 surveys of the example: the ratio of sds has a standard error of 1 %."""
+    ratio = scatter_over_prediction(example_result, 5000)
+    figure("scatter of 5000 simulated surveys over the propagated sd", f"{ratio:.4f}")
+    assert abs(ratio - 1) < 2 / np.sqrt(2 * 5000)
 
 
 def test_a_result_shows_itself_in_a_line_and_a_path_is_no_job(example_result):

@@ -68,7 +68,7 @@ def test_a_survey_is_adjusted_first_and_its_points_go_on(job, survey):
     result = run(job, steps.append)
     alone = adjust_job(job)
     assert steps[0].startswith("finding approximate values")
-    assert len(steps) == 7
+    assert len(steps) == 8
     assert result.job.points.names == result.adjustment.names == alone.names
     assert result.job.points.xyz_m == pytest.approx(alone.xyz_m, abs=1e-9)
     assert result.job.points.from_adjustment
@@ -177,7 +177,7 @@ def test_the_volume_does_not_know_which_photo_is_held(job, survey, figure):
     The vertical comes from levels, the scale from the tape; sds of coordinates are the datum's.
     """
     found, sds = [], []
-    for held in (None, *range(8)):
+    for held in (None, 0, 3, 6):
         settings = AdjustmentSettings(datum="inner" if held is None else "control", snooping=False)
         surveyed = without_control(survey, held=held, settings=settings)
         result = run(replace(job, measurements=surveyed))
@@ -354,7 +354,7 @@ def check_surveys(job, count, figure):
 
 
 def test_surveys_scatter_as_one_of_them_says(job, figure):
-    check_surveys(job, 30, figure)
+    check_surveys(job, 20, figure)
 
 
 @pytest.mark.study

@@ -1,6 +1,7 @@
 """The command line as a user meets it: help, exit status, one line a problem, results untouched."""
 
 import contextlib
+import json
 import subprocess
 import sys
 
@@ -111,8 +112,19 @@ def test_earlier_results_stay_when_the_input_breaks(done, capsys):
 
 def test_earlier_results_are_replaced_by_a_good_run(done, capsys):
     assert main(["run", str(done), "--quiet"]) == 0
-    assert "results in" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "results in" in told
     assert [path.name for path in done.glob("*results*")] == ["results"]
+    assert f": {capacity_in(done / 'results')}" in told
+
+
+def capacity_in(results):
+    """The last row of the table as the terminal tells it: two digits of U (below 100 m3)."""
+    capacity = json.loads((results / "record.json").read_text(encoding="utf-8"))["capacity"]
+    height, volume, U, k = (capacity[key][-1] for key in ("height_m", "volume_m3", "U_m3", "k"))
+    shown = f"{U:#.2g}".rstrip(".")
+    volume = f"{volume:.{len(shown.partition('.')[2])}f}"
+    return f"{volume} m3 at {height:.3f} m, U = {shown} m3 (k = {k:.2f})"
 
 
 def test_a_folder_with_foreign_files_is_refused(done, tmp_path, capsys):
@@ -181,6 +193,7 @@ def test_whatever_the_numbers_are_a_job_computes_or_says_why(tmp_path_factory, s
         assert table.notna().all().all()
 
 
+@pytest.mark.study
 def test_a_link_is_followed(done, tmp_path, capsys):
     (tmp_path / "disk").mkdir()
     link = tmp_path / "link"

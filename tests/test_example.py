@@ -49,6 +49,7 @@ def test_gross_volume_is_the_published_one(example_result):
     assert gross == pytest.approx(1252.82, rel=2e-4)
 
 
+@pytest.mark.study
 def test_the_script_writes_the_same_points_again(tmp_path):
     shutil.copytree(EXAMPLE, tmp_path / "example", ignore=shutil.ignore_patterns("results"))
     before = (tmp_path / "example" / "points.csv").read_bytes()

@@ -46,6 +46,11 @@ FULL = {
 }
 
 
+def declared(job):
+    """The inputs of uncertainty.csv, without what is assumed beside them."""
+    return [one for one in job.inputs if not one.is_default]
+
+
 def test_a_job_in_si(tmp_path):
     job = load(write_job(tmp_path / "job", **FULL))
     assert (job.tank.id, job.tank.kind) == ("T-1", "vertical")
@@ -65,7 +70,7 @@ def test_a_job_in_si(tmp_path):
         "date_of_issue": "2024-06-30",
         "notice": "RECONSTRUCTION",
     }
-    assert [(declared.name, declared.u) for declared in job.inputs] == [
+    assert [(one.name, one.u) for one in declared(job)] == [
         ("scale", 5e-6),
         ("datum", 1.5e-3),
         ("shell_temperature", 0.5),
@@ -84,11 +89,13 @@ def test_a_job_in_si(tmp_path):
 
 
 def test_defaults(tmp_path):
-    job = load(write_job(tmp_path / "job"))
+    job = load(write_job(tmp_path / "job", settings={"table.monte_carlo": None}))
     assert job.material == tankcal.job.Material(206e9, 1.1e-5, expansion_given=False)
     assert job.table == tankcal.job.TableSpec(0.01, 20.0)
+    assert job.table.monte_carlo
     assert job.datum == tankcal.job.Datum(0.0)
-    assert (job.snooping, job.scale, job.inputs, job.certificate) == (True, "a_priori", (), {})
+    assert (job.snooping, job.scale, declared(job), job.certificate) == (True, "a_priori", [], {})
+    assert (job.correlations, job.stated, job.rule) == ((), (), None)
     assert job.points.sd_m is None
     assert job.points.covariance_m2 is None
     np.testing.assert_allclose(np.hypot(*job.points.xyz_m[:, :2].T), 6.5)  # closed form
@@ -256,7 +263,7 @@ def test_parts_of_a_vertical_tank_in_si(tmp_path):
         tankcal.job.Deadwood("manhole", 0.6, 1.2, 0.05, None, 3),
     )
     assert job.roof == tankcal.job.Roof(**ROOF)
-    assert [declared.u for declared in job.inputs] == [5e9, 3.0, 2e-3, 1.0, 3e-3, 1e-3, 50.0]
+    assert [one.u for one in declared(job)] == [5e9, 3.0, 2e-3, 1.0, 3e-3, 1e-3, 50.0]
     assert (job.horizontal, job.sphere, job.mesh) == (None, None, None)
 
 
@@ -296,7 +303,7 @@ def test_a_horizontal_cylinder_in_si(tmp_path):
     assert (lying.end_a, lying.end_b) == (end_a, end_b)
     assert (lying.tilt, lying.roll_rad, lying.azimuth_rad) == (-0.005, 0.0, None)
     assert (lying.dip_from_a_m, lying.dip_direction, lying.thickness_m) == (2.0, "square", 0.008)
-    assert [declared.u for declared in job.inputs] == [2e-3, 5e-3, 4e-3, 5e-4, 0.02, 2e-4]
+    assert [one.u for one in declared(job)] == [2e-3, 5e-3, 4e-3, 5e-4, 0.02, 2e-4]
     assert job.bottom == tankcal.job.Bottom()
 
 
@@ -365,7 +372,7 @@ def warnings_of(path):
 
 def test_warnings_do_not_stop_a_job(tmp_path):
     parts = job_parts(
-        settings={"table.language": "pt", "table.step_m": 1.0},
+        settings={"table.step_m": 1.0},
         sd_mm=0.002,
         extra_points=[("twin", *job_parts().tables["points"][1][1:4])],
     )
@@ -376,14 +383,18 @@ def test_warnings_do_not_stop_a_job(tmp_path):
     lines = toml_text(parts.settings).split("\n")
     assert warnings_of(path) == [
         ("job.toml", lines.index("step_m = 1.0") + 1, "table.step_m"),
-        ("job.toml", lines.index('language = "pt"') + 1, "table.language"),
         ("points.csv", len(parts.tables["points"]), "x_m"),
         ("points.csv", None, "sx_mm"),
         ("points.csv", None, "sy_mm"),
         ("points.csv", None, "sz_mm"),
         ("courses.csv", 4, "course"),
     ]
-    assert load(path).table.language == "en"
+
+
+def test_a_language_without_words_is_refused(tmp_path):
+    path = write_job(tmp_path / "job", settings={"table.language": "pt"})
+    with pytest.raises(InputError, match="found 'pt'; expected 'en' or 'pt-BR' or 'es'"):
+        load(path)
 
 
 def test_points_in_feet_are_a_warning(tmp_path):
@@ -518,9 +529,9 @@ def test_a_section_is_for_all_points_or_for_none(tmp_path):
 
 
 def test_the_certificate_takes_fields_of_ones_own_but_no_slips(tmp_path):
-    own = {"certificate.accreditation_number": "CAL 0815"}
+    own = {"certificate.permit": "L 0815"}
     job = load(write_job(tmp_path / "own", settings=own))
-    assert job.certificate["accreditation_number"] == "CAL 0815"
+    assert job.certificate["permit"] == "L 0815"
     for slip in ("certificate.notise", "certificate.Number"):
         with pytest.raises(tankcal.InputError, match="unknown key"):
             load(write_job(tmp_path / slip, settings={slip: "x"}))

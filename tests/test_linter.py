@@ -427,6 +427,18 @@ def test_one_wrong_volume_is_told_with_what_was_meant(written, words, tmp_path):
     assert report.errors >= 1
 
 
+def test_a_long_blank_is_told_once_and_a_short_one_row_by_row(tmp_path):
+    """A critical zone is left blank in a table that is whole."""
+    for blanks, told, errors in ((10, 1, 0), (9, 0, 9)):
+        rows = [list(row) for row in cylinder_rows()]
+        for row in rows[50 : 50 + blanks]:
+            row[1] = ""
+        report = lint_rows(tmp_path, rows)
+        said = list(found(report).values())
+        assert sum("no volumes from here to row" in text for text in said) == told
+        assert sum("nothing stands here" in text for text in said) == report.errors == errors
+
+
 def test_shifted_rows_are_told_together(tmp_path):
     rows = cylinder_rows()
     for row in range(40, 60):

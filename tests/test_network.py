@@ -277,6 +277,13 @@ def test_a_missing_datum_is_told_in_words(what):
     assert adjust(survey, datum="inner").solution.rank_defect == int(message[13])
 
 
+def test_one_point_holds_no_datum(survey):
+    """A point keeps its place whichever way the rest turns: told, not a singular matrix."""
+    bare = replace(survey, observations=survey.observations[1:])
+    with pytest.raises(SolutionError, match="what is to hold the datum does not fix it"):
+        adjust(bare, datum="inner", over=np.array([0]))
+
+
 def test_plumb_lines_and_levels_give_the_vertical(survey):
     """Two of the three rotations go when something knows where the vertical is."""
     start, end = np.arange(3), np.arange(3) + 24

@@ -114,6 +114,7 @@ def test_second_start(name):
     assert name.startswith("Lanczos1") or sds >= 6  # its sds are rounding of 1e-13
 
 
+@pytest.mark.study
 def test_how_many_from_the_first_start(figure):
     solved = []
     for name in MODELS:

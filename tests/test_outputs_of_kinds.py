@@ -12,6 +12,8 @@ from job_builder import write_job
 
 import tankcal
 from tankcal import outputs
+from tankcal.report.paper import Paper
+from tankcal.report.uncertainty.table import NOT_FOR_USE, density_blocks
 
 SETTINGS = {
     "table.step_m": 0.5,
@@ -20,6 +22,7 @@ SETTINGS = {
     "bottom.form": "cone",
     "bottom.centre_z_m": -0.15,
     "survey.shell_temperature_c": 31.0,
+    "material.expansion_per_k": 1.15e-5,
 }
 ITEMS = [("coil #1", 0.2, 0.6, -0.35, 0.02), ("hatch", 0.5, 1.1, 0.12, 0.0)]
 
@@ -90,35 +93,18 @@ def test_the_workbook_has_a_sheet_for_what_is_in_the_tank(furnished):
     _, folder = furnished
     record = record_in(folder)
     book = openpyxl.load_workbook(folder / "capacity.xlsx")
-    assert {"Other densities", "Parts of the tank"} <= set(book.sheetnames)
+    assert {"Other densities", "Deadwood, bottom, roof"} <= set(book.sheetnames)
     others = cells(book["Other densities"])
     assert others[3][1:4] == ["850 kg/m³", "700 kg/m³", "1000 kg/m³"]
     by_density = np.array([row[2:4] for row in others[4:]], dtype=float)
     expected = np.array([other["volume_m3"] for other in record["densities"]])
     assert np.allclose(by_density.T, expected, rtol=1e-12)
-    parts = [value for row in cells(book["Parts of the tank"]) for value in row]
+    assert [row[0] for row in others[4:] if row[4] == "not for use"] == [1.5]
+    parts = [value for row in cells(book["Deadwood, bottom, roof"]) for value in row]
     assert {"coil #1", "cone", "in air"} <= set(parts)
     capacity = cells(book["Capacity"])
     use = capacity[3].index("Use")
     assert [row[0] for row in capacity[4:] if row[use] == "not for use"] == [1.5]
-
-
-def test_the_dip_calculator_refuses_the_critical_zone(furnished, tmp_path):
-    """Recalculated by LibreOffice at 1.3 m: between 1.0 and 1.6 m the roof is partly afloat."""
-    soffice = shutil.which("soffice")
-    if soffice is None:
-        pytest.skip("LibreOffice (soffice) is not installed: the formulas cannot be recalculated")
-    book = openpyxl.load_workbook(furnished[1] / "capacity.xlsx")
-    book["Dip calculator"]["B5"] = 1.3
-    book.save(tmp_path / "dip.xlsx")
-    profile = f"-env:UserInstallation={(tmp_path / 'profile').as_uri()}"
-    convert = ["--headless", "--convert-to", "xlsx", "--outdir", str(tmp_path / "out")]
-    subprocess.run(
-        [soffice, profile, *convert, str(tmp_path / "dip.xlsx")], check=True, capture_output=True
-    )
-    sheet = openpyxl.load_workbook(tmp_path / "out" / "dip.xlsx", data_only=True)["Dip calculator"]
-    assert sheet["B6"].value == "Refused: critical zone of the roof, not for use."
-    assert sheet["B9"].value == "–"
 
 
 def test_the_csv_table_has_further_densities_and_what_is_not_for_use(furnished):
@@ -133,8 +119,18 @@ def test_the_csv_table_has_further_densities_and_what_is_not_for_use(furnished):
 
 def test_the_certificate_prints_every_part(furnished):
     text = text_of(furnished[1] / "certificate.pdf")
-    for words in ("coil #1", "Floating roof", "cone", "not for use", "1000 kg/m³", "Pressure of"):
+    parts = ("coil #1", "Floating roof", "cone", "not for use", "1000 kg/m³", "Pressure of")
+    for words in (*parts, "1.15 × 10⁻⁵"):
         assert words in text
+
+
+def test_tables_of_other_densities_mark_what_is_not_for_use(furnished):
+    found = density_blocks(Paper(record_in(furnished[1])))
+    assert len(found) == 2
+    for block in found:
+        rows = block.data["rows"]
+        assert [row[0] for row in rows if NOT_FOR_USE in row] == ["1.500"]
+        assert len(rows) == len(record_in(furnished[1])["capacity"]["height_m"])
 
 
 def test_a_tank_without_courses_has_no_files_and_sheets_about_them(lying):

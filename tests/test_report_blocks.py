@@ -6,55 +6,17 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
+from tankcal.digits import ENGLISH, Marks
 from tankcal.errors import TankcalError
 from tankcal.job.contract import KEYS
 from tankcal.report import blocks
-from tankcal.report.html import block_html, decimal_fills
 from tankcal.report.latex_math import formula
 from tankcal.report.markdown import nodes
-from tankcal.report.numbers import fixed, significant, symbol, unit
+from tankcal.report.numbers import symbol, unit
 from tankcal.report.paper import Column, Paper
-from tankcal.uncertainty import row_decimals
+from tankcal.report.web import block_html
+from tankcal.report.web.tables import decimal_fills
 from tankcal.words import load_words
-
-
-@pytest.mark.parametrize(
-    ("value", "decimals", "text"),
-    [
-        (1249.84, 1, "1249.8"),
-        (-0.0449, 2, "−0.04"),
-        (-0.004, 2, "0.00"),  # no minus before zero
-        (2.0, 0, "2"),
-        (None, 2, "–"),
-        (float("inf"), 2, "–"),
-    ],
-)
-def test_fixed(value, decimals, text):
-    assert fixed(value, decimals) == text
-
-
-@pytest.mark.parametrize(
-    ("value", "digits", "text"),
-    [
-        (0.00020, 2, "0.00020"),
-        (386.31, 4, "386.3"),
-        (9.996, 3, "10.0"),
-        (1.1e-5, 2, "1.1·10⁻⁵"),
-        (-2.06e11, 3, "−2.06·10¹¹"),
-        (0.0, 3, "0"),
-    ],
-)
-def test_significant(value, digits, text):
-    assert significant(value, digits) == text
-
-
-def test_decimal_mark_of_another_language():
-    assert fixed(-1.25, 2, ",") == "−1,25"
-
-
-def test_rows_show_two_digits_of_their_uncertainty():
-    assert row_decimals([0.0, 0.0123, 0.5, 1.4, 14.0]) == [3, 3, 2, 1, 0]
-    assert row_decimals([0.5, 0.0]) == [2, 2]
 
 
 def test_unknown_unit_is_an_error():
@@ -70,6 +32,8 @@ def test_symbol():
 def test_decimal_marks_line_up():
     fills = decimal_fills(["1.25", "10", "3.5"])
     assert [len(fill) for fill in fills] == [0, 3, 1]
+    fills = decimal_fills(["1.234,5", "1.250", "3,75"], ",")  # a group is not a decimal
+    assert [len(fill) for fill in fills] == [1, 3, 0]
 
 
 def test_a_data_frame_becomes_a_table():
@@ -198,7 +162,10 @@ def test_every_field_that_may_be_printed_has_a_label():
 
 def test_a_language_has_the_same_words_as_english():
     """Every placeholder of every sentence can be filled: no stray brace in the file."""
-    for group, words in load_words("en").items():
+    groups = load_words("en")
+    marks = groups["language"].pop("marks")
+    assert Marks(**marks) == ENGLISH
+    for group, words in groups.items():
         for template in _templates(words):
             for name in re.findall(r"\{([^}]*)\}", template):
                 assert re.fullmatch(r"[A-Za-z_]+", name), (group, template)

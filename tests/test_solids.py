@@ -1,7 +1,6 @@
 """Lying tanks and spheres: published figures, another program, closed forms, second methods."""
 
 import itertools
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -593,23 +592,3 @@ def test_dips_outside_are_errors():
 def test_sizes_that_make_no_tank_are_refused(make, message):
     with pytest.raises(SolutionError, match=message):
         make()
-
-
-def test_a_table_of_2500_rows_is_quick(figure):
-    dip = np.linspace(0, 2.4, 2500)
-    kloepper = End("torispherical", dish_radius_m=2.4, knuckle_radius_m=0.24)
-    other = End("torispherical", dish_radius_m=2.4, knuckle_radius_m=0.2)
-    limits = {"level, equal ends": 0.05, "level, unequal ends": 0.1, "tilted": 0.5}
-    tanks = [
-        LyingTank(2.4, 2.4, 10.0, kloepper, kloepper),
-        LyingTank(2.4, 2.4, 10.0, kloepper, other),
-        LyingTank(2.4, 2.4, 10.0, kloepper, other, tilt=0.02, dip_from_a_m=5.0),
-    ]
-    for (what, limit), tank in zip(limits.items(), tanks, strict=True):
-        spent = []
-        for _ in range(5):
-            start = time.perf_counter()
-            tank.volume_m3(dip)
-            spent.append(time.perf_counter() - start)
-        figure(f"2500 rows, torispherical ends, {what}, ms", f"{1000 * min(spent):.0f}")
-        assert min(spent) < limit

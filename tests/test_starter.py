@@ -5,6 +5,7 @@ from pathlib import Path
 
 import openpyxl
 import pytest
+from filled_forms import fill_form
 from job_builder import SETTINGS, assert_same_job, job_parts, write_folder
 from survey_builder import survey_parts
 
@@ -20,6 +21,10 @@ from tankcal.job.contract import (
     SURVEYS,
     TABLES_OF_KIND,
 )
+from tankcal.job.contract.rules import LIMITS, RULE
+from tankcal.job.rule_files import parse_rule, shipped_names
+from tankcal.job.tables import Log
+from tankcal.rules import TANKS
 from tankcal.starter import write_starter
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "job-format.md"
@@ -65,6 +70,9 @@ def assert_written(starter, kind):
         assert heading.split(",") == [field.name for field in COLUMNS[table]]
     notes = (starter / "uncertainty.csv").read_text(encoding="utf-8")
     assert ("# barrel:" in notes, "# surface:" in notes) == (kind == "vertical", kind == "mesh")
+    assert (
+        "# shell_temperature: shell temperature during the survey, K; not declared: ± 2 K" in notes
+    )
 
 
 def test_another_kind_is_refused(tmp_path):
@@ -76,7 +84,7 @@ def test_another_kind_is_refused(tmp_path):
 def test_a_starter_for_a_survey(tmp_path, survey):
     write_starter(tmp_path / "starter", survey=survey)
     starter = tmp_path / "starter"
-    tables = [*SURVEYS[survey], "courses", "bottom", "deadwood", "uncertainty"]
+    tables = [*SURVEYS[survey], *TABLES_OF_KIND["vertical"][1:]]
     registers = REGISTERS_OF_SURVEY[survey]
     names = ["job.toml", "job.xlsx", *(f"{table}.csv" for table in tables)]
     names += [f"{register}.toml" for register in registers]
@@ -88,14 +96,15 @@ def test_a_starter_for_a_survey(tmp_path, survey):
     assert ("fixed_photo" in settings["adjustment"]) == has_photos
     for register in registers:
         text = (starter / f"{register}.toml").read_text(encoding="utf-8")
-        fields = [field.name for field in REGISTER_KEYS[register]]
+        fields = [field.name.partition(".")[0] for field in REGISTER_KEYS[register]]
+        fields = list(dict.fromkeys(fields))
         assert list(tomllib.loads(text)[register]["NAME"]) == fields
     for table in SURVEYS[survey]:
         text = (starter / f"{table}.csv").read_text(encoding="utf-8")
         assert text.splitlines()[-1].split(",") == [field.name for field in COLUMNS[table]]
         assert all(f"# {field.name}: {field.note}" in text for field in COLUMNS[table])
     book = openpyxl.load_workbook(starter / "job.xlsx")
-    assert book.sheetnames == ["read me", "job", *registers, *tables]
+    assert book.sheetnames == ["read me", "job", *registers, *tables, "# inputs"]
 
 
 @pytest.mark.parametrize("name", ["", "job.xlsx"])
@@ -185,24 +194,19 @@ def fill_folder(folder):
 
 
 def fill_workbook(path):
-    book = openpyxl.load_workbook(path)
-    filled = 0
-    for row in book["job"].iter_rows(min_row=2):
-        if (row[3].value or "").startswith("FILL IN"):
-            row[2].value = SETTINGS[f"{row[0].value}.{row[1].value}"]
-            filled += 1
-    for table, rows in filled_tables().items():
-        for number, row in enumerate(rows, 2):
-            for column, value in enumerate(row, 1):
-                book[table].cell(number, column).value = value
-    book.save(path)
-    return filled
+    tables = {
+        name: [[field.name for field in COLUMNS[name]], *rows]
+        for name, rows in filled_tables().items()
+    }
+    fill_form(path, {key: SETTINGS[key] for key in BLANKS}, tables)
 
 
 def filled_tables():
     """Rows in the order of the starter's columns, the optional ones left blank."""
     tables = job_parts(noise_mm=2.0).tables
-    tables["uncertainty"] = [[], ["scale", 5, "ppm", "", "", "", ""]]
+    tables["uncertainty"] = [[], ["scale", 5, "ppm"], ["datum", 2, "mm", "expanded", 2]]
+    tables["correlations"] = [[], ["datum", "scale", 0.5]]
+    tables["stated"] = [[], [9, 2]]
     return {
         name: [[*row, *[""] * (len(COLUMNS[name]) - len(row))] for row in rows[1:]]
         for name, rows in tables.items()
@@ -211,23 +215,27 @@ def filled_tables():
 
 def test_both_forms_filled_in_give_the_same_job(starter):
     assert fill_folder(starter) == len(BLANKS)
-    assert fill_workbook(starter / "job.xlsx") == len(BLANKS)
+    fill_workbook(starter / "job.xlsx")
     folder, workbook = load(starter), load(starter / "job.xlsx")
-    assert (folder.points.rows[0], workbook.points.rows[0]) == (12, 2)  # ten comments in the CSV
+    assert (folder.points.rows[0], workbook.points.rows[0]) == (12, 10)  # ten comments in the CSV
     assert (folder.tank.id, len(folder.points.names), len(folder.courses)) == ("T-1", 120, 5)
-    assert folder.inputs[0].u == 5e-6
+    assert [one.u for one in folder.inputs[:2]] == [5e-6, 1e-3]
+    assert folder.correlations == (("datum", "scale", 0.5),)
+    assert [(one.high_m, one.low_m) for one in folder.stated] == [(9.0, 2.0)]
     assert (folder.points.sd_m, folder.warnings) == (None, ())
     assert_same_job(folder, workbook)
 
 
 def test_the_workbook_helps_to_fill_it_in(starter):
     book = openpyxl.load_workbook(starter / "job.xlsx")
-    tables = ["points", "courses", "bottom", "deadwood", "uncertainty"]
-    assert book.sheetnames == ["read me", "job", *tables]
+    tables = ["points", "courses", "bottom", "deadwood", "uncertainty", "correlations", "stated"]
+    assert book.sheetnames == ["read me", "job", *tables, "# inputs"]
     lists = {rule.formula1 for rule in book["job"].data_validations.dataValidation}
     assert '"outside,inside"' in lists
-    assert book["points"]["B1"].comment.text == "coordinate x, metres."
-    name_style = book["points"].column_dimensions["A"].number_format
+    of_inputs = {rule.formula1 for rule in book["uncertainty"].data_validations.dataValidation}
+    suiting = [name for name, one in INPUTS.items() if "vertical" in one.kinds]
+    assert f'"{",".join(suiting)}"' in of_inputs
+    name_style = book["points"].column_dimensions["B"].number_format
     assert name_style == "@"  # a name such as 1-2 stays a text and becomes no date
 
 
@@ -245,6 +253,34 @@ def test_the_documentation_names_every_key_column_and_choice():
                 assert choice in text
     for name, known in INPUTS.items():
         assert f"| `{name}` | `{known.unit}` |" in text
+        assert (f"| `{name}` | {known.assumption} |" in text) == bool(known.assumption)
+
+
+def test_the_documentation_names_the_keys_and_choices_of_a_rule():
+    text = DOCS.read_text(encoding="utf-8")
+    for part, fields in {"rule": RULE, **LIMITS}.items():
+        assert f"[{part}" in text
+        for field in fields:
+            assert f"`{field.name}`" in text, field.name
+            assert all(f"`{choice}`" in text for choice in field.choices)
+    assert all(f"`{name}`" in text for name in (*shipped_names(), *TANKS))
+
+
+def test_the_rule_of_the_documentation_is_one():
+    text = DOCS.read_text(encoding="utf-8").split("```toml\n")[2].split("```")[0]
+    log = Log()
+    rule = parse_rule("house.toml", text.encode(), log)
+    assert (log.problems, rule.name, rule.verified) == ([], "House rule", True)
+    assert (len(rule.uncertainty), len(rule.deviation)) == (1, 1)
+
+
+def test_the_inputs_of_the_documentation_are_declared(tmp_path):
+    text = DOCS.read_text(encoding="utf-8").split("    input,u,unit,u_is")[1].split("\n\n")[0]
+    folder = write_folder(tmp_path / "job", job_parts())
+    lines = [line.strip() for line in f"input,u,unit,u_is{text}".splitlines()]
+    (folder / "uncertainty.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    declared = [one.name for one in load(folder).inputs if not one.is_default]
+    assert declared == ["scale", "offset", "datum"]
 
 
 def test_the_documentation_names_the_keys_of_cameras_and_instruments():

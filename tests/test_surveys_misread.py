@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from surveyed import by_instruments, by_photographs, changed, known, told
+from surveyed import by_instruments, by_photographs, changed, known, table, told
 
 from tankcal.errors import SolutionError
+from tankcal.job.measurements import AdjustmentSettings, Instrument, Measurements
 from tankcal.surveys import adjust_survey
 
 
@@ -63,6 +64,7 @@ def test_all_photos_mirrored(photos):
     assert "image_points.csv: its image points fit once the image is mirrored" in text
 
 
+@pytest.mark.study
 def test_targets_tell_a_mirrored_tank():
     """Generatrices numbered the other way round: the adjusted points are their mirror image."""
     photos = by_photographs()[0]
@@ -112,6 +114,7 @@ def test_a_further_system_with_x_and_y_swapped(stations):
         assert (wanted in text) == swapped
 
 
+@pytest.mark.study
 def test_one_camera_of_two_mirrored(photos):
     """The images of one camera upside down: the camera is named."""
     second = replace(photos.cameras[0], camera=replace(photos.cameras[0].camera, name="other"))
@@ -126,11 +129,24 @@ def test_one_camera_of_two_mirrored(photos):
     assert "its image points fit once the image is mirrored" in told(both)
 
 
-def test_distances_whose_scale_is_free_are_not_taken_for_feet(stations):
-    """With a scale of their own they fit in any unit: nothing may be concluded."""
-    tool = replace(stations.instruments[0], u_scale=np.nan)
-    table = next(one for one in stations.readings if one.table == "directions")
-    wrong = changed(stations, "directions", value=table.value + np.arange(len(table.value)) * 0.01)
-    text = told(replace(wrong, instruments=(tool,)))
-    assert "feet" not in text
+def test_distances_that_alone_give_the_scale_are_not_taken_for_another_unit():
+    """Sds ten times too small in a free network: a thousandth fits better, and means nothing."""
+    rng = np.random.default_rng(4)
+    xy = rng.uniform(0, 50, (7, 2))
+    names = [f"N{i}" for i in range(7)]
+    pairs = [(i, j) for i in range(7) for j in range(i)]
+    start, end = ([names[pair[k]] for pair in pairs] for k in (0, 1))
+    length = np.array([np.linalg.norm(xy[i] - xy[j]) for i, j in pairs])
+    tapes = table(
+        "distances", length + rng.normal(0, 0.05, len(pairs)), 0.005, start, end,
+        horizontal=np.ones(len(pairs), dtype=bool), instrument=("tape",) * len(pairs),
+    )  # fmt: skip
+    control = known(names, np.pad(xy, ((0, 0), (0, 1))), np.nan)
+    free = Measurements(
+        settings=AdjustmentSettings(datum="inner", snooping=False), control=control,
+        instruments=(Instrument("tape", "tape"),), readings=(tapes,),
+    )  # fmt: skip
+    text = told(free)
+    assert "the global test fails: sigma0 = " in text
     assert "millimetres" not in text
+    assert "feet" not in text

@@ -64,6 +64,22 @@ def test_the_table_of_another_density_is_that_of_a_job_of_that_density(tmp_path)
     assert both.by_density[1000.0] == pytest.approx(alone.table.volume_m3, rel=1e-14)
 
 
+def test_a_floating_roof_floats_in_the_liquid_of_each_table(tmp_path):
+    """In the other liquid it takes M/rho of that liquid, as in a job of that density."""
+    roof = {"mass_kg": 9000.0, "reference_density_kg_m3": 700.0}
+    both = inside_cylinder(
+        tmp_path / "a",
+        {"table.liquid_density_kg_m3": 700.0, "table.other_densities_kg_m3": [1000.0]},
+        roof=roof,
+    )
+    alone = inside_cylinder(
+        tmp_path / "b",
+        {"table.liquid_density_kg_m3": 1000.0},
+        roof=roof | {"reference_density_kg_m3": 1000.0},
+    )
+    assert both.by_density[1000.0] == pytest.approx(alone.table.volume_m3, rel=1e-14)
+
+
 # ---- bottom, deadwood, roof
 
 
@@ -382,12 +398,12 @@ def test_a_scan_gives_diameter_and_tilt_of_a_lying_tank(tmp_path):
 
 
 def test_the_intervals_of_a_scanned_lying_tank_hold_the_truth(tmp_path, figure):
-    """60 scans: at least 50 of 60 intervals of 95 % hold it (binomial, 1e-4 to be below)."""
+    """15 scans: at least 10 intervals of 95 % hold it (binomial, 6e-5 to be below)."""
     truth = np.pi * 1.2**2 * 10
     rng = np.random.default_rng(8)
     job = None
     inside = 0
-    for _ in range(60):
+    for _ in range(15):
         rows = scanned_points(2.4, 0.0, rng, clutter=0)
         if job is None:
             job = tankcal.load(
@@ -397,8 +413,8 @@ def test_the_intervals_of_a_scanned_lying_tank_hold_the_truth(tmp_path, figure):
         found = run(replace(job, points=replace(job.points, xyz_m=xyz)))
         top = found.at(found.table.height_m[-1])
         inside += abs(top.value_m3 - truth) < top.U_m3
-    figure("95 % intervals of 60 scanned lying tanks that hold the truth", inside)
-    assert inside >= 50
+    figure("95 % intervals of 15 scanned lying tanks that hold the truth", inside)
+    assert inside >= 10
 
 
 def test_ullage_volume_to_dip_and_the_shell_in_service(tmp_path):

@@ -219,6 +219,27 @@ def test_a_barrel_of_4_mm_seen_at_mid_height_costs_145_ppm(figure):
     assert ppm == pytest.approx(1e6 * 2 * 0.004 / (3 * 6.5 * np.sqrt(8)), rel=1e-9)
 
 
+def test_a_barrel_of_all_courses_is_the_sum_of_theirs():
+    stack, heights = barrelled([0.3, 0.9], 0.0), np.array([0.4, 1.5, 2.6, 4.5])
+    one_by_one = stack.by_barrel_m2(heights).sum(axis=1)
+    assert stack.by_common_barrel_m2(heights) == pytest.approx(one_by_one, rel=1e-13)
+
+
+def test_a_higher_course_lifts_all_joints_above_it():
+    """Stepped cylinders are linear in their joints: a second tank, one course 1 cm higher."""
+    radii, heights = np.array([6.5, 6.49, 6.47]), np.array([0.4, 1.2, 1.6, 3.2, 4.4])
+    stack = shell([0, 1.5, 3.0, 4.5], [[0.7], [2.2], [3.7]], lambda z: radii[int(z / 1.5)])
+
+    def volume(joints):
+        below = np.clip(heights[:, None] - joints, 0, np.diff(joints, append=np.inf))
+        return below @ (np.pi * radii**2)
+
+    joints = np.array([0.0, 1.5, 3.0])
+    lifted = [joints + 0.01 * (np.arange(3) > course) for course in range(3)]
+    expected = np.column_stack([(volume(moved) - volume(joints)) / 0.01 for moved in lifted])
+    assert stack.by_course_heights_m2(heights) == pytest.approx(expected, abs=1e-9)
+
+
 def test_three_sections_tell_the_barrel():
     found = barrelled(GAUSS_3, 0.004).barrels_m
     assert found == pytest.approx([0.004] * 3, rel=1e-6)

@@ -58,12 +58,12 @@ def test_every_code_has_words(group, beginning):
 
 
 WORDS = {
+    "language": {"marks": {"decimal": "."}},
     "choices": {
         "share": "A share of {value}.",
-        "percent": "{value:.0%}",
         "zero": {"bottom": "From the bottom."},
         "left_out": {"none": "Nothing.", "other": "Without {value}."},
-    }
+    },
 }
 
 
@@ -71,7 +71,6 @@ WORDS = {
     ("code", "value", "text"),
     [
         ("share", 0.1 + 0.2, "A share of 0.3."),
-        ("percent", 0.95, "95%"),
         ("zero", "bottom", "From the bottom."),
         ("zero", "moon", "zero: moon"),
         ("left_out", [], "Nothing."),

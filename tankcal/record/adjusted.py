@@ -4,7 +4,8 @@ import numpy as np
 from scipy.special import fdtri, gammaincinv
 
 from tankcal.camera import PARAMETERS, UNITS
-from tankcal.imaging import distort
+from tankcal.camera_analysis.edges import Frame, own_shift
+from tankcal.camera_analysis.interiors import interiors_of
 from tankcal.network import correlations
 from tankcal.network.quality import ellipsoid_factor, ellipsoids, precision
 from tankcal.rotations import angle_derivatives, angles_of
@@ -152,71 +153,48 @@ def cameras_of(adjustment, measurements=None):
     Photos with the same parameters share a set; "photos" names those of a set that is not of the
     whole camera.
     """
-    adjusted = adjustment.adjusted
-    survey = adjusted.survey
-    if survey.photos is None or not len(survey.photos.names):
-        return []
-    sets = {}
-    for photo, places in enumerate(adjusted.problem.interior_of.tolist()):
-        sets.setdefault((int(survey.photos.camera[photo]), tuple(places)), []).append(photo)
-    several = [camera for camera, _ in sets]
-    return [
-        _camera(adjustment, measurements, camera, photos, several.count(camera) > 1)
-        for (camera, _), photos in sets.items()
-    ]
+    return [_camera(one) for one in interiors_of(adjustment, measurements)]
 
 
-def _camera(adjustment, measurements, number, photos, part):
-    adjusted = adjustment.adjusted
-    camera = adjusted.survey.cameras[number]
-    values, free, cofactors = adjusted.camera(photos[0])
-    covariance = adjustment.cov_scale * np.asarray(cofactors)
-    sds = dict(zip(free, np.sqrt(np.maximum(np.diag(covariance), 0.0)), strict=True))
-    names = [n for n, scope in zip(PARAMETERS, camera.scope, strict=True) if scope != "off"]
-    corner, known = _corner(adjustment, measurements, number, photos)
+def _camera(interior):
+    values = dict(zip(PARAMETERS, interior.values.tolist(), strict=True))
+    sds = dict(
+        zip(interior.free, np.sqrt(np.maximum(np.diag(interior.covariance), 0.0)), strict=True)
+    )
+    scope = dict(zip(PARAMETERS, interior.scope, strict=True))
+    state = dict(zip(PARAMETERS, interior.state, strict=True))
+    names = [name for name in PARAMETERS if scope[name] != "off"]
     return {
-        "camera": camera.name,
-        "photos": [adjusted.survey.photos.names[i] for i in photos] if part else None,
-        "convention": camera.form.convention,
-        "affinity": camera.form.affinity,
-        "radial_balance_mm": camera.form.radial_balance_mm,
-        "edge_mm": corner,
-        "edge_known": known,
+        "camera": interior.camera,
+        "photos": interior.photos,
+        "convention": interior.form.convention,
+        "affinity": interior.form.affinity,
+        "radial_balance_mm": interior.form.radial_balance_mm,
+        "format_mm": interior.format_mm,
+        "pixel_mm": interior.frame.pixel_mm,
+        "edge_mm": interior.frame.half_mm,
+        "edge_known": interior.frame_known,
+        "reach_mm": interior.frame.reach_mm,
         "parameters": names,
         "units": [UNITS[name] for name in names],
         "values": [values[name] for name in names],
         "sds": [sds.get(name, 0.0) for name in names],
-        "scopes": [camera.scope[PARAMETERS.index(name)] for name in names],
-        "states": [camera.state[PARAMETERS.index(name)] for name in names],
-        "edge_um": [_edge_effect(name, values, camera.form, corner) for name in names],
-        "free": list(free),
-        "covariance": covariance,
-        "correlation": correlations(covariance),
+        "scopes": [scope[name] for name in names],
+        "states": [state[name] for name in names],
+        "edge_um": [
+            _edge_effect(name, values, interior.form, interior.frame.half_mm) for name in names
+        ],
+        "free": list(interior.free),
+        "covariance": interior.covariance,
+        "correlation": correlations(interior.covariance),
     }
 
 
-def _corner(adjustment, measurements, number, photos):
-    """Half width and height (mm) of the image, and whether they were declared or only seen."""
-    setups = getattr(measurements, "cameras", ())
-    if number < len(setups) and setups[number].format_mm is not None:
-        return np.asarray(setups[number].format_mm, dtype=float) / 2, True
-    images = adjustment.adjusted.survey.image_points
-    mine = np.isin(images.photo, photos)
-    return np.abs(images.xy_mm[mine]).max(axis=0, initial=0.0), False
-
-
-def _edge_effect(name, values, form, corner):
+def _edge_effect(name, values, form, corner_mm):
     """Largest shift (um) that a parameter makes in a corner of the image; None for c."""
-    if name == "c":
-        return None
-    if name in ("x0", "y0"):
-        return 1e3 * abs(values[name])
     q = np.array([values[one] for one in PARAMETERS])
-    without = np.where(np.array(PARAMETERS) == name, 0.0, q)
-    x = np.array([1.0, 1.0, -1.0, -1.0]) * corner[0] - q[1]
-    y = np.array([1.0, -1.0, 1.0, -1.0]) * corner[1] - q[2]
-    with_it, without_it = (np.array(distort(x, y, p, form.numbers)[:2]) for p in (q, without))
-    return 1e3 * float(np.hypot(*(with_it - without_it)).max())
+    shift = own_shift(name, q, form, Frame(np.asarray(corner_mm, dtype=float)))
+    return None if shift is None else shift.corner_um
 
 
 def instruments_of(adjustment, measurements=None):

@@ -5,6 +5,7 @@ from dataclasses import asdict
 import numpy as np
 from scipy.special import gammaincinv
 
+from tankcal.messages import as_plain
 from tankcal.network.cleaning import CRITICAL
 from tankcal.network.reliability import UNCONTROLLED, tau_limit
 from tankcal.record.adjusted import (
@@ -15,6 +16,7 @@ from tankcal.record.adjusted import (
     precision_of,
     systems_of,
 )
+from tankcal.record.images import depth_of, fiducials_of, image_readings_of
 
 CONFIDENCE = 0.95  # of the global test and of the intervals of variance factors
 ALPHA, POWER = 0.001, 0.80  # of the tests of single readings
@@ -29,12 +31,15 @@ def adjustment_of(adjustment, measurements=None):
     settings = getattr(measurements, "settings", None)
     return {
         **_statistics(adjustment, settings),
-        "datum": asdict(adjustment.datum),
+        "datum": _datum(adjustment.datum),
         "groups": [_group(group, adjustment) for group in adjustment.groups],
         "removed": [_reading(reading) for reading in adjustment.removed],
         "residuals": [_reading(reading) for reading in adjustment.readings],
         "cameras": cameras_of(adjustment, measurements),
         "photos": photos_of(adjustment),
+        "image_readings": image_readings_of(adjustment.repeats),
+        "fiducials": fiducials_of(getattr(measurements, "fiducials", ())),
+        "depth_of_field": depth_of(adjustment.depth),
         "instruments": instruments_of(adjustment, measurements),
         "systems": systems_of(adjustment),
         "setups": [
@@ -54,7 +59,13 @@ def adjustment_of(adjustment, measurements=None):
             for cause in adjustment.causes
         ],
         "aside": list(adjustment.aside),
+        "left_out": [{"text": str(one), **as_plain(one)} for one in adjustment.aside],
     }
+
+
+def _datum(datum):
+    said = as_plain(datum.words)
+    return {**asdict(datum), "words_code": said["code"], "words_values": said["values"]}
 
 
 def _statistics(adjustment, settings):

@@ -7,9 +7,18 @@ import numpy as np
 import scipy
 
 import tankcal
+from tankcal.messages import as_plain
+from tankcal.plain_data import plain, plain_problems
 from tankcal.record import FORMAT
 from tankcal.record.adjustment import adjustment_of
 from tankcal.record.parts import bottom_of, deadwood_of, roof_of, solid_of
+from tankcal.record.statements import (
+    budget_of,
+    budgets_of,
+    deliveries_of,
+    monte_carlo_of,
+    rule_of,
+)
 from tankcal.record.survey import (
     adjustment_in,
     courses_of,
@@ -21,7 +30,6 @@ from tankcal.record.survey import (
 )
 from tankcal.record.table import (
     adjustment_choices,
-    budget_of,
     capacity_of,
     choices_of,
     densities_of,
@@ -34,7 +42,7 @@ from tankcal.record.table import (
 def record_of(result):
     """The record of a `chain.Result`: a dict of plain numbers, texts and lists."""
     adjustment = adjustment_in(result)
-    return _plain(
+    return plain(
         {
             **_beginning(result.job),
             "shell": shell_of(result),
@@ -47,17 +55,19 @@ def record_of(result):
             "proportional_parts": proportional_parts_of(result),
             "densities": densities_of(result),
             "gross": gross_of(result),
-            "corrections": [asdict(correction) for correction in result.corrections],
+            "corrections": [_correction(one) for one in result.corrections],
             "solid": solid_of(result),
             "bottom": bottom_of(result),
             "deadwood": deadwood_of(result),
             "roof": roof_of(result),
             "budget": budget_of(result),
             "choices": choices_of(result),
-            "warnings": _warnings(result.warnings),
+            "warnings": plain_problems(result.warnings),
             "adjustment": adjustment and adjustment_of(adjustment, result.job.measurements),
-            "deliveries": None,
-            "monte_carlo": None,
+            "budgets": budgets_of(result),
+            "deliveries": deliveries_of(result),
+            "rule": rule_of(result),
+            "monte_carlo": monte_carlo_of(result),
         }
     )
 
@@ -65,7 +75,7 @@ def record_of(result):
 def record_of_adjustment(job, adjustment):
     """The record of a survey that was only adjusted: what a tank has is null or empty."""
     measurements = getattr(job, "measurements", None)
-    return _plain(
+    return plain(
         {
             **_beginning(job),
             **dict.fromkeys(_OF_A_TANK),
@@ -75,7 +85,7 @@ def record_of_adjustment(job, adjustment):
                 {"code": code, "value": value}
                 for code, value in adjustment_choices(adjustment, measurements).items()
             ],
-            "warnings": _warnings(dict.fromkeys((*job.warnings, *adjustment.warnings))),
+            "warnings": plain_problems(dict.fromkeys((*job.warnings, *adjustment.warnings))),
             "adjustment": adjustment_of(adjustment, measurements),
         }
     )
@@ -83,10 +93,11 @@ def record_of_adjustment(job, adjustment):
 
 _OF_A_TANK = (
     "shell", "capacity", "interpolation", "proportional_parts", "gross", "solid", "bottom", "roof",
-    "deliveries", "monte_carlo",
+    "rule", "monte_carlo",
 )  # fmt: skip
 _LISTS_OF_A_TANK = (
     "rejected", "sections", "courses", "densities", "corrections", "deadwood", "budget",
+    "budgets", "deliveries",
 )  # fmt: skip
 
 
@@ -104,10 +115,9 @@ def _beginning(job):
     }
 
 
-def _warnings(problems):
-    return [
-        {"file": w.file, "row": w.row, "column": w.column, "text": w.expected} for w in problems
-    ]
+def _correction(one):
+    said = as_plain(one.formula)
+    return {**asdict(one), "formula_code": said["code"], "formula_values": said["values"]}
 
 
 def _job(job):
@@ -125,18 +135,3 @@ def _job(job):
         "certificate": job.certificate,
         "source": job.source,
     }
-
-
-def _plain(value):
-    """Plain Python data: arrays as lists, and null for what is not a finite number."""
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, np.generic):
-        return _plain(value.item())
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value

@@ -1,4 +1,4 @@
-"""The part of the record that says what follows: table, corrections, budget, choices."""
+"""The part of the record that says what follows: the table, its densities, choices."""
 
 from dataclasses import asdict
 
@@ -7,6 +7,7 @@ import numpy as np
 from tankcal.chain import PARTS
 from tankcal.dips import dip_label
 from tankcal.network.cleaning import CRITICAL
+from tankcal.record.statements import intervals_of
 from tankcal.record.survey import adjustment_in
 from tankcal.snooping import CRITICAL_W
 
@@ -34,6 +35,7 @@ def capacity_of(result):
         "dof": table.dof,
         "area_m2": table.area_m2,
         "for_use": table.for_use(table.height_m),
+        **intervals_of(result),
         "inputs": [
             kind if counts[kind] == 1 else f"{kind} {number}"
             for kind, number in zip(kinds, numbers, strict=True)
@@ -81,38 +83,6 @@ def gross_of(result):
         return None
     volume = float(shell.volume_m3(shell.height_m)[0])
     return {"volume_m3": volume, "area_m2": volume / shell.height_m}
-
-
-def budget_of(result):
-    """What contributes to the uncertainty of the top row."""
-    table = result.table
-    total = table.u_m3[-1] ** 2
-    rows = []
-    for source in table.sources:
-        contribution = float(np.sqrt(np.sum(source.columns_m3[-1] ** 2)))
-        declared = source.u is not None
-        known = declared and source.u > 0
-        rows.append(
-            {
-                "input": source.kind,
-                "kind": source.kind,
-                "u": source.u,
-                "unit": source.unit,
-                "type": source.type,
-                "distribution": source.distribution,
-                "dof": source.dof,
-                "sensitivity": float(source.columns_m3[-1, 0]) / source.u if known else None,
-                "sensitivity_unit": _sensitivity_unit(source.unit) if declared else None,
-                "contribution_m3": contribution,
-                "share": contribution**2 / total if total > 0 else 0.0,
-                "note": source.note,
-            }
-        )
-    return rows
-
-
-def _sensitivity_unit(unit):
-    return "m3 K" if unit == "1/K" else f"m3/{unit}"
 
 
 def choices_of(result):

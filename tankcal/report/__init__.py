@@ -6,45 +6,75 @@ Nothing here computes a number: the record's values are formatted (docs/report.m
 from pathlib import Path
 
 FILES = ("report.ipynb", "certificate.pdf", "working-papers.pdf", "report.pdf", "report.html")
+LETTERHEAD = "letterhead.json"  # there when a letterhead was given
+_SINCE_UNCERTAINTY = ("budgets", "deliveries", "rule", "monte_carlo")
 _PARTS = (("certificate.pdf", "certificate"), ("working-papers.pdf", "working-papers"))
 
 
-def build(record_path, directory, progress=None):
+def build(record_path, directory, progress=None, language=None, letterhead=None):
     """Write the files of FILES into `directory`, from the record alone; give their paths.
 
     A record without a capacity, of a survey that was only adjusted, has no certificate: it gets
     working papers, notebook and web page.
 
     record_path   path of a record.json; it is copied beside the notebook when it is not there yet
+    directory     a workbook that lies there, too, is held inside the PDFs
     progress      called as progress(done, total) while it works
+    language      of the papers; None: that of the job
+    letterhead    a letterhead.Letterhead, or None
 
     Raises TankcalError when a cell of the notebook fails or a page cannot be set; then none of the
     files is written.
     """
     import shutil
 
-    import nbformat
-
     from tankcal import record as records
-    from tankcal.report.document import blocks_of
-    from tankcal.report.html import page
-    from tankcal.report.notebook import execute, joined
-    from tankcal.report.pdf import pdf
+    from tankcal.report.notebook import joined
 
     directory = Path(directory)
     beside = directory / "record.json"
     if Path(record_path).resolve() != beside.resolve():
         shutil.copyfile(record_path, beside)
     record = records.load(beside)
-    notebook = joined(beside.name, [part for part, value in record.items() if not value])
+    notebook = joined(
+        beside.name,
+        missing(record),
+        LANGUAGE=language,
+        LETTERHEAD=letterhead and letterhead.save(directory),
+    )
     parts = (*_PARTS, ("report.pdf", "")) if record["capacity"] else _PARTS[1:]
+    return set_papers(notebook, directory, parts, progress)
+
+
+def missing(record):
+    """Names of what a record has nothing of, or, of an earlier version, does not know."""
+    known = dict.fromkeys(_SINCE_UNCERTAINTY) | record
+    return [part for part, value in known.items() if not value]
+
+
+def set_papers(notebook, directory, parts, progress=None):
+    """Execute a notebook in `directory` and write it there with its PDFs and web page.
+
+    notebook   as `notebook.joined` gives it
+    parts      (name of the PDF, part of the notebook) of each PDF; part "" is all of it
+    progress   called as progress(done, total) while it works
+
+    Gives the paths, and raises, as `build` does.
+    """
+    import nbformat
+
+    from tankcal.report.document import blocks_of
+    from tankcal.report.notebook import execute
+    from tankcal.report.pdf import pdf
+    from tankcal.report.web import page
+
     total = len(notebook.cells) + len(parts) + 2
     tell = progress or (lambda done, total: None)
     execute(notebook, directory, on_cell=lambda done: tell(done, total))
 
     contents = {"report.ipynb": nbformat.writes(notebook).encode("utf-8")}
     for name, part in parts:
-        contents[name] = pdf(blocks_of(notebook, part))
+        contents[name] = pdf(blocks_of(notebook, part), directory)
         tell(len(notebook.cells) + len(contents), total)
     contents["report.html"] = page(blocks_of(notebook)).encode("utf-8")
     for name, content in contents.items():

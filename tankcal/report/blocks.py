@@ -11,11 +11,12 @@ A block is plain data. Jupyter shows its HTML; the exporters take the data itsel
 import io
 from dataclasses import dataclass
 
+from tankcal.digits import NOTHING
 from tankcal.errors import TankcalError
-from tankcal.report.numbers import NOTHING
 
 MIME = "application/vnd.tankcal.block+json"
 ALIGNMENTS = ("left", "center", "right", "decimal")
+WEB_ONLY = ("calculator", "tank_view")  # kinds that the PDF leaves out (report/web makes them)
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Block:
     data: dict
 
     def _repr_mimebundle_(self, include=None, exclude=None):
-        from tankcal.report.html import block_html
+        from tankcal.report.web import block_html
 
         return {
             "text/html": block_html(self.data),
@@ -43,6 +44,8 @@ def document(**properties):
     part      "certificate", "working-papers", or "" for a notebook of one's own
     running   [left, right] texts at the top of every page
     footer    text with {page} and {pages}
+    letterhead   data of a letterhead.Letterhead, or None
+    attachments  files beside the notebook that its PDF holds inside (attachments.Attachment.data)
     """
     known = {
         "part": "",
@@ -53,6 +56,8 @@ def document(**properties):
         "notice": "",
         "running": ["", ""],
         "footer": "{page} / {pages}",
+        "letterhead": None,
+        "attachments": [],
     }
     unknown = sorted(set(properties) - set(known))
     if unknown:
@@ -124,19 +129,21 @@ def key_values(items, caption=""):
     )
 
 
-def table(columns, rows=None, caption="", align=None):
+def table(columns, rows=None, caption="", align=None, decimal_mark="."):
     """A table with one heading row; or, from a pandas DataFrame alone, the same.
 
     columns   a heading each, or [heading, unit]
     rows      lists of text, as long as `columns`; None is printed as a dash
     align     "left", "center", "right" or "decimal" for each column; default: numbers to the right
+    decimal_mark  on which the numbers of a "decimal" column stand in line
     """
-    return _table("table", columns, rows, caption, align)
+    return _table("table", columns, rows, caption, align, decimal_mark)
 
 
-def columns_table(columns, rows=None, caption="", align=None, across=4):
+def columns_table(columns, rows=None, caption="", align=None, across=4, decimal_mark="."):
     """A long narrow table, set in `across` columns on each page, the headings over each of them."""
-    return _table("columns_table", columns, rows, caption, align, across=int(across))
+    across = int(across)
+    return _table("columns_table", columns, rows, caption, align, decimal_mark, across=across)
 
 
 def figure(figure, caption, alt, width=1.0):
@@ -170,7 +177,7 @@ def without_controls(text):
     return "".join(c if c.isprintable() or c in "\n\u2007\u2009\u202f\xa0" else " " for c in text)
 
 
-def _table(kind, columns, rows, caption, align, **more):
+def _table(kind, columns, rows, caption, align, decimal_mark, **more):
     if rows is None:
         columns, rows, align = _of_data_frame(columns, align)
     heads = [[_text(column), ""] if isinstance(column, str) else list(column) for column in columns]
@@ -178,10 +185,11 @@ def _table(kind, columns, rows, caption, align, **more):
     for number, row in enumerate(cells, 1):
         if len(row) != len(heads):
             raise TankcalError(f"row {number} has {len(row)} cells, the table {len(heads)} columns")
-    align = list(align or (_natural_alignment(cells, i) for i in range(len(heads))))
+    align = list(align or (_natural_alignment(cells, i, decimal_mark) for i in range(len(heads))))
     if len(align) != len(heads) or not set(align) <= set(ALIGNMENTS):
         raise TankcalError(f"{len(heads)} alignments of {', '.join(ALIGNMENTS)} expected: {align}")
     data = {"kind": kind, "caption": _text(caption), "align": align, "rows": cells, **more}
+    data["decimal_mark"] = decimal_mark
     data["columns"] = [{"heading": _text(head), "unit": _text(unit)} for head, unit in heads]
     return Block(data)
 
@@ -197,10 +205,10 @@ def _of_data_frame(frame, align):
     return list(map(str, frame.columns)), rows, align or ["right" if n else "left" for n in numeric]
 
 
-def _natural_alignment(rows, column):
+def _natural_alignment(rows, column, mark):
     """Numbers to the right, anything else to the left."""
     cells = [row[column] for row in rows if row[column] != NOTHING]
-    numbers = all(cell.lstrip("\N{MINUS SIGN}-+").replace(".", "", 1).isdigit() for cell in cells)
+    numbers = all(cell.lstrip("\N{MINUS SIGN}-+").replace(mark, "", 1).isdigit() for cell in cells)
     return "right" if cells and numbers else "left"
 
 

@@ -4,6 +4,7 @@ import base64
 
 from tankcal.errors import TankcalError
 from tankcal.report import blocks
+from tankcal.report.letterhead import data_problem
 from tankcal.report.markdown import nodes
 
 PARTS = ("certificate", "working-papers")
@@ -110,6 +111,8 @@ _KEYS = {
     "table": {"caption", "columns", "rows", "align"},
     "columns_table": {"caption", "columns", "rows", "align", "across"},
     "figure": {"caption", "alt", "width", "svg"},
+    "calculator": {"text", "unit", "height_m", "volume", "U", "deliveries"},
+    "tank_view": {"text", "shell", "solid", "reason"},
 }
 
 
@@ -121,4 +124,8 @@ def _checked(data, place):
     missing = sorted(_KEYS[kind] - set(data))
     if missing:
         raise TankcalError(f"{place} of the notebook: its {kind} lacks {', '.join(missing)}")
+    if kind == "document" and data.get("letterhead") is not None:
+        problem = data_problem(data["letterhead"])
+        if problem:
+            raise TankcalError(f"{place} of the notebook: its letterhead {problem}")
     return data

@@ -8,8 +8,8 @@ from nbconvert.exporters import Exporter
 from traitlets import Unicode, default
 
 from tankcal.report.document import blocks_of
-from tankcal.report.html import page
 from tankcal.report.pdf import pdf
+from tankcal.report.web import page
 
 
 class _BlocksExporter(Exporter):
@@ -20,8 +20,11 @@ class _BlocksExporter(Exporter):
     ).tag(config=True)
 
     def _blocks(self, notebook, resources):
-        name = (resources or {}).get("metadata", {}).get("name") or "notebook"
-        return blocks_of(notebook, self.part, name)
+        return blocks_of(notebook, self.part, _metadata(resources).get("name") or "notebook")
+
+
+def _metadata(resources):
+    return (resources or {}).get("metadata", {})
 
 
 class PdfExporter(_BlocksExporter):
@@ -36,7 +39,8 @@ class PdfExporter(_BlocksExporter):
 
     def from_notebook_node(self, nb, resources=None, **kwargs):
         notebook, resources = super().from_notebook_node(nb, resources, **kwargs)
-        return pdf(self._blocks(notebook, resources)), resources
+        folder = _metadata(resources).get("path") or "."
+        return pdf(self._blocks(notebook, resources), folder), resources
 
 
 class HtmlExporter(_BlocksExporter):

@@ -5,11 +5,15 @@ sections. Lengths of the page are inches.
 """
 
 import logging
+import textwrap
 from math import ceil, floor, log10
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import Formatter, ScalarFormatter
+
+from tankcal.report.uncertainty.stated import stated_U_m3
 
 logging.getLogger("matplotlib").setLevel(logging.ERROR)  # no remark about its font cache on paper
 
@@ -25,22 +29,24 @@ STYLE = {
     "grid.color": "#c3cad2",
     "lines.linewidth": 0.9,
 }
-INK, RED = "#1f4e79", "#b03a2e"
+INK, RED, PALE = "#1f4e79", "#b03a2e", "#9db8d2"
+LEAST_SHARE = 1e-3  # of the variance: less is no bar
 WIDTH = 6.5
+LETTERS_OF_A_BAR = 46  # in a line of its name
 _TURN = (-4, 364)  # degrees: points at north are not cut off
 MANY = 500  # points in a panel: from here on their picture is smaller than their outlines
 
 
 def residuals(paper, most=8):
     """Residuals in mm against azimuth, one panel a section, up to `most` panels a figure."""
-    groups = _groups(paper.record["sections"], most)
+    groups = even_groups(paper.record["sections"], most)
     largest = max(max(map(abs, s["residual_m"]), default=0.0) for s in paper.record["sections"])
     return [_residual_panels(paper, group, 1.1e3 * largest or 1.0) for group in groups]
 
 
 def _residual_panels(paper, sections, limit_mm):
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 0.72 * len(sections) + 0.55))
+        figure = Figure(figsize=(WIDTH, 0.55 * len(sections) + 0.55))
         axes = figure.subplots(len(sections), 1, sharex=True, squeeze=False)[:, 0]
         for ax, section in zip(axes, sections, strict=True):
             residual_mm = 1e3 * np.array(section["residual_m"])
@@ -55,7 +61,7 @@ def _residual_panels(paper, sections, limit_mm):
             ax.set_title(title, loc="left", fontsize=8, pad=2, parse_math=False)
         axes[-1].set_xlabel(paper.word("axes.azimuth"))
         figure.supylabel(paper.word("axes.residual"), fontsize=8.5, x=0.005)
-        set_margins(figure, left=0.55, right=0.12, bottom=0.42, top=0.2, hspace=0.5)
+        set_margins(figure, left=0.55, right=0.12, bottom=0.42, top=0.2, hspace=0.6)
     return figure
 
 
@@ -74,18 +80,18 @@ def round_factor(wanted):
     return max(1, round(power * max(step for step in (1, 2, 5) if step * power <= wanted)))
 
 
-def polar(paper, most=9):
+def polar(paper, most=12):
     """The sections about their circles, deviations enlarged by `polar_factor`."""
     factor = polar_factor(paper)
-    groups = _groups(paper.record["sections"], most)
+    groups = even_groups(paper.record["sections"], most)
     return [_polar_panels(paper, group, factor) for group in groups]
 
 
 def _polar_panels(paper, sections, factor):
-    across = 3
+    across = 3 if len(sections) <= 6 else 4
     down = ceil(len(sections) / across)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 2.0 * down))
+        figure = Figure(figsize=(WIDTH, 5.4 / across * down))
         axes = figure.subplots(down, across, squeeze=False).ravel()
         turn = np.linspace(0, 2 * np.pi, 361)
         for ax, section in zip(axes, sections, strict=False):
@@ -131,7 +137,7 @@ def deviation_map(paper):
     residual_mm = [1e3 * r for section in record["sections"] for r in section["residual_m"]]
     limit = max(map(abs, residual_mm), default=0.0) or 1.0
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 3.1))
+        figure = Figure(figsize=(WIDTH, 2.6))
         ax = figure.subplots()
         size = 14 if len(azimuth) <= 300 else 6
         if len(azimuth) > 3000:  # no room for edges: grey behind the points shows the white ones
@@ -159,12 +165,12 @@ def capacity_curves(paper):
     height_m = capacity["height_m"]
     litres_per_cm = 10.0 * np.array(capacity["area_m2"], dtype=float)  # 1 m2 is 10 L/cm
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 2.7))
+        figure = Figure(figsize=(WIDTH, 2.4))
         left, right = figure.subplots(1, 2)
         left.plot(height_m, litres_per_cm, color=INK)
         left.set_ylabel(paper.word("axes.litres_per_cm"))
         left.ticklabel_format(useOffset=False)
-        right.plot(height_m, capacity["U_m3"], color=INK)
+        right.plot(height_m, stated_U_m3(capacity), color=INK)
         right.set_ylabel(paper.word("axes.U_m3"))
         right.set_ylim(bottom=0)
         for ax in (left, right):
@@ -176,25 +182,30 @@ def capacity_curves(paper):
 
 
 def budget_bars(paper):
-    """The share of the variance of each input, in percent."""
-    budget = paper.record["budget"]
-    names = [paper.input_name(row) for row in budget]
+    """The share of the variance of each input, in percent; defaults are pale."""
+    budget = [row for row in paper.record["budget"] if abs(row["share"]) >= LEAST_SHARE]
+    budget.sort(key=lambda row: -row["share"])
+    names = [textwrap.fill(paper.input_name(row), LETTERS_OF_A_BAR) for row in budget]
+    high = 0.24 if not any("\n" in name for name in names) else 0.32
+    colours = [PALE if row.get("is_default") else INK for row in budget]
+    lowest = min((row["share"] for row in budget), default=0)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 0.24 * len(budget) + 0.6))
+        figure = Figure(figsize=(WIDTH, high * len(budget) + 0.6))
         ax = figure.subplots()
-        ax.barh(range(len(budget)), [100 * row["share"] for row in budget], color=INK, height=0.6)
+        shares = [100 * row["share"] for row in budget]
+        ax.barh(range(len(budget)), shares, color=colours, height=0.6)
         ax.set_yticks(range(len(budget)), names, parse_math=False)
         ax.invert_yaxis()
         ax.set_xlabel(paper.word("axes.share"))
-        ax.set_xlim(0, 100)
+        ax.set_xlim(min(0, 110 * lowest), max([100, *(1.05 * share for share in shares)]))
         ax.grid(True, axis="x")
         ax.set_axisbelow(True)
         set_margins(figure, left=2.9, right=0.2, bottom=0.42, top=0.05)
     return figure
 
 
-def _groups(sections, most):
-    """The sections in figures of nearly equal size."""
+def even_groups(sections, most):
+    """The sections in figures, or the columns in tables, of nearly equal size."""
     count = max(1, ceil(len(sections) / most))
     size = max(1, ceil(len(sections) / count))
     return [sections[i : i + size] for i in range(0, len(sections), size)]
@@ -220,3 +231,30 @@ def set_margins(figure, left, right, bottom, top, **spaces):
         left=left / width, right=1 - right / width, bottom=bottom / height, top=1 - top / height,
         **spaces,
     )  # fmt: skip
+
+
+def with_decimal_mark(figure, mark):
+    """The figure with this decimal mark in the numbers at its axes; names there stay."""
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            if isinstance(axis.get_major_formatter(), ScalarFormatter):
+                axis.set_major_formatter(_Marked(axis.get_major_formatter(), mark))
+            if isinstance(axis.get_minor_formatter(), ScalarFormatter):
+                axis.set_minor_formatter(_Marked(axis.get_minor_formatter(), mark))
+    return figure
+
+
+class _Marked(Formatter):
+    """The numbers of another formatter with a decimal mark."""
+
+    def __init__(self, of_numbers, mark):
+        self._of_numbers, self._mark = of_numbers, mark
+
+    def __call__(self, x, pos=None):
+        return self._of_numbers(x, pos).replace(".", self._mark)
+
+    def get_offset(self):
+        return self._of_numbers.get_offset().replace(".", self._mark)
+
+    def set_locs(self, locs):
+        self._of_numbers.set_locs(locs)

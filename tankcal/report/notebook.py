@@ -1,5 +1,6 @@
 """The report's notebook: the templates joined, and executed by this very Python."""
 
+import ast
 import logging
 import os
 import sys
@@ -16,25 +17,46 @@ CELL_TIMEOUT_S = 600
 LONGEST_SOCKET = 90  # characters of a socket's path; systems end at 104 to 108
 
 
-def joined(record_name, lacks=()):
+def joined(record_name, lacks=(), templates=TEMPLATES, **parameters):
     """One notebook from the shipped templates, to be kept beside the record of that name.
+
+    parameters   other names of the templates' parameters cell, and their values
 
     Cells tagged "parameters" or "setup" are taken from the first template only. A cell tagged
     "if:courses" is left out when "courses" is among `lacks`, what the record has nothing of.
+
+    Raises TankcalError for a parameter that the templates do not have.
     """
     folder = shipped("report_templates")
-    whole, *others = (nbformat.read(folder / name, as_version=4) for name in TEMPLATES)
+    whole, *others = (nbformat.read(folder / name, as_version=4) for name in templates)
     for other in others:
         whole.cells += [c for c in other.cells if not _tags(c) & {"parameters", "setup"}]
     unneeded = {f"if:{part}" for part in lacks}
     whole.cells = [cell for cell in whole.cells if not _tags(cell) & unneeded]
-    parameters = [cell for cell in whole.cells if "parameters" in _tags(cell)]
-    if len(parameters) != 1:
-        raise TankcalError(f"the templates have {len(parameters)} parameters cells, not one")
-    parameters[0].source = f"RECORD = {record_name!r}"
+    set_parameters(whole, {"RECORD": record_name, **parameters})
     for number, cell in enumerate(whole.cells, 1):
         cell.id = f"cell-{number}"
     return whole
+
+
+def set_parameters(notebook, values):
+    """Give the names in the cell tagged "parameters" their values; those not named keep theirs.
+
+    Raises TankcalError when there is not one such cell, or when it has no such name.
+    """
+    cells = [cell for cell in notebook.cells if "parameters" in _tags(cell)]
+    if len(cells) != 1:
+        raise TankcalError(f"the notebook has {len(cells)} parameters cells, not one")
+    known = {
+        statement.targets[0].id: ast.literal_eval(statement.value)
+        for statement in ast.parse(cells[0].source).body
+    }
+    unknown = sorted(set(values) - set(known))
+    if unknown:
+        raise TankcalError(
+            f"the notebook has no parameter {', '.join(unknown)}; it has: {', '.join(known)}"
+        )
+    cells[0].source = "\n".join(f"{name} = {value!r}" for name, value in (known | values).items())
 
 
 def _tags(cell):

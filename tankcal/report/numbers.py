@@ -1,13 +1,13 @@
-"""Numbers as they are printed: one function for the digits, one for the units."""
+"""Units as they are printed, and values with powers of ten beside their standard deviations."""
 
 from dataclasses import dataclass
-from math import floor, isfinite, log10, pi
+from math import pi
 
+from tankcal.digits import ENGLISH, WITHOUT_U, superscript, with_digits, written
 from tankcal.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
 from tankcal.errors import TankcalError
 
-NOTHING = "–"
-_MINUS = "\N{MINUS SIGN}"
+_SHORT = range(-2, 6)  # powers of ten written out in a narrow column
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,7 @@ UNITS = {
     "mm": Unit("mm", 1e3),
     "m2": Unit("m²"),
     "m3": Unit("m³", least=TABLE_DECIMALS["m3"]),
+    "m3/unit": Unit("m³/unit"),
     "L": Unit("L", float(1 / VOLUME_UNITS_M3["L"])),
     "bbl": Unit("bbl", float(1 / VOLUME_UNITS_M3["bbl"]), TABLE_DECIMALS["bbl"]),
     "kg": Unit("kg"),
@@ -40,9 +41,12 @@ UNITS = {
     "percent": Unit("%"),
     "share": Unit("%", 1e2),
     "ppm": Unit("ppm"),
+    "share ppm": Unit("ppm", 1e6),
     "um": Unit("µm"),
     "image mm": Unit("mm"),  # image coordinates are in millimetres in the record, too
     "image um": Unit("µm", 1e3),
+    "px": Unit("px"),
+    "arcsec": Unit("″"),
     "rad deg": Unit("°", 180 / pi),
     "rad arcsec": Unit("″", 648000 / pi),
     "deg arcsec": Unit("″", 3600.0),
@@ -60,32 +64,31 @@ def unit(name):
 
 
 def symbol(text):
-    """A unit as the record writes it, as it is printed: "m3/mm" is "m³/mm"."""
-    return text and text.replace("m3", "m³").replace("m2", "m²")
+    """A unit as the record writes it, as it is printed: "m3/kg/m3" is "m³/(kg/m³)"."""
+    if not text or text == "1":  # of a ratio
+        return None
+    above, _, below = text.replace("m3", "m³").replace("m2", "m²").partition("/")
+    return f"{above}/({below})" if "/" in below else f"{above}/{below}" if below else above
 
 
-def fixed(value, decimals, decimal_mark="."):
-    """`value` with that many decimals, a true minus sign, and no minus before zero."""
-    if value is None or not isfinite(value):
-        return NOTHING
-    text = f"{abs(value):.{decimals}f}"
-    if value < 0 and any(digit in text for digit in "123456789"):
-        text = _MINUS + text
-    return text.replace(".", decimal_mark)
+def like_its_sd(value, sd, marks=ENGLISH):
+    """`value` down to two digits of its standard deviation; four digits when it has none."""
+    if not sd:
+        return with_digits(value, 4, marks)
+    found = written(value, sd, marks, least=0, written_out=WITHOUT_U)
+    return found.value + found.power
 
 
-def significant(value, digits, decimal_mark="."):
-    """`value` with that many significant digits; powers of ten outside 1e-4 .. 1e6."""
-    if value is None or not isfinite(value):
-        return NOTHING
-    if value == 0:
-        return "0"
-    exponent = floor(log10(abs(float(f"{value:.{digits - 1}e}"))))
-    if -4 <= exponent < 6:
-        return fixed(value, max(digits - 1 - exponent, 0), decimal_mark)
-    mantissa = fixed(value / 10.0**exponent, digits - 1, decimal_mark)
-    return f"{mantissa}·10{_superscript(exponent)}"
+def concise(value, sd, marks=ENGLISH):
+    """A value with two digits of its standard deviation in brackets: "4.3816(13)".
+
+    Without a standard deviation seven digits and no bracket.
+    """
+    if not sd:
+        return with_digits(value, 7, marks)
+    return written(value, sd, marks, least=0, written_out=_SHORT).concise
 
 
-def _superscript(exponent):
-    return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+def powers(unit):
+    """A unit with powers as it is printed: "mm-2" is "mm⁻²"."""
+    return superscript(unit)

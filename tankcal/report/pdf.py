@@ -11,38 +11,57 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from tankcal.errors import TankcalError
+from tankcal.report import attachments
+from tankcal.report.blocks import WEB_ONLY
 from tankcal.shipped import shipped
 
 STANDARDS = ["a-3a", "ua-1"]  # archival, and readable by a screen reader
+UNSETTLED = "did not converge"  # in typst's warning that places are not those it set last
 FONT_FILES = ("STIXGeneral*.ttf", "DejaVuSerif*.ttf", "DejaVuSans.ttf")
 
 
-def pdf(blocks):
-    """The blocks as the bytes of a PDF; the same blocks give the same bytes.
+def pdf(blocks, folder="."):
+    """The blocks as the bytes of a PDF; the same blocks and attachments give the same bytes.
 
-    Raises TankcalError when the page cannot be set: a character that no font has, a broken SVG.
+    folder   where the files lie that the document blocks attach
+
+    Raises TankcalError when the page cannot be set (a character that no font has, a broken SVG),
+    or a file to be attached is not the one that it was.
     """
+    blocks = [block for block in blocks if block["kind"] not in WEB_ONLY]
+    attached = attachments.contents(blocks, folder)
     files, blocks = _pictures_as_files(blocks)
+    files |= {f"attached-{name}": content for name, content in attached.items()}
     files["main.typ"] = (shipped("report_templates") / "page.typ").read_bytes()
     files["blocks.json"] = json.dumps(blocks, ensure_ascii=False).encode("utf-8")
     return _compile(files, _timestamp(blocks[0]["date"]))
 
 
 def _compile(files, timestamp):
-    """Set the page; the machine's own fonts are asked only for signs that the shipped ones lack."""
+    """Set the page; the machine's own fonts are asked only for signs that the shipped ones lack.
+
+    Where tables and figures find no places that they all agree to, none is asked for its place.
+    """
     import typst
 
-    def compiled(ignore_system_fonts):
-        return typst.compile(
-            files,
+    def compiled(ignore_system_fonts, places="asked"):
+        found, warnings = typst.compile_with_warnings(
+            Path(folder) / "main.typ",
+            root=folder,
             font_paths=[folder],
             ignore_system_fonts=ignore_system_fonts,
+            sys_inputs={"places": places},
             pdf_standards=STANDARDS,
             timestamp=timestamp,
         )
+        if places == "asked" and any(UNSETTLED in warning.message for warning in warnings):
+            return compiled(ignore_system_fonts, places="no")
+        return found
 
-    with TemporaryDirectory(prefix="tankcal-fonts-") as folder:
+    with TemporaryDirectory(prefix="tankcal-page-") as folder:
         _copy_fonts(folder)
+        for name, content in files.items():
+            (Path(folder) / name).write_bytes(content)
         try:
             try:
                 return compiled(ignore_system_fonts=True)
@@ -68,6 +87,8 @@ def _pictures_as_files(blocks):
     """Pictures go into files of their own; a block then names its file."""
     files, changed = {}, []
     for number, block in enumerate(blocks):
+        if block["kind"] == "document":
+            block = block | {"letterhead": _letterhead_with_file(block.get("letterhead"), files)}
         kind = next((kind for kind in ("svg", "png") if kind in block), None)
         if kind == "svg":
             name = f"figure-{number}.svg"
@@ -79,6 +100,17 @@ def _pictures_as_files(blocks):
             block = {key: value for key, value in block.items() if key != kind} | {"file": name}
         changed.append(block)
     return files, changed
+
+
+def _letterhead_with_file(letterhead, files):
+    """The letterhead with the name of its logo's file, which is added to `files`."""
+    logo = letterhead and letterhead["logo"]
+    if not logo:
+        return letterhead
+    name, content = f"logo.{logo['kind']}", logo["content"]
+    is_svg = logo["kind"] == "svg"
+    files[name] = content.encode("utf-8") if is_svg else base64.b64decode(content)
+    return letterhead | {"logo": {"file": name, "alt": logo["alt"]}}
 
 
 def _timestamp(date):

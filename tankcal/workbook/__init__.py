@@ -4,61 +4,74 @@ No number is computed here. What stands in a cell is the record's value, at most
 (mm for m, litres per centimetre for m2), and a formula carries the record's value as its result.
 """
 
-from tankcal.words import load_words
+from tankcal.words import in_language, language_of, load_words
 from tankcal.workbook.book import Book
-from tankcal.workbook.capacity import capacity_sheet, charts_sheet
+from tankcal.workbook.calculator import calculator_sheets, factor_sheet
+from tankcal.workbook.cameras import cameras_sheet
+from tankcal.workbook.capacity import capacity_sheet
 from tankcal.workbook.certificate import certificate_sheet
-from tankcal.workbook.dip import dip_sheet
-from tankcal.workbook.papers import (
-    budget_sheet,
-    corrections_sheet,
-    courses_sheet,
-    provenance_sheet,
-)
+from tankcal.workbook.charts import charts_sheets
+from tankcal.workbook.millimetres import millimetres_sheet
+from tankcal.workbook.observations import observations_sheet
+from tankcal.workbook.papers import corrections_sheet, courses_sheet, provenance_sheet
 from tankcal.workbook.parts import densities_sheet, inside_sheet, proportional_parts_sheet
 from tankcal.workbook.points import points_sheet
-from tankcal.workbook.survey import adjustment_sheet, cameras_sheet, observations_sheet
+from tankcal.workbook.rule import rule_sheet
+from tankcal.workbook.survey import adjustment_sheet
+from tankcal.workbook.uncertainty import budget_sheet, deliveries_sheet, monte_carlo_sheet
 
 
-def write(record, path):
+def write(record, path, language=None):
     """Write the workbook of `record` (record.json as parsed) to `path`; same record, same bytes.
+
+    language  of the words; None: that of the job
 
     Raises TankcalError when no words are shipped in the language of the job, OSError when the file
     cannot be written.
     """
-    words = load_words((record["job"]["table"] or {}).get("language") or "en")
-    with Book(path, record) as book:
+    words = load_words(language or language_of(record))
+    record = in_language(words, record)
+    with Book(path, record, words) as book:
         if record["capacity"]:
-            _sheets_of_tank(book, record, words)
+            _sheets_of_tank(book, record)
         else:
-            _sheets_of_survey(book, record, words)
+            _sheets_of_survey(book, record)
 
 
-def _sheets_of_tank(book, record, words):
-    certificate_sheet(book, record, words)
+def _sheets_of_tank(book, record):
+    certificate_sheet(book, record)
     rows = capacity_sheet(book, record)
     proportional_parts_sheet(book, record)
     densities_sheet(book, record)
-    dip_sheet(book, record)
-    inside_sheet(book, record, words)
+    millimetres_sheet(book, record)
+    calculator_sheets(book, record)
+    factor_sheet(book, record)
     if record["courses"]:
-        courses_sheet(book, record, words)
-    corrections_sheet(book, record, words)
-    if record["points"]:
-        points_sheet(book, record, words)
+        courses_sheet(book, record)
+    corrections_sheet(book, record)
+    inside_sheet(book, record)
+    budget_sheet(book, record)
+    if record.get("budgets"):
+        deliveries_sheet(book, record)
+    if record.get("monte_carlo"):
+        monte_carlo_sheet(book, record)
+    if record.get("rule"):
+        rule_sheet(book, record)
     if record["adjustment"]:
-        adjustment_sheet(book, record, words)
-        observations_sheet(book, record, words)
-        cameras_sheet(book, record, words)
-    budget_sheet(book, record, words)
-    provenance_sheet(book, record, words)
-    charts_sheet(book, rows)
+        adjustment_sheet(book, record)
+    if record["points"]:
+        points_sheet(book, record)
+    if record["adjustment"]:
+        observations_sheet(book, record)
+        cameras_sheet(book, record)
+    provenance_sheet(book, record)
+    charts_sheets(book, record, rows)
 
 
-def _sheets_of_survey(book, record, words):
+def _sheets_of_survey(book, record):
     """A survey that was only adjusted: no table, nothing that follows from one."""
-    adjustment_sheet(book, record, words)
-    points_sheet(book, record, words)
-    observations_sheet(book, record, words)
-    cameras_sheet(book, record, words)
-    provenance_sheet(book, record, words)
+    adjustment_sheet(book, record)
+    points_sheet(book, record)
+    observations_sheet(book, record)
+    cameras_sheet(book, record)
+    provenance_sheet(book, record)

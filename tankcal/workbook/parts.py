@@ -1,34 +1,36 @@
 """Sheets beside the capacity table: proportional parts, other densities, what is in the tank."""
 
-from tankcal.uncertainty import LITRE_DECIMALS, decimals_for, height_decimals, row_decimals
-from tankcal.workbook.book import Column
+from tankcal.digits import LITRE_DECIMALS, decimals_of_rows, shortest, with_digits
+from tankcal.report.numbers import unit
+from tankcal.report.paper import DECIMALS_OF_PARTS, Paper
+from tankcal.report.uncertainty.stated import stated_U_m3
+from tankcal.words import marks_of
+from tankcal.workbook.look import Column, height_digits, number_format, values_of
+from tankcal.workbook.tables import set_widths
 
 _HEAD_ROW = 3
+_WIDTHS = (50, 16, 16, 16, 16)
 
 
 def proportional_parts_sheet(book, record):
     """What 1 to 9 mm add to the row below a dip, course by course; no sheet for other tables."""
     parts = record["proportional_parts"]
-    if not parts["zones"]:
-        return
-    largest = 1000 * parts["largest_m3"]
-    sheet = book.sheet(
-        "Proportional parts",
-        "Proportional parts",
-        f"in litres; largest error against the exact capacity {largest:.2g} L",
-        landscape=True,
-    )
     zones = parts["zones"]
-    heights = [[height_decimals(zone[key]) for zone in zones] for key in ("bottom_m", "top_m")]
+    if not zones:
+        return
+    largest = with_digits(1000 * parts["largest_m3"], 2, marks_of(book.words))
+    subtitle = book.word("texts.parts_subtitle", largest=largest)
+    sheet = book.sheet("proportional_parts", subtitle, landscape=True, tab="result")
     columns = [
-        Column("From (m)", [zone["bottom_m"] for zone in zones], heights[0], 10),
-        Column("To (m)", [zone["top_m"] for zone in zones], heights[1], 10),
+        book.column(code, values_of(zones, key), height_digits(values_of(zones, key)), 10)
+        for code, key in (("from_m", "bottom_m"), ("to_m", "top_m"))
     ]
     for place in range(parts["parts"] - 1):
         litres = [1000 * zone["part_m3"][place] for zone in zones]
-        columns.append(Column(f"{place + 1} mm (L)", litres, 1, 11))
-    book.widths(sheet, *(column.width for column in columns))
+        columns.append(book.column("part_l", litres, 1, 11, millimetres=place + 1))
+    set_widths(book, sheet, columns)
     book.table(sheet, _HEAD_ROW, "proportional_parts", columns)
+    book.freeze(sheet, _HEAD_ROW)
 
 
 def densities_sheet(book, record):
@@ -38,67 +40,90 @@ def densities_sheet(book, record):
         return
     capacity = record["capacity"]
     own = record["job"]["table"]["liquid_density_kg_m3"]
-    sheet = book.sheet(
-        "Other densities",
-        "Capacity by density of the liquid",
-        "volumes in m³; U is that of the sheet Capacity",
-    )
-    digits = row_decimals(capacity["U_m3"], LITRE_DECIMALS)
+    name = book.sheet_name("capacity")
+    subtitle = book.word("texts.densities_subtitle", capacity=name)
+    sheet = book.sheet("other_densities", subtitle, tab="result")
+    digits = decimals_of_rows(stated_U_m3(capacity), least=LITRE_DECIMALS)
     heights = capacity["height_m"]
     tables = [(own, capacity["volume_m3"])]
     tables += [(other["density_kg_m3"], other["volume_m3"]) for other in others]
-    columns = [Column("Dip height (m)", heights, [height_decimals(h) for h in heights], 13)]
-    columns += [Column(f"{density:g} kg/m³", volumes, digits, 16) for density, volumes in tables]
-    book.widths(sheet, *(column.width for column in columns))
-    book.table(sheet, _HEAD_ROW, "other_densities", columns)
-    sheet.freeze_panes(_HEAD_ROW + 1, 0)
-    sheet.repeat_rows(_HEAD_ROW)
+    columns = [book.column("dip_height_m", heights, height_digits(heights), 13)]
+    for density, volumes in tables:
+        heading = f"{shortest(density, marks_of(book.words))} kg/m³"
+        columns.append(Column(heading, volumes, digits, 16))
+    named = range(2, len(columns))
+    muted = [row for row, good in enumerate(capacity["for_use"]) if not good]
+    if muted:
+        columns.append(use_column(book, capacity))
+    set_widths(book, sheet, columns)
+    last = book.table(sheet, _HEAD_ROW, "other_densities", columns, muted=muted)
+    book.freeze(sheet, _HEAD_ROW)
+    for place in named:
+        book.name(name_of_density(place), sheet, _HEAD_ROW + 1, last, place)
 
 
-def inside_sheet(book, record, words):
-    """Dimensions, bottom, deadwood and roof, as far as the tank has them."""
-    described = [
-        (words["headings"]["dimensions"], record["solid"]),
-        (words["corrections"]["bottom"], record["bottom"]),
-        (words["corrections"]["roof"], record["roof"]),
-    ]
-    items = record["deadwood"]
-    if not items and not any(lines for _, lines in described):
-        return
-    sheet = book.sheet("Parts of the tank", "Parts of the tank")
-    book.widths(sheet, 50, 16, 16, 16, 16)
+def use_column(book, capacity):
+    """The column that says which rows are not for use."""
+    refused = book.words["texts"]["not_for_use"]
+    return book.column("use", ["" if good else refused for good in capacity["for_use"]], None, 14)
+
+
+def name_of_density(place):
+    """The named range of the volumes of a density of the sheet, from 2 on: 1 is the table's own."""
+    return f"volume_of_density_{place}"
+
+
+def inside_sheet(book, record):
+    """Dimensions of a solid; bottom, deadwood and roof, or that none was declared."""
+    paper, corrections = Paper(record, book.words), book.words["corrections"]
+    sheet = book.sheet("inside")
+    book.widths(sheet, *_WIDTHS)
     row = _HEAD_ROW
-    for title, lines in described:
-        if lines:
-            book.heading(sheet, row, title, 5)
-            row = _lines(book, sheet, row, lines, words) + 2
-    if items:
-        book.heading(sheet, row, words["corrections"]["deadwood"], 5)
-        book.table(sheet, row + 1, "deadwood", _deadwood(items))
+    if record["solid"]:
+        row = _described(book, sheet, row, book.words["headings"]["dimensions"], record["solid"])
+    for code in ("deadwood", "bottom", "roof"):
+        said, declared = paper.choices(code), record[code]
+        if not (said or declared):
+            continue
+        title = corrections[code]
+        if declared and code != "deadwood":
+            row = _described(book, sheet, row, title, declared) - 1
+        else:
+            book.heading(sheet, row, title, len(_WIDTHS))
+            row += 1
+        for text in said:
+            book.paragraph(sheet, row, text, _WIDTHS)
+            row += 1
+        if declared and code == "deadwood":
+            row = book.table(sheet, row + 1, "deadwood", _deadwood(book, declared)) + 1
+        row += 1
 
 
-def _lines(book, sheet, row, lines, words):
+def _described(book, sheet, row, title, lines):
+    """A heading, and a line for each {code, value, unit} of the record; returns the next row."""
+    words = book.words
+    book.heading(sheet, row, title, len(_WIDTHS))
     for line in lines:
         row += 1
-        unit, value = line["unit"], line["value"]
+        value = line["value"]
         book.put(sheet, row, 0, words["labels"].get(line["code"], line["code"]))
-        if unit is None:
-            value = words["parts"].get(value, value)
-        shown = "0.######" if unit is not None else None
-        factor = 1000 if unit in ("mm", "mm/m") else 1
-        value = value * factor if unit is not None else value
-        book.put(sheet, row, 1, value, **({"num_format": shown} if shown else {}))
-        book.put(sheet, row, 2, (unit or "").replace("m3", "m³"), indent=1)
-    return row
+        if line["unit"] is None:
+            book.put(sheet, row, 1, words["parts"].get(value, value))
+            continue
+        shown, decimals = unit(line["unit"]), DECIMALS_OF_PARTS.get(line["unit"], 0)
+        look = {"num_format": number_format(decimals)}
+        book.put(sheet, row, 1, shown.factor * value, **look)
+        book.put(sheet, row, 2, shown.symbol, indent=1)
+    return row + 2
 
 
-def _deadwood(items):
-    u = [item["u_m3"] for item in items]
-    digits = [decimals_for(one) if one else LITRE_DECIMALS + 1 for one in u]
+def _deadwood(book, items):
+    u = values_of(items, "u_m3")
+    digits = decimals_of_rows(u, unknown=LITRE_DECIMALS + 1)
     return [
-        Column("Item", [item["name"] for item in items], None, 34),
-        Column("Bottom (m)", [item["bottom_m"] for item in items], 3, 12),
-        Column("Top (m)", [item["top_m"] for item in items], 3, 12),
-        Column("Volume (m³)", [item["volume_m3"] for item in items], digits, 14),
-        Column("u (m³)", u, digits, 12),
+        book.column("item", values_of(items, "name"), None, _WIDTHS[0]),
+        book.column("bottom_m", values_of(items, "bottom_m"), 3),
+        book.column("top_m", values_of(items, "top_m"), 3),
+        book.column("volume_m3", values_of(items, "volume_m3"), digits, 14),
+        book.column("u_m3", u, digits),
     ]

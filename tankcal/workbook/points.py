@@ -1,14 +1,11 @@
 """The sheet of the points: where they are, how well they are known, why some were not used."""
 
+from tankcal.digits import decimals_of_rows
 from tankcal.words import sentence
-from tankcal.workbook.book import Column, in_mm
+from tankcal.workbook.look import in_mm, sd_digits, values_of
+from tankcal.workbook.tables import set_widths
 
 _HEAD_ROW = 3
-
-
-def _of(rows, key):
-    """The values of one key, row by row."""
-    return [row[key] for row in rows]
 
 
 def _or_empty(value):
@@ -16,42 +13,37 @@ def _or_empty(value):
     return "" if value is None else value
 
 
-def points_sheet(book, record, words):
+def points_sheet(book, record):
     """Every surveyed point with its residual, and why it was rejected when it was.
 
     Of an adjusted survey with sds and error ellipsoids; without a tank with nothing else.
     """
     rows = record["points"]
     of_tank = record["capacity"] is not None
-    columns = [
-        Column("Point", _of(rows, "point"), None, 12),
-        Column("x (m)", _of(rows, "x_m"), 4, 14),
-        Column("y (m)", _of(rows, "y_m"), 4, 14),
-        Column("z (m)", _of(rows, "z_m"), 4, 12),
-        *_adjusted(record),
-    ]
-    title, subtitle = "Adjusted points", f"{len(rows)} points; error ellipsoid of 95 %"
+    code = "points" if of_tank else "adjusted_points"
+    used = sum(row["used"] for row in rows) if of_tank else 0
+    subtitle = book.word(f"texts.{code}_subtitle", count=len(rows), used=used)
+    sheet = book.sheet(code, subtitle, landscape=True)
+    columns = [book.column("point", values_of(rows, "point"), None, 12)]
     if of_tank:
-        course, section, *others = _of_wall(record, words)
-        columns = [columns[0], course, section, *columns[1:], *others]
-        used = sum(row["used"] for row in rows)
-        title = "Points and residuals"
-        subtitle = (
-            f"{len(rows)} points surveyed, {used} accepted; residual from the circle of the "
-            "section (or the wall of a solid), outwards positive"
-        )
-    sheet = book.sheet(title, title, subtitle, landscape=True)
-    book.widths(sheet, *(column.width for column in columns))
+        columns.append(book.column("course", values_of(rows, "course"), None, 9))
+        columns.append(book.column("section", values_of(rows, "section"), None, 10))
+    for axis, sds in zip("xyz", _sds_m(rows), strict=True):
+        digits = decimals_of_rows(sds, most=6, unknown=4)
+        columns.append(book.column("of_m", values_of(rows, f"{axis}_m"), digits, 11, axis=axis))
+    if of_tank:
+        columns += _about_wall(book, record)
+    columns += _adjusted(book, record)
+    set_widths(book, sheet, columns)
     muted = [index for index, row in enumerate(rows) if of_tank and not row["used"]]
     if rows:
         book.table(sheet, _HEAD_ROW, "points", columns, muted=muted, autofilter=True)
-    sheet.freeze_panes(_HEAD_ROW + 1, 1)
-    sheet.repeat_rows(_HEAD_ROW)
+    book.freeze(sheet, _HEAD_ROW, 1)
 
 
-def _of_wall(record, words):
-    """Columns of what a tank says of its points: course, section, residual, why not used."""
-    rows = record["points"]
+def _about_wall(book, record):
+    """Columns of what a tank says of its points: residual, whether used, and why not."""
+    rows, words = record["points"], book.words
     rejected = {row["point"]: row for row in record["rejected"]}
     of_rejected = [rejected.get(row["point"], {}) for row in rows]
     residual = [
@@ -59,39 +51,43 @@ def _of_wall(record, words):
         for row, out in zip(rows, of_rejected, strict=True)
     ]
     reason = [
-        sentence(words, "reasons", out["reason"])
-        if "reason" in out
-        else sentence(words, "reasons", "not_wall")
-        if not row["used"]
-        else ""
+        "" if row["used"] else sentence(words, "reasons", out.get("reason", "not_wall"))
         for row, out in zip(rows, of_rejected, strict=True)
     ]
     return [
-        Column("Course", _of(rows, "course"), None, 9),
-        Column("Section", _of(rows, "section"), None, 10),
-        Column("Residual (mm)", [in_mm(value) for value in residual], 1, 12),
-        Column("Used", _of(rows, "used"), None, 8),
-        Column("Reason", reason, None, 48),
-        Column("w", [_or_empty(out.get("w")) for out in of_rejected], 1, 8),
-        Column("Row in the file", [_or_empty(out.get("row")) for out in of_rejected], 0, 10),
+        book.column("residual_mm", [in_mm(value) for value in residual], 1, 10),
+        book.column("used", values_of(rows, "used"), None, 8),
+        book.column("reason", reason, None, 40),
+        book.column("w", [_or_empty(out.get("w")) for out in of_rejected], 1, 8),
+        book.column("row_in_file", [_or_empty(out.get("row")) for out in of_rejected], 0, 9),
     ]
 
 
-def _adjusted(record):
+def _adjusted(book, record):
     """Columns of adjusted points: what each is, its sds and error ellipsoid; else none."""
     if not record["adjustment"]:
         return []
     known = {row["point"]: row for row in record["adjustment"]["points"]}
     rows = [known.get(row["point"], {}) for row in record["points"]]
-    variance = [row["cov_m2"] for row in record["points"]]
+    kinds = book.words["plan"]
     columns = [
-        Column("Kind", [row.get("kind", "") for row in rows], None, 10),
-        Column("Rays", [row.get("rays") for row in rows], 0, 7),
+        book.column(
+            "kind", [kinds.get(row.get("kind"), row.get("kind", "")) for row in rows], None, 15
+        ),
+        book.column("rays", [row.get("rays") for row in rows], 0, 7),
     ]
-    for i, axis in enumerate("xyz"):
-        sds = [None if one is None else 1000 * max(one[i][i], 0.0) ** 0.5 for one in variance]
-        columns.append(Column(f"sd {axis} (mm)", sds, 2, 9))
+    for axis, sds in zip("xyz", _sds_m(record["points"]), strict=True):
+        in_small = [in_mm(sd) for sd in sds]
+        columns.append(book.column("sd_of_mm", in_small, sd_digits(in_small), 9, axis=axis))
     for i, axis in enumerate("abc"):
         axes = [in_mm(row["ellipsoid_m"][i]) if row else None for row in rows]
-        columns.append(Column(f"Ellipsoid {axis} (mm)", axes, 2, 11))
+        columns.append(book.column("ellipsoid_mm", axes, sd_digits(axes), 11, axis=axis))
     return columns
+
+
+def _sds_m(rows):
+    """Standard deviations of x, of y and of z, a list each; None where a point has none."""
+    variances = [row["cov_m2"] for row in rows]
+    return [
+        [None if one is None else max(one[i][i], 0.0) ** 0.5 for one in variances] for i in range(3)
+    ]

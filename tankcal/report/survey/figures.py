@@ -51,7 +51,7 @@ def plan(paper):
     origin = np.floor(xy.min(axis=0) / 1000) * 1000 if np.abs(xy).max() > 1e5 else np.zeros(2)
     factor = plan_factor(paper)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 5.6))
+        figure = Figure(figsize=(WIDTH, 4.6))
         ax = figure.subplots()
         _lines(ax, adjustment, places, origin)
         many = {"rasterized": len(points) > MANY}
@@ -85,7 +85,7 @@ def _ellipses(ax, points, xy, factor):
 
 def _axis(paper, axis, origin):
     text = paper.word(f"axes.{axis}")
-    return f"{text} − {origin:.0f} m" if origin else text
+    return f"{text} − {paper.number(origin, 'm', decimals=0)}" if origin else text
 
 
 def _lines(ax, adjustment, places, origin):

@@ -1,11 +1,12 @@
 """Single readings: those set aside, those that fit worst, those that nothing controls."""
 
+from tankcal.digits import fixed, with_digits
 from tankcal.report import numbers
 from tankcal.report.paper import Column
 from tankcal.report.survey.common import LARGE_UNITS, MOST_ROWS, SMALL_UNITS, with_note
 from tankcal.words import observation_name
 
-WORST = 16  # rows of a table that stays on its page
+WORST = 16  # rows of a table of the worst readings
 WEAK = 0.1  # redundancy number below which a blunder has to be 13 sds to be found
 _DECIMALS = {"mm": 1, "m": 2, "rad": 1}  # of residuals in um, mm and arc seconds
 
@@ -52,7 +53,7 @@ def table(paper, name, rows, columns=("residual", "w"), **values):
 def _reading(paper, row):
     unit, number = row["unit"], paper.number
     between = " – ".join(map(str, row["ids"]))
-    element = paper.words["elements"].get(row["element"], row["element"])
+    element = _element(paper, row["element"])
     small = numbers.unit(SMALL_UNITS.get(unit, ""))
     shown = {key: _in_small(paper, row[key], unit, small) for key in ("residual", "mdb")}
     return row | {
@@ -68,12 +69,18 @@ def _reading(paper, row):
     }
 
 
+def _element(paper, code):
+    """The name of what was observed of it: an angle, or the scale of an instrument."""
+    words = paper.words
+    return words["elements"].get(code) or words["instrument_parts"].get(code, code)
+
+
 def _in_small(paper, value, unit, small):
     if value is None:
         return None
     if unit not in _DECIMALS:
-        return numbers.significant(value, 2, paper.mark)
-    return numbers.fixed(value * small.factor, _DECIMALS[unit], paper.mark)
+        return with_digits(value, 2, paper.marks)
+    return fixed(value * small.factor, _DECIMALS[unit], paper.marks)
 
 
 def removed(paper):

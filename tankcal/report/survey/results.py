@@ -1,14 +1,20 @@
 """What was found: points, check points, cameras, photographs, instruments, systems."""
 
-from math import floor, log10
-
+from tankcal.digits import NOTHING, fixed
 from tankcal.report import blocks, numbers
-from tankcal.report.numbers import NOTHING
 from tankcal.report.paper import Column
 from tankcal.report.survey.common import MOST_CAMERAS, MOST_ROWS, with_note
+from tankcal.report.survey.images import images
 from tankcal.words import listed
 
 STEEP_DEG = 80.0  # of phi: beyond, omega and kappa are hardly told apart
+_ANGLES = ("omega", "phi", "kappa")
+_DECIMALS = {  # without an sd, and at most
+    "m": (4, 6),
+    "mm": (2, 3),
+    "deg": (4, 7),
+    "deg arcsec": (1, 3),
+}
 
 
 def precision(paper):
@@ -65,15 +71,21 @@ def points(paper):
         [
             Column("point"),
             *([Column("rays", decimals=0)] if paper.record["adjustment"]["photos"] else []),
-            *(Column(f"{axis}_m", "m", decimals=4) for axis in "xyz"),
-            *(Column(f"s{axis}_m", "mm", decimals=2) for axis in "xyz"),
-            *(Column(f"e{i}_m", "mm", decimals=1) for i in (1, 2, 3)),
+            *(_to_its_sd(f"{axis}_m", "m", f"s{axis}_m") for axis in "xyz"),
+            *(_to_its_sd(f"s{axis}_m", "mm", f"s{axis}_m") for axis in "xyz"),
+            *(_to_its_sd(f"e{i}_m", "mm", f"e{i}_m") for i in (1, 2, 3)),
         ],
         probability=paper.percent(paper.record["adjustment"]["precision"]["ellipse_probability"])
         if paper.record["adjustment"]["precision"]
         else "",
     )
     return with_note(paper, block, shown, rows)
+
+
+def _to_its_sd(key, unit, sd):
+    """A column of values, or of sds, to two digits of the sd."""
+    decimals, most = _DECIMALS[unit]
+    return Column(key, unit, u=sd, decimals=decimals, most=most)
 
 
 def check_points(paper):
@@ -83,7 +95,7 @@ def check_points(paper):
         return []
     facts = paper.facts(
         [
-            ("check_count", str(len(found["points"]))),
+            ("check_count", number(len(found["points"]), decimals=0)),
             ("r_xyz", number(found["r_xyz_m"], "mm", digits=3)),
             ("largest_difference", number(found["largest_m"], "mm", digits=3)),
             ("mean_difference", number(found["mean_m"], "mm", digits=3)),
@@ -96,9 +108,9 @@ def check_points(paper):
         shown,
         [
             Column("point"),
-            *(Column(f"d{axis}_m", "mm", decimals=2) for axis in "xyz"),
+            *(_to_its_sd(f"d{axis}_m", "mm", f"s{axis}_m") for axis in "xyz"),
             Column("size_m", "mm", decimals=2),
-            *(Column(f"s{axis}_m", "mm", decimals=2) for axis in "xyz"),
+            *(_to_its_sd(f"s{axis}_m", "mm", f"s{axis}_m") for axis in "xyz"),
             Column("largest_w", decimals=1),
         ],
     )
@@ -130,12 +142,9 @@ def _camera(paper, camera):
         for i in range(len(camera["parameters"]))
     ]
     for row in rows:
-        of_value = {"digits": 4}
-        if row["sd"]:
-            of_value = _like_its_sd(row["value"], row["sd"])
-        row["value"] = paper.number(row["value"], **of_value)
+        row["value"] = numbers.like_its_sd(row["value"], row["sd"], paper.marks)
         row["sd"] = paper.number(row["sd"], digits=2) if row["sd"] else None
-        row["unit"] = _power(row["unit"]) or None
+        row["unit"] = numbers.powers(row["unit"]) or None
     corner = paper.word(
         "texts.edge" if camera["edge_known"] else "texts.edge_seen",
         x=paper.number(camera["edge_mm"][0], decimals=1),
@@ -168,7 +177,7 @@ def _correlations(paper, camera):
     rows = [
         [known.get(name, name)]
         + [
-            numbers.fixed(camera["correlation"][i][k], 2, paper.mark) if k <= i else ""
+            fixed(camera["correlation"][i][k], 2, paper.marks) if k <= i else ""
             for k in range(len(names))
         ]
         for i, name in enumerate(names)
@@ -179,7 +188,7 @@ def _correlations(paper, camera):
 
 
 def photos(paper):
-    """Positions and angles of the photos with their sds, cut to those that fit worst."""
+    """Positions, angles, sds and readings of the photos, cut to those that fit worst."""
     rows = shown = paper.record["adjustment"]["photos"]
     if not rows:
         return []
@@ -191,8 +200,8 @@ def photos(paper):
         [
             Column("photo"),
             Column("camera"),
-            *(Column(f"{axis}_m", "m", decimals=4) for axis in "xyz"),
-            *(Column(f"s{axis}_m", "mm", decimals=1) for axis in "xyz"),
+            *(_to_its_sd(f"{axis}_m", "m", f"s{axis}_m") for axis in "xyz"),
+            *(_to_its_sd(f"s{axis}_m", "mm", f"s{axis}_m") for axis in "xyz"),
             Column("points", decimals=0),
             Column("rms_mm", "image um", decimals=1),
         ],
@@ -202,14 +211,14 @@ def photos(paper):
         shown,
         [
             Column("photo"),
-            *(Column(f"{a}_deg", "deg", decimals=4) for a in ("omega", "phi", "kappa")),
-            *(Column(f"s_{a}_deg", "deg arcsec", decimals=1) for a in ("omega", "phi", "kappa")),
+            *(_to_its_sd(f"{a}_deg", "deg", f"s_{a}_deg") for a in _ANGLES),
+            *(_to_its_sd(f"s_{a}_deg", "deg arcsec", f"s_{a}_deg") for a in _ANGLES),
         ],
     )
     found = [*with_note(paper, places, shown, rows), angles]
     if any(abs(row["phi_deg"]) > STEEP_DEG for row in shown):
         found.append(paper.paragraph("steep_photos"))
-    return found
+    return found + images(paper)
 
 
 def instruments(paper):
@@ -246,10 +255,10 @@ def instruments(paper):
                 Column("kind"),
                 Column("certificate"),
                 Column("what", words="instrument_parts"),
-                Column("declared", decimals=2),
-                Column("declared_sd", decimals=2, nothing="∞"),
-                Column("value", decimals=2, heading="estimated"),
-                Column("sd", decimals=2),
+                Column("declared", u="declared_sd", decimals=2),
+                Column("declared_sd", u="declared_sd", decimals=2, nothing="∞"),
+                Column("value", u="sd", decimals=2, heading="estimated"),
+                Column("sd", u="sd", decimals=2),
                 Column("unit"),
             ],
         )
@@ -263,20 +272,8 @@ def systems(paper):
     columns = [
         Column("system"),
         *(Column(f"{axis}_m", "m", decimals=4) for axis in "xyz"),
-        *(Column(f"{a}_deg", "deg", decimals=5) for a in ("omega", "phi", "kappa")),
-        Column("scale_ppm", "ppm", decimals=1, heading="scale"),
-        Column("scale_sd_ppm", "ppm", decimals=1, heading="sd"),
+        *(Column(f"{a}_deg", "deg", decimals=5) for a in _ANGLES),
+        Column("scale_ppm", "ppm", u="scale_sd_ppm", decimals=1, heading="scale"),
+        Column("scale_sd_ppm", "ppm", u="scale_sd_ppm", decimals=1, heading="sd"),
     ]
     return [paper.table("systems", paper.record["adjustment"]["systems"], columns)]
-
-
-def _like_its_sd(value, sd):
-    """How many digits show a value down to two digits of its sd."""
-    if not value:
-        return {"digits": 2}
-    places = floor(log10(abs(value))) - floor(log10(sd)) + 2
-    return {"digits": max(places, 2)}
-
-
-def _power(unit):
-    return unit.replace("-", "\N{SUPERSCRIPT MINUS}").translate(str.maketrans("1234568", "¹²³⁴⁵⁶⁸"))

@@ -1,8 +1,8 @@
 """How well everything fits: statistics, datum, groups of observations."""
 
 from tankcal import words
-from tankcal.report import blocks
-from tankcal.report.numbers import NOTHING
+from tankcal.digits import NOTHING
+from tankcal.report import blocks, numbers
 from tankcal.report.paper import Column
 from tankcal.report.survey.common import MOST_ROWS, SMALL_UNITS
 
@@ -12,11 +12,11 @@ def facts(paper):
     a = paper.record["adjustment"]
     return paper.facts(
         [
-            ("adjusted_points", str(len(a["points"]))),
-            ("observations", str(a["observations"])),
-            ("unknowns", str(a["unknowns"])),
-            ("redundancy", str(a["redundancy"])),
-            ("iterations", str(a["iterations"])),
+            ("adjusted_points", paper.number(len(a["points"]), decimals=0)),
+            *(
+                (key, paper.number(a[key], decimals=0))
+                for key in ("observations", "unknowns", "redundancy", "iterations")
+            ),
             ("snooping", words.snooping_sentence(paper.words, a)),
             ("sigma0", paper.number(a["sigma0"], decimals=3) or NOTHING),
             ("global_test", words.global_test_sentence(paper.words, a)),
@@ -78,7 +78,8 @@ def _group(paper, row):
     smallest, largest = row["sd_smallest"], row["sd_largest"]
     declared = _small(paper, smallest, row["unit"])
     if smallest is not None and largest > smallest * (1 + 1e-9):
-        low = declared.split("\N{NO-BREAK SPACE}")[0]
+        unit = numbers.unit(SMALL_UNITS.get(row["unit"], ""))
+        low = paper.number(smallest * unit.factor, digits=2)
         declared = f"{low}–{_small(paper, largest, row['unit'])}"
     return row | {
         "group": words.group_name(paper.words, row),

@@ -1,55 +1,41 @@
-"""Blocks as HTML: inside Jupyter, and as one offline page without any script."""
+"""Each kind of block as HTML; every text of a block is escaped."""
 
 import base64
 from html import escape
 
-from tankcal.shipped import shipped
-
-_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
-
-
-def page(blocks):
-    """The blocks as one HTML page that asks the network for nothing; the style is page.css."""
-    first = blocks[0]
-    style = (shipped("report_templates") / "page.css").read_text(encoding="utf-8")
-    return "\n".join(
-        [
-            "<!DOCTYPE html>",
-            f'<html lang="{escape(first["language"])}">',
-            "<head>",
-            '<meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{escape(first['title'])}</title>",
-            f"<style>\n{style}</style>",
-            "</head>",
-            "<body>",
-            "<main>",
-            *(block_html(block) for block in blocks),
-            "</main>",
-            "</body>",
-            "</html>",
-            "",
-        ]
-    )
+from tankcal.report.web.tables import caption_of, table_html
 
 
 def block_html(block):
-    """One block as HTML; every text of the block is escaped."""
+    """One block as HTML, as Jupyter shows it."""
     return _WRITERS[block["kind"]](block)
 
 
 def _document(block):
     running = "".join(f"<span>{escape(text)}</span>" for text in block["running"])
     notice = _notice({"text": block["notice"]}) if block["notice"] else ""
-    return f'<header class="running">{running}</header>{notice}'
+    head = _letterhead(block["letterhead"]) if block.get("letterhead") else ""
+    return f'<header class="running">{running}</header>{head}{notice}'
+
+
+def _letterhead(letterhead):
+    """Logo, name and address of the laboratory; a logo is only ever a picture."""
+    logo = letterhead["logo"]
+    picture = ""
+    if logo:
+        picture = (
+            f'<img alt="{escape(logo["alt"])}" src="{_data_url(logo["kind"], logo["content"])}">'
+        )
+    address = "".join(f"<br>{escape(line)}" for line in letterhead["address"])
+    name = escape(letterhead["name"])
+    return f'<div class="letterhead">{picture}<p><strong>{name}</strong>{address}</p></div>'
 
 
 def _masthead(block):
     lines = (
         [f'<p class="laboratory">{escape(block["laboratory"])}</p>'] if block["laboratory"] else []
     )
-    lines.append(f"<h1>{escape(block['title'])}</h1>")
+    lines.append(f"<h1{id_of(block)}>{escape(block['title'])}</h1>")
     lines.append(f'<p class="subtitle">{escape(block["subtitle"])}</p>')
     if block["number_label"]:
         number = escape(block["number"]) or '<span class="blank"></span>'
@@ -57,9 +43,14 @@ def _masthead(block):
     return f'<div class="masthead">{"".join(lines)}</div>'
 
 
+def id_of(block):
+    """The attribute by which the page's contents find a heading."""
+    return f' id="{block["id"]}"' if "id" in block else ""
+
+
 def _heading(block):
     level = block["level"] + 1
-    return f"<h{level}>{escape(block['text'])}</h{level}>"
+    return f"<h{level}{id_of(block)}>{escape(block['text'])}</h{level}>"
 
 
 def _list(block):
@@ -88,71 +79,26 @@ def _key_values(block):
         f'<tr><th scope="row">{escape(name)}</th><td>{escape(value)}</td></tr>'
         for name, value in block["items"]
     )
-    return f'<table class="key-values">{_caption(block)}<tbody>{rows}</tbody></table>'
-
-
-def _table(block):
-    heads = "".join(
-        f'<th scope="col" class="{align}">{escape(column["heading"])}'
-        + (f'<br><span class="unit">{escape(column["unit"])}</span>' if column["unit"] else "")
-        + "</th>"
-        for column, align in zip(block["columns"], block["align"], strict=True)
-    )
-    columns = [
-        _cells(column, align)
-        for column, align in zip(zip(*block["rows"], strict=True), block["align"], strict=False)
-    ]
-    rows = "".join(f"<tr>{''.join(cells)}</tr>" for cells in zip(*columns, strict=True))
-    table = (
-        f'<table class="lines">{_caption(block)}<thead><tr>{heads}</tr></thead>'
-        f"<tbody>{rows}</tbody></table>"
-    )
-    return (
-        f'<div class="long" tabindex="0">{table}</div>'
-        if block["kind"] == "columns_table"
-        else table
-    )
-
-
-def _cells(texts, align):
-    """The cells of one column; under "decimal", filled up so that the decimal marks line up."""
-    fills = decimal_fills(texts) if align == "decimal" else [""] * len(texts)
-    return [
-        f'<td class="{align}">{escape(text)}{fill}</td>'
-        for text, fill in zip(texts, fills, strict=True)
-    ]
-
-
-def decimal_fills(texts):
-    """For each number what is missing behind it, as spaces as wide as a digit and as a mark."""
-    tails = [len(text) - 1 - max(text.rfind("."), text.rfind(",")) for text in texts]
-    tails = [
-        tail if "." in text or "," in text else -1 for tail, text in zip(tails, texts, strict=True)
-    ]
-    longest = max(tails, default=-1)
-    return [
-        ("\N{PUNCTUATION SPACE}" if tail < 0 <= longest else "")
-        + "\N{FIGURE SPACE}" * (longest - max(tail, 0))
-        for tail in tails
-    ]
+    return f'<table class="key-values">{caption_of(block)}<tbody>{rows}</tbody></table>'
 
 
 def _figure(block):
     kind = "svg" if "svg" in block else "png"
-    mime = {"svg": "image/svg+xml", "png": "image/png"}[kind]
-    content = block[kind]
-    if kind == "svg":
-        content = base64.b64encode(content.encode("utf-8")).decode("ascii")
-    width = f"{100 * block['width']:.0f}%"
     caption = f"<figcaption>{escape(block['caption'])}</figcaption>" if block["caption"] else ""
     return (
-        f'<figure><img style="width:{width}" alt="{escape(block["alt"])}" '
-        f'src="data:{mime};base64,{content}">{caption}</figure>'
+        f'<figure><img class="{kind}" width="{100 * block["width"]:.0f}%" '
+        f'alt="{escape(block["alt"])}" src="{_data_url(kind, block[kind])}">{caption}</figure>'
     )
 
 
-def _caption(block):
-    return f"<caption>{escape(block['caption'])}</caption>" if block["caption"] else ""
+def _data_url(kind, content):
+    """A picture, the text of an SVG or a PNG in base64, as an address that holds it whole."""
+    if kind == "svg":
+        content = base64.b64encode(content.encode("utf-8")).decode("ascii")
+    return f"data:{_MIME[kind]};base64,{escape(content)}"
+
+
+_MIME = {"svg": "image/svg+xml", "png": "image/png"}
 
 
 def _markdown(block):
@@ -168,7 +114,7 @@ def _node(node):
     if kind in _SPANS:
         return f"<{_SPANS[kind]}>{inner}</{_SPANS[kind]}>"
     if kind == "heading":
-        return f"<h{node['level'] + 1}>{inner}</h{node['level'] + 1}>"
+        return f"<h{node['level'] + 1}{id_of(node)}>{inner}</h{node['level'] + 1}>"
     if kind == "list":
         tag = "ol" if node["ordered"] else "ul"
         return f"<{tag}>{inner}</{tag}>"
@@ -204,11 +150,15 @@ def _markdown_table(node):
     )
 
 
+def _paragraph(block):
+    return f"<p>{escape(block['text'])}</p>"
+
+
 _WRITERS = {
     "document": _document,
     "masthead": _masthead,
     "heading": _heading,
-    "paragraph": lambda block: f"<p>{escape(block['text'])}</p>",
+    "paragraph": _paragraph,
     "list": _list,
     "notice": _notice,
     "result": _result,
@@ -216,8 +166,10 @@ _WRITERS = {
     "end": lambda block: f'<p class="end">{escape(block["text"])}</p>',
     "code": lambda block: f"<pre>{escape(block['text'])}</pre>",
     "key_values": _key_values,
-    "table": _table,
-    "columns_table": _table,
+    "table": table_html,
+    "columns_table": table_html,
     "figure": _figure,
     "markdown": _markdown,
+    "calculator": _paragraph,
+    "tank_view": _paragraph,
 }

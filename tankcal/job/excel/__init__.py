@@ -1,0 +1,14 @@
+"""Workbooks (.xlsx) that may come from anywhere: refused or read, in bounded time and memory."""
+
+from tankcal.job.excel.archive import MAX_FILE_BYTES, Unreadable
+from tankcal.job.excel.reading import Sheet, read_sheets
+from tankcal.job.excel.worksheet import MAX_COLUMNS, column_letters
+
+__all__ = [
+    "MAX_COLUMNS",
+    "MAX_FILE_BYTES",
+    "Sheet",
+    "Unreadable",
+    "column_letters",
+    "read_sheets",
+]

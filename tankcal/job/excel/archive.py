@@ -1,0 +1,144 @@
+"""The archive that a workbook is: looked at from the outside before any of it is parsed.
+
+Refused are passwords, macros, links to other files, embedded files, entity declarations, and
+archives that unpack to far more than they are or than a job needs.
+"""
+
+import io
+import re
+import zipfile
+
+MAX_FILE_BYTES = 50_000_000
+MAX_UNPACKED_BYTES = 100_000_000
+MAX_MEMBERS = 5000
+MAX_RATIO, RATIO_FROM_BYTES = 300, 10_000_000
+MAX_TAGS = 2_500_000  # start and end tags of all parts: four for a cell with a value
+CHUNK_BYTES = 1_000_000
+
+_BLANK_CELL = re.compile(rb"<c r=[^<>]*(?:/>|></c>)")
+_BLANK_ROW = re.compile(rb"<row r=[^<>]*(?:/>|>\s*</row>)")
+_OLE = b"\xd0\xcf\x11\xe0"
+_NOT_A_WORKBOOK = "not an Excel workbook (.xlsx)"
+_SAVE_AGAIN = "open it in Excel or LibreOffice and save it as .xlsx"
+_DAMAGED = "damaged: open it in Excel or LibreOffice and save it again"
+_HUGE = (
+    "delete the empty rows and columns that are formatted below and beside the data, or hand in a"
+    " folder with CSV files"
+)
+# beginnings of names of parts, in small letters, and what a file with such a part is
+_REFUSED_PARTS = {
+    "xl/vbaproject": "holds macros; save it as .xlsx (a workbook without macros)",
+    "xl/macrosheets/": "holds macros; save it as .xlsx (a workbook without macros)",
+    "xl/externallinks/": "holds links to other workbooks; put values in place of those formulas"
+    " (in Excel: Data, Edit Links, Break Link) and save it again",
+    "xl/connections": "holds connections to data elsewhere; remove them and save it again",
+    "xl/querytables/": "holds connections to data elsewhere; remove them and save it again",
+    "xl/embeddings/": "holds embedded files; remove them and save it again",
+    "xl/activex/": "holds controls (ActiveX); remove them and save it again",
+    "xl/workbook.bin": f"a binary workbook (.xlsb); {_SAVE_AGAIN}",
+}
+
+
+class Unreadable(Exception):
+    """The workbook cannot be read; the text says why, and how to mend it."""
+
+
+def damaged():
+    """Unreadable of a workbook that is not whole."""
+    return Unreadable(_DAMAGED)
+
+
+def open_archive(data):
+    """ZipFile of the bytes of a workbook. Raises Unreadable."""
+    if data.startswith(_OLE):
+        raise Unreadable(
+            "an old .xls or a workbook with a password; save it as .xlsx without password"
+        )
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(data))
+        _refuse_directory(archive.infolist(), len(data))
+        _refuse_kind(archive)
+        _refuse_content(archive)
+    except Unreadable:
+        raise
+    except Exception:  # zipfile and zlib raise whatever a damaged part happens to trip over
+        raise Unreadable(f"{_NOT_A_WORKBOOK}, or damaged") from None
+    return archive
+
+
+def chunks(archive, member):
+    """The bytes of a part, piece by piece; never more than its directory says."""
+    with archive.open(member) as stream:
+        while chunk := stream.read(CHUNK_BYTES):
+            yield chunk
+
+
+def without_blanks(chunk):
+    """The XML without cells that only carry a format, and rows of nothing else.
+
+    A sheet formatted down to its last row holds millions of them.
+    """
+    return _BLANK_ROW.sub(b"", _BLANK_CELL.sub(b"", chunk))
+
+
+def _refuse_directory(members, packed_bytes):
+    unpacked = sum(member.file_size for member in members)
+    if len(members) > MAX_MEMBERS:
+        raise Unreadable(f"{len(members)} parts inside, expected at most {MAX_MEMBERS}")
+    if unpacked > MAX_UNPACKED_BYTES:
+        raise Unreadable(
+            f"unpacks to {unpacked / 1e6:.0f} MB, expected at most {MAX_UNPACKED_BYTES / 1e6:.0f}"
+            f" MB: {_HUGE}"
+        )
+    if unpacked > RATIO_FROM_BYTES and unpacked > MAX_RATIO * packed_bytes:
+        raise Unreadable(
+            f"unpacks to more than {MAX_RATIO} times its size, which no workbook of a job does"
+        )
+    usual = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+    if any(member.flag_bits & 1 or member.compress_type not in usual for member in members):
+        raise Unreadable(f"packed in an unusual way; {_SAVE_AGAIN}")
+    if len({member.filename for member in members}) < len(members):
+        raise Unreadable(f"holds the same part twice; {_SAVE_AGAIN}")
+
+
+def _refuse_kind(archive):
+    names = archive.namelist()
+    if "mimetype" in names and b"opendocument" in archive.read("mimetype")[:100]:
+        raise Unreadable(f"an OpenDocument file (.ods); {_SAVE_AGAIN}")
+    for name in names:
+        for beginning, reason in _REFUSED_PARTS.items():
+            if name.lower().startswith(beginning):
+                raise Unreadable(reason)
+    if "xl/workbook.xml" not in names:
+        raise Unreadable(_NOT_A_WORKBOOK)
+
+
+def _refuse_content(archive):
+    tags = 0
+    for member in archive.infolist():
+        if not member.filename.lower().endswith((".xml", ".rels", ".vml")):
+            continue
+        before = b""
+        for chunk in chunks(archive, member):
+            if not before and _is_disguised(chunk):
+                raise _foreign_declarations()
+            joined = before[-16:] + chunk
+            if b"<!DOCTYPE" in joined or b"<!ENTITY" in joined or b"\0" in chunk:
+                raise _foreign_declarations()
+            if len(chunk) == CHUNK_BYTES and b">" not in chunk:
+                raise Unreadable(f"holds a text of more than a million characters; {_SAVE_AGAIN}")
+            tags += without_blanks(chunk).count(b"<")
+            if tags > MAX_TAGS:
+                raise Unreadable(f"holds more cells than a job needs: {_HUGE}")
+            before = chunk
+
+
+def _foreign_declarations():
+    return Unreadable("holds XML declarations that no workbook needs (DOCTYPE, ENTITY, encoding)")
+
+
+def _is_disguised(start):
+    """Is the XML in an encoding in which a DOCTYPE would not be seen?"""
+    encoding = re.match(rb"\s*(?:\xef\xbb\xbf)?<\?xml[^>]*?encoding\s*=\s*[\"']([^\"']*)", start)
+    usual = (b"utf-8", b"us-ascii", b"ascii", b"iso-8859-1", b"windows-1252")
+    return encoding is not None and encoding[1].lower() not in usual

@@ -1,0 +1,147 @@
+"""The cells of one sheet of a workbook."""
+
+import re
+from dataclasses import dataclass, field
+from functools import cache
+
+from tankcal.job.excel.archive import Unreadable, damaged
+from tankcal.job.excel.markup import parse
+from tankcal.job.excel.values import uncalculated
+from tankcal.job.tables import shown
+
+MAX_COLUMNS = 100
+MAX_ROWS = 100_000  # that are not blank
+LAST_ROW = 1_048_576  # of Excel itself
+_RANGE = re.compile(r"([A-Z]{1,3})([0-9]{1,7})(?::([A-Z]{1,3})([0-9]{1,7}))?")
+_TRUE = ("1", "true")
+
+
+@dataclass(frozen=True)
+class Grid:
+    """What a sheet holds.
+
+    rows            (row, values) of each row that is not blank, at most one column more than
+                    MAX_COLUMNS
+    merged          (first row, last row, first column, last column) of each merged range
+    hidden_rows     numbers of the rows that do not show
+    hidden_columns  (first, last) of ranges of columns that do not show
+    """
+
+    rows: list
+    merged: list
+    hidden_rows: frozenset
+    hidden_columns: list
+
+
+def read_grid(archive, member, values, title):
+    """Grid of a sheet; values: `tankcal.job.excel.values.Values`. Raises Unreadable."""
+    reader = _Cells(values, title)
+    starts = {
+        "row": reader.row,
+        "c": reader.cell,
+        "f": reader.formula,
+        "col": reader.columns,
+        "mergeCell": reader.merge,
+    }
+    ends = {"v": reader.value, "t": reader.inline_text, "c": reader.end_of_cell}
+    parse(archive, member, starts, ends)
+    rows = [(number, reader.rows[number]) for number in sorted(reader.rows)]
+    return Grid(rows, reader.merged, frozenset(reader.hidden_rows), reader.hidden_columns)
+
+
+@dataclass
+class _Cells:
+    """Handlers of the elements of a sheet, and what they have gathered."""
+
+    values: object
+    title: str
+    rows: dict = field(default_factory=dict)
+    merged: list = field(default_factory=list)
+    hidden_rows: set = field(default_factory=set)
+    hidden_columns: list = field(default_factory=list)
+    row_number: int = 0
+    column: int = 0
+    attributes: dict = field(default_factory=dict)
+    content: str | None = None
+    has_formula: bool = False
+
+    def row(self, attributes):
+        given = attributes.get("r")
+        self.row_number = self.row_number + 1 if given is None else int(given)
+        if not 0 < self.row_number <= LAST_ROW:
+            raise damaged()
+        self.column = 0
+        if attributes.get("hidden") in _TRUE:
+            self.hidden_rows.add(self.row_number)
+
+    def cell(self, attributes):
+        place = attributes.get("r")
+        self.column = self.column + 1 if place is None else _column(place.rstrip("0123456789"))
+        self.attributes, self.content, self.has_formula = attributes, None, False
+
+    def formula(self, _attributes):
+        self.has_formula = True
+
+    def value(self, text):
+        self.content = text
+
+    def inline_text(self, text):
+        self.content = (self.content or "") + text
+
+    def end_of_cell(self, _text):
+        is_text = self.attributes.get("t") == "str"  # an empty text may be a result
+        if self.has_formula and not self.content and not (is_text and self.content == ""):
+            self._keep(uncalculated())
+            return
+        if self.content is None:
+            return
+        value = self.values.of(self.attributes, self.content)
+        if value is not None:
+            self._keep(value)
+
+    def _keep(self, value):
+        row = self.rows.get(self.row_number)
+        if row is None:
+            if len(self.rows) == MAX_ROWS:
+                raise Unreadable(
+                    f"more than {MAX_ROWS} rows in sheet {shown(self.title)}; hand in a folder with"
+                    " CSV files"
+                )
+            row = self.rows[self.row_number] = []
+        place = min(self.column, MAX_COLUMNS + 1)
+        row.extend([None] * (place - len(row)))
+        row[place - 1] = value
+
+    def columns(self, attributes):
+        if attributes.get("hidden") in _TRUE:
+            self.hidden_columns.append((int(attributes["min"]), int(attributes["max"])))
+
+    def merge(self, attributes):
+        match = _RANGE.fullmatch(attributes.get("ref", ""))
+        if match is None:
+            raise damaged()
+        left, top, right, bottom = match.groups()
+        right, bottom = right or left, bottom or top
+        self.merged.append((int(top), int(bottom), _column(left), _column(right)))
+
+
+@cache
+def _column(letters):
+    """Number of a column by its letters: 1 for A."""
+    number = 0
+    for letter in letters:
+        if not "A" <= letter <= "Z":
+            raise damaged()
+        number = 26 * number + ord(letter) - 64
+    if not 0 < number <= 16_384:
+        raise damaged()
+    return number
+
+
+def column_letters(number):
+    """Letters of a column: A for 1."""
+    letters = ""
+    while number:
+        number, rest = divmod(number - 1, 26)
+        letters = chr(65 + rest) + letters
+    return letters

@@ -1,0 +1,77 @@
+"""Texts that know what they say: a code and values, so that paper says it in any language.
+
+The English stands where a text is made; the other languages stand in their words, by the code.
+"""
+
+import string
+
+
+class Message(str):
+    """An English text that `message` made.
+
+    code    its name in the words of the other languages
+    values  {name: number, text, Message or list of these}, as its template asks for them
+    """
+
+    code: str
+    values: dict
+
+
+def message(code, template, **values):
+    """The Message of an English template, "known to {sd_mm:.1f} mm", and its values."""
+    text = Message(filled(template, values))
+    text.code, text.values = code, values
+    return text
+
+
+def listed(names, most):
+    """Names as they stand in a sentence: all of them, or the first and how many more."""
+    names = [one if isinstance(one, str) else str(one) for one in names]
+    if len(names) <= most:
+        return names
+    more = len(names) - most
+    return message("and_more", "{names} and {more} more", names=names[:most], more=more)
+
+
+def joined(parts):
+    """Parts in a row with "and" before the last; one alone is itself."""
+    *first, last = parts
+    return message("and", "{first} and {last}", first=first, last=last) if first else last
+
+
+def filled(template, values, number=format, said=str):
+    """A template with its values; those of a list stand in a row.
+
+    number  number(value, spec) -> how a number is written
+    said    said(value) -> the text of a Message, or of one from a record
+    """
+    return _Filler(number, said).vformat(template, (), values)
+
+
+def fields_of(template):
+    """Names of the values that a template uses."""
+    return {name for _, name, _, _ in string.Formatter().parse(template) if name is not None}
+
+
+def as_plain(text):
+    """{code, values} of a Message for the record, {code: null, values: {}} of any other text."""
+    values = {name: _plain(value) for name, value in getattr(text, "values", {}).items()}
+    return {"code": getattr(text, "code", None), "values": values}
+
+
+def _plain(value):
+    if isinstance(value, Message):
+        return {**as_plain(value), "text": str(value)}
+    return [_plain(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+class _Filler(string.Formatter):
+    def __init__(self, number, said):
+        self._number, self._said = number, said
+
+    def format_field(self, value, spec):
+        if isinstance(value, list | tuple):
+            return ", ".join(self.format_field(one, spec) for one in value)
+        if isinstance(value, Message | dict):
+            return self._said(value)
+        return value if isinstance(value, str) else self._number(value, spec)

@@ -1,0 +1,100 @@
+"""What a certificate says beside its results: ISO/IEC 17025:2017, 7.8.2.1 and 7.8.4.1.
+
+Printed when given, never invented: what is not given is a line to write on, or named as missing.
+"""
+
+from tankcal.report import blocks
+from tankcal.report.survey import statistics
+
+TO_WRITE_ON = ""
+_ELSEWHERE = ("number", "notice", "authorised_by", "authorised_role")
+_PARTIES = (
+    *("laboratory", "laboratory_address", "accreditation_number"),
+    *("customer", "customer_address", "customer_contact", "place", "date_of_issue", "replaces"),
+)
+_WRITTEN_BY_HAND = ("laboratory", "laboratory_address", "customer", "customer_address", "place")
+_CALIBRATION = (
+    *("method", "procedure", "deviations", "operator", "equipment", "instruments"),
+    *("traceability", "conditions", "condition_of_tank", "external_results", "customer_data"),
+)
+_ASKED_FOR = ("method", "traceability", "conditions", "condition_of_tank")
+
+
+def parties(paper):
+    """Who issues the certificate, for whom, where and when; then what a job adds of its own."""
+    certificate = paper.record["job"]["certificate"]
+    given = certificate | {
+        "place": certificate.get("place") or paper.record["job"]["tank"]["details"].get("location"),
+        "date_of_issue": paper.day(certificate.get("date_of_issue")),
+    }
+    keys = [key for key in _PARTIES if not _in_the_head(paper, key, certificate)]
+    own = [key for key in certificate if key not in (*_PARTIES, *_CALIBRATION, *_ELSEWHERE)]
+    return _facts(paper, given, [*keys, *own], (*_WRITTEN_BY_HAND, "date_of_issue"))
+
+
+def _in_the_head(paper, key, certificate):
+    """Whether the head of the first page says it: the laboratory, the letterhead's address."""
+    if key == "laboratory":
+        return bool(certificate.get(key) or paper.letterhead)
+    return key == "laboratory_address" and paper.letterhead and not certificate.get(key)
+
+
+def calibration(paper):
+    """How, in which conditions and with what the tank was measured."""
+    record, job = paper.record, paper.record["job"]
+    survey = job["survey"]
+    given = job["certificate"] | {"instruments": _instruments(paper)}
+    measured = [
+        ("survey_method", statistics.method(paper) if record["adjustment"] else None),
+        ("survey_side", paper.word(f"sides.{survey['side']}")),
+        ("shell_temperature", paper.number(survey["shell_temperature_c"], "degC", digits=3)),
+        ("liquid_level", paper.number(survey["liquid_level_m"], "m", decimals=3)),
+        ("liquid_density", paper.number(survey["liquid_density_kg_m3"], "kg/m3", digits=4)),
+    ]
+    declared = [(key, given[key]) for key in _CALIBRATION if given.get(key)]
+    return paper.facts([("survey_date", paper.day(survey["date"])), *declared, *measured])
+
+
+def _instruments(paper):
+    """The instruments of the adjusted survey with their certificates, or None."""
+    adjustment = paper.record["adjustment"]
+    return "; ".join(
+        paper.word(
+            "certificate.instrument",
+            name=one["instrument"],
+            certificate=one["details"].get("certificate")
+            or paper.word("certificate.no_certificate"),
+        )
+        for one in (adjustment["instruments"] if adjustment else ())
+    )
+
+
+def statements(paper):
+    """What the results relate to, copies, and what is asked for and was not given."""
+    certificate = paper.record["job"]["certificate"]
+    missing = [paper.label(key) for key in _ASKED_FOR if not certificate.get(key)]
+    said = [paper.word("certificate.only_items"), paper.word("texts.copy")]
+    if missing:
+        said.append(paper.word("certificate.not_given", missing=", ".join(missing)))
+    return blocks.listing(said)
+
+
+def authorisation(paper):
+    """Lines to sign on; the name of who authorises stands below its line when it was given."""
+    certificate = paper.record["job"]["certificate"]
+    name, role = (certificate.get(key) for key in ("authorised_by", "authorised_role"))
+    person = paper.label("authorised_by")
+    if name:
+        person = paper.word("certificate.authorised", name=name, role=role) if role else name
+    return blocks.signature([paper.label("place_and_date"), person, paper.label("signature")])
+
+
+def _facts(paper, given, keys, to_write_on):
+    """Names and values; one that is not given is a line to write on when it is of those."""
+    return blocks.key_values(
+        [
+            (paper.label(key), given.get(key) or TO_WRITE_ON)
+            for key in keys
+            if given.get(key) or key in to_write_on
+        ]
+    )

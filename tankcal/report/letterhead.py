@@ -1,0 +1,192 @@
+"""The laboratory's letterhead: name, address, logo and colours, from one TOML file.
+
+Checked when it is read; the papers take it from the document block of the executed notebook.
+"""
+
+import base64
+import json
+import re
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from tankcal.errors import InputError, Problem
+from tankcal.job.entries import read_section
+from tankcal.job.fields import Field
+from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
+from tankcal.job.tables import Log, nearest, read_bytes
+from tankcal.report import LETTERHEAD
+from tankcal.report.logo import logo_problem
+
+LEAST_CONTRAST = 4.5  # of text on white paper: WCAG 2.2, 1.4.3
+_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
+_LABORATORY = (
+    Field("name", "text", "name of the laboratory", required=True),
+    Field("address", "names", "lines of its address, and whatever stands below it"),
+    Field("logo", "text", "file of the logo beside this one, .svg or .png"),
+    Field("logo_text", "text", "what the logo shows, for who cannot see it"),
+)
+_COLOURS = (
+    Field("ink", "text", "of titles, headings and thick rules, such as #1a2b3c", start="#1a2b3c"),
+    Field("line", "text", "of thin rules, such as #9aa5b1", start="#9aa5b1"),
+)
+_SECTIONS = {"laboratory": _LABORATORY, "colours": _COLOURS}
+
+
+@dataclass(frozen=True)
+class Logo:
+    """A logo that was checked: kind "svg" or "png", its text or base64, and what it shows."""
+
+    kind: str
+    content: str
+    alt: str
+
+
+@dataclass(frozen=True)
+class Letterhead:
+    """Name, lines of the address, Logo or None, and {"ink", "line"} as #rrggbb."""
+
+    name: str
+    address: tuple[str, ...]
+    logo: Logo | None
+    colours: dict
+
+    def data(self):
+        """The letterhead as plain data: what a document block holds."""
+        return asdict(self) | {"address": list(self.address)}
+
+    def save(self, directory):
+        """Write it, logo and all, beside the notebook that names it; give the file's name."""
+        text = json.dumps(self.data(), ensure_ascii=False, indent=1)
+        (Path(directory) / LETTERHEAD).write_text(text + "\n", encoding="utf-8")
+        return LETTERHEAD
+
+
+def load(path):
+    """The Letterhead of a TOML file; raises InputError with every problem of it."""
+    path, log = Path(path), Log()
+    data = read_bytes(path, log, MAX_SETTINGS_BYTES)
+    letterhead = None if data is None else _parsed(path, data, log)
+    log.stop_if_problems()
+    return letterhead
+
+
+def _parsed(path, data, log):
+    settings, rows = read_toml(path.name, data, log)
+    if settings is None:
+        return None
+    for section in settings:
+        if section not in _SECTIONS and (section or settings[section]):
+            expected = f"unknown section; expected [laboratory] or [colours]{_hint(section)}"
+            log.problem(path.name, expected, rows.get(section), f"[{section}]")
+    found = {
+        name: read_section(path.name, name, fields, settings.get(name, {}), rows.get(name), log)
+        for name, fields in _SECTIONS.items()
+    }
+    told = settings.get("colours", {})
+    colours = {
+        field.name: _colour(path.name, field, found["colours"], told, log) for field in _COLOURS
+    }
+    laboratory = found["laboratory"]
+    logo = _logo(path, laboratory, settings.get("laboratory", {}), log)
+    if log.problems:
+        return None
+    return Letterhead(laboratory["name"], laboratory["address"] or (), logo, colours)
+
+
+def _hint(section):
+    return nearest(section, _SECTIONS)
+
+
+def _colour(file, field, values, given, log):
+    colour = values[field.name] or field.start
+    problem = colour_problem(field.name, colour)
+    if problem:
+        log.problem(file, problem, given[field.name].row, f"colours.{field.name}")
+    return colour.lower()
+
+
+def colour_problem(name, colour):
+    """What is wrong with a colour, or None: no #rrggbb, or, of text, too light for white paper."""
+    if not isinstance(colour, str) or not _COLOUR.fullmatch(colour):
+        return f"found {colour!r}; expected a colour such as #1a2b3c"
+    if name == "ink" and contrast_with_white(colour) < LEAST_CONTRAST:
+        return (
+            f"{colour} is too light for text: its contrast with white paper is "
+            f"{contrast_with_white(colour):.1f}, expected at least {LEAST_CONTRAST}"
+        )
+    return None
+
+
+def contrast_with_white(colour):
+    """Contrast of a colour #rrggbb with white, 1 to 21 (WCAG 2.2, relative luminance)."""
+    shares = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for s in shares]
+    weights = (0.2126, 0.7152, 0.0722)
+    return 1.05 / (sum(w * s for w, s in zip(weights, linear, strict=True)) + 0.05)
+
+
+def _logo(path, laboratory, given, log):
+    name = laboratory["logo"]
+    if name is None:
+        return None
+    row = given["logo"].row
+    kind = Path(name).suffix.lower().removeprefix(".")
+    if kind not in ("svg", "png") or Path(name).name != name:
+        expected = f"found {name!r}; expected the name of an .svg or .png file beside this one"
+        log.problem(path.name, expected, row, "laboratory.logo")
+        return None
+    if not (path.parent / name).is_file():
+        expected = f"no file {name!r} beside this one; expected the logo"
+        log.problem(path.name, expected, row, "laboratory.logo")
+        return None
+    data = read_bytes(path.parent / name, log)
+    problem = None if data is None else logo_problem(kind, data)
+    if problem:
+        log.problem(name, problem)
+    if data is None or problem:
+        return None
+    content = data.decode("utf-8-sig") if kind == "svg" else base64.b64encode(data).decode("ascii")
+    return Logo(kind, content, laboratory["logo_text"] or laboratory["name"])
+
+
+def read_saved(path):
+    """The data of a letterhead that `Letterhead.save` wrote; raises InputError for any other."""
+    name = Path(path).name
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(Problem(name, f"cannot be read as a letterhead: {error}")) from error
+    problem = data_problem(data)
+    if problem:
+        raise InputError(Problem(name, problem))
+    return data
+
+
+def data_problem(data):
+    """What is wrong with the data of a letterhead, of a file or of a notebook; None: nothing."""
+    shape = {"name": str, "address": list, "logo": dict | None, "colours": dict}
+    if not _has_shape(data, shape) or not all(isinstance(one, str) for one in data["address"]):
+        return f"is no letterhead: expected {', '.join(shape)}"
+    if set(data["colours"]) != {field.name for field in _COLOURS}:
+        return f"expected the colours {', '.join(field.name for field in _COLOURS)}"
+    problems = [colour_problem(*item) for item in data["colours"].items()]
+    return next(filter(None, [*problems, _logo_problem(data["logo"])]), None)
+
+
+def _logo_problem(logo):
+    if logo is None:
+        return None
+    if not _has_shape(logo, dict.fromkeys(("kind", "content", "alt"), str)):
+        return "its logo is none: expected kind, content, alt"
+    if logo["kind"] == "svg":
+        return logo_problem("svg", logo["content"].encode("utf-8"))
+    try:
+        return logo_problem("png", base64.b64decode(logo["content"], validate=True))
+    except ValueError:
+        return "its logo is no base64"
+
+
+def _has_shape(data, shape):
+    if not isinstance(data, dict) or set(data) != set(shape):
+        return False
+    return all(isinstance(data[key], kind) for key, kind in shape.items())

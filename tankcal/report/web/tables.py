@@ -1,0 +1,96 @@
+"""Tables as HTML; on the page a long one comes in pieces, with a field to find its rows."""
+
+from html import escape
+
+PIECE = 66  # rows: one column of a printed page
+SHORT = 20  # rows of a table that is printed on one page
+
+
+def table_html(block):
+    """A table; a long narrow one in a frame that scrolls."""
+    table = _table(block, _rows(block), caption_of(block))
+    if block["kind"] == "columns_table":
+        return f'<div class="long" tabindex="0">{table}</div>'
+    return table
+
+
+def framed_table(block):
+    """A table in a frame, so that on a narrow page the table scrolls and not the page."""
+    short = " short" if len(block["rows"]) <= SHORT else ""
+    return f'<div class="frame{short}">{table_html(block)}</div>'
+
+
+def searchable_table(block, number, words):
+    """A long narrow table in pieces of PIECE rows, which a browser lays out when they are seen.
+
+    number  of the table on the page
+    """
+    rows = [row.replace('<td class="decimal">', "<td>") for row in _rows(block)]
+    pieces = "".join(
+        f'<div class="piece">{_table(block, rows[start : start + PIECE], "")}</div>'
+        for start in range(0, len(rows), PIECE)
+    )
+    caption = f'<p class="caption" id="caption-{number}">{escape(block["caption"])}</p>'
+    field = (
+        f'<p class="finder" hidden><label for="find-{number}">{escape(words["find"])}</label> '
+        f'<input type="search" id="find-{number}" inputmode="decimal" autocomplete="off" '
+        f'placeholder="{escape(_first_cell(block))}"> '
+        f'<output for="find-{number}" aria-live="polite"></output></p>'
+    )
+    return (
+        f'<div class="searchable">{caption}{field}'
+        f'<div class="pieces" role="region" tabindex="0" aria-labelledby="caption-{number}">'
+        f"{pieces}</div></div>"
+    )
+
+
+def caption_of(block):
+    """The caption of a table, where it has one."""
+    return f"<caption>{escape(block['caption'])}</caption>" if block["caption"] else ""
+
+
+def decimal_fills(texts, mark="."):
+    """For each number what is missing behind it, as spaces as wide as a digit and as a mark."""
+    tails = [len(text) - 1 - text.rfind(mark) if mark in text else -1 for text in texts]
+    longest = max(tails, default=-1)
+    return [
+        ("\N{PUNCTUATION SPACE}" if tail < 0 <= longest else "")
+        + "\N{FIGURE SPACE}" * (longest - max(tail, 0))
+        for tail in tails
+    ]
+
+
+def _table(block, rows, caption):
+    heads = "".join(
+        f'<th scope="col" class="{align}">{escape(column["heading"])}'
+        + (f'<br><span class="unit">{escape(column["unit"])}</span>' if column["unit"] else "")
+        + "</th>"
+        for column, align in zip(block["columns"], block["align"], strict=True)
+    )
+    return (
+        f'<table class="lines">{caption}<thead><tr>{heads}</tr></thead>'
+        f"<tbody>{''.join(rows)}</tbody></table>"
+    )
+
+
+def _rows(block):
+    """The rows as HTML, for their numbers line up over the whole table."""
+    columns = [
+        _cells(column, align, block["decimal_mark"])
+        for column, align in zip(zip(*block["rows"], strict=True), block["align"], strict=False)
+    ]
+    return [f"<tr>{''.join(cells)}</tr>" for cells in zip(*columns, strict=True)]
+
+
+def _cells(texts, align, mark):
+    """The cells of one column; under "decimal", filled up so that the decimal marks line up."""
+    fills = decimal_fills(texts, mark) if align == "decimal" else [""] * len(texts)
+    return [
+        f'<td class="{align}">{escape(text)}{fill}</td>'
+        for text, fill in zip(texts, fills, strict=True)
+    ]
+
+
+def _first_cell(block):
+    """An example of what can be typed: the first cell of the middle row."""
+    return block["rows"][len(block["rows"]) // 2][0] if block["rows"] else ""

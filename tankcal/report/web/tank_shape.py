@@ -1,0 +1,156 @@
+"""What the three-dimensional view of the page needs of a record: the form of the tank.
+
+A shell of courses is drawn by the outlines of its sections, a lying cylinder or a sphere by its
+dimensions. The record of a mesh has no faces: no view, and the page says so.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from tankcal.report.blocks import Block
+from tankcal.report.figures import round_factor
+from tankcal.report.web.packing import packed
+
+MOST_POINTS = 4000  # that are drawn
+TENTH_MM = 1e4  # per metre: outlines are whole tenths of a millimetre
+_LARGEST = 0.1  # of the radius: how large the largest deviation is drawn at first
+_STEPS = 48  # along a curved end
+
+
+def tank_view(paper):
+    """The block of the view: of a shell its deviations, else the nominal form or the reason."""
+    record = paper.record
+    kind = record["job"]["tank"]["kind"]
+    found = {"shell": None, "solid": None, "reason": ""}
+    if record["sections"]:
+        found["shell"] = shell_of(record)
+    elif kind in _PROFILES and record["solid"]:
+        found["solid"] = _PROFILES[kind]({one["code"]: one["value"] for one in record["solid"]})
+    else:
+        found["reason"] = paper.word("web.no_view")
+    return Block({"kind": "tank_view", "text": paper.word("web.view_here"), **found})
+
+
+def shell_of(record):
+    """A shell: outlines about their circles, rings that make its wall, points, first factor."""
+    sections, shell = record["sections"], record["shell"]
+    bottom_z_m = record["job"]["datum"]["bottom_z_m"]
+    form_m = [np.array(s["outline"]["radius_m"]) - s["radius_m"] for s in sections]
+    largest = max(float(np.max(np.abs(one))) for one in form_m)
+    radius_m = float(np.mean([s["radius_m"] for s in sections]))
+    exaggeration = round_factor(_LARGEST * radius_m / largest) if largest else 1
+    return {
+        "radius_m": radius_m,
+        "zero_m": record["capacity"]["zero_m"],
+        "steps": len(form_m[0]),
+        "form": packed(np.round(TENTH_MM * np.array(form_m)), "<i2"),
+        "rings": _rings(record["courses"], sections, shell, bottom_z_m, radius_m),
+        "exaggeration": exaggeration,
+        "points": _points(record, bottom_z_m),
+    }
+
+
+def _rings(courses, sections, shell, bottom_z_m, radius_m):
+    """A list a course of [height, section, shift x, y and of the radius from an upright cylinder].
+
+    Between its sections the wall is straight, below and above them it follows the leaning axis.
+    """
+    found = []
+    for course in courses:
+        own = [(i, s) for i, s in enumerate(sections) if s["course"] == course["course"]]
+        own.sort(key=lambda one: one[1]["height_m"])
+        if not own:
+            continue
+        ends = [(course["bottom_m"], *own[0]), *((s["height_m"], i, s) for i, s in own)]
+        ends.append((course["top_m"], *own[-1]))
+        found.append([_ring(height, i, s, shell, radius_m) for height, i, s in ends])
+    return found
+
+
+def _ring(height_m, number, section, shell, radius_m):
+    above = height_m - section["height_m"]
+    x = section["x_m"] + shell["slope_x"] * above - shell["x_m"]
+    y = section["y_m"] + shell["slope_y"] * above - shell["y_m"]
+    return [height_m, number, *(round(one, 6) for one in (x, y, section["radius_m"] - radius_m))]
+
+
+def _points(record, bottom_z_m):
+    """Names, azimuths (degrees), heights and deviations from their circles (m), evenly thinned."""
+    z_m = {point["point"]: point["z_m"] for point in record["points"]}
+    rows = [
+        (str(name), azimuth, z_m[name] - bottom_z_m, residual, number)
+        for number, s in enumerate(record["sections"])
+        for name, azimuth, residual in zip(
+            s["points"], s["azimuth_deg"], s["residual_m"], strict=True
+        )
+    ]
+    rows = rows[:: -(-len(rows) // MOST_POINTS) or 1]
+    names, azimuth, height, residual, section = zip(*rows, strict=True) if rows else ((),) * 5
+    return {
+        "names": list(names),
+        "azimuth_deg": packed(azimuth, "<f4"),
+        "height_m": packed(height, "<f4"),
+        "residual_m": packed(residual, "<f4"),
+        "section": packed(section, "<u2"),
+    }
+
+
+def _sphere(dimensions):
+    turn = np.linspace(0, np.pi, 2 * _STEPS + 1)
+    radius = dimensions["diameter"] / 2
+    return {
+        "upright": True,
+        "profile": _profile(-radius * np.cos(turn), radius * np.sin(turn)),
+        "flat": [1.0, 1.0],
+        "tilt": 0.0,
+    }
+
+
+def _lying(dimensions):
+    """A lying cylinder and its ends as a curve turned about its axis, from end a to end b."""
+    length = dimensions["cylinder_length"]
+    width, height = dimensions["section_width"], dimensions["section_height"]
+    depth_a, r_a = _end(dimensions, "a", height / 2)
+    depth_b, r_b = _end(dimensions, "b", height / 2)
+    along = np.concatenate([-length / 2 - depth_a[::-1], length / 2 + depth_b])
+    radius = np.concatenate([r_a[::-1], r_b])
+    return {
+        "upright": False,
+        "profile": _profile(along, radius),
+        "flat": [width / height, 1.0],
+        "tilt": dimensions["axis_tilt"],
+    }
+
+
+def _end(dimensions, name, radius):
+    """(how far it stands out, radius there) from the cylinder to the middle of an end."""
+    kind, depth = dimensions[f"end_{name}"], dimensions.get(f"end_{name}_depth", 0.0)
+    r = radius * np.cos(np.linspace(0, np.pi / 2, _STEPS + 1))
+    r[-1] = 0.0
+    if kind == "conical":
+        return depth * (1 - r / radius), r
+    if kind == "spherical" and depth:
+        dish = (radius**2 + depth**2) / (2 * depth)
+        return np.sqrt(dish**2 - r**2) - (dish - depth), r
+    if kind == "torispherical":
+        return _torispherical(r, radius, dimensions, name), r
+    return depth * np.sqrt(1 - (r / radius) ** 2), r  # ellipsoidal; flat ones have no depth
+
+
+def _torispherical(r, radius, dimensions, name):
+    """How far a dish with a knuckle stands out at the radii r."""
+    dish = dimensions[f"end_{name}_dish_radius"]
+    knuckle = dimensions[f"end_{name}_knuckle_radius"]
+    middle = radius - knuckle
+    centre = -sqrt((dish - knuckle) ** 2 - middle**2)
+    meet = dish * middle / (dish - knuckle)
+    of_knuckle = np.sqrt(np.maximum(knuckle**2 - (r - middle) ** 2, 0.0))
+    return np.where(r > meet, of_knuckle, centre + np.sqrt(dish**2 - np.minimum(r, dish) ** 2))
+
+
+def _profile(along, radius):
+    return [[round(float(a), 5), round(float(r), 5)] for a, r in zip(along, radius, strict=True)]
+
+
+_PROFILES = {"sphere": _sphere, "horizontal": _lying}

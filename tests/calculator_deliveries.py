@@ -1,0 +1,29 @@
+"""Deliveries of a recalculated calculator against `tankcal.deliveries`, the second method."""
+
+import numpy as np
+
+from tankcal.deliveries import deliveries
+
+K_RELATIVE = 1e-10  # of k: beta distribution, or the expansion in 1/dof
+
+
+def held_against_deliveries(typed, table, cases, figure):
+    """Second method: tankcal.deliveries on the table itself."""
+    low, high = ([case[f"delivery_{end}_dip"] for case in cases] for end in ("low", "high"))
+    expected = deliveries(table, low, high)
+    for line, values, relative in (
+        ("delivered", expected.volume_m3, 1e-9),
+        ("delivered_u", expected.u_m3, 1e-9),
+        ("delivery_dof", expected.dof, 1e-9),
+        ("delivered_k", expected.k, K_RELATIVE),
+        ("delivered_U", expected.U_m3, 1e-9),
+        ("delivered_relative", expected.relative, 1e-9),
+    ):
+        found = np.array(typed.line(line), dtype=float)
+        worst = np.max(np.abs(found / np.minimum(values, 1e99) - 1))
+        assert worst <= relative, line
+        if figure:
+            figure(
+                f"calculator: {line}, largest relative difference, {len(cases)} deliveries", worst
+            )
+    return expected

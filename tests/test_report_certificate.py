@@ -1,0 +1,182 @@
+"""What a certificate must say (ISO/IEC 17025:2017, 7.8.2.1 and 7.8.4.1), and in which words."""
+
+import copy
+import json
+
+import pytest
+from paper_cells import paper_blocks, texts
+from test_report import pages
+
+from tankcal.job.contract import KEYS
+from tankcal.report import blocks, certificate, sketch
+from tankcal.report.letterhead import Letterhead
+from tankcal.report.paper import Paper
+from tankcal.report.pdf import pdf
+from tankcal.words import load_words
+
+HARD = '#2 [west] *A* _b_ $x$ \\input{y} =1+1 <b>&amp; "q" {value}'
+
+
+@pytest.fixture
+def paper(example_record):
+    """Make a Paper of the example whose certificate has these fields alone."""
+    record = json.loads(example_record.read_text(encoding="utf-8"))
+
+    def make(**fields):
+        changed = copy.deepcopy(record)
+        changed["job"]["certificate"] = fields
+        return Paper(changed)
+
+    return make
+
+
+def items(block):
+    return dict(block.data["items"])
+
+
+def test_what_is_not_given_is_a_line_to_write_on(paper):
+    found = items(certificate.parties(paper()))
+    labels = ("Laboratory", "Address", "Customer", "Address of the customer", "Date of issue")
+    assert {found[label] for label in labels} == {""}
+    assert found["Place of calibration"] == "Fictive place"  # where the tank stands
+
+
+def test_what_cannot_be_written_in_by_hand_is_named_as_missing(paper):
+    said = certificate.statements(paper(method="ISO 7507-3")).data["items"]
+    assert said[-1].endswith("asks for it: Traceability, Conditions, Condition of the tank.")
+    given = dict.fromkeys(("method", "traceability", "conditions", "condition_of_tank"), "x")
+    assert len(certificate.statements(paper(**given)).data["items"]) == 2
+
+
+def test_results_relate_to_the_tank_alone_and_copies_are_whole(paper):
+    said = certificate.statements(paper()).data["items"]
+    assert said[0].startswith("The results relate only to the tank named here")
+    assert said[1] == "This certificate may be reproduced only in full."
+
+
+def test_every_field_of_the_contract_is_printed(example_record, tmp_path):
+    """A key that a job may give stands somewhere on the certificate."""
+    record = json.loads(example_record.read_text(encoding="utf-8"))
+    given = {field.name: f"value of {field.name}" for field in KEYS["certificate"]}
+    given["date_of_issue"] = "2024-11-21"
+    record["job"]["certificate"] = given | {"permit": "OS 7"}
+    path = tmp_path / "record.json"
+    path.write_text(json.dumps(record), encoding="utf-8")
+    printed = "\n".join(texts(paper_blocks(path)))
+    for name, value in given.items():
+        shown = "21 November 2024" if name == "date_of_issue" else value
+        assert shown in printed, name
+    assert "OS 7" in printed
+    assert "value of authorised_by, value of authorised_role" in printed
+
+
+def test_the_laboratory_of_the_letterhead_is_not_asked_for(paper):
+    of_job = paper(laboratory="Lab")
+    assert of_job.laboratory() == "Lab"
+    assert "Laboratory" not in items(certificate.parties(of_job))
+    headed = paper(laboratory="Lab")
+    headed.letterhead = Letterhead("Lab", ("Rua 1",), None, {}).data()
+    assert headed.laboratory() == ""
+    assert {"Laboratory", "Address"}.isdisjoint(items(certificate.parties(headed)))
+    other = paper(laboratory="Another")
+    other.letterhead = headed.letterhead
+    assert other.laboratory() == "Another"  # beside the letterhead: never hidden
+
+
+def test_instruments_of_the_survey_are_named_with_their_certificates(paper):
+    measured = paper()
+    tools = [
+        {"instrument": "tape 1", "details": {"certificate": "C-1"}},
+        {"instrument": "edm", "details": {}},
+    ]
+    adjustment = {"instruments": tools, "photos": [], "groups": [], "sigma0": 1.0, "points": []}
+    measured.record["adjustment"] = adjustment
+    found = items(certificate.calibration(measured))
+    assert found["Instruments, as declared"] == "tape 1: C-1; edm: no certificate named"
+
+
+def test_no_uncertainty_is_said_never_zero(example_record, tmp_path):
+    record = json.loads(example_record.read_text(encoding="utf-8"))
+    nothing = [0.0] * len(record["capacity"]["U_m3"])
+    record["capacity"] |= {"u_m3": nothing, "U_m3": nothing, "stated_U_m3": nothing}
+    record["monte_carlo"] = None
+    path = tmp_path / "record.json"
+    path.write_text(json.dumps(record), encoding="utf-8")
+    found = paper_blocks(path)
+    (result,) = (block["text"] for block in found if block["kind"] == "result")
+    top_m3 = record["capacity"]["volume_m3"][-1]
+    assert result.startswith(f"V = {top_m3:.3f}\N{NO-BREAK SPACE}m³   (no uncertainty stated")
+    (table,) = (b for b in found if b["kind"] == "columns_table" and len(b["rows"]) > 100)
+    assert table["rows"][-1][1] == f"{top_m3:.3f}"
+    assert {row[2] for row in table["rows"]} == {"–"}
+
+
+def test_one_reading_is_counted_like_many(paper):
+    measured = paper()
+    group = {"kind": "azimuth", "name": "", "count": 1}
+    adjustment = {"instruments": [], "photos": [], "groups": [group], "sigma0": 1.0, "points": []}
+    measured.record["adjustment"] = adjustment
+    assert items(certificate.calibration(measured))["Points from"].startswith("azimuths: 1; ")
+
+
+@pytest.mark.parametrize(
+    ("form", "month", "written"),
+    [
+        ("{day} {month} {year}", "November", "21 November 2026"),
+        ("{day} de {month} de {year}", "novembro", "21 de novembro de 2026"),
+        ("{day} de {month} de {year}", "noviembre", "21 de noviembre de 2026"),
+    ],
+)
+def test_a_date_is_written_in_the_language(form, month, written, example_record):
+    words = load_words()
+    words["language"]["dates"] |= {"form": form, "11": month}
+    assert Paper(example_record, words).day("2026-11-21") == written
+
+
+def test_user_text_is_printed_literally_wherever_it_reaches_paper(example_record, tmp_path):
+    """typst, LaTeX, HTML and spreadsheet markup in every text field of the job."""
+    record = json.loads(example_record.read_text(encoding="utf-8"))
+    short = {"authorised_by": "#a *b* $c$", "authorised_role": "<i>"}  # in a narrow column
+    names = {field.name for field in KEYS["certificate"]} - {"date_of_issue", *short}
+    fields = {name: f"{name} {HARD}" for name in sorted(names - {"notice"})}
+    record["job"]["certificate"] = fields | short | {"notice": "#N *x*"}
+    details = ("owner", "location", "product", "manufacturer", "construction", "remarks")
+    record["job"]["tank"]["details"] = {key: f"{key} {HARD}" for key in details}
+    for course in record["courses"]:
+        course["course"] = "$1$ #a"
+    path = tmp_path / "record.json"
+    path.write_text(json.dumps(record), encoding="utf-8")
+    found = paper_blocks(path)
+    (tmp_path / "all.pdf").write_bytes(pdf(found, tmp_path))
+    printed = " ".join(pages(tmp_path / "all.pdf")).replace(" ", "")
+    for name in (*fields, *details):
+        assert f"{name} {HARD}".replace(" ", "") in printed, name
+    for words in ("course$1$#a", "#a*b*$c$,<i>", "#N*x*"):  # of sketch, signatures, head
+        assert words in printed
+    bundle = blocks.paragraph(HARD)._repr_mimebundle_()
+    assert "<b>" not in bundle["text/html"]
+
+
+def test_the_sketch_shows_zero_reference_height_levels_and_courses(example_record, tmp_path):
+    paper = Paper(example_record)
+    block = paper.figure(sketch.sketch(paper), "sketch")
+    for words in (
+        "reference height 9.800 m", "top of the table 9.49996 m", "nominal diameter 13.000 m",
+        "zero of heights: bottom of the first course", "course 5: 1.900 m, plate 6.30 mm",
+    ):  # fmt: skip
+        assert words in block.data["svg"].replace("\xa0", " ")
+    assert block.data["alt"]
+
+
+def test_what_is_not_drawn_has_no_sketch(paper):
+    drawn = paper()
+    assert sketch.has_sketch(drawn.record)
+    drawn.record["job"]["tank"]["kind"] = "mesh"
+    assert not sketch.has_sketch(drawn.record)
+
+
+def test_every_page_bears_the_record(example_record):
+    document = Paper(example_record).document("certificate").data
+    assert document["footer"].startswith("Page {page} of {pages} · Record ")
+    (held,) = document["attachments"]
+    assert held["sha256"].startswith(document["footer"].rpartition(" ")[2])
