@@ -40,19 +40,23 @@ notebooks: $(VENV)/full ## execute every notebook, top to bottom
 	  ../$(BIN)/jupyter nbconvert --to notebook --execute --output-dir ../build/notebooks "$$one" || exit 1; \
 	done
 
-bench: $(VENV)/full ## time and memory of the main job, a table of 1 mm rows, ten million points
+bench: $(VENV)/full ## time and memory of the main job, tables of 1 mm rows and their u, ten million points, plans
 	$(BIN)/python benchmarks/main_job.py
 	$(BIN)/python benchmarks/table.py
+	$(BIN)/python benchmarks/uncertainty.py
+	$(BIN)/python benchmarks/monte_carlo.py 9500 5
 	$(BIN)/python benchmarks/rings.py
+	$(BIN)/python benchmarks/planning.py 5
 
 peer: $(VENV)/full ## the adjustment against C++ Ceres (needs libceres-dev)
 	$(MAKE) -C benchmarks/adjustment
 	$(BIN)/python benchmarks/adjustment/run.py
 
-picture: $(VENV)/full ## the picture in the README, from the example's report (needs poppler)
+picture: notebooks ## the pictures in the README, of the example's report and the notebooks (needs poppler)
 	$(BIN)/tankcal demo --quiet --out demo-results
 	mkdir -p build && pdftoppm -r 55 -png demo-results/report.pdf build/page
 	$(BIN)/python docs/picture.py build docs/images/certificate.png
+	$(BIN)/python docs/notebook_pictures.py build/notebooks docs/images
 
 wheel: $(VENV)/full ## build the wheel and run the example from it, away from this checkout
 	rm -rf build/wheel && $(BIN)/pip wheel --quiet --no-deps --wheel-dir build/wheel .
@@ -65,7 +69,7 @@ $(VENV)/base: pyproject.toml constraints.txt
 	touch $@
 
 $(VENV)/full: $(VENV)/base
-	$(BIN)/pip install --quiet --editable '.[test,check]'
+	$(BIN)/pip install --quiet --editable '.[test,check,images]'
 	touch $@
 
 clean: ## remove what was made, but not results of yours

@@ -18,7 +18,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import tankcal
+from tankcal.heads import End
 from tankcal.job import Bottom, Deadwood, DeclaredInput, Roof
+from tankcal.solids import LyingTank
 
 ROOT = Path(__file__).resolve().parent.parent
 ROUNDS, STEP_M = 20, 0.001
@@ -38,6 +40,22 @@ def furnished(job):
     return replace(furnished, inputs=job.inputs + more)
 
 
+def lying_tanks():
+    """{name: task}: 2500 rows of lying tanks with torispherical ends."""
+    dip = np.linspace(0, 2.4, 2500)
+    end = End("torispherical", dish_radius_m=2.4, knuckle_radius_m=0.24)
+    other = End("torispherical", dish_radius_m=2.4, knuckle_radius_m=0.2)
+    tanks = {
+        "equal ends": LyingTank(2.4, 2.4, 10.0, end, end),
+        "unequal ends": LyingTank(2.4, 2.4, 10.0, end, other),
+        "tilted": LyingTank(2.4, 2.4, 10.0, end, other, tilt=0.02, dip_from_a_m=5.0),
+    }
+    return {
+        f"2500 rows lying, {name}": lambda tank=tank: tank.volume_m3(dip)
+        for name, tank in tanks.items()
+    }
+
+
 def main():
     """Print a row for each step."""
     result = tankcal.run(furnished(tankcal.load(ROOT / "examples" / "silva-1995")))
@@ -46,6 +64,7 @@ def main():
     tasks = {
         "volumes alone": lambda: body.volume_m3(levels),
         "volumes, areas, covariance": lambda: body.rows(levels),
+        **lying_tanks(),
     }
     seconds = {name: [] for name in tasks}
     for _ in range(ROUNDS):

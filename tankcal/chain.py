@@ -9,29 +9,23 @@ from tankcal import dips
 from tankcal.body import Body
 from tankcal.capacity import Capacity
 from tankcal.corrections import Correction, corrections_of
-from tankcal.dips import (
-    HEIGHT_STEPS_M,
-    LADDERS_M,
-    ProportionalParts,
-    Straightness,
-    choose_rows,
-    interpolation_errors,
-    proportional_parts,
-    table_heights,
-)
-from tankcal.doubts import incomplete, of_adjustment, refuse_undetermined
+from tankcal.dips import ProportionalParts, Straightness, proportional_parts
+from tankcal.doubts import incomplete_certificate, of_adjustment, refuse_undetermined
 from tankcal.errors import HeightError, InputError, Problem, SolutionError
 from tankcal.job import Job
 from tankcal.meshes import parse_mesh
+from tankcal.rules import RuleVerdict
 from tankcal.scan import Scan, scanned
 from tankcal.service import shell_factor, shell_temperature_c
+from tankcal.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
+from tankcal.statements import Statements, statements, verdict_of
 from tankcal.surveys import Adjustment, adjust_survey, wall_points
-from tankcal.tanks import body_of, critical_zone, shell_volume, zero_height
-from tankcal.wall import Wall, among_themselves, find_wall, warnings_of
+from tankcal.tabling import doubts_of_table, tabled
+from tankcal.tanks import body_of, shell_volume
+from tankcal.wall import Wall, among_themselves, find_wall
 
 MILLIMETRE, PARTS = 0.001, 10  # of a step of the tables that proportional parts are for
 TOLD = 10  # warnings of the adjustment that are told when there is no wall
-NOMINAL_MISS = 0.05  # of the nominal volume, from which on one of the two is in doubt
 
 
 @dataclass(frozen=True, repr=False)
@@ -47,6 +41,10 @@ class Result:
     proportional_parts  what millimetres add to a row, zone by zone; () for no centimetre table
     corrections  each with its size at the top row
     by_density   {density kg/m3: (rows,) volumes}: the same table for other densities
+    stated       budgets, worst deliveries (`statements.Statements`)
+    simulation   the table by Monte Carlo (`simulation.TableSimulation`); None where it is off
+    intervals    of the rows, as they are printed (`simulation.Intervals`)
+    rule         verdict of the job's decision rule on them (`rules.RuleVerdict`); None without one
     adjustment   the adjusted survey (`surveys.Adjustment`); None where points were handed in
     """
 
@@ -60,6 +58,10 @@ class Result:
     proportional_parts: tuple[ProportionalParts, ...]
     corrections: tuple[Correction, ...]
     by_density: dict
+    stated: Statements
+    simulation: TableSimulation | None
+    intervals: Intervals
+    rule: RuleVerdict | None
     warnings: tuple[Problem, ...]
     adjustment: Adjustment | None = None
 
@@ -70,7 +72,7 @@ class Result:
             points = f", {len(self.accepted)} of {len(self.job.points.names)} points"
         return (
             f"<tankcal.Result of {self.job.tank.id}: {top.value_m3:.3f} m3 at "
-            f"{self.table.height_m[-1]:.3f} m, U = {top.U_m3:.3f} m3 (k = {top.k:.2f}){points}>"
+            f"{self.table.height_m[-1]:.3f} m, U = {self.intervals.U_m3[-1]:.3f} m3{points}>"
         )
 
     @property
@@ -135,10 +137,13 @@ class Result:
         return self.table.delivery(low_m, high_m)
 
 
-def run(job, progress=None):
+def run(job, progress=None, *, counting=None, simulated=None):
     """Compute a job: adjusted points, wall and axis, parts of the tank, table with covariance.
 
     progress  called with a line of text as each step begins
+    counting  called as counting(text, done, total) while a long step goes on
+    simulated whether the table is simulated, too; None: as the job says. One without any
+              uncertainty never is
     Raises InputError when a course is left with too few points, SolutionError when the survey does
     not determine the points, the vertical or the scale or when there is no wall, TypeError for
     anything but a `Job`.
@@ -158,27 +163,16 @@ def run(job, progress=None):
         told = map(str, adjustment.warnings[:TOLD])
         raise SolutionError("\n".join([str(error), *told])) from error
     wall = survey if isinstance(survey, Wall) else None
-    tell("integrating volumes")
-    body = body_of(job, survey)
-    zero = zero_height(job, survey)
-    tell("propagating the covariance to every row of the table")
-
-    def exact(dips_m):
-        return body.volume_m3(_levels(dips_m, zero, body))
-
-    top = body.highest_m - zero
-    kinks = np.unique([kink - zero for kink in body.kinks_m if 0 < kink - zero < top])
-    heights = _rows(job.table, exact, top, kinks)
-    levels = _levels(heights, zero, body)
-    volume, area, sources = body.rows(levels)
-    table = Capacity(
-        height_m=heights,
-        volume_m3=volume,
-        area_m2=area,
-        sources=sources,
-        probability=job.table.coverage_probability,
-        critical_m=critical_zone(job),
-    )
+    made = tabled(job, survey, tell)
+    body, zero, table = made.body, made.zero_m, made.table
+    tell("stating volumes and deliveries")
+    stated = statements(job, table, made.straightness.largest_m3)
+    simulation, intervals = None, gum_intervals(table)
+    wanted = job.table.monte_carlo if simulated is None else simulated
+    if wanted and table.sources:
+        tell("simulating the table")
+        simulation = simulate_table(job, survey, body, zero, table, stated.pairs, tell=counting)
+        intervals = simulation.intervals(table)
     return Result(
         job=job,
         wall=wall,
@@ -186,22 +180,29 @@ def run(job, progress=None):
         body=body,
         zero_m=zero,
         table=table,
-        straightness=interpolation_errors(exact, heights, kinks),
-        proportional_parts=() if wall is None else _parts(job.table, exact, top, kinks),
+        straightness=made.straightness,
+        proportional_parts=() if wall is None else _parts(job.table, made),
         corrections=corrections_of(job, survey),
-        by_density=_by_density(job, survey, levels),
-        warnings=(
-            *job.warnings,
-            *(
-                ()
-                if adjustment is None
-                else (*adjustment.warnings, *of_adjustment(job, adjustment))
-            ),
-            *(warnings_of(job, wall) if wall is not None else ()),
-            *incomplete(job, body.undeclared()),
-            *_against_nominal(job, table),
-        ),
+        by_density=_by_density(job, survey, made.levels_m),
+        stated=stated,
+        simulation=simulation,
+        intervals=intervals,
+        rule=verdict_of(job, body, table, intervals, simulation),
+        warnings=_warnings(job, adjustment, wall, made),
         adjustment=adjustment,
+    )
+
+
+def _warnings(job, adjustment, wall, made):
+    of_survey = ()
+    if adjustment is not None:
+        left_open = of_adjustment(job, adjustment.datum, adjustment.causes)
+        of_survey = (*adjustment.warnings, *left_open)
+    return (
+        *job.warnings,
+        *of_survey,
+        *doubts_of_table(job, wall, made),
+        *incomplete_certificate(job),
     )
 
 
@@ -247,53 +248,22 @@ def _survey(job, tell, dof):
     return None
 
 
-def _levels(heights_m, zero_m, body):
-    """Levels of dips in the frame of the parts; the top is the top, whatever its last bit is."""
-    return np.minimum(heights_m + zero_m, body.highest_m)
-
-
-def _rows(spec, exact, top_m, kinks_m):
-    """Dips of the rows: by the step asked for, or by the bound on linear interpolation."""
-    step = spec.step_m
-    if step is None and spec.height_unit != "m":
-        step = float(HEIGHT_STEPS_M[spec.height_unit])
-    if spec.max_interpolation_error_m3 is not None:
-        return choose_rows(
-            exact,
-            top_m,
-            spec.max_interpolation_error_m3,
-            kinks_m,
-            step_m=step,
-            ladder_m=LADDERS_M[spec.height_unit],
-        ).height_m
-    return table_heights(step, top_m, spec.fine_step_m, spec.fine_zones)
-
-
-def _parts(spec, exact, top_m, kinks_m):
+def _parts(spec, made):
     if spec.step_m is None or abs(spec.step_m - PARTS * MILLIMETRE) > 1e-9:
         return ()
-    return proportional_parts(exact, [0.0, *kinks_m, top_m], spec.step_m, PARTS)
+    edges = [0.0, *made.kinks_m, made.top_m]
+    return proportional_parts(made.volume_m3, edges, spec.step_m, PARTS)
 
 
 def _by_density(job, survey, levels):
-    """The same rows for each further density of the liquid."""
+    """The same rows for each further density of the liquid: another head, another draught."""
     return {
-        density: body_of(
-            replace(job, table=replace(job.table, liquid_density_kg_m3=density)),
-            survey,
-            uncertain=False,
-        ).volume_m3(levels)
+        density: body_of(_filled_with(job, density), survey, uncertain=False).volume_m3(levels)
         for density in job.table.other_densities_kg_m3
     }
 
 
-def _against_nominal(job, table):
-    """A warning when the capacity is far from the nominal volume."""
-    nominal = job.tank.nominal_volume_m3
-    if nominal is None or abs(table.volume_m3[-1] / nominal - 1) <= NOMINAL_MISS:
-        return ()
-    text = (
-        f"the capacity is {table.volume_m3[-1]:.6g} m3, tank.nominal_volume_m3 is {nominal:g}: "
-        f"they differ by {100 * abs(table.volume_m3[-1] / nominal - 1):.0f} %"
-    )
-    return (Problem("job.toml", text, column="tank.nominal_volume_m3"),)
+def _filled_with(job, density):
+    """The job of a tank that holds another liquid, in which its floating roof floats."""
+    roof = job.roof and replace(job.roof, reference_density_kg_m3=density)
+    return replace(job, table=replace(job.table, liquid_density_kg_m3=density), roof=roof)

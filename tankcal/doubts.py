@@ -6,17 +6,20 @@ import numpy as np
 
 from tankcal.body import OWN_SCALE
 from tankcal.errors import Problem, SolutionError
+from tankcal.messages import listed, message
 from tankcal.shell import VAGUE_TILT
 
 FEWEST_POINTS, ADVISED_POINTS = 5, 10  # of a section
+NOMINAL_MISS = 0.05  # of the nominal volume, from which on one of the two is in doubt
 WIDE_GAP_DEG = 45
 SHOWN = 5  # names in a message
 CERTIFICATE_NEEDS = ("number", "laboratory", "customer", "method")
 LARGE_NOISE_M, LARGE_JUMP_M, MANY_SNOOPED = 0.010, 0.020, 0.03
 VAGUE = 5.0  # times the median sd: what a point with one poor ray too few has
-OF_VERTICAL = (
-    "plumb lines, height differences, vertical or zenith angles, or control points with known "
-    "heights give it"
+OF_VERTICAL = message(
+    "gives_vertical",
+    "plumb lines, height differences, vertical or zenith angles, or control points with known"
+    " heights give it",
 )
 OF_SCALE = "distances, or control points that lie apart, give it"
 
@@ -50,29 +53,45 @@ def refuse_undetermined(datum):
         raise SolutionError("no capacity: " + "; ".join(missing))
 
 
-def of_adjustment(job, adjustment):
-    """What a survey that was adjusted along leaves open: heights of the frame, a scale twice."""
-    problems, datum = [], adjustment.datum
+def of_adjustment(job, datum, causes):
+    """What an adjusted survey leaves open: heights of the frame, a scale twice.
+
+    datum  `surveys.DatumReport`         causes  `surveys.Cause` of its points
+    """
+    problems = []
     if (
         datum.choice in ("inner", "fixed_photo")
         and datum.defect
         and job.datum.bottom_z_m is not None
     ):
-        text = (
-            f"datum = {datum.choice}: nothing measured fixes the heights of the frame. bottom_z_m "
-            f"is taken in the frame of the results, held by {_listed(datum.held)}: check it there"
+        text = message(
+            "heights_not_fixed",
+            "datum = {choice}: nothing measured fixes the heights of the frame. bottom_z_m is taken"
+            " in the frame of the results, held by {held}: check it there",
+            choice=datum.choice,
+            held=_held(datum.held),
         )
         problems.append(Problem("job.toml", text, column="datum.bottom_z_m"))
     scales = [
-        f"{one.name} ({one.u:g} {one.unit})" for one in adjustment.causes if one.what == OWN_SCALE
+        message("with_u", "{name} ({u:g} {unit})", name=one.name, u=one.u, unit=one.unit)
+        for one in causes
+        if one.what == OWN_SCALE
     ]
     if scales and any(one.name == "scale" for one in job.inputs):
-        text = (
-            f"scale is declared beside that of {_listed(scales)} in instruments.toml, which the "
-            "points contain: both count, which is right only for different causes"
+        text = message(
+            "scale_twice",
+            "scale is declared beside that of {instruments} in instruments.toml, which the points"
+            " contain: both count, which is right only for different causes",
+            instruments=listed(scales, SHOWN),
         )
         problems.append(Problem("uncertainty.csv", text, column="input"))
     return tuple(problems)
+
+
+def _held(names):
+    if names == ("all",):
+        return message("all_points", "all points")
+    return listed(names, SHOWN)
 
 
 def vague_vertical(points):
@@ -84,17 +103,16 @@ def vague_vertical(points):
     lean[:, 0, 0], lean[:, 2, 0] = z, -x
     lean[:, 1, 1], lean[:, 2, 1] = z, -y
     angle = np.linalg.pinv(lean.reshape(-1, 2))
-    sd = np.sqrt(np.linalg.eigvalsh(angle @ points.covariance_m2 @ angle.T)[-1])
+    sd = np.sqrt(np.linalg.eigvalsh(angle @ (points.covariance_m2 @ angle.T))[-1])
     if sd <= VAGUE_TILT:
         return []
-    text = f"the vertical is known to {1000 * sd:.1f} mm/m only (sd), so is the tilt: {OF_VERTICAL}"
+    text = message(
+        "vertical_vague",
+        "the vertical is known to {sd_mm_per_m:.1f} mm/m only (sd), so is the tilt: {remedy}",
+        sd_mm_per_m=1000 * sd,
+        remedy=OF_VERTICAL,
+    )
     return _problems(points, [text])
-
-
-def _listed(names):
-    """Names in a row, the first few of many."""
-    shown = ", ".join(map(str, names[:SHOWN]))
-    return f"{shown} and {len(names) - SHOWN} more" if len(names) > SHOWN else shown
 
 
 def vague_points(points, accepted, sds_m):
@@ -109,17 +127,31 @@ def vague_points(points, accepted, sds_m):
     vague = np.flatnonzero(own > VAGUE * middle)
     if len(vague):
         worst = vague[np.argsort(-own[vague])]
-        names = _listed([f"{points.names[accepted[i]]} ({1000 * own[i]:.1f} mm)" for i in worst])
         texts.append(
-            f"the sd of {len(vague)} points of the wall is over {VAGUE:g} times the median "
-            f"({1000 * middle:.1f} mm): {names}; more or better rays are needed there"
+            message(
+                "points_vague",
+                "the sd of {count} points of the wall is over {times:g} times the median"
+                " ({median_mm:.1f} mm): {points}; more or better rays are needed there",
+                count=len(vague),
+                times=VAGUE,
+                median_mm=1000 * middle,
+                points=listed([_with_sd(points.names[accepted[i]], own[i]) for i in worst], SHOWN),
+            )
         )
     if middle > LARGE_NOISE_M:
         texts.append(
-            f"the points of the wall are known to {1000 * middle:.1f} mm (median sd in plan): "
-            "dents and ovality of that size are not told from noise"
+            message(
+                "points_noisy",
+                "the points of the wall are known to {sd_mm:.1f} mm (median sd in plan): dents and"
+                " ovality of that size are not told from noise",
+                sd_mm=1000 * middle,
+            )
         )
     return _problems(points, texts)
+
+
+def _with_sd(name, sd_m):
+    return message("with_sd", "{name} ({sd_mm:.1f} mm)", name=name, sd_mm=1000 * sd_m)
 
 
 def weak_sections(job, groups, azimuth_rad):
@@ -128,13 +160,28 @@ def weak_sections(job, groups, azimuth_rad):
     for group in groups:
         ordered = np.sort(azimuth_rad[group.members])
         gap = np.degrees(np.max(np.diff(ordered, append=ordered[0] + 2 * np.pi)))
-        name = f"section {group.name} (course {job.courses[group.course].name})"
+        named = {"section": group.name, "course": job.courses[group.course].name}
         if len(ordered) < ADVISED_POINTS:
             texts.append(
-                f"{name} stands on {len(ordered)} points, {ADVISED_POINTS} or more are advised"
+                message(
+                    "section_weak",
+                    "section {section} (course {course}) stands on {count} points, {advised} or"
+                    " more are advised",
+                    **named,
+                    count=len(ordered),
+                    advised=ADVISED_POINTS,
+                )
             )
         if gap > WIDE_GAP_DEG:
-            texts.append(f"{name} has no point over {gap:.0f} deg of its turn: measure there")
+            texts.append(
+                message(
+                    "section_gap",
+                    "section {section} (course {course}) has no point over {gap_deg:.0f} deg of its"
+                    " turn: measure there",
+                    **named,
+                    gap_deg=gap,
+                )
+            )
     return _problems(job.points, texts)
 
 
@@ -146,50 +193,96 @@ def doubts(job, shell, sections, given_sd_m):
     """
     texts = _of_scatter(shell, None if job.points.from_adjustment else given_sd_m)
     if not shell.tilt_known:
-        texts.append("the points do not determine a tilt: the shell is taken as upright")
+        texts.append(
+            message(
+                "tilt_unknown", "the points do not determine a tilt: the shell is taken as upright"
+            )
+        )
     snooped = np.sum(shell.reason == "snooping")
     tested = snooped + np.sum(shell.reason == "")
     if snooped > max(MANY_SNOOPED * tested, 3):
         texts.append(
-            f"{snooped} of {tested} points near the wall were rejected as outliers: are they dents "
-            "of the wall, or something before it? The working papers list them"
+            message(
+                "many_outliers",
+                "{rejected} of {tested} points near the wall were rejected as outliers: are they"
+                " dents of the wall, or something before it? The working papers list them",
+                rejected=snooped,
+                tested=tested,
+            )
         )
     for below, above in pairwise(sections):
         plates = [job.courses[section.group.course].thickness_m for section in (below, above)]
         jump = abs(above.circle.radius_m - below.circle.radius_m)
         if jump > LARGE_JUMP_M + abs(plates[1] - plates[0]):
             texts.append(
-                f"the radius changes by {1000 * jump:.0f} mm from section {below.group.name} to "
-                f"section {above.group.name}: is one of them not the wall?"
+                message(
+                    "radius_jumps",
+                    "the radius changes by {jump_mm:.0f} mm from section {below} to section"
+                    " {above}: is one of them not the wall?",
+                    jump_mm=1000 * jump,
+                    below=below.group.name,
+                    above=above.group.name,
+                )
             )
     return _problems(job.points, texts)
 
 
-def incomplete(job, undeclared):
-    """A warning that names what U does not contain, and one for an incomplete certificate.
+def not_in_u(undeclared):
+    """A warning that names what U does not contain.
 
     undeclared  names of the inputs that bear on the tank and have no declared uncertainty
     """
-    problems = []
-    if undeclared:
-        problems.append(
-            Problem("uncertainty.csv", f"not declared, so not in U: {', '.join(undeclared)}")
-        )
+    if not undeclared:
+        return ()
+    text = message("undeclared", "not declared, so not in U: {inputs}", inputs=list(undeclared))
+    return (Problem("uncertainty.csv", text),)
+
+
+def incomplete_certificate(job):
+    """A warning that names what a certificate lacks."""
     lacking = [key for key in CERTIFICATE_NEEDS if not job.certificate.get(key)]
-    if lacking:
-        text = f"not given: {', '.join(lacking)}; ISO/IEC 17025, 7.8.2, asks for them"
-        problems.append(Problem("job.toml", text, column="certificate"))
-    return problems
+    if not lacking:
+        return ()
+    text = message(
+        "certificate_incomplete",
+        "not given: {entries}; ISO/IEC 17025, 7.8.2, asks for them",
+        entries=lacking,
+    )
+    return (Problem("job.toml", text, column="certificate"),)
+
+
+def against_nominal(tank, capacity_m3):
+    """A warning when the capacity is far from the nominal volume."""
+    nominal = tank.nominal_volume_m3
+    if nominal is None or abs(capacity_m3 / nominal - 1) <= NOMINAL_MISS:
+        return ()
+    text = message(
+        "not_nominal",
+        "the capacity is {volume_m3:.6g} m3, tank.nominal_volume_m3 is {nominal_m3:g}: they differ"
+        " by {percent:.0f} %",
+        volume_m3=capacity_m3,
+        nominal_m3=nominal,
+        percent=100 * abs(capacity_m3 / nominal - 1),
+    )
+    return (Problem("job.toml", text, column="tank.nominal_volume_m3"),)
 
 
 def _of_scatter(shell, given_sd_m):
-    scatter = f"the points scatter by {1000 * shell.noise_m:.1f} mm (sd) about the shell's form"
+    noise_mm = 1000 * shell.noise_m
     if given_sd_m is not None:
-        given = np.median(given_sd_m)
-        if shell.noise_m > 2 * given:
-            return [f"{scatter}, their given sd is {1000 * given:.1f} mm: are the sds too small?"]
+        given_mm = 1000 * np.median(given_sd_m)
+        if noise_mm > 2 * given_mm:
+            template = (
+                "the points scatter by {noise_mm:.1f} mm (sd) about the shell's form, their given"
+                " sd is {given_mm:.1f} mm: are the sds too small?"
+            )
+            return [message("sds_small", template, noise_mm=noise_mm, given_mm=given_mm)]
     elif shell.noise_m > LARGE_NOISE_M:
-        return [f"{scatter}: is there a second surface (insulation, pipes) near the wall?"]
+        template = (
+            "the points scatter by {noise_mm:.1f} mm (sd) about the shell's form: is there a second"
+            " surface (insulation, pipes) near the wall?"
+        )
+        return [message("points_scatter", template, noise_mm=noise_mm)]
     return []
 
 

@@ -20,18 +20,22 @@ class Problem:
     expected  what was found and what was expected, in plain words
     row       line of the file or row of the sheet, counted as an editor shows it (heading = 1)
     column    heading of the column, or the key ("tank.nominal_height_m")
+    cell      of a sheet ("C7"), when it is known
     """
 
     file: str
     expected: str
     row: int | None = None
     column: str | None = None
+    cell: str | None = None
 
     def __str__(self):
         place = [self.file]
-        if self.row is not None:
+        if self.cell is not None:
+            place.append(f"cell {self.cell}")
+        elif self.row is not None:
             place.append(f"row {self.row}")
-        if self.column is not None:
+        if self.column:
             place.append(self.column)
         return ", ".join(place) + ": " + self.expected
 

@@ -23,7 +23,8 @@ class Deadwood:
 
     names                (n,) as in the job
     bottoms_m, tops_m    (n,)
-    volumes_m3, u_m3     (n,) signed volumes and their standard uncertainties
+    volumes_m3, u_m3     (n,) signed volumes and their standard uncertainties; nan where unknown:
+                         the relative uncertainty that these items share is the input "deadwood"
     """
 
     names: tuple[str, ...]
@@ -43,14 +44,21 @@ class Deadwood:
 
     def area_m2(self, levels_m):
         """(rows,) derivative of `volume_m3` by the level; the upper side where an item begins."""
-        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))[:, None]
+        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))
         tall = self.tops_m > self.bottoms_m
-        here = (levels >= self.bottoms_m[tall]) & (levels < self.tops_m[tall])
-        return here @ (self.volumes_m3[tall] / (self.tops_m - self.bottoms_m)[tall])
+        low, high = self.bottoms_m[tall], self.tops_m[tall]
+        here = (levels >= low[:, None]) & (levels < high[:, None])
+        return (self.volumes_m3[tall] / (high - low)) @ here
 
     def derivatives(self, levels_m):
-        """None: bottoms and tops are dips, they move with the table's zero."""
-        return {}
+        """{"deadwood": (rows,)} m3 by a relative error of all items without an uncertainty.
+
+        Bottoms and tops are dips, they move with the table's zero.
+        """
+        shared = np.isnan(self.u_m3)
+        if not np.any(shared):
+            return {}
+        return {"deadwood": self._parts(levels_m)[:, shared] @ self.volumes_m3[shared]}
 
     def sources(self, levels_m):
         """One `Source` for each item that has an uncertainty: the part of it below each level."""
@@ -70,24 +78,24 @@ class Deadwood:
 
     def _parts(self, levels_m):
         """(rows, n) which part of each item lies below each level."""
-        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))[:, None]
-        heights = self.tops_m - self.bottoms_m
+        above = np.atleast_1d(np.asarray(levels_m, dtype=float)) - self.bottoms_m[:, None]
+        heights = (self.tops_m - self.bottoms_m)[:, None]
         step = heights == 0
-        linear = np.clip((levels - self.bottoms_m) / np.where(step, 1.0, heights), 0.0, 1.0)
-        return np.where(step, levels >= self.bottoms_m, linear)
+        linear = np.clip(above / np.where(step, 1.0, heights), 0.0, 1.0)
+        return np.where(step, above >= 0, linear).T
 
 
 def deadwood(names, bottoms_m, tops_m, volumes_m3, u_m3=None):
-    """`Deadwood` of items; u_m3 None: exact.
+    """`Deadwood` of items; u_m3 None: exact; an item's None: unknown.
 
     Raises SolutionError, naming the item, for a top below its bottom, a negative uncertainty, or a
     number that is not finite.
     """
     names = tuple(names)
     u = np.zeros(len(names)) if u_m3 is None else u_m3
-    columns = [np.asarray(c, dtype=float) for c in (bottoms_m, tops_m, volumes_m3, u)]
+    columns = [np.array(c, dtype=float) for c in (bottoms_m, tops_m, volumes_m3, u)]
     for name, bottom, top, volume, sd in zip(names, *columns, strict=True):
-        if not np.all(np.isfinite([bottom, top, volume, sd])):
+        if not np.all(np.isfinite([bottom, top, volume])) or np.isinf(sd):
             raise SolutionError(f"deadwood {name}: expected finite numbers")
         if top < bottom:
             raise SolutionError(

@@ -9,8 +9,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from tankcal.digits import LITRE_DECIMALS, PROGRAM, decimals_of_height, fixed
 from tankcal.errors import HeightError
-from tankcal.uncertainty import LITRE_DECIMALS, height_decimals
 
 METRES_PER_INCH = Fraction(254, 10_000)
 INCHES_PER_FOOT = 12
@@ -60,7 +60,7 @@ def dip_label(height_m, height_unit="m"):
     as many as it needs, of an inch three. Raises HeightError for a negative height in feet.
     """
     if height_unit == "m":
-        return f"{height_m:.{height_decimals(height_m)}f}"
+        return fixed(height_m, decimals_of_height(height_m), PROGRAM)
     if height_m < 0:
         raise HeightError(f"height {height_m:g} m: feet and inches count from zero upwards")
     step = HEIGHT_STEPS_M[height_unit]

@@ -11,6 +11,6 @@ Source: Brown 1958; Triggs et al. 2000, Bundle adjustment - a modern synthesis, 
 
 from tankcal.gauss_markov.model import Group, Model
 from tankcal.gauss_markov.solution import Solution
-from tankcal.gauss_markov.solving import UndeterminedError, solve
+from tankcal.gauss_markov.solving import UndeterminedError, linearise, solve
 
-__all__ = ["Group", "Model", "Solution", "UndeterminedError", "solve"]
+__all__ = ["Group", "Model", "Solution", "UndeterminedError", "linearise", "solve"]

@@ -67,6 +67,26 @@ def responses(solution, columns, jac):
         yield part, found
 
 
+def covariances(solution, columns, jac):
+    """Covariance (unknowns, m) of all unknowns with m functions of some of them, Q J'.
+
+    columns  (K,) unknowns, -1 where fixed         jac  (m, K)
+
+    Other than in `responses` the functions may be any, not only what observations can see: where a
+    datum is chosen they may change with it.
+    """
+    rows, found = _sparse_rows(solution.model.unknowns, columns[None], jac[None]), []
+    with threads_for(solution.plan.reduced):
+        for part in _parts(len(jac), solution.model.unknowns):
+            found.append(_response(solution, rows[part]))
+    found = np.hstack(found)
+    if solution.datum is not None:
+        free, h, m = solution.datum
+        by_free = rows @ free
+        found += free @ (m @ by_free.T - (rows @ h).T) - h @ by_free.T
+    return found
+
+
 def _response(solution, rows):
     """Q J' (unknowns, k) of a sparse matrix of rows (k, unknowns), in the datum of the factor."""
     own, reduced = _through(solution, rows)

@@ -37,6 +37,22 @@ def solve(model, state, *, max_iterations=100, tolerance=1e-4):
         return _solved(_Work(model), state, max_iterations, tolerance)
 
 
+def linearise(model, state):
+    """The Solution of a Model with its derivatives at `state`: no step is made.
+
+    Its cofactors are those of a survey whose observations are what `state` computes, so it tells
+    how well the unknowns will be known before anything is measured. Raises SolutionError when the
+    observations do not determine the unknowns (the message names them).
+    """
+    with threads_for(model.reduced):
+        work = _Work(model)
+        cost, factor = work.evaluate(state), work.factor(state, 0.0)
+        if factor is None:
+            raise SolutionError(f"the normal equations have no factor{weakness(work, state)}")
+        _refuse_untouched(model, factor)
+        return Solution(work, state, cost, 0, factor, factor)
+
+
 def _solved(work, state, max_iterations, tolerance):
     """The iteration of `solve`."""
     model, state = work.model, work.closed_start(state)
@@ -146,6 +162,8 @@ class _Work:
         if self.model.free is not None and not damping:
             free = self.model.free(state)
             ties = free * self.model.inner[:, None]
+            if np.linalg.matrix_rank(ties.T @ free) < free.shape[1]:
+                raise SolutionError("what is to hold the datum does not fix it")
             held = np.linalg.qr(free[:nr] / scale[:, None])[0]
         if self.plan.blocks == 0 and self.rows * nr * nr < SMALL:
             lower, sound, pull = self._dense_root(scale, untouched, damping, held, tangent)

@@ -1,10 +1,33 @@
-"""The file of a mesh, which lies beside job.toml or beside the workbook; it is not parsed here."""
+"""What lies beside job.toml or the workbook; the file of a mesh is not parsed here."""
 
-import hashlib
+from dataclasses import dataclass
 
-from tankcal.job.tables import read_bytes
+import numpy as np
+
+from tankcal.job.tables import fingerprint, read_bytes
+from tankcal.rules.model import Rule
 
 MAX_MESH_BYTES = 200_000_000
+
+
+@dataclass(frozen=True)
+class Attached:
+    """What a job has beside its settings and tables; None: not there.
+
+    covariance_m2  (3n, 3n) of its points
+    mesh           ((name, SHA-256, size), bytes)
+    rule           (Rule, (name, SHA-256, size) of its file, or None: it ships with tankcal)
+    """
+
+    covariance_m2: np.ndarray | None
+    mesh: tuple | None
+    rule: tuple[Rule, tuple | None] | None
+
+    @property
+    def files(self):
+        """(name, SHA-256, size) of each file that was read for it."""
+        given = (self.mesh and self.mesh[0], self.rule and self.rule[1])
+        return tuple(file for file in given if file)
 
 
 def read_mesh_file(folder, name, log):
@@ -26,4 +49,4 @@ def read_mesh_file(folder, name, log):
     if not data.strip():
         log.problem(name, "empty; expected a closed mesh")
         return None
-    return (name, hashlib.sha256(data).hexdigest(), len(data)), data
+    return fingerprint(name, data), data

@@ -11,7 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.camera import PARAMETERS, Form
-from tankcal.job.contract.registers import PARAMETER_KEYS, SECOND_NAMES, sd_key
+from tankcal.focus import RADIAL, Lens
+from tankcal.job.contract.registers import (
+    AFFINITIES_BY_AUTHOR,
+    FOCUS_CALIBRATIONS,
+    PARAMETER_KEYS,
+    SECOND_NAMES,
+    sd_key,
+)
 from tankcal.job.measurements import CameraSetup
 from tankcal.network.survey import DEFAULT_SCOPE, Camera
 
@@ -44,7 +51,38 @@ def parameters_of(given, settings):
 
     given     {key: value} of cameras.toml     settings  {key: value} of [adjustment.camera]
     """
+    given = at_focus(given)
     return [_parameter(name, given, settings) for name in PARAMETERS]
+
+
+def focus_keys():
+    """Keys of the focus calibrations: the distances, then K1, K2, K3."""
+    return tuple(
+        f"{FOCUS_CALIBRATIONS}.{key}"
+        for key in ("distance_m", *(PARAMETER_KEYS[name][0] for name in RADIAL))
+    )
+
+
+def lens_of(given):
+    """The focus.Lens of a camera {key: value}; None where its keys do not make one."""
+    distances, *radial = (given[key] for key in focus_keys())
+    focal, focus = given["lens_focal_length_mm"], given["focus_m"]
+    whole = None not in (distances, focal, focus) and any(radial)
+    if not whole or any(len(one) != 2 for one in (distances, *filter(None, radial))):
+        return None
+    if distances[0] == distances[1] or min(*distances, focus) * 1000 <= focal:
+        return None
+    pairs = [one or (0.0, 0.0) for one in radial]
+    return Lens(focal, 1000 * focus, 1000 * np.array(distances), np.array(pairs).T)
+
+
+def at_focus(given):
+    """The keys of a camera, with K1, K2, K3 for its focus where a Lens tells them."""
+    lens = lens_of(given)
+    if lens is None:
+        return given
+    values = zip(RADIAL, lens.focused.tolist(), strict=True)
+    return given | {PARAMETER_KEYS[name][0]: value for name, value in values}
 
 
 def _parameter(name, given, settings):
@@ -74,21 +112,23 @@ def is_adjusted(parameter):
 
 
 def affinity_of(given):
-    """Name of the form of the affinity: as named, else b1_b2."""
-    return given["affinity"] or "b1_b2"
+    """Name of the form of the affinity: as named, by itself or by its author, else b1_b2."""
+    name = given["affinity"] or "b1_b2"
+    return AFFINITIES_BY_AUTHOR.get(name, name)
 
 
 def format_of(given):
-    """(format_mm, pixel_mm) of a camera, pairs; None where the keys do not say it."""
+    """(format_mm, pixel_mm) of a camera, pairs; None where the keys do not say it.
+
+    With all three keys format_mm is that of the pixels: it is where their middle is.
+    """
     pixel = _pair(given["pixel_um"], 1e-3)
     size_mm, size_px = _pair(given["format_mm"]), _pair(given["format_px"])
     if size_px is None:
         return size_mm, None
     if pixel is None and size_mm is not None:
         pixel = size_mm / size_px
-    if size_mm is None and pixel is not None:
-        size_mm = size_px * pixel
-    return size_mm, pixel
+    return size_mm if pixel is None else size_px * pixel, pixel
 
 
 def _pair(values, factor=1.0):
@@ -114,7 +154,7 @@ def make_camera(name, given, settings):
         name=name,
     )
     format_mm, pixel_mm = format_of(given)
-    return CameraSetup(camera, format_mm, pixel_mm)
+    return CameraSetup(camera, format_mm, pixel_mm, lens_of(given))
 
 
 def _role(parameter):

@@ -5,15 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.job.contract import (
-    COLUMNS,
-    KEYS,
-    KINDS,
-    LATER_KEYS,
-    OPEN_SECTIONS,
-    REGISTER_KEYS,
-)
-from tankcal.job.fields import MAX_NAME, NUMBER, Field, Refused, is_blank, read_value
+from tankcal.job.contract import COLUMNS, KEYS, KINDS, OPEN_SECTIONS, REGISTER_KEYS
+from tankcal.job.contract.registers import FAMILIES, SHORT_KEYS
+from tankcal.job.fields import IN_TOML, MAX_NAME, NUMBER, Field, Refused, is_blank, read_value
 from tankcal.job.tables import nearest
 
 
@@ -62,7 +56,7 @@ def read_settings(raw, log, is_whole=True):
         values[section] = {
             field.name: None
             if is_foreign
-            else _setting(
+            else read_setting(
                 raw.settings_file,
                 f"{section}.{field.name}",
                 field,
@@ -79,13 +73,14 @@ def read_settings(raw, log, is_whole=True):
 def read_register(raw, name, log):
     """{name: {key: value}} of cameras or instruments, with None for what is blank, missing or bad.
 
-    An entry in which nothing is filled in counts as not there.
+    An entry in which nothing is filled in counts as not there. A family of keys (marks) is one
+    value {name in the family: value}, without those that are blank or bad.
     """
     register = raw.registers.get(name)
     if register is None:
         return {}
     fields, values = REGISTER_KEYS[name], {}
-    known = [field.name for field in fields]
+    known = [*(field.name for field in fields), *SHORT_KEYS[name].values()]
     for owner, entries in register.entries.items():
         if all(is_blank(value.raw) for value in entries.values()):
             continue
@@ -95,23 +90,52 @@ def read_register(raw, name, log):
         except Refused as refusal:
             log.problem(register.file, str(refusal), row, owner)
         for key, value in entries.items():
-            if key not in known:
+            if key not in known and key.partition(".")[0] not in FAMILIES.get(name, ()):
                 expected = f"unknown key{nearest(key, known)}"
                 log.problem(register.file, expected, value.row, f"{owner}.{key}")
-        values[owner] = {
-            field.name: _setting(
-                register.file,
-                f"{owner}.{field.name}",
-                field,
-                entries.get(field.name),
-                None,
-                log,
-                field.required,
-                row,
+        _refuse_two_spellings(register.file, name, owner, entries, log)
+        values[owner] = {}
+        for field in fields:
+            key = as_spelt(name, entries, field.name)
+            place = (register.file, f"{owner}.{key}")
+            values[owner][field.name] = read_setting(
+                *place, field, entries.get(key), None, log, field.required, row
             )
-            for field in fields
-        }
+        for family, field in FAMILIES.get(name, {}).items():
+            values[owner][family] = _read_family(register.file, owner, family, field, entries, log)
     return values
+
+
+def _read_family(file, owner, family, field, entries, log):
+    """{name: value} of the keys that belong to a family; what is bad is told to `log`."""
+    found = {}
+    for key, value in entries.items():
+        first, _, own = key.partition(".")
+        if first != family or is_blank(value.raw):
+            continue
+        try:
+            own = read_value(Field(key, "name", ""), own)
+            found[own] = read_value(field, value.raw)
+        except Refused as refusal:
+            log.problem(file, str(refusal), value.row, f"{owner}.{key}")
+    return found
+
+
+def as_spelt(register, entries, key):
+    """The spelling of a key that an entry has: its short one when that alone is filled in."""
+    short = SHORT_KEYS[register].get(key)
+    return short if _is_filled(entries, short) and not _is_filled(entries, key) else key
+
+
+def _is_filled(entries, key):
+    return key in entries and not is_blank(entries[key].raw)
+
+
+def _refuse_two_spellings(file, register, owner, entries, log):
+    for key, short in SHORT_KEYS[register].items():
+        if _is_filled(entries, key) and _is_filled(entries, short):
+            expected = f"given beside {key}; expected one of them: they are the same parameter"
+            log.problem(file, expected, entries[short].row, f"{owner}.{short}")
 
 
 def kind_of(raw):
@@ -131,18 +155,14 @@ def _only_for(field, kind):
 
 
 def _refuse_unknown(file, section, entries, section_row, log):
-    later = "not available in this version of tankcal; remove it or set it to 0"
     if section not in KEYS:
         log.problem(file, f"unknown section{nearest(section, KEYS)}", section_row, f"[{section}]")
         return
     known = [field.name for field in KEYS[section]]
     for key, value in entries.items():
-        name = f"{section}.{key}"
-        if key in LATER_KEYS.get(section, ()):
-            if not is_blank(value.raw) and value.raw not in (0, []):
-                log.problem(file, later, value.row, name)
-        elif key not in known and not _is_own(section, key, known):
-            log.problem(file, f"unknown key{nearest(key, known)}", value.row, name)
+        if key not in known and not _is_own(section, key, known):
+            expected = f"unknown key{nearest(key, known)}"
+            log.problem(file, expected, value.row, f"{section}.{key}")
 
 
 def _own_fields(section, fields, given):
@@ -161,28 +181,64 @@ def _is_own(section, key, known):
     return section in OPEN_SECTIONS and plain is not None and not nearest(key, known)
 
 
-def _setting(file, name, field, value, kind, log, is_required, row=None):
-    """The value of one key; row: where its section begins, for a message that it is missing."""
+def read_setting(file, name, field, value, kind, log, is_required, row=None):
+    """The value of one key, or None after telling `log`, which calls it `name`.
+
+    value  its tables.Value, or None         kind  of the tank, or None
+    row    where its section begins, for a message that it is missing
+    """
     if value is None or (is_blank(value.raw) and value.raw not in field.choices):
         if is_required:
             found = "missing" if value is None else "blank"
-            place = row if value is None else value.row
-            log.problem(file, f"{found}; expected {field.wanted()}", place, name)
+            log.problem(file, f"{found}; expected {field.wanted()}", _row_of(value, row), name)
         return None
     if not field.suits(kind):
         if not _says_nothing(value):
-            log.problem(file, f"{_only_for(field, kind)}; remove it", value.row, name)
+            log.problem(file, f"{_only_for(field, kind)}; remove it", _row_of(value, row), name)
         return None
     try:
-        return read_value(field, value.raw)
+        return read_value(field, value.raw, IN_TOML if file.endswith(".toml") else None)
     except Refused as refusal:
-        log.problem(file, str(refusal), value.row, name)
+        log.problem(file, str(refusal), _row_of(value, row), name)
         return None
 
 
-def read_columns(name, table, log):
-    """ColumnValues of one raw table; unknown, missing and bad things are told to `log`."""
-    fields = COLUMNS[name]
+def read_section(file, section, fields, given, row, log):
+    """{key: value or None} of one section of a file; unknown, missing and bad goes to the log.
+
+    given  {key: tables.Value}         row  where the section begins
+    """
+    known = [field.name for field in fields]
+    for key, value in given.items():
+        if key not in known:
+            expected = f"unknown key; expected {', '.join(known)}{nearest(key, known)}"
+            log.problem(file, expected, value.row or row, f"{section}.{key}")
+    return {
+        field.name: read_setting(
+            file,
+            f"{section}.{field.name}",
+            field,
+            given.get(field.name),
+            None,
+            log,
+            field.required,
+            row,
+        )
+        for field in fields
+    }
+
+
+def _row_of(value, row):
+    """The row of a value; of one within an inline table, that of its section."""
+    return row if value is None or value.row is None else value.row
+
+
+def read_columns(name, table, log, fields=None):
+    """ColumnValues of one raw table; unknown, missing and bad things are told to `log`.
+
+    fields  its columns; None: those that a job's table of this name has
+    """
+    fields = COLUMNS[name] if fields is None else fields
     known = [field.name for field in fields]
     for heading in table.headings:
         if heading not in known:

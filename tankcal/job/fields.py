@@ -10,18 +10,20 @@ import re
 import unicodedata
 from dataclasses import dataclass
 
-from tankcal.job.tables import BadCell, nearest, shown
+from tankcal.job.misread import hint_of_date, hint_of_number, hint_of_text
+from tankcal.job.tables import BadCell, Percent, nearest, shown
+from tankcal.naming import MAX_NAME, is_name
 
 MAX_TEXT = 300
-MAX_NAME = 64
 MAX_LIST = 50  # numbers or pairs
+IN_TOML = "toml"  # in place of a decimal mark: a number is a number, and never a cell
 MAX_NAMES = 5000
 NAME_RULE = "a letter, digit or underscore first, then letters, digits, spaces or _ - . ( ) / #"
 TANK_ID_RULE = "letters, digits, spaces or _ - . ( ), no .. and no . or - first"
 
 NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
-_NAME = re.compile(r"\w[\w .()/#-]*")
 _TANK_ID = re.compile(r"(?!.*\.\.)[\w(][\w .()-]*")
+_RULE_NAME = re.compile(r"(?!.*\.\.)\w[\w .()-]*")
 _MESH_FILE = re.compile(r"(?!.*\.\.)\w[\w .()-]*\.(stl|obj|ply|off)", re.IGNORECASE)
 _DMS = re.compile(
     r"([+-]?)([0-9]{1,3})(?:[ \t]*[°º][ \t]*|[ \t]+|-)([0-9]{1,2})(?:"
@@ -41,8 +43,8 @@ class Field:
 
     name       as written in the file, with its unit
     kind       "number", "text", "name", "tank id", "choice", "flag", "date", "mesh file",
-               "numbers" (several of them), "ranges" (pairs of numbers), "names" (several of them)
-               or "dms" (an angle in degrees, minutes and seconds; read as degrees)
+               "rule name", "numbers" (several of them), "ranges" (pairs of numbers), "names"
+               (several of them) or "dms" (degrees, minutes and seconds; read as degrees)
     note       one line for the person who fills it in
     required   must be there and filled in, for every kind of tank in `kinds`
     kinds      the kinds of tank that it is for; (): all
@@ -88,15 +90,16 @@ class Field:
         if self.kind == "dms":
             return f"degrees, minutes and seconds such as 123 04 05.6{self._bounds(' degrees')}"
         if self.kind == "numbers":
-            return f"numbers{self._bounds()}, such as 700; 850 (in job.toml also [700, 850])"
+            return f"numbers{self._bounds()}, such as 700; 850 (in a .toml file also [700, 850])"
         return {
             "text": f"text of at most {MAX_TEXT} characters in one line",
             "name": f"a name of at most {MAX_NAME} characters ({NAME_RULE})",
             "tank id": f"a name of at most {MAX_NAME} characters ({TANK_ID_RULE})",
             "flag": "true or false",
             "date": "a date such as 2024-05-31",
-            "ranges": "pairs such as 0-0.3; 2.1-2.4 (in job.toml also [[0, 0.3], [2.1, 2.4]])",
-            "names": 'names such as P7; P9 (in job.toml also ["P7", "P9"])',
+            "ranges": "pairs such as 0-0.3; 2.1-2.4 (in a .toml file also [[0, 0.3], [2.1, 2.4]])",
+            "names": 'names such as P7; P9 (in a .toml file also ["P7", "P9"])',
+            "rule name": "the name of a rule of tankcal, or of a .toml file in the job's folder",
             "mesh file": "the plain name of a .stl, .obj, .ply or .off file, in the job's folder",
         }[self.kind]
 
@@ -125,8 +128,8 @@ def is_blank(raw):
 def read_value(field, raw, decimal=None):
     """The value of a field as float, text or bool; `raw` is not blank.
 
-    decimal is the mark of numbers that stand as text (CSV), or None where a number is a number
-    (TOML, workbook). Raises Refused.
+    decimal is the mark of numbers that stand as text (CSV), or None (workbook) or IN_TOML where a
+    number is a number. Raises Refused.
     """
     if isinstance(raw, BadCell):
         raise Refused(f"{raw.complaint}; expected {field.expectation()}")
@@ -148,10 +151,11 @@ def _read_number(field, raw, decimal):
         return raw.strip()
     if isinstance(raw, str):
         value = _number_of_text(field, raw, decimal)
-    elif isinstance(raw, int | float) and not isinstance(raw, bool):
+    elif isinstance(raw, int | float) and not isinstance(raw, bool | Percent):
         value = _float(raw)
     else:
-        raise Refused(f"found {_kind_of(raw)}{shown(raw)}; expected {field.expectation()}")
+        found, hint = _kind_of(raw) + shown(raw), hint_of_number(raw)
+        raise Refused(f"found {found}; expected {field.expectation()}{hint}")
     if not math.isfinite(value):
         raise Refused(f"found {shown(raw)}; expected {field.expectation()}, not NaN or infinite")
     if value > field.high or value < field.low or (field.above_low and value == field.low):
@@ -167,15 +171,15 @@ def _number_of_text(field, raw, decimal):
         raise Refused(f"found {shown(raw)}; expected {wanted}")
     plain = text.replace(",", ".") if decimal != "." else text
     is_number = NUMBER.fullmatch(plain) is not None
-    if decimal is None:
-        hint = ", stored as a number (no quotation marks, no text cell)" if is_number else ""
+    if decimal in (None, IN_TOML):
+        hint = hint_of_text(text, in_cell=decimal is None)
         raise Refused(f"found the text {shown(raw)}; expected {wanted}{hint}")
     if is_number and not (decimal == "," and "." in text):
         return float(plain)
     if decimal == "." and NUMBER.fullmatch(text.replace(",", ".")):
-        hint = " with a decimal point; for decimal commas see [csv] decimal in job.toml"
+        hint = " with a decimal point; for decimal commas set [csv] decimal = ','"
     elif decimal == "," and NUMBER.fullmatch(text):
-        hint = " with a decimal comma, as [csv] decimal in job.toml says"
+        hint = " with a decimal comma, as [csv] decimal says"
     else:
         hint = ""
     raise Refused(f"found {shown(raw)}; expected {wanted}{hint}")
@@ -195,7 +199,7 @@ def _kind_of(raw):
         return "the date "
     if isinstance(raw, datetime.time | datetime.timedelta):
         return "the time "
-    return ""
+    return "the percentage " if isinstance(raw, Percent) else ""
 
 
 def _other_unit(field, value):
@@ -224,8 +228,11 @@ def _read_text(field, raw, _decimal):
         text = str(raw)
     if field.kind == "text":
         sound = len(text) <= MAX_TEXT and all(_is_writing(char) for char in text)
+    elif field.kind == "name":
+        sound = is_name(text)
     else:
-        pattern = {"name": _NAME, "tank id": _TANK_ID, "mesh file": _MESH_FILE}[field.kind]
+        patterns = {"tank id": _TANK_ID, "mesh file": _MESH_FILE, "rule name": _RULE_NAME}
+        pattern = patterns[field.kind]
         sound = len(text) <= MAX_NAME and pattern.fullmatch(text) is not None
     if not sound:
         raise Refused(f"found {shown(text)}; expected {field.expectation()}")
@@ -264,19 +271,18 @@ def _read_date(field, raw, _decimal):
             return datetime.date.fromisoformat(text).isoformat()
     except ValueError:
         pass
-    raise Refused(f"found {shown(raw)}; expected {field.expectation()}")
+    raise Refused(f"found {shown(raw)}; expected {field.expectation()}{hint_of_date(raw)}")
 
 
-def _read_numbers(field, raw, _decimal):
+def _read_numbers(field, raw, decimal):
     """Tuple of a list of numbers, of a text such as 700; 850, or of one number."""
     parts = raw.split(";") if isinstance(raw, str) else raw if isinstance(raw, list) else [raw]
     if not parts or len(parts) > MAX_LIST:
         raise Refused(f"found {shown(raw)}; expected 1 to {MAX_LIST} {field.expectation()}")
-    decimal = "." if isinstance(raw, str) else None
+    is_text = isinstance(raw, str)
+    mark = "." if is_text else decimal
     try:
-        return tuple(
-            _read_number(field, part.strip() if decimal else part, decimal) for part in parts
-        )
+        return tuple(_read_number(field, part.strip() if is_text else part, mark) for part in parts)
     except Refused as refusal:
         found = str(refusal).partition("; expected")[0]
         raise Refused(f"{found}; expected {field.expectation()}") from None

@@ -1,14 +1,13 @@
 """A job as a folder: job.toml for the settings, a CSV file for each table."""
 
 import csv
-import hashlib
 import re
 import tomllib
 
 from tankcal.job.tables import (
     COVARIANCE_FILE,
-    LATER_TABLES,
     MAX_FILE_BYTES,
+    REFUSED_FILE,
     REGISTERS,
     SEPARATORS,
     SETTINGS_FILE,
@@ -16,6 +15,7 @@ from tankcal.job.tables import (
     RawJob,
     Register,
     Value,
+    fingerprint,
     make_table,
     nearest,
     read_bytes,
@@ -39,7 +39,7 @@ def read_folder(folder, log):
     def content(name, limit=MAX_FILE_BYTES):
         data = read_bytes(folder / name, log, limit)
         if data is not None:
-            files.append((name, hashlib.sha256(data).hexdigest(), len(data)))
+            files.append(fingerprint(name, data))
         return data
 
     settings, sections = None, {}
@@ -49,7 +49,7 @@ def read_folder(folder, log):
             settings, sections = read_toml(SETTINGS_FILE, data, log)
     else:
         log.problem(SETTINGS_FILE, "missing file; every job folder has one" + _hint(names))
-    marks = _csv_marks(settings or {}, log)
+    marks = csv_marks(SETTINGS_FILE, settings or {}, log)
     tables = {}
     for table in TABLES:
         name = f"{table}.csv"
@@ -85,12 +85,10 @@ def _hint(names):
 def _refuse_unknown_files(names, log):
     known = [f"{table}.csv" for table in TABLES]
     for name in names:
-        stem, _, ending = name.lower().rpartition(".")
-        if name.startswith((".", "~")) or name in known:
+        ending = name.lower().rpartition(".")[2]
+        if name.startswith((".", "~")) or name in known or name == REFUSED_FILE:
             continue
-        if stem in LATER_TABLES and ending == "csv":
-            log.problem(name, "not available in this version of tankcal: remove the file")
-        elif ending == "csv":
+        if ending == "csv":
             listed = ", ".join(known)
             log.problem(
                 name, f"unknown file; the CSV files of a job are {listed}{nearest(name, known)}"
@@ -121,17 +119,20 @@ def _lines(text):
 
 def read_toml(file, data, log):
     """({section: {key: Value}}, {section: row}) of a TOML file, or (None, {}) when unreadable."""
-    parsed = _parsed(file, data, log)
-    return (None, {}) if parsed is None else _flatten(file, *parsed, log)
+    parsed = parsed_toml(file, data, log)
+    return (None, {}) if parsed is None else flattened(file, *parsed, log)
 
 
-def read_register(file, data, log):
-    """Register of cameras.toml or instruments.toml, or None after telling `log` what is wrong."""
-    parsed = _parsed(file, data, log)
+def read_register(file, data, log, register=None):
+    """Register of cameras.toml or instruments.toml, or None after telling `log` what is wrong.
+
+    register  "cameras" or "instruments"; None: as the file is called
+    """
+    parsed = parsed_toml(file, data, log)
     if parsed is None:
         return None
     content, rows = parsed
-    register = file.rpartition(".")[0]
+    register = register or file.rpartition(".")[0]
     entries, places = {}, {}
     for section, inside in content.items():
         if section != register or not isinstance(inside, dict):
@@ -145,13 +146,23 @@ def read_register(file, data, log):
                 log.problem(file, expected, rows.get(where), name)
                 continue
             entries[name] = {
-                key: Value(value, rows.get(f"{where}.{key}")) for key, value in given.items()
+                key: Value(value, rows.get(re.sub(r"[\s\"']", "", f"{where}.{key}")))
+                for key, value in _flat(given)
             }
             places[name] = rows.get(where)
     return Register(file, entries, places)
 
 
-def _parsed(file, data, log):
+def _flat(given):
+    """Pairs (key, value) of an entry; those of a section within it as section.key."""
+    for key, value in given.items():
+        if isinstance(value, dict):
+            yield from ((f"{key}.{inner}", one) for inner, one in value.items())
+        else:
+            yield key, value
+
+
+def parsed_toml(file, data, log):
     """(content, row of each section and 'section.key') of a TOML file, or None when unreadable."""
     text = decode(file, data, log)
     if text is None:
@@ -187,7 +198,8 @@ def _toml_rows(text):
     return rows
 
 
-def _flatten(file, data, rows, log):
+def flattened(file, data, rows, log):
+    """({section: {key: Value}}, {section: row}) of the content of a TOML file."""
     settings, sections = {}, {}
     todo = [("", data, 0)]
     while todo:
@@ -207,8 +219,8 @@ def _flatten(file, data, rows, log):
     return settings, sections
 
 
-def _csv_marks(settings, log):
-    """(separator, decimal mark), or None when they cannot be used.
+def csv_marks(file, settings, log):
+    """(separator, decimal mark) that the settings in a file give, or None when they are unusable.
 
     Marks that are not known are told by the check of the settings.
     """
@@ -219,19 +231,21 @@ def _csv_marks(settings, log):
     if separator == decimal:
         row = next(iter(settings["csv"].values())).row
         expected = "separator and decimal are both a comma; expected two marks, such as ; and ,"
-        log.problem(SETTINGS_FILE, expected, row, "csv.separator")
+        log.problem(file, expected, row, "csv.separator")
         return None
     return separator, decimal
 
 
-def read_csv(file, data, separator, decimal, log):
+def read_csv(file, data, separator, decimal, log, settings_file=SETTINGS_FILE):
     """Table of the bytes of a CSV file, or None after telling `log` why it cannot be read."""
     text = decode(file, data, log)
     if text is None:
         return None
     hint = ""
     if separator == "," and decimal == ".":
-        hint = "; for decimal commas set [csv] separator = ';' and decimal = ',' in job.toml"
+        hint = (
+            f"; for decimal commas set [csv] separator = ';' and decimal = ',' in {settings_file}"
+        )
     return make_table(file, _csv_rows(file, text, separator, log), decimal, log, hint)
 
 

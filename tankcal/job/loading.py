@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tankcal.job.attached import read_mesh_file
+from tankcal.job.attached import Attached, read_mesh_file
 from tankcal.job.checks import check_all
 from tankcal.job.checks.common import has_survey
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
@@ -11,6 +11,7 @@ from tankcal.job.entries import kind_of, read_columns, read_register, read_setti
 from tankcal.job.folder import read_folder
 from tankcal.job.making import make_frame, make_job
 from tankcal.job.measuring import make_measurements
+from tankcal.job.rule_files import find_rule
 from tankcal.job.sheets import expected_sheets, read_workbook
 from tankcal.job.tables import (
     COVARIANCE_FILE,
@@ -21,6 +22,8 @@ from tankcal.job.tables import (
     TANK_TABLES,
     Log,
 )
+
+OTHER_WORKBOOKS = (".xls", ".xlsm", ".xlsb", ".xltx", ".ods", ".numbers")
 
 
 def load(path, only=None):
@@ -44,17 +47,14 @@ def load(path, only=None):
     registers = {name: read_register(raw, name, log) for name in REGISTERS}
     values = read_settings(raw, log, is_whole) if raw.settings is not None else None
     check_all(values, tables, registers, raw, is_whole, log)
-    covariance, mesh, measurements = None, None, None
-    if is_whole:
-        covariance = _covariance(raw, tables["points"], log)
-    if is_whole and values is not None and values["mesh"]["file"] is not None:
-        mesh = read_mesh_file(raw.folder, values["mesh"]["file"], log)
+    attached = _attached(raw, values, tables["points"], log) if is_whole else None
     log.stop_if_problems()
+    measurements = None
     if has_survey(tables):
         measurements = make_measurements(values, tables, registers)
     if not is_whole:
         return make_frame(raw, values, tables, measurements, tuple(log.warnings))
-    return make_job(raw, values, tables, covariance, mesh, measurements, tuple(log.warnings))
+    return make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
 
 
 def _read(path, log):
@@ -68,6 +68,8 @@ def _read(path, log):
         if path.suffix.lower() == ".xlsx" and path.is_file():
             return read_workbook(path, log)
         found = f"found a {path.suffix or 'nameless'} file" if path.exists() else "not found"
+        if path.suffix.lower() in OTHER_WORKBOOKS and path.is_file():
+            expected = "open it in Excel or LibreOffice and save it as .xlsx"
     except (OSError, ValueError):
         found = "an impossible name"
     log.problem(path.name or ".", f"{found}; {expected}")
@@ -113,6 +115,18 @@ def _missing(raw, name):
     needed = ", ".join(field.name for field in COLUMNS[name] if field.required)
     instead = ", or the files of a survey, such as distances.csv" if name == "points" else ""
     return f"missing file; expected one with the columns {needed}{instead}"
+
+
+def _attached(raw, values, points, log):
+    """What lies beside the settings, None for what cannot be read; values: None: unreadable."""
+    mesh = rule = None
+    if values is not None:
+        mesh, rule = values["mesh"]["file"], values["table"]["rule"]
+    return Attached(
+        _covariance(raw, points, log),
+        None if mesh is None else read_mesh_file(raw.folder, mesh, log),
+        None if rule is None else find_rule(raw, rule, log),
+    )
 
 
 def _covariance(raw, points, log):

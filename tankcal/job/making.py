@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.job.checks import bottom_form
-from tankcal.job.contract import INPUTS
 from tankcal.job.contract.parts import MESH_UNITS_M
+from tankcal.job.declaring import correlations_of, inputs_of, stated_of
 from tankcal.job.model import (
     Bottom,
     Course,
     Datum,
     Deadwood,
-    DeclaredInput,
     End,
     Horizontal,
     InputFile,
@@ -29,28 +28,29 @@ from tankcal.job.model import (
 )
 
 
-def make_job(raw, values, tables, covariance, mesh, measurements, warnings):
+def make_job(raw, values, tables, attached, measurements, warnings):
     """The Job of values and tables without problems.
 
-    covariance    (3n, 3n) m2 or None; mesh  ((name, SHA-256, size), bytes) or None
-    measurements  Measurements or None
+    attached  attached.Attached        measurements  Measurements or None
     """
     kind = values["tank"]["kind"]
-    points = _points(tables["points"], covariance)
+    points = _points(tables["points"], attached.covariance_m2)
     has_points = points is not None or measurements is not None
     frame = make_frame(raw, values, tables, measurements, warnings, has_points)
-    files = frame.files if mesh is None else (*frame.files, InputFile(*mesh[0]))
     return replace(
         frame,
         points=points,
-        inputs=_inputs(tables["uncertainty"]),
-        files=files,
+        inputs=inputs_of(values, tables),
+        correlations=correlations_of(tables["correlations"]),
+        stated=stated_of(tables["stated"]),
+        rule=attached.rule and attached.rule[0],
+        files=(*frame.files, *(InputFile(*file) for file in attached.files)),
         bottom=_bottom(values, tables["bottom"]),
         deadwood=_deadwood(tables["deadwood"]),
         roof=_roof(values["roof"]),
         horizontal=_horizontal(values["horizontal"], has_points) if kind == "horizontal" else None,
         sphere=_sphere(values["sphere"]) if kind == "sphere" else None,
-        mesh=_mesh(values["mesh"], mesh[1]) if kind == "mesh" else None,
+        mesh=_mesh(values["mesh"], attached.mesh[1]) if kind == "mesh" else None,
     )
 
 
@@ -105,7 +105,7 @@ def _datum(values, kind, has_points):
 def _table(values):
     if values["reference_temperature_c"] is None:
         return None
-    given = _given(values) | {"language": "en"}
+    given = _given(values)
     litres = given.pop("max_interpolation_error_l", None)
     return TableSpec(
         step_m=given.pop("step_m", None),
@@ -213,24 +213,3 @@ def _sphere(values):
 
 def _mesh(values, data):
     return Mesh(values["file"], MESH_UNITS_M[values["unit"]], data)
-
-
-def _inputs(table):
-    if table is None:
-        return ()
-    names = ("input", "u", "unit", "type", "distribution", "dof", "note")
-    return tuple(
-        DeclaredInput(
-            name=name,
-            u=u / INPUTS[name].per_si,
-            unit=unit,
-            u_as_read=u,
-            type=type or "B",
-            distribution=distribution or "normal",
-            dof=np.inf if dof is None else dof,
-            note=note or "",
-        )
-        for name, u, unit, type, distribution, dof, note in zip(
-            *(table.of(name) for name in names), strict=True
-        )
-    )

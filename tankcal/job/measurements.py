@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tankcal.comparator import Transformation
+from tankcal.focus import Lens
 from tankcal.network.survey import Camera
 
 
@@ -25,6 +27,10 @@ class AdjustmentSettings:
     scale         of the covariances that go on: "a_priori" or "a_posteriori"
     refraction    coefficient k (0.13) for zenith angles, vertical angles and slope distances; None:
                   neither curvature nor refraction
+    explain       whether a survey that does not fit is tried again as if it had been misread; what
+                  compares wrong suppositions on purpose leaves it out
+    reading_limit_mm  sd of one of repeated readings beyond which they are rejected; None: never
+    depth_of_field    whether radial distortion follows the depth of each point
     """
 
     datum: str = "control"
@@ -34,6 +40,9 @@ class AdjustmentSettings:
     snooping: bool = True
     scale: str = "a_priori"
     refraction: float | None = None
+    explain: bool = True
+    reading_limit_mm: float | None = None
+    depth_of_field: bool = False
 
 
 @dataclass(frozen=True)
@@ -43,11 +52,18 @@ class CameraSetup:
     camera     network.Camera, mm
     format_mm  (2,) width and height of the image
     pixel_mm   (2,) size of a pixel, or None: image coordinates come in mm
+    lens       radial distortion by distance, which `camera` has at the focus; None: one for all
     """
 
     camera: Camera
     format_mm: np.ndarray
     pixel_mm: np.ndarray | None = None
+    lens: Lens | None = None
+
+    @property
+    def format_px(self):
+        """(2,) columns and lines of the image, whole; needs `pixel_mm`."""
+        return np.round(self.format_mm / self.pixel_mm).astype(int)
 
 
 @dataclass(frozen=True)
@@ -69,6 +85,8 @@ class ImageReadings:
     """Image coordinates (n, 2), mm, x to the right and y up from the middle of the format.
 
     sd_mm  (n, 2), nan where not given        check  (n,) True: compared, not adjusted
+    shared_sd_mm  (n, 2) of the transformation from the comparator, the same error for all readings
+                  of a point; None: no photo was read on a comparator
     """
 
     photo: tuple
@@ -78,6 +96,47 @@ class ImageReadings:
     check: np.ndarray
     rows: tuple = ()
     file: str = "image_points.csv"
+    shared_sd_mm: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class RejectedReadings:
+    """Repeated readings of a point or mark that scatter beyond the limit.
+
+    count  of the readings    sd_mm  (2,) of one of them, from the sample    row  of the first
+    """
+
+    photo: str
+    name: str
+    count: int
+    sd_mm: np.ndarray
+    row: int | None = None
+
+
+@dataclass(frozen=True)
+class FiducialFit:
+    """How the readings of a photo's marks fit their calibrated coordinates.
+
+    marks        (n,) names            calibrated_mm  (n, 2)
+    count        (n,) readings         mean_mm        (n, 2) of the readings, without weights
+    sd_mm        (n, 2) of one reading, from the sample; nan for a single one
+    residual_mm  (n, 2) mean of the readings, transformed, minus calibrated
+    rejected     tuple of RejectedReadings
+    growth       largest sd of an image coordinate over what it would be without that of the
+                 transformation; nan without image points
+    """
+
+    photo: str
+    camera: str
+    marks: tuple
+    calibrated_mm: np.ndarray
+    count: np.ndarray
+    mean_mm: np.ndarray
+    sd_mm: np.ndarray
+    residual_mm: np.ndarray
+    transformation: Transformation
+    rejected: tuple[RejectedReadings, ...] = ()
+    growth: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -206,6 +265,8 @@ class Measurements:
     control   None: no control.csv             check    None: no check.csv
     readings  a table for each file that has rows
     nominal   None where the job has no vertical tank
+    fiducials a FiducialFit for each photo that was read on a comparator: `image_points` are
+              transformed by them already
     """
 
     settings: AdjustmentSettings = AdjustmentSettings()
@@ -219,3 +280,4 @@ class Measurements:
     setups: tuple[Setup, ...] = ()
     readings: tuple[Readings, ...] = ()
     nominal: NominalTank | None = None
+    fiducials: tuple[FiducialFit, ...] = ()

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from tankcal.job.cameras import image_coordinates, image_frames, make_camera
+from tankcal.job.cameras import make_camera
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.contract.registers import FREE, INSTRUMENT_KINDS
 from tankcal.job.datum import AXES, datum_point
+from tankcal.job.imagery import imagery_of
 from tankcal.job.measurements import (
     AdjustmentSettings,
     ImageReadings,
@@ -35,7 +36,7 @@ def make_measurements(values, tables, registers):
         make_camera(name, given, values["adjustment.camera"])
         for name, given in registers["cameras"].items()
     )
-    images = _image_points(tables["image_points"], tables["photos"], registers["cameras"])
+    images, fits = _image_points(tables, registers["cameras"], values["adjustment"])
     return Measurements(
         settings=_settings(values["adjustment"]),
         cameras=cameras,
@@ -52,6 +53,7 @@ def make_measurements(values, tables, registers):
             _readings(name, tables[name]) for name in READINGS if _has_rows(tables[name])
         ),
         nominal=_nominal(values),
+        fiducials=fits,
     )
 
 
@@ -60,7 +62,7 @@ def _has_rows(table):
 
 
 def _settings(given):
-    sd = given["image_sd_um"]
+    sd, limit = given["image_sd_um"], given["reading_limit_um"]
     return AdjustmentSettings(
         datum=given["datum"] or "control",
         datum_points=tuple(datum_point(text) for text in given["datum_points"] or ()),
@@ -69,6 +71,8 @@ def _settings(given):
         snooping=given["snooping"] is not False,
         scale=given["scale"] or "a_priori",
         refraction=given["refraction"],
+        reading_limit_mm=None if limit is None else limit / 1000,
+        depth_of_field=bool(given["depth_of_field"]),
     )
 
 
@@ -112,20 +116,24 @@ def _photos(table, images):
     return tuple(Photo(*row) for row in named if row[0] in seen)
 
 
-def _image_points(table, photos, cameras):
+def _image_points(tables, cameras, adjustment):
+    """ImageReadings, or None, and the FiducialFit of photos that have image points."""
+    table = tables["image_points"]
     if not _has_rows(table):
-        return None
-    size, pixel = image_frames(table, photos, cameras)
-    sd = np.column_stack([table.numbers("sx_um"), table.numbers("sy_um")]) / 1000
-    return ImageReadings(
-        photo=tuple(table.of("photo")),
+        return None, ()
+    found = imagery_of(tables, cameras, adjustment)
+    photos = tuple(table.of("photo"))
+    images = ImageReadings(
+        photo=photos,
         point=tuple(table.of("point")),
-        xy_mm=image_coordinates(table, size, pixel),
-        sd_mm=np.where(np.isnan(sd), table.numbers("s_px")[:, None] * pixel, sd),
+        xy_mm=found.xy_mm,
+        sd_mm=found.sd_mm,
         check=_check(table),
         rows=table.rows,
         file=table.file,
+        shared_sd_mm=found.shared_sd_mm,
     )
+    return images, tuple(fit for photo, fit in found.fits.items() if photo in set(photos))
 
 
 def _known_points(table, check=False):

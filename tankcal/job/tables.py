@@ -6,21 +6,25 @@ is wrong to a `Log`, so that all problems of a job come in one run.
 """
 
 import difflib
+import hashlib
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 
-TANK_TABLES = ("points", "courses", "bottom", "deadwood", "uncertainty")
+TANK_TABLES = (
+    *("points", "courses", "bottom", "deadwood"),
+    *("uncertainty", "correlations", "stated"),
+)
 SURVEY_TABLES = (
-    *("targets", "photos", "image_points", "control", "check", "setups", "distances"),
-    *("slope_distances", "directions", "zenith_angles", "azimuths", "horizontal_angles"),
-    *("vertical_angles", "height_differences", "plumb_lines"),
+    *("targets", "photos", "image_points", "fiducials", "film", "control", "check", "setups"),
+    *("distances", "slope_distances", "directions", "zenith_angles", "azimuths"),
+    *("horizontal_angles", "vertical_angles", "height_differences", "plumb_lines"),
 )
 TABLES = TANK_TABLES + SURVEY_TABLES
-LATER_TABLES = ("fiducials",)
 REGISTERS = {"cameras": "camera", "instruments": "instrument"}  # and what each one lists
 SETTINGS_FILE = "job.toml"
+REFUSED_FILE = "image_points_refused.csv"  # written beside image_points.csv, never read
 COVARIANCE_FILE = "points_cov.npz"
 
 MAX_FILE_BYTES = 200_000_000
@@ -47,6 +51,8 @@ def nearest(word, known):
 
 
 def _printable(text):
+    if text.isprintable():
+        return text
     return "".join(char if char.isprintable() else "?" for char in text)
 
 
@@ -56,14 +62,31 @@ class Log:
     def __init__(self):
         self.problems = []
         self.warnings = []
+        self._letters = {}
+
+    def place_columns(self, file, letters):
+        """Tell in which column of a sheet each heading stands: {heading: letters}.
+
+        None in place of a heading stands for all that is no heading, such as the keys of settings.
+        """
+        self._letters[file] = letters
 
     def problem(self, file, expected, row=None, column=None):
         """Note one thing that stops the job; each text becomes one printable line."""
-        self.problems.append(_make_problem(file, expected, row, column))
+        self.problems.append(self._problem(file, expected, row, column))
 
     def warning(self, file, expected, row=None, column=None):
         """Note one thing that does not stop the job."""
-        self.warnings.append(_make_problem(file, expected, row, column))
+        self.warnings.append(self._problem(file, expected, row, column))
+
+    def _problem(self, file, expected, row, column):
+        letters = self._letters.get(file)
+        cell = None
+        if letters is not None and row is not None and column is not None:
+            letter = letters.get(column, letters.get(None))
+            cell = None if letter is None else f"{letter}{row}"
+        column = None if column is None else _printable(str(column)[:80])
+        return Problem(_printable(str(file)[:120]), _printable(expected), row, column, cell)
 
     def stop_if_problems(self):
         """Raise InputError with every problem, by file and row; the longest lists are cut."""
@@ -82,16 +105,18 @@ class Log:
         raise InputError(listed)
 
 
-def _make_problem(file, expected, row, column):
-    column = None if column is None else _printable(str(column)[:80])
-    return Problem(_printable(str(file)[:120]), _printable(expected), row, column)
-
-
 @dataclass(frozen=True)
 class BadCell:
     """A workbook cell without a usable value: a formula never calculated, an error such as #N/A."""
 
     complaint: str
+
+
+class Percent(float):
+    """A number that a workbook shows in percent: 0.05 for 5 %."""
+
+    def __str__(self):
+        return f"{100 * self:.12g} %"
 
 
 @dataclass(frozen=True)
@@ -164,6 +189,8 @@ class RawJob:
 def read_bytes(path, log, limit=MAX_FILE_BYTES):
     """The bytes of a file, or None after telling `log` why it cannot be read."""
     try:
+        if not path.exists():
+            return log.problem(path.name, "not found; expected a file")
         if not path.is_file():
             log.problem(path.name, "expected a file, found something else")
             return None
@@ -175,6 +202,11 @@ def read_bytes(path, log, limit=MAX_FILE_BYTES):
         reason = getattr(error, "strerror", None) or "impossible name"
         log.problem(path.name, f"the file cannot be read ({reason})")
     return None
+
+
+def fingerprint(name, data):
+    """(name, SHA-256, bytes) of a file, as `RawJob.files` lists it."""
+    return name, hashlib.sha256(data).hexdigest(), len(data)
 
 
 def make_table(file, numbered_rows, decimal, log, hint=""):

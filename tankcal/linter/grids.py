@@ -5,12 +5,13 @@ import json
 import re
 from dataclasses import dataclass
 
-from tankcal.job import sheets
+from tankcal.job.excel import MAX_COLUMNS, Unreadable, read_sheets
 from tankcal.job.folder import decode
+from tankcal.job.sheets import is_read
 from tankcal.job.tables import read_bytes, shown
 
 RECORD_FORMAT = "tankcal-record/1"
-MOST_COLUMNS, MOST_LINES = sheets.MAX_COLUMNS, 200_000
+MOST_COLUMNS, MOST_LINES = MAX_COLUMNS, 200_000
 _BY_CERTAINTY = (";", "\t", ",")  # a comma may be a decimal mark
 
 
@@ -51,23 +52,19 @@ def read_grids(path, log):
 
 
 def _workbook(file, data, log):
-    complaint = sheets._complaint(data)
-    if complaint:
-        log.problem(file, complaint)
-        return ()
     try:
-        cells = sheets._read_cells(data)
-    except Exception:  # openpyxl raises whatever a damaged part happens to trip over
-        log.problem(file, "damaged: open it in Excel or LibreOffice and save it again")
+        sheets = read_sheets(data, is_read)
+    except Unreadable as reason:
+        log.problem(file, str(reason))
         return ()
     return tuple(
         Grid(
-            f"{file}, sheet {title}",
-            tuple((number, tuple(row)) for number, row in rows),
-            sheet=title,
+            f"{file}, sheet {sheet.title}",
+            tuple((number, tuple(cells)) for number, cells in sheet.grid.rows),
+            sheet=sheet.title,
         )
-        for title, rows in cells.items()
-        if rows
+        for sheet in sheets
+        if sheet.grid.rows
     )
 
 

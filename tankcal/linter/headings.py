@@ -19,7 +19,7 @@ _VOLUME = re.compile(
 _OTHER = re.compile(
     "u|k|sd|per|por|uncertainty|incerteza|incertidumbre|area|temperatur[ae]|densit[ya]|densidade?|"
     "correction|correcao|correccion|difference|diferenca|diferencia|increment[o]?|delta|fa[c]?tor|"
-    "deviation|desvio"
+    "deviation|desvio|low|high"
 )
 _RATE = re.compile(r"/ ?(mm|cm|dm|m|in|ft|pol)\b")
 _PARTS = re.compile("proportional|proporciona|interpola|milimetrica")

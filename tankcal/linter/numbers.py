@@ -14,6 +14,7 @@ from tankcal.job.tables import BadCell, shown
 THOUSANDS = (",", ".", " ", "'", "\u2019", "\u00a0", "\u2009", "\u202f")
 MOST_DECIMALS = 15
 LARGEST = 1e12
+BLANK = "nothing stands here; expected a number"
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def read_number(cell, style):
     if isinstance(cell, BadCell):
         return Reading(None, complaint=cell.complaint)
     if is_blank(cell):
-        return Reading(None, complaint="nothing stands here; expected a number")
+        return Reading(None, complaint=BLANK)
     if isinstance(cell, str):
         return _read_text(cell.strip(), style)
     if isinstance(cell, bool) or not isinstance(cell, int | float) or not isfinite(cell):

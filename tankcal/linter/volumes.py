@@ -1,16 +1,18 @@
 """The volumes of a table: readable, rounded alike, never falling, each where the others put it."""
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 import numpy as np
 
 from tankcal.linter.examination import examine
+from tankcal.linter.numbers import BLANK
 from tankcal.linter.suggestions import suggestion
 
 _USUAL = 0.98  # part of the rows that have at most the usual number of decimals
 _FINEST = 1e-9  # of the total: what lies below it is no rounding
 _MOST_WRITTEN = 6  # decimals that people write
+_LONG_BLANK = 10  # rows
 _FITTING, _EDGE = 0.5, 0.01  # of a step's volume: fittings take up, or give, no more
 
 
@@ -31,7 +33,12 @@ class Volumes:
 
 def volumes_of(table, series, log):
     """`Volumes` of a series, after telling `log` what is wrong with them; None when too few."""
-    good = [k for k, entry in enumerate(series.entries) if _is_readable(table, entry, log)]
+    left_out = _left_out(table, series.entries, log)
+    good = [
+        k
+        for k, entry in enumerate(series.entries)
+        if k not in left_out and _is_readable(table, entry, log)
+    ]
     if len(good) < 3:
         return None
     entries = [series.entries[k] for k in good]
@@ -50,6 +57,21 @@ def volumes_of(table, series, log):
         log.warning(table.name, "too rough to be examined row by row to its end")
     joints = tuple(float(height[row]) for row in found.joints)
     return Volumes(height, volume, decimals, joints)
+
+
+def _left_out(table, entries, log):
+    """Rows of long blanks, which somebody meant: a critical zone of a roof is not for use."""
+    found = set()
+    for is_blank, run in groupby(
+        range(len(entries)), lambda k: entries[k].volume.complaint == BLANK
+    ):
+        rows = list(run)
+        if is_blank and len(rows) >= _LONG_BLANK:
+            first, last = entries[rows[0]], entries[rows[-1]]
+            text = f"no volumes from here to row {last.row}: are these heights not for use?"
+            log.warning(table.name, text, first.row, first.volume_column)
+            found.update(rows)
+    return found
 
 
 def _is_readable(table, entry, log):

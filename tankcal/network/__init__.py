@@ -18,6 +18,7 @@ _ROOM_OF = {
     "adjust": "adjusting",
     "approximate": "starting",
     "correlations": "results",
+    "predict": "adjusting",
     "snoop": "cleaning",
 }
 

@@ -1,7 +1,7 @@
 """Adjust a survey: one call from observations to adjusted points with their covariance."""
 
 from tankcal.errors import SolutionError
-from tankcal.gauss_markov import UndeterminedError, solve
+from tankcal.gauss_markov import UndeterminedError, linearise, solve
 from tankcal.network.assembly import assemble
 from tankcal.network.datum import held, in_words, unobserved
 from tankcal.network.results import Adjusted
@@ -21,17 +21,43 @@ def adjust(survey, *, datum="control", over=None, photo=None, tolerance=1e-4, ma
     Returns an Adjusted. Raises SolutionError when something is not determined: a datum defect in
     words, points and parameters by name; or when the iteration does not converge.
     """
+    problem = _in_datum(survey, datum, over, photo)
+    return _adjusted(
+        survey,
+        problem,
+        datum,
+        lambda: solve(
+            problem.model, problem.state, tolerance=tolerance, max_iterations=max_iterations
+        ),
+    )
+
+
+def predict(survey, *, datum="control", over=None, photo=None):
+    """What `adjust` would give, before anything is measured: an Adjusted at the start values.
+
+    The derivatives are taken at the start values of the Survey and no step is made, so the values
+    of its observations do not matter; arguments and errors are those of `adjust`. Residuals and
+    sigma0 mean nothing, covariances, redundancy numbers and minimal detectable biases do.
+    """
+    problem = _in_datum(survey, datum, over, photo)
+    return _adjusted(survey, problem, datum, lambda: linearise(problem.model, problem.state))
+
+
+def _in_datum(survey, datum, over, photo):
+    """The Problem of a survey, with inner constraints where they are asked for and needed."""
     problem = assemble(survey)
     if datum == "inner":
         free = unobserved(problem)
-        if free.shape[1]:
-            problem = held(problem, over, free, photo)
-    elif any(isinstance(one, PlumbLines) for one in survey.observations):
+        return held(problem, over, free, photo) if free.shape[1] else problem
+    if any(isinstance(one, PlumbLines) for one in survey.observations):
         _refuse_defect(problem)  # a plumb line that is not quite plumb would hide one
+    return problem
+
+
+def _adjusted(survey, problem, datum, solved):
+    """The Adjusted of a problem that `solved` solves; what cannot be solved is told in words."""
     try:
-        solution = solve(
-            problem.model, problem.state, tolerance=tolerance, max_iterations=max_iterations
-        )
+        solution = solved()
     except UndeterminedError:
         if datum != "inner":
             _refuse_defect(problem)

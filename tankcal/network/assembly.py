@@ -6,6 +6,7 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.gauss_markov import Group, Model
+from tankcal.messages import message
 from tankcal.network.columns import eliminated_points, layout_of
 from tankcal.network.naming import in_words, name_of, name_of_exact
 from tankcal.network.survey import FEWEST, SCOPES
@@ -127,9 +128,19 @@ def _set_aside(survey):
     if images is not None:
         seen = images.point if images.use is None else images.point[images.use > 0]
         rays += np.bincount(seen, minlength=len(bad))
-    what = np.where(rays == 1, "has one ray", "has too few observations")
-    names = zip(survey.points, what, bad, strict=True)
-    return tuple(f"point {name} {why}" if poor else "" for name, why, poor in names)
+    names = zip(survey.points, rays.tolist(), bad, strict=True)
+    return tuple(_poor(name, count) if is_bad else "" for name, count, is_bad in names)
+
+
+def _poor(name, rays):
+    if rays == 1:
+        return one_ray(name)
+    return message("hardly_observed", "point {point} has too few observations", point=name)
+
+
+def one_ray(name):
+    """What is said of a point that one image alone shows."""
+    return message("one_ray", "point {point} has one ray", point=name)
 
 
 def _refuse_poor_photos(survey):

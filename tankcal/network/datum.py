@@ -10,9 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
-WAYS = ("x", "y", "z", "about X", "about Y", "about Z", "scale")
+from tankcal.messages import joined, message
+
+SHIFTS, TURNS = ("x", "y", "z"), ("X", "Y", "Z")
+THREE_TURNS = message("rotations", "three rotations")
+SCALE = message("scale", "the scale")
 UNFELT = 1e-8  # change of the whitened rows, with all columns scaled to length one
 DEPENDS, TINY = 1e-6, 1e-12  # change of a quantity over the sum of its parts' changes; m or rad
+NAMED = 4  # points and photos in a sentence
 AS_IF_FIXED = 1e4  # weight of a fixed unknown among the rows, as if it were known to 0.1 mm
 
 
@@ -162,7 +167,13 @@ def dependent(adjusted, quantities, fixed=False):
 
 
 def in_words(combinations, problem=None):
-    """The datum defect in words, from combinations (7, d) of the seven ways.
+    """The datum defect in words, and what helps; see `defect_in_words`."""
+    defect = defect_in_words(combinations, problem)
+    return f"{defect}; add control or choose datum = inner"
+
+
+def defect_in_words(combinations, problem=None):
+    """The datum defect in words, from combinations (7, d) of the seven ways: a Message.
 
     problem  to name the points that a single rotation leaves in place, or None
     """
@@ -170,34 +181,40 @@ def in_words(combinations, problem=None):
     basis = np.linalg.qr(combinations)[0]
     share = np.sum(basis**2, axis=1)
     pure = [i for i in range(7) if share[i] > 1 - 1e-6]
-    parts = []
-    shifts = [WAYS[i] for i in pure if i < 3]
-    turns = [WAYS[i] for i in pure if 3 <= i < 6]
-    if len(shifts) == 3:
-        parts.append("three translations")
-    elif shifts:
-        parts.append("the translation" + "s" * (len(shifts) > 1) + " in " + " and ".join(shifts))
-    if len(turns) == 3:
-        parts.append("three rotations")
-    elif turns:
-        parts.append("the rotation" + "s" * (len(turns) > 1) + " " + " and ".join(turns))
-    if 6 in pure:
-        parts.append("the scale")
+    parts = _ways(pure)
     if len(pure) < d:
-        rest = d - len(pure)
-        mixed = [WAYS[i] for i in range(7) if 1e-6 < share[i] <= 1 - 1e-6]
-        about = "" if problem is None else _about_what_stays(combinations, problem)
-        parts.append(about or f"{rest} combination{'s' * (rest > 1)} of {', '.join(mixed)}")
-    listed = parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
-    verb = "is" if d == 1 else "are"
-    return (
-        f"datum defect {d}: {listed} {verb} not determined by any observation; "
-        "add control or choose datum = inner"
-    )
+        mixed = [i for i in range(7) if 1e-6 < share[i] <= 1 - 1e-6]
+        about = None if problem is None else _about_what_stays(combinations, problem)
+        parts.append(about or _mixture(d - len(pure), _ways(mixed)))
+    if d == 1:
+        one = "datum defect 1: {what} is not determined by any observation"
+        return message("datum_defect_one", one, what=joined(parts))
+    several = "datum defect {defect}: {what} are not determined by any observation"
+    return message("datum_defect", several, defect=d, what=joined(parts))
+
+
+def _ways(numbers):
+    """What each of some of the seven ways is called; three of a kind are one."""
+    shifts = [SHIFTS[i] for i in numbers if i < 3]
+    turns = [TURNS[i - 3] for i in numbers if 3 <= i < 6]
+    found = [message("translation", "the translation in {axis}", axis=one) for one in shifts]
+    if len(shifts) == 3:
+        found = [message("translations", "three translations")]
+    if len(turns) == 3:
+        found.append(THREE_TURNS)
+    else:
+        found += [message("rotation", "the rotation about {axis}", axis=one) for one in turns]
+    return found + [SCALE] * (6 in numbers)
+
+
+def _mixture(count, ways):
+    if count == 1:
+        return message("combination", "a combination of {ways}", ways=ways)
+    return message("combinations", "{count} combinations of {ways}", count=count, ways=ways)
 
 
 def _about_what_stays(combinations, problem):
-    """Words on turning and stretching about what keeps its place, "" when nothing does."""
+    """What turns and stretches about what keeps its place, None when nothing does."""
     turns, stretches = (
         np.linalg.matrix_rank(combinations[rows], tol=1e-6 * np.abs(combinations[rows]).max())
         if np.abs(combinations[rows]).max() > 1e-9 * np.abs(combinations).max()
@@ -205,33 +222,42 @@ def _about_what_stays(combinations, problem):
         for rows in (slice(3, 6), slice(6, 7))
     )
     if turns + stretches != combinations.shape[1]:
-        return ""
+        return None
     still, count = _staying(combinations, problem)
     if not count:
-        return ""
+        return None
     if turns == 1 and not stretches and count > 1:
-        return f"the rotation about the line through {still}"
-    what = ["", "the rotation", "two rotations", "three rotations"][turns]
-    both = " and ".join(filter(None, [what, "the scale" * stretches]))
-    return f"{both} about {still}"
+        return message("about_line", "the rotation about the line through {still}", still=still)
+    what = {
+        1: [message("one_rotation", "the rotation")],
+        2: [message("two_rotations", "two rotations")],
+        3: [THREE_TURNS],
+    }.get(turns, [])
+    what += [SCALE] * stretches
+    return message("about_place", "{what} about {still}", what=joined(what), still=still)
 
 
 def _staying(combinations, problem):
-    """Names of the points and photos that no combination (7, d) moves, in words, and how many."""
+    """The points and photos that no combination (7, d) moves, in words, and how many."""
     used = ~_idle(problem)[id(problem.layout.points)][:, 0]
     xyz = np.vstack([problem.state.xyz_m[used], problem.state.photo_xyz_m])
     size = np.linalg.norm(_of_places(xyz) @ combinations, axis=(1, 2))
     points = np.flatnonzero(used)
     still = np.flatnonzero(size < 1e-3 * size.max())
-    found = [
-        _plural("point", [problem.name_of_point(int(points[i])) for i in still if i < len(points)]),
-        _plural("photo", [problem.photos[i - len(points)] for i in still if i >= len(points)]),
-    ]
-    return " and ".join(filter(None, found)), len(still)
+    names = [problem.name_of_point(int(points[i])) for i in still if i < len(points)]
+    photos = [problem.photos[i - len(points)] for i in still if i >= len(points)]
+    found = []
+    if names:
+        found.append(_points(names[:NAMED]))
+    if photos:
+        found.append(message("photos", "photos {photos}", photos=photos[:NAMED]))
+    return joined(found) if found else None, len(still)
 
 
-def _plural(what, names):
-    return f"{what}{'s' * (len(names) > 1)} {', '.join(names[:4])}" if names else ""
+def _points(names):
+    if len(names) == 1:
+        return message("point", "point {point}", point=names[0])
+    return message("points", "points {points}", points=names)
 
 
 def held(problem, over, combinations, photo=None):

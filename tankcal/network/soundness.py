@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 from tankcal.network.datum import in_words, unobserved
 
 WORTHLESS = 0.1  # sd over the principal distance, or over the extent of the survey
@@ -39,7 +40,12 @@ def hardly_determined(adjusted):
     there = xyz[np.isfinite(xyz).all(axis=1)]
     extent = 4 * np.median(np.linalg.norm(there - np.median(there, axis=0), axis=1))
     return tuple(
-        f"point {adjusted.survey.points[i]} is hardly determined (sd {sd[i]:.2g} m)"
+        message(
+            "hardly_determined",
+            "point {point} is hardly determined (sd {sd_m:.2g} m)",
+            point=adjusted.survey.points[i],
+            sd_m=sd[i],
+        )
         for i in np.flatnonzero(sd > WORTHLESS * extent)
     )
 

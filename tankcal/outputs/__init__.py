@@ -1,102 +1,104 @@
 """Everything that a run leaves behind, written all or nothing."""
 
 import shutil
-import tempfile
 from pathlib import Path
 
+from tankcal import folders, report, workbook
 from tankcal import record as records
-from tankcal import report, workbook
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, TankcalError
+from tankcal.job.tables import COVARIANCE_FILE
+from tankcal.languages import LANGUAGES
 from tankcal.outputs import tables
 
+RECORD = "record.json"
 WORKBOOKS = ("capacity.xlsx", "adjustment.xlsx")
-FILES = ("record.json", *tables.FILES, *WORKBOOKS, *report.FILES)
+FILES = (RECORD, *tables.FILES, *WORKBOOKS, *report.FILES, report.LETTERHEAD)
 
 
-def write(result, directory, progress=None):
+def write(result, directory, progress=None, letterhead=None):
     """Write record, CSV files, workbook, notebook, PDFs and HTML of a `chain.Result`.
 
-    directory  made when missing; earlier results there are replaced when all is written, and a
-               folder that holds anything else is refused
-    progress   called as progress(text, done, total)
+    directory   made when missing; earlier results there are replaced when all is written, and a
+                folder that holds anything else is refused
+    progress    called as progress(text, done, total)
+    letterhead  a report.letterhead.Letterhead, or None
     Returns the paths. Raises InputError for a folder that is not tankcal's to replace.
     """
-    return _write(
-        lambda: records.record_of(result),
-        result.adjustment,
-        "capacity.xlsx",
-        directory,
-        progress,
-    )
+
+    def prepare(folder):
+        records.save(records.record_of(result), folder / RECORD)
+        if result.adjustment is not None:
+            tables.write_covariance(result.adjustment, folder)
+
+    return _write(prepare, directory, progress, letterhead=letterhead)
 
 
-def write_adjustment(job, adjustment, directory, progress=None):
+def write_adjustment(job, adjustment, directory, progress=None, letterhead=None):
     """The same for a survey that was only adjusted (`surveys.Adjustment` of a `Job`)."""
-    return _write(
-        lambda: records.record_of_adjustment(job, adjustment),
-        adjustment,
-        "adjustment.xlsx",
-        directory,
-        progress,
-    )
+
+    def prepare(folder):
+        records.save(records.record_of_adjustment(job, adjustment), folder / RECORD)
+        tables.write_covariance(adjustment, folder)
+
+    return _write(prepare, directory, progress, letterhead=letterhead)
 
 
-def _write(make_record, adjustment, workbook_name, directory, progress):
-    refuse_foreign(directory)
-    target = Path(directory).resolve()  # where a link points to
-    tell = progress or (lambda text, done, total: None)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(prefix=".tankcal-", dir=target.parent))
+def rebuild(record_path, directory, progress=None, language=None, letterhead=None):
+    """Write the same from a record.json alone; nothing is computed again, the record is copied.
+
+    record_path  of a record.json, or the folder of results that holds one
+    language     of workbook and papers, one of LANGUAGES; None: that of the job
+    points_cov.npz, which no record holds, is taken over when it lies beside the record. The other
+    arguments are those of `write`. Raises InputError for what is no record, or a language that is
+    not known.
+    """
+    source = record_file(record_path)
+    if language not in (None, *LANGUAGES):
+        expected = f"found {language!r}; expected one of {', '.join(LANGUAGES)}"
+        raise InputError(Problem("--language", expected))
+    records.load(source)
+
+    def prepare(folder):
+        for path in (source, source.with_name(COVARIANCE_FILE)):
+            if path.exists():
+                shutil.copyfile(path, folder / (RECORD if path == source else path.name))
+
     try:
+        return _write(prepare, directory, progress, language, letterhead)
+    except TankcalError:
+        raise
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        found = f"does not hold what a record does ({type(error).__name__}: {error})"
+        raise InputError(Problem(source.name, found)) from error
+
+
+def record_file(path):
+    """The record that a path names: the file itself, or record.json in a folder of results."""
+    return Path(path) / RECORD if Path(path).is_dir() else Path(path)
+
+
+def _write(prepare, directory, progress, language=None, letterhead=None):
+    """Write everything into `directory`; `prepare` puts the record into a folder."""
+    refuse_foreign(directory)
+    tell = progress or (lambda text, done, total: None)
+    with folders.replaced(directory) as temporary:
         tell("writing the record and the workbook", 0, 1)
-        record = make_record()
-        records.save(record, temporary / "record.json")
+        prepare(temporary)
+        record = records.load(temporary / RECORD)
         tables.write_tables(record, temporary)
-        if adjustment is not None:
-            tables.write_covariance(adjustment, temporary)
-        workbook.write(record, temporary / workbook_name)
+        of_tank, of_survey = WORKBOOKS
+        name = of_tank if record["capacity"] else of_survey
+        workbook.write(record, temporary / name, language)
         report.build(
-            temporary / "record.json",
+            temporary / RECORD,
             temporary,
             lambda done, total: tell("writing the report", done, total),
+            language,
+            letterhead,
         )
-        temporary.chmod(0o755)
-        _swap(temporary, target)
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-    return [Path(directory) / name for name in FILES if (target / name).exists()]
+    return [Path(directory) / name for name in FILES if (Path(directory) / name).exists()]
 
 
 def refuse_foreign(directory):
     """Raise InputError when `directory` exists and holds anything but results of tankcal."""
-    directory = Path(directory)
-    if not directory.exists():
-        return
-    if not directory.is_dir():
-        raise InputError(Problem(directory.name, "is a file; expected a folder for the results"))
-    foreign = sorted(path.name for path in directory.iterdir() if path.name not in FILES)
-    if foreign:
-        raise InputError(
-            Problem(
-                directory.name,
-                f"holds {foreign[0]!r}, which tankcal did not write; expected an empty folder or "
-                "one with earlier results only: move your files away or choose another --out",
-            )
-        )
-
-
-def _swap(temporary, directory):
-    """Put `temporary` in the place of `directory`; the old one goes last."""
-    if not directory.exists():
-        temporary.rename(directory)
-        return
-    aside = Path(tempfile.mkdtemp(prefix=".tankcal-old-", dir=directory.parent))
-    try:
-        directory.rename(aside / directory.name)
-        try:
-            temporary.rename(directory)
-        except OSError:
-            (aside / directory.name).rename(directory)
-            raise
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
+    folders.refuse_foreign(directory, FILES)

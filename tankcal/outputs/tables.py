@@ -3,10 +3,12 @@
 import numpy as np
 import pandas as pd
 
+from tankcal.digits import PROGRAM, decimals_of_rows, fixed
 from tankcal.job.covariance import MAX_POINTS
 
 IN_SMALL_UNITS = {"mm": ("um", 1e3), "m": ("mm", 1e3), "rad": ("arcsec", 648000 / np.pi)}
 IN_LARGE_UNITS = {"rad": ("deg", 180 / np.pi)}
+LEAST_DECIMALS = 6  # micrometres, square millimetres, millilitres
 FILES = (
     "points.csv",
     "points_cov.npz",
@@ -35,7 +37,8 @@ def write_tables(record, directory):
         }
     for name, table in tables.items():
         if len(table):
-            style = "%.6f" if name in ("points", "sections", "capacity") else "%.12g"
+            in_metres = name in ("points", "sections", "capacity")
+            style = f"%.{LEAST_DECIMALS}f" if in_metres else "%.12g"
             table.to_csv(
                 directory / f"{name}.csv", index=False, float_format=style, lineterminator="\n"
             )
@@ -111,14 +114,32 @@ def _capacity_table(record):
     capacity, spec = record["capacity"], record["job"]["table"]
     if capacity is None:
         return pd.DataFrame()
-    columns = {key: capacity[key] for key in ("height_m", "volume_m3", "u_m3", "k", "U_m3")}
+    digits = decimals_of_rows(capacity["U_m3"], least=LEAST_DECIMALS)
+    columns = {
+        "height_m": capacity["height_m"],
+        "volume_m3": _to_digits(capacity["volume_m3"], digits),
+        "u_m3": _to_digits(capacity["u_m3"], digits),
+        "k": capacity["k"],
+        "U_m3": _to_digits(capacity["U_m3"], digits),
+        "low_m3": _to_digits(capacity["low_m3"], digits),
+        "high_m3": _to_digits(capacity["high_m3"], digits),
+        "interval": capacity["interval"],
+        "stated_U_m3": _to_digits(capacity["stated_U_m3"], digits),
+    }
     if spec["height_unit"] != "m":
         columns["dip"] = capacity["dip"]
     for other in record["densities"]:
-        columns[f"volume_m3_at_{other['density_kg_m3']:g}_kg_m3"] = other["volume_m3"]
+        columns[f"volume_m3_at_{other['density_kg_m3']:g}_kg_m3"] = _to_digits(
+            other["volume_m3"], digits
+        )
     if not all(capacity["for_use"]):
         columns["for_use"] = ["yes" if good else "no" for good in capacity["for_use"]]
     return pd.DataFrame(columns)
+
+
+def _to_digits(values, decimals):
+    """Volumes to the digits of their U, the same for all columns of a row."""
+    return [fixed(value, places, PROGRAM) for value, places in zip(values, decimals, strict=True)]
 
 
 def _sds_mm(covariance):

@@ -1,25 +1,29 @@
 """A survey adjusted: from the measurements as they were read to points with their covariance."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.messages import message
 from tankcal.network.cleaning import CRITICAL
 from tankcal.network.soundness import hardly_determined
 from tankcal.surveys.causes import causes_of
 from tankcal.surveys.checks import check_points, check_readings, disagreeing
 from tankcal.surveys.cleaning import searched
 from tankcal.surveys.diagnoses import MIRROR, diagnosed
+from tankcal.surveys.focusing import in_depth
 from tankcal.surveys.frames import framed
 from tankcal.surveys.gathering import gather, named_in
+from tankcal.surveys.holding import wrongly_held
 from tankcal.surveys.results import Adjustment
 from tankcal.surveys.rows import gone_with_their_points, readings_of
 from tankcal.surveys.screening import gross_readings, swapped_at_start
 from tankcal.surveys.spelling import names_alike, same_place
 from tankcal.surveys.starts import mirrored_targets, started, started_like
 from tankcal.surveys.trials import likely_mistake, photos_that_do_not_fit
-from tankcal.surveys.victims import SOME, one_sided, set_aside, undecided, wrongly_held
+from tankcal.surveys.victims import SOME, one_sided, set_aside, undecided
 
 SUSPICIOUS = 4.0  # sigma0 above which whole files are doubted
 SEVERAL = 0.05  # share of the values set aside, above which they are as well
@@ -36,16 +40,22 @@ def adjust_survey(measurements, tell=None):
     one is found) when the survey does not determine what is asked for.
     """
     tell = tell or (lambda text: None)
+
+    def adjusted(measured, like):
+        return _adjusted(measured, tell, like=like)
+
     try:
-        search, gathered, frame = _adjusted(measurements, tell)
+        found, measurements, depth = in_depth(measurements, adjusted, tell)
     except SolutionError as error:
+        if not measurements.settings.explain:
+            raise
         tell("looking for what is wrong")
         told = _why_not(measurements, str(error))
         if not told:
             raise
         raise SolutionError("\n".join([str(error), *map(str, told)])) from error
     tell("working out what the residuals say")
-    return _complete(search, gathered, frame, measurements)
+    return replace(_complete(*found, measurements), depth=depth)
 
 
 def _adjusted(measurements, tell, snooping=None, most=100, like=None):
@@ -142,15 +152,19 @@ def _complete(search, gathered, frame, measurements):
         rounds=search.rounds,
         warnings=tuple(dict.fromkeys(warnings)),
         doubts=tuple(doubts),
+        repeats=gathered.repeats,
     )
 
 
 def _kept(one, traces):
     """Problem of a reading that disagrees, but cannot be spared."""
     trace = traces[one.source]
-    text = (
-        f"{one.kind} {'-'.join(trace.ids[one.row])} disagrees with the others (w = {one.w:.1f}), "
-        "and was kept: without it something would not be determined"
+    text = message(
+        "disagreeing_but_kept",
+        "reading {reading} disagrees with the others (w = {w:.1f}), and was kept: without it"
+        " something would not be determined",
+        reading="-".join(trace.ids[one.row]),
+        w=one.w,
     )
     return Problem(trace.file, text, trace.rows[one.row])
 
@@ -158,7 +172,8 @@ def _kept(one, traces):
 def _lost(measurements, name, why):
     """Problem of a point that the search for blunders left with too few readings."""
     file, row = named_in(measurements, name)
-    return Problem(file, f"{why} left after the search for blunders", row)
+    text = message("left_after_search", "{why} left after the search for blunders", why=why)
+    return Problem(file, text, row)
 
 
 def _diagnoses(adjusted, readings, groups, gathered, measurements):
@@ -172,6 +187,8 @@ def _diagnoses(adjusted, readings, groups, gathered, measurements):
 
 def _causes(adjusted, readings, gathered, measurements, diagnoses):
     """Problem rows: what is wrong with the whole rather than with single readings."""
+    if not measurements.settings.explain:
+        return []
     gone = set_aside(adjusted.survey)
     told = one_sided(readings, gathered.known)
     if not (told or adjusted.sigma0 > SUSPICIOUS or gone > SOME * len(readings)):
@@ -206,5 +223,5 @@ def _cov_scale(adjusted, settings):
         return 1.0, []
     if adjusted.dof > 0 and adjusted.sigma0 > 0:
         return adjusted.sigma0**2, []
-    text = "nothing is redundant: covariances keep the a-priori scale"
+    text = message("nothing_redundant", "nothing is redundant: covariances keep the a-priori scale")
     return 1.0, [Problem("job.toml", text, None, "adjustment.scale")]

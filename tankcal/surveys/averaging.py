@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from tankcal.errors import Problem
+from tankcal.messages import message
 
 LEVEL = 0.001  # of the tests of scatter, for all readings of a file together
 
@@ -111,14 +112,15 @@ def scatter_warnings(averages, name_of, file, rows):
         if ratio[i] > 1:
             share, first = np.sqrt((averages.chi2[i] / dof[i]).max()), averages.first[i]
             row = rows[first] if len(rows) else None
-            found.append(
-                Problem(
-                    file,
-                    f"the {averages.repeats[i]} readings of {name_of(first)} scatter {share:.1f} "
-                    "times as much as their standard deviations say",
-                    row,
-                )
+            text = message(
+                "readings_scatter",
+                "the {count} readings of {what} scatter {times:.1f} times as much as their standard"
+                " deviations say",
+                count=averages.repeats[i],
+                what=name_of(first),
+                times=share,
             )
+            found.append(Problem(file, text, row))
     return found + _of_all(averages.chi2.sum(), int(dof.sum()), file, bool(found))
 
 
@@ -127,10 +129,11 @@ def _of_all(chi2, dof, file, told):
     high, low = chdtri(dof, [LEVEL / 2, 1 - LEVEL / 2])
     if low <= chi2 <= high or (told and chi2 > high):
         return []
-    return [
-        Problem(
-            file,
-            f"all repeated readings together scatter {share:.2f} times as much as their standard "
-            f"deviations say ({dof} degrees of freedom)",
-        )
-    ]
+    text = message(
+        "all_readings_scatter",
+        "all repeated readings together scatter {times:.2f} times as much as their standard"
+        " deviations say ({dof} degrees of freedom)",
+        times=share,
+        dof=dof,
+    )
+    return [Problem(file, text)]

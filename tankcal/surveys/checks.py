@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.errors import Problem
+from tankcal.messages import message
 from tankcal.network import ImagePoints
 from tankcal.network.quality import compared
 from tankcal.observations import ImageCoordinates
@@ -40,9 +41,15 @@ def disagreeing(found, table):
             away = np.nan_to_num(np.abs(difference) / sd, posinf=0.0)
         if name in table.point and away.max() > DISAGREE:
             k = int(away.argmax())
-            text = (
-                f"{'xyz'[k]} of {name} differs by {1e3 * difference[k]:+.1f} mm from the adjusted "
-                f"point, {away[k]:.1f} times its standard deviation of {1e3 * sd[k]:.1f} mm"
+            text = message(
+                "check_point_off",
+                "{axis} of {point} differs by {difference_mm:+.1f} mm from the adjusted point,"
+                " {times:.1f} times its standard deviation of {sd_mm:.1f} mm",
+                axis="xyz"[k],
+                point=name,
+                difference_mm=1e3 * difference[k],
+                times=away[k],
+                sd_mm=1e3 * sd[k],
             )
             row = table.rows[table.point.index(name)] if table.rows else None
             problems.append(Problem(table.file, text, row, f"{'xyz'[k]}_m"))

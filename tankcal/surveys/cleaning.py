@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import Problem, SolutionError
+from tankcal.messages import message
 from tankcal.network import adjust, snoop
 from tankcal.network.cleaning import started, with_use
 
@@ -36,7 +37,12 @@ def searched(survey, options, gross=None):
         found = _without(survey, options, gross) if gross else snoop(survey, **options)
     except SolutionError as error:
         adjusted = adjust(survey, **options)
-        text = f"{error}: nothing was set aside, blunders may be in the result"
+        text = message(
+            "search_failed",
+            "the search for blunders failed ({error}): nothing was set aside, blunders may be in"
+            " the result",
+            error=str(error),
+        )
         return Searched(
             adjusted, (), 1, (), (Problem("job.toml", text, None, "adjustment.snooping"),)
         )

@@ -9,22 +9,30 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.errors import Problem
+from tankcal.messages import message
 from tankcal.network.cleaning import CRITICAL
 from tankcal.network.growing import sights_of
 from tankcal.network.resection import resected
 
+MISPLACED = message("misplaced_point", "a misplaced decimal point")
 FACTORS = (
-    (1000.0, "millimetres given as metres"),
-    (1 / 0.3048, "feet given as metres"),
-    (100.0, "centimetres given as metres"),
-    (0.001, "kilometres given as metres"),
-    (0.3048, "metres that were converted from feet once too often"),
-    (10.0, "a misplaced decimal point"),
-    (0.1, "a misplaced decimal point"),
+    (1000.0, message("millimetres_as_metres", "millimetres given as metres")),
+    (1 / 0.3048, message("feet_as_metres", "feet given as metres")),
+    (100.0, message("centimetres_as_metres", "centimetres given as metres")),
+    (0.001, message("kilometres_as_metres", "kilometres given as metres")),
+    (
+        0.3048,
+        message("feet_twice", "metres that were converted from feet once too often"),
+    ),
+    (10.0, MISPLACED),
+    (0.1, MISPLACED),
 )
 CLOSE = 0.003  # relative: how well such a factor must explain a distance
 SWAPPED = 0.05  # what a swap may leave of the plan distance between given and adjusted
-GON = ((0.9, "gon read as degrees"), (1 / 0.9, "degrees read as gon"))
+GON = (
+    (0.9, message("gon_as_degrees", "gon read as degrees")),
+    (1 / 0.9, message("degrees_as_gon", "degrees read as gon")),
+)
 LEFT = 0.05  # what the factor may leave of the scatter of a station's angles
 TOLD = 10  # diagnoses of one kind that are listed
 TRIMMED = 0.97  # sigma0 that a search for blunders at 0.1 % alone may leave of 1 (it takes 0.6 %)
@@ -62,20 +70,62 @@ def failed_test(adjusted, groups):
         if one.redundancy > 1 and (one.factor - 1) * (1 if large else -1) > 3 * one.factor_sd
     ]
     off.sort(key=lambda one: -abs(np.log(max(one.factor, 1e-9))))
-    text = (
-        f"the global test fails: sigma0 = {adjusted.sigma0:.3g}, chi-square {test.chi2:.1f} is "
-        f"{'above' if large else 'below'} {test.high if large else test.low:.1f} for "
-        f"{test.dof} degrees of freedom"
-    )
-    if off:
-        names = (f"{one.kind} {one.name}".strip() for one in off[:4])
-        parts = (f"{n} ({one.factor:.2g} times)" for n, one in zip(names, off, strict=False))
-        text += f"; standard deviations declared too {'small' if large else 'large'}: " + ", ".join(
-            parts
-        )
-    elif large:
-        text += "; no group alone explains it: look for blunders, or a model that does not hold"
+    text, cause = _verdict(adjusted.sigma0, test, large), _cause(off[:4], large)
+    if cause:
+        text = message("test_and_cause", "{test}; {cause}", test=text, cause=cause)
     return [Problem("job.toml", text, None, "adjustment")]
+
+
+def _verdict(sigma0, test, large):
+    if large:
+        return message(
+            "test_above",
+            "the global test fails: sigma0 = {sigma0:.3g}, chi-square {chi2:.1f} is above"
+            " {bound:.1f} for {dof} degrees of freedom",
+            sigma0=sigma0,
+            chi2=test.chi2,
+            bound=test.high,
+            dof=test.dof,
+        )
+    return message(
+        "test_below",
+        "the global test fails: sigma0 = {sigma0:.3g}, chi-square {chi2:.1f} is below {bound:.1f}"
+        " for {dof} degrees of freedom",
+        sigma0=sigma0,
+        chi2=test.chi2,
+        bound=test.low,
+        dof=test.dof,
+    )
+
+
+def _cause(off, large):
+    """The groups whose standard deviations explain a failed test; None: nothing to be said."""
+    groups = [_group(one) for one in off]
+    if groups and large:
+        template = "standard deviations declared too small: {groups}"
+        return message("sds_too_small", template, groups=groups)
+    if groups:
+        template = "standard deviations declared too large: {groups}"
+        return message("sds_too_large", template, groups=groups)
+    if large:
+        return message(
+            "no_group_explains",
+            "no group alone explains it: look for blunders, or a model that does not hold",
+        )
+    return None
+
+
+def _group(one):
+    if one.name:
+        return message(
+            "named_group",
+            "{group} {of_group} ({factor:.2g} times)",
+            group=one.kind,
+            of_group=one.name,
+            factor=one.factor,
+        )
+    template = "{group} ({factor:.2g} times)"
+    return message("whole_group", template, group=one.kind, factor=one.factor)
 
 
 def swapped_points(names, xyz_m, known, sd_m=0.0):
@@ -91,9 +141,13 @@ def swapped_points(names, xyz_m, known, sd_m=0.0):
         away = np.hypot(*(here - given)[:2])
         back = np.hypot(here[0] - given[1], here[1] - given[0])
         if away > max(10 * sd, 1e-3) and back < SWAPPED * away:
-            text = (
-                f"point {name} lies {away:.3f} m from where it was given, and {back:.3f} m from "
-                "there with x and y exchanged: x and y seem to be swapped"
+            text = message(
+                "point_swapped",
+                "point {point} lies {away_m:.3f} m from where it was given, and {back_m:.3f} m from"
+                " there with x and y exchanged: x and y seem to be swapped",
+                point=name,
+                away_m=away,
+                back_m=back,
             )
             found.append(Problem("control.csv", text, row, "x_m"))
     return found[:TOLD]
@@ -108,9 +162,14 @@ def wrong_distances(doubtful):
             continue
         for factor, what in FACTORS:
             if abs(one.value / computed / factor - 1) < CLOSE:
-                text = (
-                    f"distance {'-'.join(one.ids)} is {one.value:.4f} m where {computed:.4f} m was "
-                    f"expected: it looks like {what}"
+                text = message(
+                    "wrong_distance",
+                    "distance {distance} is {value_m:.4f} m where {computed_m:.4f} m was expected:"
+                    " it looks like {what}",
+                    distance="-".join(one.ids),
+                    value_m=one.value,
+                    computed_m=computed,
+                    what=what,
                 )
                 found.append(Problem(one.file, text, one.row))
                 break
@@ -135,7 +194,12 @@ def wrong_angles(readings, doubtful):
         for factor, what in GON:
             turns = value + 2 * np.pi * np.arange(2)[:, None]
             if len(mine) > 1 + free and _least(computed, factor * turns, free) < LEFT * now:
-                text = f"the angles from {station} fit once they are taken for {what}"
+                text = message(
+                    "angles_from_station",
+                    "the angles from {station} fit once they are taken for {what}",
+                    station=station,
+                    what=what,
+                )
                 found.append(Problem(file, text, mine[0].row))
                 break
     return found[:TOLD]
@@ -168,16 +232,21 @@ def mirrored_photos(adjusted):
     lost = np.bincount(images.photo, weights=images.use == 0, minlength=n)
     doubtful = np.flatnonzero(lost > LOST * np.bincount(images.photo, minlength=n))
     return [
-        Problem("image_points.csv", f"photo {adjusted.survey.photos.names[i]}: {MIRROR}")
-        for i in doubtful
-        if mirrored(adjusted, i)
+        mirrored_photo(adjusted.survey.photos.names[i]) for i in doubtful if mirrored(adjusted, i)
     ]
 
 
-MIRROR = (
-    "its image points fit once the image is mirrored: x and y seem to be swapped, or one of them "
-    "counted the wrong way round"
+MIRROR = message(
+    "image_mirrored",
+    "its image points fit once the image is mirrored: x and y seem to be swapped, or one of them"
+    " counted the wrong way round",
 )
+
+
+def mirrored_photo(name):
+    """The Problem of a photo that fits once it is mirrored."""
+    text = message("photo_mirrored", "photo {photo}: {why}", photo=name, why=MIRROR)
+    return Problem("image_points.csv", text)
 
 
 def mirrored(adjusted, photo):

@@ -6,8 +6,9 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.messages import message
 from tankcal.network.assembly import assemble
-from tankcal.network.datum import directions, in_words, unobserved
+from tankcal.network.datum import defect_in_words, directions, in_words, unobserved
 from tankcal.observations import ControlCoordinates
 from tankcal.surveys.results import DatumReport
 
@@ -47,13 +48,16 @@ def framed(survey, gathered, settings):
     report = DatumReport(
         choice=settings.datum,
         defect=free.shape[1],
-        words=in_words(free, problem).split(";")[0] if free.shape[1] else "",
+        words=defect_in_words(free, problem) if free.shape[1] else "",
         held=tuple(names),
         vertical=not _moves(undetermined, (3, 4)),
         scale=not _moves(undetermined, (6,)),
     )
     if free.shape[1] and not report.scale and settings.datum != "control":
-        text = "nothing that was measured gives the scale: it is that of what holds the datum"
+        text = message(
+            "scale_of_datum",
+            "nothing that was measured gives the scale: it is that of what holds the datum",
+        )
         warnings = [*warnings, Problem("job.toml", text, None, "adjustment.datum")]
     return Frame(chosen, options, report, held, tuple(warnings))
 
@@ -133,13 +137,16 @@ def _minimal(survey, bare, problem, free, gathered, settings):
     rank = _rank(rows[wanted])
     if rank < d:
         raise SolutionError(
-            f"{in_words(free, problem).split(';')[0]}; the {len(wanted)} coordinates held "
+            f"{defect_in_words(free, problem)}; the {len(wanted)} coordinates held "
             f"({', '.join(_named(survey, held))}) fix {rank} of {d}: name others in datum_points, "
             "add control or choose datum = inner"
         )
     if len(wanted) > d:
-        text = (
-            f"{len(wanted)} coordinates are held where {d} would do: the others strain the network"
+        text = message(
+            "too_many_held",
+            "{held} coordinates are held where {needed} would do: the others strain the network",
+            held=len(wanted),
+            needed=d,
         )
         warnings.append(Problem("job.toml", text, None, "adjustment.datum_points"))
     xyz = np.where(held & np.isfinite(gathered.known.xyz_m), gathered.known.xyz_m, survey.xyz_m)
@@ -166,8 +173,8 @@ def _photo(survey, bare, problem, free, gathered, settings):
     held = np.zeros((len(survey.points), 3), dtype=bool)
     if free.shape[1] < 6:  # observations determine the rest: holding that, too, would strain them
         number = names.index(name)
-        return bare, {"datum": "inner", "photo": number}, held, (f"photo {name}",), []
-    return chosen, {}, held, (f"photo {name}",), []
+        return bare, {"datum": "inner", "photo": number}, held, (name,), []
+    return chosen, {}, held, (name,), []
 
 
 def _inner(survey, bare, problem, free, gathered, settings):
@@ -185,7 +192,7 @@ def _inner(survey, bare, problem, free, gathered, settings):
     )
     if rank < free.shape[1]:
         raise SolutionError(
-            f"{in_words(free, problem).split(';')[0]}; inner constraints over {len(over)} points "
+            f"{defect_in_words(free, problem)}; inner constraints over {len(over)} points "
             f"fix {rank} of {free.shape[1]}: take more points, not all on one line"
         )
     known = gathered.known.xyz_m
@@ -195,7 +202,11 @@ def _inner(survey, bare, problem, free, gathered, settings):
 
 
 def _nothing_left(choice):
-    text = f"observations determine the frame already: nothing is left for datum = {choice}"
+    text = message(
+        "nothing_left_to_hold",
+        "observations determine the frame already: nothing is left for datum = {choice}",
+        choice=choice,
+    )
     return Problem("job.toml", text, None, "adjustment.datum")
 
 

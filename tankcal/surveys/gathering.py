@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import InputError, Problem
+from tankcal.messages import listed, message
 from tankcal.network import ImagePoints, Instrument, Survey, System
 from tankcal.observations import ControlCoordinates, SystemCoordinates
 from tankcal.surveys.averaging import averaged, scatter_warnings
 from tankcal.surveys.pictures import gathered_photos, orientation_of
-from tankcal.surveys.poor import left_out, sorted_out
+from tankcal.surveys.poor import left_out, not_measured, sorted_out
 from tankcal.surveys.readings import (
     Numbers,
     Trace,
@@ -18,6 +19,8 @@ from tankcal.surveys.readings import (
     observed,
     table_of,
 )
+from tankcal.surveys.repeating import without_scattered
+from tankcal.surveys.spelling import in_photo
 
 TOLD = 10  # points left out that are told one by one
 
@@ -36,6 +39,7 @@ class Gathered:
     lost     {name: file} of points that cannot be adjusted
     aside    sentences about them
     warnings tuple of Problem
+    repeats  RepeatedReadings of image points, or None
     """
 
     survey: Survey
@@ -46,6 +50,7 @@ class Gathered:
     lost: dict
     aside: tuple
     warnings: tuple
+    repeats: object = None
 
 
 @dataclass(frozen=True)
@@ -62,6 +67,7 @@ class Known:
 
 def gather(measurements):
     """The Gathered of Measurements; raises InputError for what cannot be meant."""
+    measurements, repeated, scattered = without_scattered(measurements)
     excluded = {}
     while True:
         found = _gathered(measurements, excluded)
@@ -80,7 +86,8 @@ def gather(measurements):
         idle=idle,
         lost={name: file for name, (file, _) in where.items()},
         aside=tuple(excluded.values()),
-        warnings=(*found.warnings, *warnings),
+        warnings=(*scattered, *found.warnings, *warnings),
+        repeats=repeated,
     )
 
 
@@ -89,10 +96,11 @@ def _of_excluded(excluded, where):
     found = [Problem(where[name][0], text, where[name][1]) for name, text in excluded.items()]
     if len(found) <= TOLD:
         return found
-    names = ", ".join(list(excluded)[TOLD - 1 :][:TOLD])
-    more = len(found) - TOLD + 1
-    text = f"{more} more points are left out for want of observations: {names}"
-    text += ", ..." if more > TOLD else ""
+    text = message(
+        "more_left_out",
+        "further points are left out for want of observations: {points}",
+        points=listed(list(excluded)[TOLD - 1 :], TOLD),
+    )
     return [*found[: TOLD - 1], Problem("job.toml", text, None, "adjustment")]
 
 
@@ -102,7 +110,7 @@ def _unmeasured(measurements, points, excluded):
     for table in (measurements.control, measurements.check):
         for name in () if table is None else table.point:
             if name not in points and name not in found:
-                found[name] = f"point {name} is not measured"
+                found[name] = not_measured(name)
     return found
 
 
@@ -307,14 +315,17 @@ def _images(measurements, points, order, warnings):
     trace = _image_trace(images, first, means.repeats, cameras)
     trace = replace(trace, scatter=means.chi2.sum(axis=1))
     warnings += scatter_warnings(
-        means, lambda k: "point {1} in photo {0}".format(*trace.ids[means.group[k]]), images.file,
+        means, lambda k: in_photo(*trace.ids[means.group[k]]), images.file,
         [images.rows[i] for i in rows] if images.rows else (),
     )  # fmt: skip
-    used = ImagePoints(point[first], photo[first], means.value, means.sd)
+    shared = np.zeros_like(sd) if images.shared_sd_mm is None else images.shared_sd_mm
+    used = ImagePoints(point[first], photo[first], means.value, np.hypot(means.sd, shared[first]))
     rows = np.flatnonzero(there & check)
     if not len(rows):
         return used, trace, []
-    left = ImagePoints(point[rows], photo[rows], images.xy_mm[rows], sd[rows])
+    left = ImagePoints(
+        point[rows], photo[rows], images.xy_mm[rows], np.hypot(sd[rows], shared[rows])
+    )
     return used, trace, [(left, _image_trace(images, rows, np.ones(len(rows), dtype=int), cameras))]
 
 

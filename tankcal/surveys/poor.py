@@ -3,6 +3,8 @@
 import numpy as np
 
 from tankcal.errors import Problem
+from tankcal.messages import joined, listed, message
+from tankcal.network.assembly import one_ray
 from tankcal.observations import (
     Azimuths,
     ControlCoordinates,
@@ -14,6 +16,7 @@ from tankcal.observations import (
     SystemCoordinates,
 )
 
+SHOWN = 5  # points in a sentence
 IN_PLAN = (Azimuths, Directions, HorizontalAngles, PlumbLines)
 
 
@@ -34,10 +37,21 @@ def left_out(survey):
 
 def _why(name, rays, rows, needed, measured):
     if not measured:
-        return f"point {name} is not measured"
+        return not_measured(name)
     if rays == 1 and rows == 2:
-        return f"point {name} has one ray"
-    return f"point {name} has too few observations: {rows} for {needed} coordinates"
+        return one_ray(name)
+    return message(
+        "too_few_observations",
+        "point {point} has too few observations: {count} for {needed} coordinates",
+        point=name,
+        count=rows,
+        needed=needed,
+    )
+
+
+def not_measured(name):
+    """What is said of a point that nothing measured."""
+    return message("not_measured", "point {point} is not measured", point=name)
 
 
 def sorted_out(survey):
@@ -45,20 +59,17 @@ def sorted_out(survey):
     plan, height, _, _, _ = _counts(survey)
     idle = np.column_stack([plan == 0, plan == 0, height == 0])
     warnings = []
-    for columns, what in ((slice(0, 2), "x and y"), (slice(2, 3), "z")):
+    for columns, what in ((slice(0, 2), joined(["x", "y"])), (slice(2, 3), "z")):
         names = [survey.points[i] for i in np.flatnonzero(idle[:, columns].all(axis=1))]
         if names:
-            shown = ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
-            verb = "keep" if len(names) > 1 else "keeps"
-            warnings.append(
-                Problem(
-                    "job.toml",
-                    f"no observation says anything about {what} of {shown}: {len(names)} points "
-                    f"{verb} the value that was given, or 0",
-                    None,
-                    "adjustment",
-                )
+            text = message(
+                "untouched",
+                "no observation says anything about {axes} of {points}: what was given is kept, or"
+                " 0",
+                axes=what,
+                points=listed(names, SHOWN),
             )
+            warnings.append(Problem("job.toml", text, None, "adjustment"))
     return idle, warnings
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.job.measurements import RejectedReadings
 from tankcal.network import Adjusted
 
 
@@ -126,6 +127,51 @@ class Cause:
 
 
 @dataclass(frozen=True)
+class RepeatedReadings:
+    """Repeated readings of image points, before anything was averaged.
+
+    photo, point  (n,) names of the points read more than once      count  (n,) readings
+    mean_mm       (n, 2) without weights      sd_mm  (n, 2) of one reading, from the sample
+    limit_mm      sd beyond which readings were rejected; None: no limit
+    rejected      tuple of RejectedReadings, which are among the n
+    """
+
+    photo: tuple
+    point: tuple
+    count: np.ndarray
+    mean_mm: np.ndarray
+    sd_mm: np.ndarray
+    limit_mm: float | None
+    rejected: tuple[RejectedReadings, ...]
+
+    @property
+    def mean_sd_mm(self):
+        """(2,) mean of the standard deviations."""
+        return self.sd_mm.mean(axis=0)
+
+    @property
+    def pooled_sd_mm(self):
+        """(2,) root of the mean variance, by degrees of freedom: sd of one reading of any point."""
+        return np.sqrt((self.count - 1) @ self.sd_mm**2 / np.sum(self.count - 1))
+
+
+@dataclass(frozen=True)
+class DepthOfField:
+    """The outer iteration that corrects image points for the depth of their objects.
+
+    rounds      adjustments made           last_change_mm  largest change of the last correction
+    largest_mm  largest correction (x or y)       rms_mm   root mean square of all of them
+    left        image readings left uncorrected: their objects have no depth in front of the lens
+    """
+
+    rounds: int
+    last_change_mm: float
+    largest_mm: float
+    rms_mm: float
+    left: int
+
+
+@dataclass(frozen=True)
 class Adjustment:
     """The adjusted survey. Covariances are scaled as `cov_scale` says.
 
@@ -145,6 +191,8 @@ class Adjustment:
     warnings       tuple of Problem
     doubts         those of the warnings that put the whole result in doubt: what was set aside may
                    be the victim of what was kept, or another reading may be wrong in its place
+    repeats        RepeatedReadings of image points; None: each was read once
+    depth          DepthOfField; None: not asked for
     """
 
     names: tuple
@@ -168,6 +216,8 @@ class Adjustment:
     rounds: int
     warnings: tuple = ()
     doubts: tuple = ()
+    repeats: RepeatedReadings | None = None
+    depth: DepthOfField | None = None
 
     @property
     def dof(self):

@@ -9,12 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.errors import Problem, SolutionError
+from tankcal.errors import SolutionError
 from tankcal.network.assembly import assemble
 from tankcal.network.growing import sights_of
 from tankcal.network.resection import bearings, intersected
 from tankcal.observations import Directions, Distances
-from tankcal.surveys.diagnoses import MIRROR, mirrored_fits, swapped_points
+from tankcal.surveys.diagnoses import mirrored_fits, mirrored_photo, swapped_points
 
 FAR = 0.25  # relative, of a distance
 ASKEW_RAD = 0.1  # of an angle
@@ -106,7 +106,7 @@ def _refuse_mirrored(survey, off_mm, rows):
         return
     sights = sights_of(replace(survey, image_points=replace(images, use=None)))
     found = [
-        Problem("image_points.csv", f"photo {survey.photos.names[i]}: {MIRROR}")
+        mirrored_photo(survey.photos.names[i])
         for i in doubtful
         if mirrored_fits(survey.xyz_m[sights[i].point], sights[i].ideal)
     ]

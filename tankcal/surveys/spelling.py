@@ -7,6 +7,7 @@ import scipy.spatial
 from scipy.special import chdtri
 
 from tankcal.errors import Problem
+from tankcal.messages import message
 
 LEVEL = 0.001  # of the test whether two points are one
 RARELY = 3  # rays or readings of the point that is doubted, at most
@@ -22,6 +23,11 @@ def alike(name):
     return re.sub(r"(?<!\d)0+(?=\d)", "", plain.translate(str.maketrans("il", "11")))
 
 
+def in_photo(photo, point):
+    """What an image point is called."""
+    return message("point_in_photo", "point {point} in photo {photo}", point=point, photo=photo)
+
+
 def names_alike(aside, names):
     """Problem rows for points that could not be adjusted and whose name is nearly another's.
 
@@ -31,10 +37,19 @@ def names_alike(aside, names):
     for name in names:
         known.setdefault(alike(name), name)
     return [
-        Problem(file, f"point {name} could not be adjusted: is it {known[alike(name)]}?")
+        Problem(file, _is_it(name, known[alike(name)]))
         for name, file in aside.items()
         if known.get(alike(name), name) != name
     ][:TOLD]
+
+
+def _is_it(name, other):
+    return message(
+        "is_it",
+        "point {point} could not be adjusted: is it {other}?",
+        point=name,
+        other=other,
+    )
 
 
 def same_place(adjusted):
@@ -64,10 +79,13 @@ def same_place(adjusted):
             continue
         if not _together(adjusted, xyz[few] - xyz[many], few, many):
             continue
-        text = (
-            f"points {survey.points[few]} and {survey.points[many]} lie {1e3 * apart[i]:.1f} mm "
-            "apart, within their standard deviations, and no photo or station shows both: one "
-            "point under two names?"
+        text = message(
+            "two_names",
+            "points {point} and {other} lie {apart_mm:.1f} mm apart, within their standard"
+            " deviations, and no photo or station shows both: one point under two names?",
+            point=survey.points[few],
+            other=survey.points[many],
+            apart_mm=1e3 * apart[i],
         )
         found.append(Problem("job.toml", text))
         if len(found) == TOLD:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.errors import Problem, SolutionError
+from tankcal.messages import message
 from tankcal.network import approximate
 from tankcal.network.cleaning import started as started_from
 from tankcal.network.pieces import similarity
@@ -116,10 +117,11 @@ def mirrored_targets(xyz_m, points, measurements):
     common = np.isfinite(nominal).all(axis=1) & np.isfinite(xyz_m).all(axis=1)
     if not turned_over(nominal[common], xyz_m[common]):
         return []
-    text = (
-        "the adjusted points are a mirror image of the generatrices: these are numbered "
-        "anticlockwise (fine, if that is meant), or images are mirrored, or x and y of control are "
-        "swapped"
+    text = message(
+        "mirrored_generatrices",
+        "the adjusted points are a mirror image of the generatrices: these are numbered"
+        " anticlockwise (fine, if that is meant), or images are mirrored, or x and y of control are"
+        " swapped",
     )
     return [Problem("targets.csv", text, None, "generatrix")]
 

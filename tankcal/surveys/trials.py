@@ -11,13 +11,18 @@ import numpy as np
 
 from tankcal.camera import corrected
 from tankcal.errors import InputError, Problem, SolutionError
-from tankcal.surveys.diagnoses import MIRROR, mirrored_fits
+from tankcal.messages import message
+from tankcal.surveys.diagnoses import GON, MIRROR, mirrored_fits, mirrored_photo
+from tankcal.surveys.holding import ALIKE
 from tankcal.surveys.readings import ANGLES
-from tankcal.surveys.victims import ALIKE
 
 BETTER = 0.2  # share of sigma0 that may be left by what explains a survey
 SOUND = 5.0  # sigma0 of a survey that fits, if not well: a single blunder makes more of it
 CERTAIN = 2.0  # sigma0 after which nothing else is tried
+OTHER_UNITS = (
+    (0.3048, message("feet", "feet")),
+    (0.001, message("millimetres", "millimetres")),
+)
 HORIZONTAL = ("directions", "horizontal_angles", "azimuths")
 EXCHANGED = 7  # control points of which each two are exchanged
 MOST = 12  # photos that are left out one after the other
@@ -54,7 +59,10 @@ def _mirrored(measurements):
     yield from _of_images(measurements)
     for one in measurements.readings:
         if one.table in HORIZONTAL:
-            text = "the angles fit once they are taken for those of a circle read anticlockwise"
+            text = message(
+                "angles_anticlockwise",
+                "the angles fit once they are taken for those of a circle read anticlockwise",
+            )
             yield Problem(one.file, text), _times(measurements, [one.table], -1.0)
 
 
@@ -68,7 +76,12 @@ def _exchanged(measurements):
         if control.system[i] == control.system[j]:
             order = np.arange(len(names))
             order[[i, j]] = j, i
-            text = f"all fits once {names[i]} and {names[j]} are exchanged"
+            text = message(
+                "names_exchanged",
+                "all fits once {point} and {other} are exchanged",
+                point=names[i],
+                other=names[j],
+            )
             changed = replace(control, xyz_m=control.xyz_m[order], sd_m=control.sd_m[order])
             row = control.rows[j] if control.rows else None
             yield Problem("control.csv", text, row, "point"), replace(measurements, control=changed)
@@ -78,19 +91,19 @@ def _in_other_units(measurements):
     """The same of a file in another unit."""
     tables = measurements.readings
     angles = [one.table for one in tables if one.table in ANGLES]
-    for factor, what in ((0.9, "gon read as degrees"), (1 / 0.9, "degrees read as gon")):
+    for factor, what in GON:
         if len(angles) > 1:
-            yield (
-                Problem("job.toml", f"all angles together fit once they are taken for {what}"),
-                _times(measurements, angles, factor),
-            )
+            template = "all angles together fit once they are taken for {what}"
+            text = message("all_angles_misread", template, what=what)
+            yield Problem("job.toml", text), _times(measurements, angles, factor)
+        text = message("angles_misread", "the angles fit once they are taken for {what}", what=what)
         for table in angles:
-            text = f"the angles fit once they are taken for {what}"
             yield Problem(f"{table}.csv", text), _times(measurements, [table], factor)
     for table in ("distances", "slope_distances"):
         if any(one.table == table for one in tables) and _scale_is_known(measurements, table):
-            for factor, what in ((0.3048, "feet"), (0.001, "millimetres")):
-                text = f"the distances fit once they are taken for {what}"
+            for factor, what in OTHER_UNITS:
+                template = "the distances fit once they are taken for {what}"
+                text = message("distances_misread", template, what=what)
                 yield Problem(f"{table}.csv", text), _times(measurements, [table], factor)
 
 
@@ -105,8 +118,15 @@ def _of_control(measurements):
         if system is None or not mine.all():
             xyz, sd = control.xyz_m.copy(), control.sd_m.copy()
             xyz[mine], sd[mine] = xyz[mine][:, [1, 0, 2]], sd[mine][:, [1, 0, 2]]
-            of_system = "" if not system else f" of system {system}"
-            text = f"all coordinates{of_system} fit once x and y are swapped"
+            text = message(
+                "all_coordinates_swapped", "all coordinates fit once x and y are swapped"
+            )
+            if system:
+                text = message(
+                    "system_swapped",
+                    "all coordinates of system {system} fit once x and y are swapped",
+                    system=system,
+                )
             changed = replace(control, xyz_m=xyz, sd_m=sd)
             yield Problem("control.csv", text), replace(measurements, control=changed)
 
@@ -122,7 +142,11 @@ def _of_images(measurements):
         mine = np.ones(len(of), dtype=bool) if camera is None else of == camera
         if camera is None or not mine.all():
             xy = np.where(mine[:, None], images.xy_mm * [-1.0, 1.0], images.xy_mm)
-            text = MIRROR if camera is None else f"camera {camera}: {MIRROR}"
+            text = MIRROR
+            if camera is not None:
+                text = message(
+                    "camera_mirrored", "camera {camera}: {why}", camera=camera, why=MIRROR
+                )
             changed = replace(images, xy_mm=xy)
             yield Problem("image_points.csv", text), replace(measurements, image_points=changed)
 
@@ -161,11 +185,7 @@ def photos_that_do_not_fit(measurements, message, run):
         adjusted, _ = run(replace(measurements, image_points=_some(images, kept)))
     except (SolutionError, InputError):
         return []
-    return [
-        Problem("image_points.csv", f"photo {name}: {MIRROR}")
-        for name in lost
-        if _is_mirrored(measurements, name, adjusted)
-    ]
+    return [mirrored_photo(name) for name in lost if _is_mirrored(measurements, name, adjusted)]
 
 
 def _is_mirrored(measurements, name, adjusted):

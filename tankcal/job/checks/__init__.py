@@ -4,21 +4,24 @@ Each check tells `log` its problems and warnings and returns nothing. A check wh
 missing or bad stays silent: what is wrong with them has been told already.
 """
 
+from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.bottom import bottom_form, check_bottom
-from tankcal.job.checks.common import extent_of, has_rows, has_survey, has_wall_points
+from tankcal.job.checks.common import Extent, extent_of, has_rows, has_survey, has_wall_points
+from tankcal.job.checks.correlations import check_correlations
 from tankcal.job.checks.courses import check_courses
 from tankcal.job.checks.deadwood import check_deadwood
 from tankcal.job.checks.geometry import check_cylinder, check_scan
-from tankcal.job.checks.inputs import check_inputs
+from tankcal.job.checks.inputs import check_inputs, spreads, standard_u
 from tankcal.job.checks.kinds import check_horizontal, check_sphere
 from tankcal.job.checks.points import check_points
 from tankcal.job.checks.roof import check_roof
 from tankcal.job.checks.settings import check_settings
+from tankcal.job.checks.stated import check_stated
 from tankcal.job.checks.steps import check_steps
 from tankcal.job.checks.survey import check_survey
 from tankcal.job.entries import kind_of
 
-__all__ = ["bottom_form", "check_all"]
+__all__ = ["bottom_form", "check_all", "check_tank", "spreads", "standard_u", "useless_inputs"]
 
 
 def check_all(values, tables, registers, raw, is_whole, log):
@@ -30,14 +33,14 @@ def check_all(values, tables, registers, raw, is_whole, log):
     is_whole   False: the survey alone is asked for, whatever there is of the tank
     """
     if is_whole:
-        _check_tank(values, tables, raw, log)
+        check_tank(values, tables, raw, log)
     check_survey(values, tables, registers, raw, is_whole, log)
 
 
-def _check_tank(values, tables, raw, log):
+def check_tank(values, tables, raw, log):
+    """The checks of everything but the survey; arguments as in `check_all`."""
     kind = kind_of(raw)
-    points, inputs = tables["points"], tables["uncertainty"]
-    extent = None
+    points, extent = tables["points"], Extent()
     if values is not None:
         extent = extent_of(values, tables, kind)
         check_steps(values["table"], extent, raw, log)
@@ -47,8 +50,17 @@ def _check_tank(values, tables, raw, log):
         check_points(points, log)
     if values is not None:
         _check_of_kind(values, tables, extent, kind, raw, log)
+    _check_uncertainty(values, tables, extent, kind, raw, log)
+
+
+def _check_uncertainty(values, tables, extent, kind, raw, log):
+    inputs, correlations, stated = (tables[t] for t in ("uncertainty", "correlations", "stated"))
     if inputs is not None:
         check_inputs(inputs, values, tables, kind, log)
+    if correlations is not None:
+        check_correlations(correlations, inputs, raw, log)
+    if stated is not None:
+        check_stated(stated, extent, log)
 
 
 def _check_of_kind(values, tables, extent, kind, raw, log):

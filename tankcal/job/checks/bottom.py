@@ -4,6 +4,7 @@ import numpy as np
 
 from tankcal.job.checks.common import has_rows, is_not_given, tell, zero_z
 from tankcal.job.checks.geometry import places_of
+from tankcal.messages import message
 
 SURVEYED, MEASURED = ("x_m", "y_m", "z_m"), ("level_m", "volume_m3")
 MIN_POINTS, MAX_POINTS = 12, 500  # that a surface is made through
@@ -80,10 +81,18 @@ def _check_centre(form, values, raw, log):
         expected = f"{where}; expected at most {diameter / 4:g} m above, {deepest:g} m below:"
         tell(log.problem, raw, "bottom", "centre_z_m", f"{expected} another unit or frame?")
     elif abs(rise) > STEEP_FACTOR * diameter:
-        expected = f"{where}, which is steep: is it in the frame of the points?"
+        expected = message(
+            "bottom_steep",
+            "{rise_m:+g} m from its edge (datum.bottom_z_m), which is steep: is it in the frame of"
+            " the points?",
+            rise_m=rise,
+        )
         tell(log.warning, raw, "bottom", "centre_z_m", expected)
     elif rise == 0:
-        tell(log.warning, raw, "bottom", "centre_z_m", f"at the height of the edge: a flat {form}")
+        expected = message(
+            "bottom_flat", "at the height of the edge: bottom.form = {form} is flat", form=form
+        )
+        tell(log.warning, raw, "bottom", "centre_z_m", expected)
 
 
 def _check_points(table, wall, values, log):
@@ -103,7 +112,10 @@ def _check_points(table, wall, values, log):
         log.problem(table.file, expected, None, "x_m")
         return
     if spread < PARTIAL * diameter:
-        expected = "the points cover a small part of the bottom; expected them all over it"
+        expected = message(
+            "bottom_partly_surveyed",
+            "the points cover a small part of the bottom; expected them all over it",
+        )
         log.warning(table.file, expected, None, "x_m")
     _refuse_same_places(table, xyz, log)
     if wall is not None:
@@ -149,7 +161,11 @@ def _check_depths(table, rise, diameter, log):
     _tell_rows(table, "z_m", bad, texts, hint, log)
     steep = np.min(rise) < -max(LEAST_DEPTH_M, STEEP_FACTOR * diameter)
     if steep and not np.any(bad):
-        expected = f"{-np.min(rise):.4g} m below datum.bottom_z_m, which is deep: in metres?"
+        expected = message(
+            "bottom_deep",
+            "{depth_m:.4g} m below datum.bottom_z_m, which is deep: in metres?",
+            depth_m=-np.min(rise),
+        )
         log.warning(table.file, expected, table.rows[int(np.argmin(rise))], "z_m")
 
 
@@ -212,7 +228,13 @@ def _check_slices(table, levels, volumes, extent, log):
         if is_bad:
             log.problem(table.file, f"{text}, expected about that: in litres?", row, "volume_m3")
     if not np.any(bad) and filled[-1] < EMPTY:
-        expected = f"{texts[-1]}: is the bottom not covered yet, or is it another unit?"
+        expected = message(
+            "bottom_hardly_filled",
+            "{more_m3:.4g} m3 more than the row above; the full cross-section holds {full_m3:.4g}"
+            " m3 there: is the bottom not covered yet, or is it another unit?",
+            more_m3=volumes[-1] - volumes[-2],
+            full_m3=full[-1],
+        )
         log.warning(table.file, expected, table.rows[-1], "volume_m3")
     largest_heel = extent.area_m2 * max(LEAST_DEPTH_M, np.sqrt(extent.area_m2))
     if not np.any(bad) and volumes[0] > largest_heel:

@@ -7,6 +7,7 @@ import numpy as np
 from tankcal.job.contract.observations import READINGS
 from tankcal.job.entries import settings_place
 from tankcal.job.fields import is_blank
+from tankcal.messages import message
 
 
 def tell(to, raw, section, key, expected):
@@ -47,6 +48,18 @@ def refuse_repeated(table, column, log):
             log.problem(table.file, expected, row, column)
         else:
             first_row[name] = row
+
+
+def tiny_sd(unit, largest):
+    """What is said of standard deviations of which the largest is tiny in their unit."""
+    if unit == "mm":
+        template = "at most {largest:g}; expected millimetres: is it in metres?"
+        return message("tiny_sd_mm", template, largest=largest)
+    if unit == "um":
+        template = "at most {largest:g}; expected micrometres: is it in millimetres?"
+        return message("tiny_sd_um", template, largest=largest)
+    template = "at most {largest:g}; expected seconds of arc: is it in degrees or gon?"
+    return message("tiny_sd_arcsec", template, largest=largest)
 
 
 def loads_the_shell(values):

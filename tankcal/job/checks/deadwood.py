@@ -1,6 +1,7 @@
 """deadwood.csv: things that are in the tank, of a size that fits into it."""
 
 from tankcal.job.checks.common import refuse_repeated
+from tankcal.messages import message
 
 TOLERANCE_M = 0.05  # by which a thing may stick out of the drawing's tank
 LEAST_HEIGHT_M = 0.05  # of a thing that is given as if it had none
@@ -25,7 +26,12 @@ def check_deadwood(table, extent, log):
             continue
         _check_volume(table, row, top - bottom, volume, extent, log)
         if u is not None and volume and u > abs(volume):
-            expected = f"u = {u:g} m3 of a volume of {volume:g} m3: is it the right unit?"
+            expected = message(
+                "deadwood_u_large",
+                "u = {u_m3:g} m3 of a volume of {volume_m3:g} m3: is it the right unit?",
+                u_m3=u,
+                volume_m3=volume,
+            )
             log.warning(table.file, expected, row, "u_m3")
 
 
@@ -50,13 +56,21 @@ def _check_place(table, row, bottom, top, volume, extent, log):
 
 def _check_volume(table, row, height, volume, extent, log):
     if volume == 0:
-        log.warning(table.file, "found 0; a volume of nothing", row, "volume_m3")
+        expected = message("deadwood_of_nothing", "found 0; a volume of nothing")
+        log.warning(table.file, expected, row, "volume_m3")
     if extent.area_m2 is None:
         return
     full = extent.area_m2 * max(height, LEAST_HEIGHT_M)
-    found = f"found {volume:g}; the whole tank holds {full:.4g} m3 between bottom_m and top_m"
     if abs(volume) > SLACK * full:
+        found = f"found {volume:g}; the whole tank holds {full:.4g} m3 between bottom_m and top_m"
         expected = f"{found}, expected less, in cubic metres: in litres?"
         log.problem(table.file, expected, row, "volume_m3")
     elif abs(volume) > LARGE_SHARE * full:
-        log.warning(table.file, f"{found}: in litres?", row, "volume_m3")
+        expected = message(
+            "deadwood_large",
+            "found {volume_m3:g}; the whole tank holds {full_m3:.4g} m3 between bottom_m and"
+            " top_m: in litres?",
+            volume_m3=volume,
+            full_m3=full,
+        )
+        log.warning(table.file, expected, row, "volume_m3")

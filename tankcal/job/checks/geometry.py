@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.job.checks.common import tell
+from tankcal.messages import message
 
 MIN_POINTS_PER_COURSE = 5
 FEW_POINTS_PER_COURSE = 10
@@ -77,7 +78,14 @@ def check_extent(points, column, extent, key, nominal, log):
     found = f"the points are {extent:.4g} m apart (most of them), {key} is {nominal:g} m"
     if 1 / UNIT_FACTOR <= ratio <= UNIT_FACTOR:
         if ratio > DOUBTFUL_EXTENT:
-            expected = f"{found}: one of them in feet, or many points far off the tank?"
+            expected = message(
+                "points_too_wide",
+                "the points are {extent_m:.4g} m apart (most of them), {key} is {nominal_m:g} m:"
+                " one of them in feet, or many points far off the tank?",
+                extent_m=extent,
+                key=key,
+                nominal_m=nominal,
+            )
             log.warning(points.file, expected, None, column)
         return True
     large, small = ("the points", key) if ratio > 1 else (key, "the points")
@@ -107,5 +115,11 @@ def _check_points_in_courses(z, unplaced, edges, courses, raw, log):
             expected = f"{count} points lie in course {name}, expected {MIN_POINTS_PER_COURSE}"
             log.problem(courses.file, expected + " or more", row, "course")
         elif count + unplaced < FEW_POINTS_PER_COURSE:
-            expected = f"only {count} points lie in course {name}, expected"
-            log.warning(courses.file, f"{expected} {FEW_POINTS_PER_COURSE} or more", row, "course")
+            expected = message(
+                "few_points_in_course",
+                "only {count} points lie in course {course}, expected {advised} or more",
+                count=count,
+                course=name,
+                advised=FEW_POINTS_PER_COURSE,
+            )
+            log.warning(courses.file, expected, row, "course")

@@ -1,94 +1,91 @@
 """uncertainty.csv: each input once, in its own unit, of a credible size, and of use here."""
 
-from tankcal.job.checks.bottom import bottom_form
-from tankcal.job.checks.common import has_wall_points, loads_the_shell, refuse_repeated
+from tankcal.distributions import FAMILIES, expanded, standard, within
+from tankcal.job.checks.bearing import useless_inputs
+from tankcal.job.checks.common import refuse_repeated
 from tankcal.job.contract import INPUTS
+
+OF_T = ("scale", "sd")
+NORMAL = "normal"
+SPREAD_COLUMNS = ("u", "u_is", "k", "distribution", "dof")
 
 
 def check_inputs(inputs, values, tables, kind, log):
     """Each input once, in its own unit, of a credible size, and of use for this job."""
+    told = {problem.row for problem in log.problems if problem.file == inputs.file}
     refuse_repeated(inputs, "input", log)
-    useless = {} if values is None or kind is None else _useless(values, tables, kind)
-    given = zip(inputs.rows, inputs.of("input"), inputs.of("u"), inputs.of("unit"), strict=True)
-    for row, name, u, unit in given:
+    useless = {} if values is None or kind is None else useless_inputs(values, tables, kind)
+    units = inputs.of("unit")
+    rows = zip(inputs.rows, inputs.of("input"), units, spreads(inputs), strict=True)
+    for row, name, unit, spread in rows:
         if name in useless:
             log.problem(inputs.file, f"found {name}; {useless[name]}", row, "input")
-        if None in (name, u, unit):
+        if None in (name, unit):
             continue
-        known = INPUTS[name]
-        if unit != known.unit:
-            expected = f"found {unit!r}; expected {known.unit!r} for {name}"
+        if unit != INPUTS[name].unit:
+            expected = f"found {unit!r}; expected {INPUTS[name].unit!r} for {name}"
             log.problem(inputs.file, expected, row, "unit")
-        elif u > known.largest:
-            expected = f"found {u:g} {unit} for {name}; expected at most {known.largest:g} {unit}"
-            log.problem(inputs.file, expected, row, "u")
+        if row not in told and spread[0] is not None:
+            _check_spread(inputs.file, row, name, unit, spread, log)
 
 
-def _useless(values, tables, kind):
-    """{name of an input without any effect on this job: why}."""
-    useless = {
-        name: f"it has no bearing on a tank of kind {kind}"
-        for name, known in INPUTS.items()
-        if kind not in known.kinds
-    }
-    survey, switches = values["survey"], values["corrections"]
-    expands = survey["shell_temperature_c"] is not None and switches["temperature"] is not False
-    rules = {"expansion": "" if expands else "expected only with a temperature correction"}
-    if kind == "vertical":
-        rules |= _rules_of_vertical(values, tables)
-    elif kind == "horizontal":
-        rules |= _rules_of_horizontal(values, tables)
-    elif kind == "sphere":
-        rules |= _rules_of_wall(values["sphere"], values, has_wall_points(tables))
-    return useless | {name: why for name, why in rules.items() if why}
+def spreads(inputs):
+    """(u, u_is, k, distribution, dof) of each row of uncertainty.csv, None where blank."""
+    return [*zip(*(inputs.of(column) for column in SPREAD_COLUMNS), strict=True)]
 
 
-def _rules_of_vertical(values, tables):
-    """{input: "" or why it has no effect}."""
-    survey, switches = values["survey"], values["corrections"]
-    inside = survey["side"] == "inside"
-    head = loads_the_shell(values)
-    no_liquid = not survey["liquid_level_m"] or switches["head"] is False
-    no_head = "expected only with a liquid head: a density in [table]"
-    no_survey_liquid = "expected only with survey.liquid_level_m above 0"
-    not_subtracted = "expected only with side = outside: nothing is subtracted"
-    no_plate = inside or switches["plate"] is False
-    no_roof = values["roof"]["mass_kg"] is None or switches["roof"] is False
-    is_measured = bottom_form(values, tables["bottom"]) == "liquid"
-    return {
-        "plate_thickness": not_subtracted if no_plate and no_liquid and not head else "",
-        "paint": not_subtracted if inside or switches["paint"] is False else "",
-        "youngs_modulus": no_head if not head and no_liquid else "",
-        "liquid_density": "" if head else no_head,
-        "survey_level": no_survey_liquid if no_liquid else "",
-        "survey_density": no_survey_liquid if no_liquid else "",
-        "bottom": "expected u_m3 in bottom.csv instead" if is_measured else "",
-        "roof_mass": "expected only with a floating roof: [roof]" if no_roof else "",
-    }
+def standard_u(u, u_is, k, distribution, dof):
+    """Standard uncertainty of a sound row, in its unit; of a t distribution its scale."""
+    if u_is == "half_width":
+        return within(u, distribution).u
+    if u_is == "expanded":
+        return expanded(u, k=k).u
+    if u_is == "sd":
+        return standard(u, distribution, dof=dof, u_is=u_is).u
+    return u
 
 
-def _rules_of_horizontal(values, tables):
-    given, has_points = values["horizontal"], has_wall_points(tables)
-    leans = has_points or (given["tilt_mm_per_m"] and values["corrections"]["tilt"] is not False)
-    all_flat = given["end_a"] == given["end_b"] == "flat"
-    switched_off = values["corrections"]["tilt"] is False
-    return _rules_of_wall(given, values, has_points) | {
-        "end_depth": "expected only with an end that is not flat" if all_flat else "",
-        "tilt": _from_points(has_points) or ("corrections.tilt is false" if switched_off else ""),
-        "dip_position": "" if leans else "expected only for a tank that leans",
-    }
+def _check_spread(file, row, name, unit, spread, log):
+    """Cells of a row without other problems: do they agree, and is u of a credible size?"""
+    contradictions = _contradictions(*spread[1:])
+    for column, expected in contradictions:
+        log.problem(file, expected, row, column)
+    known = INPUTS[name]
+    if contradictions or unit != known.unit:
+        return
+    u = standard_u(*spread)
+    if u > known.largest:
+        found = f"found {spread[0]:g}, a standard uncertainty of" if u != spread[0] else "found"
+        expected = f"{found} {u:g} {unit} for {name}; expected at most {known.largest:g} {unit}"
+        log.problem(file, expected, row, "u")
 
 
-def _rules_of_wall(given, values, has_points):
-    """What horizontal cylinders and spheres share."""
-    switched_off = values["corrections"]["plate"] is False
-    outside = values["survey"]["side"] == "outside" and not switched_off
-    nothing = "expected only with side = outside and a thickness_mm: nothing is subtracted"
-    return {
-        "diameter": _from_points(has_points),
-        "plate_thickness": "" if outside and given["thickness_mm"] else nothing,
-    }
+def _contradictions(u_is, k, distribution, dof):
+    """[(column, what is wrong)] of what u is, its coverage factor and its distribution."""
+    name = distribution or NORMAL
+    found = [*_of_t(u_is, dof)] if name == "t" else [*_of_others(u_is, name)]
+    if u_is == "expanded" and k is None:
+        found.append(("k", "blank; expected the coverage factor, beside u_is = expanded"))
+    if u_is != "expanded" and k is not None:
+        found.append(("k", f"found {k:g}; expected a blank, or u_is = expanded beside it"))
+    return found
 
 
-def _from_points(has_points):
-    return "it comes from the points, with their uncertainty" if has_points else ""
+def _of_t(u_is, dof):
+    if u_is not in OF_T:
+        found = "blank" if u_is is None else f"found {u_is}"
+        yield "u_is", f"{found}; expected scale or sd: of a t distribution u may be either"
+    if dof is None:
+        yield "dof", "blank; expected the degrees of freedom of the t distribution"
+    elif u_is == "sd" and dof <= 2:
+        yield "dof", f"found {dof:g}; expected above 2: with fewer a t distribution has no sd"
+
+
+def _of_others(u_is, name):
+    if u_is in OF_T:
+        yield "u_is", f"found {u_is}; expected it only beside distribution = t, this one is {name}"
+    if u_is == "half_width" and name not in FAMILIES:
+        bounded = ", ".join(FAMILIES)
+        yield "distribution", f"{name} has no half-width; expected {bounded} beside it"
+    if u_is == "expanded" and name != NORMAL:
+        yield "distribution", f"found {name}; expected {NORMAL} or a blank beside u_is = expanded"

@@ -1,6 +1,7 @@
 """Sizes of horizontal cylinders and spheres: complete, consistent, and said once."""
 
 from tankcal.job.checks.common import is_not_given, tell
+from tankcal.messages import message
 
 STRONG_TILT_MM_PER_M = 50
 DEEPEST_END = 2.0  # diameters
@@ -131,13 +132,17 @@ def _check_dip(given, raw, log):
                 expected += f", but it would leave the top at {at_top:.3f} m"
             tell(log.problem, raw, "horizontal", "dip_from_a_m", expected)
     if given["roll_deg"] and given["diameter_m"] is not None:
-        expected = "of no effect on a round cylinder"
+        expected = message("roll_of_round_tank", "of no effect on a round cylinder")
         tell(log.warning, raw, "horizontal", "roll_deg", expected)
     if tilt and is_not_given(raw, "horizontal", "dip_from_a_m"):
         expected = "missing; expected the place of the dip point, for the tank leans"
         tell(log.problem, raw, "horizontal", "dip_from_a_m", expected)
     if tilt and abs(tilt) > STRONG_TILT_MM_PER_M:
-        expected = f"{tilt:g} mm/m is much; tanks lean by 5 to 20: is it in another unit?"
+        expected = message(
+            "large_tilt",
+            "{tilt_mm_per_m:g} mm/m is much; tanks lean by 5 to 20: is it in another unit?",
+            tilt_mm_per_m=tilt,
+        )
         tell(log.warning, raw, "horizontal", "tilt_mm_per_m", expected)
 
 

@@ -1,6 +1,7 @@
 """points.csv by itself: names and places once, standard deviations and sections complete."""
 
-from tankcal.job.checks.common import refuse_repeated
+from tankcal.job.checks.common import refuse_repeated, tiny_sd
+from tankcal.messages import message
 
 MAX_POINTS = 50_000
 TINY_SD_MM = 0.01
@@ -26,8 +27,7 @@ def check_points(points, log):
     for name in given:
         found = [sd for sd in points.of(name) if sd is not None]
         if found and max(found) < TINY_SD_MM:
-            expected = f"at most {max(found):g} mm; expected millimetres: is it in metres?"
-            log.warning(points.file, expected, None, name)
+            log.warning(points.file, tiny_sd("mm", max(found)), None, name)
 
 
 def _warn_same_places(points, log):
@@ -37,7 +37,11 @@ def _warn_same_places(points, log):
         if None in place:
             continue
         if place in first_row:
-            expected = f"the same coordinates as row {first_row[place]}; counted once"
+            expected = message(
+                "same_coordinates",
+                "the same coordinates as row {row}; counted once",
+                row=first_row[place],
+            )
             log.warning(points.file, expected, row, "x_m")
         else:
             first_row[place] = row

@@ -1,6 +1,7 @@
 """Settings that hang together: heights of the datum, the survey's liquid, densities, points."""
 
 from tankcal.job.checks.common import has_wall_points, is_not_given, loads_the_shell, tell
+from tankcal.messages import message
 
 MAX_DIP_OFFSET_M = 1.0
 LIGHT_KG_M3, HEAVY_KG_M3 = 500, 2000  # of the liquids that tanks are calibrated for
@@ -14,7 +15,7 @@ DENSITIES = (
 
 
 def check_settings(values, tables, extent, kind, raw, log):
-    """Heights of the datum, pairs of keys, densities, language."""
+    """Heights of the datum and of deliveries, pairs of keys, densities."""
     datum, table = values["datum"], values["table"]
     _check_dip_plate(values, tables, kind, raw, log)
     for given, lacking in (("dip_x_m", "dip_y_m"), ("dip_y_m", "dip_x_m")):
@@ -25,9 +26,24 @@ def check_settings(values, tables, extent, kind, raw, log):
     if table["other_densities_kg_m3"] and not loads_the_shell(values):
         expected = "given with corrections.head = false; expected one or the other"
         tell(log.problem, raw, "table", "other_densities_kg_m3", expected)
-    if table["language"] not in (None, "en"):
-        expected = "this version prints English; expected en"
-        tell(log.warning, raw, "table", "language", expected)
+    _check_deliveries(table["minimum_delivery_m"] or (), extent, raw, log)
+    issued, surveyed = values["certificate"].get("date_of_issue"), values["survey"]["date"]
+    if issued and surveyed and issued < surveyed:
+        expected = f"found {issued}, before the survey of {surveyed}; expected no earlier day"
+        tell(log.problem, raw, "certificate", "date_of_issue", expected)
+
+
+def _check_deliveries(heights, extent, raw, log):
+    """Each height of a least delivery once, and no more than the tank has."""
+    for place, height in enumerate(heights):
+        expected = ""
+        if extent.height_m is not None and height > extent.height_m:
+            expected = f"expected at most the height of the tank, {extent.height_m:g} m"
+        elif height in heights[:place]:
+            expected = "expected it once"
+        if expected:
+            expected = f"found {height:g}; {expected}"
+            tell(log.problem, raw, "table", "minimum_delivery_m", expected)
 
 
 def _check_dip_plate(values, tables, kind, raw, log):
@@ -85,8 +101,12 @@ def _check_densities(values, raw, log):
                 expected = f"found {density:g}; expected kg/m3, such as 850: is it in g/cm3?"
                 tell(log.problem, raw, section, key, expected)
             elif not LIGHT_KG_M3 <= density <= HEAVY_KG_M3:
-                expected = (
-                    f"{density:g} kg/m3; liquids in tanks have {LIGHT_KG_M3} to {HEAVY_KG_M3}"
+                expected = message(
+                    "strange_density",
+                    "{density_kg_m3:g} kg/m3; liquids in tanks have {least} to {most}",
+                    density_kg_m3=density,
+                    least=LIGHT_KG_M3,
+                    most=HEAVY_KG_M3,
                 )
                 tell(log.warning, raw, section, key, expected)
     table = values["table"]
@@ -94,3 +114,13 @@ def _check_densities(values, raw, log):
     if len(set(all_of_table)) < len(all_of_table):
         expected = "a density twice, or the one of liquid_density_kg_m3 again; expected others"
         tell(log.problem, raw, "table", "other_densities_kg_m3", expected)
+    own, of_roof = table["liquid_density_kg_m3"], values["roof"]["reference_density_kg_m3"]
+    if own and of_roof and own != of_roof:
+        text = message(
+            "roof_density",
+            "{roof_kg_m3:g} kg/m3 beside {table_kg_m3:g} kg/m3 of the table: its roof is that of"
+            " another liquid than its head",
+            roof_kg_m3=of_roof,
+            table_kg_m3=own,
+        )
+        tell(log.warning, raw, "roof", "reference_density_kg_m3", text)

@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 from tankcal.job.checks.common import is_not_given, tell
+from tankcal.messages import message
 
 MAX_TABLE_ROWS = 25_000  # a 20 m tank in millimetres; its certificate has 90 pages
 COARSE_STEP_M = 0.5
@@ -64,7 +65,11 @@ def _check_step(step, table, height, raw, log):
         expected = f"{height / step:.0f} rows in the table, expected at most {MAX_TABLE_ROWS}"
         tell(log.problem, raw, "table", key, expected)
     elif step > COARSE_STEP_M:
-        expected = f"{step:g} m is a coarse step for a table: is it in another unit?"
+        expected = message(
+            "coarse_step",
+            "{step_m:g} m is a coarse step for a table: is it in another unit?",
+            step_m=step,
+        )
         tell(log.warning, raw, "table", key, expected)
 
 

@@ -20,22 +20,21 @@ COLUMNS = TANK_COLUMNS | SURVEY_COLUMNS
 KEYS = {section: (COMMON_KEYS | PART_KEYS)[section] for section in SECTIONS}
 
 REQUIRED_TABLES = {"vertical": ("points", "courses")}
+_OF_ALL = ("uncertainty", "correlations", "stated")
 TABLES_OF_KIND = {
-    "vertical": ("points", "courses", "bottom", "deadwood", "uncertainty"),
-    "horizontal": ("points", "deadwood", "uncertainty"),
-    "sphere": ("points", "deadwood", "uncertainty"),
-    "mesh": ("deadwood", "uncertainty"),
+    "vertical": ("points", "courses", "bottom", "deadwood", *_OF_ALL),
+    "horizontal": ("points", "deadwood", *_OF_ALL),
+    "sphere": ("points", "deadwood", *_OF_ALL),
+    "mesh": ("deadwood", *_OF_ALL),
 }
 
 OPEN_SECTIONS = ("certificate",)  # hold text fields of the user's own, too
-LATER_KEYS = {"table": ("rule", "minimum_delivery_m")}
 
 __all__ = [
     "COLUMNS",
     "INPUTS",
     "KEYS",
     "KINDS",
-    "LATER_KEYS",
     "OF_PHOTOS",
     "OPEN_SECTIONS",
     "REGISTERS_OF_SURVEY",

@@ -1,6 +1,7 @@
 """The columns of every table."""
 
-from tankcal.job.contract.inputs import INPUTS, UNITS
+from tankcal.distributions import FAMILIES
+from tankcal.job.contract.inputs import AS_READ, INPUTS, UNITS
 from tankcal.job.fields import Field
 
 
@@ -105,7 +106,7 @@ UNCERTAINTY = (
     Field(
         "u",
         "number",
-        "its standard uncertainty (not the half-width, not U)",
+        "how uncertain it is: its standard uncertainty, or what u_is says",
         required=True,
         low=0,
     ),
@@ -116,15 +117,52 @@ UNCERTAINTY = (
         required=True,
         choices=UNITS,
     ),
-    Field("type", "choice", "A (statistics) or B; blank: B", choices=("A", "B")),
     Field(
-        "distribution",
+        "u_is",
         "choice",
-        "blank: normal",
-        choices=("normal", "rectangular", "triangular", "u-shaped", "t"),
+        "what u is: standard; half_width of a bounded distribution; expanded, with its k; scale or"
+        " sd of a t distribution; blank: standard",
+        choices=AS_READ,
     ),
-    Field("dof", "number", "degrees of freedom; blank: infinite", low=0, above_low=True),
+    Field("k", "number", "coverage factor of an expanded uncertainty", low=1, high=20),
+    Field("type", "choice", "A (statistics) or B; blank: B", choices=("A", "B")),
+    Field("distribution", "choice", "blank: normal", choices=("normal", *FAMILIES, "t")),
+    Field("dof", "number", "degrees of freedom, 1 or more; blank: infinite", low=1),
     Field("note", "text", "where the figure comes from"),
+)
+CORRELATED = tuple(name for name, one in INPUTS.items() if one.correlates)
+CORRELATIONS = (
+    Field("input", "choice", "an input of uncertainty.csv", required=True, choices=CORRELATED),
+    Field("with", "choice", "another one, correlated with it", required=True, choices=CORRELATED),
+    Field("r", "number", "their coefficient of correlation", required=True, low=-1, high=1),
+)
+STATED = (
+    Field(
+        "high_m",
+        "number",
+        "dip from the table's zero, metres: its volume is reported with uncertainty and budget",
+        required=True,
+        low=0,
+        above_low=True,
+        high=100,
+    ),
+    Field(
+        "low_m",
+        "number",
+        "of a delivery: the dip it ends at, metres; blank: the volume below high_m",
+        low=0,
+        high=100,
+    ),
+    Field(
+        "volume_m3",
+        "number",
+        "volume that an earlier table or a contract states there, cubic metres, for a decision"
+        " rule that limits deviations",
+        low=0,
+        above_low=True,
+        high=1e6,
+    ),
+    Field("note", "text", "what it is"),
 )
 
 COLUMNS = {
@@ -133,4 +171,6 @@ COLUMNS = {
     "bottom": BOTTOM,
     "deadwood": DEADWOOD,
     "uncertainty": UNCERTAINTY,
+    "correlations": CORRELATIONS,
+    "stated": STATED,
 }

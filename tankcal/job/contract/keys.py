@@ -2,6 +2,7 @@
 
 from tankcal.job.contract.kinds import KINDS, VERTICAL, WITH_POINTS
 from tankcal.job.contract.registers import CAMERA_SETTINGS
+from tankcal.job.contract.table import TABLE
 from tankcal.job.fields import Field
 
 
@@ -11,10 +12,6 @@ def _text(name, note):
 
 def _size(name, note, high, required_for=()):
     return Field(name, "number", note, required_for=required_for, low=0.1, high=high)
-
-
-def _temperature(name, note, required=False):
-    return Field(name, "number", note, required=required, low=-60, high=120)
 
 
 TANK = (
@@ -56,9 +53,12 @@ SURVEY = (
         choices=("outside", "inside"),
     ),
     Field("date", "date", "day of the survey, year-month-day", required=True),
-    _temperature(
+    Field(
         "shell_temperature_c",
+        "number",
         "temperature of the shell during the survey, degrees Celsius; blank: no correction",
+        low=-60,
+        high=120,
     ),
     Field(
         "liquid_level_m",
@@ -105,84 +105,6 @@ DATUM = (
         above_low=True,
         high=200,
     ),
-)
-TABLE = (
-    Field(
-        "step_m",
-        "number",
-        "step of the capacity table, metres: 0.01 for centimetres; blank with feet and inches",
-        low=0,
-        above_low=True,
-        start="0.01",
-    ),
-    _temperature(
-        "reference_temperature_c",
-        "shell temperature that the table is for, degrees Celsius",
-        required=True,
-    ),
-    Field(
-        "height_unit",
-        "choice",
-        "of the printed table: m, or feet and inches in steps of 1/8 or 1/16 inch; blank: m",
-        choices=("m", "ft-in-8", "ft-in-16"),
-    ),
-    Field(
-        "volume_unit",
-        "choice",
-        "of the printed table: m3, L, or bbl (42 US gallons); blank: m3",
-        choices=("m3", "L", "bbl"),
-    ),
-    Field(
-        "fine_step_m",
-        "number",
-        "smaller step within fine_zones, metres",
-        low=0,
-        above_low=True,
-    ),
-    Field(
-        "fine_zones",
-        "ranges",
-        "dips, metres, between which the table has that step: 0-0.3; 2.1-2.4",
-    ),
-    Field(
-        "max_interpolation_error_l",
-        "number",
-        "largest error of linear interpolation between rows, litres; without step_m the step is"
-        " chosen by it",
-        low=0,
-        above_low=True,
-        high=1e5,
-    ),
-    Field(
-        "height_expansion",
-        "flag",
-        "true: dips expand with the shell, too; blank: false",
-    ),
-    Field(
-        "liquid_density_kg_m3",
-        "number",
-        "density of the liquid that loads the shell, kg/m3; 0 or blank: no head",
-        kinds=VERTICAL,
-        low=0,
-        high=3000,
-    ),
-    Field(
-        "other_densities_kg_m3",
-        "numbers",
-        "densities of further tables, kg/m3: 700; 850",
-        kinds=VERTICAL,
-        low=0,
-        above_low=True,
-        high=3000,
-    ),
-    Field(
-        "coverage_probability",
-        "number",
-        "of the expanded uncertainty; blank: 0.95",
-        low=0.5,
-        high=0.9999,
-    ),
-    _text("language", "this version prints English: en or blank"),
 )
 MATERIAL = (
     Field(
@@ -250,6 +172,25 @@ ADJUSTMENT = (
         of_survey=True,
     ),
     Field(
+        "reading_limit_um",
+        "number",
+        "largest standard deviation of repeated readings of an image point or mark, micrometres;"
+        " beyond it they are rejected; blank: none are",
+        kinds=WITH_POINTS,
+        low=0,
+        above_low=True,
+        high=1e4,
+        of_survey=True,
+    ),
+    Field(
+        "depth_of_field",
+        "flag",
+        "true: radial distortion by the depth of each point, from focus_calibrations in"
+        " cameras.toml; blank: false",
+        kinds=WITH_POINTS,
+        of_survey=True,
+    ),
+    Field(
         "refraction",
         "number",
         "coefficient of refraction for zenith and vertical angles and slope distances, such as"
@@ -264,14 +205,25 @@ CERTIFICATE = (
     _text("number", "number of the certificate"),
     _text("laboratory", "who issues the certificate"),
     _text("laboratory_address", "the issuer's address"),
+    _text("accreditation_number", "accreditation of the laboratory, such as: CAL 0123"),
     _text("customer", "who ordered the calibration"),
     _text("customer_address", "the customer's address"),
+    _text("customer_contact", "whom the customer named, with telephone or e-mail"),
+    _text("place", "where the calibration was made; blank: where the tank stands"),
     _text("method", "how it was surveyed, such as: total station, ISO 7507-3"),
     _text("procedure", "the laboratory's own procedure"),
+    _text("deviations", "what was done otherwise than the method says, or left out"),
     _text("operator", "who surveyed"),
+    _text("equipment", "instruments that were used"),
+    _text("traceability", "to what standards, and by which certificates, results are traceable"),
+    _text("conditions", "weather during the survey"),
+    _text("condition_of_tank", "state of the tank during the survey, such as: clean, empty"),
+    _text("external_results", "results that came from others, and from whom"),
+    _text("customer_data", "what the customer supplied and the laboratory did not measure"),
+    _text("replaces", "the certificate that this one replaces, and why"),
+    _text("authorised_by", "who authorises the certificate"),
+    _text("authorised_role", "that person's function"),
     Field("date_of_issue", "date", "day of issue, year-month-day"),
-    _text("traceability", "instruments and their certificates"),
-    _text("conditions", "weather and state of the tank during the survey"),
     _text("remarks", "anything to be printed on the certificate"),
     _text("notice", "a word that every page carries, such as RECONSTRUCTION"),
 )

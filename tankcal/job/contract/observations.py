@@ -136,6 +136,28 @@ IMAGE_POINTS = (
     _number("s_px", "standard deviation of column and line, pixels", 0, 1e4, above_low=True),
     USE,
 )
+FIDUCIALS = (
+    _name("photo", "the photo, as in photos.csv"),
+    _name("mark", "the fiducial mark, as in cameras.toml; a repeated row is a repeated reading"),
+    _number("x_mm", "as the comparator read it, millimetres", -1e4, 1e4, True),
+    _number("y_mm", "as the comparator read it, millimetres", -1e4, 1e4, True),
+    _number(
+        "s_um",
+        "standard deviation of both, micrometres; blank: image_sd_um",
+        0,
+        1e5,
+        above_low=True,
+    ),
+)
+FILM = (
+    _name("camera", "the camera, as in cameras.toml: for all its photos; or a photo", False),
+    _name("photo", "one photo, in place of the camera", False),
+    _number("x_mm", "place on the film, to the right of the middle, millimetres", -1e3, 1e3, True),
+    _number("y_mm", "place on the film, above the middle, millimetres", -1e3, 1e3, True),
+    _number(
+        "height_um", "height of its surface there, towards the lens, micrometres", -5e3, 5e3, True
+    ),
+)
 CONTROL = (
     _name("point", "name of the point, once in each system"),
     *_coordinates(),
@@ -230,6 +252,8 @@ COLUMNS = {
     "targets": TARGETS,
     "photos": PHOTOS,
     "image_points": IMAGE_POINTS,
+    "fiducials": FIDUCIALS,
+    "film": FILM,
     "control": CONTROL,
     "check": CHECK,
     "setups": SETUPS,

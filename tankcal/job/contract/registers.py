@@ -1,6 +1,7 @@
 """The keys of cameras.toml, instruments.toml and [adjustment.camera]."""
 
 from tankcal.camera import AFFINITIES, CONVENTIONS
+from tankcal.comparator import KINDS as TRANSFORMATIONS
 from tankcal.job.fields import Field
 from tankcal.network.survey import STATES
 
@@ -63,6 +64,57 @@ def _sd(name, of=None):
     return Field(sd_key(name), "number", note, low=0, high=PARAMETER_KEYS[of or name][1])
 
 
+AFFINITIES_BY_AUTHOR = {"silva": "both_y", "pessoa": "both_x"}
+MARKS = "marks"
+FOCUS_CALIBRATIONS = "focus_calibrations"
+# [cameras.NAME.marks] has keys of the user's own, each with the same kind of value
+FAMILIES = {
+    "cameras": {
+        MARKS: Field(
+            MARKS,
+            "numbers",
+            "calibrated place of a fiducial mark, millimetres from the middle: [-83.01, 0.02]",
+            low=-1e3,
+            high=1e3,
+        )
+    }
+}
+_FOCUS = (
+    Field(
+        "focus_m",
+        "number",
+        "distance that the lens is focused at, metres; with focus_calibrations, in place of K",
+        low=0,
+        above_low=True,
+        high=1e9,
+    ),
+    Field(
+        "lens_focal_length_mm",
+        "number",
+        "focal length of the lens (c at infinity), millimetres; with focus_calibrations",
+        low=0,
+        above_low=True,
+        high=1e4,
+    ),
+    Field(
+        f"{FOCUS_CALIBRATIONS}.distance_m",
+        "numbers",
+        "two focus distances at which the lens was calibrated, metres (1e9: infinity): [5, 25]",
+        low=0,
+        above_low=True,
+        high=1e9,
+    ),
+    *(
+        Field(
+            f"{FOCUS_CALIBRATIONS}.{PARAMETER_KEYS[name][0]}",
+            "numbers",
+            f"radial distortion {name} at these two distances; blank: 0",
+            low=-1.0,
+            high=1.0,
+        )
+        for name in ("K1", "K2", "K3")
+    ),
+)
 CAMERA = (
     Field(
         "format_mm",
@@ -95,8 +147,8 @@ CAMERA = (
     Field(
         "affinity",
         "choice",
-        "form of the affinity: both_y, both_x or b1_b2; blank: b1_b2",
-        choices=tuple(AFFINITIES),
+        "form of the affinity: both_y (silva), both_x (pessoa) or b1_b2; blank: b1_b2",
+        choices=(*AFFINITIES, *AFFINITIES_BY_AUTHOR),
     ),
     Field(
         "radial_balance_mm",
@@ -112,6 +164,13 @@ CAMERA = (
         " with any of them",
         choices=tuple(CONVENTIONS),
     ),
+    Field(
+        "fiducial_transformation",
+        "choice",
+        "of comparator readings through the marks in fiducials.csv; blank: affine",
+        choices=tuple(TRANSFORMATIONS),
+    ),
+    *_FOCUS,
 )
 INSTRUMENT = (
     Field("kind", "text", f"{', '.join(INSTRUMENT_KINDS)}, or another one", required=True),
@@ -172,6 +231,13 @@ CAMERA_SETTINGS = (
     *(_override(key, _note(key)) for key in SECOND_NAMES.values()),
 )
 
+# other spellings of keys, of the same meaning and unit: K1 for K1_mm-2, s_c for s_c_mm
+SHORT_KEYS = {
+    "cameras": {key: name for name, (key, _) in PARAMETER_KEYS.items() if name[0] in "KP"}
+    | {sd_key(name): f"s_{name}" for name in ("c", "x0", "y0")},
+    "instruments": {},
+}
 REGISTER_KEYS = {"cameras": CAMERA, "instruments": INSTRUMENT}
 REGISTERS_OF_SURVEY = {"photos": ("cameras", "instruments"), "total-station": ("instruments",)}
-OF_PHOTOS = ("fixed_photo", "image_sd_um")  # keys of [adjustment] that need photographs
+# keys of [adjustment] that need photographs
+OF_PHOTOS = ("fixed_photo", "image_sd_um", "reading_limit_um", "depth_of_field")

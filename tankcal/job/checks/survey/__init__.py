@@ -9,6 +9,7 @@ from tankcal.job.checks.survey.cameras import check_cameras
 from tankcal.job.checks.survey.datum import check_datum
 from tankcal.job.checks.survey.doubtful import check_doubtful
 from tankcal.job.checks.survey.files import SurveyFiles
+from tankcal.job.checks.survey.focus import check_depth_of_field
 from tankcal.job.checks.survey.held import check_held
 from tankcal.job.checks.survey.images import check_images
 from tankcal.job.checks.survey.instruments import check_instruments
@@ -17,6 +18,7 @@ from tankcal.job.checks.survey.names import check_names
 from tankcal.job.checks.survey.readings import check_readings
 from tankcal.job.contract import KEYS
 from tankcal.job.tables import SURVEY_TABLES
+from tankcal.messages import message
 
 __all__ = ["check_survey"]
 
@@ -35,6 +37,7 @@ def check_survey(values, tables, registers, raw, is_whole, log):
     told = frozenset((problem.file, problem.row) for problem in log.problems)
     files = SurveyFiles(values, tables, registers, raw, log, told)
     check_cameras(files)
+    check_depth_of_field(files)
     check_instruments(files)
     check_images(files)
     check_readings(files)
@@ -53,7 +56,9 @@ def _tell_nothing_to_adjust(values, tables, raw, is_whole, log):
         expected = "nothing to adjust; expected image points, distances or other observations"
         log.problem(raw.settings_file, expected)
         return
-    expected = "without effect: the job has no observations that could be adjusted"
+    expected = message(
+        "nothing_to_adjust", "without effect: the job has no observations that could be adjusted"
+    )
     for name in SURVEY_TABLES:
         if tables[name] is not None:
             log.warning(tables[name].file, expected)

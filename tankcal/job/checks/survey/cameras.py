@@ -5,14 +5,19 @@ import numpy as np
 from tankcal.job.cameras import (
     ASSUMED_CONVENTION,
     affinity_of,
+    at_focus,
     format_of,
     is_adjusted,
     parameters_of,
 )
 from tankcal.job.checks.common import tell
+from tankcal.job.checks.survey.focus import check_focus
 from tankcal.job.contract.registers import PARAMETER_KEYS, SECOND_NAMES, sd_key
+from tankcal.messages import message
 
 SAME_SIZE = 0.01
+SMALLEST_PIXEL_UM, LARGEST_FORMAT_MM = 0.1, 1000
+PART_OF_PIXEL = 0.1  # by which a format in mm may miss a whole number of pixels
 CREDIBLE_LENGTHS = (0.1, 100)  # principal distance, in diagonals of the format
 DOUBTFUL_DISTORTION, IMPOSSIBLE_DISTORTION = 0.1, 0.5  # at the corner, part of the radius
 
@@ -26,12 +31,44 @@ def check_cameras(files):
     for name, given in files.registers["cameras"].items():
         is_sound = _check_format(files, name, given)
         _check_affinity(files, name, given)
+        check_focus(files, name, given)
         if settings is not None:
             parameters = parameters_of(given, settings)
             _check_convention(files, name, given, parameters)
             _check_states(files, name, parameters)
         if is_sound:
             _check_sizes(files, name, given)
+
+
+def check_calibrations(files, in_pixels=True):
+    """Each camera by itself, of a file of cameras that belongs to no job.
+
+    in_pixels  whether the size of a pixel must be known
+    """
+    none_adjusted = dict.fromkeys((*PARAMETER_KEYS, *SECOND_NAMES.values())) | {"default": "off"}
+    for name, given in files.registers["cameras"].items():
+        is_sound = _check_format(files, name, given)
+        _check_affinity(files, name, given)
+        check_focus(files, name, given)
+        _check_convention(files, name, given, parameters_of(given, none_adjusted))
+        if is_sound:
+            _check_pixels(files, name, given, in_pixels)
+            _check_sizes(files, name, given)
+
+
+def _check_pixels(files, name, given, in_pixels):
+    """The size of a pixel is known, and the format is a whole number of them."""
+    if given["format_px"] is not None:
+        return
+    if given["pixel_um"] is None:
+        if in_pixels and not files.is_given("cameras", name, "pixel_um"):
+            expected = "missing beside format_mm; expected the size of a pixel, or format_px"
+            files.tell_key(files.log.problem, "cameras", name, "pixel_um", expected)
+        return
+    pixels = np.array(given["format_mm"]) / np.broadcast_to(given["pixel_um"], 2) * 1000
+    if np.any(np.abs(pixels - np.round(pixels)) > PART_OF_PIXEL):
+        expected = f"of {pixels[0]:.8g} x {pixels[1]:.8g} pixels; expected whole ones, or format_px"
+        files.tell_key(files.log.problem, "cameras", name, "format_mm", expected)
 
 
 def _refuse_two_names(files, settings):
@@ -77,18 +114,30 @@ def _check_format(files, name, given):
     if has_px and not has_mm and not has_pixel:
         problem("pixel_um", "missing beside format_px; expected the size of a pixel, micrometres")
         return False
-    size, pixel = format_of(given)
+    size = format_of(given)[0]
     if size is None:
         return False  # what is wrong is told
-    if given["format_px"] is not None:
-        if any(number != round(number) for number in given["format_px"]):
-            problem("format_px", "expected whole numbers of pixels")
-        of_pixels = np.array(given["format_px"]) * pixel
-        if np.any(np.abs(of_pixels / size - 1) > SAME_SIZE):
-            expected = f"format_px times pixel_um is {of_pixels[0]:g} x {of_pixels[1]:g} mm;"
-            problem("format_mm", f"{expected} expected the same, or one of the three left out")
-            return False
-    return True
+    in_px, in_mm = given["format_px"], given["format_mm"]
+    if in_px is not None and any(number != round(number) for number in in_px):
+        problem("format_px", "expected whole numbers of pixels")
+    if in_px is not None and in_mm is not None and np.any(np.abs(size / in_mm - 1) > SAME_SIZE):
+        expected = f"format_px times pixel_um is {size[0]:g} x {size[1]:g} mm;"
+        problem("format_mm", f"{expected} expected the same, or one of the three left out")
+        return False
+    return _check_unit(files, name, given, size)
+
+
+def _check_unit(files, name, given, size_mm):
+    """Is a pixel as large as micrometres make it? Returns whether it is."""
+    pixel = given["pixel_um"]
+    if pixel is None or (min(pixel) >= SMALLEST_PIXEL_UM and max(size_mm) <= LARGEST_FORMAT_MM):
+        return True
+    found = f"{min(pixel):g} micrometres makes a format of {size_mm[0]:.4g} x {size_mm[1]:.4g} mm"
+    is_small = min(pixel) < SMALLEST_PIXEL_UM
+    unit = "millimetres" if is_small else "another unit"
+    expected = f"found {found}; expected micrometres: is it in {unit}?"
+    files.tell_key(files.log.problem, "cameras", name, "pixel_um", expected)
+    return False
 
 
 def _check_affinity(files, name, given):
@@ -118,7 +167,11 @@ def _check_convention(files, name, given, parameters):
         )
         files.tell_key(files.log.problem, "cameras", name, "convention", expected)
     elif any(parameter.value or is_adjusted(parameter) for parameter in lens):
-        expected = f"missing; K, P and the affinity are taken as {ASSUMED_CONVENTION}"
+        expected = message(
+            "convention_assumed",
+            "missing; K, P and the affinity are taken as {convention}",
+            convention=ASSUMED_CONVENTION,
+        )
         files.tell_key(files.log.warning, "cameras", name, "convention", expected)
 
 
@@ -139,9 +192,12 @@ def _check_states(files, name, parameters):
         elif parameter.sd and parameter.state != "weighted":
             unused.append(parameter)
     if unused:
-        keys = ", ".join(parameter.sd_key for parameter in unused)
-        example = f'{unused[0].setting} = "{unused[0].scope} weighted"'
-        expected = f"without effect, not weighted ({keys}); [adjustment.camera] {example} uses it"
+        expected = message(
+            "sd_not_weighted",
+            "without effect, not weighted ({keys}); [adjustment.camera] {example} uses it",
+            keys=[parameter.sd_key for parameter in unused],
+            example=f'{unused[0].setting} = "{unused[0].scope} weighted"',
+        )
         files.tell_key(files.log.warning, "cameras", name, unused[0].sd_key, expected)
 
 
@@ -152,7 +208,11 @@ def _asks_free(files, parameter):
 
 def _warn_held(files, name, parameter):
     if parameter.value and parameter.is_own:
-        expected = f"adjustment.camera.{parameter.setting} is off; it is held at this value"
+        expected = message(
+            "parameter_held",
+            "{key} is off; it is held at this value",
+            key=f"adjustment.camera.{parameter.setting}",
+        )
         files.tell_key(files.log.warning, "cameras", name, parameter.key, expected)
 
 
@@ -162,16 +222,24 @@ def _check_sizes(files, name, given):
     low, high = CREDIBLE_LENGTHS
     c = given["c_mm"]
     if c is not None and not low * 2 * radius <= c <= high * 2 * radius:
-        expected = f"found {c:g} with a format of {2 * radius:.4g} mm across: in another unit?"
+        expected = message(
+            "strange_principal_distance",
+            "found {c_mm:g} with a format of {across_mm:.4g} mm across: in another unit?",
+            c_mm=c,
+            across_mm=2 * radius,
+        )
         files.tell_key(files.log.warning, "cameras", name, "c_mm", expected)
     keys = [PARAMETER_KEYS[f"K{number}"][0] for number in range(1, 5)]
-    parts = [abs(given[key] or 0.0) * radius ** (2 * n) for n, key in enumerate(keys, 1)]
+    values = at_focus(given)
+    parts = [abs(values[key] or 0.0) * radius ** (2 * n) for n, key in enumerate(keys, 1)]
     worst = int(np.argmax(parts))
     if parts[worst] > DOUBTFUL_DISTORTION:
         is_problem = parts[worst] > IMPOSSIBLE_DISTORTION
         to = files.log.problem if is_problem else files.log.warning
-        expected = (
-            f"moves the corner of the image by {100 * parts[worst]:.3g} % of its radius; expected"
-            " less: of another unit than millimetres, or of normalised coordinates?"
+        expected = message(
+            "large_distortion",
+            "moves the corner of the image by {percent:.3g} % of its radius; expected less: of"
+            " another unit than millimetres, or of normalised coordinates?",
+            percent=100 * parts[worst],
         )
         files.tell_key(to, "cameras", name, keys[worst], expected)

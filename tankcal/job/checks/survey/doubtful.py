@@ -2,20 +2,17 @@
 
 import numpy as np
 
-from tankcal.job.checks.common import has_rows
+from tankcal.job.checks.common import has_rows, tiny_sd
 from tankcal.job.checks.survey.gon import check_gon
 from tankcal.job.checks.survey.places import places_of
 from tankcal.job.contract.observations import ANGLES, READINGS
+from tankcal.messages import message
 
-# column of sds: (largest that all may have without a doubt, what it then looks like)
-TINY = {
-    "s_mm": (0.005, "millimetres: is it in metres?"),
-    "s_arcsec": (0.01, "seconds of arc: is it in degrees or gon?"),
-    "sx_um": (0.05, "micrometres: is it in millimetres?"),
-    "sy_um": (0.05, "micrometres: is it in millimetres?"),
-    "sx_mm": (0.005, "millimetres: is it in metres?"),
-    "sy_mm": (0.005, "millimetres: is it in metres?"),
-    "sz_mm": (0.005, "millimetres: is it in metres?"),
+TINY = {"mm": 0.005, "um": 0.05, "arcsec": 0.01}  # sds: all below that are doubted
+OF_SDS = {
+    **dict.fromkeys(("s_mm", "sx_mm", "sy_mm", "sz_mm"), "mm"),
+    **dict.fromkeys(("sx_um", "sy_um", "s_um"), "um"),
+    "s_arcsec": "arcsec",
 }
 MUCH_LARGER = 200  # distances in parts of the survey's extent
 THOUSANDFOLD = (500, 2000)  # distances in parts of those between known points
@@ -28,7 +25,7 @@ MIN_MISFIT_M = 1.0
 
 def check_doubtful(files):
     """Standard deviations, distances, control and angles that look wrong."""
-    for name in ("image_points", "control", "check", *READINGS):
+    for name in ("image_points", "fiducials", "control", "check", *READINGS):
         if has_rows(files.tables[name]):
             _warn_tiny_sds(files, name, files.tables[name])
     places = places_of(files)
@@ -43,14 +40,13 @@ def check_doubtful(files):
 
 
 def _warn_tiny_sds(files, name, table):
-    for column, (limit, what) in TINY.items():
+    for column, unit in OF_SDS.items():
         if table.columns.get(column) is None:
             continue
         sd = table.numbers(column)
         given = sd[sd > 0]
-        if len(given) and given.max() < limit:
-            expected = f"at most {given.max():g}; expected {what}"
-            files.log.warning(table.file, expected, None, column)
+        if len(given) and given.max() < TINY[unit]:
+            files.log.warning(table.file, tiny_sd(unit, given.max()), None, column)
 
 
 def _check_size(files, places):
@@ -128,11 +124,15 @@ def _tell_swapped(files, places):
             continue
         certain = _far_unless_swapped(point, places, VERY_FAR, 2)
         if certain:
-            files.log.problem(control.file, f"{certain}: x and y swapped?", row, "x_m")
+            files.log.problem(control.file, _is_swapped(certain), row, "x_m")
             continue
         evidence = _far_unless_swapped(point, places) or _misfit_unless_swapped(point, places)
         if evidence:
-            files.log.warning(control.file, f"{evidence}: x and y swapped?", row, "x_m")
+            files.log.warning(control.file, _is_swapped(evidence), row, "x_m")
+
+
+def _is_swapped(evidence):
+    return message("swapped", "{evidence}: x and y swapped?", evidence=evidence)
 
 
 def _far_unless_swapped(point, places, times=FAR, of_others=MIN_OF_OTHERS):
@@ -142,9 +142,14 @@ def _far_unless_swapped(point, places, times=FAR, of_others=MIN_OF_OTHERS):
         return ""
     far, swapped = (float(np.hypot(*(place - middle))) for place in (here, here[::-1]))
     if far > times * usual > 0 and swapped < NEAR * usual:
-        return (
-            f"{point!r} is {far:.4g} m from the middle of the other known points, which lie"
-            f" {usual:.3g} m from it as a rule; with x and y swapped {swapped:.3g} m"
+        return message(
+            "far_from_others",
+            "{point!r} is {far_m:.4g} m from the middle of the other known points, which lie"
+            " {usual_m:.3g} m from it as a rule; with x and y swapped {swapped_m:.3g} m",
+            point=point,
+            far_m=far,
+            usual_m=usual,
+            swapped_m=swapped,
         )
     return ""
 
@@ -165,8 +170,11 @@ def _misfit_unless_swapped(point, places):
     bad = sum(one > max(MISFIT * distance, MIN_MISFIT_M) for one, _, distance in misfits)
     if 2 * bad > len(misfits) and all(two < FIT * distance for _, two, distance in misfits):
         worst = max(misfits)
-        return (
-            f"{point!r} misses the measured distances to other known points by up to"
-            f" {worst[0]:.3g} m; with x and y swapped it fits them"
+        return message(
+            "misses_distances",
+            "{point!r} misses the measured distances to other known points by up to"
+            " {worst_m:.3g} m; with x and y swapped it fits them",
+            point=point,
+            worst_m=worst[0],
         )
     return ""

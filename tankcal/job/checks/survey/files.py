@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tankcal.job.entries import as_spelt
 from tankcal.job.fields import is_blank
 from tankcal.job.tables import REGISTERS, nearest
 
@@ -39,12 +40,14 @@ class SurveyFiles:
 
     def is_given(self, register, owner, key):
         """Does a camera or an instrument have the key, be its value good or bad?"""
-        value = self.raw.registers[register].entries[owner].get(key)
+        entries = self.raw.registers[register].entries[owner]
+        value = entries.get(as_spelt(register, entries, key))
         return value is not None and not is_blank(value.raw)
 
     def tell_key(self, to, register, owner, key, expected):
         """Tell log.problem or log.warning about one key of a camera or an instrument."""
         known = self.raw.registers[register]
+        key = as_spelt(register, known.entries[owner], key)
         value = known.entries[owner].get(key)
         row = known.rows[owner] if value is None else value.row
         to(known.file, expected, row, f"{owner}.{key}")

@@ -25,7 +25,7 @@ def check_held(files):
         if not has_rows(table) or "setup" in table.columns:
             continue
         sd = table.numbers("s_arcsec" if name in ANGLES else "s_mm")
-        exact = (sd == 0) & np.array([use != "check" for use in table.of("use")])
+        exact = (sd == 0) & np.array([use != "check" for use in table.of("use")], dtype=bool)
         if exact.any():
             places = np.flatnonzero(exact)
             _refuse_between_held(files, name, table, places, held)

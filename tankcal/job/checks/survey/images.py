@@ -2,9 +2,13 @@
 
 import numpy as np
 
-from tankcal.job.cameras import image_coordinates, image_frames
+from tankcal.job.cameras import image_frames
 from tankcal.job.checks.common import has_rows, is_not_given, refuse_repeated, tell
+from tankcal.job.checks.survey.fiducials import check_fiducials
 from tankcal.job.checks.survey.files import refuse_undefined, tell_rows
+from tankcal.job.checks.survey.film import check_film
+from tankcal.job.imagery import imagery_of
+from tankcal.messages import message
 
 MIN_POINTS = 3
 ANGLES = ("omega", "phi", "kappa")
@@ -24,9 +28,18 @@ def check_images(files):
         refuse_undefined(files, images, "photo", defined, "photos")
         _check_coordinates(files, images)
         _check_sds(files, images)
-        _check_format(files, images)
+        adjustment = None if files.values is None else files.values["adjustment"]
+        imagery = imagery_of(files.tables, files.registers["cameras"], adjustment)
+        told = check_fiducials(files, imagery)
+        check_film(files, imagery)
+        _check_format(files, images, imagery, told)
     if photos is not None:
         _check_counts(files, photos, images)
+    if has_rows(photos) and not has_rows(images) and not files.is_unreadable("image_points"):
+        names = photos.of("photo")
+        more = f" and {len(names) - 1} more photos" if len(names) > 1 else ""
+        expected = f"no rows; expected the image points of photo {names[0]!r}{more}"
+        files.log.problem("image_points.csv", expected)
 
 
 def _check_orientations(files, photos):
@@ -120,12 +133,14 @@ def _check_sds(files, images):
         tell(files.log.problem, files.raw, "adjustment", "image_sd_um", expected)
 
 
-def _check_format(files, images):
+def _check_format(files, images, imagery, told):
+    """Image points within the format, but for those of photos that are told already."""
     size, pixel = image_frames(images, files.tables["photos"], files.registers["cameras"])
-    xy = image_coordinates(images, size, pixel)
+    xy = imagery.xy_mm
     with np.errstate(invalid="ignore"):
         outside = np.abs(xy) > size / 2 * (1 + 1e-9)
         of_corner = np.nanmin(xy, axis=0, initial=np.inf) >= 0
+    outside[[photo in told for photo in images.of("photo")]] = False
     if not outside.any():
         return
     in_px = ~np.isnan(images.numbers("column_px"))
@@ -141,6 +156,8 @@ def _check_format(files, images):
         else:
             allowed = f"at most {size[place, axis] / 2:g} mm from the middle"
         found = images.of(column)[place]
+        if images.of("photo")[place] in imagery.fits:
+            found, hint = xy[place, axis], " after the transformation"
         expected = f"found {found:g}, outside the format; expected {allowed}{hint}"
         files.log.problem(images.file, expected, images.rows[place], column)
 
@@ -166,7 +183,11 @@ def _check_counts(files, photos, images):
         if name is None or count >= MIN_POINTS:
             continue
         if name not in is_seen:
-            expected = f"photo {name!r} has no image points; it is left out"
+            expected = message(
+                "photo_without_points",
+                "photo {photo!r} has no image points; it is left out",
+                photo=name,
+            )
             files.log.warning(photos.file, expected, row, "photo")
         elif known[place] < 6:
             expected = (

@@ -4,6 +4,7 @@ import numpy as np
 
 from tankcal.job.checks.common import has_rows, refuse_repeated
 from tankcal.job.checks.survey.files import refuse_undefined
+from tankcal.messages import message
 
 DOUBTFUL_CORRECTION = 0.01
 TAKEN_FROM_SETUPS = ("slope_distances", "directions", "zenith_angles")
@@ -30,7 +31,12 @@ def check_instruments(files):
 def _check_instrument(files, name, given):
     correction, expansion = given["correction"], given["expansion_per_k"]
     if correction is not None and abs(correction) > DOUBTFUL_CORRECTION:
-        expected = f"found {correction:g}, {1e6 * correction:.0f} ppm; expected a plain ratio"
+        expected = message(
+            "large_correction",
+            "found {correction:g}, {ppm:.0f} ppm; expected a plain ratio",
+            correction=correction,
+            ppm=1e6 * correction,
+        )
         files.tell_key(files.log.warning, "instruments", name, "correction", expected)
     if expansion and not files.is_given("instruments", name, "certified_temperature_c"):
         expected = "missing beside expansion_per_k; expected the temperature of the certificate"
@@ -46,17 +52,26 @@ def _check_temperatures(files, distances, instruments):
             for name in distances.of("instrument")
         ]
     )
+    without = expands & np.isnan(temperature)
+    idle = ~expands & ~np.isnan(temperature) & files.sound(distances)
     for told, expected in (
         (
-            expands & np.isnan(temperature),
-            "blank in {n} rows of a tape with expansion_per_k; they are not corrected",
+            without,
+            message(
+                "tape_without_temperature",
+                "blank in {rows} rows of a tape with expansion_per_k; they are not corrected",
+                rows=int(without.sum()),
+            ),
         ),
         (
-            ~expands & ~np.isnan(temperature) & files.sound(distances),
-            "without effect in {n} rows: the instrument has no expansion_per_k",
+            idle,
+            message(
+                "temperature_idle",
+                "without effect in {rows} rows: the instrument has no expansion_per_k",
+                rows=int(idle.sum()),
+            ),
         ),
     ):
         if told.any():
             row = distances.rows[int(np.argmax(told))]
-            count = int(told.sum())
-            files.log.warning(distances.file, expected.format(n=count), row, "temperature_c")
+            files.log.warning(distances.file, expected, row, "temperature_c")

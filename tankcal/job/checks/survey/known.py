@@ -5,6 +5,7 @@ import numpy as np
 from tankcal.job.checks.common import has_rows, refuse_repeated
 from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.names import observed_names
+from tankcal.messages import listed, message
 
 MOST_NAMED = 5
 
@@ -17,12 +18,11 @@ def check_known(files):
         if has_rows(table):
             _refuse_point_twice(files, table)
             _check_coordinates(files, table)
-            what = "are observed nowhere; they bear on nothing"
-            _warn_unobserved(files, table, seen, what)
+            _warn_unobserved(files, table, seen, _bear_on_nothing)
     targets = files.tables["targets"]
     if has_rows(targets):
         refuse_repeated(targets, "point", files.log)
-        _warn_unobserved(files, targets, seen, "are observed nowhere; they are left out")
+        _warn_unobserved(files, targets, seen, _left_out)
     _warn_control_that_checks(files)
 
 
@@ -47,7 +47,18 @@ def _check_coordinates(files, table):
     tell_rows(files.log.problem, table, sound & ~known, "x_m", expected)
 
 
-def _warn_unobserved(files, table, seen, what):
+def _bear_on_nothing(names):
+    return message(
+        "known_unobserved", "observed nowhere, so that they bear on nothing: {points}", points=names
+    )
+
+
+def _left_out(names):
+    return message("targets_unobserved", "observed nowhere and left out: {points}", points=names)
+
+
+def _warn_unobserved(files, table, seen, told):
+    """told: told(names) -> the Message of points that nothing observes"""
     if any(files.is_unreadable(name) for name in ("image_points", "setups", "directions")):
         return
     lacking = [
@@ -56,13 +67,8 @@ def _warn_unobserved(files, table, seen, what):
         if point is not None and point not in seen
     ]
     if lacking:
-        named = ", ".join(repr(point) for _, point in lacking[:MOST_NAMED])
-        more = " ..." if len(lacking) > MOST_NAMED else ""
-        plural = "points" if len(lacking) > 1 else "point"
-        what = what if len(lacking) > 1 else what.replace("are", "is").replace("they is", "it is")
-        what = what.replace("they bear", "it bears") if len(lacking) == 1 else what
-        expected = f"{len(lacking)} {plural} ({named}{more}) {what}"
-        files.log.warning(table.file, expected, lacking[0][0], "point")
+        names = listed([point for _, point in lacking], MOST_NAMED)
+        files.log.warning(table.file, told(names), lacking[0][0], "point")
 
 
 def _warn_control_that_checks(files):
@@ -79,5 +85,9 @@ def _warn_control_that_checks(files):
     }
     for row, point, system in zip(check.rows, check.of("point"), check.of("system"), strict=True):
         if (point, system) in used:
-            expected = f"{point!r} is a control point, too; it is no independent check"
+            expected = message(
+                "check_is_control",
+                "{point!r} is a control point, too; it is no independent check",
+                point=point,
+            )
             files.log.warning(check.file, expected, row, "point")

@@ -4,6 +4,7 @@ import re
 
 from tankcal.job.checks.common import has_rows
 from tankcal.job.contract.observations import READINGS
+from tankcal.messages import message
 
 KNOWN = (("control", "point"), ("check", "point"), ("targets", "point"), ("setups", "station"))
 
@@ -68,11 +69,19 @@ def _tell(files, spellings, places):
     most, *others = spellings
     for point in others:
         file, row, column, count = places[point]
-        rows = "1 row" if count == 1 else f"{count} rows"
-        other = "1 row" if places[most][3] == 1 else f"{places[most][3]} rows"
-        found = f"{point!r} stands in {rows}, {most!r} in {other}"
         if count == 1:
+            other = "1 row" if places[most][3] == 1 else f"{places[most][3]} rows"
+            found = f"{point!r} stands in 1 row, {most!r} in {other}"
             expected = f"{found}; expected one spelling of one point, or another name"
             files.log.problem(file, expected, row, column)
         else:
-            files.log.warning(file, f"{found}: one point in two spellings?", row, column)
+            expected = message(
+                "two_spellings",
+                "{point!r} stands in {rows} rows, {other!r} in {rows_of_other} rows: one point in"
+                " two spellings?",
+                point=point,
+                rows=count,
+                other=most,
+                rows_of_other=places[most][3],
+            )
+            files.log.warning(file, expected, row, column)

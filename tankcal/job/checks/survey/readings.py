@@ -6,6 +6,7 @@ from tankcal.job.checks.common import has_rows
 from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.instruments import TAKEN_FROM_SETUPS
 from tankcal.job.contract.observations import ANGLE_UNITS, ANGLES, READINGS
+from tankcal.messages import listed, message
 
 BY_CHANCE = 0.1  # share of the rows: coarse readings repeat themselves
 MOST_REPEATED = 3  # rows that a warning names
@@ -85,11 +86,12 @@ def _warn_copies(files, table):
             copies.append((row, before))
     if len(copies) <= BY_CHANCE * len(raw.rows):
         return
-    shown = ", ".join(f"{row} as {before}" for row, before in copies[:MOST_REPEATED])
-    more = " and more" if len(copies) > MOST_REPEATED else ""
-    expected = (
-        f"{len(copies)} rows are the same as another one to the last digit (row {shown}{more}):"
-        " copied? Each counts as a reading of its own"
+    expected = message(
+        "copied_rows",
+        "{count} rows are the same as another one to the last digit (rows {pairs}): copied?"
+        " Each counts as a reading of its own",
+        count=len(copies),
+        pairs=listed([f"{row} = {before}" for row, before in copies], MOST_REPEATED),
     )
     files.log.warning(table.file, expected, copies[0][0])
 
@@ -105,9 +107,13 @@ def _warn_single_directions(files, table):
             sets.setdefault((setup, name), {})[to] = row
     for (setup, name), seen in sets.items():
         if len(seen) == 1 and not table.skipped:
-            of_set = "" if name is None else f", set {name!r}"
-            expected = (
-                f"set-up {setup!r}{of_set} has directions to one point only; they determine"
-                " nothing but its zero"
+            where = setup
+            if name is not None:
+                where = message("set_of_setup", "{setup}, set {set}", setup=setup, set=name)
+            expected = message(
+                "single_direction",
+                "set-up {where} has directions to one point only; they determine nothing but its"
+                " zero",
+                where=where,
             )
             files.log.warning(table.file, expected, next(iter(seen.values())), "to")

@@ -1,0 +1,88 @@
+"""The command line: arguments, progress, exit status. It computes nothing."""
+
+import argparse
+import os
+import sys
+
+import tankcal
+from tankcal.cli import camera, linting, planning, reporting, running, starting
+from tankcal.errors import TankcalError
+
+DESCRIPTION = """\
+tankcal calibrates storage tanks: from surveyed points of the wall to the capacity
+table, with its uncertainty, as Excel workbook, PDF certificate and notebook."""
+
+EPILOG = """\
+a new tank, step by step:
+  tankcal new my-tank           write an empty job: the folder my-tank with job.toml, points.csv,
+                                courses.csv, and the same as one workbook, job.xlsx
+  (fill in the blanks, in the CSV files or in the workbook)
+  tankcal run my-tank           compute it; the results are in my-tank/results
+  tankcal run my-tank/job.xlsx  the same, from the workbook
+  tankcal report my-tank/results --language es   the papers again, in Spanish
+  tankcal lint table.csv        look for mistakes in any capacity table
+
+photographs, distances, angles and levels instead of surveyed points:
+  tankcal new my-tank --survey photos          (or total-station) write such a job
+  tankcal run my-tank --only adjustment        adjust the survey; no tank is needed
+  tankcal plan my-plan                         what a survey will be worth, before it is made
+
+exit status: 0 done; 2 the input must be mended (one line per problem: file, row, column, what was
+expected; earlier results stay as they were); 3 the survey has no sound solution.
+
+the job format: docs/job-format.md; axes, signs and units: docs/conventions.md"""
+
+
+def main(arguments=None):
+    """Run the command line; returns the exit status."""
+    options = _options(arguments)
+    try:
+        return options.command(options) or 0
+    except TankcalError as error:
+        for line in str(error).splitlines():
+            print(f"tankcal: {line}", file=sys.stderr)
+        return error.exit_status
+    except BrokenPipeError:  # the reader of our output went away: nothing to say to nobody
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        print(f"tankcal: {error.filename or 'system'}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    except BaseException as error:
+        if not _interrupted(error):
+            raise
+        print("tankcal: stopped; nothing was written", file=sys.stderr)
+        return 130
+
+
+def _interrupted(error):
+    """Whether Ctrl-C is behind an error, however a library dressed it."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__context__
+    return error is not None
+
+
+def _options(arguments):
+    """Parsed arguments; names that come after options are names, too."""
+    parser = _parser()
+    options, rest = parser.parse_known_args(arguments)
+    if rest and (not hasattr(options, "names") or any(one.startswith("-") for one in rest)):
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    if rest:
+        options.names = [*options.names, *rest]
+    return options
+
+
+def _parser():
+    parser = argparse.ArgumentParser(
+        prog="tankcal",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"tankcal {tankcal.__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    for room in (running, reporting, starting, planning, linting, camera):
+        room.add(commands)
+    return parser

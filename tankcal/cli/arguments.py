@@ -1,0 +1,33 @@
+"""Numbers on the command line."""
+
+import argparse
+
+
+def positive(text):
+    value = _number(text)
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"found {text!r}; expected a number above 0")
+    return value
+
+
+def share(text):
+    value = _number(text)
+    if not 0 < value < 1:
+        raise argparse.ArgumentTypeError(f"found {text!r}; expected a number between 0 and 1")
+    return value
+
+
+def several(text):
+    value = _number(text)
+    if not (2 <= value <= 1e6 and value == int(value)):
+        raise argparse.ArgumentTypeError(
+            f"found {text!r}; expected a whole number from 2 to 1000000"
+        )
+    return int(value)
+
+
+def _number(text):
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")

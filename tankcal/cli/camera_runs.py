@@ -1,0 +1,289 @@
+"""What `tankcal camera …` does: read, analyse, show, write. It computes nothing."""
+
+import json
+from pathlib import Path
+
+import tankcal
+from tankcal.cli.showing import Progress, counted, listed, prepare_for_small_work, warn
+from tankcal.errors import InputError, Problem
+
+FIRST_WORDS = 200  # bytes
+
+
+def parameters(options):
+    """Which additional parameters belong in the model."""
+    prepare_for_small_work()
+    from tankcal.camera_analysis.interiors import sets_to_be
+    from tankcal.camera_analysis.parameters.analysing import analyse_job, analyse_record
+    from tankcal.camera_analysis.parameters.findings import Choices
+    from tankcal.camera_analysis.parameters.plain import as_json
+
+    show = _start(options)
+    choices = Choices(
+        alpha=options.alpha, of=options.matrix, limit_px=options.limit_px, limit_um=options.limit_um
+    )
+    of = {"camera": options.camera, "photo": options.photo}
+    job, record = None, _record_of(options.source)
+    if record is not None:
+        found = analyse_record(record, choices, **of)
+    else:
+        job = _load(options.source, show)
+        if job.measurements is not None:
+            _refuse_several(options, sets_to_be(job.measurements, **of))
+        found = analyse_job(job, choices, **of, dropping=not options.no_trials, tell=show.part)
+    paths = [] if job is not None else [options.source]
+    _finish([as_json(one) for one in found], options, show, paths, job, record)
+
+
+def compare(options):
+    """All pairs of calibrations."""
+    prepare_for_small_work()
+    from tankcal.camera_analysis.stability.comparing import compare as compared
+    from tankcal.camera_analysis.stability.grids import parse
+    from tankcal.camera_analysis.stability.plain import as_json, summary
+    from tankcal.camera_analysis.stability.terrains import parse_terrain
+    from tankcal.job.calibrations import choose, read_cameras, with_pixels
+
+    show = _start(options)
+    warnings = []
+    pixel_um = options.pixel_um
+    cameras = read_cameras(options.cameras, warnings.append, in_pixels=pixel_um is None)
+    name = Path(options.cameras).name
+    found = compared(
+        choose(with_pixels(cameras, pixel_um), options.names, name),
+        options.method,
+        grid=None if options.grid is None else parse(options.grid),
+        terrain=None if options.terrain is None else parse_terrain(options.terrain),
+        threshold_px=options.threshold,
+        as_published=options.as_published,
+        seed=options.seed,
+        file=name,
+    )
+    warn(warnings)
+    _finish([as_json(found)], options, show, [options.cameras], printed=summary(found))
+
+
+def influence(options):
+    """The same survey with each of several calibrations."""
+    prepare_for_small_work()
+    from tankcal.camera_analysis.influence.plain import as_json
+    from tankcal.camera_analysis.influence.runs import influence as influence_of
+    from tankcal.job.calibrations import read_cameras
+
+    show = _start(options)
+    warnings = []
+    calibrations = read_cameras(options.cameras, warnings.append, in_pixels=False)
+    job = _load(options.job, show)
+    found = influence_of(
+        job,
+        calibrations,
+        states=options.states,
+        camera=options.camera,
+        tell=show.part,
+        file=Path(options.cameras).name,
+    )
+    warn(warnings)
+    _finish([as_json(found)], options, show, [options.cameras], job)
+
+
+def check(options):
+    """Differences at check points against a table of limits."""
+    prepare_for_small_work()
+    from tankcal.camera_analysis.product import limits
+    from tankcal.camera_analysis.product.checking import check_product
+    from tankcal.camera_analysis.product.differences import differences_of, read_differences
+    from tankcal.camera_analysis.product.plain import as_json
+
+    show = _start(options)
+    table = limits.read_limits(options.limits) if options.limits else limits.shipped_limits()
+    if options.scale is not None:
+        table = limits.of_scale(table, options.scale)
+    job, record = None, _record_of(options.source)
+    if record is not None:
+        differences = differences_of(record)
+    elif Path(options.source).suffix.lower() == ".csv":
+        differences = read_differences(options.source, options.separator, options.decimal)
+    else:
+        job = _load(options.source, show)
+        differences = differences_of(tankcal.adjust_job(job, show.step))
+    axes, values = differences.of_known_axes()
+    found = check_product(values, axes, names=differences.names, limits=table, alpha=options.alpha)
+    paths = [] if job is not None else [options.source]
+    paths += [options.limits] if options.limits else []
+    _finish([as_json(found)], options, show, paths, job, record)
+
+
+def convert(options):
+    """A camera of one program, or of a publication, as another has it."""
+    from tankcal.conversions.published import in_form
+    from tankcal.conversions.writing import write_camera
+
+    cameras, sds = _cameras_of(options)
+    if options.name is not None:
+        cameras, sds = _only(options, cameras, sds)
+    for name, camera in cameras:
+        _tell_error(f"{name}, as read", camera.error_px)
+    if options.form is not None:
+        cameras, sds = [(name, in_form(camera, options.form)) for name, camera in cameras], None
+        for name, camera in cameras:
+            _tell_error(f"{name}, in the form of {options.form}", camera.error_px)
+    written = write_camera(options.to, cameras, sds, options.radius_mm)
+    if options.to != "cameras.toml":
+        for (name, _), error_px in zip(cameras, written.error_px, strict=True):
+            _tell_error(f"{name}, as {options.to}", error_px)
+    if options.out is None:
+        print(written.text, end="")
+        return
+    _write_new(Path(options.out), written.text)
+
+
+def _cameras_of(options):
+    """[(name, FramedCamera)] of a cameras.toml, a record or a file of another program, and sds."""
+    from tankcal.camera_analysis.interiors import framed_in
+    from tankcal.conversions.reading import read_camera
+
+    if options.kind is None and _is_record(options.file):
+        pixel_mm = options.pixel_um and options.pixel_um / 1000
+        return framed_in(_record_of(options.file), pixel_mm)
+    if Path(options.file).suffix.lower() == ".toml":
+        return _registered(options.file)
+    size_px = None if options.size_px is None else tuple(options.size_px)
+    return read_camera(options.file, options.kind, options.pixel_um, size_px), None
+
+
+def _registered(path):
+    """[(name, FramedCamera)] of a cameras.toml, and their standard deviations."""
+    from tankcal.conversions.frame import framed
+    from tankcal.job.calibrations import read_cameras
+
+    setups = read_cameras(path)
+    cameras = [
+        (one.camera.name, framed(one.camera.values, one.camera.form, one.pixel_mm, one.format_px))
+        for one in setups
+    ]
+    return cameras, [one.camera.sd for one in setups]
+
+
+def _only(options, cameras, sds):
+    """The camera of that name alone."""
+    names = [name for name, _ in cameras]
+    if options.name not in names:
+        expected = f"found --name {options.name!r}; expected one of {', '.join(names[:20])}"
+        raise InputError(Problem(Path(options.file).name, expected))
+    place = names.index(options.name)
+    return [cameras[place]], None if sds is None else [sds[place]]
+
+
+def _tell_error(what, error_px):
+    if error_px > 1e-9:
+        warn([f"{what}: fitted, up to {error_px:.2g} px away within the frame"])
+
+
+def _write_new(target, text):
+    try:
+        with target.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError as error:
+        raise InputError(Problem(target.name, "exists; expected the name of a new file")) from error
+    print(f"wrote {target}")
+
+
+def read(options):
+    """Targets from photographs into image_points.csv."""
+    prepare_for_small_work()
+    from tankcal.targets import Wanted, read_photographs
+
+    show = Progress(options.quiet)
+    wanted = Wanted(
+        what=options.what,
+        dictionary=options.dictionary,
+        names=options.names,
+        places=options.places,
+        reach_px=options.reach_px,
+        smallest_px=options.smallest_px,
+        largest_px=options.largest_px,
+        bit_errors=options.bit_errors,
+        encoding=options.encoding,
+    )
+    found = read_photographs(options.photos, options.out, wanted, options.replace, show.part)
+    show.end()
+    warn(found.warnings)
+    refused = sum(found.refused.values())
+    reasons = ", ".join(f"{code} {count}" for code, count in sorted(found.refused.items()))
+    print(
+        f"{counted(found.targets, 'target')}, {counted(found.points, 'image point')} in "
+        f"{counted(len(found.photos), 'photo')}; refused: {refused}"
+        + (f" ({reasons})" if refused else "")
+    )
+    print(f"  {found.path}\n  {found.refused_path}")
+
+
+def _start(options):
+    """Progress; a folder for the results that is not ours is refused before any work."""
+    from tankcal import camera_papers
+
+    if options.out is not None:
+        camera_papers.refuse_foreign(options.out)
+    return Progress(options.quiet)
+
+
+def _load(source, show):
+    """The job, with its tank where it has one."""
+    show.step(f"reading {source}")
+    job = tankcal.load(source, only="adjustment")
+    return job if job.tank is None else tankcal.load(source)
+
+
+def _record_of(source):
+    """The record when `source` is one, else None."""
+    if Path(source).suffix.lower() != ".json":
+        return None
+    from tankcal.record import load
+
+    return load(source)
+
+
+def _is_record(source):
+    """Whether a JSON file is a record rather than another program's: its first words tell."""
+    if Path(source).suffix.lower() != ".json" or not Path(source).is_file():
+        return False
+    with Path(source).open("rb") as file:
+        return b'"tankcal-record/' in file.read(FIRST_WORDS)
+
+
+def _finish(results, options, show, paths, job=None, record=None, printed=None):
+    """Print tables or JSON; write the papers where they are asked for."""
+    from tankcal import camera_papers
+
+    language = options.language or _language_of(job, record)
+    _refuse_several(options, len(results))
+    made_from = camera_papers.made_from(paths, job)
+    results = [result | {"made_from": made_from} for result in results]
+    written = []
+    if options.out is not None:
+        written = camera_papers.write(results[0], options.out, show.part, language)
+    show.end()
+    if options.json:
+        whole = results[0] if len(results) == 1 else results
+        print(json.dumps(whole if printed is None else printed, indent=1, allow_nan=False))
+        return
+    for result in results:
+        for line in camera_papers.lines(result, language):
+            print(line)
+    if written:
+        listed(options.out, written)
+
+
+def _language_of(job, record):
+    """The language that a job, or a record, asks for; None where there is neither."""
+    from tankcal.words import language_of
+
+    if record is not None:
+        return language_of(record)
+    return job.table.language if job is not None and job.table is not None else None
+
+
+def _refuse_several(options, count):
+    if options.out is not None and count > 1:
+        several = f"there are {count} sets of parameters; expected --camera or --photo"
+        raise InputError(Problem("--out", f"{several}, to write one"))

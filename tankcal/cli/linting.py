@@ -1,0 +1,51 @@
+"""`tankcal lint`: mistakes in any capacity table."""
+
+from tankcal.cli.arguments import positive
+from tankcal.cli.showing import counted, prepare_for_small_work
+from tankcal.errors import InputError, Problem
+
+MOST_FINDINGS = 50  # that are shown at once
+
+
+def add(commands):
+    """The parser of `tankcal lint`."""
+    lint = commands.add_parser(
+        "lint",
+        help="look for mistakes in a capacity table, of any origin",
+        description="Look for mistakes in a capacity table: unreadable numbers, rows missing, "
+        "doubled or swapped, wrong digits, shifted blocks, wrong units, a total or a last row "
+        "that does not fit. One line a finding; docs/table.md says how they are found.",
+        epilog="exit status: 0 no errors (there may be warnings); 2 errors found, or no table.",
+    )
+    lint.add_argument(
+        "file", metavar="FILE", help="a CSV file, an Excel workbook (.xlsx), or a record.json"
+    )
+    lint.add_argument("--sheet", metavar="NAME", help="of a workbook (default: the longest table)")
+    for name, unit, what in (
+        ("volume", "M3", "volume the tank is meant to hold, m3"),
+        ("diameter", "M", "inside diameter of an upright tank, m; with --nominal-height"),
+        ("height", "M", "height that the last row is meant to have, m"),
+    ):
+        lint.add_argument(f"--nominal-{name}", metavar=unit, type=positive, help=what)
+    lint.set_defaults(command=_lint)
+
+
+def _lint(options):
+    prepare_for_small_work()
+    from tankcal.linter import Nominal, lint
+
+    if options.nominal_diameter is not None and options.nominal_height is None:
+        expected = "given without --nominal-height; expected both"
+        raise InputError(Problem("--nominal-diameter", expected))
+    nominal = Nominal(options.nominal_volume, options.nominal_diameter, options.nominal_height)
+    report = lint(options.file, nominal, options.sheet)
+    for finding in report.findings[:MOST_FINDINGS]:
+        print(finding)
+    more = len(report.findings) - MOST_FINDINGS
+    if more > 0:
+        print(f"and {more} more findings; mend these first")
+    warnings = len(report.findings) - report.errors
+    for summary in report.summaries:
+        print(summary)
+    print(f"{counted(report.errors, 'error')}, {counted(warnings, 'warning')}")
+    return 2 if report.errors else 0

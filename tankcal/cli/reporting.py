@@ -1,0 +1,62 @@
+"""`tankcal report`: the papers again, from a record alone."""
+
+from pathlib import Path
+
+from tankcal.cli.showing import Progress, listed
+from tankcal.languages import LANGUAGES
+
+
+def add(commands):
+    """The parser of `tankcal report`."""
+    report = commands.add_parser(
+        "report",
+        help="write the papers again, from a record",
+        description="Write workbook, notebook, PDFs, web page and CSV files again, all or "
+        "nothing, from record.json alone: nothing is computed again.",
+        epilog="exit status: 0 done; 2 the record, the language or the letterhead cannot be used. "
+        "Then nothing is written.",
+    )
+    report.add_argument("record", metavar="RECORD", help="a record.json, or a folder of results")
+    report.add_argument(
+        "--out",
+        metavar="DIR",
+        help="where to write (default: the record's folder); earlier results there are replaced",
+    )
+    report.add_argument(
+        "--language",
+        metavar="CODE",
+        help=f"of the papers: {', '.join(LANGUAGES)} (default: that of the job)",
+    )
+    add_letterhead(report)
+    report.add_argument("--quiet", action="store_true", help="no progress, only problems")
+    report.set_defaults(command=_report)
+
+
+def add_letterhead(parser):
+    """The option --letterhead."""
+    parser.add_argument(
+        "--letterhead",
+        metavar="FILE",
+        help="TOML file with the laboratory's name, address, logo and colours (docs/report.md)",
+    )
+
+
+def letterhead_of(options):
+    """The letterhead that the options name, checked; None when they name none."""
+    if options.letterhead is None:
+        return None
+    from tankcal.report.letterhead import load
+
+    return load(options.letterhead)
+
+
+def _report(options):
+    from tankcal import outputs
+
+    show = Progress(options.quiet)
+    letterhead = letterhead_of(options)
+    source = outputs.record_file(options.record)
+    out = Path(options.out) if options.out else source.parent
+    paths = outputs.rebuild(source, out, show.part, options.language, letterhead)
+    show.end()
+    listed(out, paths)

@@ -1,0 +1,172 @@
+"""`tankcal run` and `tankcal demo`: a job computed, its results written."""
+
+from pathlib import Path
+
+import tankcal
+from tankcal.cli.reporting import add_letterhead, letterhead_of
+from tankcal.cli.showing import Progress, counted, listed, prepare_for_small_work, warn
+from tankcal.digits import PROGRAM, decimals_of_height, fixed, with_digits, written
+from tankcal.errors import SolutionError
+
+
+def add(commands):
+    """The parsers of `tankcal run` and `tankcal demo`."""
+    _add_run(commands)
+    demo = commands.add_parser(
+        "demo",
+        help="run the shipped example",
+        description="Compute the shipped example, a reconstruction of the tank of Silva 1995.",
+    )
+    demo.add_argument("--out", metavar="DIR", help="where to write", default="tankcal-demo-results")
+    demo.add_argument("--quiet", action="store_true", help="no progress, only problems")
+    demo.set_defaults(command=_demo)
+
+
+def _add_run(commands):
+    run = commands.add_parser(
+        "run",
+        help="compute a job and write its results",
+        description="Read and check a job, compute it, and write the results, all or nothing: "
+        "record.json, points.csv, sections.csv, capacity.csv, capacity.xlsx, report.ipynb, "
+        "certificate.pdf, working-papers.pdf, report.pdf (both) and report.html. An adjusted "
+        "survey adds points_cov.npz, photos.csv, cameras.csv, groups.csv and residuals.csv.",
+        epilog="exit status: 0 done; 2 the input must be mended; 3 no sound solution, or, with "
+        "--strict, the adjustment is in doubt. Then nothing is written.",
+    )
+    run.add_argument("job", metavar="JOB", help="a job folder, its job.toml, or a job workbook")
+    run.add_argument(
+        "--out",
+        metavar="DIR",
+        help="where to write (default: results in the job's folder, or NAME-results beside "
+        "NAME.xlsx); earlier results there are replaced",
+    )
+    run.add_argument(
+        "--only",
+        choices=("adjustment",),
+        help="stop after the adjustment of the survey; no tank is needed, and adjustment.xlsx "
+        "takes the place of capacity.xlsx",
+    )
+    run.add_argument(
+        "--strict",
+        action="store_true",
+        help="write nothing when the global test of the adjustment fails, or when what was set "
+        "aside as a blunder may not be the one (exit status 3)",
+    )
+    add_letterhead(run)
+    run.add_argument("--quiet", action="store_true", help="no progress, only problems")
+    run.set_defaults(command=_run)
+
+
+def _run(options):
+    source = Path(options.job)
+    out = Path(options.out) if options.out else _default_out(source)
+    compute = _adjust if options.only == "adjustment" else _compute
+    compute(source, out, options.quiet, options.strict, letterhead_of(options))
+
+
+def _default_out(source):
+    if source.suffix.lower() == ".xlsx":
+        return source.with_name(f"{source.stem}-results")
+    return (source.parent if source.name == "job.toml" else source) / "results"
+
+
+def _demo(options):
+    from tankcal.shipped import shipped
+
+    _compute(shipped("examples") / "silva-1995", Path(options.out), options.quiet)
+
+
+def _compute(source, out, quiet, strict=False, letterhead=None):
+    prepare_for_small_work()
+    from tankcal import outputs
+
+    show = Progress(quiet)
+    show.step(f"reading {source}")
+    job = tankcal.load(source)
+    outputs.refuse_foreign(out)
+    result = tankcal.run(job, show.step, counting=show.part)
+    adjustment = result.adjustment
+    if strict:
+        _refuse_failed(adjustment)
+    paths = outputs.write(result, out, show.part, letterhead)
+    show.end()
+    warn(result.warnings)
+    if adjustment is not None:
+        print(_summary(adjustment))
+    print(_capacity(result))
+    listed(out, paths)
+
+
+def _capacity(result):
+    """One line: what the tank holds to the digits of U, and how many points say so."""
+    top_m = result.table.height_m[-1]
+    top, stated = result.at(top_m), result.intervals
+    volume = written(top.value_m3, stated.U_m3[-1], PROGRAM, least=0)
+    how = f"k = {fixed(top.k, 2, PROGRAM)}" if stated.by_gum[-1] else "by Monte Carlo"
+    points = ""
+    if result.accepted is not None:
+        accepted = len(result.accepted)
+        surveyed = len(result.job.points.names)
+        points = f", {accepted} points of the wall, {surveyed - accepted} rejected"
+    return (
+        f"{result.job.tank.id}: {volume.value} m3 at "
+        f"{fixed(top_m, decimals_of_height(top_m), PROGRAM)} m, U = {volume.uncertainty} m3 "
+        f"({how}){points}"
+    )
+
+
+def _adjust(source, out, quiet, strict, letterhead):
+    prepare_for_small_work()
+    from tankcal import outputs
+
+    show = Progress(quiet)
+    show.step(f"reading {source}")
+    job = tankcal.load(source, only="adjustment")
+    outputs.refuse_foreign(out)
+    adjustment = tankcal.adjust_job(job, show.step)
+    if strict:
+        _refuse_failed(adjustment)
+    paths = outputs.write_adjustment(job, adjustment, out, show.part, letterhead)
+    show.end()
+    warn(dict.fromkeys((*job.warnings, *adjustment.warnings)))
+    print(_summary(adjustment))
+    listed(out, paths)
+
+
+def _refuse_failed(adjustment):
+    """Raise when there is an adjustment that is in doubt, or whose global test failed."""
+    if adjustment is not None and adjustment.doubts:
+        raise SolutionError(
+            "\n".join([*map(str, adjustment.doubts), "nothing was written (--strict)"])
+        )
+    if adjustment is None or adjustment.redundancy <= 0:
+        return
+    test = adjustment.adjusted.test()
+    if not test.passed:
+        raise SolutionError(
+            f"the global test of the adjustment failed: v'Pv = {test.chi2:.1f}, expected "
+            f"{test.low:.1f} to {test.high:.1f} ({test.dof} degrees of freedom, sigma0 = "
+            f"{adjustment.sigma0:.3f}); nothing was written (--strict)"
+        )
+
+
+def _summary(adjustment):
+    """One line: how well the survey fits, and how good its points are."""
+    from tankcal.network.quality import precision
+
+    test, sigma0 = "nothing redundant, not tested", ""
+    if adjustment.redundancy > 0:
+        passed = adjustment.adjusted.test().passed
+        test = f"global test {'passed' if passed else 'FAILED'}"
+        sigma0 = f"sigma0 = {adjustment.sigma0:.3f}, "
+    removed = len({(one.kind, one.ids, one.row) for one in adjustment.removed})
+    free = ~adjustment.fixed.all(axis=1)
+    mean = ""
+    if free.any():
+        found = precision(adjustment.xyz_m[free], adjustment.covariance_m2[free])
+        mean = f", mean sd {with_digits(1000 * found.mean_sd_m, 3, PROGRAM)} mm"
+    return (
+        f"adjustment: {sigma0}redundancy {adjustment.redundancy}, {test}, "
+        f"{counted(removed, 'observation')} set aside, "
+        f"{counted(len(adjustment.names), 'point')}{mean}"
+    )

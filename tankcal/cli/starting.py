@@ -1,0 +1,52 @@
+"""`tankcal new`: an empty job to fill in."""
+
+from pathlib import Path
+
+from tankcal.languages import DEFAULT, LANGUAGES
+
+
+def add(commands):
+    """The parser of `tankcal new`."""
+    new = commands.add_parser(
+        "new",
+        help="write an empty job to fill in",
+        description="Write a starter job: job.toml and the CSV files of that kind of tank, with "
+        "comments, and the same as one workbook, job.xlsx. Fill in one of the two.",
+    )
+    new.add_argument(
+        "directory", metavar="DIR", help="a folder to make; with --workbook also a new .xlsx file"
+    )
+    new.add_argument("--workbook", action="store_true", help="write the workbook alone")
+    new.add_argument(
+        "--language",
+        choices=LANGUAGES,
+        default=DEFAULT,
+        help="of the workbook's explanations and of the papers (default: en)",
+    )
+    new.add_argument(
+        "--kind",
+        choices=("vertical", "horizontal", "sphere", "mesh"),
+        default="vertical",
+        help="kind of tank (default: vertical)",
+    )
+    new.add_argument(
+        "--survey",
+        choices=("photos", "total-station"),
+        help="with files for photographs or total-station readings, in place of surveyed points",
+    )
+    new.set_defaults(command=_new)
+
+
+def _new(options):
+    from tankcal.starter import write_input_workbook, write_starter
+
+    directory = Path(options.directory)
+    form = (options.kind, options.survey, options.language)
+    if options.workbook:
+        path = write_input_workbook(directory, *form)
+        print(f"wrote {path}: fill it in, save it, then")
+        print(f"  tankcal run {path}")
+        return
+    write_starter(directory, *form)
+    print(f"wrote {directory}: fill in job.toml and the CSV files, or job.xlsx instead, then")
+    print(f"  tankcal run {directory}     or     tankcal run {directory / 'job.xlsx'}")

@@ -1,0 +1,62 @@
+"""Folders of results: written all or nothing, and only where nothing of somebody else lies."""
+
+import shutil
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+
+from tankcal.errors import InputError, Problem
+
+
+def refuse_foreign(directory, known):
+    """Raise InputError when `directory` exists and holds a file that is not among `known`."""
+    directory = Path(directory)
+    if not directory.exists():
+        return
+    name = directory.resolve().name
+    if not directory.is_dir():
+        raise InputError(Problem(name, "is a file; expected a folder for the results"))
+    foreign = sorted(path.name for path in directory.iterdir() if path.name not in known)
+    if foreign:
+        raise InputError(
+            Problem(
+                name,
+                f"holds {foreign[0]!r}, which tankcal did not write; expected an empty folder or "
+                "one with earlier results only: move your files away or choose another --out",
+            )
+        )
+
+
+@contextmanager
+def replaced(directory):
+    """A folder to write to that takes the place of `directory` when the block ends without error.
+
+    It lies beside `directory` (beside what a link points to), which is made when missing; what was
+    there before goes last.
+    """
+    target = Path(directory).resolve()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    temporary = Path(tempfile.mkdtemp(prefix=".tankcal-", dir=target.parent))
+    try:
+        yield temporary
+        temporary.chmod(0o755)
+        _swap(temporary, target)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _swap(temporary, directory):
+    """Put `temporary` in the place of `directory`; the old one goes last."""
+    if not directory.exists():
+        temporary.rename(directory)
+        return
+    aside = Path(tempfile.mkdtemp(prefix=".tankcal-old-", dir=directory.parent))
+    try:
+        directory.rename(aside / directory.name)
+        try:
+            temporary.rename(directory)
+        except OSError:
+            (aside / directory.name).rename(directory)
+            raise
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)

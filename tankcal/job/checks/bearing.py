@@ -1,0 +1,122 @@
+"""Which inputs of uncertainty.csv have an effect on a job, and why the others have none."""
+
+from tankcal.job.checks.bottom import bottom_form
+from tankcal.job.checks.common import has_wall_points
+from tankcal.job.contract import INPUTS
+
+NOT_SUBTRACTED = "expected only with side = outside: nothing is subtracted"
+SWITCHED_OFF = "corrections.{} is false"
+
+
+def useless_inputs(values, tables, kind):
+    """{name of an input without any effect on this job: why}.
+
+    values, tables  of the job; what is blank or bad there counts as not given
+    """
+    others = {
+        name: f"it has no bearing on a tank of kind {kind}"
+        for name, known in INPUTS.items()
+        if kind not in known.kinds
+    }
+    rules = _of_temperature(values) | {"deadwood": _of_deadwood(values, tables["deadwood"])}
+    if kind == "vertical":
+        rules |= _of_vertical(values, tables)
+    elif kind == "horizontal":
+        rules |= _of_horizontal(values, has_wall_points(tables))
+    elif kind == "sphere":
+        rules |= _of_wall(values["sphere"], values, has_wall_points(tables))
+    return others | {name: why for name, why in rules.items() if why}
+
+
+def _of_temperature(values):
+    """{input: "" or why it has no effect}; so do all below."""
+    given = values["survey"]["shell_temperature_c"] is not None
+    expands = given and values["corrections"]["temperature"] is not False
+    why = "" if expands else "expected only with a temperature correction"
+    return {"shell_temperature": why, "expansion": why}
+
+
+def _of_deadwood(values, deadwood):
+    if values["corrections"]["deadwood"] is False:
+        return SWITCHED_OFF.format("deadwood")
+    is_there = deadwood is not None and any(
+        volume != 0 and u is None
+        for volume, u in zip(deadwood.of("volume_m3"), deadwood.of("u_m3"), strict=True)
+    )
+    return "" if is_there else "expected only with deadwood that has no u_m3 of its own"
+
+
+def _of_vertical(values, tables):
+    survey, switches = values["survey"], values["corrections"]
+    head = values["table"]["liquid_density_kg_m3"] and switches["head"] is not False
+    no_liquid = not survey["liquid_level_m"] or switches["head"] is False
+    no_head = "expected only with a liquid head: table.liquid_density_kg_m3"
+    no_survey_liquid = "expected only with survey.liquid_level_m above 0"
+    no_roof = values["roof"]["mass_kg"] is None or switches["roof"] is False
+    return _of_plates(values, tables["courses"], head or not no_liquid) | {
+        "course_heights": _of_heights(tables["courses"]),
+        "youngs_modulus": no_head if not head and no_liquid else "",
+        "liquid_density": "" if head else no_head,
+        "survey_level": no_survey_liquid if no_liquid else "",
+        "survey_density": no_survey_liquid if no_liquid else "",
+        "bottom": _of_bottom(values, tables["bottom"]),
+        "roof_mass": "expected only with a floating roof: [roof]" if no_roof else "",
+        "tilt": SWITCHED_OFF.format("tilt") if switches["tilt"] is False else "",
+    }
+
+
+def _of_bottom(values, bottom):
+    if values["corrections"]["bottom"] is False:
+        return SWITCHED_OFF.format("bottom")
+    return {
+        "liquid": "expected u_m3 in bottom.csv instead",
+        "flat": "expected only with a bottom that is not flat: of a flat one datum says it all",
+    }.get(bottom_form(values, bottom), "")
+
+
+def _of_plates(values, courses, is_loaded):
+    """Plates count where they are subtracted or loaded, paint where it is subtracted."""
+    switches, inside = values["corrections"], values["survey"]["side"] == "inside"
+    why = {"plate_thickness": "", "paint": ""}
+    if (inside or switches["plate"] is False) and not is_loaded:
+        why["plate_thickness"] = NOT_SUBTRACTED
+    if inside or switches["paint"] is False:
+        why["paint"] = NOT_SUBTRACTED
+    if courses is not None and not courses.skipped:
+        for name, column in (("plate_thickness", "thickness_mm"), ("paint", "paint_mm")):
+            if not why[name] and not any(courses.of(column)):
+                why[name] = f"expected only with {column} above 0 in courses.csv"
+    return why
+
+
+def _of_heights(courses):
+    is_one = courses is not None and len(courses.rows) + courses.skipped == 1
+    return "expected only with two courses or more" if is_one else ""
+
+
+def _of_horizontal(values, has_points):
+    given, no_tilt = values["horizontal"], values["corrections"]["tilt"] is False
+    leans = has_points or (given["tilt_mm_per_m"] and not no_tilt)
+    all_flat = given["end_a"] == given["end_b"] == "flat"
+    switched_off = SWITCHED_OFF.format("tilt") if no_tilt else ""
+    return _of_wall(given, values, has_points) | {
+        "end_depth": "expected only with an end that is not flat" if all_flat else "",
+        "tilt": _from_points(has_points) or switched_off,
+        "dip_position": "" if leans else "expected only for a tank that leans",
+    }
+
+
+def _of_wall(given, values, has_points):
+    """What horizontal cylinders and spheres share."""
+    switched_off = values["corrections"]["plate"] is False
+    outside = values["survey"]["side"] == "outside" and not switched_off
+    nothing = "expected only with side = outside and a thickness_mm: nothing is subtracted"
+    return {
+        "diameter": _from_points(has_points),
+        "offset": "" if has_points else "expected only beside points; without them: diameter",
+        "plate_thickness": "" if outside and given["thickness_mm"] else nothing,
+    }
+
+
+def _from_points(has_points):
+    return "it comes from the points, with their uncertainty" if has_points else ""

@@ -1,0 +1,44 @@
+"""stated.csv: dips within the tank, the upper one first, and volumes that it can hold."""
+
+from tankcal.job.checks.geometry import UNIT_FACTOR
+
+_ROUNDING_M = 1e-9
+
+
+def check_stated(table, extent, log):
+    """Dips within the tank, high above low, each pair once; volumes in cubic metres."""
+    first_row = {}
+    columns = (table.of(name) for name in ("high_m", "low_m", "volume_m3"))
+    for row, high, low, volume in zip(table.rows, *columns, strict=True):
+        _check_within(table, row, high, low, extent, log)
+        if high is None:
+            continue
+        if low is not None and low >= high:
+            expected = f"found {low:g}; expected a dip below high_m = {high:g}"
+            log.problem(table.file, expected, row, "low_m")
+        elif (high, low) in first_row:
+            expected = f"this dip is there already, in row {first_row[high, low]}; expected once"
+            log.problem(table.file, expected, row, "high_m")
+        elif volume is not None:
+            _check_volume(table, row, high, low, volume, extent, log)
+        first_row.setdefault((high, low), row)
+
+
+def _check_within(table, row, high, low, extent, log):
+    top = extent.height_m if extent.top_m is None else extent.top_m
+    for column, dip in (("high_m", high), ("low_m", low)):
+        if None not in (dip, top) and dip > top + _ROUNDING_M:
+            expected = f"found {dip:g}; expected at most {top:.5g}, the top of the tank, in metres"
+            log.problem(table.file, expected, row, column)
+
+
+def _check_volume(table, row, high, low, volume, extent, log):
+    """Far more than the whole tank holds, or the slice of a delivery, is another unit."""
+    height = extent.height_m if low is None else high - low
+    if None in (height, extent.area_m2):
+        return
+    full = extent.area_m2 * height
+    if volume > UNIT_FACTOR * full:
+        what = "the whole tank" if low is None else "the tank between low_m and high_m"
+        expected = f"found {volume:g}; {what} holds about {full:.4g} m3, expected m3: in litres?"
+        log.problem(table.file, expected, row, "volume_m3")

@@ -1,0 +1,51 @@
+"""Hints for values that a spreadsheet keeps as something else than what was meant."""
+
+import datetime
+import re
+import unicodedata
+
+_WITH_UNIT = re.compile(
+    r"([+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?)([^\W\d_].{0,11}|[%°'\"′″].{0,5})?"
+)
+_DAYS_OF_OUR_TIME = (18_000, 80_000)  # numbers that spreadsheets have for 1949 to 2119
+
+
+def hint_of_text(text, in_cell=True):
+    """How to mend a text that looks like a number; "" for one that does not.
+
+    in_cell  False: it stands in a TOML file
+    """
+    plain = unicodedata.normalize("NFKC", text).strip().lstrip("'\u2019`").replace(" ", "")
+    match = _WITH_UNIT.fullmatch(plain)
+    if match is None:
+        return ""
+    number, unit = match.groups()
+    marks = len(re.findall("[.,]", number))
+    if not in_cell:
+        whole = number.replace(",", ".") if marks < 2 else "it"
+        return f", stored as a number: write {whole} without quotation marks"
+    if unit is not None:
+        return f", stored as a number: type {number} alone, the unit stands in the heading"
+    if marks > 1:
+        return ", stored as a number: type it again without marks between thousands"
+    return (
+        f", stored as a number: type {number} again without quotation marks or apostrophe, in a"
+        " cell that is not of text format"
+    )
+
+
+def hint_of_number(raw):
+    """How to mend a cell that holds a number's place as a date or a percentage."""
+    if isinstance(raw, float):
+        return f" without percent format (the cell holds {float(raw):.12g})"
+    if isinstance(raw, datetime.date | datetime.time | datetime.timedelta):
+        return " (spreadsheets take 12/5 for a date: give the cell a number format, type it again)"
+    return ""
+
+
+def hint_of_date(raw):
+    """How to mend a cell that holds the number of a day in place of a date."""
+    low, high = _DAYS_OF_OUR_TIME
+    if isinstance(raw, int | float) and not isinstance(raw, bool) and low < raw < high:
+        return ": give the cell a date format"
+    return ""

@@ -1,0 +1,163 @@
+"""The parts of a tank, and the points of its wall, in SI."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Course:
+    """One ring of plates, from the bottom up: height, plate and paint thickness, m."""
+
+    name: str
+    height_m: float
+    thickness_m: float
+    paint_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Points:
+    """Surveyed points, in the order of the file.
+
+    names       (n,) text            rows        (n,) row of each in its file, for messages
+    xyz_m       (n, 3) coordinates   covariance_m2  (3n, 3n), or None: not given
+    sd_m        (n, 3) standard deviations, or None: not given (estimated from residuals)
+    section     (n,) text or None: given section name
+    generatrix  (n,) text or None
+    causes      named causes that the covariance contains (`surveys.Cause`): covariance = the rest
+                + sum of column column', their columns over the coordinates of these points
+    from_adjustment  True: adjusted from a survey; the covariance has the scale that it should have
+    """
+
+    names: tuple
+    xyz_m: np.ndarray
+    sd_m: np.ndarray | None
+    covariance_m2: np.ndarray | None
+    section: tuple
+    generatrix: tuple
+    rows: tuple
+    causes: tuple = ()
+    from_adjustment: bool = False
+
+
+@dataclass(frozen=True)
+class Bottom:
+    """The bottom of a vertical tank, below or above the bottom of its first course.
+
+    form        "flat", "leaning" (square to the shell's axis), "cone", "dish", "points" (a surveyed
+                surface) or "liquid" (measured volumes)
+    centre_z_m  cone and dish: z of the centre in the survey's frame; the edge is at bottom_z_m
+    xyz_m       (n, 3) points: surveyed, in the survey's frame
+    sd_m        (n,) standard deviations of their z, or None: not given
+    level_m     (n,) liquid: dips, from the table's zero, ascending
+    volume_m3   (n,) liquid: the capacity below each level, ascending
+    u_m3        (n,) their standard uncertainties, or None: not given
+    rows        (n,) row of each point or level in its file, for messages
+    """
+
+    form: str = "flat"
+    centre_z_m: float | None = None
+    xyz_m: np.ndarray | None = None
+    sd_m: np.ndarray | None = None
+    level_m: np.ndarray | None = None
+    volume_m3: np.ndarray | None = None
+    u_m3: np.ndarray | None = None
+    rows: tuple = ()
+
+
+@dataclass(frozen=True)
+class Deadwood:
+    """A thing in the tank that takes room (negative volume) or gives some (positive).
+
+    bottom_m, top_m  dips, from the table's zero; the volume is linear in height between them
+    u_m3             standard uncertainty of the volume, or None: not given
+    """
+
+    name: str
+    bottom_m: float
+    top_m: float
+    volume_m3: float
+    u_m3: float | None = None
+    row: int | None = None
+
+
+@dataclass(frozen=True)
+class Roof:
+    """A floating roof. It displaces its mass over the density of the liquid.
+
+    critical_bottom_m, critical_top_m  dips, from the table's zero: between them it is partly afloat
+    reference_density_kg_m3            of the liquid that the table is for
+    weighing                           "air" or "vacuum": what `mass_kg` was weighed in
+    """
+
+    mass_kg: float
+    critical_bottom_m: float
+    critical_top_m: float
+    reference_density_kg_m3: float
+    weighing: str
+
+
+@dataclass(frozen=True)
+class End:
+    """One end of a horizontal cylinder, bulging outwards; sizes as measured.
+
+    kind              "flat", "conical", "ellipsoidal", "torispherical" or "spherical"
+    depth_m           along the axis, from the end of the cylinder; flat: 0; torispherical: 0, it
+                      follows from the radii
+    dish_radius_m     torispherical: radius of the dish (crown); else None
+    knuckle_radius_m  torispherical: radius of the knuckle; else None
+    """
+
+    kind: str
+    depth_m: float = 0.0
+    dish_radius_m: float | None = None
+    knuckle_radius_m: float | None = None
+
+
+@dataclass(frozen=True)
+class Horizontal:
+    """A horizontal cylinder between its ends A and B; sizes as measured, on the side of the survey.
+
+    length_m            of the cylinder, without the ends; the same inside and outside
+    width_m, height_m   of its cross-section, equal when round; None: they come from the points
+    tilt                rise of end B over end A per metre of axis, tan of the angle; None: from
+                        the points
+    roll_rad            turn of the cross-section about the axis, clockwise seen from A
+    dip_from_a_m        of the dip point, along the axis from the start of the cylinder at A
+    dip_direction       dips are read "plumb", or "square" to the axis
+    thickness_m         plate and paint, to be subtracted from what was measured outside
+    azimuth_rad         direction from A to B, clockwise from +y; None: no points
+    """
+
+    length_m: float
+    end_a: End
+    end_b: End
+    width_m: float | None
+    height_m: float | None
+    tilt: float | None = 0.0
+    roll_rad: float = 0.0
+    dip_from_a_m: float = 0.0
+    dip_direction: str = "plumb"
+    thickness_m: float = 0.0
+    azimuth_rad: float | None = None
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A sphere.
+
+    diameter_m   as measured, on the side of the survey; None: it comes from the points
+    thickness_m  plate and paint, to be subtracted from what was measured outside
+    """
+
+    diameter_m: float | None
+    thickness_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A closed mesh of the inside: name and bytes of its file, metres of one unit of it."""
+
+    file: str
+    unit_m: float
+    data: bytes = field(repr=False)

@@ -1,0 +1,112 @@
+"""What job.toml says of tank, survey, datum, table and shell, in SI."""
+
+from dataclasses import dataclass
+
+from tankcal.languages import DEFAULT
+
+
+@dataclass(frozen=True)
+class Tank:
+    """The tank: its kind, nominal sizes (None: not given), and what is printed about it.
+
+    kind     "vertical", "horizontal", "sphere" or "mesh"
+    details  owner, location, product, ...: text, printed when given
+    """
+
+    id: str
+    kind: str
+    nominal_diameter_m: float | None
+    nominal_height_m: float | None
+    details: dict
+    nominal_volume_m3: float | None = None
+
+
+@dataclass(frozen=True)
+class Survey:
+    """The survey: `date` ISO text, temperature of the shell degC, liquid that was in the tank.
+
+    side            "outside" or "inside": where points and sizes were measured
+    liquid_level_m  dip of the survey day, from the table's zero; None or 0: empty
+    """
+
+    side: str
+    date: str
+    shell_temperature_c: float | None = None
+    liquid_level_m: float | None = None
+    liquid_density_kg_m3: float | None = None
+
+
+@dataclass(frozen=True)
+class Datum:
+    """Heights in the survey's frame, m.
+
+    bottom_z_m     bottom of the first course of a vertical tank. Horizontal cylinder and sphere
+                   without points: 0, for z then counts from the inside bottom beneath the dip
+                   point; with points, and for a mesh: None, the tank's own lowest point
+    dip_plate_z_m  the dip plate, which is the table's zero; None: the zero is the bottom
+    """
+
+    bottom_z_m: float | None
+    dip_plate_z_m: float | None = None
+    dip_x_m: float | None = None
+    dip_y_m: float | None = None
+    reference_height_m: float | None = None
+
+
+@dataclass(frozen=True)
+class TableSpec:
+    """What the capacity table is to be.
+
+    step_m                      None: given by `height_unit`, or chosen so that linear interpolation
+                                errs by at most `max_interpolation_error_m3`
+    reference_temperature_c     of the shell
+    liquid_density_kg_m3        of the liquid head; 0: no head
+    height_unit                 "m", "ft-in-8" or "ft-in-16" (rows of 1/8 and 1/16 inch)
+    volume_unit                 "m3", "L" or "bbl" (42 US gallons)
+    other_densities_kg_m3       densities of further tables
+    fine_step_m, fine_zones     smaller step between the dips of each (low_m, high_m), ascending
+    max_interpolation_error_m3  bound of the error of linear interpolation between rows; or None
+    height_expansion            whether dips expand with the shell, too
+    rule                        name of the decision rule, as written (`Job.rule` has it); or None
+    minimum_delivery_m          heights of the least deliveries to be reported; None: not given
+    monte_carlo                 whether the model is drawn from, too
+    """
+
+    step_m: float | None
+    reference_temperature_c: float
+    liquid_density_kg_m3: float = 0.0
+    coverage_probability: float = 0.95
+    rule: str | None = None
+    minimum_delivery_m: tuple[float, ...] | None = None
+    monte_carlo: bool = True
+    language: str = DEFAULT
+    height_unit: str = "m"
+    volume_unit: str = "m3"
+    other_densities_kg_m3: tuple[float, ...] = ()
+    fine_step_m: float | None = None
+    fine_zones: tuple[tuple[float, float], ...] = ()
+    max_interpolation_error_m3: float | None = None
+    height_expansion: bool = False
+
+
+@dataclass(frozen=True)
+class Switches:
+    """Which corrections are made; one that is off is named in the report."""
+
+    plate: bool = True
+    paint: bool = True
+    temperature: bool = True
+    head: bool = True
+    tilt: bool = True
+    bottom: bool = True
+    deadwood: bool = True
+    roof: bool = True
+
+
+@dataclass(frozen=True)
+class Material:
+    """The shell's steel: Young's modulus Pa, thermal expansion 1/K."""
+
+    e_pa: float = 206e9
+    expansion_per_k: float = 1.1e-5
+    expansion_given: bool = False  # False: the default was taken, and the report says so
