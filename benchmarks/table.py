@@ -18,6 +18,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import tankcal
+from tankcal.capacity import Capacity
+from tankcal.deliveries import worst_deliveries
 from tankcal.heads import End
 from tankcal.job import Bottom, Deadwood, DeclaredInput, Roof
 from tankcal.solids import LyingTank
@@ -61,9 +63,11 @@ def main():
     result = tankcal.run(furnished(tankcal.load(ROOT / "examples" / "silva-1995")))
     body = result.body
     levels = np.arange(0, body.highest_m, STEP_M)
+    table = Capacity(levels, *body.rows(levels), 0.95)
     tasks = {
         "volumes alone": lambda: body.volume_m3(levels),
         "volumes, areas, covariance": lambda: body.rows(levels),
+        "worst delivery of 2 m or more": lambda: worst_deliveries(table, 2.0),
         **lying_tanks(),
     }
     seconds = {name: [] for name in tasks}

@@ -46,7 +46,8 @@ def pytest_terminal_summary(terminalreporter):
     """Print the figures that tests measured: what they guard is a number, not only a verdict."""
     lines = [
         f"  {text}"
-        for report in terminalreporter.stats.get("passed", [])
+        for outcome in ("passed", "failed")
+        for report in terminalreporter.stats.get(outcome, [])
         for name, text in report.user_properties
         if name == "figure"
     ]

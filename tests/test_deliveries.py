@@ -1,6 +1,5 @@
 """Deliveries: any pair of dips, and the worst of at least a height, against brute force."""
 
-import time
 import tracemalloc
 from dataclasses import replace
 
@@ -279,25 +278,19 @@ def test_the_least_delivery_height_is_where_the_limit_begins_to_hold(few_dof):
     assert (least_delivery_m(table, 0.99 * U, False) is None) == (U > 0)
 
 
-def test_a_full_table_takes_a_fraction_of_a_second_and_no_matrix(figure):
+def test_a_full_table_takes_no_matrix(figure):
     """9 501 rows of 30 columns: a matrix of all pairs would be 722 MB."""
     for few_dof in (False, True):
         table = tank(9501, 3, few_dof)
         assert table.factor_m3.shape == (9501, 30)
-        seconds = []
-        for _ in range(3):
-            start = time.process_time()
-            worst_deliveries(table, 2.0)
-            seconds.append(time.process_time() - start)
         tracemalloc.start()
         worst_deliveries(table, 2.0)
         peak = tracemalloc.get_traced_memory()[1] / 1e6
         tracemalloc.stop()
         figure(
             f"worst delivery, 9 501 x 30, {'few' if few_dof else 'many'} degrees of freedom",
-            f"{min(seconds):.2f} s, {peak:.0f} MB",
+            f"{peak:.0f} MB",
         )
-        assert min(seconds) < 1
         assert peak < 100
 
 

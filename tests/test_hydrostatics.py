@@ -1,6 +1,5 @@
 """Liquid head: closed forms, a fine numerical integration of a bulging shell, the way back."""
 
-import time
 from itertools import pairwise
 
 import numpy as np
@@ -244,23 +243,3 @@ def test_a_level_above_the_shell_is_an_error():
     for level in (9.51, np.nan):
         with pytest.raises(HeightError):
             part.volume_m3([1.0, level])
-
-
-def test_nine_thousand_rows_in_eight_courses(figure):
-    joints = np.linspace(0, 9.5, 9)
-    part = liquid_head(
-        shell(joints, lambda z: 6.5 + 0.001 * z),
-        np.linspace(0.012, 0.005, 8),
-        E_PA,
-        850.0,
-        survey_density_kg_m3=1000.0,
-        survey_level_m=5.0,
-    )
-    levels = np.linspace(0, 9.5, 9501)
-    spent = []
-    for _ in range(20):
-        start = time.process_time()
-        part.with_density(700.0).volume_m3(levels)
-        spent.append(time.process_time() - start)
-    figure("liquid head of 9501 rows, 8 courses, ms", f"{1e3 * min(spent):.1f}")
-    assert min(spent) < 0.05  # a guard against a loop over rows

@@ -5,7 +5,6 @@ The normal run takes a twentieth of the rows and fewer seeds; `-m study` the who
 
 import resource
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -160,9 +159,6 @@ def test_a_control_that_says_nothing_does_no_harm(figure):
 @pytest.mark.study
 @pytest.mark.parametrize("kinds", [ORDINARY, MIXED], ids=["normal", "mixed"])
 def test_a_table_is_no_worse_than_a_million_plain_draws_study(kinds, figure):
-    """9 500 rows, 50 seeds: the goal, with time and memory."""
+    """9 500 rows, 50 seeds: the goal; its time is measured by benchmarks/monte_carlo.py."""
     assert np.all(ratios_over_seeds(9500, 50, kinds, figure) <= 1)
-    start = time.process_time()
-    simulate(*tank(9500, kinds))
-    assert time.process_time() - start < 2.0
     figure("peak memory of the whole test run, MB", peak_mb())

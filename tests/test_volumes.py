@@ -1,7 +1,5 @@
 """Volumes of exact shapes, a mesh as second method, and the published variances."""
 
-import time
-
 import numpy as np
 import pytest
 from jacobians import assert_derivative
@@ -293,16 +291,3 @@ def test_the_form_of_each_course_is_a_factor_of_its_own():
     assert stack.own_form_m2.shape[1] <= 6
     own, common = effects[0][:, :198], courses[0].upper("by_form_m2")
     assert own == pytest.approx(common * np.sqrt(0.5), rel=1e-12)
-
-
-def test_a_table_of_millimetres_is_quick(figure):
-    """9500 rows, 8 courses of 3 sections: volume, area, and 48 columns of the covariance."""
-    stack = barrelled(GAUSS_3, 0.004, courses=8)
-    heights, factor = np.linspace(0, 12.0, 9500), np.eye(len(stack.features))
-    times = []
-    for _ in range(7):
-        start = time.perf_counter()
-        stack.volume_m3(heights), stack.area_m2(heights), stack.integrated(heights, factor)
-        times.append(time.perf_counter() - start)
-    figure("9500 rows: volume, area and 48 columns, ms", f"{1000 * np.median(times):.1f}")
-    assert min(times) < 0.020  # 2 ms on an idle core
