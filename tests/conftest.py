@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 import tankcal
 from tankcal.record import record_of, save
@@ -11,6 +12,11 @@ from tankcal.record import record_of, save
 os.environ.setdefault("TANKCAL_COMPILED", "patient")  # a run of few tests waits for no compiler
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "silva-1995"
+
+# the same examples on every machine, however slow; new ones by: pytest --hypothesis-profile search
+settings.register_profile("house", deadline=None, derandomize=True)
+settings.register_profile("search", deadline=None, print_blob=True)
+settings.load_profile("house")
 
 
 @pytest.fixture(scope="session")

@@ -448,7 +448,6 @@ NASTY = st.one_of(
 LISTS = st.lists(st.one_of(st.floats(0, 1000), st.lists(st.floats(0, 10), max_size=3)), max_size=3)
 QUICK = settings(
     max_examples=150,
-    deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.too_slow],
 )

@@ -20,7 +20,7 @@ from tankcal.job import Job, load
 from tankcal.job.checks.survey.names import plain
 from tankcal.job.tables import SURVEY_TABLES
 
-QUICK = settings(max_examples=60, deadline=None, suppress_health_check=[*HealthCheck])
+QUICK = settings(max_examples=60, suppress_health_check=[*HealthCheck])
 FILM = "UMK 10/1318"
 
 

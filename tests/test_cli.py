@@ -167,7 +167,7 @@ def test_new_writes_a_job_and_refuses_a_full_folder(tmp_path, capsys):
 coordinates = st.floats(-1e4, 1e4, allow_nan=False).map(lambda value: f"{value:.3f}")
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=40, suppress_health_check=list(HealthCheck))
 @given(
     spoilt=st.lists(st.tuples(st.integers(1, 60), st.integers(1, 3), coordinates), max_size=40),
     heights=st.lists(st.sampled_from(["1.9", "0.1", "3.0", "9.5"]), min_size=2, max_size=2),

@@ -166,7 +166,7 @@ def test_ros_and_json_lists_are_read():
 POWERS = np.array([-1, -1, 2, 4, 6, 8, 1, 1, 2, 4, 0, 0])  # of 1/mm, of all but c
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.lists(st.floats(-1e-3, 1e-3), min_size=12, max_size=12),
     st.floats(1, 300),
@@ -331,7 +331,7 @@ def test_files_that_are_none(tmp_path):
         assert len(caught.value.problems) == 1
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(
     st.sampled_from(list(GOOD)),
     st.lists(

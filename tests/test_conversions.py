@@ -15,7 +15,7 @@ from tankcal.errors import SolutionError
 
 SAME_PX = 1e-9
 SIZE, PIXEL = (4608, 3456), 0.00134
-QUICK = settings(deadline=None, max_examples=25)
+QUICK = settings(max_examples=25)
 
 
 def parts(low, high, count):

@@ -859,7 +859,7 @@ TOKENS = st.sampled_from(
 HEADINGS = st.sampled_from(["height_m,volume_m3", "cm;L;cm;L", "a,b", "", "Ullage (m)\tVolume (L)"])
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=150, suppress_health_check=list(HealthCheck))
 @given(
     heading=HEADINGS,
     separator=st.sampled_from([",", ";", "\t"]),

@@ -181,7 +181,7 @@ def test_steps_of_the_free_surface_are_told_apart():
     assert part.area_m2([0.999, 1.0, 1.25, 1.5, 2.0]) == pytest.approx([2.25, 3.25, 3.25, 1.0, 1.0])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     seed=st.integers(0, 2**31),
     rows=st.integers(1, 40),
@@ -221,7 +221,7 @@ def plain(corners, weights, height, power):
     return total
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     seed=st.integers(0, 2**31),
     rows=st.integers(1, 70),

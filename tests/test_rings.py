@@ -166,7 +166,7 @@ def _assert_same(found, expected):
         )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(
     edges=st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=12, unique=True),
     heights=st.lists(st.floats(-1.1e3, 1.1e3), min_size=1, max_size=40),

@@ -417,7 +417,7 @@ ends = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, derandomize=True)
 @given(
     a=ends,
     b=ends,

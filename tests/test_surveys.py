@@ -93,7 +93,7 @@ def test_groups_say_how_good_each_is(adjustment):
         assert group.factor**2 * group.redundancy == pytest.approx(square, rel=1e-9)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.lists(st.tuples(st.integers(0, 4), st.floats(-5, 5), st.floats(0.1, 3)), min_size=1),
     st.floats(-7, 7),
