@@ -49,13 +49,25 @@ def test_gross_volume_is_the_published_one(example_result):
     assert gross == pytest.approx(1252.82, rel=2e-4)
 
 
-@pytest.mark.study
+def reconstruct(folder, *options):
+    """What the script of the example prints, run beside the printed tables alone."""
+    shutil.copytree(EXAMPLE / "published", folder / "published")
+    shutil.copy(EXAMPLE / "reconstruct.py", folder)
+    command = [sys.executable, folder / "reconstruct.py", *options]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+
 def test_the_script_writes_the_same_points_again(tmp_path):
-    shutil.copytree(EXAMPLE, tmp_path / "example", ignore=shutil.ignore_patterns("results"))
-    before = (tmp_path / "example" / "points.csv").read_bytes()
-    (tmp_path / "example" / "points.csv").unlink()
-    subprocess.run([sys.executable, tmp_path / "example" / "reconstruct.py"], check=True)
-    assert (tmp_path / "example" / "points.csv").read_bytes() == before
+    reconstruct(tmp_path)
+    assert (tmp_path / "points.csv").read_bytes() == (EXAMPLE / "points.csv").read_bytes()
+
+
+@pytest.mark.study
+def test_signs_that_do_are_found(tmp_path):
+    """The search itself ends with an error where the rounding of the table is exceeded."""
+    found = reconstruct(tmp_path, "--search").split()
+    assert [len(signs) for signs in found] == [24, 24, 23, 24, 24]
+    assert {sign for signs in found for sign in signs} == {"+", "-"}
 
 
 def test_what_is_invented_is_listed():
