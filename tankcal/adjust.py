@@ -11,6 +11,7 @@ covariance. Source: Mikhail & Ackermann 1976, Observations and Least Squares, ch
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy.linalg
@@ -71,18 +72,21 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
     v, size = np.zeros_like(l), np.inf
     q = scipy.sparse.diags_array(covariance) if np.ndim(covariance) == 1 else covariance
     sd = np.sqrt(np.maximum(q.diagonal(), np.finfo(float).tiny))
+    by_weights = cache(lambda: _whitener(q))
     for iteration in range(1, max_iterations + 1):
         w, a, b = model(x, l + v)
         if len(w) < len(x):
             raise SolutionError(f"{len(w)} conditions for {len(x)} unknowns: too few observations")
-        b = -scipy.sparse.eye_array(len(l)) if b is None else b
-        qb = q @ b.T
-        whiten = _whitener(b @ qb)
-        aw, ww = whiten(a), whiten(w - b @ v)
+        if b is None:  # B = -I
+            minus_qb, whiten, w_there = q, by_weights(), w + v
+        else:
+            minus_qb = -(q @ b.T)
+            whiten, w_there = _whitener(-(b @ minus_qb)), w - b @ v
+        aw, ww = whiten(a), whiten(w_there)
         step, cofactor, basis = _solve(aw, ww)
         x = x + step
         normalised = ww + aw @ step
-        v_before, v = v, -qb @ whiten(normalised, transposed=True)
+        v_before, v = v, minus_qb @ whiten(normalised, transposed=True)
         of_unknowns = np.abs(step) * np.linalg.norm(aw, axis=0)
         before, size = size, max(of_unknowns.max(initial=0.0), np.max(np.abs(v - v_before) / sd))
         limit = tolerance * len(w) ** 0.5
