@@ -277,11 +277,7 @@ class Body:
         factors = [one for part in self.parts for one in getattr(part, "factors", ())]
         if any(one.kind == OWN_SCALE for one in factors):
             known.add("scale")
-        return tuple(
-            name
-            for name, by in moved.items()
-            if np.abs(by).max(initial=0.0) > 0 and name not in known
-        )
+        return tuple(name for name, by in moved.items() if name not in known and _bears(by))
 
     def sources(self, levels_m):
         """One `Source` for each cause of uncertainty: the parts' own, then what was declared."""
@@ -310,6 +306,14 @@ class Body:
             if one.name in derivatives
         }
         return (*own, *grouped(alone, self.correlations))
+
+
+def _bears(by):
+    """Whether an input moves volumes, by its derivatives (rows,) or (rows, courses).
+
+    The heights of several courses do, even where a nominal tank has equal ones: no real tank has.
+    """
+    return (by.ndim == 2 and by.shape[1] > 1) or bool(np.any(by != 0))
 
 
 def summed(derivatives):

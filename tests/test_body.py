@@ -70,6 +70,16 @@ def test_what_bears_and_was_not_declared_is_named():
     assert Body((Slab(10.0, 0.0),), (), 0.0, 4.0).undeclared() == ("datum",)  # scale moves nothing
 
 
+@pytest.mark.parametrize(("courses", "named"), [(1, False), (2, True)])
+def test_heights_of_several_courses_bear_even_on_a_perfect_shell(courses, named):
+    outline = section_of(ring(6.5, azimuths(24))).outline
+    shapes = [course_shape(i, i + 1, [i + 0.5], [outline]) for i in range(courses)]
+    perfect = ShellPart(ShellVolume(tuple(shapes)), (), 1.0, 1.1e-5)
+    assert not perfect.derivatives(LEVELS / 4)["course_heights"].any()
+    body = Body((perfect,), (), 0.0, float(courses))
+    assert ("course_heights" in body.undeclared()) == named
+
+
 def test_a_declared_input_that_no_part_knows_changes_nothing():
     body = Body((Slab(10.0, 3.0),), (Declared("roof_mass"),), 0.0, 4.0)
     assert [source.kind for source in body.sources(LEVELS)] == ["points"]
