@@ -164,22 +164,33 @@ def among_themselves(points):
     datum that holds one photo or one point gives them whatever variance it has: sections fitted
     with it would depend on that choice. Columns of causes go along.
     """
-    x, y, _ = (points.xyz_m - points.xyz_m.mean(axis=0)).T
-    motions = np.zeros((len(x), 3, 4))
-    motions[:, :, :3] = np.eye(3)
-    motions[:, 0, 3], motions[:, 1, 3] = -y, x
-    basis = np.linalg.qr(motions.reshape(-1, 4))[0]
-    given = points.covariance_m2
-    spread = given @ basis
-    across = spread - 0.5 * basis @ (basis.T @ spread)
-    left = np.trace(given) - 2 * np.sum(basis * across)
-    across -= 0.5 * max(left, 0.0) / (len(basis) - 4) * basis
+    basis, given = common_motions(points.xyz_m), points.covariance_m2
+    across = taken_along(basis, given @ basis, np.trace(given))
     change = np.hstack([basis, across]) @ np.hstack([across, basis]).T
     causes = tuple(
         replace(cause, column_m=cause.column_m - basis @ (basis.T @ cause.column_m))
         for cause in points.causes
     )
     return replace(points, covariance_m2=np.subtract(given, change, out=change), causes=causes)
+
+
+def common_motions(xyz_m):
+    """(3n, 4) orthonormal basis of the shifts and the turn about the vertical of points (n, 3)."""
+    x, y, _ = (xyz_m - xyz_m.mean(axis=0)).T
+    motions = np.zeros((len(x), 3, 4))
+    motions[:, :, :3] = np.eye(3)
+    motions[:, 0, 3], motions[:, 1, 3] = -y, x
+    return np.linalg.qr(motions.reshape(-1, 4))[0]
+
+
+def taken_along(basis, spread, trace):
+    """A (3n, 4) of C' = C - D A' - A D', which is S C S + s2 D D' of `among_themselves`.
+
+    A = C D - D (D'C D + s2 I) / 2; basis D, spread C D, trace of C
+    """
+    across = spread - 0.5 * basis @ (basis.T @ spread)
+    left = trace - 2 * np.sum(basis * across)
+    return across - 0.5 * max(left, 0.0) / (len(basis) - 4) * basis
 
 
 def radial_sds(points):

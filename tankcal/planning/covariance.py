@@ -3,9 +3,8 @@
 What a volume needs of all points together are products with a few columns: Q M comes from the
 reduced normal equations, 3n times d numbers and not 3n times 3n.
 
-Shifts and the turn about the vertical are taken out as `wall.among_themselves` takes them out:
-
-    C' = C - D A' - A D'     D basis of these motions     A = C D - D (D'C D + s2 I) / 2
+Shifts and the turn about the vertical are taken out as `wall.among_themselves` takes them out,
+by its D and A: C' = C - D A' - A D'.
 """
 
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ import numpy as np
 import scipy.sparse
 
 from tankcal.gauss_markov.effects import covariances
+from tankcal.wall import common_motions, taken_along
 
 
 @dataclass(frozen=True)
@@ -48,22 +48,12 @@ class PredictedCovariance:
 
     @cached_property
     def _basis(self):
-        """(3n, 4) orthonormal basis of the common shift and the turn about the vertical."""
-        xyz = self.adjusted.xyz_m[self.points]
-        x, y, _ = (xyz - xyz.mean(axis=0)).T
-        motions = np.zeros((len(x), 3, 4))
-        motions[:, :, :3] = np.eye(3)
-        motions[:, 0, 3], motions[:, 1, 3] = -y, x
-        return np.linalg.qr(motions.reshape(-1, 4))[0]
+        return common_motions(self.adjusted.xyz_m[self.points])
 
     @cached_property
     def _across(self):
-        basis = self._basis
-        spread = self._in_frame(basis)
-        across = spread - 0.5 * basis @ (basis.T @ spread)
         trace = np.einsum("nii->", self.adjusted.point_covariances_m2[self.points])
-        left = trace - 2 * np.sum(basis * across)
-        return across - 0.5 * max(left, 0.0) / (len(basis) - 4) * basis
+        return taken_along(self._basis, self._in_frame(self._basis), trace)
 
     def among(self, column):
         """A column (3n,) of one cause, without the common motions."""
