@@ -106,7 +106,7 @@ def test_intervals_cover_tanks_with_form_between_the_targets(common, share, figu
 @pytest.mark.study
 @FORMS
 def test_intervals_cover_tanks_with_form_between_the_targets_study(common, share, figure):
-    check(round(5000 * share), common, figure)
+    check(round(3000 * share), common, figure)
 
 
 BARREL_M = 0.003
@@ -195,7 +195,7 @@ def test_scanned_courses_that_taper_and_bulge(heights, figure):
 @pytest.mark.study
 @HEIGHTS
 def test_scanned_courses_that_taper_and_bulge_study(heights, figure):
-    check_scans(1000, heights, figure)
+    check_scans(300, heights, figure)
 
 
 def test_the_unit_form_has_the_variance_that_is_simulated():

@@ -355,8 +355,8 @@ def test_what_is_found_in_spoilt_tables(tmp_path, figure):
 
 @pytest.mark.study
 def test_the_study_of_spoilt_tables(tmp_path, figure):
-    counts = study(tmp_path, 1200, seed=1, steps=list(STEPS))
-    show(figure, counts, "linter, 1200 spoilt tables")
+    counts = study(tmp_path, 600, seed=1, steps=list(STEPS))
+    show(figure, counts, "linter, 600 spoilt tables")
     for spoil in SPOILING:
         total, seen, named, _ = counts[spoil]
         if spoil is not missing_last_row:

@@ -108,7 +108,7 @@ def test_the_uncertainty_of_simulated_bottoms_holds(figure):
 @pytest.mark.study
 @pytest.mark.parametrize("declared", [True, False])
 def test_the_uncertainty_of_many_simulated_bottoms_holds(figure, declared):
-    judge(figure, 1440, declared, tolerance=3)
+    judge(figure, 720, declared, tolerance=3)
 
 
 ROUND = Footprint(3.0, 1.0, np.full(72, 6.5))
