@@ -36,9 +36,8 @@ format: $(VENV)/full ## bring the code to the house style
 
 notebooks: $(VENV)/full ## execute every notebook, top to bottom
 	mkdir -p build/notebooks
-	cd notebooks && for one in *.ipynb; do \
-	  ../$(BIN)/jupyter nbconvert --to notebook --execute --output-dir ../build/notebooks "$$one" || exit 1; \
-	done
+	cd notebooks && ls *.ipynb | xargs -P 2 -n 1 \
+	  ../$(BIN)/jupyter nbconvert --to notebook --execute --output-dir ../build/notebooks
 
 bench: $(VENV)/full ## time and memory of the main job, tables of 1 mm rows and their u, ten million points, plans
 	$(BIN)/python benchmarks/main_job.py
