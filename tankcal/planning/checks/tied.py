@@ -76,8 +76,8 @@ def _check_plumb_lines(plan, given, log):
 
 def _check_control(plan, control, log):
     """Control that the plan places itself is there; what only control places has all of x, y, z."""
-    setups = [one.name for one in plan.setups]
-    own = {name: plan.points[name] for name in (*plan.targets.names, *plan.facing, *setups)}
+    points, setups = plan.points, [one.name for one in plan.setups]
+    own = {name: points[name] for name in (*plan.targets.names, *plan.facing, *setups)}
     acting = {one.name for one in plan.known}
     given = np.column_stack([control.numbers(f"{axis}_m") for axis in "xyz"])
     for row, name, xyz in zip(control.rows, control.of("point"), given, strict=True):
