@@ -14,6 +14,7 @@ from tankcal.errors import HeightError
 from tankcal.uncertainty import Source, coverage_factor, effective_dof
 
 SAME_ROW = 1e-9  # of a weight: a dip this near to a row is that row
+SAME_M = 1e-9  # dips nearer than this are the same
 
 
 @dataclass(frozen=True)
@@ -109,21 +110,29 @@ class Capacity:
         for_use = bool(np.all(self.for_use([height for height, _ in terms])))
         return Quantity(float(weights @ self.volume_m3), u, dof, k, k * u, for_use)
 
+    def inside(self, heights_m):
+        """(n,) dips of the table: its ends for those that are beyond them by rounding.
+
+        The top of the shell rounded to a millimetre counts as the top. Raises HeightError for
+        others outside.
+        """
+        dips = np.atleast_1d(np.asarray(heights_m, dtype=float))
+        first, last = self.height_m[0], self.height_m[-1]
+        outside = ~((dips >= first - SAME_M) & (dips <= max(round(last, 3), last + SAME_M)))
+        if np.any(outside):
+            raise HeightError(
+                f"dip {dips[outside][0]:g} m is outside the capacity table "
+                f"({first:g} to {last:g} m)"
+            )
+        return np.clip(dips, first, last)
+
     def weights(self, heights_m):
         """(n, rows) by which the rows give the volumes at n dips: linear between two rows.
 
         The top of the shell rounded to a millimetre counts as the top. Raises HeightError outside
         the table.
         """
-        dips = np.asarray(heights_m, dtype=float)
-        first, last = self.height_m[0], self.height_m[-1]
-        dips = np.where((dips > last) & (dips <= round(last, 3)), last, dips)
-        outside = ~((dips >= first) & (dips <= last))
-        if np.any(outside):
-            raise HeightError(
-                f"height {dips[outside][0]:g} m is outside the capacity table "
-                f"({first:g} to {last:g} m)"
-            )
+        dips = self.inside(heights_m)
         upper = np.clip(np.searchsorted(self.height_m, dips), 1, len(self.height_m) - 1)
         below, above = self.height_m[upper - 1], self.height_m[upper]
         part = (dips - below) / (above - below)

@@ -12,7 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from tankcal.deliveries.pairs import SAME_M, Rows, ratio_of
+from tankcal.capacity import SAME_M
+from tankcal.deliveries.pairs import Rows, ratio_of
 from tankcal.uncertainty import coverage_factor
 
 FAN = 4  # blocks that make up one of the next level

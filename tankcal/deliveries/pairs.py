@@ -1,13 +1,11 @@
 """Deliveries between any pairs of dips, each with its own degrees of freedom."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.errors import HeightError
 from tankcal.uncertainty import coverage_factor
 
-SAME_M = 1e-9  # dips nearer than this are the same
 CHUNK = 2048
 
 
@@ -15,7 +13,7 @@ CHUNK = 2048
 class Deliveries:
     """Volumes between pairs of dips, each field (n,).
 
-    low_m, high_m  dips before and after (m)     volume_m3  V(high) - V(low)
+    low_m, high_m  dips before and after (m), as asked     volume_m3  V(high) - V(low)
     u_m3           standard uncertainty          dof        effective degrees of freedom
     k, U_m3        coverage factor, k u
     for_use        False where one of the dips is in the critical zone of a floating roof
@@ -41,20 +39,15 @@ def deliveries(table, low_m, high_m):
 
     table          a tankcal.capacity.Capacity
     low_m, high_m  (n,) or scalars, dips in m
-    Raises HeightError for a dip outside the table.
+    Raises HeightError for a dip outside the table (`Capacity.inside`).
     """
     low_m, high_m = np.broadcast_arrays(*np.atleast_1d(low_m, high_m))
     low_m, high_m = low_m.astype(float), high_m.astype(float)
-    first, last = table.height_m[0], table.height_m[-1]
-    for dip in (low_m, high_m):
-        outside = ~((dip >= first - SAME_M) & (dip <= last + SAME_M))
-        if np.any(outside):
-            raise HeightError(
-                f"dip {dip[outside][0]:g} m is outside the capacity table ({first:g} to {last:g} m)"
-            )
+    low, high = table.inside(low_m), table.inside(high_m)
     rows = Rows(table.height_m, table.volume_m3, table.factor_m3, Groups(table.sources))
-    for_use = table.for_use(low_m) & table.for_use(high_m)
-    return between(rows, table.probability, low_m, high_m, for_use)
+    for_use = table.for_use(low) & table.for_use(high)
+    found = between(rows, table.probability, low, high, for_use)
+    return replace(found, low_m=low_m, high_m=high_m)
 
 
 def between(rows, probability, low, high, for_use):

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.capacity import SAME_M
 from tankcal.deliveries.blocks import Search, bounds_of, kids_of, levels_of
-from tankcal.deliveries.pairs import CHUNK, SAME_M, Groups, Rows, between
+from tankcal.deliveries.pairs import CHUNK, Groups, Rows, between
 
 TOLERANCE = 1e-6  # relative: the worst delivery is found to this part of itself
 
