@@ -22,7 +22,8 @@ class Budget:
     """A volume read from the table and what its uncertainty is made of.
 
     low_m, high_m  dips; low_m None: the volume below high_m
-    table_u_m3     of the table alone; u_m3, dof, k, U_m3 with what the reading adds
+    table_u_m3     of the table alone; u_m3, dof, k, U_m3 with what the reading adds, alone
+                   `reading_U_m3`
     for_use        False where a dip stands in a zone in which the table must not be used
     lines          in the order of the table's sources, then the reading's; shares add up to 1
     """
@@ -37,6 +38,11 @@ class Budget:
     U_m3: float
     for_use: bool
     lines: tuple[BudgetRow, ...]
+
+    @property
+    def reading_U_m3(self):
+        """k times what reading adds: the standard uncertainties of its lines, by squares."""
+        return self.k * max(self.u_m3**2 - self.table_u_m3**2, 0.0) ** 0.5
 
 
 def reading_sources(declared, largest_interpolation_m3):

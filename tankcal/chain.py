@@ -18,7 +18,7 @@ from tankcal.rules import RuleVerdict
 from tankcal.scan import Scan, scanned
 from tankcal.service import shell_factor, shell_temperature_c
 from tankcal.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
-from tankcal.statements import Statements, statements, verdict_of
+from tankcal.statements import Statements, pairs_to_simulate, statements, verdict_of
 from tankcal.surveys import Adjustment, adjust_survey, wall_points
 from tankcal.tabling import doubts_of_table, tabled
 from tankcal.tanks import body_of, shell_volume
@@ -171,7 +171,8 @@ def run(job, progress=None, *, counting=None, simulated=None):
     wanted = job.table.monte_carlo if simulated is None else simulated
     if wanted and table.sources:
         tell("simulating the table")
-        simulation = simulate_table(job, survey, body, zero, table, stated.pairs, tell=counting)
+        pairs = pairs_to_simulate(stated, job, body, table)
+        simulation = simulate_table(job, survey, body, zero, table, pairs, tell=counting)
         intervals = simulation.intervals(table)
     return Result(
         job=job,

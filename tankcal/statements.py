@@ -7,7 +7,8 @@ import numpy as np
 from tankcal.budgets import Budget, budget, reading_sources
 from tankcal.deliveries import WorstDeliveries, worst_deliveries
 from tankcal.errors import InputError, Problem
-from tankcal.rules import Printed, StatedVolume, judge
+from tankcal.job.tables import SETTINGS_FILE
+from tankcal.rules import Printed, StatedVolume, deliveries_judged, judge
 
 MINIMA_M = (1.5, 2.0, 3.0)  # of deliveries, where the job names none
 QUARTERS = (0.25, 0.5, 0.75, 1.0)  # of the table, where the job names no dips
@@ -40,7 +41,7 @@ def statements(job, table, largest_interpolation_m3):
     _refuse_outside(job.stated, table)
     reading = reading_sources(job.inputs, largest_interpolation_m3)
     dips = [one.high_m for one in job.stated if one.low_m is None] or _quarters(table)
-    worst = tuple(filter(None, (worst_deliveries(table, one) for one in _minima(job))))
+    worst = _worst(job, table)
     pairs = [(one.low_m, one.high_m) for one in job.stated if one.low_m is not None]
     pairs += [(one.at_minimum.low_m, one.at_minimum.high_m) for one in worst if one.at_minimum]
     return Statements(
@@ -50,6 +51,12 @@ def statements(job, table, largest_interpolation_m3):
         ),
         worst=worst,
     )
+
+
+def pairs_to_simulate(stated, job, body, table):
+    """((low_m, high_m), ...) of the `Statements`, then of the deliveries a rule is decided by."""
+    judged = () if job.rule is None else deliveries_judged(job.rule, table, _tank(job, body))
+    return tuple(dict.fromkeys((*stated.pairs, *judged)))
 
 
 def verdict_of(job, body, table, intervals, simulation):
@@ -70,10 +77,37 @@ def _printed(intervals, simulation):
     delivered = simulation.delivered
     U = delivered.U_m3
     printed = simulation.of_deliveries[1].stated(delivered.volume_m3, U)
-    factor = np.max(np.divide(printed, U, out=np.ones(len(U)), where=U > 0), initial=1.0)
+    ratio = np.divide(printed, U, out=np.ones(len(U)), where=U > 0)
+    factor = np.max(ratio[simulation.smooth], initial=1.0)
     pairs = zip(delivered.low_m.tolist(), delivered.high_m.tolist(), strict=True)
     of_pairs = dict(zip(pairs, printed.tolist(), strict=True))
     return Printed(intervals.U_m3, intervals.by_gum, of_pairs, float(factor))
+
+
+def _worst(job, table):
+    """`WorstDeliveries` of the least heights; InputError for one that the job names and none is of.
+
+    Of the heights that are looked at where it names none, those count that fit. The height of the
+    table rounded to a millimetre counts as its height.
+    """
+    height = float(np.ptp(table.height_m))
+    found = {
+        one: worst_deliveries(table, min(one, height) if one <= round(height, 3) else one)
+        for one in _minima(job)
+    }
+    if job.table.minimum_delivery_m is not None:
+        expected = (
+            f"expected at most {height:g} m between two dips of the table that are for use: "
+            "there is no such delivery"
+        )
+        problems = [
+            Problem(SETTINGS_FILE, f"found {one:g}; {expected}", column="table.minimum_delivery_m")
+            for one, worst in found.items()
+            if worst is None
+        ]
+        if problems:
+            raise InputError(problems)
+    return tuple(worst for worst in found.values() if worst is not None)
 
 
 def _refuse_outside(stated, table):

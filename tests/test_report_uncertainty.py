@@ -158,12 +158,20 @@ def test_rows_with_an_uneven_interval_are_listed_with_its_ends(found, record):
 # ---- stated volumes and deliveries
 
 
-def test_a_stated_volume_has_the_U_of_its_row(record):
+def of_reading(budget):
+    """k u of what reading the table adds."""
+    return budget["k"] * np.sqrt(budget["u_m3"] ** 2 - budget["table_u_m3"] ** 2)
+
+
+def test_a_stated_volume_has_the_U_of_its_row_and_of_its_reading(record):
     capacity = record["capacity"]
     rows = {(row["low_m"], row["high_m"]): row for row in stated_rows(record)}
     assert len(rows) == len(record["budgets"])
     row = rows[None, 1.2]
-    assert row["U_m3"] == capacity["stated_U_m3"][12]
+    (budget,) = (one for one in record["budgets"] if one["high_m"] == 1.2)
+    assert of_reading(budget) > 0
+    U = np.hypot(capacity["stated_U_m3"][12], of_reading(budget))
+    assert row["U_m3"] == pytest.approx(U, rel=1e-12)
     assert (row["simulated"], row["k"]) == (True, None)
 
 
@@ -189,8 +197,9 @@ def test_between_two_rows_the_largest_U_is_stated(result, record, largest):
         U[largest] = 7.0
     (row,) = (row for row in _stated(result, U_m3=U, by_gum=by_gum) if row["high_m"] == 1.75)
     (of_budget,) = (one for one in record["budgets"] if one["high_m"] == 1.75)
-    assert row["U_m3"] == (of_budget["U_m3"] if largest == "budget" else 7.0)
-    assert row["simulated"]
+    U = of_budget["U_m3"] if largest == "budget" else np.hypot(7.0, of_reading(of_budget))
+    assert row["U_m3"] == pytest.approx(U, rel=1e-12)
+    assert row["simulated"] == (largest != "budget")  # else it is k u
 
 
 def test_a_delivery_has_monte_carlos_interval_where_gums_is_not_validated(result, record):
@@ -206,13 +215,15 @@ def test_a_delivery_has_monte_carlos_interval_where_gums_is_not_validated(result
     other = record | {"budgets": budgets_of(replace(result, simulation=simulation))}
     one, two = (b for b in other["budgets"] if b["low_m"] in (1.0, 1.4))
     rows = {row["low_m"]: row for row in stated_rows(other)}
-    assert rows[1.0]["U_m3"] == pytest.approx(0.5)
+    down, up = np.hypot([0.5, 0.2], of_reading(one))
+    assert rows[1.0]["U_m3"] == pytest.approx(down, rel=1e-12)
     assert rows[1.0]["k"] is None
-    assert rows[1.0]["low_m3"] == one["low_m3"] == volume - 0.5  # uneven: its ends are told
+    assert rows[1.0]["low_m3"] == one["low_m3"]  # uneven: its ends are told
+    assert one["low_m3"] == pytest.approx(volume - down, rel=1e-12)
     assert (rows[1.4]["U_m3"], rows[1.4]["k"]) == (two["U_m3"], two["k"])
     remarks = method.remarks(Paper(other), rows[1.0])
     assert remarks == [
-        f"from {one['volume_m3'] - 0.5:.2f}\xa0m³ to {one['volume_m3'] + 0.2:.2f}\xa0m³",
+        f"from {one['volume_m3'] - down:.2f}\xa0m³ to {one['volume_m3'] + up:.2f}\xa0m³",
         f"stated {one['stated_m3']:.2f}\xa0m³; difference "
         f"{fixed(one['volume_m3'] - one['stated_m3'], 2)}\xa0m³",
         one["note"],

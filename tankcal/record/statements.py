@@ -61,18 +61,27 @@ def _of_volume(one, result):
     if np.all(intervals.by_gum[rows]):
         return _even(one.volume_m3, one.U_m3, "gum")
     if len(rows) > 1:
-        return _even(one.volume_m3, max(one.U_m3, *intervals.U_m3[rows]), "monte_carlo")
+        U = float(np.hypot(intervals.U_m3[rows].max(), one.reading_U_m3))
+        return _even(one.volume_m3, max(one.U_m3, U), "gum" if one.U_m3 >= U else "monte_carlo")
     (row,) = rows
-    low, high = intervals.low_m3[row], intervals.high_m3[row]
-    return _interval(intervals.U_m3[row], low, high, "monte_carlo")
+    return _with_reading(one, intervals.low_m3[row], intervals.high_m3[row])
 
 
 def _of_delivery(one, judged):
     """The same of a delivery, by what Monte Carlo says of it, or None."""
     if judged is None or judged["validated"]:
         return _even(one.volume_m3, one.U_m3, "gum")
-    low, high = judged["low"], judged["high"]
-    return _interval(max(one.volume_m3 - low, high - one.volume_m3), low, high, "monte_carlo")
+    return _with_reading(one, judged["low"], judged["high"])
+
+
+def _with_reading(one, low_m3, high_m3):
+    """Monte Carlo's interval of the table, each side made longer by what reading adds, in squares.
+
+    The errors of reading are each reading's own and as likely up as down.
+    """
+    down = float(np.hypot(one.volume_m3 - low_m3, one.reading_U_m3))
+    up = float(np.hypot(high_m3 - one.volume_m3, one.reading_U_m3))
+    return _interval(max(down, up), one.volume_m3 - down, one.volume_m3 + up, "monte_carlo")
 
 
 def _even(volume_m3, U_m3, source):

@@ -2,7 +2,7 @@
 
 from tankcal.rules.deviation import DeviationVerdict, StatedVolume, conformity_probability
 from tankcal.rules.expanded import UncertaintyVerdict
-from tankcal.rules.judging import RuleVerdict, judge
+from tankcal.rules.judging import RuleVerdict, deliveries_judged, judge
 from tankcal.rules.model import TANKS, DeviationLimit, Rule, UncertaintyLimit
 from tankcal.rules.plain import as_json
 from tankcal.rules.printed import Printed
@@ -19,5 +19,6 @@ __all__ = [
     "UncertaintyVerdict",
     "as_json",
     "conformity_probability",
+    "deliveries_judged",
     "judge",
 ]

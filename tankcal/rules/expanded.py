@@ -2,19 +2,30 @@
 
 U(h) <= limit V(h), or limit V(top). With a constant k, U is convex between rows and the limit is
 linear, so what holds at two neighbouring rows holds between them. Nothing is divided, so the empty
-tank (V = 0) keeps a limit only where U = 0, too. Deliveries are judged over all dips.
+tank (V = 0) keeps a limit only where U = 0, too. Deliveries are judged over all dips by the law of
+propagation, and those that were simulated by what is printed of them: the worst one, and some down
+to the lowest dip, where the volume cannot fall below nothing and the errors of the two dips do not
+cancel as the law of propagation has it (`deliveries_to_judge`).
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.deliveries import Delivery, least_delivery_m, ratio_of, worst_deliveries
+from tankcal.deliveries import (
+    Delivery,
+    deliveries,
+    least_delivery_m,
+    ratio_of,
+    worst_deliveries,
+)
 from tankcal.errors import HeightError
 from tankcal.rules.model import UncertaintyLimit
 from tankcal.rules.printed import of_table
 
 _ROUNDING = 1e-12  # relative: U equal to the limit keeps it
+_SAME_M = 1e-6  # heights of deliveries nearer than this are the same
+TO_LOWEST = 12  # deliveries to the lowest dip that are simulated for a limit
 
 
 @dataclass(frozen=True)
@@ -51,8 +62,8 @@ def judge_uncertainty(limit, table, lowest_m=None, printed=None):
 
     lowest_m  dip of the start of the calibrated zone; only rows from there on are judged, and
               deliveries between them. None: all.
-    printed   `Printed` uncertainties; None: the table's. Deliveries are searched by the table's U,
-              taken larger by the factor of the printed ones
+    printed   `Printed` uncertainties; None: the table's. Deliveries are searched by the table's U;
+              the worst one and all that were simulated have the U that is printed of them
     Raises HeightError for a lowest_m above the table's last row.
     """
     if lowest_m is not None and lowest_m > table.height_m[-1]:
@@ -65,7 +76,7 @@ def judge_uncertainty(limit, table, lowest_m=None, printed=None):
     if lowest_m is not None:
         judged &= table.height_m >= lowest_m
     if limit.of == "deliveries":
-        return _judge_deliveries(limit, _from(table, lowest_m), capacity, printed.factor)
+        return _judge_deliveries(limit, _from(table, lowest_m), capacity, printed)
     if limit.of == "capacity":
         judged &= np.arange(len(judged)) == np.flatnonzero(judged).max(initial=-1)
     if not np.any(judged):
@@ -105,27 +116,73 @@ def _judge_rows(limit, table, printed, rows, capacity):
     )
 
 
-def _judge_deliveries(limit, table, capacity, factor):
-    """factor  by which U of deliveries is larger than the table says."""
+def deliveries_to_judge(limit, table):
+    """((low_m, high_m), ...) of the deliveries that a limit of deliveries is decided by.
+
+    The worst by U and by U over its volume, and some to the lowest dip, from the least height to
+    the whole table; only what is for use.
+    """
+    found = worst_deliveries(table, limit.minimum_height_m)
+    if found is None:
+        return ()
+    lowest, top = table.height_m[0], table.height_m[-1]
+    heights = np.linspace(limit.minimum_height_m, top - lowest, TO_LOWEST)
+    highs = np.minimum(lowest + heights, top)
+    usable = table.for_use(highs) & table.for_use(lowest)
+    pairs = [(one.low_m, one.high_m) for one in (found.absolute, found.relative)]
+    return (*pairs, *((float(lowest), float(high)) for high in highs[usable]))
+
+
+def _judge_deliveries(limit, table, capacity, printed):
     found = worst_deliveries(table, limit.minimum_height_m)
     if found is None:
         return UncertaintyVerdict(limit, "nothing_to_judge", None)
-    is_relative = limit.relative_to == "itself"
-    worst = _larger(found.relative if is_relative else found.absolute, factor)
-    if limit.limit is None:
-        worst = _larger(found.relative, factor)
-        return _of_delivery(limit, "stated", worst, worst.relative)
-    bound = limit.limit if is_relative else limit.limit * capacity
+    is_relative = limit.relative_to == "itself" or limit.limit is None
+    judged = _as_printed(found.relative if is_relative else found.absolute, limit, table, printed)
+
+    def size(one):
+        return one.relative if is_relative else one.U_m3
+
+    worst = max(judged, key=size)
     ratio = worst.relative if is_relative else float(ratio_of(worst.U_m3, capacity))
-    if (worst.relative if is_relative else worst.U_m3) <= bound * (1 + _ROUNDING):
+    if limit.limit is None:
+        return _of_delivery(limit, "stated", worst, ratio)
+    bound = (limit.limit if is_relative else limit.limit * capacity) * (1 + _ROUNDING)
+    broken = [_height(one) for one in judged if size(one) > bound]
+    if not broken:
         return _of_delivery(limit, "holds", worst, ratio, limit.minimum_height_m)
-    from_m = least_delivery_m(table, bound / factor * (1 + _ROUNDING), is_relative)
+    from_m = least_delivery_m(table, bound / printed.factor, is_relative)
+    kept = [_height(one) for one in judged if _height(one) > max(broken) + _SAME_M]
+    if from_m is not None and max(broken) > from_m - _SAME_M:
+        from_m = float(np.ceil(1000 * min(kept) - 1e-6) / 1000) if kept else None
     code = "fails" if from_m is None else "holds_from"
     return _of_delivery(limit, code, worst, ratio, from_m)
 
 
-def _larger(delivery, factor):
-    return replace(delivery, U_m3=factor * delivery.U_m3, relative=factor * delivery.relative)
+def _as_printed(worst, limit, table, printed):
+    """The worst Delivery by the table, and all that were simulated, with their printed U."""
+    first, last = table.height_m[[0, -1]]
+    least = limit.minimum_height_m - _SAME_M
+    pairs = {(worst.low_m, worst.high_m): printed.of(table, worst.low_m, worst.high_m, worst.U_m3)}
+    pairs |= {
+        (low, high): U
+        for (low, high), U in printed.pairs_m3.items()
+        if low >= first and high <= last and high - low >= least
+    }
+    low, high = np.array(list(pairs)).T
+    found, U = deliveries(table, low, high), np.array(list(pairs.values()))
+    k = ratio_of(U, found.u_m3)
+    fields = (low, high, found.volume_m3, found.u_m3, found.dof, k, U)
+    rows = zip(*fields, ratio_of(U, found.volume_m3), strict=True)
+    return [
+        Delivery(*map(float, row))
+        for row, for_use in zip(rows, found.for_use, strict=True)
+        if for_use
+    ]
+
+
+def _height(delivery):
+    return delivery.high_m - delivery.low_m
 
 
 def _of_delivery(limit, code, worst: Delivery, ratio, from_m=None):

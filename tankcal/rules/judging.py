@@ -5,7 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.rules.deviation import DeviationVerdict, judge_deviation
-from tankcal.rules.expanded import UncertaintyVerdict, judge_uncertainty
+from tankcal.rules.expanded import (
+    UncertaintyVerdict,
+    deliveries_to_judge,
+    judge_uncertainty,
+)
 from tankcal.rules.model import TANKS, Rule
 from tankcal.rules.printed import of_table
 
@@ -70,6 +74,13 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
         deviation=deviation,
         unjudged=unjudged,
     )
+
+
+def deliveries_judged(rule, table, tank):
+    """((low_m, high_m), ...) of the deliveries that a rule's limits are decided by, each once."""
+    limits = [one for one in rule.uncertainty if one.of == "deliveries" and _is_for(one, tank)]
+    pairs = [pair for limit in limits for pair in deliveries_to_judge(limit, table)]
+    return tuple(dict.fromkeys(pairs))
 
 
 def _is_for(limit, tank):

@@ -12,7 +12,8 @@ class Printed:
     rows_m3   (rows,) U of the rows
     by_gum    (rows,) whether it is the table's own; None: all
     pairs_m3  {(low_m, high_m): U} of the deliveries that were simulated
-    factor    of U of every other delivery: the largest that a simulated one needed, at least 1
+    factor    of U of every other delivery: the largest that a simulated one needed whose volumes
+              are smooth at both dips, at least 1
     """
 
     rows_m3: np.ndarray

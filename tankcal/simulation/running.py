@@ -36,6 +36,7 @@ class TableSimulation:
     found, judged  `monte_carlo.Simulation` and `Verdict` of the rows
     delivered      the `deliveries.Deliveries` that were simulated, too
     of_deliveries  (Simulation, Verdict) of them
+    smooth         (deliveries,) whether a parabola by the datum follows their volumes
     curved         pairs of inputs whose second derivatives were kept
     bent           (rows,) whether the row was simulated with the tank's own volumes, not a parabola
     drawn          rows that were drawn for; the others of a long table follow their neighbours
@@ -46,6 +47,7 @@ class TableSimulation:
     judged: Verdict
     delivered: Deliveries
     of_deliveries: tuple[Simulation, Verdict]
+    smooth: np.ndarray
     curved: tuple[tuple[str, str], ...]
     bent: np.ndarray
     drawn: int
@@ -82,6 +84,7 @@ def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, tel
         judged=verdict(rows, table.volume_m3, table.u_m3, table.dof, digits=goal.digits),
         delivered=delivered,
         of_deliveries=(others, verdict(others, *of_delivered, digits=goal.digits)),
+        smooth=~model.bent[model.parts[1]],
         curved=model.curved.pairs,
         bent=model.bent[model.parts[0]],
         drawn=model.drawn,
