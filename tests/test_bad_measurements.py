@@ -118,6 +118,10 @@ BAD_KEYS = [
     ("cameras", FILM, "b2", 1e-4, "given with affinity = both_y"),
     ("cameras", FILM, "s_K1", None, "expected it above 0, for the parameter is block weighted"),
     ("cameras", FILM, "K1_mm-2", 1e-3, "of normalised coordinates?"),
+    ("cameras", FILM, "P1_mm-1", 0.01, "of normalised coordinates?"),
+    ("cameras", FILM, "x0_mm", 100.0, "outside the format, whose width is 180 mm"),
+    ("cameras", FILM, "c_mm", 0.1, "expected 11.1 to 44407 mm: in another unit?"),
+    ("cameras", FILM, "s_c_mm", 300.0, "expected less: in another unit?"),
     ("cameras", FILM, "K1_mm-2", 1.2e-7, "expected the same"),
     ("cameras", "D", "pixel_um", None, "expected the size of a pixel"),
     ("cameras", "D", "format_mm", [30.0, 20.0], "format_px times pixel_um is 24 x 16 mm"),
@@ -610,7 +614,7 @@ def test_directions_between_known_points(tmp_path, factor):
             "adjustment.camera.K3 is off; it is held at this value",
         ),
         (
-            lambda parts: parts.registers["cameras"][FILM].update({"c_mm": 10.0}),
+            lambda parts: parts.registers["cameras"][FILM].update({"c_mm": 15.0}),
             "in another unit?",
         ),
         (

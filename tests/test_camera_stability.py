@@ -642,6 +642,22 @@ def complaints(tmp_path, text):
     return caught.value.problems
 
 
+PUBLISHED_SET = """[cameras.set1]
+format_px = [4608, 3456]
+pixel_um = 1.339451
+c_mm = 4.3816
+x0_mm = 0.0625
+y0_mm = 0.0427
+K1_mm-2 = -0.00174185
+P1_mm-1 = 0.0008448316
+P2_mm-1 = 0.0006318956
+convention = "correction_subtracted"
+s_c_mm = 0.001321
+s_x0_mm = 0.0003811
+s_y0_mm = 0.0004067
+"""  # Pessoa 2017, table 6
+
+
 def test_both_spellings_of_the_keys(tmp_path):
     assert "_mm-" not in SHORT
     (one,), (other,) = read(tmp_path, LONG), read(tmp_path, SHORT)
@@ -772,9 +788,44 @@ def test_files_that_are_not_there(tmp_path):
 
 def test_doubts_are_told_to_who_asks(tmp_path):
     told = []
-    (tmp_path / "a.toml").write_text(LONG.replace("4.38", "4380.0"), encoding="utf-8")
+    (tmp_path / "a.toml").write_text(LONG.replace("4.38", "0.5"), encoding="utf-8")
     read_cameras(tmp_path / "a.toml", told.append)
     assert [(one.column, one.expected[-16:]) for one in told] == [("one.c_mm", "in another unit?")]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("x0_mm", 62.5, "outside the format, whose width is 6.172 mm; expected at most 3.086"),
+        ("y0_mm", -42.7, "outside the format, whose height is 4.629 mm"),
+        ("c_mm", 4381.6, "with a format of 7.715 mm across; expected 0.386 to 1543 mm"),
+        ("c_mm", 0.0043816, "expected 0.386 to 1543 mm: in another unit?"),
+        ("P1_mm-1", 0.8448316, "moves the corner of the image by 806 % of its radius"),
+        ("P2_mm-1", -0.6318956, "moves the corner of the image by 480 % of its radius"),
+        ("P4_mm-4", 1.0, "moves the corner of the image by"),
+        ("s_c_mm", 13.0, "with a format of 7.715 mm across; expected less: in another unit?"),
+        ("s_x0_mm", 381.1, "expected less: in another unit?"),
+    ],
+)
+def test_numbers_a_thousand_times_off(tmp_path, key, value, words):
+    """Property: of each length and of P, a thousandth or a thousandfold is refused by its key."""
+    lines = dict(line.split(" = ") for line in PUBLISHED_SET.splitlines()[1:])
+    lines[key] = str(value)
+    text = "[cameras.set1]\n" + "".join(f"{key} = {value}\n" for key, value in lines.items())
+    (problem,) = complaints(tmp_path, text)
+    assert problem.column == f"set1.{key}"
+    assert words in problem.expected
+
+
+def test_a_published_calibration_and_lenses_of_every_length_are_taken(tmp_path):
+    told = []
+    (tmp_path / "a.toml").write_text(PUBLISHED_SET, encoding="utf-8")
+    read_cameras(tmp_path / "a.toml", told.append)
+    for c_mm in (8.0, 35.0, 1200.0):  # a full frame with a fisheye, a usual and the longest lens
+        text = f"[cameras.a]\nformat_mm = [36, 24]\npixel_um = 6\nc_mm = {c_mm}\n"
+        (tmp_path / "a.toml").write_text(text, encoding="utf-8")
+        read_cameras(tmp_path / "a.toml", told.append)
+    assert told == []
 
 
 def test_choosing_by_name(seven):

@@ -19,6 +19,8 @@ SAME_SIZE = 0.01
 SMALLEST_PIXEL_UM, LARGEST_FORMAT_MM = 0.1, 1000
 PART_OF_PIXEL = 0.1  # by which a format in mm may miss a whole number of pixels
 CREDIBLE_LENGTHS = (0.1, 100)  # principal distance, in diagonals of the format
+POSSIBLE_LENGTHS = (0.05, 200)
+RADIAL_TERMS, DECENTRING_TERMS = ("K1", "K2", "K3", "K4"), ("P1", "P2", "P3", "P4")
 DOUBTFUL_DISTORTION, IMPOSSIBLE_DISTORTION = 0.1, 0.5  # at the corner, part of the radius
 
 
@@ -217,29 +219,97 @@ def _warn_held(files, name, parameter):
 
 
 def _check_sizes(files, name, given):
-    """Principal distance and radial distortion of a credible size for the format."""
-    radius = float(np.hypot(*format_of(given)[0])) / 2
-    low, high = CREDIBLE_LENGTHS
-    c = given["c_mm"]
-    if c is not None and not low * 2 * radius <= c <= high * 2 * radius:
+    """Interior parameters and standard deviations of a credible size for the format."""
+    size_mm = format_of(given)[0]
+    _check_principal_distance(files, name, given, size_mm)
+    _check_principal_point(files, name, given, size_mm)
+    _check_distortion(files, name, given, size_mm)
+    _check_sds(files, name, given, size_mm)
+
+
+def _check_principal_distance(files, name, given, size_mm):
+    c, across = given["c_mm"], float(np.hypot(*size_mm))
+    if c is None or _is_between(c / across, CREDIBLE_LENGTHS):
+        return
+    if _is_between(c / across, POSSIBLE_LENGTHS):
         expected = message(
             "strange_principal_distance",
             "found {c_mm:g} with a format of {across_mm:.4g} mm across: in another unit?",
             c_mm=c,
-            across_mm=2 * radius,
+            across_mm=across,
         )
         files.tell_key(files.log.warning, "cameras", name, "c_mm", expected)
-    keys = [PARAMETER_KEYS[f"K{number}"][0] for number in range(1, 5)]
+        return
+    low, high = (across * limit for limit in POSSIBLE_LENGTHS)
+    expected = (
+        f"found {c:g} with a format of {across:.4g} mm across; expected {low:.3g} to {high:.5g} mm:"
+        " in another unit?"
+    )
+    files.tell_key(files.log.problem, "cameras", name, "c_mm", expected)
+
+
+def _is_between(value, limits):
+    low, high = limits
+    return low <= value <= high
+
+
+def _check_principal_point(files, name, given, size_mm):
+    """The principal point is in the frame."""
+    for key, side, length in zip(("x0_mm", "y0_mm"), ("width", "height"), size_mm, strict=True):
+        if abs(given[key] or 0.0) > length / 2:
+            expected = (
+                f"found {given[key]:g}, outside the format, whose {side} is {length:.4g} mm;"
+                f" expected at most {length / 2:.4g} from its middle: in another unit?"
+            )
+            files.tell_key(files.log.problem, "cameras", name, key, expected)
+
+
+def _check_distortion(files, name, given, size_mm):
+    """No term moves the corner of the image by an incredible part of its radius.
+
+    Of radial and of decentring terms the worst is told.
+    """
     values = at_focus(given)
-    parts = [abs(values[key] or 0.0) * radius ** (2 * n) for n, key in enumerate(keys, 1)]
-    worst = int(np.argmax(parts))
-    if parts[worst] > DOUBTFUL_DISTORTION:
-        is_problem = parts[worst] > IMPOSSIBLE_DISTORTION
-        to = files.log.problem if is_problem else files.log.warning
-        expected = message(
-            "large_distortion",
-            "moves the corner of the image by {percent:.3g} % of its radius; expected less: of"
-            " another unit than millimetres, or of normalised coordinates?",
-            percent=100 * parts[worst],
-        )
-        files.tell_key(to, "cameras", name, keys[worst], expected)
+    for names in (RADIAL_TERMS, DECENTRING_TERMS):
+        keys = [PARAMETER_KEYS[one][0] for one in names]
+        parts = _parts_at_corner([values[key] or 0.0 for key in keys], names, size_mm)
+        worst = int(np.argmax(parts))
+        if parts[worst] > DOUBTFUL_DISTORTION:
+            is_problem = parts[worst] > IMPOSSIBLE_DISTORTION
+            to = files.log.problem if is_problem else files.log.warning
+            expected = message(
+                "large_distortion",
+                "moves the corner of the image by {percent:.3g} % of its radius; expected less: of"
+                " another unit than millimetres, or of normalised coordinates?",
+                percent=100 * parts[worst],
+            )
+            files.tell_key(to, "cameras", name, keys[worst], expected)
+
+
+def _parts_at_corner(values, names, size_mm):
+    """What each K or P moves the corner of the image by, in parts of its radius.
+
+    names  of the values, RADIAL_TERMS or DECENTRING_TERMS
+
+    With (x, y) the corner and r its radius: |K1| r^2, |K2| r^4, ...; of P1 (r^2 + 2 x^2, 2 x y) and
+    of P2 (2 x y, r^2 + 2 y^2) the length is |P| r sqrt(r^2 + 8 x^2) and the same with y; P3 r^2 and
+    P4 r^4 are factors of both, taken as adding up.
+    """
+    radius, size = np.hypot(*size_mm) / 2, np.abs(values)
+    squares = radius ** (2 * np.arange(1, 5))
+    if names == RADIAL_TERMS:
+        return size * squares
+    decentring = size[:2] * np.sqrt(radius**2 + 2 * np.square(size_mm))
+    return np.concatenate([decentring, size[2:] * squares[:2] * decentring.sum()])
+
+
+def _check_sds(files, name, given, size_mm):
+    """No standard deviation of the principal distance or point is larger than the format."""
+    across = float(np.hypot(*size_mm))
+    for key in map(sd_key, ("c", "x0", "y0")):
+        if (given[key] or 0.0) > across:
+            expected = (
+                f"found {given[key]:g} with a format of {across:.4g} mm across; expected less: in"
+                " another unit? For an unknown value, leave it out"
+            )
+            files.tell_key(files.log.problem, "cameras", name, key, expected)
