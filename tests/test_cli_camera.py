@@ -9,8 +9,12 @@ import numpy as np
 import pytest
 
 import tankcal
+from tankcal.camera import Form
+from tankcal.camera_analysis.interiors import framed_in
 from tankcal.cli import main
+from tankcal.conversions.published import converted
 from tankcal.languages import LANGUAGES
+from tankcal.record import load as load_record
 from tankcal.shipped import shipped
 
 SEVEN = shipped("examples") / "pessoa-2017" / "cameras.toml"
@@ -263,6 +267,65 @@ def test_convert_a_record_of_film(record, capsys):
     adjusted = tankcal.adjust_job(tankcal.load(PHOTOS, only="adjustment")).adjusted
     assert camera["c_mm"] == pytest.approx(adjusted.camera(0)[0]["c"], rel=1e-12)
     assert camera["s_K3"] > 0
+
+
+def converted_set(capsys, *arguments):
+    """Keys of the camera that a conversion of the published set 1 prints."""
+    command = ["camera", "convert", str(SEVEN), "--name", "set1", "--to", "cameras.toml"]
+    assert main([*command, *arguments]) == 0
+    return tomllib.loads(capsys.readouterr().out)["cameras"]["set1"]
+
+
+def test_convert_carries_standard_deviations_into_other_forms(capsys):
+    """Published sds, which the form that has them keeps; in another, that of c is nearly the same,
+    for what differs is below a pixel.
+    """
+    given = tomllib.loads(SEVEN.read_text(encoding="utf-8"))["cameras"]["set1"]
+    same = converted_set(capsys, "--as", "pessoa")
+    for key in ("c_mm", "x0_mm", "K1", "K2", "P1", "A", "B"):
+        printed = next(one for one in same if one in (f"s_{key}", f"s_{key.split('_')[0]}"))
+        assert same[printed] == pytest.approx(sd_of(given, key), rel=1e-9)
+    silva = converted_set(capsys, "--as", "silva")
+    assert {key for key in silva if key.startswith("s_")} >= {"s_c_mm", "s_K1", "s_P1", "s_B"}
+    assert silva["s_c_mm"] == pytest.approx(same["s_c_mm"], rel=0.02)
+    assert silva["s_B"] == pytest.approx(same["s_A"], rel=0.01)  # A x of both_x is near B y
+
+
+def sd_of(camera, key):
+    """A standard deviation by the key of its value, in either spelling."""
+    name = key.split("_")[0]
+    return next(camera[one] for one in (f"s_{key}", f"s_{name}") if one in camera)
+
+
+def test_convert_keeps_held_parameters_and_those_without_standard_deviation(tmp_path, capsys):
+    (tmp_path / "a.toml").write_text(
+        "[cameras.a]\nformat_px = [6000, 4000]\npixel_um = 4\nc_mm = 24\nx0_mm = 0.1\nK1 = 1e-5\n"
+        's_c = 0.01\ns_x0 = 0\nconvention = "correction_added"\n',
+        encoding="utf-8",
+    )
+    command = ["camera", "convert", str(tmp_path / "a.toml"), "--to", "cameras.toml"]
+    assert main([*command, "--as", "pessoa"]) == 0
+    found = tomllib.loads(capsys.readouterr().out)["cameras"]["a"]
+    sds = {key: value for key, value in found.items() if key.startswith("s_")}
+    assert sds == {"s_c_mm": pytest.approx(0.01, rel=1e-9), "s_x0_mm": 0}
+    assert found["K1_mm-2"] == -1e-5
+
+
+def test_convert_a_record_with_its_correlations(record, capsys):
+    """Second method: the covariance of the record through the derivatives of the library."""
+    command = ["camera", "convert", str(record), "--to", "cameras.toml", "--pixel-um", "10"]
+    assert main([*command, "--as", "plain"]) == 0
+    found = tomllib.loads(capsys.readouterr().out)["cameras"]["UMK"]
+    ((_, camera),), (covariance,) = framed_in(load_record(record), 0.01)
+    known = np.nan_to_num(covariance)
+    frame = (camera.size_px, camera.pixel_mm)
+    after = converted(camera.interior, camera.form, Form(), *frame, covariance=known).covariance
+    sds = [found[key] for key in ("s_c_mm", "s_K1", "s_K2", "s_P1")]
+    assert sds == pytest.approx(np.sqrt(np.diag(after))[[0, 3, 4, 7]].tolist(), rel=1e-9)
+    alone = converted(
+        camera.interior, camera.form, Form(), *frame, covariance=np.diag(np.diag(known))
+    )
+    assert sds[1] != pytest.approx(np.sqrt(alone.covariance[3, 3]), rel=0.01)
 
 
 def test_convert_keeps_a_file_that_is_there(tmp_path, capsys):

@@ -127,13 +127,14 @@ def chosen(interiors, camera=None, photo=None):
 
 
 def framed_in(record, pixel_mm=None):
-    """[(name, FramedCamera)] of a record and the sds (13,) of each, for a file of cameras.
+    """[(name, FramedCamera)] of a record and the covariance (13, 13) of each, nan on its diagonal
+    for what was not adjusted.
 
     pixel_mm  side of a pixel, for cameras of which the record knows none (film)
 
     Raises InputError for cameras without a format or without pixels.
     """
-    cameras, sds, problems = [], [], []
+    cameras, covariances, problems = [], [], []
     for one in interiors_in(record):
         pixel = one.frame.pixel_mm
         if pixel is None and pixel_mm is not None:
@@ -144,11 +145,18 @@ def framed_in(record, pixel_mm=None):
             continue
         size_px = np.round(one.format_mm / pixel).astype(int)
         cameras.append((one.camera, framed(one.values, one.form, pixel, size_px)))
-        sd = dict(zip(one.free, np.sqrt(np.diag(one.covariance)), strict=True))
-        sds.append(np.array([sd.get(name, np.nan) for name in PARAMETERS]))
+        covariances.append(_among_all(one.free, one.covariance))
     if problems:
         raise InputError(problems)
-    return cameras, sds
+    return cameras, covariances
+
+
+def _among_all(names, covariance):
+    """(13, 13) with the covariance of some parameters; nan on the diagonal for the others."""
+    found = np.diag([0.0 if name in names else np.nan for name in PARAMETERS])
+    places = [PARAMETERS.index(name) for name in names]
+    found[np.ix_(places, places)] = covariance
+    return found
 
 
 def interiors_in(record):

@@ -115,18 +115,20 @@ def check(options):
 
 def convert(options):
     """A camera of one program, or of a publication, as another has it."""
-    from tankcal.conversions.published import in_form
+    import numpy as np
+
     from tankcal.conversions.writing import write_camera
 
-    cameras, sds = _cameras_of(options)
+    cameras, covariances = _cameras_of(options)
     if options.name is not None:
-        cameras, sds = _only(options, cameras, sds)
+        cameras, covariances = _only(options, cameras, covariances)
     for name, camera in cameras:
         _tell_error(f"{name}, as read", camera.error_px)
     if options.form is not None:
-        cameras, sds = [(name, in_form(camera, options.form)) for name, camera in cameras], None
+        cameras, covariances = _in_form(options.form, cameras, covariances)
         for name, camera in cameras:
             _tell_error(f"{name}, in the form of {options.form}", camera.error_px)
+    sds = [None if one is None else np.sqrt(np.diag(one)) for one in covariances]
     written = write_camera(options.to, cameras, sds, options.radius_mm)
     if options.to != "cameras.toml":
         for (name, _), error_px in zip(cameras, written.error_px, strict=True):
@@ -137,8 +139,21 @@ def convert(options):
     _write_new(Path(options.out), written.text)
 
 
+def _in_form(form, cameras, covariances):
+    """[(name, FramedCamera)] in the form of a publication, and their covariances or None."""
+    from tankcal.conversions.published import in_form
+
+    found = [
+        (name, *in_form(camera, form, covariance))
+        for (name, camera), covariance in zip(cameras, covariances, strict=True)
+    ]
+    return [(name, camera) for name, camera, _ in found], [after for *_, after in found]
+
+
 def _cameras_of(options):
-    """[(name, FramedCamera)] of a cameras.toml, a record or a file of another program, and sds."""
+    """[(name, FramedCamera)] of a cameras.toml, a record or a file of another program, and the
+    covariance (13, 13) of each, or None.
+    """
     from tankcal.camera_analysis.interiors import framed_in
     from tankcal.conversions.reading import read_camera
 
@@ -148,11 +163,14 @@ def _cameras_of(options):
     if Path(options.file).suffix.lower() == ".toml":
         return _registered(options.file)
     size_px = None if options.size_px is None else tuple(options.size_px)
-    return read_camera(options.file, options.kind, options.pixel_um, size_px), None
+    cameras = read_camera(options.file, options.kind, options.pixel_um, size_px)
+    return cameras, [None] * len(cameras)
 
 
 def _registered(path):
-    """[(name, FramedCamera)] of a cameras.toml, and their standard deviations."""
+    """[(name, FramedCamera)] of a cameras.toml, and covariances of their standard deviations."""
+    import numpy as np
+
     from tankcal.conversions.frame import framed
     from tankcal.job.calibrations import read_cameras
 
@@ -161,17 +179,17 @@ def _registered(path):
         (one.camera.name, framed(one.camera.values, one.camera.form, one.pixel_mm, one.format_px))
         for one in setups
     ]
-    return cameras, [one.camera.sd for one in setups]
+    return cameras, [np.diag(one.camera.sd**2) for one in setups]
 
 
-def _only(options, cameras, sds):
+def _only(options, cameras, covariances):
     """The camera of that name alone."""
     names = [name for name, _ in cameras]
     if options.name not in names:
         expected = f"found --name {options.name!r}; expected one of {', '.join(names[:20])}"
         raise InputError(Problem(Path(options.file).name, expected))
     place = names.index(options.name)
-    return [cameras[place]], None if sds is None else [sds[place]]
+    return [cameras[place]], [covariances[place]]
 
 
 def _tell_error(what, error_px):

@@ -90,12 +90,31 @@ def converted(
     return Converted(found, to_form, float(off.max()), rms, is_exact, after, turn)
 
 
-def in_form(camera, name):
-    """The FramedCamera in the form of a publication, one of PUBLISHED; see converted."""
-    found = converted(
-        camera.interior, camera.form, PUBLISHED[name], camera.size_px, camera.pixel_mm
-    )
-    return framed(found.interior, found.form, camera.pixel_mm, camera.size_px, found.error_px)
+def in_form(camera, name, covariance=None):
+    """A FramedCamera in the form of a publication, one of PUBLISHED, and its covariance.
+
+    covariance  (13, 13) of camera.interior, its diagonal nan where no sd is known, or None: then
+                that of the result is None, too
+
+    See converted. What has no sd counts as exact for the sds of the others, and has none again.
+    """
+    known = None if covariance is None else np.nan_to_num(covariance)
+    to_form, frame = PUBLISHED[name], (camera.size_px, camera.pixel_mm)
+    found = converted(camera.interior, camera.form, to_form, *frame, covariance=known)
+    after = None
+    if covariance is not None:
+        after = _with_unknown(found.covariance, camera.interior, covariance)
+    interior = framed(found.interior, to_form, camera.pixel_mm, camera.size_px, found.error_px)
+    return interior, after
+
+
+def _with_unknown(after, values, covariance):
+    """A covariance (13, 13) after a conversion, nan on the diagonal where no sd is known.
+
+    values, covariance  (13,) and (13, 13) before: a value, not 0, without sd; or nothing at all
+    """
+    is_unknown = np.isnan(np.diag(covariance)) & ((values != 0) | (np.diag(after) == 0))
+    return after + np.diag(np.where(is_unknown, np.nan, 0.0))
 
 
 def propagated(function, values, covariance):
