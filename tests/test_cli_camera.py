@@ -159,6 +159,35 @@ def test_every_analysis_refuses_a_language_without_words(what, capsys):
     assert "pt-BR" in told
 
 
+@pytest.mark.parametrize(
+    ("option", "name", "words"),
+    [
+        ("--photo", "NOPHOTO", "--photo: found 'NOPHOTO'; expected one of "),
+        ("--camera", "NOCAMERA", "--camera: found 'NOCAMERA'; expected one of UMK"),
+    ],
+)
+def test_parameters_of_what_is_not_there(record, option, name, words, capsys):
+    for source in (PHOTOS, record):
+        assert run("parameters", source, "--no-trials", option, name) == 2
+        told = capsys.readouterr()
+        assert words in told.err
+        assert told.out == ""
+
+
+def test_parameters_of_a_photo_with_parameters_of_its_own(tmp_path, capsys):
+    job = shutil.copytree(PHOTOS, tmp_path / "job")
+    text = (job / "job.toml").read_text(encoding="utf-8")
+    own = '\n[adjustment.camera]\nx0 = "photo free"\n'
+    (job / "job.toml").write_text(text + own, encoding="utf-8")
+    name = tankcal.load(job, only="adjustment").measurements.photos[1].name
+    out = tmp_path / "out"
+    assert main(["run", str(job), "--only", "adjustment", "--out", str(out), "--quiet"]) == 0
+    capsys.readouterr()
+    for source in (job, out / "record.json"):
+        assert run("parameters", source, "--no-trials", "--photo", name, "--json") == 0
+        assert json.loads(capsys.readouterr().out)["photos"] == [name]
+
+
 def test_parameters_without_photographs(capsys):
     assert run("parameters", shipped("examples") / "total-station") == 2
     assert "no photographs" in capsys.readouterr().err

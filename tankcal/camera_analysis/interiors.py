@@ -12,6 +12,8 @@ from tankcal.camera_analysis.edges import Frame
 from tankcal.conversions.frame import framed
 from tankcal.errors import InputError, Problem
 
+MOST_NAMES = 20  # in a message
+
 
 @dataclass(frozen=True)
 class Interior:
@@ -112,18 +114,44 @@ def sets_to_be(measurements, camera=None, photo=None):
     return len(own) + len({one.camera for one in photos} - alone)
 
 
-def chosen(interiors, camera=None, photo=None):
-    """Those of a camera, and of a photo; all of them without names. InputError: there are none."""
-    found = tuple(
+def photos_in(record):
+    """{photo: its camera} of a record (dict); InputError where it does not say them."""
+    try:
+        return {one["photo"]: one["camera"] for one in record["adjustment"]["photos"]}
+    except (KeyError, TypeError) as error:
+        raise InputError(_problem("no sound list", "adjustment.photos")) from error
+
+
+def refuse_unknown(photos, camera=None, photo=None):
+    """Raise InputError for the name of a camera, or of a photo of it, that is not there.
+
+    photos  {photo: its camera}
+    """
+    cameras = list(dict.fromkeys(photos.values()))
+    if camera is not None and camera not in cameras:
+        raise InputError(Problem("--camera", _unknown(camera, cameras)))
+    own = [name for name, of in photos.items() if camera in (None, of)]
+    if photo is not None and photo not in own:
+        raise InputError(Problem("--photo", _unknown(photo, own)))
+
+
+def _unknown(name, known):
+    more = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
+    return f"found {name!r}; expected one of {', '.join(known[:MOST_NAMES])}{more}"
+
+
+def chosen(interiors, photos, camera=None, photo=None):
+    """Those of a camera, and of a photo; all of them without names. InputError: there are none.
+
+    photos  {photo: its camera}
+    """
+    refuse_unknown(photos, camera, photo)
+    return tuple(
         one
         for one in interiors
-        if camera in (None, one.camera) and (photo is None or photo in (one.photos or (photo,)))
+        if camera in (None, one.camera)
+        and (photo is None or (photos[photo] == one.camera and photo in (one.photos or (photo,))))
     )
-    if not found:
-        known = ", ".join(dict.fromkeys(one.camera for one in interiors))
-        asked = " ".join(f"{name}" for name in (camera, photo) if name is not None)
-        raise InputError(Problem("--camera", f"found {asked!r}; expected one of {known}"))
-    return found
 
 
 def framed_in(record, pixel_mm=None):

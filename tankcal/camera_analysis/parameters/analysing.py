@@ -8,7 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.camera_analysis.interiors import chosen, interiors_in, interiors_of
+from tankcal.camera_analysis.interiors import (
+    chosen,
+    interiors_in,
+    interiors_of,
+    photos_in,
+    refuse_unknown,
+)
 from tankcal.camera_analysis.parameters.dropping import Dropping, interior_after
 from tankcal.camera_analysis.parameters.findings import Choices, Statistics
 from tankcal.camera_analysis.parameters.judging import (
@@ -29,10 +35,12 @@ def analyse_record(record, choices=None, *, camera=None, photo=None):
 
     camera, photo  names, to have the sets of these only
 
-    Raises InputError where it is no record of an adjustment with cameras, or holds no parameter
-    that was adjusted.
+    Raises InputError where it is no record of an adjustment with cameras, holds no parameter that
+    was adjusted, or no such camera or photo.
     """
     interiors = interiors_in(record)
+    if camera is not None or photo is not None:
+        interiors = chosen(interiors, photos_in(record), camera, photo)
     return _of_all(interiors, _statistics_in(record), choices or Choices(), "record.json")
 
 
@@ -69,19 +77,21 @@ def analyse_job(
     dropping    whether the survey is adjusted again without each candidate
     tell        tell(text, done, total) is called as the work goes on
 
-    Raises InputError for a job without photographs or without adjusted parameters, SolutionError
-    when the survey cannot be adjusted.
+    Raises InputError for a job without photographs, without adjusted parameters or without such a
+    camera or photo, SolutionError when the survey cannot be adjusted.
     """
     tell = tell or (lambda text, done, total: None)
     if job.measurements is None or not job.measurements.photos:
         raise InputError(Problem("job.toml", "no photographs: there is no camera to be judged"))
+    photos = {one.name: one.camera for one in job.measurements.photos}
+    refuse_unknown(photos, camera, photo)
     if adjustment is None:
         tell("adjusting the survey with all parameters", 0, 1)
         adjustment = adjust_job(job)
     groups = [(g.kind, g.name, g.count, g.redundancy, g.rms) for g in adjustment.groups]
     statistics = Statistics(adjustment.sigma0, adjustment.redundancy, adjustment.cov_scale, groups)
     interiors = interiors_of(adjustment, job.measurements)
-    interiors = chosen(interiors, camera, photo)
+    interiors = chosen(interiors, photos, camera, photo)
     found = _of_all(interiors, statistics, choices or Choices(), "cameras.toml", source="job")
     return _with_outcomes(found, job, adjustment, tell) if dropping else found
 
