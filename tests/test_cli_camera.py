@@ -286,8 +286,12 @@ def test_convert_there_and_back(form, tmp_path, capsys):
 
 
 def test_convert_a_record_of_film(record, capsys):
-    assert main(["camera", "convert", str(record), "--to", "cameras.toml"]) == 2
-    assert "--pixel-um" in capsys.readouterr().err
+    assert main(["camera", "convert", str(record), "--to", "opencv"]) == 2
+    assert "UMK.pixel_um: missing; opencv counts in pixels" in capsys.readouterr().err
+    assert main(["camera", "convert", str(record), "--to", "cameras.toml"]) == 0
+    in_mm = tomllib.loads(capsys.readouterr().out)["cameras"]["UMK"]
+    assert in_mm["format_mm"] == [180, 130]
+    assert "pixel_um" not in in_mm
     arguments = ["camera", "convert", str(record), "--to", "cameras.toml", "--pixel-um", "10"]
     assert main(arguments) == 0
     camera = tomllib.loads(capsys.readouterr().out)["cameras"]["UMK"]
@@ -296,6 +300,69 @@ def test_convert_a_record_of_film(record, capsys):
     adjusted = tankcal.adjust_job(tankcal.load(PHOTOS, only="adjustment")).adjusted
     assert camera["c_mm"] == pytest.approx(adjusted.camera(0)[0]["c"], rel=1e-12)
     assert camera["s_K3"] > 0
+    assert {key: camera[key] for key in camera if key in in_mm} == {
+        key: in_mm[key] for key in in_mm if key != "format_mm"
+    }
+
+
+CURVED_FILM = FILM + "x0_mm = 0.1\nK1 = -1e-6\nP1 = 2e-7\nA = 1e-4\n"
+
+
+@pytest.mark.parametrize("form", ["opencv", "opencv-json", "colmap", "metashape", "pix4d"])
+def test_film_needs_pixels_where_the_other_form_counts_in_them(form, tmp_path, capsys):
+    (tmp_path / "film.toml").write_text(CURVED_FILM, encoding="utf-8")
+    command = ["camera", "convert", str(tmp_path / "film.toml"), "--to", form]
+    assert main(command) == 2
+    told = capsys.readouterr().err
+    assert "film.toml, longer.pixel_um: missing" in told
+    assert "(--pixel-um)" in told
+    assert main([*command, "--pixel-um", "10"]) == 0
+
+
+@pytest.mark.parametrize("form", ["silva", "pessoa", "dbat", "plain"])
+def test_film_in_the_forms_of_publications(form, tmp_path, capsys):
+    """Second method: the same film with pixels of 5 um; what is left is told as a length."""
+    (tmp_path / "film.toml").write_text(CURVED_FILM, encoding="utf-8")
+    command = ["camera", "convert", str(tmp_path / "film.toml"), "--to", "cameras.toml"]
+    assert main([*command, "--as", form]) == 0
+    printed = capsys.readouterr()
+    film = tomllib.loads(printed.out)["cameras"]["longer"]
+    assert " px " not in printed.err
+    assert main([*command, "--as", form, "--pixel-um", "5"]) == 0
+    fine = tomllib.loads(capsys.readouterr().out)["cameras"]["longer"]
+    assert film.pop("format_mm") == [180, 130]
+    assert "pixel_um" not in film
+    del fine["format_px"], fine["pixel_um"]
+    assert film.keys() == fine.keys()
+    assert "s_y0_mm" not in film  # what rounding makes of a parameter without one is none
+    for key in [key for key in film if isinstance(film[key], float)]:
+        assert film[key] == pytest.approx(fine[key], rel=2e-3, abs=1e-14), key
+
+
+def test_film_as_aicon_and_back(tmp_path, capsys):
+    """Closed form: c, x0, K and P of the balanced form about 0 are the same numbers."""
+    plain = "format_mm = [180, 130]\nc_mm = 100.3\nx0_mm = 0.1\nK1 = -1e-6\nP1 = 2e-7\n"
+    (tmp_path / "film.toml").write_text(
+        f'[cameras.film]\n{plain}convention = "distortion_of_ideal"\n', encoding="utf-8"
+    )
+    out = tmp_path / "film.ior"
+    command = ["camera", "convert", str(tmp_path / "film.toml"), "--to", "aicon"]
+    assert main([*command, "--out", str(out)]) == 0
+    text = out.read_text(encoding="utf-8")
+    assert "format_width 180.0\nformat_height 130.0\n" in text
+    assert "pixel" not in text
+    capsys.readouterr()
+    assert main(["camera", "convert", str(out), "--to", "cameras.toml"]) == 0
+    found = tomllib.loads(capsys.readouterr().out)["cameras"]["film"]
+    assert found["format_mm"] == [180, 130]
+    assert [found[key] for key in ("c_mm", "x0_mm", "K1_mm-2", "P1_mm-1")] == [
+        100.3, 0.1, -1e-6, 2e-7
+    ]  # fmt: skip
+    assert main(["camera", "convert", str(out), "--to", "cameras.toml", "--pixel-um", "10"]) == 0
+    assert "format_px = [18000, 13000]" in capsys.readouterr().out
+    out.write_text(text.replace("format_height 130.0\n", ""), encoding="utf-8")
+    assert main(["camera", "convert", str(out), "--to", "cameras.toml"]) == 2
+    assert "expected format_width and format_height" in capsys.readouterr().err
 
 
 def converted_set(capsys, *arguments):

@@ -9,7 +9,7 @@ import numpy as np
 
 from tankcal.camera import AFFINITIES, CONVENTIONS, PARAMETERS, Form
 from tankcal.camera_analysis.edges import Frame
-from tankcal.conversions.frame import framed
+from tankcal.conversions.frame import framed, on_film
 from tankcal.errors import InputError, Problem
 
 MOST_NAMES = 20  # in a message
@@ -158,25 +158,31 @@ def framed_in(record, pixel_mm=None):
     """[(name, FramedCamera)] of a record and the covariance (13, 13) of each, nan on its diagonal
     for what was not adjusted.
 
-    pixel_mm  side of a pixel, for cameras of which the record knows none (film)
+    pixel_mm  side of a pixel, for cameras of which the record knows none (film); None: they stay
+              without pixels
 
-    Raises InputError for cameras without a format or without pixels.
+    Raises InputError for cameras without a format.
     """
     cameras, covariances, problems = [], [], []
     for one in interiors_in(record):
-        pixel = one.frame.pixel_mm
-        if pixel is None and pixel_mm is not None:
-            pixel = np.full(2, pixel_mm)
-        if pixel is None or one.format_mm is None:
-            lacking = "the size of a pixel (--pixel-um)" if pixel is None else "its format"
-            problems.append(_problem(f"camera {one.camera}: expected {lacking}"))
+        if one.format_mm is None:
+            problems.append(_problem(f"camera {one.camera}: expected its format"))
             continue
-        size_px = np.round(one.format_mm / pixel).astype(int)
-        cameras.append((one.camera, framed(one.values, one.form, pixel, size_px)))
+        cameras.append((one.camera, _framed(one, pixel_mm)))
         covariances.append(_among_all(one.free, one.covariance))
     if problems:
         raise InputError(problems)
     return cameras, covariances
+
+
+def _framed(interior, pixel_mm):
+    """FramedCamera of an Interior with a format; pixel_mm: of a film, or None."""
+    pixel = interior.frame.pixel_mm
+    if pixel is None and pixel_mm is None:
+        return on_film(interior.values, interior.form, interior.format_mm)
+    pixel = np.full(2, pixel_mm) if pixel is None else pixel
+    size_px = np.round(interior.format_mm / pixel).astype(int)
+    return framed(interior.values, interior.form, pixel, size_px)
 
 
 def _among_all(names, covariance):

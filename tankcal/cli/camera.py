@@ -150,7 +150,12 @@ def _convert(kinds):
         help="cameras.toml, opencv, opencv-json, colmap, metashape, pix4d or aicon",
     )
     one.add_argument("--from", dest="kind", metavar="FORM", help="where the file does not tell")
-    one.add_argument("--pixel-um", type=positive, help="height of a pixel, where the file has none")
+    one.add_argument(
+        "--pixel-um",
+        type=positive,
+        help="height of a pixel, where the file has none and the form that is read or written"
+        " counts in pixels",
+    )
     one.add_argument(
         "--size-px", type=int, nargs=2, metavar=("COLUMNS", "LINES"), help="where the file has none"
     )

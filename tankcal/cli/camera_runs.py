@@ -1,6 +1,7 @@
 """What `tankcal camera …` does: read, analyse, show, write. It computes nothing."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import tankcal
@@ -123,16 +124,17 @@ def convert(options):
     if options.name is not None:
         cameras, covariances = _only(options, cameras, covariances)
     for name, camera in cameras:
-        _tell_error(f"{name}, as read", camera.error_px)
+        _tell_error(f"{name}, as read", camera)
     if options.form is not None:
         cameras, covariances = _in_form(options.form, cameras, covariances)
         for name, camera in cameras:
-            _tell_error(f"{name}, in the form of {options.form}", camera.error_px)
-    sds = [None if one is None else np.sqrt(np.diag(one)) for one in covariances]
-    written = write_camera(options.to, cameras, sds, options.radius_mm)
+            _tell_error(f"{name}, in the form of {options.form}", camera)
+    sds = [None if one is None else np.sqrt(np.maximum(np.diag(one), 0.0)) for one in covariances]
+    file = Path(options.file).name
+    written = write_camera(options.to, cameras, sds, options.radius_mm, file)
     if options.to != "cameras.toml":
-        for (name, _), error_px in zip(cameras, written.error_px, strict=True):
-            _tell_error(f"{name}, as {options.to}", error_px)
+        for (name, camera), error_px in zip(cameras, written.error_px, strict=True):
+            _tell_error(f"{name}, as {options.to}", replace(camera, error_px=error_px))
     if options.out is None:
         print(written.text, end="")
         return
@@ -161,25 +163,31 @@ def _cameras_of(options):
         pixel_mm = options.pixel_um and options.pixel_um / 1000
         return framed_in(_record_of(options.file), pixel_mm)
     if Path(options.file).suffix.lower() == ".toml":
-        return _registered(options.file)
+        return _registered(options.file, options.pixel_um)
     size_px = None if options.size_px is None else tuple(options.size_px)
     cameras = read_camera(options.file, options.kind, options.pixel_um, size_px)
     return cameras, [None] * len(cameras)
 
 
-def _registered(path):
+def _registered(path, pixel_um):
     """[(name, FramedCamera)] of a cameras.toml, and covariances of their standard deviations."""
     import numpy as np
 
-    from tankcal.conversions.frame import framed
-    from tankcal.job.calibrations import read_cameras
+    from tankcal.job.calibrations import read_cameras, with_pixels
 
-    setups = read_cameras(path)
-    cameras = [
-        (one.camera.name, framed(one.camera.values, one.camera.form, one.pixel_mm, one.format_px))
-        for one in setups
-    ]
+    setups = with_pixels(read_cameras(path, in_pixels=False), pixel_um)
+    cameras = [(one.camera.name, _framed(one)) for one in setups]
     return cameras, [np.diag(one.camera.sd**2) for one in setups]
+
+
+def _framed(setup):
+    """FramedCamera of a CameraSetup."""
+    from tankcal.conversions.frame import framed, on_film
+
+    values, form = setup.camera.values, setup.camera.form
+    if setup.pixel_mm is None:
+        return on_film(values, form, setup.format_mm)
+    return framed(values, form, setup.pixel_mm, setup.format_px)
 
 
 def _only(options, cameras, covariances):
@@ -192,9 +200,11 @@ def _only(options, cameras, covariances):
     return [cameras[place]], [covariances[place]]
 
 
-def _tell_error(what, error_px):
-    if error_px > 1e-9:
-        warn([f"{what}: fitted, up to {error_px:.2g} px away within the frame"])
+def _tell_error(what, camera):
+    if camera.error_px > 1e-9:
+        is_film = camera.film_mm is not None
+        away = f"{camera.error_um:.2g} um" if is_film else f"{camera.error_px:.2g} px"
+        warn([f"{what}: fitted, up to {away} away within the frame"])
 
 
 def _write_new(target, text):

@@ -19,12 +19,14 @@ import numpy as np
 
 from tankcal.camera import Form
 from tankcal.conversions.fitting import USUAL
-from tankcal.conversions.frame import framed
+from tankcal.conversions.frame import framed, on_film
 from tankcal.conversions.published import converted
 from tankcal.conversions.texts import exactly, shown
 
 KEYS = ("Ck", "Xh", "Yh", "A1", "A2", "R0", "A3", "B1", "B2", "C1", "C2")
-FRAME_KEYS = ("columns", "lines", "pixel_width", "pixel_height")
+FILM_KEYS = ("format_width", "format_height")
+LARGEST_FILM_MM = 1000
+FRAME_KEYS = ("columns", "lines", "pixel_width", "pixel_height", *FILM_KEYS)
 CONVENTIONS_OF = ("distortion_of_ideal", "correction_subtracted")
 # places of KEYS, R0 apart, in the order of camera.PARAMETERS
 PLACES = {"Ck": 0, "Xh": 1, "Yh": 2, "A1": 3, "A2": 4, "A3": 5}
@@ -52,12 +54,21 @@ def from_balanced(camera, pixel_mm, size_px):
 
     pixel_mm  one number, or width and height        size_px  (columns, lines)
     """
+    return framed(*_interior_of(camera), pixel_mm, size_px)
+
+
+def film_from_balanced(camera, format_mm):
+    """FramedCamera of a film (2,) width and height, mm; see from_balanced."""
+    return on_film(*_interior_of(camera), format_mm)
+
+
+def _interior_of(camera):
+    """(13,) and Form."""
     interior = np.zeros(13)
     for key, place in PLACES.items():
         interior[place] = camera.values[key]
     interior[0] = abs(interior[0])
-    form = Form(camera.convention, "b1_b2", float(camera.values["R0"]))
-    return framed(interior, form, pixel_mm, size_px)
+    return interior, Form(camera.convention, "b1_b2", float(camera.values["R0"]))
 
 
 def to_balanced(camera, radius_mm, convention="distortion_of_ideal", covariance=None):
@@ -113,8 +124,15 @@ def _check(values, notes):
             notes.tell("missing; expected a number (R0 is 0 when not balanced)", key=key)
     if values.get("Ck") == 0:
         notes.tell("0; expected a number of mm, negative", key="Ck")
+    for key in FILM_KEYS:
+        if values.get(key, 0) > LARGEST_FILM_MM:
+            notes.tell(f"found {values[key]:g}; expected mm, at most {LARGEST_FILM_MM}", key=key)
     if values.get("R0", 0) < 0:
         notes.tell("below 0; expected a radius in mm", key="R0")
+
+
+def _written(value):
+    return str(value) if isinstance(value, int) else exactly(value)
 
 
 def text_of(camera, framed_camera):
@@ -122,6 +140,9 @@ def text_of(camera, framed_camera):
     lines = ["# camera in the balanced form: mm, x to the right, y up"]
     lines += [f"{key} {exactly(value)}" for key, value in camera.values.items()]
     lines += [f"convention {camera.convention}"]
-    frame = (*framed_camera.size_px, *map(exactly, framed_camera.pixel_mm))
-    lines += [f"{key} {value}" for key, value in zip(FRAME_KEYS, frame, strict=True)]
+    keys, frame = FILM_KEYS, framed_camera.film_mm
+    if frame is None:
+        keys = [key for key in FRAME_KEYS if key not in FILM_KEYS]
+        frame = (*framed_camera.size_px, *framed_camera.pixel_mm)
+    lines += [f"{key} {_written(value)}" for key, value in zip(keys, frame, strict=True)]
     return "\n".join(lines) + "\n"

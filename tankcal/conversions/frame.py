@@ -8,13 +8,14 @@ the ideal image point is c X, c Y. The pixels of tankcal count from the centre o
 Source: Pessoa 2017 (1, 2).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tankcal.camera import Form, corrected, measured
 from tankcal.errors import SolutionError
 
+COUNTED_ON_FILM = 4608  # stand-ins for pixels along the longest side of a film
 GRID = (46, 35)  # points of the frame, edges included, over which errors are stated
 SAME_POINT_PX = 1e-6
 
@@ -29,6 +30,7 @@ class FramedCamera:
     size_px   (2,) columns, lines
     error_px  what the conversion that made it could not express: the largest distance of an image
               point over the frame, the rays being the same; 0 but for rounding where it is exact
+    film_mm   (2,) width and height of a film, whose pixels are stand-ins to count in; else None
     """
 
     interior: np.ndarray
@@ -36,6 +38,12 @@ class FramedCamera:
     pixel_mm: np.ndarray
     size_px: tuple[int, int]
     error_px: float = 0.0
+    film_mm: np.ndarray | None = None
+
+    @property
+    def error_um(self):
+        """error_px as a length in the image, of pixels that are square but for rounding."""
+        return self.error_px * float(self.pixel_mm.max()) * 1e3
 
 
 def framed(interior, form, pixel_mm, size_px, error_px=0.0):
@@ -50,6 +58,16 @@ def framed(interior, form, pixel_mm, size_px, error_px=0.0):
         (int(size_px[0]), int(size_px[1])),
         float(error_px),
     )
+
+
+def on_film(interior, form, format_mm):
+    """FramedCamera of a film, which has no pixels.
+
+    format_mm  (2,) width and height
+    """
+    film_mm = np.array(format_mm, dtype=float)
+    size_px = np.maximum(np.round(film_mm / film_mm.max() * COUNTED_ON_FILM), 2)
+    return replace(framed(interior, form, film_mm / size_px, size_px), film_mm=film_mm)
 
 
 def frame_points(size_px, counts=GRID):

@@ -12,13 +12,14 @@ is fitted over the frame, and what is left is stated.
 Source: Silva 1995 (39-47, 58); Pessoa 2017 (3-6, 10); Boerlin & Grussenmeyer 2013 (DBAT).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tankcal.camera import CONVENTIONS, PARAMETERS, Form, balanced_about, rescaled
 from tankcal.conversions.fitting import USUAL, fit
 from tankcal.conversions.frame import (
+    SAME_POINT_PX,
     differences_px,
     frame_points,
     framed,
@@ -101,20 +102,39 @@ def in_form(camera, name, covariance=None):
     known = None if covariance is None else np.nan_to_num(covariance)
     to_form, frame = PUBLISHED[name], (camera.size_px, camera.pixel_mm)
     found = converted(camera.interior, camera.form, to_form, *frame, covariance=known)
-    after = None
-    if covariance is not None:
-        after = _with_unknown(found.covariance, camera.interior, covariance)
-    interior = framed(found.interior, to_form, camera.pixel_mm, camera.size_px, found.error_px)
-    return interior, after
+    changed = replace(camera, interior=found.interior, form=found.form, error_px=found.error_px)
+    if covariance is None:
+        return changed, None
+    return changed, _with_lacking(found.covariance, changed, camera.interior, covariance)
 
 
-def _with_unknown(after, values, covariance):
-    """A covariance (13, 13) after a conversion, nan on the diagonal where no sd is known.
+def _with_lacking(after, camera, values, covariance):
+    """A covariance (13, 13) after a conversion, as the one before where it says nothing.
 
-    values, covariance  (13,) and (13, 13) before: a value, not 0, without sd; or nothing at all
+    camera              FramedCamera after the conversion
+    values, covariance  (13,) and (13, 13) before
+
+    Nan: a value, not 0, had no sd. What had none, or was held, and has one that no image point
+    feels, is as it was: that is rounding.
     """
-    is_unknown = np.isnan(np.diag(covariance)) & ((values != 0) | (np.diag(after) == 0))
-    return after + np.diag(np.where(is_unknown, np.nan, 0.0))
+    before = np.diag(covariance)
+    is_open = np.isnan(before) | (before == 0)
+    sds = np.sqrt(np.where(is_open, np.maximum(np.diag(after), 0.0), 0.0))
+    is_felt = _effect_px(camera, sds) > SAME_POINT_PX
+    found = np.where(is_open & ~is_felt, 0.0, after)
+    found = np.where((is_open & ~is_felt)[:, None], 0.0, found)
+    is_unknown = np.isnan(before) & ((values != 0) | ~is_felt)
+    return found + np.diag(np.where(is_unknown, np.nan, 0.0))
+
+
+def _effect_px(camera, changes):
+    """(13,) largest movements of the image over the frame by each of (13,) changes."""
+    points = frame_points(camera.size_px)
+    rays = rays_of(camera, points)
+    changed = camera.interior + np.diag(changes)
+    return np.array(
+        [differences_px(replace(camera, interior=one), rays, points).max() for one in changed]
+    )
 
 
 def propagated(function, values, covariance):

@@ -165,6 +165,15 @@ def _pix4d(text, notes, _file, size_px):
 
 def _aicon(text, notes, file, size_px):
     camera, frame = balanced.parse(text, notes)
+    film_mm = [frame[key] for key in balanced.FILM_KEYS if key in frame]
+    if len(film_mm) == 1:
+        notes.tell(
+            "one side of a film; expected format_width and format_height", key="format_width"
+        )
+    if len(film_mm) == 2 and len(frame) > 2:
+        notes.tell("given beside pixels; expected a format, or pixels", key="format_width")
+    if film_mm:
+        return [(_stem(file), _film_of(camera, film_mm))]
     given = (frame["columns"], frame["lines"]) if {"columns", "lines"} <= set(frame) else None
     size = _one_size(given, size_px, notes)
     sides = [frame[key] for key in ("pixel_width", "pixel_height") if key in frame]
@@ -179,6 +188,18 @@ def _aicon(text, notes, file, size_px):
         return balanced.from_balanced(camera, sides or pixel_mm, size)
 
     return [(_stem(file), convert)]
+
+
+def _film_of(camera, film_mm):
+    """From a size of pixels, mm, or None, to the FramedCamera of a Balanced camera on film."""
+
+    def convert(pixel_mm):
+        if pixel_mm is None:
+            return balanced.film_from_balanced(camera, film_mm)
+        size_px = [max(2, round(side / pixel_mm)) for side in film_mm]
+        return balanced.from_balanced(camera, pixel_mm, size_px)
+
+    return convert
 
 
 def _one_size(of_file, given, notes):

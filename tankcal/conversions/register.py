@@ -15,22 +15,20 @@ from tankcal.naming import is_name
 NEIGHBOURS = 4
 
 
-def as_cameras_toml(name, interior, form, size_px, pixel_mm, sds=None):
+def as_cameras_toml(name, interior, form, size_px, pixel_mm, sds=None, film_mm=None):
     """An entry [cameras.NAME] of cameras.toml, with its final line break.
 
     name      of the camera                 interior  (13,)        form  its Form
     size_px   (2,) columns, lines           pixel_mm  one number, or width and height
     sds       (13,) standard deviations in the order of PARAMETERS, 0: held; nan: none
+    film_mm   (2,) width and height of a film, which has no pixels, or None
 
     What is 0 and has no standard deviation is left out, but for c, x0 and y0.
 
     Raises InputError for a name that no camera can have.
     """
-    width, height = np.broadcast_to(pixel_mm, 2)
-    sizes = [_micrometres(width)] if width == height else list(map(_micrometres, (width, height)))
-    pixel = sizes[0] if len(sizes) == 1 else f"[{', '.join(sizes)}]"
-    lines = [f"[cameras.{_quoted(name)}]", f"format_px = [{int(size_px[0])}, {int(size_px[1])}]"]
-    lines.append(f"pixel_um = {pixel}")
+    frame = _pixels(size_px, pixel_mm) if film_mm is None else [f"format_mm = {_pair(film_mm)}"]
+    lines = [f"[cameras.{_quoted(name)}]", *frame]
     for place, parameter in enumerate(PARAMETERS):
         sd = np.nan if sds is None else float(sds[place])
         if place < 3 or interior[place] or np.isfinite(sd):
@@ -41,6 +39,18 @@ def as_cameras_toml(name, interior, form, size_px, pixel_mm, sds=None):
     lines.append(f"radial_balance_mm = {exactly(form.radial_balance_mm)}")
     lines.append(f'convention = "{form.convention}"')
     return "\n".join(lines) + "\n"
+
+
+def _pixels(size_px, pixel_mm):
+    """Lines of the frame of a camera with pixels."""
+    width, height = np.broadcast_to(pixel_mm, 2)
+    sizes = [_micrometres(width)] if width == height else list(map(_micrometres, (width, height)))
+    pixel = sizes[0] if len(sizes) == 1 else f"[{', '.join(sizes)}]"
+    return [f"format_px = [{int(size_px[0])}, {int(size_px[1])}]", f"pixel_um = {pixel}"]
+
+
+def _pair(values):
+    return f"[{', '.join(map(exactly, values))}]"
 
 
 def value_key(parameter):

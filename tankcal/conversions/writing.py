@@ -24,16 +24,17 @@ class Written:
     error_px: tuple[float, ...]
 
 
-def write_camera(kind, cameras, sds=None, radius_mm=0.0):
+def write_camera(kind, cameras, sds=None, radius_mm=0.0, file="cameras"):
     """Written: the text of a file of cameras.
 
     kind       one of KINDS; files of SINGLE hold one camera
     cameras    [(name, FramedCamera)]
     sds        [(13,) or None] of each camera, which only cameras.toml has a place for; or None
     radius_mm  R0 of "aicon"
+    file       what messages call the place where the cameras are from
 
-    Raises InputError for another kind or number of cameras, SolutionError where the distortion
-    folds the image within the frame.
+    Raises InputError for another kind or number of cameras and for a film in a form of pixels,
+    SolutionError where the distortion folds the image within the frame.
     """
     if kind not in KINDS:
         expected = f"{shown(kind)} as the kind of file; expected one of {', '.join(KINDS)}"
@@ -41,6 +42,8 @@ def write_camera(kind, cameras, sds=None, radius_mm=0.0):
     if not cameras or (kind in SINGLE and len(cameras) > 1):
         expected = f"{len(cameras)} cameras; expected one" + ("" if kind in SINGLE else " or more")
         raise InputError(Problem("cameras", f"{expected} in a file of kind {kind}"))
+    if kind not in IN_MM:
+        _refuse_film(kind, cameras, file)
     if kind == "cameras.toml":
         return _register(cameras, sds)
     if kind == "aicon":
@@ -48,10 +51,22 @@ def write_camera(kind, cameras, sds=None, radius_mm=0.0):
     return _WRITERS[kind](cameras)
 
 
+def _refuse_film(kind, cameras, file):
+    """Raise InputError for cameras whose pixels are not known."""
+    expected = f"missing; {kind} counts in pixels: expected their size, micrometres (--pixel-um)"
+    problems = [
+        Problem(file, expected, None, f"{name}.pixel_um")
+        for name, one in cameras
+        if one.film_mm is not None
+    ]
+    if problems:
+        raise InputError(problems)
+
+
 def _register(cameras, sds):
     sds = [None] * len(cameras) if sds is None else sds
     entries = [
-        as_cameras_toml(name, one.interior, one.form, one.size_px, one.pixel_mm, sd)
+        as_cameras_toml(name, one.interior, one.form, one.size_px, one.pixel_mm, sd, one.film_mm)
         for (name, one), sd in zip(cameras, sds, strict=True)
     ]
     return Written("\n".join(entries), tuple(one.error_px for _, one in cameras))
@@ -98,4 +113,5 @@ _WRITERS = {
     "pix4d": _pix4d,
 }
 SINGLE = ("opencv", "opencv-json", "metashape", "aicon")  # one camera a file
+IN_MM = ("cameras.toml", "aicon")  # forms that need no pixels
 KINDS = ("cameras.toml", *_WRITERS, "aicon")
