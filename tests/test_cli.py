@@ -280,3 +280,36 @@ def test_nominal_sizes_are_above_zero(number, tmp_path, capsys):
         main(["lint", table(tmp_path / "t.csv"), f"--nominal-volume={number}"])
     assert stop.value.code == 2
     assert "expected a number above 0" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        ("camera compare cameras.toml", "--threshold"),
+        ("camera compare cameras.toml", "--seed"),
+        ("camera compare cameras.toml", "--pixel-um"),
+        ("camera parameters job", "--limit-um"),
+        ("camera parameters job", "--alpha"),
+        ("camera check d.csv", "--scale"),
+        ("camera convert a.cam --to aicon", "--radius-mm"),
+        ("camera convert a.cam --to aicon", "--size-px 100"),
+        ("camera read a.png", "--bit-errors"),
+        ("plan job", "--simulate"),
+        ("plan job", "--blunders"),
+        ("plan job", "--seed"),
+        ("lint t.csv", "--nominal-height"),
+    ],
+)
+def test_numbers_of_options_are_those_of_tables(command, option, capsys):
+    """Digit groups and digits of other scripts, which Python's own conversion takes."""
+    groups = "0.0_5" if option in ("--alpha", "--blunders") else "1_0"
+    for text in (
+        groups,
+        groups.replace("_", "").translate({ord("0"): "\uff10", ord("1"): "\u0661"}),
+    ):
+        with pytest.raises(SystemExit) as stop:
+            main([*command.split(), *option.split(), text])
+        assert stop.value.code == 2
+        told = capsys.readouterr().err
+        assert option.split()[0] in told
+        assert "number" in told

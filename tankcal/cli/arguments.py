@@ -2,6 +2,8 @@
 
 import argparse
 
+from tankcal.numerals import NUMBER, WHOLE_NUMBER
+
 
 def positive(text):
     value = _number(text)
@@ -26,8 +28,12 @@ def several(text):
     return int(value)
 
 
+def whole(text):
+    if not WHOLE_NUMBER.fullmatch(text):
+        raise argparse.ArgumentTypeError(f"found {text!r}; expected a whole number")
+    return int(text)
+
+
 def _number(text):
-    try:
-        return float(text)
-    except ValueError:
-        return float("nan")
+    """Its value; nan for what a table refuses, too, such as 1_000 or full-width digits."""
+    return float(text) if NUMBER.fullmatch(text) else float("nan")

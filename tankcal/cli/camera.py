@@ -3,7 +3,7 @@
 import argparse
 
 from tankcal.cli import camera_runs as runs
-from tankcal.cli.arguments import positive, share
+from tankcal.cli.arguments import positive, share, whole
 from tankcal.languages import DEFAULT, LANGUAGES
 
 
@@ -77,7 +77,7 @@ def _compare(kinds):
     one.add_argument(
         "--pixel-um", type=positive, help="of film: pixels that the figures are counted in"
     )
-    one.add_argument("--seed", type=int, default=1, help="of the terrain (default 1)")
+    one.add_argument("--seed", type=whole, default=1, help="of the terrain (default 1)")
     one.add_argument(
         "--threshold", metavar="PX", type=positive, default=0.5, help="default 0.5; 0.33 is usual"
     )
@@ -157,7 +157,11 @@ def _convert(kinds):
         " counts in pixels",
     )
     one.add_argument(
-        "--size-px", type=int, nargs=2, metavar=("COLUMNS", "LINES"), help="where the file has none"
+        "--size-px",
+        type=whole,
+        nargs=2,
+        metavar=("COLUMNS", "LINES"),
+        help="where the file has none",
     )
     one.add_argument(
         "--radius-mm", type=positive, default=0.0, help="R0 of the balanced form aicon (default 0)"
@@ -204,7 +208,7 @@ def _read(kinds):
     ):
         one.add_argument(f"--{name}", metavar="PX", type=positive, default=value, help=text)
     one.add_argument(
-        "--bit-errors", type=int, default=0, help="cells of a code that may be wrong (default 0)"
+        "--bit-errors", type=whole, default=0, help="cells of a code that may be wrong (default 0)"
     )
     one.add_argument(
         "--encoding",

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tankcal.cli.arguments import several, share
+from tankcal.cli.arguments import several, share, whole
 from tankcal.cli.showing import Progress, listed, prepare_for_small_work, warn
 from tankcal.digits import PROGRAM, fixed, with_digits, written
 
@@ -49,7 +49,7 @@ def add(commands):
         default=0.0,
         help="share of the simulated readings that are off by 20 sds, such as 0.01 (default: none)",
     )
-    plan.add_argument("--seed", type=int, default=1, help="of the simulation (default 1)")
+    plan.add_argument("--seed", type=whole, default=1, help="of the simulation (default 1)")
     plan.add_argument("--quiet", action="store_true", help="no progress, only problems")
     plan.set_defaults(command=_plan)
 

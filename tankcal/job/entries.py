@@ -7,8 +7,9 @@ import numpy as np
 
 from tankcal.job.contract import COLUMNS, KEYS, KINDS, OPEN_SECTIONS, REGISTER_KEYS
 from tankcal.job.contract.registers import FAMILIES, SHORT_KEYS
-from tankcal.job.fields import IN_TOML, MAX_NAME, NUMBER, Field, Refused, is_blank, read_value
+from tankcal.job.fields import IN_TOML, MAX_NAME, Field, Refused, is_blank, read_value
 from tankcal.job.tables import nearest
+from tankcal.numerals import NUMBER
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from tankcal.job.misread import hint_of_date, hint_of_number, hint_of_text
 from tankcal.job.tables import BadCell, Percent, nearest, shown
 from tankcal.naming import MAX_NAME, is_name
+from tankcal.numerals import NUMBER
 
 MAX_TEXT = 300
 MAX_LIST = 50  # numbers or pairs
@@ -21,7 +22,6 @@ MAX_NAMES = 5000
 NAME_RULE = "a letter, digit or underscore first, then letters, digits, spaces or _ - . ( ) / #"
 TANK_ID_RULE = "letters, digits, spaces or _ - . ( ), no .. and no . or - first"
 
-NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
 _TANK_ID = re.compile(r"(?!.*\.\.)[\w(][\w .()-]*")
 _RULE_NAME = re.compile(r"(?!.*\.\.)\w[\w .()-]*")
 _MESH_FILE = re.compile(r"(?!.*\.\.)\w[\w .()-]*\.(stl|obj|ply|off)", re.IGNORECASE)

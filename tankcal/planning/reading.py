@@ -17,7 +17,7 @@ from tankcal.job.entries import (
     read_setting,
     read_settings,
 )
-from tankcal.job.fields import NUMBER, is_blank
+from tankcal.job.fields import is_blank
 from tankcal.job.folder import (
     MAX_SETTINGS_BYTES,
     csv_marks,
@@ -42,6 +42,7 @@ from tankcal.job.tables import (
 from tankcal.job.tables import (
     TABLES as JOB_FILES,
 )
+from tankcal.numerals import NUMBER
 from tankcal.planning.assembling import assembled
 from tankcal.planning.checks.given import check_given
 from tankcal.planning.checks.placed import check_plan

@@ -1,7 +1,7 @@
 """The unit that the name of a key or column ends with, and what is a number."""
 
 from tankcal.digits import superscript
-from tankcal.job.fields import NUMBER
+from tankcal.numerals import NUMBER
 
 _UNITS = {
     "_mm_per_m": "mm/m",
