@@ -15,7 +15,12 @@ from photographed_jobs import by_tape, control_of, measurements, tank_job
 import tankcal
 from tankcal.camera import PARAMETERS, Form, measured
 from tankcal.camera_analysis.influence.blocks import block_of, differences
-from tankcal.camera_analysis.influence.exchange import free_parameters, with_calibration, without
+from tankcal.camera_analysis.influence.exchange import (
+    counted_in,
+    free_parameters,
+    with_calibration,
+    without,
+)
 from tankcal.camera_analysis.influence.plain import as_json
 from tankcal.camera_analysis.influence.runs import influence
 from tankcal.camera_analysis.product.differences import differences_of
@@ -575,6 +580,18 @@ def test_film_keeps_its_millimetres_unless_a_calibration_has_pixels():
     digital = setup_of(FLIGHT, "job")
     _, own, _ = with_calibration(Measurements(cameras=(digital,)), digital, other, "fixed", ("c",))
     assert own.pixel_mm is digital.pixel_mm
+
+
+def test_what_has_no_pixel_counts_in_that_of_the_calibrations():
+    film = replace(setup_of(FLIGHT, "job"), pixel_mm=None)
+    fine, same, coarse = (
+        replace(changed(name), pixel_mm=np.full(2, size))
+        for name, size in (("a", 0.002), ("b", 0.002), ("c", 0.003))
+    )
+    assert counted_in(film, (film, fine, same)).pixel_mm is fine.pixel_mm
+    assert counted_in(film, (film,)) is film
+    assert counted_in(film, (fine, coarse)) is film
+    assert counted_in(coarse, (fine, same)) is coarse
 
 
 def test_residuals_in_pixels_that_are_not_square(with_blunders):

@@ -224,6 +224,17 @@ def test_influence_of_a_film_camera(tmp_path, capsys):
     assert found["runs"][1]["volume"]["volume_m3"] == pytest.approx(1249.6, abs=0.5)
 
 
+def test_influence_counts_all_runs_of_film_in_the_pixels_of_a_calibration(tmp_path, capsys):
+    fine = FILM.replace("longer", "fine").replace("c_mm", "pixel_um = 10\nc_mm")
+    (tmp_path / "cameras.toml").write_text(FILM + fine, encoding="utf-8")
+    arguments = ("--cameras", tmp_path / "cameras.toml", "--states", "fixed", "--json")
+    assert run("influence", PHOTOS, *arguments) == 0
+    images = [one["images"] for one in json.loads(capsys.readouterr().out)["runs"]]
+    assert len(images) == 3
+    for one in images:
+        assert one["largest_px"] == pytest.approx(one["largest_um"] / 10, rel=1e-12)
+
+
 def test_influence_needs_states_that_are_some():
     with pytest.raises(SystemExit) as stop:
         run("influence", PHOTOS, "--cameras", SEVEN, "--states", "held")

@@ -61,7 +61,8 @@ def adjusted(paper):
 def runs(paper):
     """How well each adjustment fits, and the residuals of its images."""
     rows = [_run(paper, run) for run in paper.result["runs"]]
-    in_pixels = any(row["rms_x_px"] is not None for row in rows)
+    seen = [row for row in rows if row["largest_um"] is not None]
+    in_pixels = bool(seen) and all(row["rms_x_px"] is not None for row in seen)
     unit, column = ("px", "px") if in_pixels else ("um", "um")
     columns = [
         Column("run"),

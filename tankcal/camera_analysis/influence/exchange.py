@@ -65,6 +65,16 @@ def refuse_others(setup, calibrations, file=FILE):
         raise InputError(problems)
 
 
+def counted_in(setup, calibrations):
+    """The job.CameraSetup with a pixel to count residuals in: where it has none, that of the
+    calibrations if they have one in common.
+    """
+    known = [one.pixel_mm for one in calibrations if one.pixel_mm is not None]
+    if setup.pixel_mm is not None or not known or any(_differ(one, known[0]) for one in known):
+        return setup
+    return replace(setup, pixel_mm=known[0])
+
+
 def _differ(theirs, ours):
     if theirs is None or ours is None:
         return False

@@ -26,6 +26,7 @@ from tankcal.camera_analysis.influence.exchange import (
     STATES,
     can_be_weighted,
     chosen_camera,
+    counted_in,
     free_parameters,
     refuse_others,
     with_calibration,
@@ -126,12 +127,13 @@ def influence(
     calibrations = tuple(calibrations)
     setup = chosen_camera(job, camera)
     refuse_others(setup, calibrations, file)
+    calibrations = tuple(counted_in(one, calibrations) for one in calibrations)
     free = free_parameters(setup, calibrations)
     tell = tell or (lambda text, done, total: None)
     total = 1 + len(calibrations) * len(states)
     tell(REFERENCE, 0, total)
     top = TopOfTank(job) if volume and _is_whole(job) else None
-    reference, removed = _reference(job, setup, alpha, top)
+    reference, removed = _reference(job, counted_in(setup, calibrations), alpha, top)
     common = without(job.measurements, removed)
     runs = [reference]
     for one in calibrations:
