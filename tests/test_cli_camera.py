@@ -235,6 +235,16 @@ def test_influence_counts_all_runs_of_film_in_the_pixels_of_a_calibration(tmp_pa
         assert one["largest_px"] == pytest.approx(one["largest_um"] / 10, rel=1e-12)
 
 
+def test_influence_prints_calibrations_against_each_other(tmp_path, capsys):
+    other = FILM.replace("longer", "shorter").replace("100.3", "99.8")
+    (tmp_path / "cameras.toml").write_text(FILM + other, encoding="utf-8")
+    arguments = ("--cameras", tmp_path / "cameras.toml", "--states", "fixed")
+    assert run("influence", PHOTOS, *arguments) == 0
+    printed = capsys.readouterr().out
+    assert "calibrations against each other" in printed
+    assert "longer, fixed  shorter, fixed" in printed
+
+
 def test_influence_needs_states_that_are_some():
     with pytest.raises(SystemExit) as stop:
         run("influence", PHOTOS, "--cameras", SEVEN, "--states", "held")

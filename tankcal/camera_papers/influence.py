@@ -7,7 +7,7 @@ from tankcal.report import blocks
 from tankcal.report.plain import Column
 from tankcal.words import listed, observation_name
 
-MOST_PAIRS = 40
+MOST_PAIRS, MOST_PAIRS_ON_TERMINAL = 40, 15
 tables = influence_tables.tables
 
 
@@ -20,6 +20,7 @@ def summary(paper):
         *shifts(paper),
         *checks(paper),
         *volumes(paper),
+        *pairs(paper, MOST_PAIRS_ON_TERMINAL),
     ]
 
 
@@ -207,8 +208,8 @@ def volumes(paper):
     return [paper.table("volumes_of_runs", rows, columns)]
 
 
-def pairs(paper):
-    """All pairs of runs, those with the largest movement of points first."""
+def pairs(paper, most=MOST_PAIRS):
+    """Pairs of runs, those with the largest movement of points first, and how many there are."""
     every = paper.result["runs"]
     rows = [
         _shift("", pair)
@@ -223,7 +224,7 @@ def pairs(paper):
     if not rows:
         return []
     rows.sort(key=lambda row: -(row["points_largest_mm"] or 0.0))
-    shown = rows[:MOST_PAIRS]
+    shown = rows[:most]
     columns = [
         Column("one"),
         Column("other"),
