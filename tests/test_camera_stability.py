@@ -831,7 +831,7 @@ def test_a_published_calibration_and_lenses_of_every_length_are_taken(tmp_path):
 def test_choosing_by_name(seven):
     assert choose(seven, []) == seven
     chosen = choose(seven, ["set5", "set2"])
-    assert [one.camera.name for one in chosen] == ["set2", "set5"]  # in the order of the file
+    assert [one.camera.name for one in chosen] == ["set5", "set2"]  # in the order asked for
     with pytest.raises(InputError) as caught:
         choose(seven, ["set1", "sett7", "set1", "=evil\n"], "seven.toml")
     lines = [str(one) for one in caught.value.problems]

@@ -65,6 +65,15 @@ def test_names_may_come_after_options(capsys):
         main(["run", "job", "another"])
 
 
+def test_pairs_stand_in_the_order_asked_for(capsys):
+    assert run("compare", SEVEN, "set2", "set1", "--json") == 0
+    (pair,) = json.loads(capsys.readouterr().out)
+    assert (pair["a"], pair["b"]) == ("set2", "set1")
+    assert run("compare", SEVEN, "--json") == 0
+    pair = json.loads(capsys.readouterr().out)[0]
+    assert (pair["a"], pair["b"]) == ("set1", "set2")
+
+
 def test_compare_film_in_pixels_of_ones_own(tmp_path, capsys):
     (tmp_path / "film.toml").write_text(FILM + FILM.replace("longer", "again"), encoding="utf-8")
     assert run("compare", tmp_path / "film.toml", "--json") == 2

@@ -62,7 +62,12 @@ def _compare(kinds):
         "a threshold, and where in the frame they differ.",
     )
     one.add_argument("cameras", metavar="CAMERAS.toml")
-    one.add_argument("names", metavar="NAME", nargs="*", help="only these (default: all)")
+    one.add_argument(
+        "names",
+        metavar="NAME",
+        nargs="*",
+        help="only these, in this order (default: all, in the order of the file)",
+    )
     one.add_argument(
         "--method",
         choices=("mis", "zrot", "rot", "spr"),

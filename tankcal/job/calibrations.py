@@ -60,7 +60,7 @@ def with_pixels(setups, pixel_um):
 
 
 def choose(setups, names, file=CAMERAS_FILE):
-    """The CameraSetup of the names, in the order of `setups`; all of them without a name.
+    """The CameraSetup of the names, in their order; without a name all, in that of `setups`.
 
     file  what messages call the place where they stand
     Raises InputError for names that are not there, or stand there twice.
@@ -75,7 +75,7 @@ def choose(setups, names, file=CAMERAS_FILE):
             problems.append(Problem(file, f"{shown(name)} was named twice; expected once"))
     if problems:
         raise InputError(problems)
-    return tuple(setup for setup in setups if not names or setup.camera.name in names)
+    return tuple(setups[known.index(name)] for name in names) or tuple(setups)
 
 
 def _listed(known):
