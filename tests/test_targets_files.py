@@ -182,6 +182,19 @@ def test_circles_are_named_by_their_places(circles, tmp_path):
     assert any("no circle within 15 px of 1 places: 'X'" in str(one) for one in reading.warnings)
 
 
+def test_places_in_photos_that_are_not_given_are_told(circles, tmp_path):
+    places = tmp_path / "places.csv"
+    rows = ("disc,C,63,48", "discs,A,63,48", "disc,D,5,5", "other,A,63,48")
+    places.write_text("\n".join(["photo,point,column_px,line_px", *rows]))
+    wanted = Wanted(what="circles", places=places)
+    reading = read_photographs([circles[0]], tmp_path / "o.csv", wanted)
+    assert [str(one) for one in reading.warnings if one.file == "places.csv"] == [
+        "places.csv, row 2, photo: found 'disc'; expected one of the photos given"
+        " (did you mean discs?): not used",
+        "places.csv, row 5, photo: found 'other'; expected one of the photos given: not used",
+    ]
+
+
 def test_ambiguous_places_are_refused(circles, tmp_path):
     places = tmp_path / "places.csv"
     places.write_text("photo,point,column_px,line_px\ndiscs,A,60,50\ndiscs,B,62,52\n")

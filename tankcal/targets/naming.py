@@ -6,7 +6,7 @@ import numpy as np
 
 from tankcal.job.fields import Field, Refused, is_blank, read_value
 from tankcal.job.folder import read_csv
-from tankcal.job.tables import MAX_FILE_BYTES, read_bytes
+from tankcal.job.tables import MAX_FILE_BYTES, nearest, read_bytes, shown
 
 ID = Field("id", "number", "number of the code", required=True, low=0, high=1e6)
 POINT = Field("point", "name", "name of the point", required=True)
@@ -46,10 +46,11 @@ def read_names(path, log, suffixes=()):
 
 @dataclass(frozen=True)
 class Place:
-    """Where a point is about to be found in a photo."""
+    """Where a point is about to be found in a photo; row of the file that says so."""
 
     point: str
     place_px: np.ndarray
+    row: int
 
 
 def read_places(path, log):
@@ -60,8 +61,20 @@ def read_places(path, log):
             expected = f"{point!r} stands in row {first[photo, point]} already; expected once"
             log.problem(file, f"{expected} in photo {photo!r}", row, "point")
         first.setdefault((photo, point), row)
-        places.setdefault(photo, []).append(Place(point, np.array([column, line])))
+        places.setdefault(photo, []).append(Place(point, np.array([column, line]), row))
     return places
+
+
+def warn_of_unused(places, photos, file, log):
+    """Warn of each photo in read_places that is not among the photos (names) that are read.
+
+    file  that the places stand in
+    """
+    for photo in places:
+        if photo not in photos:
+            hint = nearest(photo, photos)
+            expected = f"found {shown(photo)}; expected one of the photos given{hint}: not used"
+            log.warning(file, expected, places[photo][0].row, "photo")
 
 
 def _rows(path, fields, log):

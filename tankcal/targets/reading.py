@@ -10,7 +10,7 @@ from tankcal.targets.circles import read_circles
 from tankcal.targets.coded import read_coded
 from tankcal.targets.dictionaries import dictionary_of
 from tankcal.targets.found import Refused
-from tankcal.targets.naming import CORNERS, by_places, read_names, read_places
+from tankcal.targets.naming import CORNERS, by_places, read_names, read_places, warn_of_unused
 from tankcal.targets.opencv import opencv
 from tankcal.targets.pictures import ENCODINGS, photo_name, read_picture
 from tankcal.targets.writing import ImagePoint, PhotoReading, check_free, write_image_points
@@ -82,6 +82,8 @@ def read_photographs(paths, out_csv, wanted=None, replace=False, tell=None):
     names, places = _lists(wanted, log)
     check_free(out_csv, replace, log)
     titles = _titles(paths, log)
+    if places:
+        warn_of_unused(places, [title for _, title in titles], Path(wanted.places).name, log)
     photos, encodings = [], Counter()
     for done, (path, title) in enumerate(titles):
         if tell:
