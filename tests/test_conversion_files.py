@@ -263,6 +263,7 @@ BROKEN = {
     "json twice": ('{"K": [1,0,0,0,1,0,0,0,1], "k": 3, "dist": []}', "'k'", "twice"),
     "json true": ('{"K": [true,0,1,0,1,1,0,0,1], "dist": []}', "k", "finite"),
     "aicon no ck": ("Ck\nA1 2", "'Ck'", "one number"),
+    "aicon c above 0": (AICON.replace("-15", "15"), "Ck", "found 15; expected a number"),
     "aicon key": (AICON + "Z 3", "'Z'", "unknown"),
     "aicon convention": (AICON + "convention odd", "convention", "expected one of"),
     "folds": (METASHAPE.replace("-0.07", "-0.9"), None, "folds"),

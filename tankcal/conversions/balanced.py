@@ -122,8 +122,8 @@ def _check(values, notes):
     for key in ("Ck", "R0"):
         if key not in values:
             notes.tell("missing; expected a number (R0 is 0 when not balanced)", key=key)
-    if values.get("Ck") == 0:
-        notes.tell("0; expected a number of mm, negative", key="Ck")
+    if values.get("Ck", -1) >= 0:
+        notes.tell(f"found {values['Ck']:g}; expected a number of mm below 0", key="Ck")
     for key in FILM_KEYS:
         if values.get(key, 0) > LARGEST_FILM_MM:
             notes.tell(f"found {values[key]:g}; expected mm, at most {LARGEST_FILM_MM}", key=key)
