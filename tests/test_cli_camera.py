@@ -302,8 +302,7 @@ def test_convert_there_and_back(form, tmp_path, capsys):
         encoding="utf-8",
     )
     assert main(["camera", "convert", str(source), "--to", form, "--out", str(there)]) == 0
-    kind = form.removesuffix("-json")
-    sizes = ["--pixel-um", "4", "--size-px", "6000", "4000", "--from", kind]
+    sizes = ["--pixel-um", "4", "--size-px", "6000", "4000", "--from", form]
     command = ["camera", "convert", str(there), "--to", "cameras.toml", "--out", str(back), *sizes]
     assert main(command) == 0
     assert "fitted" not in capsys.readouterr().err
@@ -313,6 +312,17 @@ def test_convert_there_and_back(form, tmp_path, capsys):
     both.write_text(source.read_text(encoding="utf-8") + text, encoding="utf-8")
     assert run("compare", both, "--method", "zrot", "--json") == 0
     assert json.loads(capsys.readouterr().out)[0]["figure_px"] < 1e-9
+
+
+def test_convert_from_what_is_said_whatever_the_name_of_the_file(tmp_path, capsys):
+    odd = tmp_path / "cameras.txt"
+    shutil.copy(SEVEN, odd)
+    arguments = ["camera", "convert", str(odd), "--name", "set1", "--to", "aicon"]
+    assert main([*arguments, "--from", "cameras.toml"]) == 0
+    assert "Ck -4.38" in capsys.readouterr().out
+    arguments[2] = str(SEVEN)
+    assert main([*arguments, "--from", "aicon"]) == 2
+    assert "Ck: missing" in capsys.readouterr().err
 
 
 def test_convert_a_record_of_film(record, capsys):

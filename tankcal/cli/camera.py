@@ -154,7 +154,9 @@ def _convert(kinds):
         metavar="FORM",
         help="cameras.toml, opencv, opencv-json, colmap, metashape, pix4d or aicon",
     )
-    one.add_argument("--from", dest="kind", metavar="FORM", help="where the file does not tell")
+    one.add_argument(
+        "--from", dest="kind", metavar="FORM", help="one of the same, where the file does not tell"
+    )
     one.add_argument(
         "--pixel-um",
         type=positive,

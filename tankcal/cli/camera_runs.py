@@ -162,7 +162,8 @@ def _cameras_of(options):
     if options.kind is None and _is_record(options.file):
         pixel_mm = options.pixel_um and options.pixel_um / 1000
         return framed_in(_record_of(options.file), pixel_mm)
-    if Path(options.file).suffix.lower() == ".toml":
+    is_register = options.kind is None and Path(options.file).suffix.lower() == ".toml"
+    if is_register or options.kind == "cameras.toml":
         return _registered(options.file, options.pixel_um)
     size_px = None if options.size_px is None else tuple(options.size_px)
     cameras = read_camera(options.file, options.kind, options.pixel_um, size_px)

@@ -1,7 +1,7 @@
 """One door for cameras of other programs: the file tells which of them it is from.
 
 kind       file
-opencv     YAML of FileStorage, JSON with K and dist
+opencv     YAML of FileStorage, JSON with K and dist; opencv-json means the same
 colmap     cameras.txt
 metashape  XML of a calibration
 pix4d      PROJECT_pix4d_calibrated_internal_camera_parameters.cam
@@ -19,7 +19,7 @@ from tankcal.errors import SolutionError
 
 SAME_PIXEL = 0.01  # pixels of a file and as given may differ by as much, for rounding
 PIXELS_UM = (0.1, 100.0)  # of cameras and scanners
-KINDS = ("opencv", "colmap", "metashape", "pix4d", "aicon")
+KINDS = ("opencv", "opencv-json", "colmap", "metashape", "pix4d", "aicon")
 
 
 def read_camera(path, kind=None, pixel_um=None, size_px=None):
@@ -45,7 +45,7 @@ def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
     kind = kind or _recognised(text, notes)
     notes.stop()
     found = _PARSERS[kind](text, notes, file, size_px)
-    needs_pixel = kind in ("opencv", "colmap", "metashape")
+    needs_pixel = kind not in ("pix4d", "aicon")
     if needs_pixel and pixel_um is None:
         expected = f"missing; a file of kind {kind} does not say it. Give it in micrometres"
         notes.tell(expected, key="pixel_um")
@@ -225,6 +225,7 @@ def _stem(file):
 
 _PARSERS = {
     "opencv": _opencv,
+    "opencv-json": _opencv,
     "colmap": _colmap,
     "metashape": _metashape,
     "pix4d": _pix4d,
