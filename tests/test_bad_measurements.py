@@ -663,6 +663,7 @@ def test_free_and_held_contradict(tmp_path):
         ("[cameras]\nc_mm = 1.0\n", "stands in no [cameras.NAME]"),
         ("c_mm = 1.0\n", "expected sections such as [cameras.NAME]"),
         ("[cameras.D\n", "cannot be read"),
+        ('[cameras." D"]\nc_mm = 1.0\n', "found ' D'; expected 'D', without more spaces"),
         ('[cameras."=cmd()"]\nc_mm = 1.0\n', "a letter, digit or underscore first"),
     ],
 )

@@ -8,7 +8,7 @@ import numpy as np
 from tankcal.job.contract import COLUMNS, KEYS, KINDS, OPEN_SECTIONS, REGISTER_KEYS
 from tankcal.job.contract.registers import FAMILIES, SHORT_KEYS
 from tankcal.job.fields import IN_TOML, MAX_NAME, Field, Refused, is_blank, read_value
-from tankcal.job.tables import nearest
+from tankcal.job.tables import nearest, shown
 from tankcal.numerals import NUMBER
 
 
@@ -87,7 +87,10 @@ def read_register(raw, name, log):
             continue
         row = register.rows[owner]
         try:
-            read_value(Field(owner, "name", ""), owner)
+            name_read = read_value(Field(owner, "name", ""), owner)
+            if name_read != owner:
+                expected = f"found {shown(owner)}; expected {shown(name_read)}, without more spaces"
+                log.problem(register.file, expected, row, owner)
         except Refused as refusal:
             log.problem(register.file, str(refusal), row, owner)
         for key, value in entries.items():
