@@ -777,11 +777,13 @@ def test_files_that_are_no_calibrations(tmp_path, text, words):
     assert any(words in one.expected for one in complaints(tmp_path, text))
 
 
-def test_files_that_are_not_there(tmp_path):
+def test_files_that_are_not_there(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"none\.toml: not found; expected a file with"):
         read_cameras(tmp_path / "none.toml")
-    with pytest.raises(InputError, match=r"cameras\.toml: not found"):
-        read_cameras(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match=r"^empty.cameras\.toml: not found"):
+        read_cameras("empty")
     (tmp_path / "cameras.toml").write_text(LONG, encoding="utf-8")
     assert len(read_cameras(tmp_path)) == 1
 

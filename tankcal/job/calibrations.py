@@ -32,8 +32,13 @@ def read_cameras(path, warn=None, in_pixels=True):
     Raises InputError with every problem of the file.
     """
     path, log = Path(path), Log()
+    missing = path.name or "."
     if path.is_dir():
         path = path / CAMERAS_FILE
+        missing = str(path)
+    if not path.exists():
+        log.problem(missing, "not found; expected a file with [cameras.NAME]")
+    log.stop_if_problems()
     values = _values(path, log, in_pixels)
     log.stop_if_problems()
     for one in log.warnings if warn else ():
@@ -84,9 +89,6 @@ def _listed(known):
 
 def _values(path, log, in_pixels):
     """{name: {key: value}} of the file; what is wrong goes to `log`."""
-    if not path.exists():
-        log.problem(path.name or ".", "not found; expected a file with [cameras.NAME]")
-        return {}
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     register = None if data is None else raw_register(path.name, data, log, "cameras")
     if register is None:
