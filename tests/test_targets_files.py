@@ -58,7 +58,7 @@ def test_corners_get_their_names(photos, tmp_path):
     written = [[float(row["column_px"]), float(row["line_px"])] for row in rows[:4]]
     assert np.abs(np.array(written) - marker.corners_px).max() < 1e-4
     assert [float(row["s_px"]) for row in rows[:4]] == pytest.approx(marker.sd_px, abs=1e-4)
-    assert steps == [("left", 0, 2), ("right", 1, 2), ("", 2, 2)]
+    assert steps == [("left", 0, 2), ("right", 1, 2), ("done", 2, 2)]
     assert (reading.targets, reading.points, reading.refused) == (4, 16, {})
     assert any("listed but never read: 1: 'T12'" in str(one) for one in reading.warnings)
     assert rows_of(reading.refused_path) == []

@@ -100,7 +100,7 @@ def read_photographs(paths, out_csv, wanted=None, replace=False, tell=None):
         log.warning("photographs", f"{expected}; where that is wrong, edges are half a pixel off")
     written = write_image_points(photos, out_csv, replace)
     if tell:
-        tell("", len(titles), len(titles))
+        tell("done", len(titles), len(titles))
     return Reading(
         tuple(photos),
         *written,
