@@ -171,6 +171,20 @@ def test_the_capacity_table_is_printed_in_a_size_that_is_read(records, language,
     assert (210 / 25.4 - margins) / (pixels / 96) >= 0.8
 
 
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_all_rows_of_the_capacity_table_have_one_height(records, language, tmp_path):
+    """Also where the interval of some rows is Monte Carlo's, and where some are not for use."""
+    for kind in ("uncertain", "furnished"):
+        workbook.write(records[kind], tmp_path / "capacity.xlsx", language)
+        book = openpyxl.load_workbook(tmp_path / "capacity.xlsx")
+        sheet = book[load_words(language)["workbook"]["sheets"]["capacity"]]
+        ((_, top, _, last),) = tables_of(sheet)
+        heights = {sheet.row_dimensions[row].height for row in range(top + 1, last + 1)}
+        assert len(heights) == 1, (kind, heights)
+    assert set(records["uncertain"]["capacity"]["interval"]) == {"gum", "monte_carlo"}
+    assert not all(records["furnished"]["capacity"]["for_use"])
+
+
 def test_a_line_may_break_after_a_hyphen():
     assert pieces_of("Incerteza-padrão u (m³) -1") == ["Incerteza-", "padrão", "u", "(m³)", "-1"]
 

@@ -6,7 +6,7 @@ from tankcal.digits import LITRE_DECIMALS, decimals_of_height, decimals_of_rows,
 from tankcal.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
 from tankcal.report.uncertainty.stated import stated_U_m3
 from tankcal.words import marks_of
-from tankcal.workbook.look import height_digits, width_of
+from tankcal.workbook.look import height_digits, width_of, width_of_lines
 from tankcal.workbook.parts import use_column
 
 NAMED = ("height", "volume", "U", "k", "standard_u", "litres_per_cm", "low", "high", "interval")
@@ -80,7 +80,7 @@ def _intervals(book, capacity):
     return {
         "low": book.column("from_m3", capacity["low_m3"], digits, 11),
         "high": book.column("to_m3", capacity["high_m3"], digits, 11),
-        "interval": book.column("interval", codes, None, 11),
+        "interval": book.column("interval", codes, None, max(width_of_lines(codes), 11)),
     }
 
 

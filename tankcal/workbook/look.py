@@ -98,6 +98,12 @@ def width_of(column):
     return max(column.width, (max(heading, cells) + 1.5 * _EMPTY_PX) / _UNIT_PX)
 
 
+def width_of_lines(texts):
+    """The width of a column, in digits, in which each of these texts stands on one line."""
+    longest = max(map(_pixels, set(texts)), default=0)
+    return (longest + _INDENT_PX + 1.5 * _EMPTY_PX) / _UNIT_PX
+
+
 def pieces_of(text):
     """The parts of a text between which a line may break."""
     return [piece for piece in _BREAKS.split(text) if piece]
