@@ -415,6 +415,46 @@ def test_all_problems_of_a_run_come_together(tmp_path):
     )
 
 
+BRAZILIAN = {"csv.separator": ";", "csv.decimal": ","}
+
+
+@pytest.mark.parametrize("lost", [b"[tank\n", b'owner = "Jo\xe3o"\n', None])
+def test_tables_are_not_judged_by_marks_that_unreadable_settings_would_have_given(tmp_path, lost):
+    count = len(job_parts().tables["points"]) - 1
+    parts = job_parts(
+        settings=BRAZILIAN,
+        deadwood=[("coil", 0.5, 1.0, -0.2)],
+        covariance_m2=np.eye(3 * count) * 4e-6,
+    )
+    folder = write_folder(tmp_path / "job", parts)
+    if lost is None:
+        (folder / "job.toml").unlink()
+    else:
+        (folder / "job.toml").write_bytes(lost + (folder / "job.toml").read_bytes())
+    (problem,) = problems_of(folder)
+    assert problem.file == "job.toml"
+
+
+def test_tables_with_commas_are_judged_beside_unreadable_settings(tmp_path):
+    parts = job_parts()
+    parts.tables["points"][3][1] = "x"
+    folder = write_folder(tmp_path / "job", parts)
+    (folder / "job.toml").write_text("[tank\n")
+    assert places(problems_of(folder)) == [("job.toml", 1, None), ("points.csv", 4, "x_m")]
+
+
+def test_a_decimal_comma_in_the_settings_is_the_only_problem_of_tables_with_commas(tmp_path):
+    parts = job_parts(settings=BRAZILIAN | {"table.step_m": 0.25})
+    folder = write_folder(tmp_path / "job", parts)
+    text = (folder / "job.toml").read_text(encoding="utf-8")
+    assert text.count("step_m = 0.25") == 1
+    (folder / "job.toml").write_text(text.replace("0.25", "0,25"), encoding="utf-8")
+    (problem,) = problems_of(folder)
+    place = settings_place("folder", parts, "table.step_m")
+    assert (problem.file, problem.row) == place[:2]
+    assert "found 'step_m = 0,25'; expected a decimal point" in problem.expected
+
+
 def test_a_long_list_of_problems_is_cut_and_counted(tmp_path):
     parts = job_parts()
     for row in parts.tables["points"][1:]:

@@ -405,3 +405,12 @@ def test_a_camera_that_sees_no_target(changed):
         file.writelines(f"M{k},{14.8 + k / 2},21.5,12.0,,,\n" for k in (2, 3, 4))
     (line,) = told(folder)
     assert "photograph R1-1 sees no target (other points: 3), and 10 more of this ring" in line
+
+
+def test_decimal_commas_are_told_each_with_its_row(changed):
+    lines = told(changed(("length_m = 9.0", "length_m = 9,0")))
+    assert len(lines) == 3
+    assert all("found 'length_m = 9,0'; expected a decimal point" in line for line in lines)
+    (line,) = told(changed(("c_mm = 100.0", "c_mm = 100,0"), file="cameras.toml"))
+    assert line.startswith("cameras.toml, row ")
+    assert "found 'c_mm = 100,0'; expected a decimal point" in line

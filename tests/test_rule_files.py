@@ -92,6 +92,7 @@ def test_a_house_rule_is_read():
         ("[uncertainty.step]", "[uncertainty]", "stands in no limit"),
         ("[rule]", "name = 'x'\n[rule]", "stands in no [section]"),
         ("[rule]", "[rule", "own.toml, row 2: cannot be read"),
+        ("limit_m3 = 2.5", "limit_m3 = 2,5", "found 'limit_m3 = 2,5'; expected a decimal point"),
     ],
 )
 def test_a_wrong_file_is_told_in_words(old, new, told):

@@ -10,7 +10,7 @@ from job_builder import job_parts, write_book
 from tankcal.job.fields import Field, Refused, read_value
 from tankcal.job.folder import read_csv, read_folder, read_toml
 from tankcal.job.sheets import read_workbook
-from tankcal.job.tables import BadCell, Log, nearest, shown
+from tankcal.job.tables import MAX_PROBLEMS_PER_FILE, BadCell, Log, nearest, shown
 
 
 def csv_table(text, separator=",", decimal="."):
@@ -92,6 +92,40 @@ def test_settings_that_cannot_be_read(text, row, words):
     assert problem.row == row
     assert words in problem.expected
     assert not settings
+
+
+def test_decimal_commas_of_settings_are_told_one_by_one_and_hide_nothing():
+    log = Log()
+    text = (
+        'x = """\na = 1,5\n"""\r\n[table]\r\nstep_m = 0,01  # cm\r\nlow_m=-1,5e-1\nlist = [1,5]\n'
+    )
+    settings, _ = read_toml("job.toml", text.encode(), log)
+    told = [(problem.row, problem.expected) for problem in log.problems[:2]]
+    assert told == [
+        (5, "found 'step_m = 0,01'; expected a decimal point, as in every .toml file"),
+        (6, "found 'low_m=-1,5e-1'; expected a decimal point, as in every .toml file"),
+    ]
+    assert "stands in no [section]" in log.problems[2].expected  # x: what else is wrong is told
+    found = {key: (value.raw, value.row) for key, value in settings["table"].items()}
+    assert found == {"step_m": (0.01, 5), "low_m": (-0.15, 6), "list": ([1, 5], 7)}
+
+
+def test_a_file_of_nothing_but_decimal_commas_ends():
+    log = Log()
+    text = "".join(f"x{number} = 1,5\n" for number in range(1000))
+    assert read_toml("job.toml", text.encode(), log) == (None, {})
+    assert len(log.problems) == MAX_PROBLEMS_PER_FILE
+
+
+@pytest.mark.parametrize(
+    ("encoding", "words"), [("latin-1", "not UTF-8; save the file"), ("utf-16", "UTF-16; save it")]
+)
+def test_settings_are_no_csv_in_words_about_their_encoding(encoding, words):
+    log = Log()
+    assert read_toml("plan.toml", 'owner = "João"\n'.encode(encoding), log) == (None, {})
+    (problem,) = log.problems
+    assert problem.row == 1
+    assert problem.expected.endswith(f"{words} as UTF-8 text")
 
 
 def test_deeply_nested_settings_are_cut_to_sections_that_nobody_knows():

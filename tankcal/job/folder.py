@@ -7,6 +7,7 @@ import tomllib
 from tankcal.job.tables import (
     COVARIANCE_FILE,
     MAX_FILE_BYTES,
+    MAX_PROBLEMS_PER_FILE,
     REFUSED_FILE,
     REGISTERS,
     SEPARATORS,
@@ -19,11 +20,16 @@ from tankcal.job.tables import (
     make_table,
     nearest,
     read_bytes,
+    shown,
 )
 
 MAX_SETTINGS_BYTES = 1_000_000
 MAX_SETTINGS_LINE = 4000  # characters
 DECIMALS = (".", ",")
+_LONGEST_START = 100_000  # bytes, of comments before a heading
+_DECIMAL_COMMA = re.compile(
+    r"(\s*[\w.\"'-]+\s*=\s*[+-]?\d+),(\d+(?:[eE][+-]?\d+)?)\s*(?:#.*)?", re.DOTALL
+)
 
 
 def read_folder(folder, log):
@@ -56,6 +62,8 @@ def read_folder(folder, log):
         if name in names:
             data = content(name)
             is_readable = data is not None and marks is not None
+            if is_readable and settings is None:  # what [csv] says is lost
+                is_readable = _has_plain_heading(data)
             tables[table] = read_csv(name, data, *marks, log) if is_readable else None
     covariance = content(COVARIANCE_FILE) if COVARIANCE_FILE in names else None
     registers = {}
@@ -82,6 +90,14 @@ def _hint(names):
     return f" (or give the workbook itself: {books[0]})" if books else ""
 
 
+def _has_plain_heading(data):
+    """Is the heading of a CSV file free of the separators that only [csv] can allow?"""
+    for line in data[:_LONGEST_START].splitlines():
+        if line.strip() and not line.lstrip(b'\xef\xbb\xbf \t"').startswith(b"#"):
+            return not any(mark.encode() in line for mark in SEPARATORS[1:])
+    return len(data) <= _LONGEST_START
+
+
 def _refuse_unknown_files(names, log):
     known = [f"{table}.csv" for table in TABLES]
     for name in names:
@@ -98,7 +114,7 @@ def _refuse_unknown_files(names, log):
 def decode(file, data, log):
     """The text of a UTF-8 file (a byte order mark is allowed), or None after telling `log`."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        log.problem(file, "written as UTF-16; save it as 'CSV UTF-8' or plain UTF-8 text", 1)
+        log.problem(file, f"written as UTF-16; save it as {_utf8(file)}", 1)
         return None
     if b"\0" in data:
         row = data[: data.index(b"\0")].count(b"\n") + 1
@@ -109,8 +125,13 @@ def decode(file, data, log):
     except UnicodeDecodeError as error:
         # error.start counts without the byte order mark, which holds no line break
         row = data[: error.start].count(b"\n") + 1
-        log.problem(file, "a letter that is not UTF-8; save the file as 'CSV UTF-8'", row)
+        log.problem(file, f"a letter that is not UTF-8; save the file as {_utf8(file)}", row)
         return None
+
+
+def _utf8(file):
+    """What programs call the text that is expected of a file."""
+    return "UTF-8 text" if file.lower().endswith(".toml") else "'CSV UTF-8' or plain UTF-8 text"
 
 
 def _lines(text):
@@ -171,16 +192,43 @@ def parsed_toml(file, data, log):
         if len(line) > MAX_SETTINGS_LINE:
             log.problem(file, f"a line of more than {MAX_SETTINGS_LINE} characters", number)
             return None
-    try:
-        return tomllib.loads(text), _toml_rows(text)
-    except (ValueError, RecursionError) as error:
-        line = re.search(r"at line (\d+)", str(error))
-        reason = re.sub(r"\s*\(at .*\)$", "", str(error))
-        if isinstance(error, RecursionError):
-            reason = "too deeply nested"
-        place = int(line[1]) if line else None
-        log.problem(file, f'cannot be read: {reason}; expected lines such as key = "text"', place)
-        return None
+    content = _content(file, text, log)
+    return None if content is None else (content, _toml_rows(text))
+
+
+def _content(file, text, log):
+    """What a TOML text says, or None when unreadable.
+
+    A decimal comma is told and read as a point, so that all else is judged in the same run.
+    """
+    lines = text.split("\n")  # as tomllib counts them
+    for _ in range(MAX_PROBLEMS_PER_FILE):
+        try:
+            return tomllib.loads("\n".join(lines))
+        except (ValueError, RecursionError) as error:
+            row = _row_of(error)
+            number = _DECIMAL_COMMA.fullmatch(lines[row - 1]) if row else None
+            if number is None:
+                reason = _reason(error)
+                expected = f'cannot be read: {reason}; expected lines such as key = "text"'
+                log.problem(file, expected, row)
+                return None
+            found = shown(f"{number[1]},{number[2]}".strip())
+            expected = f"found {found}; expected a decimal point, as in every .toml file"
+            log.problem(file, expected, row)
+            lines[row - 1] = f"{number[1]}.{number[2]}"
+    return None
+
+
+def _row_of(error):
+    line = re.search(r"at line (\d+)", str(error))
+    return int(line[1]) if line else None
+
+
+def _reason(error):
+    if isinstance(error, RecursionError):
+        return "too deeply nested"
+    return re.sub(r"\s*\(at .*\)$", "", str(error))
 
 
 def _toml_rows(text):

@@ -134,8 +134,10 @@ def _covariance(raw, points, log):
     if raw.covariance is None:
         return None
     if points is None:
-        expected = "given without points that it belongs to; expected points.csv beside it"
-        log.problem(COVARIANCE_FILE, expected)
+        is_unreadable = "points" in raw.tables and raw.tables["points"] is None
+        if not is_unreadable:
+            expected = "given without points that it belongs to; expected points.csv beside it"
+            log.problem(COVARIANCE_FILE, expected)
         return None
     if points.columns["sx_mm"] is not None:
         expected = "given beside sx_mm, sy_mm, sz_mm of the points; expected one of them"
