@@ -80,6 +80,22 @@ OLD = {"IF", "AND", "OR", "NOT", "ISBLANK", "ISNUMBER", "ISLOGICAL", "INDEX", "M
        "ROWS", "ROUND", "CHOOSE", "SUMSQ", "SQRT", "EXP", "NORMSINV", "BETAINV"}  # fmt: skip
 
 
+WITHOUT_READING = {
+    "en": "without what reading the table adds",
+    "pt-BR": "sem o que a leitura da tabela acrescenta",
+    "es": "sin lo que añade la lectura de la tabla",
+}
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_volume_and_delivery_say_that_their_U_is_without_reading(record, language, tmp_path):
+    write(record, tmp_path / "words.xlsx", language)
+    words = load_words(language)["workbook"]["sheets"]
+    sheet = openpyxl.load_workbook(tmp_path / "words.xlsx")[words["dip_calculator"]]
+    cells = [str(cell.value) for row in sheet.iter_rows() for cell in row]
+    assert sum(WITHOUT_READING[language] in text for text in cells) == 2
+
+
 def test_formulas_use_only_functions_of_excel_2007(roofed):
     book = openpyxl.load_workbook(roofed[1])
     formulas = [
