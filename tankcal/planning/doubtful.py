@@ -5,6 +5,8 @@ volume of the full tank by up to
 
     dV = g Q j' delta0 / sqrt(r)        g = dV/dx, j the whitened row of the reading
 
+All numbers are of one reading: of those that are repeated see `repeated`.
+
 Source: Baarda 1968, as in tankcal.network.reliability.
 """
 
@@ -14,6 +16,7 @@ import numpy as np
 
 from tankcal.gauss_markov.effects import covariances
 from tankcal.network.reliability import UNCONTROLLED, noncentrality
+from tankcal.planning.repeated import single_readings
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,7 @@ class GroupReliability:
     """How far the readings of one kind control one another.
 
     kind, name    such as "distance", "tape"      unit   of the blunder
-    count         values                          uncontrolled  of them nothing controls
+    count         values that are read            uncontrolled  of them nothing controls
     redundancy    mean redundancy number
     blunder       largest undetectable one of a controlled value; nan: none is controlled
     of            names of the reading that it is of
@@ -45,11 +48,12 @@ class GroupReliability:
     per_unit_of: tuple
 
 
-def reliability(predicted, covariance, by_points_m2):
+def reliability(plan, predicted, covariance, by_points_m2):
     """A GroupReliability for each kind and name of readings (alpha 0.001, power 0.80).
 
-    predicted    surveys.Predicted           by_points_m2  (3n,) see PredictedTable
-    covariance   PredictedCovariance of these n points
+    plan         Plan                        predicted     surveys.Predicted of it
+    covariance   PredictedCovariance         by_points_m2  (3n,) see PredictedTable
+                 of these n points
     """
     adjusted = predicted.adjusted
     problem, solution = adjusted.problem, adjusted.solution
@@ -63,7 +67,8 @@ def reliability(predicted, covariance, by_points_m2):
         r = 1.0 - solution.leverage(number, jac)
         columns = problem.model.groups[number].columns
         effect = np.abs(np.einsum("nmk,nk->nm", jac, pull[columns]))
-        found += _by_name(one, trace, rows, r, effect)
+        single = single_readings(plan, one, trace, rows)
+        found += _by_name(one, trace, rows, single, single.redundancy(r), effect)
     return tuple(found)
 
 
@@ -72,12 +77,17 @@ def _pull(solution, columns, gradient):
     return np.append(covariances(solution, columns, gradient[None])[:, 0], 0.0)
 
 
-def _by_name(one, trace, rows, redundancy, effect):
-    """The groups of one table of observations: redundancy and effect (n, m)."""
+def _by_name(one, trace, rows, single, redundancy, effect):
+    """The groups of one table of observations.
+
+    single  SingleReadings (k)      redundancy  (k, m) of these     effect  (n, m) of the rows
+    """
+    rows = rows[single.of]
     names = np.array([trace.group[i] for i in rows.tolist()], dtype=object)
     controlled = redundancy > UNCONTROLLED
     size = np.where(controlled, noncentrality() / np.sqrt(np.where(controlled, redundancy, 1)), 0)
-    weight = one.using(np.ones(len(one))).weight
+    weight = one.using(np.ones(len(one))).weight[single.of] * single.root()
+    effect = effect[single.of] * single.root()
     blunder, volume = size / weight, size * effect
     per_unit = np.where(controlled, -1.0, effect * weight)
     for name in dict.fromkeys(names):
@@ -86,10 +96,12 @@ def _by_name(one, trace, rows, redundancy, effect):
             mine[np.argmax(part[mine].max(axis=1))] for part in (blunder, volume, per_unit)
         )
         known, is_bare = controlled[mine].any(), bool((~controlled[mine]).any())
+        count = single.count[mine]
         yield GroupReliability(
-            kind=one.kind, name=str(name), unit=one.unit, count=int(redundancy[mine].size),
-            uncontrolled=int(np.sum(~controlled[mine])),
-            redundancy=float(redundancy[mine].mean()),
+            kind=one.kind, name=str(name), unit=one.unit,
+            count=int(count.sum() * redundancy.shape[1]),
+            uncontrolled=int(count @ np.sum(~controlled[mine], axis=1)),
+            redundancy=float(count @ redundancy[mine].mean(axis=1) / count.sum()),
             blunder=float(blunder[worst].max()) if known else float("nan"),
             of=trace.ids[rows[worst]],
             volume_m3=float(volume[moves].max()) if known else float("nan"),

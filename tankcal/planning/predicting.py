@@ -90,7 +90,8 @@ class Prediction:
     @cached_property
     def reliability(self):
         """What blunders could do unnoticed: a tuple of GroupReliability."""
-        return reliability(self.predicted, self.tabled.covariance, self.tabled.by_points_m2)
+        tabled = self.tabled
+        return reliability(self.plan, self.predicted, tabled.covariance, tabled.by_points_m2)
 
     @cached_property
     def sections(self):
