@@ -10,6 +10,7 @@ from tankcal.naming import is_name
 from tankcal.planning import load_plan, predict
 from tankcal.planning.changes import changes_of, cost_of
 from tankcal.planning.helping import greedy, smallest, what_helps
+from tankcal.planning.model import Box
 
 PLAN = EXAMPLE.parent / "plan-silva"
 
@@ -54,6 +55,18 @@ def test_the_best_come_first_and_cost_what_they_cost(plan, effects):
     station = next(one.change for one in effects if one.change.action == "add")
     assert station.cost > 0
     assert cost_of(plan) == pytest.approx(11 * 35 + 8 * 20 + 11 * 60 + 120 * 2)
+
+
+def test_what_is_added_into_an_obstacle_cannot_stand_there(plan):
+    """A station half-way between two others, where something is in the way."""
+    added = next(one for one in changes_of(plan, ("add",), ("photo_station",)))
+    place = next(one.xyz_m for one in added.plan.photos if one.station == added.name)
+    sound, hidden = (
+        what_helps(plan, (replace(added, plan=replace(added.plan, obstacles=obstacles)),))[0]
+        for obstacles in ((), (Box(place - 0.1, place + 0.1, "pump house"),))
+    )
+    assert not sound.why
+    assert hidden.why.endswith(f"station {added.name} stands in the obstacle pump house")
 
 
 def test_a_plumb_line_costs_no_tape(plan):

@@ -203,15 +203,19 @@ def test_what_is_added_has_a_place(prediction, effects, tmp_path):
 
 
 def test_what_can_be_spared_is_listed_beside_what_would_help(prediction, effects):
-    first = effects[0]
-    needed = replace(first, why="rank defect 1: not determined by the observations")
-    paper = PlanPaper(prediction, effects=(*effects, needed))
+    drop, add = (
+        next(one for one in effects if one.change.action == action) for action in ("drop", "add")
+    )
+    needed = replace(drop, why="rank defect 1: not determined by the observations")
+    idle = replace(add, why="plan.toml, row 48, photo_rings[1]: photograph N-R1-1 sees nothing")
+    paper = PlanPaper(prediction, effects=(*effects, needed, idle))
     tables = {one.data.get("caption"): one.data for one in outlook(paper)}
     drops = [one for one in effects if one.change.action == "drop"]
     assert len(tables["What is lost by less"]["rows"]) == min(30, len(drops))
     assert len(tables["What is gained by more"]["rows"]) == min(30, len(effects) - len(drops))
     text = texts_of(outlook(paper))
-    assert f"{paper.change(first.change)}: what is left would not determine all unknowns" in text
+    assert f"{paper.change(drop.change)}: what is left would not determine all unknowns" in text
+    assert f"{paper.change(add.change)}: see changes.csv" not in text
     assert "Weak or lost" in text
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from tankcal.errors import TankcalError
 from tankcal.planning.changes import ITEMS, Change, changes_of, cost_of
+from tankcal.planning.checks.placed import refuse_misplaced
 from tankcal.planning.checks.seen import refuse_blind
 from tankcal.planning.predicting import Prediction, limited_u, predict
 from tankcal.planning.simulating import measurements_of, nominal_of
@@ -193,6 +194,8 @@ def _effect(change, before):
     """The Effect of a Change, from the Prediction before it."""
     plan = change.plan
     try:
+        if change.action == "add":
+            refuse_misplaced(plan, change.name)
         seen = visible(plan)
         refuse_blind(plan, seen)
         predicted = predict_survey(measurements_of(plan, seen), nominal_of(plan))

@@ -46,11 +46,11 @@ def _best(paper, name, effects, columns):
 
 
 def _needed(paper):
-    """What the survey would not work without, and why."""
+    """What the survey would not work without, and why; additions that cannot be are left out."""
     lost = [
         paper.word(f"texts.needed_{_reason(one.why)}", change=paper.change(one.change))
         for one in paper.effects
-        if one.why
+        if one.why and one.change.action == "drop"
     ]
     return [paper.paragraph("needed"), blocks.listing(lost)] if lost else []
 

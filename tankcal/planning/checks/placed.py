@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.job.checks.common import is_not_given, tell
-from tankcal.job.tables import nearest
+from tankcal.job.tables import Log, nearest
 from tankcal.messages import message
 from tankcal.planning.checks.pattern import check_targets
 from tankcal.planning.checks.tied import check_tied
@@ -24,7 +24,7 @@ def check_plan(plan, given, raw, log):
         return
     pattern = given.single["pattern"]
     check_targets(plan, pattern, log)
-    _check_stations(plan, log)
+    _check_stations(plan, (*plan.photos, *plan.setups), log)
     _check_fixed_photo(plan, raw, log)
     check_tied(plan, given, log)
     warn_of_places(plan, given, log)
@@ -51,15 +51,31 @@ def _check_fixed_photo(plan, raw, log):
         tell(log.problem, raw, "adjustment", "fixed_photo", expected + nearest(name, names))
 
 
-def _check_stations(plan, log):
-    """A station on the wrong side of the wall, in it, in an obstacle; one line a ring."""
+def refuse_misplaced(plan, name):
+    """Raise InputError where the station or set-up `name` of a plan cannot stand."""
+    stands = [one for one in (*plan.photos, *plan.setups) if _station(one) == name]
+    log = Log()
+    _check_stations(plan, stands, log)
+    log.stop_if_problems()
+
+
+def _check_stations(plan, stands, log):
+    """A station on the wrong side of the wall, in it, in an obstacle; one line a ring.
+
+    stands  photographs and set-ups
+    """
     told = set()
-    for one in (*plan.photos, *plan.setups):
+    for one in stands:
         why = _misplaced(plan, one.xyz_m)
         if why and one.place not in told:
             told.add(one.place)
             file, row, name = one.place
-            log.problem(file, f"station {getattr(one, 'station', one.name)} {why}", row, name)
+            log.problem(file, f"station {_station(one)} {why}", row, name)
+
+
+def _station(one):
+    """The name of the place of a photograph or a set-up."""
+    return getattr(one, "station", one.name)
 
 
 def _misplaced(plan, xyz):
