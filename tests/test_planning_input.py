@@ -6,9 +6,11 @@ import pytest
 from conftest import EXAMPLE
 from plan_folders import with_setups
 
+from tankcal import cli
 from tankcal.cli import main
 from tankcal.errors import InputError, SolutionError
 from tankcal.planning import helping, load_plan, predict
+from tankcal.planning.changes import changes_of
 from tankcal.planning_papers import FILES, JOB
 
 PLAN = EXAMPLE.parent / "plan-silva"
@@ -414,3 +416,13 @@ def test_decimal_commas_are_told_each_with_its_row(changed):
     (line,) = told(changed(("c_mm = 100.0", "c_mm = 100,0"), file="cameras.toml"))
     assert line.startswith("cameras.toml, row ")
     assert "found 'c_mm = 100,0'; expected a decimal point" in line
+
+
+def test_what_a_change_is_called_on_the_terminal(changed):
+    """Rows of targets have theirs in their names, in changes.csv as well."""
+    plan = load_plan(changed(("levels = 1 ", "levels = 2 ")))
+    rows = changes_of(plan, ("add", "drop"), ("target_row",))
+    found = {cli.planning.called(one) for one in rows}
+    assert {"add target row in course 1", "drop target row 1"} <= found
+    tape = next(one for one in changes_of(plan, ("drop",), ("tape",)))
+    assert cli.planning.called(tape) == "drop tape V1"

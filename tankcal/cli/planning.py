@@ -165,12 +165,17 @@ def _changes(effects):
     for one in effects[:SHOWN]:
         if not one.why:
             yield (
-                f"  {one.change.action} {one.change.item.replace('_', ' ')} {one.change.name}: "
-                f"U/V {_percent(one.relative_u)} ({1e6 * one.difference:+.1f} ppm, cost "
-                f"{one.change.cost:+g})"
+                f"  {called(one.change)}: U/V {_percent(one.relative_u)} "
+                f"({1e6 * one.difference:+.1f} ppm, cost {one.change.cost:+g})"
             )
     if len(effects) > SHOWN:
         yield f"  and {len(effects) - SHOWN} more changes"
+
+
+def called(change):
+    """What is done to which item of a plan; rows of targets have theirs in their names."""
+    item = change.item.replace("_", " ").removesuffix(" row")
+    return f"{change.action} {item} {change.name}"
 
 
 def _design(path):
