@@ -426,3 +426,12 @@ def test_what_a_change_is_called_on_the_terminal(changed):
     assert {"add target row in course 1", "drop target row 1"} <= found
     tape = next(one for one in changes_of(plan, ("drop",), ("tape",)))
     assert cli.planning.called(tape) == "drop tape V1"
+
+
+def test_too_few_generatrices(changed):
+    """Each section of the wall needs as many points as in a job; told once, not by the section."""
+    (line,) = told(changed(("generatrices = 24", "generatrices = 4")))
+    assert line == (
+        "plan.toml, row 30, pattern.generatrices: found 4, the points of each section of the wall; "
+        "expected at least 5 (10 or more are advised)"
+    )

@@ -1,5 +1,6 @@
 """What is given in a plan and cannot be meant: names, keys that belong together, accuracies."""
 
+from tankcal.doubts import ADVISED_POINTS, FEWEST_POINTS
 from tankcal.job.checks.common import is_not_given, refuse_repeated
 from tankcal.job.tables import nearest
 from tankcal.planning.given import PLAN_FILE
@@ -49,7 +50,14 @@ def _check_kinds(instruments, given, log):
 
 
 def _check_pattern(pattern, log):
-    """Heights or levels, and a form that is larger than its part."""
+    """Lines enough for a section, heights or levels, and a form that is larger than its part."""
+    lines = pattern["generatrices"]
+    if lines in range(FEWEST_POINTS):
+        expected = (
+            f"found {lines:g}, the points of each section of the wall; expected at least "
+            f"{FEWEST_POINTS} ({ADVISED_POINTS} or more are advised)"
+        )
+        pattern.tell(log.problem, "generatrices", expected)
     if {"levels", "heights_m"} <= pattern.filled:
         expected = "given together with heights_m; expected one of the two"
         pattern.tell(log.problem, "levels", expected)
