@@ -1,6 +1,7 @@
 """Surveys that determine less than they seem to: told in words, never a number without meaning."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from networks import tank_points
 from tankcal.camera import Form, measured
 from tankcal.errors import SolutionError
 from tankcal.network import Camera, ImagePoints, Photos, Survey, adjust
+from tankcal.network.naming import in_words
 from tankcal.network.soundness import hardly_determined
 from tankcal.observations import ControlCoordinates, Distances
 from tankcal.rotations import looking
@@ -76,6 +78,26 @@ def test_a_plane_seen_at_right_angles_says_nothing_of_c(noise):
         adjust(survey)
     known = adjust(scene(SQUARE, FOUR, **LEVEL, control=SPREAD, noise=noise))
     assert known.point_sd_m.max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("count", "which"),
+    [
+        (2, "the position of photo S0, the position of photo S1"),
+        (5, "the positions of 5 photos (S0, S1, S2, S3, S4)"),
+        (7, "the positions of 7 photos (S0, S1, S2, S3, S4 and 2 more)"),
+        (9, "the positions of all photos"),
+    ],
+)
+def test_photos_that_nothing_determines_are_named(count, which):
+    """Some of nine photos move, and a point with them."""
+    columns = np.arange(9 * 6 + 3)
+    layout = SimpleNamespace(photos=columns[3:].reshape(9, 6), points=columns[None, :3])
+    photos = SimpleNamespace(names=tuple(f"S{i}" for i in range(9)))
+    moving = np.zeros((len(columns), 1))
+    moving[layout.photos[:count, :3].ravel()] = moving[:3] = 1.0
+    told = in_words(SimpleNamespace(points=("P",), photos=photos), layout, None, moving)
+    assert told == f"{which} and the place of point P cannot be told apart"
 
 
 def test_the_principal_point_of_photos_that_are_all_upright():

@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.camera import PARAMETERS
+from tankcal.messages import filled, listed
 
 ELEMENTS = ("x", "y", "z", "omega", "phi", "kappa")
 
@@ -50,7 +51,8 @@ def name_of(survey, layout, table, column):
 
 
 SHARE = 0.1  # of the largest part of a direction: below it an unknown does not take part
-LISTED = 3  # names; more of a kind are counted
+LISTED = 3  # parts in a sentence; more of a kind are one, with their number
+NAMED = 5  # names in it
 
 
 def in_words(survey, layout, table, directions):
@@ -67,8 +69,7 @@ def in_words(survey, layout, table, directions):
         who = np.flatnonzero(size[columns].max(axis=1, initial=0.0) > 0) if len(names) else []
         told_already[columns.ravel()] = True
         if len(who) > LISTED:
-            many = "all" if len(who) == len(names) else f"{len(who)}"
-            parts.append(f"the {what}s of {many} {one}s")
+            parts.append(f"the {what}s of {_many(names, who, one)}")
         else:
             parts += [f"the {what} of {one} {names[i]}" for i in who]
     others = np.flatnonzero((size[:-1] > 0) & ~told_already[:-1])
@@ -77,3 +78,11 @@ def in_words(survey, layout, table, directions):
         return parts[0]
     told_of = f"{', '.join(parts[:-1])} and {parts[-1]} cannot be told apart"
     return told_of + (f"; fix {parts[0]} or give it a standard deviation" if len(others) else "")
+
+
+def _many(names, who, one):
+    """Some of the photos or points, `who` their numbers: all of them, or how many and which."""
+    if len(who) == len(names):
+        return f"all {one}s"
+    which = listed([names[i] for i in who], NAMED)
+    return filled("{count} {what}s ({which})", {"count": len(who), "what": one, "which": which})
