@@ -413,8 +413,8 @@ def test_the_verdict_of_the_rule_in_words(found, record):
     in_guard = "limit ± 0.9 m³, guard band U: NOT accepted: in the guard band."
     assert f"{in_guard} Probability of conformity {100 * steps['probability']:.2f} %." in whole
     assert "Probability of conformity below 0.01 %." in whole
-    enlarged = "U of deliveries is enlarged where Monte Carlo asks for it."
-    assert f"The worst delivery is sought by the law of propagation; {enlarged}" in whole
+    simulated = "it and some deliveries down to the lowest dip are simulated by Monte Carlo."
+    assert f"The worst delivery is sought by the law of propagation; {simulated}" in whole
 
 
 def test_limits_that_nothing_was_held_against_are_named(record):
