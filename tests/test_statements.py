@@ -108,6 +108,14 @@ def test_what_reading_adds_is_in_u_whichever_method_counts(tmp_path):
     assert (low["interval"] == "gum") == (low["stated_U_m3"] == low["U_m3"])
 
 
+def test_with_its_reading_no_tank_holds_less_than_nothing(tmp_path):
+    """At a dip of 5 mm with a zero known to 5 mm: 0.66 m3, u of 0.66 and 0.4 m3 of reading."""
+    result = computed(tmp_path, "0.005,,,\n", {"table.step_m": 0.005}, inputs=READING, rule="")
+    (low,) = (one for one in budgets_of(result) if one["high_m"] == 0.005)
+    assert (low["interval"], low["low_m3"]) == ("monte_carlo", 0.0)
+    assert low["stated_U_m3"] > low["volume_m3"]
+
+
 LEANING = {"tilt": (0.003, 0.0)}  # its top is 0.04 mm lower than its courses are long
 
 

@@ -77,11 +77,14 @@ def _of_delivery(one, judged):
 def _with_reading(one, low_m3, high_m3):
     """Monte Carlo's interval of the table, each side made longer by what reading adds, in squares.
 
-    The errors of reading are each reading's own and as likely up as down.
+    The errors of reading are each reading's own and as likely up as down; but no tank holds less
+    than nothing.
     """
     down = float(np.hypot(one.volume_m3 - low_m3, one.reading_U_m3))
     up = float(np.hypot(high_m3 - one.volume_m3, one.reading_U_m3))
-    return _interval(max(down, up), one.volume_m3 - down, one.volume_m3 + up, "monte_carlo")
+    low = one.volume_m3 - down
+    low = max(low, 0.0) if one.low_m is None else low
+    return _interval(max(down, up), low, one.volume_m3 + up, "monte_carlo")
 
 
 def _even(volume_m3, U_m3, source):
