@@ -19,7 +19,7 @@ from tankcal.planning_papers.field_sheets import sheets
 from tankcal.planning_papers.outlook import outlook
 from tankcal.planning_papers.paper import PlanPaper
 from tankcal.planning_papers.stands import stands
-from tankcal.report.figures import INK, RED
+from tankcal.plots import INK, RED
 
 OBSTACLE = (
     '[[obstacles]]\nname = "bund"\nkind = "box"\nfrom_m = [10.0, 24.0, 8.0]\n'

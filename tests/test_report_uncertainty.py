@@ -15,6 +15,7 @@ from paper_cells import paper_blocks, table_of, texts
 from uncertain_job import HOSTILE, as_before, write_uncertain_job
 
 import tankcal
+from tankcal import plots
 from tankcal.digits import decimals_of, decimals_of_rows, fixed
 from tankcal.distributions import NAMES
 from tankcal.job.contract.inputs import INPUTS
@@ -310,7 +311,7 @@ def test_bars_of_defaults_are_pale(record):
     other["budget"][1]["is_default"] = True
     (ax,) = figures.budget_bars(Paper(other)).axes
     names = [label.get_text() for label in ax.get_yticklabels()]
-    pale = [to_hex(bar.get_facecolor()) == figures.PALE for bar in ax.patches]
+    pale = [to_hex(bar.get_facecolor()) == plots.PALE for bar in ax.patches]
     assert pale == [name.endswith("(default)") for name in names]
     assert pale.count(True) == 1
     shares = [bar.get_width() for bar in ax.patches]

@@ -7,7 +7,7 @@ from math import ceil, floor, log10
 import matplotlib
 import numpy as np
 
-from tankcal.report.figures import INK, RED, STYLE
+from tankcal.plots import INK, RED, STYLE
 
 COLOURS = (INK, RED, "#3b7d4f", "#b8860b", "#6a4c93", "#1b998b", "#8a5a44", "#555555")
 DASHES = ("-", "--", ":")

@@ -12,7 +12,7 @@ from tankcal.camera_papers.drawings import (
 )
 from tankcal.camera_papers.parameter_tests import in_pixels
 from tankcal.digits import fixed
-from tankcal.report.figures import INK, RED, WIDTH, set_margins
+from tankcal.plots import INK, RED, WIDTH, set_margins
 
 COLOUR_MAP = "RdBu_r"
 

@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from tankcal.camera_papers.drawings import FAINT, line_style, styled
 from tankcal.camera_papers.influence import adjusted, label
 from tankcal.camera_papers.product import unit_of
+from tankcal.plots import INK, RED, WIDTH, set_margins
 from tankcal.report import numbers
-from tankcal.report.figures import INK, RED, WIDTH, set_margins
 
 BAR = 0.26
 

@@ -13,7 +13,7 @@ from tankcal.camera_papers.drawings import FAINT, in_parts, line_style, mathemat
 from tankcal.camera_papers.naming import numbered
 from tankcal.camera_papers.stability import KEYS, numbered_labels
 from tankcal.digits import fixed
-from tankcal.report.figures import INK, WIDTH, set_margins
+from tankcal.plots import INK, WIDTH, set_margins
 
 ACROSS, MOST_PANELS = 6, 36
 WIDE_RANGE = 8.0  # largest over threshold: from here on colours are logarithmic

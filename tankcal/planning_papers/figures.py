@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tankcal.planning_papers.sketches import unrolled
-from tankcal.report.figures import INK, PALE, RED, STYLE, WIDTH, set_margins
+from tankcal.plots import INK, PALE, RED, STYLE, WIDTH, set_margins
 
 MOST = 32  # bars
 COLOURS = {"add": INK, "repeat": PALE, "drop": RED}

@@ -8,7 +8,7 @@ from tankcal.planning.model import TAPED
 from tankcal.planning.places import joints_m, place_of, reference_rad
 from tankcal.planning.rings import full_turn
 from tankcal.planning_papers.rows import lost_points
-from tankcal.report.figures import INK, RED, STYLE, WIDTH, set_margins
+from tankcal.plots import INK, RED, STYLE, WIDTH, set_margins
 
 GREY, FAINT = "#445566", "#9aa5b1"
 GREEN, OCHRE = "#2e7d5b", "#b9770e"

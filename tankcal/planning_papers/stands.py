@@ -17,7 +17,7 @@ from tankcal.planning_papers.sketches import (
     own_name,
     text,
 )
-from tankcal.report.figures import INK, PALE, STYLE, WIDTH, round_factor
+from tankcal.plots import INK, PALE, STYLE, WIDTH, round_factor
 
 HIGH = 4.6  # inches
 STEEP = 0.5  # sine of an azimuth: names of stations nearer to the y axis stand above or below

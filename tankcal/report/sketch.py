@@ -7,7 +7,7 @@ import matplotlib
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Rectangle
 
-from tankcal.report.figures import INK, PALE, RED, STYLE, WIDTH
+from tankcal.plots import INK, PALE, RED, STYLE, WIDTH
 
 _GREY = "#445566"
 _LEFT, _RIGHT = 2.0, 4.0  # of the tank on the page

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
-from tankcal.report.figures import INK, MANY, RED, STYLE, WIDTH, round_factor, set_margins
+from tankcal.plots import INK, MANY, RED, STYLE, WIDTH, round_factor, set_margins
 
 MOST_PHOTOS = 12
 MOST_NAMES = 60  # places whose names are written in the plan

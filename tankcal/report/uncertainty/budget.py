@@ -1,8 +1,8 @@
 """Budgets: line by line for the top row and a delivery, contributions for the others."""
 
 from tankcal.digits import NOTHING, decimals_of, fixed, shortest
+from tankcal.plots import even_groups
 from tankcal.report import blocks
-from tankcal.report.figures import even_groups
 from tankcal.report.numbers import like_its_sd, symbol
 from tankcal.report.paper import Column
 from tankcal.words import name_of_input

@@ -8,8 +8,8 @@ from math import sqrt
 
 import numpy as np
 
+from tankcal.plots import round_factor
 from tankcal.report.blocks import Block
-from tankcal.report.figures import round_factor
 from tankcal.report.web.packing import packed
 
 MOST_POINTS = 4000  # that are drawn

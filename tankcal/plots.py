@@ -1,0 +1,259 @@
+"""Drawings of a calibrated tank: sections, the wall unrolled, the table and its budget.
+
+Plain numbers go in, matplotlib figures come out, in one style for notebooks and papers. Lengths of
+the page are inches. The words at the axes are those of WORDS, or of `words(key, **values)`.
+"""
+
+import logging
+import textwrap
+from dataclasses import dataclass
+from math import ceil, floor, log10
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+logging.getLogger("matplotlib").setLevel(logging.ERROR)  # no remark about its font cache on paper
+
+STYLE = {
+    "font.family": ["STIXGeneral", "DejaVu Serif"],
+    "font.size": 8.5,
+    "axes.linewidth": 0.5,
+    "axes.edgecolor": "#445566",
+    "axes.unicode_minus": True,
+    "xtick.major.width": 0.5,
+    "ytick.major.width": 0.5,
+    "grid.linewidth": 0.3,
+    "grid.color": "#c3cad2",
+    "lines.linewidth": 0.9,
+}
+WORDS = {
+    "azimuth": "Azimuth / °",
+    "residual": "Residual / mm",
+    "height": "Height / m",
+    "litres_per_cm": "Capacity / (L/cm)",
+    "U_m3": "U / m³",
+    "share": "Share of the variance / %",
+    "section": "Section {section}",
+    "section_height": "height {height}",
+}
+INK, RED, PALE = "#1f4e79", "#b03a2e", "#9db8d2"
+LEAST_SHARE = 1e-3  # of the variance: less is no bar
+WIDTH = 6.5
+LETTERS_OF_A_BAR = 46  # in a line of its name
+MANY = 500  # points in a panel: from here on their picture is smaller than their outlines
+_TURN = (-4, 364)  # degrees: points at north are not cut off
+
+
+def english(key, **values):
+    """The word of WORDS at an axis, its places filled."""
+    return WORDS[key].format(**values)
+
+
+@dataclass(frozen=True)
+class Ring:
+    """A section as it is drawn: its circle, its outline, and the residuals of its points.
+
+    name, height        what stands beside it, as texts
+    radius_m            of the circle
+    azimuth_deg         (n,) of the points
+    residual_m          (n,) of the points from the circle, outwards positive
+    outline_deg         (m,) azimuths of the outline
+    outline_m           (m,) its radii about the centre of the circle
+    """
+
+    name: str
+    height: str
+    radius_m: float
+    azimuth_deg: np.ndarray
+    residual_m: np.ndarray
+    outline_deg: np.ndarray
+    outline_m: np.ndarray
+
+    @property
+    def deviation_m(self):
+        """(m,) the outline less the circle."""
+        return np.asarray(self.outline_m) - self.radius_m
+
+    def title(self, words):
+        """[name, height] as they stand at its drawing."""
+        return [
+            words("section", section=self.name),
+            words("section_height", height=self.height),
+        ]
+
+
+def residual_panels(rings, words=english, most=8):
+    """Residuals in mm against azimuth, one panel a section, up to `most` panels a figure."""
+    largest_m = max((np.max(np.abs(ring.residual_m), initial=0.0) for ring in rings), default=0.0)
+    return [
+        _residual_panels(group, 1.1e3 * largest_m or 1.0, words)
+        for group in even_groups(rings, most)
+    ]
+
+
+def _residual_panels(rings, limit_mm, words):
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, 0.55 * len(rings) + 0.55))
+        axes = figure.subplots(len(rings), 1, sharex=True, squeeze=False)[:, 0]
+        for ax, ring in zip(axes, rings, strict=True):
+            residual_mm = 1e3 * np.asarray(ring.residual_m)
+            azimuth = ring.azimuth_deg
+            if len(azimuth) <= 72:
+                ax.vlines(azimuth, 0, residual_mm, color=INK, linewidth=0.8)
+            ax.plot(azimuth, residual_mm, "o", color=INK, markersize=2.2, **light(azimuth))
+            ax.axhline(0, color="#445566", linewidth=0.5)
+            ax.set(xlim=_TURN, ylim=(-limit_mm, limit_mm), xticks=range(0, 361, 45))
+            ax.grid(True)
+            ax.set_title(
+                ", ".join(ring.title(words)), loc="left", fontsize=8, pad=2, parse_math=False
+            )
+        axes[-1].set_xlabel(words("azimuth"))
+        figure.supylabel(words("residual"), fontsize=8.5, x=0.005)
+        set_margins(figure, left=0.55, right=0.12, bottom=0.42, top=0.2, hspace=0.6)
+    return figure
+
+
+def polar_factor(rings):
+    """How many times larger than the tank the deviations of `polar` are drawn: 1, 2 or 5·10^n."""
+    largest = max(
+        max(np.max(np.abs(of), initial=0.0) for of in (ring.deviation_m, ring.residual_m))
+        / ring.radius_m
+        for ring in rings
+    )
+    return round_factor(0.25 / largest) if largest > 0 else 1
+
+
+def round_factor(wanted):
+    """The largest of 1, 2, 5 times a power of ten that is at most `wanted`, and at least 1."""
+    power = 10.0 ** floor(log10(wanted))
+    return max(1, round(power * max(step for step in (1, 2, 5) if step * power <= wanted)))
+
+
+def polar(rings, words=english, most=12):
+    """The sections about their circles, deviations enlarged by `polar_factor`."""
+    factor = polar_factor(rings)
+    return [_polar_panels(group, factor, words) for group in even_groups(rings, most)]
+
+
+def _polar_panels(rings, factor, words):
+    across = 3 if len(rings) <= 6 else 4
+    down = ceil(len(rings) / across)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, 5.4 / across * down))
+        axes = figure.subplots(down, across, squeeze=False).ravel()
+        turn = np.linspace(0, 2 * np.pi, 361)
+        for ax, ring in zip(axes, rings, strict=False):
+            ax.plot(np.sin(turn), np.cos(turn), color="#9aa5b1", linewidth=0.6)
+            line = _enlarged(ring.outline_deg, ring.deviation_m / ring.radius_m, factor)
+            closed = np.concatenate([line, line[:, :1]], axis=1)
+            ax.plot(*closed, color=INK)
+            residual = np.asarray(ring.residual_m) / ring.radius_m
+            points = _enlarged(ring.azimuth_deg, residual, factor)
+            few = points.shape[1] <= 200  # many would hide the outline: smaller, and below it
+            style = {"markersize": 2.2, "zorder": 3} if few else {"markersize": 1.0, "zorder": 1}
+            ax.plot(*points, ".", color=RED, **style, **light(points[0]))
+            ax.set(aspect="equal", xlim=(-1.32, 1.32), ylim=(-1.32, 1.32))
+            title = "\n".join(ring.title(words))
+            ax.text(0, 0, title, ha="center", va="center", fontsize=8, parse_math=False)
+        for ax in axes:
+            ax.axis("off")
+        figure.subplots_adjust(left=0, right=1, bottom=0, top=1, wspace=0, hspace=0)
+    return figure
+
+
+def _enlarged(azimuth_deg, deviation, factor):
+    azimuth = np.radians(azimuth_deg)
+    radius = 1 + factor * deviation
+    return np.array([radius * np.sin(azimuth), radius * np.cos(azimuth)])
+
+
+def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english):
+    """The wall unrolled: azimuth by height, every point coloured by its residual."""
+    residual_mm = 1e3 * np.asarray(residual_m)
+    limit = np.max(np.abs(residual_mm), initial=0.0) or 1.0
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, 2.6))
+        ax = figure.subplots()
+        size = 14 if len(azimuth_deg) <= 300 else 6
+        if len(azimuth_deg) > 3000:  # no room for edges: grey behind the points shows white ones
+            size = 2
+            ax.set_facecolor("#d5dae0")
+        shown = ax.scatter(
+            azimuth_deg, height_m, c=residual_mm, s=size, cmap="RdBu_r", vmin=-limit, vmax=limit,
+            edgecolors="#445566", linewidths=0.25 if size > 2 else 0, zorder=3,
+            **light(azimuth_deg),
+        )  # fmt: skip
+        ax.hlines(joints_m, *_TURN, color="#445566", linewidth=0.5)
+        ax.set(xlim=_TURN, xticks=range(0, 361, 45))
+        ax.set_xlabel(words("azimuth"))
+        ax.set_ylabel(words("height"))
+        bar = figure.colorbar(shown, ax=ax, pad=0.02, aspect=30)
+        bar.set_label(words("residual"))
+        figure.subplots_adjust(left=0.075, right=1.04, bottom=0.14, top=0.98)
+    return figure
+
+
+def capacity_curves(height_m, area_m2, U_m3, words=english):
+    """Litres per centimetre, and U, against height."""
+    litres_per_cm = 10.0 * np.array(area_m2, dtype=float)  # 1 m2 is 10 L/cm
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, 2.4))
+        left, right = figure.subplots(1, 2)
+        left.plot(height_m, litres_per_cm, color=INK)
+        left.set_ylabel(words("litres_per_cm"))
+        left.ticklabel_format(useOffset=False)
+        right.plot(height_m, U_m3, color=INK)
+        right.set_ylabel(words("U_m3"))
+        right.set_ylim(bottom=0)
+        for ax in (left, right):
+            ax.set_xlabel(words("height"))
+            ax.set_xlim(height_m[0], height_m[-1])
+            ax.grid(True)
+        set_margins(figure, left=0.65, right=0.12, bottom=0.42, top=0.08, wspace=0.3)
+    return figure
+
+
+def budget_bars(bars, words=english):
+    """The share of the variance of each input, in percent; defaults are pale.
+
+    bars  [(name, share of the variance, whether it is a default), ...]
+    """
+    bars = sorted((one for one in bars if abs(one[1]) >= LEAST_SHARE), key=lambda one: -one[1])
+    names = [textwrap.fill(name, LETTERS_OF_A_BAR) for name, _, _ in bars]
+    high = 0.24 if not any("\n" in name for name in names) else 0.32
+    colours = [PALE if is_default else INK for _, _, is_default in bars]
+    shares = [100 * share for _, share, _ in bars]
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, high * len(bars) + 0.6))
+        ax = figure.subplots()
+        ax.barh(range(len(bars)), shares, color=colours, height=0.6)
+        ax.set_yticks(range(len(bars)), names, parse_math=False)
+        ax.invert_yaxis()
+        ax.set_xlabel(words("share"))
+        ax.set_xlim(1.1 * min([0, *shares]), max([100, *(1.05 * share for share in shares)]))
+        ax.grid(True, axis="x")
+        ax.set_axisbelow(True)
+        set_margins(figure, left=2.9, right=0.2, bottom=0.42, top=0.05)
+    return figure
+
+
+def even_groups(items, most):
+    """The sections in figures, or the columns in tables, of nearly equal size."""
+    count = max(1, ceil(len(items) / most))
+    size = max(1, ceil(len(items) / count))
+    return [items[i : i + size] for i in range(0, len(items), size)]
+
+
+def light(points):
+    """Very many points are drawn as a picture inside the figure."""
+    return {"rasterized": len(points) > MANY}
+
+
+def set_margins(figure, left, right, bottom, top, **spaces):
+    """Margins in inches."""
+    width, height = figure.get_size_inches()
+    figure.subplots_adjust(
+        left=left / width, right=1 - right / width, bottom=bottom / height, top=1 - top / height,
+        **spaces,
+    )  # fmt: skip
