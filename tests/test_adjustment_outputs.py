@@ -296,7 +296,7 @@ def test_effect_at_the_edge_in_closed_form():
 def test_verdict_of_a_group(factor, redundancy, verdict):
     """Closed form: factor sqrt(r / chi2) is 1 at the ends of the interval that just hold it."""
     group = GroupOfReadings("distance", "tape 1", "m", 60, 0, redundancy, factor, 0.1, 0.001)
-    row = _group(group, SimpleNamespace(groups=(group,), readings=()))
+    row = _group(group)
     assert row["verdict"] == verdict
     sentences = verdict_sentences(load_words(), {"groups": [row]})
     assert len(sentences) == (verdict in ("worse", "better"))

@@ -191,7 +191,7 @@ def balanced(survey, adjust, *, rounds=20, tolerance=0.01):
         factors = {
             source: float(np.sqrt(square / redundancy))
             for source, (square, redundancy) in merged.items()
-            if redundancy > 1
+            if redundancy > 1 and square > 0  # residuals of 0 say nothing of an sd
         }
         for source, factor in factors.items():
             total[source] = total.get(source, 1.0) * factor

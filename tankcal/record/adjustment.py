@@ -32,7 +32,7 @@ def adjustment_of(adjustment, measurements=None):
     return {
         **_statistics(adjustment, settings),
         "datum": _datum(adjustment.datum),
-        "groups": [_group(group, adjustment) for group in adjustment.groups],
+        "groups": [_group(group) for group in adjustment.groups],
         "removed": [_reading(reading) for reading in adjustment.removed],
         "residuals": [_reading(reading) for reading in adjustment.readings],
         "cameras": cameras_of(adjustment, measurements),
@@ -102,7 +102,7 @@ def _reading(reading):
     return row
 
 
-def _group(group, adjustment):
+def _group(group):
     """A group with the 95 % interval of its true sd over the declared one, and what follows."""
     row = asdict(group)
     low = high = None
@@ -116,7 +116,6 @@ def _group(group, adjustment):
         "factor_low": low,
         "factor_high": high,
         "verdict": _verdict(group, low, high),
-        **_declared(group, adjustment),
     }
 
 
@@ -128,21 +127,6 @@ def _verdict(group, low, high):
     if low > 1:
         return "worse"
     return "better" if high < 1 else "as_declared"
-
-
-def _declared(group, adjustment):
-    """Smallest and largest declared sd; of one group among several of its kind the mean sd."""
-    same = [one for one in adjustment.groups if (one.kind, one.unit) == (group.kind, group.unit)]
-    if len(same) > 1:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            mean = group.rms / group.factor * np.sqrt(group.count / np.float64(group.redundancy))
-        return {"sd_smallest": mean, "sd_largest": mean}
-    sd = [
-        one.sd
-        for one in adjustment.readings
-        if (one.kind, one.unit) == (group.kind, group.unit) and not (one.check or one.removed)
-    ]
-    return {"sd_smallest": min(sd, default=None), "sd_largest": max(sd, default=None)}
 
 
 def _check_points(found):

@@ -27,6 +27,7 @@ from tankcal.surveys.victims import SOME, one_sided, set_aside, undecided
 
 SUSPICIOUS = 4.0  # sigma0 above which whole files are doubted
 SEVERAL = 0.05  # share of the values set aside, above which they are as well
+NOISELESS = 1e-6  # sigma0 of rounding alone: what was measured scatters more
 TRIED = 25  # iterations of a survey that is only supposed
 FILES = ("image_points.csv", "photos.csv", "control.csv")  # first in the list of readings
 
@@ -221,7 +222,14 @@ def _cov_scale(adjusted, settings):
     """Variance factor of the covariances that go on, and what is to be said about it."""
     if settings.scale != "a_posteriori":
         return 1.0, []
-    if adjusted.dof > 0 and adjusted.sigma0 > 0:
+    if adjusted.dof > 0 and adjusted.sigma0 > NOISELESS:
         return adjusted.sigma0**2, []
     text = message("nothing_redundant", "nothing is redundant: covariances keep the a-priori scale")
+    if adjusted.dof > 0:
+        text = message(
+            "nothing_scatters",
+            "all residuals are zero (sigma0 = {sigma0:.1g}): that is no measure of the readings,"
+            " and covariances keep the a-priori scale",
+            sigma0=adjusted.sigma0,
+        )
     return 1.0, [Problem("job.toml", text, None, "adjustment.scale")]

@@ -58,6 +58,7 @@ class GroupOfReadings:
     factor_sd   its sd, if the      nothing controls the group
                 declaration holds
     rms         of the residuals, in `unit`
+    sd_smallest, sd_largest         declared sds of the values adjusted; None: there are none
     """
 
     kind: str
@@ -69,6 +70,8 @@ class GroupOfReadings:
     factor: float
     factor_sd: float
     rms: float
+    sd_smallest: float | None = None
+    sd_largest: float | None = None
 
 
 @dataclass(frozen=True)

@@ -158,6 +158,8 @@ def _group(kind, name, unit, parts, repeated):
         factor = float(np.sqrt((np.sum((residual / sd) ** 2) + scatter[0]) / redundancy))
         factor_sd = float(1.0 / np.sqrt(2.0 * redundancy))
     rms = float(np.sqrt(np.mean(residual**2))) if len(residual) else np.nan
+    low, high = (float(sd.min()), float(sd.max())) if len(sd) else (None, None)
     return GroupOfReadings(
-        kind, name, unit, len(residual), count - len(residual), redundancy, factor, factor_sd, rms
-    )
+        kind, name, unit, len(residual), count - len(residual), redundancy, factor, factor_sd,
+        rms, low, high,
+    )  # fmt: skip
