@@ -8,10 +8,22 @@
 >>> job = tankcal.load("survey", only="adjustment")   # measurements without a tank
 >>> tankcal.adjust_job(job).xyz_m                     # adjusted points, with their covariance
 
+>>> result.plot("sections")                           # a drawing; `tankcal.plot` names them all
+
 Names are resolved when they are first used, so importing tankcal loads nothing heavy.
 """
 
 from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # what a type checker reads; nothing of it runs
+    from tankcal.chain import Result, adjust_job, run
+    from tankcal.errors import HeightError, InputError, SolutionError, TankcalError
+    from tankcal.job import Job, load
+    from tankcal.linter import lint
+    from tankcal.outputs import write
+    from tankcal.surveys import Adjustment
+    from tankcal.views import plot
 
 __version__ = "0.1.0"
 
@@ -21,16 +33,35 @@ _ROOM_OF = {
     "run": "chain",
     "adjust_job": "chain",
     "Result": "chain",
+    "Adjustment": "surveys",
+    "plot": "views",
     "write": "outputs",
+    "lint": "linter",
     "TankcalError": "errors",
     "InputError": "errors",
     "SolutionError": "errors",
+    "HeightError": "errors",
 }
 
-__all__ = ["__version__", *_ROOM_OF]
+__all__ = [
+    "Adjustment",
+    "HeightError",
+    "InputError",
+    "Job",
+    "Result",
+    "SolutionError",
+    "TankcalError",
+    "__version__",
+    "adjust_job",
+    "lint",
+    "load",
+    "plot",
+    "run",
+    "write",
+]
 
 
-def __getattr__(name):
+def __getattr__(name: str):
     if name not in _ROOM_OF:
         raise AttributeError(f"module 'tankcal' has no attribute {name!r}")
     return getattr(import_module(f"tankcal.{_ROOM_OF[name]}"), name)

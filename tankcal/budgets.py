@@ -7,9 +7,11 @@ Source: JCGM 100:2008 5.1.3, 5.2.2, 7.2.7.
 """
 
 from dataclasses import dataclass, replace
+from math import isnan
 
 import numpy as np
 
+from tankcal.display import table_html, volume_text
 from tankcal.distributions import within
 from tankcal.gum import BudgetRow
 from tankcal.uncertainty import Source, coverage_factor, declared_source, effective_dof
@@ -43,6 +45,26 @@ class Budget:
     def reading_U_m3(self):
         """k times what reading adds: the standard uncertainties of its lines, by squares."""
         return self.k * max(self.u_m3**2 - self.table_u_m3**2, 0.0) ** 0.5
+
+    def __str__(self) -> str:
+        dips = (
+            f"{self.high_m:g} m" if self.low_m is None else f"{self.low_m:g} to {self.high_m:g} m"
+        )
+        return f"{dips}: {volume_text(self.volume_m3, self.U_m3, self.k)}"
+
+    def _repr_html_(self) -> str:
+        ordered = sorted(self.lines, key=lambda one: -abs(one.share))
+        rows = [
+            [
+                one.name + (" (default)" if one.is_default else ""),
+                None if isnan(one.u) else one.u,
+                one.unit,
+                one.contribution,
+                100 * one.share,
+            ]
+            for one in ordered
+        ]
+        return table_html(str(self), ["input", "u", "unit", "contribution, m3", "share, %"], rows)
 
 
 def reading_sources(declared, largest_interpolation_m3):

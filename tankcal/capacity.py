@@ -7,9 +7,11 @@ Source: JCGM 100:2008 5.2, JCGM 102:2011 6.2; degrees of freedom by Welch-Satter
 
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 
 import numpy as np
 
+from tankcal.display import volume_text
 from tankcal.errors import HeightError
 from tankcal.uncertainty import Source, coverage_factor, effective_dof
 
@@ -30,6 +32,12 @@ class Quantity:
     k: float
     U_m3: float
     for_use: bool = True
+
+    def __str__(self) -> str:
+        return volume_text(self.value_m3, self.U_m3, self.k)
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(str(self))}{'' if self.for_use else ', not for use'}</p>"
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,21 @@
 """The main job on one screen: a checked job in; wall, parts and the capacity table out."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from tankcal import dips
 from tankcal.body import Body
-from tankcal.capacity import Capacity
+from tankcal.budgets import Budget, budget, reading_sources
+from tankcal.capacity import Capacity, Quantity
 from tankcal.corrections import Correction, corrections_of
-from tankcal.dips import ProportionalParts, Straightness, proportional_parts
+from tankcal.digits import decimals_of_height, fixed
+from tankcal.dips import Dips, ProportionalParts, Straightness, proportional_parts
+from tankcal.display import table_html, volume_text
 from tankcal.doubts import incomplete_certificate, of_adjustment, refuse_undetermined
 from tankcal.errors import HeightError, InputError, Problem, SolutionError
 from tankcal.job import Job
@@ -22,7 +28,12 @@ from tankcal.statements import Statements, pairs_to_simulate, statements, verdic
 from tankcal.surveys import Adjustment, adjust_survey, wall_points
 from tankcal.tabling import doubts_of_table, tabled
 from tankcal.tanks import body_of, shell_volume
+from tankcal.views import plot
+from tankcal.volumes import ShellVolume
 from tankcal.wall import Wall, among_themselves, find_wall
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 MILLIMETRE, PARTS = 0.001, 10  # of a step of the tables that proportional parts are for
 TOLD = 10  # warnings of the adjustment that are told when there is no wall
@@ -57,7 +68,7 @@ class Result:
     straightness: Straightness
     proportional_parts: tuple[ProportionalParts, ...]
     corrections: tuple[Correction, ...]
-    by_density: dict
+    by_density: dict[float, np.ndarray]
     stated: Statements
     simulation: TableSimulation | None
     intervals: Intervals
@@ -65,31 +76,71 @@ class Result:
     warnings: tuple[Problem, ...]
     adjustment: Adjustment | None = None
 
-    def __repr__(self):
-        top = self.at(self.table.height_m[-1])
+    def __str__(self) -> str:
+        top_m = self.table.height_m[-1]
+        k = self.table.k[-1] if self.intervals.by_gum[-1] else None
+        top = volume_text(self.table.volume_m3[-1], self.intervals.U_m3[-1], k)
         points = ""
         if self.accepted is not None:
-            points = f", {len(self.accepted)} of {len(self.job.points.names)} points"
+            points = f"; {len(self.accepted)} of {len(self.job.points.names)} points of the wall"
+        return f"{self.job.tank.id}: {top} at {fixed(top_m, decimals_of_height(top_m))} m{points}"
+
+    def __repr__(self) -> str:
+        return f"<tankcal.Result of {self}>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [one.code, "yes" if one.applied else "no", one.size_m3, one.size_percent]
+            for one in self.corrections
+        ]
+        warnings = "".join(f"<li>{escape(str(one))}</li>" for one in self.warnings)
         return (
-            f"<tankcal.Result of {self.job.tank.id}: {top.value_m3:.3f} m3 at "
-            f"{self.table.height_m[-1]:.3f} m, U = {self.intervals.U_m3[-1]:.3f} m3{points}>"
+            f"<p><b>{escape(str(self))}</b></p>"
+            + table_html("Corrections at the top", ["correction", "made", "m3", "%"], rows)
+            + (f"<p>Warnings:</p><ul>{warnings}</ul>" if warnings else "")
         )
 
+    def plot(self, what: str | None = None) -> "Figure":
+        """A drawing of the result, by the names that `tankcal.plot` takes."""
+        return plot(self, what)
+
+    def budget(
+        self, high_m: float | None = None, low_m: float | None = None, *, reading: bool = False
+    ) -> Budget:
+        """What the uncertainty of a volume, or of a delivery, consists of.
+
+        Parameters
+        ----------
+        high_m, low_m : float, optional
+            Dips, m; without `high_m` the top row, without `low_m` the volume below `high_m`.
+        reading : bool
+            Whether what reading the table adds (interpolation, rounding) is in it.
+
+        Raises
+        ------
+        HeightError
+            For a dip outside the table.
+        """
+        high_m = float(self.table.height_m[-1]) if high_m is None else high_m
+        largest_m3 = self.straightness.largest_m3
+        added = reading_sources(self.job.inputs, largest_m3) if reading else ()
+        return budget(self.table, high_m, low_m, added)
+
     @property
-    def accepted(self):
+    def accepted(self) -> np.ndarray | None:
         """(m,) indices of the points that are of the wall; None where none were surveyed."""
         found = self.wall or self.scan
         return None if found is None else found.accepted
 
     @property
-    def gross(self):
+    def gross(self) -> ShellVolume | None:
         """The shell as surveyed, without any correction (`volumes.ShellVolume`); else None."""
         if self.wall is None:
             return None
         return shell_volume(self.job.courses, self.wall.joints_m, self.wall.sections)
 
     @property
-    def capacity(self):
+    def capacity(self) -> pd.DataFrame:
         """The capacity table: height_m, volume_m3, u_m3, k, U_m3; with a floating roof for_use."""
         table = self.table
         columns = {
@@ -103,11 +154,18 @@ class Result:
             columns["for_use"] = table.for_use(table.height_m)
         return pd.DataFrame(columns)
 
-    def at(self, height_m):
+    def at(self, height_m: float) -> Quantity:
         """Volume at a dip, with its uncertainty (`capacity.Quantity`); HeightError outside."""
         return self.table.at(height_m)
 
-    def in_service_m3(self, height_m, liquid_c, ambient_c=None, *, insulated=False):
+    def in_service_m3(
+        self,
+        height_m: float,
+        liquid_c: float,
+        ambient_c: float | None = None,
+        *,
+        insulated: bool = False,
+    ) -> float:
         """Volume at a dip of a shell that the liquid keeps at another temperature: V times CTSh.
 
         ambient_c  needed for a shell that is not insulated (`service.shell_temperature_c`)
@@ -117,12 +175,12 @@ class Result:
         factor = shell_factor(shell_c, reference, expansion.expansion_per_k)
         return self.at(height_m).value_m3 * factor
 
-    def dip_of(self, volume_m3):
+    def dip_of(self, volume_m3: float | np.ndarray) -> Dips:
         """(n,) dips of volumes, with their standard uncertainties (`dips.Dips`); HeightError."""
         table = self.table
         return dips.dips_of(table.height_m, table.volume_m3, table.factor_m3, volume_m3)
 
-    def at_ullage(self, ullage_m):
+    def at_ullage(self, ullage_m: float) -> Quantity:
         """Volume at an ullage, measured down from the reference point of the gauge.
 
         Raises HeightError outside the table, and without a reference height in the job.
@@ -132,12 +190,18 @@ class Result:
             raise HeightError("no ullage without datum.reference_height_m in the job")
         return self.at(float(dips.ullage_m(reference, ullage_m)))
 
-    def delivery(self, low_m, high_m):
+    def delivery(self, low_m: float, high_m: float) -> Quantity:
         """Volume between two dips, with its own uncertainty; HeightError outside."""
         return self.table.delivery(low_m, high_m)
 
 
-def run(job, progress=None, *, counting=None, simulated=None):
+def run(
+    job: Job,
+    progress: Callable[[str], None] | None = None,
+    *,
+    counting: Callable[[str, int, int], None] | None = None,
+    simulated: bool | None = None,
+) -> Result:
     """Compute a job: adjusted points, wall and axis, parts of the tank, table with covariance.
 
     progress  called with a line of text as each step begins
@@ -207,7 +271,7 @@ def _warnings(job, adjustment, wall, made):
     )
 
 
-def adjust_job(job, progress=None):
+def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjustment:
     """Adjust the survey of a job, whether it has a tank or not: a `surveys.Adjustment`.
 
     progress  called with a line of text as each step begins

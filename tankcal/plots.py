@@ -11,6 +11,7 @@ from math import ceil, floor, log10
 
 import matplotlib
 import numpy as np
+from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
 logging.getLogger("matplotlib").setLevel(logging.ERROR)  # no remark about its font cache on paper
@@ -235,6 +236,41 @@ def budget_bars(bars, words=english):
         ax.grid(True, axis="x")
         ax.set_axisbelow(True)
         set_margins(figure, left=2.9, right=0.2, bottom=0.42, top=0.05)
+    return figure
+
+
+def network(names, xy_m, covariance_m2, most_names=60):
+    """Points from above with their standard error ellipses, enlarged.
+
+    names          (n,) of the points, written where there are at most `most_names`
+    xy_m           (n, 2)
+    covariance_m2  (n, 2, 2) of x and y of each point
+    """
+    xy_m = np.asarray(xy_m, dtype=float)
+    variances, axes = np.linalg.eigh(covariance_m2)
+    half_m = np.sqrt(np.maximum(variances, 0.0))
+    extent = float(np.ptp(xy_m, axis=0).max()) or 1.0
+    largest = float(half_m.max(initial=0.0))
+    factor = round_factor(0.04 * extent / largest) if largest > 0 else 1
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, 4.6))
+        ax = figure.subplots()
+        width, height = 2 * factor * half_m[:, 1], 2 * factor * half_m[:, 0]
+        turn = np.degrees(np.arctan2(axes[:, 1, 1], axes[:, 0, 1]))
+        ellipses = EllipseCollection(
+            width, height, turn, units="xy", offsets=xy_m, offset_transform=ax.transData,
+            facecolors="none", edgecolors=RED, linewidths=0.6,
+        )  # fmt: skip
+        ax.add_collection(ellipses)
+        ax.plot(*xy_m.T, ".", color=INK, markersize=2.5, **light(xy_m))
+        if len(names) <= most_names:
+            for name, place in zip(names, xy_m, strict=True):
+                ax.annotate(
+                    name, place, (2, 2), textcoords="offset points", fontsize=6, parse_math=False
+                )
+        ax.set(aspect="equal", xlabel="x / m", ylabel="y / m")
+        ax.set_title(f"standard error ellipses, {factor} times", loc="left", fontsize=8)
+        ax.grid(True)
     return figure
 
 

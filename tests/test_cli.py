@@ -42,13 +42,6 @@ def test_help_loads_nothing_heavy():
     assert subprocess.run([sys.executable, "-c", code], stdout=subprocess.DEVNULL).returncode == 0
 
 
-def test_no_command_is_no_traceback(capsys):
-    with pytest.raises(SystemExit) as stop:
-        main([])
-    assert stop.value.code == 2
-    assert "usage" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("job", ["nowhere", "nowhere.xlsx", "\0", "x" * 5000])
 def test_a_job_that_is_not_there(job, capsys):
     assert main(["run", job]) == 2

@@ -6,6 +6,7 @@ import sys
 
 import tankcal
 from tankcal.cli import camera, linting, planning, reporting, running, starting
+from tankcal.cli.machine import failure, print_json
 from tankcal.errors import TankcalError
 
 DESCRIPTION = """\
@@ -36,9 +37,15 @@ the job format: docs/job-format.md; axes, signs and units: docs/conventions.md""
 def main(arguments=None):
     """Run the command line; returns the exit status."""
     options = _options(arguments)
+    if options.command is None:
+        options.shown.print_help()
+        return 0
     try:
         return options.command(options) or 0
     except TankcalError as error:
+        if getattr(options, "json", False):
+            print_json(**failure(error))
+            return error.exit_status
         for line in str(error).splitlines():
             print(f"tankcal: {line}", file=sys.stderr)
         return error.exit_status
@@ -81,7 +88,8 @@ def _parser():
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"tankcal {tankcal.__version__}")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    parser.set_defaults(command=None, shown=parser)
+    commands = parser.add_subparsers(metavar="COMMAND")
 
     for room in (running, reporting, starting, planning, linting, camera):
         room.add(commands)

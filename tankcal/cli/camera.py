@@ -15,7 +15,8 @@ def add(commands):
         description="Examine, compare and convert cameras and their calibrations, and read targets "
         "from photographs. docs/camera.md says what is computed and how to read it.",
     )
-    kinds = camera.add_subparsers(required=True, metavar="WHAT")
+    camera.set_defaults(command=None, shown=camera)
+    kinds = camera.add_subparsers(metavar="WHAT")
     for add_one in (_parameters, _compare, _influence, _check, _convert, _read):
         add_one(kinds)
 

@@ -1,6 +1,7 @@
 """`tankcal lint`: mistakes in any capacity table."""
 
 from tankcal.cli.arguments import positive
+from tankcal.cli.machine import add_json, print_json, problem_of
 from tankcal.cli.showing import counted, prepare_for_small_work
 from tankcal.errors import InputError, Problem
 
@@ -27,6 +28,7 @@ def add(commands):
         ("height", "M", "height that the last row is meant to have, m"),
     ):
         lint.add_argument(f"--nominal-{name}", metavar=unit, type=positive, help=what)
+    add_json(lint)
     lint.set_defaults(command=_lint)
 
 
@@ -39,6 +41,9 @@ def _lint(options):
         raise InputError(Problem("--nominal-diameter", expected))
     nominal = Nominal(options.nominal_volume, options.nominal_diameter, options.nominal_height)
     report = lint(options.file, nominal, options.sheet)
+    if options.json:
+        print_json(exit_status=2 if report.errors else 0, **_plain(report))
+        return 2 if report.errors else 0
     for finding in report.findings[:MOST_FINDINGS]:
         print(finding)
     more = len(report.findings) - MOST_FINDINGS
@@ -49,3 +54,13 @@ def _lint(options):
         print(summary)
     print(f"{counted(report.errors, 'error')}, {counted(warnings, 'warning')}")
     return 2 if report.errors else 0
+
+
+def _plain(report):
+    findings = [{"severity": one.severity, **problem_of(one.problem)} for one in report.findings]
+    return {
+        "errors": report.errors,
+        "warnings": len(report.findings) - report.errors,
+        "summaries": list(map(str, report.summaries)),
+        "findings": findings,
+    }

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import tankcal
+from tankcal.cli.machine import add_json, print_json, problem_of
 from tankcal.cli.reporting import add_letterhead, letterhead_of
 from tankcal.cli.showing import Progress, counted, listed, prepare_for_small_work, warn
 from tankcal.digits import PROGRAM, decimals_of_height, fixed, with_digits, written
@@ -54,6 +55,7 @@ def _add_run(commands):
     )
     add_letterhead(run)
     run.add_argument("--quiet", action="store_true", help="no progress, only problems")
+    add_json(run)
     run.set_defaults(command=_run)
 
 
@@ -61,7 +63,9 @@ def _run(options):
     source = Path(options.job)
     out = Path(options.out) if options.out else _default_out(source)
     compute = _adjust if options.only == "adjustment" else _compute
-    compute(source, out, options.quiet, options.strict, letterhead_of(options))
+    tell = _tell_machine if options.json else _tell
+    quiet = options.quiet or options.json
+    compute(source, out, quiet, options.strict, letterhead_of(options), tell)
 
 
 def _default_out(source):
@@ -76,7 +80,54 @@ def _demo(options):
     _compute(shipped("examples") / "silva-1995", Path(options.out), options.quiet)
 
 
-def _compute(source, out, quiet, strict=False, letterhead=None):
+def _tell(out, paths, warnings, result, adjustment):
+    """Warnings, a summary and the files, for a person."""
+    warn(warnings)
+    if adjustment is not None:
+        print(_summary(adjustment))
+    if result is not None:
+        print(_capacity(result))
+    listed(out, paths)
+
+
+def _tell_machine(out, paths, warnings, result, adjustment):
+    """The same as one JSON object."""
+    print_json(
+        exit_status=0,
+        out=str(out),
+        files=[path.name for path in paths],
+        tank=None if result is None else result.job.tank.id,
+        top=None if result is None else _top(result),
+        adjustment=None if adjustment is None else _fit(adjustment),
+        warnings=[problem_of(one) for one in warnings],
+    )
+
+
+def _top(result):
+    """The top row: numbers in full, k null where U is Monte Carlo's."""
+    table, stated = result.table, result.intervals
+    return {
+        "height_m": float(table.height_m[-1]),
+        "volume_m3": float(table.volume_m3[-1]),
+        "u_m3": float(table.u_m3[-1]),
+        "U_m3": float(stated.U_m3[-1]),
+        "k": float(table.k[-1]) if stated.by_gum[-1] else None,
+        "coverage_probability": table.probability,
+    }
+
+
+def _fit(adjustment):
+    tested = adjustment.redundancy > 0
+    return {
+        "points": len(adjustment.names),
+        "redundancy": adjustment.redundancy,
+        "sigma0": float(adjustment.sigma0) if tested else None,
+        "global_test_passed": bool(adjustment.adjusted.test().passed) if tested else None,
+        "set_aside": len(adjustment.removed),
+    }
+
+
+def _compute(source, out, quiet, strict=False, letterhead=None, tell=_tell):
     prepare_for_small_work()
     from tankcal import outputs
 
@@ -90,11 +141,7 @@ def _compute(source, out, quiet, strict=False, letterhead=None):
         _refuse_failed(adjustment)
     paths = outputs.write(result, out, show.part, letterhead)
     show.end()
-    warn(result.warnings)
-    if adjustment is not None:
-        print(_summary(adjustment))
-    print(_capacity(result))
-    listed(out, paths)
+    tell(out, paths, result.warnings, result, adjustment)
 
 
 def _capacity(result):
@@ -115,7 +162,7 @@ def _capacity(result):
     )
 
 
-def _adjust(source, out, quiet, strict, letterhead):
+def _adjust(source, out, quiet, strict, letterhead, tell=_tell):
     prepare_for_small_work()
     from tankcal import outputs
 
@@ -128,9 +175,7 @@ def _adjust(source, out, quiet, strict, letterhead):
         _refuse_failed(adjustment)
     paths = outputs.write_adjustment(job, adjustment, out, show.part, letterhead)
     show.end()
-    warn(dict.fromkeys((*job.warnings, *adjustment.warnings)))
-    print(_summary(adjustment))
-    listed(out, paths)
+    tell(out, paths, dict.fromkeys((*job.warnings, *adjustment.warnings)), None, adjustment)
 
 
 def _refuse_failed(adjustment):

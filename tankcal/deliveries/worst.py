@@ -14,6 +14,7 @@ import numpy as np
 from tankcal.capacity import SAME_M
 from tankcal.deliveries.blocks import Search, bounds_of, kids_of, levels_of
 from tankcal.deliveries.pairs import CHUNK, Groups, Rows, between
+from tankcal.display import volume_text
 
 TOLERANCE = 1e-6  # relative: the worst delivery is found to this part of itself
 
@@ -30,6 +31,11 @@ class Delivery:
     k: float
     U_m3: float
     relative: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.low_m:g} to {self.high_m:g} m: {volume_text(self.volume_m3, self.U_m3, self.k)}"
+        )
 
 
 @dataclass(frozen=True)

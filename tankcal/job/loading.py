@@ -1,5 +1,6 @@
 """From a folder or a workbook to a checked `Job`, or to every problem that it has."""
 
+from os import PathLike
 from pathlib import Path
 
 from tankcal.job.attached import Attached, read_mesh_file
@@ -11,6 +12,7 @@ from tankcal.job.entries import kind_of, read_columns, read_register, read_setti
 from tankcal.job.folder import read_folder
 from tankcal.job.making import make_frame, make_job
 from tankcal.job.measuring import make_measurements
+from tankcal.job.model import Job
 from tankcal.job.rule_files import find_rule
 from tankcal.job.sheets import expected_sheets, read_workbook
 from tankcal.job.tables import (
@@ -26,7 +28,7 @@ from tankcal.job.tables import (
 OTHER_WORKBOOKS = (".xls", ".xlsm", ".xlsb", ".xltx", ".ods", ".numbers")
 
 
-def load(path, only=None):
+def load(path: str | PathLike, only: str | None = None) -> Job:
     """The Job in a folder, in the folder of a job.toml, or in a workbook (.xlsx).
 
     only  "adjustment": the survey alone is needed. Of the rest what is there is read and its values

@@ -1,15 +1,17 @@
 """From a file to findings."""
 
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
+from tankcal.display import table_html
 from tankcal.errors import InputError, Problem
 from tankcal.job.tables import Log, nearest
 from tankcal.linter.grids import read_grids
 from tankcal.linter.heights import series_of
 from tankcal.linter.layout import tables_of
 from tankcal.linter.parts import MOST_PARTS, check_parts
-from tankcal.linter.totals import NOTHING_NOMINAL, check_totals, units_of
+from tankcal.linter.totals import NOTHING_NOMINAL, Nominal, check_totals, units_of
 from tankcal.linter.volumes import volumes_of
 
 _PART_OF_LARGEST = 0.5  # of its rows: smaller tables beside it are not capacity tables
@@ -40,8 +42,22 @@ class Report:
         """Number of findings that are errors."""
         return sum(finding.severity == "error" for finding in self.findings)
 
+    def __str__(self) -> str:
+        warnings = len(self.findings) - self.errors
+        return f"{self.errors} errors, {warnings} warnings"
 
-def lint(path, nominal=NOTHING_NOMINAL, sheet=None):
+    def _repr_html_(self) -> str:
+        rows = [
+            [one.severity, one.problem.row, one.problem.column, str(one.problem.expected)]
+            for one in self.findings
+        ]
+        caption = "; ".join([*self.summaries, str(self)])
+        return table_html(caption, ["", "row", "column", "finding"], rows)
+
+
+def lint(
+    path: str | PathLike, nominal: Nominal = NOTHING_NOMINAL, sheet: str | None = None
+) -> Report:
     """`Report` on the capacity table in a file.
 
     path     a CSV file, an Excel workbook (.xlsx), or a record.json of tankcal

@@ -1,7 +1,10 @@
 """Everything that a run leaves behind, written all or nothing."""
 
 import shutil
+from collections.abc import Callable
+from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tankcal import folders, report, workbook
 from tankcal import record as records
@@ -10,12 +13,21 @@ from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.languages import LANGUAGES
 from tankcal.outputs import tables
 
+if TYPE_CHECKING:
+    from tankcal.chain import Result
+    from tankcal.report.letterhead import Letterhead
+
 RECORD = "record.json"
 WORKBOOKS = ("capacity.xlsx", "adjustment.xlsx")
 FILES = (RECORD, *tables.FILES, *WORKBOOKS, *report.FILES, report.LETTERHEAD)
 
 
-def write(result, directory, progress=None, letterhead=None):
+def write(
+    result: "Result",
+    directory: str | PathLike,
+    progress: Callable[[str, int, int], None] | None = None,
+    letterhead: "Letterhead | None" = None,
+) -> list[Path]:
     """Write record, CSV files, workbook, notebook, PDFs and HTML of a `chain.Result`.
 
     directory   made when missing; earlier results there are replaced when all is written, and a

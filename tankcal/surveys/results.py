@@ -4,8 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.digits import fixed
+from tankcal.display import table_html
 from tankcal.job.measurements import RejectedReadings
 from tankcal.network import Adjusted
+
+_SHOWN = 20  # points that an adjustment shows of itself
 
 
 @dataclass(frozen=True)
@@ -174,7 +178,7 @@ class DepthOfField:
     left: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Adjustment:
     """The adjusted survey. Covariances are scaled as `cov_scale` says.
 
@@ -221,6 +225,36 @@ class Adjustment:
     doubts: tuple = ()
     repeats: RepeatedReadings | None = None
     depth: DepthOfField | None = None
+
+    def __str__(self) -> str:
+        fit = "nothing redundant"
+        if self.redundancy > 0:
+            test = "passed" if self.adjusted.test().passed else "FAILED"
+            fit = f"sigma0 = {fixed(self.sigma0, 3)}, global test {test}"
+        aside = f", {len(self.removed)} readings set aside" if self.removed else ""
+        return f"{len(self.names)} points, redundancy {self.redundancy}, {fit}{aside}"
+
+    def __repr__(self) -> str:
+        return f"<tankcal.Adjustment of {self}>"
+
+    def _repr_html_(self) -> str:
+        sd_mm = 1000 * np.sqrt(np.einsum("nii->ni", self.covariance_m2))
+        rows = [
+            [name, *(fixed(value, 4) for value in xyz), *(fixed(value, 2) for value in sd)]
+            for name, xyz, sd in zip(self.names[:_SHOWN], self.xyz_m, sd_mm, strict=False)
+        ]
+        more = len(self.names) - _SHOWN
+        headings = ["point", "x, m", "y, m", "z, m", "sx, mm", "sy, mm", "sz, mm"]
+        table = table_html(f"Adjustment: {self}", headings, rows)
+        return table + (f"<p>and {more} more points</p>" if more > 0 else "")
+
+    @property
+    def points(self) -> dict:
+        """The adjusted points by columns, as `pandas.DataFrame` takes them: m, and sds in mm."""
+        sd_mm = 1000 * np.sqrt(np.einsum("nii->ni", self.covariance_m2))
+        columns = {"point": list(self.names)}
+        columns |= {f"{axis}_m": self.xyz_m[:, i] for i, axis in enumerate("xyz")}
+        return columns | {f"s{axis}_mm": sd_mm[:, i] for i, axis in enumerate("xyz")}
 
     @property
     def dof(self):

@@ -1,0 +1,44 @@
+"""What `--json` prints: one JSON object on standard output, for programs that call tankcal."""
+
+import json
+import sys
+
+from tankcal.errors import InputError
+from tankcal.messages import as_plain
+
+
+def add_json(parser):
+    """The option `--json` of a command."""
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print one JSON object instead of lines of text, when it fails too; implies --quiet",
+    )
+
+
+def print_json(**values):
+    """Print one object; numbers that do not exist are null."""
+    json.dump(values, sys.stdout, ensure_ascii=False, allow_nan=False, indent=1)
+    print()
+
+
+def failure(error):
+    """What is printed of a `TankcalError`: its problems, and the exit status that follows."""
+    problems = error.problems if isinstance(error, InputError) else ()
+    return {
+        "exit_status": error.exit_status,
+        "problems": [problem_of(one) for one in problems],
+        "error": None if problems else str(error),
+    }
+
+
+def problem_of(problem):
+    """A `Problem` as the record writes warnings: place, text in English, code and values."""
+    return {
+        "file": problem.file,
+        "row": problem.row,
+        "column": problem.column,
+        "cell": problem.cell,
+        "text": str(problem.expected),
+        **as_plain(problem.expected),
+    }
