@@ -42,6 +42,14 @@ def example_record(example_result, tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="session")
+def records_of_kinds(tmp_path_factory):
+    """{kind: record} that together fill every sheet of the workbook; nobody changes them."""
+    from workbook_records import records_of_every_kind
+
+    return records_of_every_kind(tmp_path_factory.mktemp("kinds"))
+
+
 @pytest.fixture
 def figure(record_property):
     """Call figure("what", value) to show a measured figure in the summary of the test run."""

@@ -185,7 +185,7 @@ def test_missing_word_is_an_error(example_record):
 def test_a_file_that_is_no_record_is_an_error(tmp_path):
     path = tmp_path / "record.json"
     path.write_text('{"format": "tankcal-record/9"}', encoding="utf-8")
-    with pytest.raises(TankcalError, match=r"expected .tankcal-record/1"):
+    with pytest.raises(TankcalError, match=r"expected .tankcal-record/2"):
         Paper(path)
 
 

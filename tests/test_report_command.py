@@ -9,6 +9,7 @@ import pytest
 from tankcal import outputs
 from tankcal.cli import main
 from tankcal.errors import TankcalError
+from tankcal.record import FORMAT
 from tankcal.report import attachments, blocks
 from tankcal.report.pdf import pdf
 
@@ -66,7 +67,18 @@ def test_the_covariance_that_no_record_holds_is_taken_over(again, tmp_path):
     [
         ({"format": "tankcal-record/9"}, [], "record.json: found format 'tankcal-record/9'"),
         ("no json", [], "record.json: cannot be read as a record"),
-        ({"capacity": {}, "points": 7}, [], "record.json: does not hold what a record does"),
+        (
+            {"capacity": {}, "points": 7},
+            [],
+            f"record.json: found format {FORMAT} without capacity.",
+        ),
+        ({"rejected": {}, "gross": 7}, [], f"record.json: found format {FORMAT} without gross."),
+        ({"deadwood": [7]}, [], "record.json: found format"),
+        (
+            {"densities": [{"density_kg_m3": "x", "volume_m3": []}]},
+            [],
+            "record.json: does not hold what a record does",
+        ),
         ({}, ["--language", "pt"], "--language: found 'pt'; expected one of en, pt-BR, es"),
         ({}, ["--letterhead", "none.toml"], "none.toml: not found"),
     ],

@@ -7,7 +7,7 @@ import openpyxl
 import pandas as pd
 import pytest
 from openpyxl.utils import range_boundaries
-from workbook_records import KINDS, records_of_every_kind
+from workbook_records import KINDS
 
 from tankcal import workbook
 from tankcal.languages import LANGUAGES
@@ -20,8 +20,8 @@ SHORT_DATE = "mm-dd-yy"  # Excel's format 14, which each system shows in its own
 
 
 @pytest.fixture(scope="module")
-def records(tmp_path_factory):
-    return records_of_every_kind(tmp_path_factory.mktemp("records"))
+def records(records_of_kinds):
+    return records_of_kinds
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import zipfile
 import openpyxl
 import pytest
 from invented_language import bracketed, without_brackets
-from workbook_records import KINDS, records_of_every_kind
+from workbook_records import KINDS
 
 from tankcal import workbook
 from tankcal.shipped import shipped
@@ -21,8 +21,8 @@ UNITS = {"ppm", "arcsec"}
 
 
 @pytest.fixture(scope="module")
-def records(tmp_path_factory):
-    return records_of_every_kind(tmp_path_factory.mktemp("records"))
+def records(records_of_kinds):
+    return records_of_kinds
 
 
 def texts_in(value):

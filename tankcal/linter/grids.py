@@ -9,8 +9,8 @@ from tankcal.job.excel import MAX_COLUMNS, Unreadable, read_sheets
 from tankcal.job.folder import decode
 from tankcal.job.sheets import is_read
 from tankcal.job.tables import read_bytes, shown
+from tankcal.record import FORMAT, version_of
 
-RECORD_FORMAT = "tankcal-record/1"
 MOST_COLUMNS, MOST_LINES = MAX_COLUMNS, 200_000
 _BY_CERTAINTY = (";", "\t", ",")  # a comma may be a decimal mark
 
@@ -73,11 +73,13 @@ def _record(file, text, log):
         record = json.loads(text)
         table = record["capacity"]
         columns = [list(table[key]) for key in ("height_m", "volume_m3")]
-        is_ours = record["format"] == RECORD_FORMAT
+        is_ours = version_of(record) is not None
     except (ValueError, KeyError, TypeError, RecursionError):
         is_ours = False
     if not is_ours:
-        log.problem(file, f"not a record of tankcal; expected format {RECORD_FORMAT!r}")
+        log.problem(
+            file, f"not a record of tankcal; expected format {FORMAT!r} or an older version of it"
+        )
         return ()
     if len(columns[0]) != len(columns[1]):
         found = f"{len(columns[0])} heights and {len(columns[1])} volumes"

@@ -4,8 +4,12 @@ import json
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
+from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
 
-FORMAT = "tankcal-record/1"
+__all__ = [
+    "FORMAT", "VERSION", "load", "migrated", "record_of", "record_of_adjustment", "save",
+    "version_of",
+]  # fmt: skip
 
 
 def record_of(result):
@@ -29,13 +33,13 @@ def save(record, path):
 
 
 def load(path):
-    """Read a record; raises InputError when it is no record of this format."""
+    """Read a record of this version, or of an older one, to which is added what it did not have.
+
+    Raises InputError, in one line, when it is no record or of a version that cannot be read.
+    """
     name = Path(path).name
     try:
         record = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(Problem(name, f"cannot be read as a record: {error}")) from error
-    found = record.get("format") if isinstance(record, dict) else None
-    if found != FORMAT:
-        raise InputError(Problem(name, f"found format {found!r}, expected {FORMAT!r}"))
-    return record
+    return migrated(record, name)
