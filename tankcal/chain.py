@@ -231,7 +231,8 @@ def run(
     body, zero, table = made.body, made.zero_m, made.table
     tell("stating volumes and deliveries")
     stated = statements(job, table, made.straightness.largest_m3)
-    simulation, intervals = None, gum_intervals(table)
+    simulation = None
+    intervals = gum_intervals(table.volume_m3, table.u_m3, table.U_m3)
     wanted = job.table.monte_carlo if simulated is None else simulated
     if wanted and table.sources:
         tell("simulating the table")

@@ -60,3 +60,16 @@ class HeightError(TankcalError, ValueError):
     """A height outside the capacity table was asked for; a table is never extrapolated."""
 
     exit_status = 2
+
+
+class ProgramError(TankcalError):
+    """A result that contradicts itself, such as an interval that leaves its volume out.
+
+    The mistake is tankcal's, not the user's: nothing is written, and the message says so.
+    """
+
+    def __init__(self, message):
+        super().__init__(
+            f"{message}: this contradicts itself, so nothing is stated. It is a mistake of "
+            "tankcal; please report it with the job"
+        )

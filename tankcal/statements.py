@@ -76,7 +76,7 @@ def _printed(intervals, simulation):
         return Printed(intervals.U_m3)
     delivered = simulation.delivered
     U = delivered.U_m3
-    printed = simulation.of_deliveries[1].stated(delivered.volume_m3, U)
+    printed = simulation.of_delivered.U_m3
     ratio = np.divide(printed, U, out=np.ones(len(U)), where=U > 0)
     factor = np.max(ratio[simulation.smooth], initial=1.0)
     pairs = zip(delivered.low_m.tolist(), delivered.high_m.tolist(), strict=True)

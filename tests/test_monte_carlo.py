@@ -5,7 +5,9 @@ import pytest
 from scipy import stats
 
 from tankcal.distributions import Normal, Rectangular, StudentT, Triangular, UShaped, within
+from tankcal.errors import ProgramError
 from tankcal.monte_carlo import Goal, QuadraticRows, numerical_tolerance, simulate, verdict
+from tankcal.monte_carlo.goal import simulation
 from tankcal.monte_carlo.inputs import inputs_of
 from tankcal.monte_carlo.linear import linear_law, shapes_of
 from tankcal.uncertainty import coverage_factor
@@ -259,3 +261,30 @@ def test_correlated_inputs_that_are_not_normal_are_drawn_without_a_control():
     assert not found.controlled[0]
     assert found.high[0] == pytest.approx(1.9, abs=5 * found.se_high[0] + 1e-6)
     assert found.u[0] == pytest.approx(2 / np.sqrt(3), abs=5 * found.se_u[0] + 1e-6)
+
+
+def products(strengths):
+    """Rows of three inputs, each bent the more the greater its strength."""
+    hessians = np.zeros((2, 3, 3))
+    hessians[0, 0, 0] = hessians[1, 1, 1] = 1.0
+    hessians[1, 0, 2] = hessians[1, 2, 0] = 0.3
+    slopes = np.tile([1.0, 0.5, 0.2], (len(strengths), 1))
+    weights = np.outer(strengths, [0.3, -0.2])
+    return QuadraticRows(np.full(len(strengths), 5.0), slopes, hessians, weights, np.zeros(3))
+
+
+def test_a_row_that_more_points_show_to_be_unsteady_is_drawn_for():
+    """Property: a row steady with 16 points and not with 64 got an interval of zeros."""
+    inputs = [rectangular(1.0), Normal(1.0), Normal(1.0)]
+    rows = products(np.linspace(0.088, 0.0955, 40))  # one of them is such a row
+    found = simulate(rows, inputs, goal=Goal(plain_draws=20_000))
+    assert np.all((found.low < 5.0) & (found.high > 5.0))
+    assert np.ptp(found.low) < 0.1  # beside one another
+    drawn = simulate(lambda x: rows(x), inputs, goal=Goal(plain_draws=20_000))
+    assert np.abs(found.low - drawn.low).max() < 0.05
+
+
+def test_an_interval_without_ends_is_an_error_of_the_program():
+    estimates = np.array([[5.0], [1.0], [3.0], [7.0], [3.0], [np.nan]])
+    with pytest.raises(ProgramError, match="contradicts itself"):
+        simulation(Goal(), estimates, np.zeros((6, 1)), np.ones(1), np.ones(1, dtype=bool))

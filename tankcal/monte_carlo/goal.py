@@ -8,6 +8,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from scipy.special import ndtri
 
+from tankcal.errors import ProgramError
+
 NAMES = ("value", "u", "low", "high", "shortest_low", "shortest_high")
 SAFETY = 1.3  # a standard error from ten batches is itself known to a quarter
 
@@ -118,7 +120,18 @@ def no_worse(goal, estimates, errors, plain):
 
 
 def simulation(goal, estimates, errors, draws, controlled):
-    """The result, complete. estimates, errors  (6, rows) in the order of NAMES."""
+    """The result, complete. estimates, errors  (6, rows) in the order of NAMES.
+
+    Raises ProgramError for an interval without ends or with its ends the wrong way round.
+    """
+    low, high = estimates[2::2], estimates[3::2]
+    astray = np.flatnonzero(~np.all(low <= high, axis=0))
+    if len(astray):
+        row = astray[0]
+        raise ProgramError(
+            f"Monte Carlo gives row {row + 1} the intervals {low[0, row]:g} to {high[0, row]:g} "
+            f"and {low[1, row]:g} to {high[1, row]:g}"
+        )
     met = (errors <= allowed(goal, estimates)) | ~np.isfinite(estimates)
     values = dict(zip(NAMES, estimates, strict=True))
     deviations = {f"se_{name}": se for name, se in zip(NAMES, errors, strict=True)}

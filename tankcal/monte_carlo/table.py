@@ -24,7 +24,8 @@ def table_estimates(model, ready, goal, tell):
     """Estimates and errors (6, rows), draws, control (rows,), and which rows are sound.
 
     A row is not sound where its quadratic part is too large for one parabola to be followed, its
-    shortest interval lies far from the symmetric one, or plain draws would be as good.
+    shortest interval lies far from the symmetric one, or plain draws would be as good. The ends of
+    such a row are nan: another method has to find them.
     """
     rows = model.in_coordinates(ready.transform)
     sets = _point_sets(ready, goal)
@@ -36,18 +37,19 @@ def table_estimates(model, ready, goal, tell):
     law = linear_law(scaled, ready.normal, shapes, levels)
     moments = np.stack([_moments(rows, ready, e, q) for e, q in zip(sets, forms, strict=True)])
     found = _Ends(lines, law, levels, sets, forms)
-    estimates, errors = np.zeros((2, 6, len(rows.value)))
+    estimates, errors = np.full((2, 6, len(rows.value)), np.nan)  # what nobody fills shows
     estimates[:2], errors[:2] = _mean_and_error(moments)
     draws = np.full(len(rows.value), SETS * POINTS)
     pending, count = np.flatnonzero(law.known), FIRST
     sound = ~np.any(scaled != 0, axis=1) & ~np.any(rows.weights != 0, axis=1)
-    estimates[2:, sound] = rows.value[sound]
+    estimates[2:, sound], errors[2:, sound] = rows.value[sound], 0.0
     plain = _plain(goal, rows, ready, shapes, law)
     while len(pending) and count <= MOST:
         ends, steady = found.of(pending, count)
         estimates[2:, pending], errors[2:, pending] = _mean_and_error(ends)
         part = estimates[:, pending], errors[:, pending], plain[:, pending]
-        sound[pending[steady & no_worse(goal, *part)]] = True
+        # more points may show what fewer hid: a row that was sound with 16 need not stay so
+        sound[pending] = steady & no_worse(goal, *part)
         part[1][:2] = 0.0  # mean and u come from all points already
         done = enough(goal, *part)
         pending, count = pending[~done & steady], 4 * count
@@ -108,8 +110,8 @@ class _Ends:
         self.score = ndtri(levels)
 
     def of(self, rows, count):
-        """(sets, 4, rows) ends from `count` points of every set, and which rows are steady."""
-        ends = np.zeros((len(self.sets), 4, len(rows)))
+        """(sets, 4, rows) ends from `count` points of every set, nan where a row is not steady."""
+        ends = np.full((len(self.sets), 4, len(rows)), np.nan)
         steady = np.zeros(len(rows), dtype=bool)
         place = np.full(len(self.law.known), -1)
         place[rows] = np.arange(len(rows))
@@ -124,10 +126,12 @@ class _Ends:
             sound = np.flatnonzero(unbent & rising & (near <= RARE))
             base = self.lines.rows.value[block[sound]]
             inner = np.ones(len(sound), dtype=bool)
+            own = np.empty((len(ends), 4, len(sound)))
             for i, score in enumerate(scores[:, sound]):
                 found, within = self._invert(score, target[sound])
-                ends[i][:, at[sound]] = base + found
+                own[i] = base + found
                 inner &= within
+            ends[:, :, at[sound[inner]]] = own[:, :, inner]
             steady[at[sound]] = inner
         return ends, steady
 

@@ -48,9 +48,11 @@ def budgets_of(result):
     simulation = result.simulation
     asked = {(one.low_m, one.high_m): one for one in result.job.stated}
     found = [_budget_of(one, asked, None, _of_volume(one, result)) for one in result.stated.volumes]
+    delivered = simulation and simulation.of_delivered
     for number, one in enumerate(result.stated.deliveries):
         judged = simulation and _of_place(simulation.of_deliveries[1], number)
-        found.append(_budget_of(one, asked, judged, _of_delivery(one, judged)))
+        interval = simulation and _of_place(delivered, number)
+        found.append(_budget_of(one, asked, judged, _of_delivery(one, interval)))
     return found
 
 
@@ -67,11 +69,11 @@ def _of_volume(one, result):
     return _with_reading(one, intervals.low_m3[row], intervals.high_m3[row])
 
 
-def _of_delivery(one, judged):
-    """The same of a delivery, by what Monte Carlo says of it, or None."""
-    if judged is None or judged["validated"]:
+def _of_delivery(one, interval):
+    """The same of a delivery, by its own interval of the table, or None."""
+    if interval is None or interval["by_gum"]:
         return _even(one.volume_m3, one.U_m3, "gum")
-    return _with_reading(one, judged["low"], judged["high"])
+    return _with_reading(one, interval["low_m3"], interval["high_m3"])
 
 
 def _with_reading(one, low_m3, high_m3):
@@ -110,9 +112,9 @@ def _budget_of(one, asked, judged, interval):
 _BUDGET = ("low_m", "high_m", "volume_m3", "table_u_m3", "u_m3", "dof", "k", "U_m3", "for_use")
 
 
-def _of_place(verdict, number):
-    """What a verdict says of one volume."""
-    return {one.name: getattr(verdict, one.name)[number] for one in fields(verdict)}
+def _of_place(columns, number):
+    """What a `Verdict` or `Intervals` say of one volume."""
+    return {one.name: getattr(columns, one.name)[number] for one in fields(columns)}
 
 
 def deliveries_of(result):

@@ -3,11 +3,7 @@
 Sources: JCGM 101:2008, clause 8 for the verdict; JCGM 102:2011, 7.
 """
 
-from tankcal.simulation.running import (
-    Intervals,
-    TableSimulation,
-    gum_intervals,
-    simulate_table,
-)
+from tankcal.simulation.intervals import Intervals, gum_intervals
+from tankcal.simulation.running import TableSimulation, simulate_table
 
 __all__ = ["Intervals", "TableSimulation", "gum_intervals", "simulate_table"]

@@ -6,27 +6,8 @@ import numpy as np
 
 from tankcal.deliveries import Deliveries, deliveries
 from tankcal.monte_carlo import Goal, Simulation, Verdict, verdict
+from tankcal.simulation.intervals import judged_intervals
 from tankcal.simulation.model import Model
-
-
-@dataclass(frozen=True)
-class Intervals:
-    """The interval of each row that counts, (rows,), and the U that it is stated with.
-
-    by_gum  True: volume +- k u; False: Monte Carlo's, where it does not validate that
-    U_m3    of the law of propagation, or the larger distance of Monte Carlo's ends from the volume
-    """
-
-    low_m3: np.ndarray
-    high_m3: np.ndarray
-    by_gum: np.ndarray
-    U_m3: np.ndarray
-
-
-def gum_intervals(table):
-    """`Intervals` of a table that was not simulated."""
-    volume, U = table.volume_m3, table.U_m3
-    return Intervals(volume - U, volume + U, np.full(len(U), True), U)
 
 
 @dataclass(frozen=True)
@@ -56,10 +37,13 @@ class TableSimulation:
 
     def intervals(self, table):
         """`Intervals` of the rows of the table that was simulated."""
-        by_gum = self.judged.validated
-        low = np.where(by_gum, self.judged.low, np.maximum(self.judged.low, 0.0))
-        judged = replace(self.judged, low=low)
-        return Intervals(low, judged.high, by_gum, judged.stated(table.volume_m3, table.U_m3))
+        return judged_intervals(self.judged, table.volume_m3, table.u_m3, table.U_m3, least_m3=0.0)
+
+    @property
+    def of_delivered(self):
+        """`Intervals` of the deliveries that were simulated."""
+        one = self.delivered
+        return judged_intervals(self.of_deliveries[1], one.volume_m3, one.u_m3, one.U_m3)
 
 
 def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, tell=None):
