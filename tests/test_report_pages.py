@@ -1,4 +1,4 @@
-"""How pages are filled: no lone rows, no lone end mark, figures that shrink to their page."""
+"""How pages are filled: no lone rows, headings or end mark, figures that shrink to their page."""
 
 import re
 import shutil
@@ -7,6 +7,8 @@ import subprocess
 import pytest
 import typst
 
+from paper_pages import filled, lone_headings, pages_of, sparse_pages
+
 from tankcal.report import blocks
 from tankcal.report.pdf import pdf
 
@@ -14,7 +16,7 @@ SQUARE = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">'
     '<rect width="100" height="100" fill="#1f4e79"/></svg>'
 )
-TOGETHER = 3  # rows of a long table that page.typ keeps together
+TOGETHER = 6  # rows of a long table that page.typ keeps together
 
 
 @pytest.fixture
@@ -56,6 +58,48 @@ def test_a_caption_stands_above_its_table(printed, above):
     rows = [[f"row {n}"] for n in range(20)]
     found = printed(*lines_above(above), blocks.table(["a"], rows, "the caption"))
     assert rows_of(next(page for page in found if "the caption" in page)) >= TOGETHER
+
+
+def numbered(count):
+    return [[f"row {n}"] for n in range(count)]
+
+
+AFTER_A_HEADING = {
+    "short table": lambda: [blocks.table(["a"], numbered(5), "c")],
+    "long table": lambda: [blocks.table(["a"], numbered(13), "c")],
+    "short columns": lambda: [blocks.columns_table(["a"], numbered(40), "c", across=4)],
+    "facts": lambda: [blocks.key_values([(f"row {n}", "v") for n in range(20)])],
+    "figure": lambda: [blocks.figure(SQUARE, "the caption", "a square", width=0.8)],
+    "sentences": lambda: [blocks.listing([f"row {n}" for n in range(4)])],
+}
+
+
+@pytest.mark.parametrize("what", AFTER_A_HEADING)
+def test_no_heading_ends_a_page(tmp_path, what):
+    """Each document of one PDF has one line more above the heading than the one before."""
+    made = []
+    for above in range(28, 44):
+        heading = blocks.heading("Alone")
+        document = blocks.document(title="T", footer="")
+        made += [document, *lines_above(above), heading, *AFTER_A_HEADING[what]()]
+    path = tmp_path / "made.pdf"
+    path.write_bytes(pdf([block.data for block in made]))
+    pages = pages_of(path)
+    assert len(pages) > 16
+    assert lone_headings(pages, {"Alone"}) == []
+
+
+@pytest.mark.parametrize(("above", "count"), [(31, 200), (38, 905)])
+def test_a_heading_goes_with_its_long_table(tmp_path, above, count):
+    table = blocks.columns_table(["a"], numbered(count), "c", across=4)
+    document = blocks.document(title="T", footer="")
+    path = tmp_path / "made.pdf"
+    made = [document, *lines_above(above), blocks.heading("Alone"), table]
+    path.write_bytes(pdf([block.data for block in made]))
+    pages = pages_of(path)
+    assert lone_headings(pages, {"Alone"}) == []
+    assert sparse_pages(pages) == []
+    assert min(map(filled, pages)) > 0.25
 
 
 @pytest.mark.parametrize("count", range(230, 400, 10))
@@ -108,4 +152,4 @@ def test_many_long_tables_are_all_there_and_their_pages_are_counted(printed, mon
     assert len(found) == len(set(found)) == 8 * 700
     numbers = [re.findall(r"page (\d+) of (\d+)", page)[-1] for page in pages]
     assert numbers == [(str(n), str(len(pages))) for n in range(1, len(pages) + 1)]
-    assert asked == ["asked", "no"]
+    assert asked == ["asked", "tables", "no"]

@@ -16,6 +16,7 @@ from tankcal.report.blocks import WEB_ONLY
 from tankcal.shipped import shipped
 
 STANDARDS = ["a-3a", "ua-1"]  # archival, and readable by a screen reader
+PLACES = ("asked", "tables", "no")  # who asks for its place on the page (page.typ)
 UNSETTLED = "did not converge"  # in typst's warning that places are not those it set last
 FONT_FILES = ("STIXGeneral*.ttf", "DejaVuSerif*.ttf", "DejaVuSans.ttf")
 
@@ -40,22 +41,23 @@ def pdf(blocks, folder="."):
 def _compile(files, timestamp):
     """Set the page; the machine's own fonts are asked only for signs that the shipped ones lack.
 
-    Where tables and figures find no places that they all agree to, none is asked for its place.
+    Where tables and figures find no places that they all agree to, the figures no longer ask for
+    theirs, and where that is not enough nobody does.
     """
     import typst
 
-    def compiled(ignore_system_fonts, places="asked"):
+    def compiled(ignore_system_fonts, places=PLACES):
         found, warnings = typst.compile_with_warnings(
             Path(folder) / "main.typ",
             root=folder,
             font_paths=[folder],
             ignore_system_fonts=ignore_system_fonts,
-            sys_inputs={"places": places},
+            sys_inputs={"places": places[0]},
             pdf_standards=STANDARDS,
             timestamp=timestamp,
         )
-        if places == "asked" and any(UNSETTLED in warning.message for warning in warnings):
-            return compiled(ignore_system_fonts, places="no")
+        if places[1:] and any(UNSETTLED in warning.message for warning in warnings):
+            return compiled(ignore_system_fonts, places[1:])
         return found
 
     with TemporaryDirectory(prefix="tankcal-page-") as folder:
