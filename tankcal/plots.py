@@ -43,6 +43,8 @@ LEAST_SHARE = 1e-3  # of the variance: less is no bar
 WIDTH = 6.5
 LETTERS_OF_A_BAR = 46  # in a line of its name
 MANY = 500  # points in a panel: from here on their picture is smaller than their outlines
+SHELL_SHARE = 0.03  # of its cut: so far the cut of a shell changes with height
+BOTTOM_SHARE = 0.8  # of the cut of the shell: below it the curve of a bottom would hide the shell's
 _TURN = (-4, 364)  # degrees: points at north are not cut off
 
 
@@ -195,23 +197,44 @@ def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english):
     return figure
 
 
+def bottom_rows(area_m2):
+    """How many rows from the lowest on lie in a bottom, above which the cut hardly changes; 0: none.
+
+    Beside a cut that grows from nothing, what distinguishes the courses of a shell cannot be seen.
+    """
+    area = np.array(area_m2, dtype=float)
+    shell = np.median(area)
+    off = np.flatnonzero(np.abs(area - shell) > SHELL_SHARE * shell)
+    if not len(off) or off[-1] + 1 > len(area) / 2 or area[: off[-1] + 1].min() > BOTTOM_SHARE * shell:
+        return 0
+    return int(off[-1]) + 1
+
+
 def capacity_curves(height_m, area_m2, U_m3, words=english):
-    """Litres per centimetre, and U, against height."""
+    """Litres per centimetre, and U, against height; a bottom and the shell in panels of their own."""
+    height_m = np.asarray(height_m)
     litres_per_cm = 10.0 * np.array(area_m2, dtype=float)  # 1 m2 is 10 L/cm
+    of_bottom = bottom_rows(area_m2)
+    parts = [slice(of_bottom + 1), slice(of_bottom, None)] if of_bottom else [slice(None)]
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH, 2.4))
-        left, right = figure.subplots(1, 2)
-        left.plot(height_m, litres_per_cm, color=INK)
-        left.set_ylabel(words("litres_per_cm"))
-        left.ticklabel_format(useOffset=False)
+        *left, right = figure.subplots(1, len(parts) + 1)
+        for ax, rows in zip(left, parts, strict=True):
+            ax.plot(height_m[rows], litres_per_cm[rows], color=INK)
+            ax.ticklabel_format(useOffset=False)
+            ax.set_xlim(height_m[rows][0], height_m[rows][-1])
+        left[0].set_ylabel(words("litres_per_cm"))
+        if of_bottom:
+            left[0].set_ylim(bottom=0)
         right.plot(height_m, U_m3, color=INK)
         right.set_ylabel(words("U_m3"))
         right.set_ylim(bottom=0)
-        for ax in (left, right):
+        right.set_xlim(height_m[0], height_m[-1])
+        for ax in (*left, right):
             ax.set_xlabel(words("height"))
-            ax.set_xlim(height_m[0], height_m[-1])
             ax.grid(True)
-        set_margins(figure, left=0.65, right=0.12, bottom=0.42, top=0.08, wspace=0.3)
+        space = 0.3 if len(parts) == 1 else 0.45
+        set_margins(figure, left=0.65, right=0.12, bottom=0.42, top=0.08, wspace=space)
     return figure
 
 

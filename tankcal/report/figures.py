@@ -47,6 +47,12 @@ def capacity_curves(paper):
     )
 
 
+def capacity_curves_name(paper):
+    """Name of the caption: whether a bottom has a panel of its own."""
+    of_bottom = plots.bottom_rows(paper.record["capacity"]["area_m2"])
+    return "capacity_curves_bottom" if of_bottom else "capacity_curves"
+
+
 def budget_bars(paper):
     """The share of the variance of each input, in percent; defaults are pale."""
     bars = [

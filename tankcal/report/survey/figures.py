@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
+from tankcal.labels import MARK, Label, write_labels
 from tankcal.plots import INK, MANY, RED, STYLE, WIDTH, round_factor, set_margins
 
 MOST_PHOTOS = 12
@@ -16,6 +17,7 @@ LARGEST_ELLIPSE = 0.04  # of the plan
 SAME_PLACE = 0.015  # of the plan
 PLAN_POINTS = 300  # typographic points that the plan measures
 _GREY = "#445566"
+_BEHIND = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.3}
 _MARKS = {"control": ("^", INK), "check": ("s", "#6b4c9a"), "station": ("D", "#2e7d32")}
 
 
@@ -57,7 +59,7 @@ def plan(paper):
         many = {"rasterized": len(points) > MANY}
         _ellipses(ax, points, xy - origin, factor)
         _marks(ax, paper, points, xy - origin, many)
-        _photos(ax, paper, adjustment["photos"], origin)
+        photos = _photos(ax, paper, adjustment["photos"], origin)
         ax.set_aspect("equal")
         ax.autoscale_view()
         ax.margins(0.06)
@@ -67,6 +69,12 @@ def plan(paper):
         ax.set_axisbelow(True)
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=5, frameon=False)
         set_margins(figure, left=0.65, right=0.1, bottom=0.75, top=0.08)
+        labels = _names(paper, points, xy - origin, factor)
+        labels += _photo_names(adjustment["photos"], photos)
+        marks = np.vstack([xy - origin, photos])
+        ellipses = [0.75 * _on_page(paper, factor * one["ellipse_m"][0]) for one in points]
+        room = np.maximum([*ellipses, *(0.0 for _ in photos)], MARK)
+        write_labels(ax, labels, marks, size=6, room=room, color=_GREY, zorder=5, bbox=_BEHIND)
     return figure
 
 
@@ -117,25 +125,36 @@ def _marks(ax, paper, points, xy, many):
         if own.any():
             ax.plot(*xy[own].T, mark, color=colour, markersize=3.5, zorder=4,
                     label=paper.word(f"plan.{kind}"))  # fmt: skip
-    _names(ax, points, xy, _extent(paper), plan_factor(paper))
 
 
-def _names(ax, points, xy, extent, factor):
-    """Names beside the ellipses, outwards; points above one another share a line."""
+def _on_page(paper, length_m):
+    """A length in the plan in typographic points, about."""
+    return PLAN_POINTS * length_m / _extent(paper)
+
+
+def _names(paper, points, xy, factor):
+    """Names beside the ellipses, outwards; points above one another share a line.
+
+    Those of stations, control and check points find their places first.
+    """
     middle = xy.mean(axis=0)
-    for numbers in _at_one_place(points, xy, SAME_PLACE * extent):
-        names = [points[n]["point"] for n in numbers[:MOST_AT_A_PLACE]]
-        more = [f"+{len(numbers) - MOST_AT_A_PLACE}"] if len(numbers) > MOST_AT_A_PLACE else []
-        away = xy[numbers[0]] - middle
-        right, up = away[0] >= 0, away[1] >= 0
+    groups = _at_one_place(points, xy, SAME_PLACE * _extent(paper))
+    groups.sort(key=lambda numbers: all(points[n]["kind"] == "point" for n in numbers))
+    found = []
+    for numbers in groups:
+        names = [points[n]["point"] for n in numbers]
         ellipse = factor * max(points[n]["ellipse_m"][0] for n in numbers)
-        clear = 2 + 0.75 * PLAN_POINTS * ellipse / extent
-        ax.annotate(
-            ", ".join([*names, *more])[:60], xy[numbers[0]], textcoords="offset points",
-            xytext=(clear if right else -clear, clear if up else -clear), fontsize=6, color=_GREY,
-            ha="left" if right else "right", va="bottom" if up else "top", zorder=5,
-            parse_math=False,
-        )  # fmt: skip
+        clear = 3 + 0.75 * _on_page(paper, ellipse)
+        forms = tuple(_shortened(names, most) for most in (MOST_AT_A_PLACE, 1))
+        away = tuple(np.sign(xy[numbers[0]] - middle) + 1e-3 * (xy[numbers[0]] - middle))
+        found.append(Label(*xy[numbers[0]], forms, clear, away))
+    return found
+
+
+def _shortened(names, most):
+    """The first names, and how many more there are."""
+    more = [f"+{len(names) - most}"] if len(names) > most else []
+    return ", ".join([*names[:most], *more])[:60]
 
 
 def _at_one_place(points, xy, near):
@@ -154,17 +173,18 @@ def _at_one_place(points, xy, near):
 
 
 def _photos(ax, paper, photos, origin):
-    if not photos:
-        return
-    xy = np.array([[one["x_m"], one["y_m"]] for one in photos]) - origin
-    ax.plot(*xy.T, "v", color="white", markeredgecolor=INK, markersize=6, zorder=4,
-            label=paper.word("plan.photo"))  # fmt: skip
-    if len(photos) <= MOST_NAMES:
-        for photo, place in zip(photos, xy, strict=True):
-            ax.annotate(
-                photo["photo"], place, xytext=(5, 4), textcoords="offset points", fontsize=7,
-                color=INK, parse_math=False,
-            )  # fmt: skip
+    """Mark where the photographs were taken; their places (n, 2)."""
+    xy = np.array([[one["x_m"], one["y_m"]] for one in photos]).reshape(-1, 2) - origin
+    if photos:
+        ax.plot(*xy.T, "v", color="white", markeredgecolor=INK, markersize=6, zorder=4,
+                label=paper.word("plan.photo"))  # fmt: skip
+    return xy
+
+
+def _photo_names(photos, xy):
+    if len(photos) > MOST_NAMES:
+        return []
+    return [Label(*place, (one["photo"],), 5.0) for one, place in zip(photos, xy, strict=True)]
 
 
 def distributions(paper):

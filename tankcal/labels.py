@@ -1,0 +1,88 @@
+"""Names beside the marks of a drawing, none over another or over a mark.
+
+A name goes to the first of the places about its mark that is free; where no form of it finds one
+it is left out. Sizes of text are estimated, since the reader's program sets it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+LETTER, LINE = 0.56, 1.15  # of the size of the type: mean width of a letter, height of a line
+MARK = 2.5  # points about a mark that no name covers
+AROUND = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
+FARTHER = (1.0, 2.2)  # times the least distance from the mark
+_SIDES = {-1: "right", 0: "center", 1: "left"}
+_ENDS = {-1: "top", 0: "center", 1: "bottom"}
+
+
+@dataclass(frozen=True)
+class Label:
+    """A name beside a place of a drawing.
+
+    x, y     the place, in the units of the axes
+    texts    the name, then shorter forms of it
+    clear    typographic points from the place to the name, at least
+    outward  (2,) direction that is tried first
+    """
+
+    x: float
+    y: float
+    texts: tuple[str, ...]
+    clear: float = 3.0
+    outward: tuple[float, float] = (1.0, 1.0)
+
+
+def write_labels(ax, labels, marks, *, size, room=MARK, **style):
+    """Write the labels that find room, the first first; returns how many were left out.
+
+    marks   (n, 2) places that no name may cover, in the units of the axes
+    room    typographic points about a mark that are kept free, one for all or (n,)
+    The axes must have their final limits and place.
+    """
+    ax.apply_aspect()
+    places = _in_points(ax, np.array([[one.x, one.y] for one in labels]).reshape(-1, 2))
+    around = _in_points(ax, np.asarray(marks, dtype=float).reshape(-1, 2))
+    half = np.broadcast_to(np.asarray(room, dtype=float), len(around))[:, None]
+    taken = np.column_stack([around - half, around + half])
+    frame = _in_points(ax, np.array([[*ax.get_xlim()], [*ax.get_ylim()]]).T).ravel()
+    left_out = 0
+    for label, place in zip(labels, places, strict=True):
+        found = _free(label, place, taken, frame, size)
+        if found is None:
+            left_out += 1
+            continue
+        text, side, offset, box = found
+        taken = np.vstack([taken, box])
+        ax.annotate(
+            text, (label.x, label.y), textcoords="offset points", xytext=offset, fontsize=size,
+            ha=_SIDES[side[0]], va=_ENDS[side[1]], parse_math=False, **style,
+        )  # fmt: skip
+    return left_out
+
+
+def _in_points(ax, xy):
+    """Places of the axes in typographic points of the figure."""
+    return ax.transData.transform(xy) * 72 / ax.figure.dpi
+
+
+def _free(label, place, taken, frame, size):
+    """(text, side, offset, box) of the first form and place that cover nothing; None: none."""
+    sides = sorted(AROUND, key=lambda side: -np.dot(side, label.outward) / np.hypot(*side))
+    for text in label.texts:
+        extent = np.array([LETTER * len(text), LINE]) * size
+        for farther in FARTHER:
+            for side in sides:
+                offset = farther * label.clear * np.array(side, dtype=float)
+                low = place + offset + extent * (np.array(side) - 1) / 2
+                box = np.concatenate([low, low + extent])
+                is_inside = (box[:2] >= frame[:2]).all() and (box[2:] <= frame[2:]).all()
+                if is_inside and not _overlaps(box, taken).any():
+                    return text, side, tuple(offset), box
+    return None
+
+
+def _overlaps(box, others):
+    """(n,) whether a box [x0, y0, x1, y1] covers part of each of the others."""
+    low, high = np.maximum(box[:2], others[:, :2]), np.minimum(box[2:], others[:, 2:])
+    return (low < high).all(axis=1)
