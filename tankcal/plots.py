@@ -198,20 +198,24 @@ def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english):
 
 
 def bottom_rows(area_m2):
-    """How many rows from the lowest on lie in a bottom, above which the cut hardly changes; 0: none.
+    """How many rows, from the lowest on, lie in a bottom; 0: none. Above it the cut hardly changes.
 
     Beside a cut that grows from nothing, what distinguishes the courses of a shell cannot be seen.
     """
     area = np.array(area_m2, dtype=float)
     shell = np.median(area)
     off = np.flatnonzero(np.abs(area - shell) > SHELL_SHARE * shell)
-    if not len(off) or off[-1] + 1 > len(area) / 2 or area[: off[-1] + 1].min() > BOTTOM_SHARE * shell:
+    if (
+        not len(off)
+        or off[-1] + 1 > len(area) / 2
+        or area[: off[-1] + 1].min() > BOTTOM_SHARE * shell
+    ):
         return 0
     return int(off[-1]) + 1
 
 
 def capacity_curves(height_m, area_m2, U_m3, words=english):
-    """Litres per centimetre, and U, against height; a bottom and the shell in panels of their own."""
+    """Litres per centimetre, and U, against height; a bottom has a panel of its own."""
     height_m = np.asarray(height_m)
     litres_per_cm = 10.0 * np.array(area_m2, dtype=float)  # 1 m2 is 10 L/cm
     of_bottom = bottom_rows(area_m2)

@@ -6,7 +6,6 @@ import subprocess
 
 import pytest
 import typst
-
 from paper_pages import filled, lone_headings, pages_of, sparse_pages
 
 from tankcal.report import blocks
