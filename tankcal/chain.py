@@ -20,6 +20,7 @@ from tankcal.doubts import incomplete_certificate, of_adjustment, refuse_undeter
 from tankcal.errors import HeightError, InputError, Problem, SolutionError
 from tankcal.job import Job
 from tankcal.meshes import parse_mesh
+from tankcal.plausibility import refuse_other_side
 from tankcal.rules import RuleVerdict
 from tankcal.scan import Scan, scanned
 from tankcal.service import shell_factor, shell_temperature_c
@@ -227,6 +228,8 @@ def run(
         told = map(str, adjustment.warnings[:TOLD])
         raise SolutionError("\n".join([str(error), *told])) from error
     wall = survey if isinstance(survey, Wall) else None
+    if wall is not None and adjustment is not None:
+        refuse_other_side(job, wall, adjustment)
     made = tabled(job, survey, tell)
     body, zero, table = made.body, made.zero_m, made.table
     tell("stating volumes and deliveries")
@@ -254,12 +257,12 @@ def run(
         simulation=simulation,
         intervals=intervals,
         rule=verdict_of(job, body, table, intervals, simulation),
-        warnings=_warnings(job, adjustment, wall, made),
+        warnings=_warnings(job, adjustment, survey, made),
         adjustment=adjustment,
     )
 
 
-def _warnings(job, adjustment, wall, made):
+def _warnings(job, adjustment, survey, made):
     of_survey = ()
     if adjustment is not None:
         left_open = of_adjustment(job, adjustment.datum, adjustment.causes)
@@ -267,7 +270,7 @@ def _warnings(job, adjustment, wall, made):
     return (
         *job.warnings,
         *of_survey,
-        *doubts_of_table(job, wall, made),
+        *doubts_of_table(job, survey, made),
         *incomplete_certificate(job),
     )
 

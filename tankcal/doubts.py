@@ -6,11 +6,11 @@ import numpy as np
 
 from tankcal.body import OWN_SCALE
 from tankcal.errors import Problem, SolutionError
+from tankcal.job.plausibility import VOLUME_MISS
 from tankcal.messages import listed, message
 from tankcal.shell import VAGUE_TILT
 
 FEWEST_POINTS, ADVISED_POINTS = 5, 10  # of a section
-NOMINAL_MISS = 0.05  # of the nominal volume, from which on one of the two is in doubt
 WIDE_GAP_DEG = 45
 SHOWN = 5  # names in a message
 CERTIFICATE_NEEDS = ("number", "laboratory", "customer", "method")
@@ -254,7 +254,7 @@ def incomplete_certificate(job):
 def against_nominal(tank, capacity_m3):
     """A warning when the capacity is far from the nominal volume."""
     nominal = tank.nominal_volume_m3
-    if nominal is None or abs(capacity_m3 / nominal - 1) <= NOMINAL_MISS:
+    if nominal is None or abs(capacity_m3 / nominal - 1) <= VOLUME_MISS:
         return ()
     text = message(
         "not_nominal",

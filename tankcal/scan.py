@@ -8,6 +8,7 @@ from tankcal.body import Factor, survey_factors
 from tankcal.cylinders import lying_cylinder
 from tankcal.doubts import noise_is_estimated, origin_of
 from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.plausibility import refuse_misfit
 from tankcal.primitives import fit_sphere
 from tankcal.sections import covariance_of
 
@@ -56,13 +57,15 @@ def scanned(job, dof=np.inf):
     causes = job.points.causes
     effects = [_effect(job, chosen, cause.column_m) for cause in causes]
     used = residuals[chosen]
+    noise = float(np.sqrt(used @ used / max(fit.dof, 1)))
+    refuse_misfit(job.points, noise, float(values[0]))
     return Scan(
         names,
         values,
         survey_factors(cofactor * factor, dof, causes, effects),
         np.flatnonzero(chosen),
         residuals,
-        float(np.sqrt(used @ used / max(fit.dof, 1))),
+        noise,
     )
 
 

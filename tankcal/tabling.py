@@ -18,8 +18,10 @@ from tankcal.dips import (
     table_heights,
 )
 from tankcal.doubts import against_nominal, not_in_u
+from tankcal.plausibility import doubts_of_mesh, doubts_of_scan, doubts_of_wall
+from tankcal.scan import Scan
 from tankcal.tanks import body_of, critical_zone, zero_height
-from tankcal.wall import warnings_of
+from tankcal.wall import Wall, warnings_of
 
 
 @dataclass(frozen=True)
@@ -79,13 +81,21 @@ def tabled(job, survey, tell=lambda text: None):
     return Tabled(body, zero, levels, kinks, table, straightness)
 
 
-def doubts_of_table(job, wall, made):
-    """Warnings of a wall (None: there is none) and of the `Tabled` that was made of it."""
+def doubts_of_table(job, survey, made):
+    """Warnings of what was surveyed, as for `tabled`, and of the `Tabled` that was made of it."""
     return (
-        *(() if wall is None else warnings_of(job, wall)),
+        *_doubts_of_survey(job, survey, made.top_m),
         *not_in_u(made.body.undeclared()),
         *against_nominal(job.tank, made.table.volume_m3[-1]),
     )
+
+
+def _doubts_of_survey(job, survey, top_m):
+    if isinstance(survey, Wall):
+        return (*warnings_of(job, survey), *doubts_of_wall(job, survey))
+    if isinstance(survey, Scan):
+        return doubts_of_scan(job, survey, top_m)
+    return () if survey is None else doubts_of_mesh(job, top_m)
 
 
 def _exact(body, zero_m):

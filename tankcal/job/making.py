@@ -50,6 +50,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         roof=_roof(values["roof"]),
         horizontal=_horizontal(values["horizontal"], has_points) if kind == "horizontal" else None,
         sphere=_sphere(values["sphere"]) if kind == "sphere" else None,
+        circumference_m=values["checks"]["circumference_m"],
         mesh=_mesh(values["mesh"], attached.mesh[1]) if kind == "mesh" else None,
     )
 

@@ -12,6 +12,7 @@ SECTION_NOTES = {
     "roof": "the floating roof: all of it, or nothing when there is none",
     "corrections": "false switches a correction off, and the report says so",
     "material": "the shell's steel",
+    "checks": "only compared, to tell a slip of the hand: nothing here changes a number",
     "adjustment": "how bad points are treated, and what holds the frame of a survey",
     "adjustment.camera": "what of the cameras is adjusted: off, camera free, camera weighted,"
     " camera fixed, or the same with block or photo in place of camera",

@@ -13,6 +13,7 @@ from tankcal.job.checks.deadwood import check_deadwood
 from tankcal.job.checks.geometry import check_cylinder, check_scan
 from tankcal.job.checks.inputs import check_inputs, spreads, standard_u
 from tankcal.job.checks.kinds import check_horizontal, check_sphere
+from tankcal.job.checks.plausible import check_plausible
 from tankcal.job.checks.points import check_points
 from tankcal.job.checks.roof import check_roof
 from tankcal.job.checks.settings import check_settings
@@ -45,6 +46,7 @@ def check_tank(values, tables, raw, log):
         extent = extent_of(values, tables, kind)
         check_steps(values["table"], extent, raw, log)
         check_settings(values, tables, extent, kind, raw, log)
+        check_plausible(values, tables, extent, kind, raw, log)
     needs_points = kind == "vertical" and not has_survey(tables)
     if points is not None and (needs_points or has_rows(points)):
         check_points(points, log)

@@ -1,10 +1,10 @@
 """Settings that hang together: heights of the datum, the survey's liquid, densities, points."""
 
 from tankcal.job.checks.common import has_wall_points, is_not_given, loads_the_shell, tell
+from tankcal.job.plausibility import DENSITIES_KG_M3
 from tankcal.messages import message
 
 MAX_DIP_OFFSET_M = 1.0
-LIGHT_KG_M3, HEAVY_KG_M3 = 500, 2000  # of the liquids that tanks are calibrated for
 RELATIVE_DENSITY = 20  # smaller numbers are no densities in kg/m3
 DENSITIES = (
     ("survey", "liquid_density_kg_m3"),
@@ -48,7 +48,7 @@ def _check_deliveries(heights, extent, raw, log):
 
 def _check_dip_plate(values, tables, kind, raw, log):
     """The plate lies on the bottom, or nearly so; of a scan the bottom is not known yet."""
-    plate, bottoms = values["datum"]["dip_plate_z_m"], _bottoms_z(values, tables, kind)
+    plate, bottoms = values["datum"]["dip_plate_z_m"], bottoms_z(values, tables, kind)
     if plate is None or not bottoms:
         return
     low, high = min(bottoms), max(bottoms)
@@ -64,7 +64,7 @@ def _check_dip_plate(values, tables, kind, raw, log):
     tell(log.problem, raw, "datum", "dip_plate_z_m", expected)
 
 
-def _bottoms_z(values, tables, kind):
+def bottoms_z(values, tables, kind):
     """Heights at which a bottom is known to lie, m, in the frame of the points."""
     if kind in ("horizontal", "sphere"):
         return [] if has_wall_points(tables) else [0.0]
@@ -92,6 +92,7 @@ def _check_survey_liquid(survey, extent, raw, log):
 
 
 def _check_densities(values, raw, log):
+    lightest, heaviest = DENSITIES_KG_M3
     for section, key in DENSITIES:
         found = values[section][key]
         for density in found if isinstance(found, tuple) else (found,):
@@ -100,13 +101,13 @@ def _check_densities(values, raw, log):
             if density < RELATIVE_DENSITY:
                 expected = f"found {density:g}; expected kg/m3, such as 850: is it in g/cm3?"
                 tell(log.problem, raw, section, key, expected)
-            elif not LIGHT_KG_M3 <= density <= HEAVY_KG_M3:
+            elif not lightest <= density <= heaviest:
                 expected = message(
                     "strange_density",
-                    "{density_kg_m3:g} kg/m3; liquids in tanks have {least} to {most}",
+                    "{density_kg_m3:g} kg/m3; liquids in tanks have {least:g} to {most:g}",
                     density_kg_m3=density,
-                    least=LIGHT_KG_M3,
-                    most=HEAVY_KG_M3,
+                    least=lightest,
+                    most=heaviest,
                 )
                 tell(log.warning, raw, section, key, expected)
     table = values["table"]

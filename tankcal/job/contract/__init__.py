@@ -14,7 +14,8 @@ from tankcal.job.contract.registers import OF_PHOTOS, REGISTER_KEYS, REGISTERS_O
 
 SECTIONS = (
     *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "bottom", "roof"),
-    *("corrections", "material", "adjustment", "adjustment.camera", "certificate", "csv"),
+    *("corrections", "material", "checks", "adjustment", "adjustment.camera", "certificate"),
+    "csv",
 )
 COLUMNS = TANK_COLUMNS | SURVEY_COLUMNS
 KEYS = {section: (COMMON_KEYS | PART_KEYS)[section] for section in SECTIONS}

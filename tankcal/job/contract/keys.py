@@ -57,8 +57,8 @@ SURVEY = (
         "shell_temperature_c",
         "number",
         "temperature of the shell during the survey, degrees Celsius; blank: no correction",
-        low=-60,
-        high=120,
+        low=-200,
+        high=300,
     ),
     Field(
         "liquid_level_m",

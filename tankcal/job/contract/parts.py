@@ -2,6 +2,7 @@
 
 from tankcal.job.contract.kinds import VERTICAL, WITH_POINTS
 from tankcal.job.fields import Field
+from tankcal.job.plausibility import SERVICES, SHELLS
 
 HORIZONTAL_ONLY = ("horizontal",)
 SPHERE_ONLY = ("sphere",)
@@ -220,6 +221,59 @@ CORRECTIONS = (
     _switch("roof", "take the floating roof into account", VERTICAL),
 )
 
+CHECKS = (
+    Field(
+        "shell",
+        "choice",
+        "metal of the shell: carbon_steel, stainless_steel, aluminium, or other; blank:"
+        " carbon_steel",
+        choices=SHELLS,
+    ),
+    Field(
+        "service",
+        "choice",
+        "ambient, heated or refrigerated: what temperatures are plausible; blank: ambient",
+        choices=SERVICES,
+    ),
+    Field(
+        "air_temperature_c",
+        "number",
+        "temperature of the air during the survey, degrees Celsius; the shell's is near it",
+        low=-80,
+        high=150,
+    ),
+    Field(
+        "top_z_m",
+        "number",
+        "z of the top of the shell as surveyed, in the frame of the points, metres; bottom_z_m and"
+        " the courses lead there",
+        kinds=VERTICAL,
+        low=-1e5,
+        high=1e5,
+    ),
+    Field(
+        "bottom_slopes",
+        "choice",
+        "cone and dish: the bottom goes up or down from its edge to its centre",
+        kinds=VERTICAL,
+        choices=("up", "down"),
+    ),
+    Field(
+        "circumference_m",
+        "number",
+        "circumference of the first course by tape, outside, square to the axis, metres",
+        kinds=VERTICAL,
+        low=0.3,
+        high=1000,
+    ),
+    _length(
+        "length_m",
+        "length of the cylinder from the drawing, without the ends, metres",
+        HORIZONTAL_ONLY,
+        200,
+    ),
+)
+
 KEYS = {
     "horizontal": HORIZONTAL,
     "sphere": SPHERE,
@@ -227,4 +281,5 @@ KEYS = {
     "bottom": BOTTOM,
     "roof": ROOF,
     "corrections": CORRECTIONS,
+    "checks": CHECKS,
 }

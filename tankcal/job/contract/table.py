@@ -18,8 +18,8 @@ TABLE = (
         "number",
         "shell temperature that the table is for, degrees Celsius",
         required=True,
-        low=-60,
-        high=120,
+        low=-200,
+        high=300,
     ),
     Field(
         "height_unit",

@@ -66,6 +66,7 @@ class Job:
                   the job and are not declared
     correlations  (name, name, r) of declared inputs
     rule          the decision rule that the table is judged by, or None
+    circumference_m  of the first course by tape, outside; only compared; None: not given
     """
 
     tank: Tank | None
@@ -93,3 +94,4 @@ class Job:
     correlations: tuple[tuple[str, str, float], ...] = ()
     stated: tuple[StatedVolume, ...] = ()
     rule: Rule | None = None
+    circumference_m: float | None = None

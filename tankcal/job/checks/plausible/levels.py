@@ -1,0 +1,119 @@
+"""Heights of the datum: bottom, dip plate, top of the shell, reference point."""
+
+import numpy as np
+
+from tankcal.job.checks.common import has_rows, tell
+from tankcal.job.checks.geometry import places_of
+from tankcal.job.checks.settings import bottoms_z
+from tankcal.job.plausibility import (
+    DIP_PLATE_M,
+    RIM,
+    RIM_MISS_M,
+    SLOPE_UP,
+    TOP_MISS_M,
+    reference_doubt,
+)
+from tankcal.messages import message
+
+MIN_RIM = 6  # points of the bottom near the wall
+
+
+def check_levels(values, tables, extent, kind, raw, log):
+    """Arguments as in `checks.check_tank`."""
+    _check_dip_plate(values, tables, kind, raw, log)
+    _check_reference(values, extent, raw, log)
+    if kind == "vertical":
+        _check_top(values, raw, log)
+        _check_slope(values, raw, log)
+        if has_rows(tables["bottom"]):
+            _check_rim(values, tables["bottom"], log)
+
+
+def _check_reference(values, extent, raw, log):
+    reference = values["datum"]["reference_height_m"]
+    if None in (reference, extent.top_m):
+        return
+    text = reference_doubt(reference, extent.top_m, values["tank"]["nominal_diameter_m"])
+    if text is not None:
+        tell(log.warning, raw, "datum", "reference_height_m", text)
+
+
+def _check_dip_plate(values, tables, kind, raw, log):
+    plate, bottoms = values["datum"]["dip_plate_z_m"], bottoms_z(values, tables, kind)
+    if plate is None or not bottoms:
+        return
+    away = max(plate - max(bottoms), min(bottoms) - plate)
+    if away > DIP_PLATE_M * (1 + 1e-9):
+        text = message(
+            "dip_plate_far",
+            "{away_m:.3g} m from the bottom, expected at most {most_m:g} m: the whole table counts"
+            " from here",
+            away_m=away,
+            most_m=DIP_PLATE_M,
+        )
+        tell(log.warning, raw, "datum", "dip_plate_z_m", text)
+
+
+def _check_top(values, raw, log):
+    top, bottom = values["checks"]["top_z_m"], values["datum"]["bottom_z_m"]
+    height = values["tank"]["nominal_height_m"]
+    if None in (top, bottom, height) or abs(bottom + height - top) <= TOP_MISS_M:
+        return
+    text = message(
+        "top_not_met",
+        "with tank.nominal_height_m = {height_m:g} m the shell ends at z = {end_m:.4g} m,"
+        " checks.top_z_m is {top_m:.4g} m: they miss each other by {miss_m:+.3f} m",
+        height_m=height,
+        end_m=bottom + height,
+        top_m=top,
+        miss_m=bottom + height - top,
+    )
+    tell(log.warning, raw, "datum", "bottom_z_m", text)
+
+
+def _check_slope(values, raw, log):
+    """A cone or a dish that rises where the drawing falls, or more than any does."""
+    centre, edge = values["bottom"]["centre_z_m"], values["datum"]["bottom_z_m"]
+    diameter, drawn = values["tank"]["nominal_diameter_m"], values["checks"]["bottom_slopes"]
+    if None in (centre, edge) or centre == edge:
+        return
+    found = "up" if centre > edge else "down"
+    if drawn is not None and drawn != found:
+        text = message(
+            "bottom_slopes_otherwise",
+            "{rise_m:+.3g} m from the edge (datum.bottom_z_m), so that the bottom goes {found} to"
+            " its centre; checks.bottom_slopes is {drawn}: expected one of them",
+            rise_m=centre - edge,
+            found=found,
+            drawn=drawn,
+        )
+        tell(log.problem, raw, "bottom", "centre_z_m", text)
+    elif drawn is None and diameter is not None and centre - edge > SLOPE_UP * diameter / 2:
+        text = message(
+            "bottom_rises_much",
+            "{rise_m:+.3g} m from the edge (datum.bottom_z_m), which is steep for a bottom that"
+            " goes up to its centre: is it down? checks.bottom_slopes says which",
+            rise_m=centre - edge,
+        )
+        tell(log.warning, raw, "bottom", "centre_z_m", text)
+
+
+def _check_rim(values, table, log):
+    """Bottom points near the wall lie at the bottom of the shell."""
+    edge, diameter = values["datum"]["bottom_z_m"], values["tank"]["nominal_diameter_m"]
+    xyz = places_of(table)
+    if None in (edge, diameter) or len(xyz) < MIN_RIM or table.columns["x_m"] is None:
+        return
+    low, high = xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)
+    far = np.hypot(*(xyz[:, :2] - (low + high) / 2).T) > RIM * diameter / 2
+    if far.sum() < MIN_RIM:
+        return
+    miss = float(np.median(xyz[far, 2]) - edge)
+    if abs(miss) > RIM_MISS_M:
+        text = message(
+            "rim_off",
+            "the points near the wall lie {miss_m:+.3g} m from datum.bottom_z_m (median): is it the"
+            " height of the first course?",
+            miss_m=miss,
+        )
+        log.warning(table.file, text, None, "z_m")

@@ -1,0 +1,129 @@
+"""Plates and paint: against the head that they carry, the diameter, and each other."""
+
+import numpy as np
+
+from tankcal.job.checks.common import tell
+from tankcal.job.plausibility import (
+    HEAVY,
+    LEAST_PLATE_MM,
+    LIGHT,
+    PAINT_MM,
+    RISING_PLATES,
+    SOLID_PLATES_MM,
+    least_course_mm,
+    most_course_mm,
+)
+from tankcal.messages import message
+
+WATER_KG_M3 = 1000.0
+
+
+def check_plates(values, courses, kind, raw, log):
+    """Plates of courses, or of a lying cylinder or a sphere."""
+    if kind == "vertical" and courses is not None:
+        _check_courses(values, courses, log)
+    elif kind in SOLID_PLATES_MM:
+        _check_solid(values, kind, raw, log)
+
+
+def _check_courses(values, courses, log):
+    diameter, heights = values["tank"]["nominal_diameter_m"], courses.of("height_m")
+    thickness = courses.of("thickness_mm")
+    if diameter is None or None in heights or None in thickness or courses.skipped:
+        return
+    given = values["table"]["liquid_density_kg_m3"] or 0.0
+    heaviest = max(HEAVY, given / WATER_KG_M3)
+    lightest = given / WATER_KG_M3 if given else LIGHT
+    above = np.cumsum(heights[::-1])[::-1]
+    is_metal = values["checks"]["shell"] != "other"
+    for row, plate, head in zip(courses.rows, thickness, above.tolist(), strict=True):
+        least = least_course_mm(diameter, head, lightest)
+        most = most_course_mm(diameter, head, heaviest)
+        if not is_metal or plate == 0:
+            continue
+        if plate > most:
+            text = message(
+                "plate_thick",
+                "{found_mm:g} mm, expected at most {most_mm:.3g} mm for {head_m:.4g} m of shell"
+                " above it and a diameter of {diameter_m:g} m: ten times too thick?",
+                found_mm=plate,
+                most_mm=most,
+                head_m=head,
+                diameter_m=diameter,
+            )
+            log.warning(courses.file, text, row, "thickness_mm")
+        elif plate < least:
+            text = message(
+                "plate_thin",
+                "{found_mm:g} mm, expected {least_mm:.3g} mm or more for {head_m:.4g} m of shell"
+                " above it and a diameter of {diameter_m:g} m: in centimetres?",
+                found_mm=plate,
+                least_mm=least,
+                head_m=head,
+                diameter_m=diameter,
+            )
+            log.warning(courses.file, text, row, "thickness_mm")
+    if thickness and 0 < RISING_PLATES * thickness[0] < thickness[-1]:
+        text = message(
+            "courses_top_down",
+            "the plates grow thicker upwards, from {first_mm:g} to {last_mm:g} mm; expected the"
+            " courses from the bottom up: do they stand from the top down?",
+            first_mm=thickness[0],
+            last_mm=thickness[-1],
+        )
+        log.warning(courses.file, text, courses.rows[0], "thickness_mm")
+    _check_paint(values, courses, log)
+
+
+def _check_paint(values, courses, log):
+    paints = courses.of("paint_mm")
+    for row, paint in zip(courses.rows, paints, strict=True):
+        if paint is not None and paint > PAINT_MM:
+            text = message(
+                "paint_thick",
+                "{found_mm:g} mm of paint, expected at most {most_mm:g}: in another unit?",
+                found_mm=paint,
+                most_mm=PAINT_MM,
+            )
+            log.warning(courses.file, text, row, "paint_mm")
+    if values["survey"]["side"] == "inside" and any(paints):
+        text = message(
+            "paint_of_inside",
+            "paint is given, which is subtracted from what was measured outside, and survey.side is"
+            " inside: is it outside?",
+        )
+        log.warning(courses.file, text, None, "paint_mm")
+
+
+def _check_solid(values, kind, raw, log):
+    given, nominal = values[kind], values["tank"]["nominal_diameter_m"]
+    diameter = given["diameter_m"] or nominal
+    if kind == "horizontal":
+        diameter = given["height_m"] or diameter
+    plate = given["thickness_mm"]
+    if not plate:
+        return
+    if plate < LEAST_PLATE_MM:
+        text = message(
+            "solid_plate_tiny",
+            "found {found_mm:g}; expected millimetres, 0 or at least {least_mm:g}: in centimetres"
+            " or metres?",
+            found_mm=plate,
+            least_mm=LEAST_PLATE_MM,
+        )
+        tell(log.problem, raw, kind, "thickness_mm", text)
+        return
+    if diameter is None or values["checks"]["shell"] == "other":
+        return
+    least, most = (a + b * diameter for a, b in SOLID_PLATES_MM[kind])
+    if not least <= plate <= most:
+        text = message(
+            "solid_plate_strange",
+            "{found_mm:g} mm, expected {least_mm:.3g} to {most_mm:.3g} mm for a diameter of"
+            " {diameter_m:g} m: ten times too thick, or in centimetres?",
+            found_mm=plate,
+            least_mm=least,
+            most_mm=most,
+            diameter_m=diameter,
+        )
+        tell(log.warning, raw, kind, "thickness_mm", text)

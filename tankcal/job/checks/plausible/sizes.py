@@ -1,0 +1,154 @@
+"""Sizes of lying cylinders and spheres: against the drawing, and against each other."""
+
+import numpy as np
+
+from tankcal.job.checks.common import tell
+from tankcal.job.plausibility import (
+    DISH_RADIUS,
+    END_DEPTH,
+    ENDS_DIFFER,
+    ENDS_DIFFER_M,
+    HEMISPHERE,
+    IMPOSSIBLE_MISS,
+    KNUCKLE_RADIUS,
+    LENGTH_OVER_DIAMETER,
+    MOST_LENGTH_OVER_DIAMETER,
+    SIZE_MISS,
+    SPHERE_M,
+)
+from tankcal.messages import message
+
+RADII = (("dish_radius_m", DISH_RADIUS), ("knuckle_radius_m", KNUCKLE_RADIUS))
+
+
+def check_sizes(values, kind, raw, log):
+    """Sizes of the kinds that are given by sizes."""
+    if kind == "sphere":
+        _check_sphere(values, raw, log)
+    if kind == "horizontal":
+        _check_lying(values, raw, log)
+
+
+def _check_sphere(values, raw, log):
+    found, nominal = values["sphere"]["diameter_m"], values["tank"]["nominal_diameter_m"]
+    _compare(found, nominal, "sphere", "diameter_m", "tank.nominal_diameter_m", raw, log)
+    if found is not None and found > SPHERE_M:
+        text = message(
+            "sphere_large",
+            "{found_m:g} m, expected at most {most_m:g} m: in feet?",
+            found_m=found,
+            most_m=SPHERE_M,
+        )
+        tell(log.warning, raw, "sphere", "diameter_m", text)
+
+
+def _check_lying(values, raw, log):
+    given, nominal = values["horizontal"], values["tank"]["nominal_diameter_m"]
+    drawn = "tank.nominal_diameter_m"
+    _compare(given["diameter_m"], nominal, "horizontal", "diameter_m", drawn, raw, log)
+    diameter = given["diameter_m"] or nominal
+    if None not in (given["width_m"], given["height_m"]):
+        diameter = float(np.sqrt(given["width_m"] * given["height_m"]))
+    length = given["length_m"]
+    drawn = values["checks"]["length_m"]
+    _compare(length, drawn, "horizontal", "length_m", "checks.length_m", raw, log)
+    if diameter is None:
+        return
+    if length is not None:
+        _check_length(length, diameter, raw, log)
+    for end in "ab":
+        _check_end(given, end, diameter, raw, log)
+    if given["end_a"] == given["end_b"] in END_DEPTH:
+        _check_pair(given, raw, log)
+
+
+def _compare(found, nominal, section, key, drawn, raw, log):
+    """A size against the drawing's."""
+    if None in (found, nominal) or abs(found / nominal - 1) <= SIZE_MISS:
+        return
+    text = message(
+        "size_unlike_drawing",
+        "{found_m:g} m, {drawn} is {nominal_m:g} m: they differ by {percent:+.1f} % (a radius, or"
+        " another unit?)",
+        found_m=found,
+        drawn=drawn,
+        nominal_m=nominal,
+        percent=100 * (found / nominal - 1),
+    )
+    is_impossible = not 1 / (1 + IMPOSSIBLE_MISS) <= found / nominal <= 1 + IMPOSSIBLE_MISS
+    tell(log.problem if is_impossible else log.warning, raw, section, key, text)
+
+
+def _check_length(length, diameter, raw, log):
+    ratio, (least, most) = length / diameter, LENGTH_OVER_DIAMETER
+    if ratio > MOST_LENGTH_OVER_DIAMETER:
+        text = message(
+            "length_impossible",
+            "found {found_m:g} m, {ratio:.3g} diameters; expected at most {most:g}: in decimetres?",
+            found_m=length,
+            ratio=ratio,
+            most=MOST_LENGTH_OVER_DIAMETER,
+        )
+        tell(log.problem, raw, "horizontal", "length_m", text)
+    elif not least <= ratio <= most:
+        text = message(
+            "length_strange",
+            "{found_m:g} m is {ratio:.3g} diameters, expected {least:g} to {most:g}: is one of them"
+            " in another unit, or a radius?",
+            found_m=length,
+            ratio=ratio,
+            least=least,
+            most=most,
+        )
+        tell(log.warning, raw, "horizontal", "length_m", text)
+
+
+def _check_end(given, end, diameter, raw, log):
+    form, key = given[f"end_{end}"], f"end_{end}_depth_m"
+    depth = given[key]
+    if form in END_DEPTH and depth is not None:
+        (least, most), ratio = END_DEPTH[form], depth / diameter
+        is_hemisphere = form == "spherical" and ratio >= HEMISPHERE
+        if not least <= ratio <= most and not is_hemisphere:
+            text = message(
+                "end_depth_strange",
+                "{found_m:g} m is {ratio:.3g} diameters, expected {least:g} to {most:g} for a"
+                " {form} end: is it the depth, and of one end?",
+                found_m=depth,
+                ratio=ratio,
+                least=least,
+                most=most,
+                form=form,
+            )
+            tell(log.warning, raw, "horizontal", key, text)
+    for name, (least, most) in RADII:
+        radius = given[f"end_{end}_{name}"]
+        if form == "torispherical" and radius is not None and not (
+            least <= radius / diameter <= most
+        ):  # fmt: skip
+            text = message(
+                "end_radius_strange",
+                "{found_m:g} m is {ratio:.3g} diameters, expected {least:g} to {most:g}: is it the"
+                " right radius, and is the diameter one?",
+                found_m=radius,
+                ratio=radius / diameter,
+                least=least,
+                most=most,
+            )
+            tell(log.warning, raw, "horizontal", f"end_{end}_{name}", text)
+
+
+def _check_pair(given, raw, log):
+    a, b = given["end_a_depth_m"], given["end_b_depth_m"]
+    if None in (a, b) or abs(a - b) < max(ENDS_DIFFER_M, (ENDS_DIFFER - 1) * min(a, b)):
+        return
+    deeper, other = ("a", "b") if a > b else ("b", "a")
+    text = message(
+        "ends_differ",
+        "{found_m:g} m, and end {other} is {other_m:g} m deep: expected two ends of one form to be"
+        " alike",
+        found_m=max(a, b),
+        other=other.upper(),
+        other_m=min(a, b),
+    )
+    tell(log.warning, raw, "horizontal", f"end_{deeper}_depth_m", text)

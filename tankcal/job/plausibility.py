@@ -1,0 +1,387 @@
+"""What is plausible: one table of ranges and cross-checks, for the checks and for the docs.
+
+A number beyond a range is told as a warning, or as a problem where it cannot be at all; the limits
+are tankcal's own choice, wide enough for what is built, narrow enough for a slip of the hand.
+`docs/plausibility.md` shows TABLE, and a test holds the two together.
+"""
+
+from dataclasses import dataclass
+
+from tankcal.messages import message
+
+AMBIENT, HEATED, REFRIGERATED = SERVICES = ("ambient", "heated", "refrigerated")
+SHELLS = ("carbon_steel", "stainless_steel", "aluminium", "other")
+
+FIRST_YEAR = 1900  # of a survey
+DAYS_AHEAD = 1  # of a survey, for time zones
+DAYS_TO_ISSUE = 60  # a certificate may be prepared before its day
+
+SHELL_C = {AMBIENT: (-35.0, 50.0), HEATED: (-35.0, 300.0), REFRIGERATED: (-200.0, 50.0)}
+REFERENCE_C = {AMBIENT: (0.0, 40.0), HEATED: (0.0, 300.0), REFRIGERATED: (-200.0, 40.0)}
+AIR_C = (-45.0, 48.0)
+SHELL_OVER_AIR_K = (-15.0, 30.0)  # a shell at night and a shell in the sun
+
+EXPANSION_PER_K = {
+    "carbon_steel": (0.95e-5, 1.4e-5),
+    "stainless_steel": (0.95e-5, 1.9e-5),
+    "aluminium": (2.1e-5, 2.6e-5),
+}
+E_GPA = {
+    "carbon_steel": (185.0, 220.0),
+    "stainless_steel": (175.0, 220.0),
+    "aluminium": (62.0, 80.0),
+}
+
+WATER_STRESS_MPA, LEAST_STRESS_MPA = 350.0, 137.0  # of thin plates at most; of thick ones at least
+LIGHT, HEAVY = 0.45, 1.0  # relative densities of the contents where the job gives none
+THICK_MM, THICK_FACTOR = 16.0, 2.0  # what a course may have over what the head needs
+THIN_MM, THIN_PER_M = 1.0, 0.05  # of a course, by the diameter in metres
+SOLID_PLATES_MM = {  # a lying cylinder or a sphere: least and most, each a + b times the diameter
+    "horizontal": ((1.0, 0.4), (12.0, 8.0)),
+    "sphere": ((1.0, 0.2), (6.0, 4.0)),
+}
+LEAST_PLATE_MM = 1.0
+PAINT_MM = 2.0
+RISING_PLATES = 1.1  # thickness of the top course over that of the bottom course
+
+NEAR_JOINT_M = 0.025  # rings are surveyed on plates, not on welds
+LEVEL_M, RING_GAP_M, MOST_RINGS = 0.03, 0.08, 60
+TOP_MISS_M = 0.05
+RIM, RIM_MISS_M = 0.8, 0.25  # bottom points beyond this part of the radius lie near bottom_z_m
+DIP_PLATE_M = 0.3
+PLATE_ON_BOTTOM, PLATE_ON_BOTTOM_M = 0.5, 0.05  # of the rise at the dip point, and
+SLOPE_UP = 0.04  # rise of a cone over the radius; 1:120 is usual, up to 1:25 is plausible
+REFERENCE_BELOW_M, REFERENCE_ABOVE_M, REFERENCE_ABOVE = 0.05, 5.0, 0.2
+
+DIAMETER_MISS, DIAMETER_MISS_M = 0.01, 0.02
+SIZE_MISS, IMPOSSIBLE_MISS = 0.03, 0.3
+VOLUME_MISS = 0.05
+LENGTH_OVER_DIAMETER, MOST_LENGTH_OVER_DIAMETER = (0.4, 16.0), 40.0
+END_DEPTH = {  # over the diameter
+    "conical": (0.02, 0.3),
+    "ellipsoidal": (0.12, 0.4),
+    "spherical": (0.05, 0.22),
+}
+HEMISPHERE = 0.47
+DISH_RADIUS, KNUCKLE_RADIUS = (0.7, 1.3), (0.03, 0.25)  # over the diameter
+ENDS_DIFFER, ENDS_DIFFER_M = 1.2, 0.03
+SPHERE_M = 50.0
+DENSITIES_KG_M3 = (400.0, 2000.0)
+ROOF_KG_M2 = (15.0, 500.0)
+
+MISFIT, MISFIT_M, IMPOSSIBLE_MISFIT = 0.002, 0.010, 0.02  # rms of residuals, over the diameter
+MISFIT_SDS = 3.0  # over the standard deviation that was given
+CIRCUMFERENCE_MISS, CIRCUMFERENCE_SDS = 4e-4, 3.0
+
+TAKES_ROOM = (
+    *("coil", "pipe", "tube", "column", "pillar", "ladder", "stair", "agitator", "mixer", "beam"),
+    *("serpentina", "tubo", "tubulação", "coluna", "pilar", "escada", "agitador", "viga"),
+    *("tubería", "columna", "escalera", "mezclador"),
+)
+GIVES_ROOM = (
+    *("manhole", "manway", "sump", "boca de visita", "poço de drenagem", "boca de hombre"),
+    *("sumidero", "boca de inspeção"),
+)
+
+
+@dataclass(frozen=True)
+class Plausible:
+    """One line of the table.
+
+    what     keys of job.toml and columns of tables, as they are written
+    expected the plausible range, in words
+    slip     what slip of the hand is told by it
+    against  what the number is compared with
+    codes    of the messages that tell it
+    """
+
+    what: str
+    expected: str
+    slip: str
+    against: str
+    codes: tuple[str, ...]
+
+
+def least_course_mm(diameter_m, head_m, density=LIGHT):
+    """Plate that water stress of 350 MPa asks for, or what small tanks are made of at least."""
+    needed = _head_mm(diameter_m, head_m, density, WATER_STRESS_MPA)
+    return max(THIN_MM + THIN_PER_M * diameter_m, needed)
+
+
+def most_course_mm(diameter_m, head_m, density=HEAVY):
+    """Twice the plate that a stress of 137 MPa asks for, and 16 mm."""
+    return THICK_MM + THICK_FACTOR * _head_mm(diameter_m, head_m, density, LEAST_STRESS_MPA)
+
+
+def reference_doubt(reference_m, top_m, diameter_m):
+    """Message about a reference height against the dip of the top; None: plausible."""
+    if reference_m < top_m - REFERENCE_BELOW_M:
+        return message(
+            "reference_below_top",
+            "{found_m:g} m, and the top of the tank is {top_m:.4g} m above the table's zero:"
+            " expected the reference point above it",
+            found_m=reference_m,
+            top_m=top_m,
+        )
+    most = top_m + REFERENCE_ABOVE_M + REFERENCE_ABOVE * (diameter_m or 0.0)
+    if reference_m > most:
+        return message(
+            "reference_far_above",
+            "{found_m:g} m, and the top of the tank is {top_m:.4g} m above the table's zero:"
+            " expected at most {most_m:.4g} m; in another unit?",
+            found_m=reference_m,
+            top_m=top_m,
+            most_m=most,
+        )
+    return None
+
+
+def _head_mm(diameter_m, head_m, density, stress_mpa):
+    """Thickness under a liquid head: 1000 rho g H D / 2 over the stress, mm."""
+    return 4.903 * density * diameter_m * head_m / stress_mpa
+
+
+def _c(bounds):
+    return f"{bounds[0]:g} to {bounds[1]:g} °C"
+
+
+def _per_k(shell):
+    low, high = EXPANSION_PER_K[shell]
+    return f"{low:g} to {high:g} 1/K"
+
+
+def _line(kind):
+    (a, b), (c, d) = SOLID_PLATES_MM[kind]
+    return f"({a:g} + {b:g} D) to ({c:g} + {d:g} D) mm, D in m"
+
+
+def _of_ends(form):
+    low, high = END_DEPTH[form]
+    return f"{form} {low:g} to {high:g}"
+
+
+TABLE = (
+    Plausible(
+        "survey.date",
+        f"year {FIRST_YEAR} to today (problem)",
+        "1024 for 2024, a day to come",
+        "today's date",
+        ("survey_date_impossible",),
+    ),
+    Plausible(
+        "certificate.date_of_issue",
+        f"up to {DAYS_TO_ISSUE} days from today",
+        "a wrong year",
+        "today's date, survey.date",
+        ("issue_date_far",),
+    ),
+    Plausible(
+        "survey.shell_temperature_c",
+        f"{_c(SHELL_C[AMBIENT])}; checks.service heated {_c(SHELL_C[HEATED])}, refrigerated"
+        f" {_c(SHELL_C[REFRIGERATED])}",
+        "degrees Fahrenheit",
+        f"checks.air_temperature_c: {SHELL_OVER_AIR_K[0]:g} to {SHELL_OVER_AIR_K[1]:+g} K from it",
+        ("shell_temperature_strange", "shell_unlike_air"),
+    ),
+    Plausible(
+        "table.reference_temperature_c",
+        f"{_c(REFERENCE_C[AMBIENT])}; checks.service heated {_c(REFERENCE_C[HEATED])}, refrigerated"
+        f" {_c(REFERENCE_C[REFRIGERATED])}",
+        "degrees Fahrenheit (68, 60, 59)",
+        "checks.service",
+        ("reference_temperature_strange",),
+    ),
+    Plausible(
+        "checks.air_temperature_c",
+        _c(AIR_C),
+        "degrees Fahrenheit",
+        "",
+        ("air_temperature_strange",),
+    ),
+    Plausible(
+        "material.expansion_per_k",
+        f"carbon steel {_per_k('carbon_steel')}, stainless {_per_k('stainless_steel')}, aluminium"
+        f" {_per_k('aluminium')}; needed with a shell of another kind than carbon steel",
+        "ten times too small, that of aluminium",
+        "checks.shell; blank: carbon steel",
+        ("expansion_strange", "expansion_missing"),
+    ),
+    Plausible(
+        "material.e_gpa",
+        "; ".join(f"{name} {low:g} to {high:g} GPa" for name, (low, high) in E_GPA.items())
+        + "; needed under a liquid head with a shell of another kind than carbon steel",
+        "that of another metal",
+        "checks.shell; blank: carbon steel",
+        ("modulus_strange", "modulus_missing"),
+    ),
+    Plausible(
+        "courses.thickness_mm",
+        f"from {THIN_MM:g} + {THIN_PER_M:g} D mm, or 4.9 D h G / {WATER_STRESS_MPA:g}, up to"
+        f" {THICK_MM:g} + {THICK_FACTOR:g} × 4.9 D h G / {LEAST_STRESS_MPA:g} (D diameter, h shell"
+        f" above the course's bottom, m; G relative density, {LIGHT:g} to {HEAVY:g} if not given)",
+        "ten times too thick or too thin, centimetres",
+        "the head that the plate carries",
+        ("plate_thick", "plate_thin"),
+    ),
+    Plausible(
+        "courses: their order",
+        f"the top course at most {RISING_PLATES:g} times as thick as the bottom one; no level ring"
+        f" of points within {1000 * NEAR_JOINT_M:g} mm of a joint",
+        "courses from the top down, a wrong height",
+        "plates, rings of points.csv",
+        ("courses_top_down", "ring_on_joint"),
+    ),
+    Plausible(
+        "courses.paint_mm",
+        f"up to {PAINT_MM:g} mm; none where survey.side is inside",
+        "another unit, inside for outside",
+        "survey.side",
+        ("paint_thick", "paint_of_inside"),
+    ),
+    Plausible(
+        "horizontal.thickness_mm, sphere.thickness_mm",
+        f"lying {_line('horizontal')}; sphere {_line('sphere')}; below {LEAST_PLATE_MM:g} mm a"
+        " problem",
+        "ten times too thick, centimetres",
+        "the diameter",
+        ("solid_plate_strange", "solid_plate_tiny"),
+    ),
+    Plausible(
+        "datum.bottom_z_m",
+        f"with the courses {1000 * TOP_MISS_M:g} mm from checks.top_z_m; bottom points near the"
+        f" wall within {RIM_MISS_M:g} m",
+        "half a metre off",
+        "checks.top_z_m, bottom.csv",
+        ("top_not_met", "rim_off"),
+    ),
+    Plausible(
+        "datum.dip_plate_z_m",
+        f"within {DIP_PLATE_M:g} m of the bottom; with a cone or a dish and the place of the dip"
+        f" point within {PLATE_ON_BOTTOM_M:g} m and half the rise of its surface there",
+        "half a metre off",
+        "the bottom",
+        ("dip_plate_far", "dip_plate_off_bottom"),
+    ),
+    Plausible(
+        "datum.reference_height_m",
+        f"from {REFERENCE_BELOW_M:g} m below the tank's top to {REFERENCE_ABOVE_M:g} m + "
+        f"{REFERENCE_ABOVE:g} D above",
+        "below the shell's top, feet",
+        "the top of shell or solid",
+        ("reference_below_top", "reference_far_above"),
+    ),
+    Plausible(
+        "bottom.centre_z_m",
+        f"at most {SLOPE_UP:g} of the radius above the edge",
+        "cone up for down",
+        "checks.bottom_slopes (problem), the dip plate",
+        ("bottom_slopes_otherwise", "bottom_rises_much", "bottom_steep"),
+    ),
+    Plausible(
+        "deadwood.volume_m3",
+        "negative for coils, pipes, columns, stairs, mixers; positive for manholes and sumps",
+        "the wrong sign",
+        "the name, in English, Portuguese or Spanish",
+        ("deadwood_takes", "deadwood_gives", "deadwood_large"),
+    ),
+    Plausible(
+        "tank.nominal_diameter_m",
+        f"{100 * SIZE_MISS:g} % from the given diameter, {100 * DIAMETER_MISS:g} % +"
+        f" {1000 * DIAMETER_MISS_M:g} mm from that of the points; {100 * IMPOSSIBLE_MISS:g} % is a"
+        " problem",
+        "radius for diameter, feet",
+        "sizes and points",
+        ("size_unlike_drawing", "points_unlike_drawing", "points_too_wide"),
+    ),
+    Plausible(
+        "tank.nominal_volume_m3",
+        f"{100 * VOLUME_MISS:g} % from the capacity",
+        "whatever moves the volume much",
+        "the capacity",
+        ("not_nominal",),
+    ),
+    Plausible(
+        "horizontal.length_m",
+        f"{LENGTH_OVER_DIAMETER[0]:g} to {LENGTH_OVER_DIAMETER[1]:g} diameters; over"
+        f" {MOST_LENGTH_OVER_DIAMETER:g} a problem",
+        "decimetres, feet",
+        f"the diameter; checks.length_m within {100 * SIZE_MISS:g} %",
+        ("length_strange", "length_impossible"),
+    ),
+    Plausible(
+        "horizontal.end_a_depth_m, horizontal.end_b_depth_m",
+        "over the diameter: "
+        + ", ".join(_of_ends(form) for form in END_DEPTH)
+        + f" or {HEMISPHERE:g} to 0.5; two ends of one form differ by less than"
+        f" {100 * (ENDS_DIFFER - 1):.0f} % or {1000 * ENDS_DIFFER_M:g} mm",
+        "twice as deep, the dish's radius for its depth",
+        "the diameter, the other end",
+        ("end_depth_strange", "ends_differ"),
+    ),
+    Plausible(
+        "horizontal.end_a_dish_radius_m, end_a_knuckle_radius_m and those of end B",
+        f"dish {DISH_RADIUS[0]:g} to {DISH_RADIUS[1]:g}, knuckle {KNUCKLE_RADIUS[0]:g} to"
+        f" {KNUCKLE_RADIUS[1]:g} diameters",
+        "radius for diameter, twice as large",
+        "the diameter",
+        ("end_radius_strange",),
+    ),
+    Plausible(
+        "horizontal.tilt_mm_per_m",
+        "up to 50 mm/m",
+        "degrees or percent",
+        "",
+        ("large_tilt",),
+    ),
+    Plausible(
+        "sphere.diameter_m",
+        f"up to {SPHERE_M:g} m",
+        "feet",
+        "tank.nominal_diameter_m",
+        ("sphere_large",),
+    ),
+    Plausible(
+        "roof.mass_kg",
+        f"{ROOF_KG_M2[0]:g} to {ROOF_KG_M2[1]:g} kg for a square metre of the tank",
+        "tonnes",
+        "tank.nominal_diameter_m",
+        ("roof_mass_strange",),
+    ),
+    Plausible(
+        "table.liquid_density_kg_m3 and all densities",
+        f"{DENSITIES_KG_M3[0]:g} to {DENSITIES_KG_M3[1]:g} kg/m3",
+        "g/cm3",
+        "",
+        ("strange_density",),
+    ),
+    Plausible(
+        "points of a lying cylinder or a sphere",
+        f"residuals (rms) up to {100 * MISFIT:g} % of the diameter + {1000 * MISFIT_M:g} mm, and"
+        f" {MISFIT_SDS:g} times their given sd; over {100 * IMPOSSIBLE_MISFIT:g} % a problem",
+        "one axis in another unit, points of something else",
+        "the fitted shape",
+        ("points_misfit", "points_beyond_sd", "points_make_no_shape"),
+    ),
+    Plausible(
+        "survey.side",
+        "set-ups and photographs on that side of the wall (problem)",
+        "inside for outside",
+        "the adjusted stations",
+        ("stations_on_other_side",),
+    ),
+    Plausible(
+        "checks.circumference_m",
+        f"{1e6 * CIRCUMFERENCE_MISS:g} ppm and {CIRCUMFERENCE_SDS:g} sd from that of the points",
+        "inside for outside, a wrong scale, feet",
+        "the first course, outside, plate and paint added where it was surveyed inside",
+        ("circumference_off",),
+    ),
+    Plausible(
+        "check readings, distances between control points",
+        "4 sd",
+        "slope distances 0.1 % too long",
+        "the adjusted survey",
+        ("check_reading_off", "check_point_off", "control_scale"),
+    ),
+)
+CODES = frozenset(code for one in TABLE for code in one.codes)
