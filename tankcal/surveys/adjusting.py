@@ -19,6 +19,7 @@ from tankcal.surveys.gathering import gather, named_in
 from tankcal.surveys.holding import wrongly_held
 from tankcal.surveys.results import Adjustment
 from tankcal.surveys.rows import gone_with_their_points, readings_of
+from tankcal.surveys.scales import check_readings_off, scale_of_control
 from tankcal.surveys.screening import gross_readings, swapped_at_start
 from tankcal.surveys.spelling import names_alike, same_place
 from tankcal.surveys.starts import mirrored_targets, started, started_like
@@ -131,6 +132,8 @@ def _complete(search, gathered, frame, measurements):
         acting = np.isfinite(known.xyz_m) & np.isfinite(known.sd_m)
     checked = check_points(adjusted, measurements, known, acting, scale)
     warnings += disagreeing(checked, measurements.check)
+    warnings += check_readings_off(readings)
+    warnings += scale_of_control(adjusted, readings, measurements)
     return Adjustment(
         names=names,
         xyz_m=adjusted.xyz_m[there],
