@@ -35,9 +35,9 @@ format: $(VENV)/full ## bring the code to the house style
 	$(BIN)/ruff check --fix .
 
 notebooks: $(VENV)/full ## execute every notebook, top to bottom
-	mkdir -p build/notebooks
-	cd notebooks && ls *.ipynb | xargs -P 2 -n 1 \
-	  ../$(BIN)/jupyter nbconvert --to notebook --execute --output-dir ../build/notebooks
+	mkdir -p build/notebooks/studies
+	cd notebooks && ls *.ipynb studies/*.ipynb | xargs -P 2 -I {} \
+	  sh -c '../$(BIN)/jupyter nbconvert --to notebook --execute --output-dir ../build/notebooks/$$(dirname {}) {}'
 
 bench: $(VENV)/full ## time and memory of the main job, tables of 1 mm rows and their u, ten million points, plans
 	$(BIN)/python benchmarks/main_job.py

@@ -13,13 +13,12 @@ from PIL import Image
 from tankcal.report.blocks import MIME
 
 FIGURES = {  # which of its figures, counted from 0
-    "01_main_job": 0,
-    "02_adjustment": 2,
-    "03_sections_and_volumes": 3,
-    "04_camera": 0,
+    "01_main_job": 1,
+    "02_adjustment": 0,
+    "03_sections_and_volumes": 1,
     "05_uncertainty": 1,
     "06_new_tank": 0,
-    "07_planning": 3,
+    "07_planning": 0,
 }
 WIDTH, HEIGHT, DPI = 420, 200, 220
 PAGE = b'#set page(width: auto, height: auto, margin: 2mm)\n#image("figure.svg", width: 165mm)'

@@ -11,7 +11,7 @@ def main(arguments):
     fix = "--fix" in arguments
     dirty = []
     for folder in (name for name in arguments if name != "--fix"):
-        for path in sorted(Path(folder).glob("*.ipynb")):
+        for path in sorted(Path(folder).rglob("*.ipynb")):
             notebook = nbformat.read(path, as_version=4)
             code = [cell for cell in notebook.cells if cell.cell_type == "code"]
             if any(cell.outputs or cell.execution_count for cell in code):

@@ -19,7 +19,7 @@ from tankcal.uncertainty import Source, coverage_factor, declared_source, effect
 HALF_A_LITRE_M3 = 5e-4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Budget:
     """A volume read from the table and what its uncertainty is made of.
 
@@ -51,6 +51,9 @@ class Budget:
             f"{self.high_m:g} m" if self.low_m is None else f"{self.low_m:g} to {self.high_m:g} m"
         )
         return f"{dips}: {volume_text(self.volume_m3, self.U_m3, self.k)}"
+
+    def __repr__(self) -> str:
+        return f"<Budget of {self}>"
 
     def _repr_html_(self) -> str:
         ordered = sorted(self.lines, key=lambda one: -abs(one.share))

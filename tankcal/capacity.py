@@ -40,7 +40,7 @@ class Quantity:
         return f"<p>{escape(str(self))}{'' if self.for_use else ', not for use'}</p>"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Capacity:
     """The table: (rows,) dip heights from the table's zero, volumes, and areas of the cut.
 
@@ -54,6 +54,10 @@ class Capacity:
     sources: tuple[Source, ...]
     probability: float
     critical_m: tuple[float, float] | None = None
+
+    def __repr__(self) -> str:
+        top_m = self.height_m[-1]
+        return f"<Capacity of {len(self.height_m)} rows to {top_m:g} m: {self.at(top_m)}>"
 
     @cached_property
     def factor_m3(self):

@@ -1,9 +1,10 @@
 """Drawings of a calibrated tank: sections, the wall unrolled, the table and its budget.
 
-Plain numbers go in, matplotlib figures come out, in one style for notebooks and papers. Lengths of
+Plain numbers go in, `Drawing`s come out, in one style for notebooks and papers. Lengths of
 the page are inches. The words at the axes are those of WORDS, or of `words(key, **values)`.
 """
 
+import io
 import logging
 import textwrap
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ STYLE = {
     "grid.color": "#c3cad2",
     "lines.linewidth": 0.9,
 }
+_DPI_ON_SCREEN = 110
 WORDS = {
     "azimuth": "Azimuth / °",
     "residual": "Residual / mm",
@@ -46,6 +48,15 @@ MANY = 500  # points in a panel: from here on their picture is smaller than thei
 SHELL_SHARE = 0.03  # of its cut: so far the cut of a shell changes with height
 BOTTOM_SHARE = 0.8  # of the cut of the shell: below it the curve of a bottom would hide the shell's
 _TURN = (-4, 364)  # degrees: points at north are not cut off
+
+
+class Drawing(Figure):
+    """A matplotlib Figure that a notebook shows, whatever backend it has."""
+
+    def _repr_png_(self):
+        image = io.BytesIO()
+        self.savefig(image, format="png", dpi=_DPI_ON_SCREEN)
+        return image.getvalue()
 
 
 def english(key, **values):
@@ -97,7 +108,7 @@ def residual_panels(rings, words=english, most=8):
 
 def _residual_panels(rings, limit_mm, words):
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 0.55 * len(rings) + 0.55))
+        figure = Drawing(figsize=(WIDTH, 0.55 * len(rings) + 0.55))
         axes = figure.subplots(len(rings), 1, sharex=True, squeeze=False)[:, 0]
         for ax, ring in zip(axes, rings, strict=True):
             residual_mm = 1e3 * np.asarray(ring.residual_m)
@@ -143,7 +154,7 @@ def _polar_panels(rings, factor, words):
     across = 3 if len(rings) <= 6 else 4
     down = ceil(len(rings) / across)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 5.4 / across * down))
+        figure = Drawing(figsize=(WIDTH, 5.4 / across * down))
         axes = figure.subplots(down, across, squeeze=False).ravel()
         turn = np.linspace(0, 2 * np.pi, 361)
         for ax, ring in zip(axes, rings, strict=False):
@@ -176,7 +187,7 @@ def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english):
     residual_mm = 1e3 * np.asarray(residual_m)
     limit = np.max(np.abs(residual_mm), initial=0.0) or 1.0
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 2.6))
+        figure = Drawing(figsize=(WIDTH, 2.6))
         ax = figure.subplots()
         size = 14 if len(azimuth_deg) <= 300 else 6
         if len(azimuth_deg) > 3000:  # no room for edges: grey behind the points shows white ones
@@ -221,7 +232,7 @@ def capacity_curves(height_m, area_m2, U_m3, words=english):
     of_bottom = bottom_rows(area_m2)
     parts = [slice(of_bottom + 1), slice(of_bottom, None)] if of_bottom else [slice(None)]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 2.4))
+        figure = Drawing(figsize=(WIDTH, 2.4))
         *left, right = figure.subplots(1, len(parts) + 1)
         for ax, rows in zip(left, parts, strict=True):
             ax.plot(height_m[rows], litres_per_cm[rows], color=INK)
@@ -253,7 +264,7 @@ def budget_bars(bars, words=english):
     colours = [PALE if is_default else INK for _, _, is_default in bars]
     shares = [100 * share for _, share, _ in bars]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, high * len(bars) + 0.6))
+        figure = Drawing(figsize=(WIDTH, high * len(bars) + 0.6))
         ax = figure.subplots()
         ax.barh(range(len(bars)), shares, color=colours, height=0.6)
         ax.set_yticks(range(len(bars)), names, parse_math=False)
@@ -280,7 +291,7 @@ def network(names, xy_m, covariance_m2, most_names=60):
     largest = float(half_m.max(initial=0.0))
     factor = round_factor(0.04 * extent / largest) if largest > 0 else 1
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 4.6))
+        figure = Drawing(figsize=(WIDTH, 4.6))
         ax = figure.subplots()
         width, height = 2 * factor * half_m[:, 1], 2 * factor * half_m[:, 0]
         turn = np.degrees(np.arctan2(axes[:, 1, 1], axes[:, 0, 1]))

@@ -40,9 +40,7 @@ def plot(result, what: str | None = None) -> "Figure":
 
 
 def _drawn(draw, result):
-    import matplotlib.pyplot  # noqa: F401  Jupyter shows figures once it is loaded
-
-    from tankcal import plots
+    from tankcal import plots  # matplotlib is loaded when something is drawn
 
     return draw(plots, result)
 

@@ -30,7 +30,7 @@ class Finding:
         return str(Problem(self.problem.file, text, self.problem.row, self.problem.column))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Report:
     """Findings in the order of the file, and one line about each table that was read."""
 
@@ -45,6 +45,9 @@ class Report:
     def __str__(self) -> str:
         warnings = len(self.findings) - self.errors
         return f"{self.errors} errors, {warnings} warnings"
+
+    def __repr__(self) -> str:
+        return f"<Report of {self}>"
 
     def _repr_html_(self) -> str:
         rows = [

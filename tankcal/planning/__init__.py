@@ -8,8 +8,11 @@ from importlib import import_module
 _ROOM_OF = {
     "Plan": "model",
     "Prediction": "predicting",
+    "greedy": "helping",
     "load_plan": "reading",
     "predict": "predicting",
+    "smallest": "helping",
+    "what_helps": "helping",
 }
 
 __all__ = [*_ROOM_OF]
