@@ -9,8 +9,9 @@ from surveyed import by_instruments, by_photographs, changed, known, table, told
 from tankcal.cli import main
 from tankcal.job.measurements import Measurements
 from tankcal.network import adjust
-from tankcal.network.cleaning import with_use
-from tankcal.network.separability import APART, alternatives
+from tankcal.network.cleaning import CRITICAL, with_use
+from tankcal.network.separability import alternatives
+from tankcal.record.adjustment import adjustment_of
 from tankcal.surveys import adjust_survey
 from tankcal.surveys.averaging import averaged, torn_apart
 
@@ -215,12 +216,14 @@ def test_whatever_may_be_wrong_instead_explains_it_as_well():
         found = intersection(stations)
         assert [one.row for one in found.removed] == [2]
         likely = alternatives(found.adjusted, 0, 0)
-        best, size = found.adjusted.test().chi2, len(stations)
+        size = len(stations)
+        whole = adjust(with_use(found.adjusted.survey, {0: np.ones(size)}))
         for row in range(1, size):
             uses = np.ones(size)
             uses[row] = 0.0
-            again = adjust(with_use(found.adjusted.survey, {0: uses})).test().chi2
-            assert ((0, row) in likely) == (again - best < APART)
+            again = adjust(with_use(found.adjusted.survey, {0: uses}))
+            agrees = again.residuals[0].whole[0] <= CRITICAL
+            assert ((0, row) in likely) == (agrees and whole.chi2 - again.chi2 > CRITICAL**2)
     assert not any("as well be" in str(one) for one in found.warnings)
 
 
@@ -301,3 +304,27 @@ def test_what_agrees_with_the_rest_does_not_stay_set_aside(seed):
     azimuths = table("azimuths", value, 1e-4, names, ["P"] * 6)
     found = adjust_survey(Measurements(control=control, readings=(azimuths,)))
     assert all(abs(one.w) > 3.29 for one in found.removed)
+
+
+def test_every_held_coordinate_has_a_row_with_its_test(stations):
+    """Property: the row of a held coordinate says what adjusting without it says."""
+    measurements = held(stations, error_m=0.004)
+    measurements = replace(measurements, settings=replace(measurements.settings, snooping=False))
+    found = adjust_survey(measurements)
+    rows = [one for one in found.readings if one.kind == "control coordinate"]
+    assert [(one.ids[0], one.element) for one in rows] == [
+        (name, axis) for name in stations.control.point for axis in "xyz"
+    ]
+    record = adjustment_of(found, measurements)
+    assert [row["ids"] for row in record["held"]] == [list(one.ids) for one in rows]
+    assert all(row["controlled"] for row in record["held"])
+    control = measurements.control
+    free = replace(control, sd_m=control.sd_m.copy())
+    free.sd_m[0, 0] = np.nan
+    again = adjust_survey(replace(measurements, control=free))
+    place = again.names.index(control.point[0])
+    released, sd = again.xyz_m[place, 0], np.sqrt(again.covariance_m2[place, 0, 0])
+    assert record["held"][0]["released"] == pytest.approx(released, abs=2e-6)
+    assert record["held"][0]["sd"] == pytest.approx(sd, rel=1e-3)
+    assert rows[0].w == pytest.approx((released - control.xyz_m[0, 0]) / sd, rel=1e-3)
+    assert not [one for one in found.groups if one.kind == "control coordinate"]

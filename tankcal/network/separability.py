@@ -1,29 +1,38 @@
-"""What else would explain a blunder: readings that agree as badly when the one set aside is back.
+"""What else would explain a blunder: readings without which the one set aside agrees again.
 
-With a set-aside observation i back (residual e, whitened row J) the sum of squares grows by
+With a set-aside observation i back (residual e, whitened row J, S = 1 + J Q J') and B = J_j Q J',
+the residuals of i and of another one j, and their covariances, are
 
-    T_i = e' S^-1 e,   S = 1 + J Q J'
+    v_i = S^-1 e,   R_i = S^-1,   v_j = v - B S^-1 e,   R_j = (1 - J_j Q J_j') + B S^-1 B',
+    R_ij = -S^-1 B'
 
-and the test quantities of all others become, with B = J_j Q J',
+Without j in its place, i is tested by
 
-    w_j = (v - B S^-1 e) / sqrt(r + B S^-1 B')
+    T = u' M^-1 u,   u = v_i - R_ij R_j^-1 v_j,   M = R_i - R_ij R_j^-1 R_ji
 
-Were j the blunder instead, the sum of squares would be larger by T_i - w_j^2 only: where that is
-small, the survey cannot tell the two apart. Source: Foerstner 1983, Reliability and discernability
-of extended Gauss-Markov models.
+and j may be the blunder as well when T is insignificant (0.1 %) and j itself is not. Image points
+are pairs, here as in the search. A coordinate that is held is released: with its reaction g and
+square q (see `reactions`), and r = C_i + J X, both become g - r' S^-1 e and q + r' S^-1 r.
+Source: Foerstner 1983, Reliability and discernability of extended Gauss-Markov models.
 """
 
 import numpy as np
+from scipy.special import chdtri
 
 from tankcal.gauss_markov.effects import responses
 from tankcal.network.cleaning import CRITICAL
+from tankcal.network.reactions import HELD
 from tankcal.network.reliability import UNCONTROLLED
 
-APART = 10.8  # chi-square, 1 degree of freedom, 0.1 %
+LIMITS = (0.0, CRITICAL**2, float(chdtri(2, 0.001)))  # of T, by the number of values tested
+WORTH = 0.5 * CRITICAL**2  # w^2 of a single value from which its observation is looked at
+LOOKED_AT = 200  # observations of a group, the worst
 
 
-def alternatives(adjusted, source, row):
+def alternatives(adjusted, source, row, held=None):
     """[(source, row)] of readings that may be the blunder in place of one that was set aside.
+
+    held  Reactions of held coordinates, which may be wrong as well; None: they are not asked
 
     The likeliest first. Empty where the survey tells them apart.
     """
@@ -41,16 +50,77 @@ def alternatives(adjusted, source, row):
     columns = problem.model.groups[number].columns[mine]
     moves = np.hstack([part for _, part in responses(solution, columns, jac)])
     moves = np.vstack([moves, np.zeros((1, moves.shape[1]))])
-    s = np.eye(whole.rows) + jac[0] @ moves[columns[0]]
-    back = np.linalg.solve(s, e[0])
-    limit, found = max(float(e[0] @ back) - APART, CRITICAL**2), []
+    inverse = np.linalg.inv(np.eye(whole.rows) + jac[0] @ moves[columns[0]])
+    back, found = inverse @ e[0], []
     for k, table in enumerate(adjusted.residuals[: len(problem.sources)]):
         if table.source == "known beforehand":
             continue
         b = np.einsum("nmk,nkd->nmd", solution.jacobians[k], moves[problem.model.groups[k].columns])
-        v = table.residual / table.sd - b @ back
-        r = table.redundancy + np.einsum("nmd,de,nme->nm", b, np.linalg.inv(s), b)
-        square = np.where(r > UNCONTROLLED, v**2 / np.maximum(r, UNCONTROLLED), 0.0).max(axis=1)
-        for i in np.flatnonzero(table.used & (square > limit)):
-            found.append((square[i], table.source, int(table.rows[i])))
+        for i, blocks in _near(solution, problem, table, k, b, inverse, back):
+            own, instead = _tests(*blocks, inverse, back)
+            if own is not None and instead is not None:
+                found.append((own, table.source, int(table.rows[i])))
+    if held is not None and len(held.rows):
+        c = np.zeros((whole.rows, len(held.rows)))
+        place = whole.columns(held.layout)[0] - problem.model.unknowns
+        c[:, place[place >= 0]] = jac[0][:, place >= 0]
+        found += _released(held, c + jac[0] @ np.vstack([held.changes, 0 * c[:1]])[columns[0]],
+                           inverse, e[0])  # fmt: skip
     return [one[1:] for one in sorted(found, key=lambda one: -one[0])]
+
+
+def _near(solution, problem, table, number, b, inverse, back):
+    """Observations that stand out with i back: place, (v_j, R_j, B)."""
+    v = table.residual / table.sd - b @ back
+    r = table.redundancy + np.einsum("nmd,de,nme->nm", b, inverse, b)
+    square = np.where(r > UNCONTROLLED, v**2 / np.maximum(r, UNCONTROLLED), 0.0).max(axis=1)
+    near = np.flatnonzero(table.used & (square > WORTH) & (b != 0).any(axis=(1, 2)))
+    near = near[np.argsort(-square[near], kind="stable")][:LOOKED_AT]
+    if not len(near):
+        return
+    columns, jac = problem.model.groups[number].columns[near], solution.jacobians[number][near]
+    m = jac.shape[1]
+    for part, response in responses(solution, columns, jac):
+        response = np.vstack([response, np.zeros((1, response.shape[1]))])
+        for value in range(part.start, min(part.stop, len(near) * m)):
+            place, first = divmod(value, m)
+            if first == 0:
+                covariance = np.zeros((m, m))
+            covariance[:, first] = jac[place] @ response[columns[place], value - part.start]
+            if first == m - 1:
+                j = near[place]
+                cofactors = np.eye(m) - covariance + b[j] @ inverse @ b[j].T
+                yield j, (v[j], cofactors, b[j])
+
+
+def _tests(v, cofactors, b, inverse, back):
+    """T of j with i back, None: insignificant; T of i without j, None: significant."""
+    own = _square(v, cofactors)
+    if own[0] <= LIMITS[own[1]]:
+        return None, None
+    cross = -inverse @ b.T
+    by_j = cross @ np.linalg.pinv(cofactors, rcond=UNCONTROLLED, hermitian=True)
+    instead = _square(back - by_j @ v, inverse - by_j @ cross.T)
+    return own[0], instead[0] if instead[0] <= LIMITS[instead[1]] else None
+
+
+def _square(v, cofactors):
+    """v' R^-1 v and the number of values in it: what nothing controls is left out."""
+    size, ways = np.linalg.eigh(cofactors)
+    controlled = size > UNCONTROLLED
+    part = ways[:, controlled].T @ v
+    return float(np.sum(part**2 / size[controlled])), int(controlled.sum())
+
+
+def _released(held, r, inverse, e):
+    """(T, source, row) of held coordinates with whose release a reading i agrees again.
+
+    r (m, k) change of the rows of i by each release, e (m,) of them
+    """
+    before = held.w**2
+    square = held.square + np.einsum("mk,mn,nk->k", r, inverse, r)
+    reaction = held.reaction - r.T @ inverse @ e
+    own = np.where(held.square > 0, reaction**2 / np.where(square > 0, square, 1.0), 0.0)
+    instead = e @ inverse @ e + before - own
+    near = np.flatnonzero((own > CRITICAL**2) & (instead <= LIMITS[len(e)]))
+    return [(own[i], HELD, int(held.rows[i])) for i in near]

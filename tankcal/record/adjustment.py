@@ -7,7 +7,7 @@ from scipy.special import gammaincinv
 
 from tankcal.messages import as_plain
 from tankcal.network.cleaning import CRITICAL
-from tankcal.network.reliability import UNCONTROLLED, tau_limit
+from tankcal.network.reliability import UNCONTROLLED, noncentrality, tau_limit
 from tankcal.record.adjusted import (
     adjusted_points_of,
     cameras_of,
@@ -33,6 +33,7 @@ def adjustment_of(adjustment, measurements=None):
         **_statistics(adjustment, settings),
         "datum": _datum(adjustment.datum),
         "groups": [_group(group) for group in adjustment.groups],
+        "held": [_held(reading) for reading in adjustment.readings if _holds(reading)],
         "removed": [_reading(reading) for reading in adjustment.removed],
         "residuals": [_reading(reading) for reading in adjustment.readings],
         "cameras": cameras_of(adjustment, measurements),
@@ -98,8 +99,42 @@ def _reading(reading):
     """One reading; what is infinite (nothing controls it) is null in the record."""
     row = asdict(reading)
     row["ids"] = list(reading.ids)
-    row["controlled"] = bool(reading.check or reading.redundancy > UNCONTROLLED)
+    row["controlled"] = _controlled(reading)
     return row
+
+
+def _controlled(reading):
+    """Whether others would show an error of a reading, or of a value that is held."""
+    if _holds(reading):
+        return bool(np.isfinite(reading.mdb))
+    return bool(reading.check or reading.redundancy > UNCONTROLLED)
+
+
+def _holds(reading):
+    """Whether a value holds exactly: it has neither residual nor redundancy, but a reaction."""
+    return reading.sd == 0 and not (reading.check or reading.removed)
+
+
+def _held(reading):
+    """What the release of a value that is held would say of it."""
+    controlled = _controlled(reading)
+    sd = reading.mdb / noncentrality(ALPHA, POWER) if controlled else None
+    return {
+        "kind": reading.kind,
+        "ids": list(reading.ids),
+        "element": reading.element,
+        "file": reading.file,
+        "row": reading.row,
+        "unit": reading.unit,
+        "value": reading.value,
+        "released": reading.value + reading.w * sd if controlled else None,
+        "change": reading.w * sd if controlled else None,
+        "sd": sd,
+        "w": reading.w if controlled else None,
+        "mdb": reading.mdb,
+        "effect_m": reading.effect_m,
+        "controlled": controlled,
+    }
 
 
 def _group(group):

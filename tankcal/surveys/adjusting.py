@@ -8,6 +8,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.network.cleaning import CRITICAL
+from tankcal.network.reactions import HELD, reactions
 from tankcal.network.soundness import hardly_determined
 from tankcal.surveys.causes import causes_of
 from tankcal.surveys.checks import check_points, check_readings, disagreeing
@@ -15,7 +16,7 @@ from tankcal.surveys.cleaning import searched
 from tankcal.surveys.diagnoses import MIRROR, diagnosed
 from tankcal.surveys.focusing import in_depth
 from tankcal.surveys.frames import framed
-from tankcal.surveys.gathering import gather, named_in
+from tankcal.surveys.gathering import gather, held_trace, named_in
 from tankcal.surveys.holding import wrongly_held
 from tankcal.surveys.results import Adjustment
 from tankcal.surveys.rows import gone_with_their_points, readings_of
@@ -107,7 +108,9 @@ def _complete(search, gathered, frame, measurements):
     adjusted = search.adjusted
     scale, warnings = _cov_scale(adjusted, measurements.settings)
     warnings = [*gathered.warnings, *frame.warnings, *search.warnings, *warnings]
-    readings, groups = readings_of(adjusted, gathered.traces)
+    held = reactions(adjusted.problem, adjusted.solution, frame.tested & ~gathered.idle)
+    traces = gathered.traces | {HELD: held_trace(gathered.known, adjusted.survey.points)}
+    readings, groups = readings_of(adjusted, traces, held.residuals(adjusted.problem))
     readings += gone_with_their_points(adjusted, search.removed, gathered.traces)
     removed = sorted((one for one in readings if one.removed), key=lambda one: -abs(one.w))
     readings += check_readings(adjusted, gathered.checks, scale)
@@ -123,8 +126,8 @@ def _complete(search, gathered, frame, measurements):
     if not doubts:
         of_images = [one for one in search.removed if one.source == "image points"]
         others = [one for one in search.removed if one.source != "image points"]
-        doubts = undecided(adjusted, others, gathered.traces)
-        rays = undecided(adjusted, of_images, gathered.traces)  # one more or less: a warning
+        doubts = undecided(adjusted, others, traces, held)
+        rays = undecided(adjusted, of_images, traces, held)  # one more or less: a warning
     warnings = [*doubts, *warnings, *diagnoses, *rays]
     known = gathered.known
     acting = frame.held

@@ -24,6 +24,7 @@ class Frame:
 
     survey    to be adjusted          options   of network.adjust: datum, over
     report    DatumReport             held      (points, 3) True: control that holds the datum
+    tested    (points, 3) True: those of `held` that readings, too, speak of
     warnings  tuple of Problem
     """
 
@@ -31,6 +32,7 @@ class Frame:
     options: dict
     report: DatumReport
     held: np.ndarray
+    tested: np.ndarray
     warnings: tuple = field(default=())
 
 
@@ -59,7 +61,8 @@ def framed(survey, gathered, settings):
             "nothing that was measured gives the scale: it is that of what holds the datum",
         )
         warnings = [*warnings, Problem("job.toml", text, None, "adjustment.datum")]
-    return Frame(chosen, options, report, held, tuple(warnings))
+    spare = settings.datum != "minimal" or held.sum() > free.shape[1]
+    return Frame(chosen, options, report, held, held & spare, tuple(warnings))
 
 
 def _free(problem):

@@ -22,6 +22,7 @@ from tankcal.surveys.readings import (
 from tankcal.surveys.repeating import without_scattered
 from tankcal.surveys.spelling import in_photo
 
+AXES = "xyz"
 TOLD = 10  # points left out that are told one by one
 
 
@@ -271,6 +272,19 @@ def _control_trace(control, rows, axis, repeats):
         repeats,
         ("",) * len(rows),
         tuple(("xyz"[k],) for k in axis),
+    )
+
+
+def held_trace(known, points):
+    """The Trace of held coordinates, numbered 3 point + axis, of Known control."""
+    n = len(points)
+    return Trace(
+        "control.csv",
+        tuple(known.row.get(name) for name in points for _ in AXES),
+        tuple((name,) for name in points for _ in AXES),
+        np.ones(3 * n, dtype=int),
+        ("",) * (3 * n),
+        tuple((axis,) for axis in AXES) * n,
     )
 
 

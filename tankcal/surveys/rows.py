@@ -5,30 +5,36 @@ from itertools import repeat
 import numpy as np
 
 from tankcal.camera import PARAMETERS, UNITS
+from tankcal.network.reactions import HELD
 from tankcal.network.reliability import UNCONTROLLED
 from tankcal.surveys.results import GroupOfReadings, Reading
 
 TOOLS = {"scale": ("scale", ""), "offset_m": ("offset", "m")}
 
 
-def readings_of(adjusted, traces):
+def readings_of(adjusted, traces, held):
     """Reading rows in the order of the tables, and a GroupOfReadings for each kind and name.
 
     adjusted  network.Adjusted       traces  {source: Trace}
+    held      network.Residuals of held coordinates: rows of no group, for they are not observed
     """
     found, groups = [], {}
-    for number, table in enumerate(adjusted.residuals):
+    for number, table in enumerate((*adjusted.residuals, held)):
         if table.source == "known beforehand":
             trace = _known_trace(adjusted, adjusted.problem.observations[number])
             value = adjusted.problem.observations[number].value
         else:
             trace = traces[table.source]
             value = _values(adjusted.survey, table)
+        if not len(table.rows):
+            continue
         rows = table.rows.tolist()
         units = _units(table, trace)
         found += _rows(
             table, np.reshape(value, table.residual.shape), trace, units, adjusted.sigma0
         )
+        if table.source == HELD:
+            continue
         names = np.array([trace.group[i] for i in rows], dtype=object)
         for name, unit in dict.fromkeys(zip(names, units, strict=True)):
             mine = (names == name) & (np.array(units, dtype=object) == unit)
@@ -67,6 +73,8 @@ def gone_with_their_points(adjusted, removed, traces):
 def _values(survey, table):
     """Observed values of a table of residuals."""
     images = table.source == "image points"
+    if table.source == HELD:
+        return survey.xyz_m.ravel()[table.rows]
     value = survey.image_points.xy_mm if images else survey.observations[table.source].value
     return value[table.rows]
 
@@ -154,8 +162,10 @@ def _group(kind, name, unit, parts, repeated):
     count = sum(int(mine.sum()) * table.residual.shape[1] for table, mine in parts)
     redundancy = float(share.sum() + scatter[1])
     factor = factor_sd = np.nan
-    if redundancy > UNCONTROLLED and (sd > 0).all():
-        factor = float(np.sqrt((np.sum((residual / sd) ** 2) + scatter[0]) / redundancy))
+    weighs = sd > 0  # what holds exactly has neither residual nor redundancy
+    if redundancy > UNCONTROLLED and weighs.any():
+        square = np.sum((residual[weighs] / sd[weighs]) ** 2) + scatter[0]
+        factor = float(np.sqrt(square / redundancy))
         factor_sd = float(1.0 / np.sqrt(2.0 * redundancy))
     rms = float(np.sqrt(np.mean(residual**2))) if len(residual) else np.nan
     low, high = (float(sd.min()), float(sd.max())) if len(sd) else (None, None)

@@ -16,6 +16,7 @@ from scipy.special import betainc
 
 from tankcal.errors import Problem
 from tankcal.messages import listed, message
+from tankcal.network.reactions import HELD
 from tankcal.network.separability import alternatives
 from tankcal.surveys.spelling import in_photo
 
@@ -121,14 +122,15 @@ def _many(gone, total):
     return [Problem("job.toml", text, None, "adjustment.snooping")]
 
 
-def undecided(adjusted, removed, traces):
+def undecided(adjusted, removed, traces, held):
     """Problem rows of readings set aside in whose place others might have been.
 
     removed  tuple of network.cleaning.Removed, the worst first        traces  {source: Trace}
+    held     network.reactions.Reactions of held coordinates
     """
     found = []
     for one in removed[:TESTED]:
-        others = alternatives(adjusted, one.source, one.row)
+        others = alternatives(adjusted, one.source, one.row, held)
         if others:
             names = [_named(adjusted, traces, *other) for other in others]
             text = message(
@@ -164,7 +166,7 @@ def _named(adjusted, traces, source, row):
     ids = trace.ids[row]
     if source == "image points":
         return in_photo(*ids)
-    kind = adjusted.survey.observations[source].kind
+    kind = "control coordinate" if source == HELD else adjusted.survey.observations[source].kind
     of = trace.table.replace("_", " ") or kind.removesuffix(" of a further system")
     name, kind = (
         " ".join(filter(None, ["-".join(ids), trace.element[row][0]])),

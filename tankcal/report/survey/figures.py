@@ -191,7 +191,7 @@ def distributions(paper):
     """Histogram of w against the normal distribution, and of the redundancy numbers."""
     rows = [
         row for row in paper.record["adjustment"]["residuals"]
-        if not row["removed"] and not row["check"]
+        if not row["removed"] and not row["check"] and row["sd"] != 0
     ]  # fmt: skip
     w = np.array([row["w"] for row in rows if row["controlled"] and row["w"] is not None])
     redundancy = np.array([row["redundancy"] for row in rows if row["redundancy"] is not None])

@@ -12,12 +12,46 @@ _DECIMALS = {"mm": 1, "m": 2, "rad": 1}  # of residuals in um, mm and arc second
 
 
 def adjusted(paper):
-    """Readings that took part: neither set aside nor only compared."""
+    """Readings that took part: neither set aside nor only compared, nor held."""
     return [
         row
         for row in paper.record["adjustment"]["residuals"]
-        if not row["removed"] and not row["check"]
+        if not row["removed"] and not row["check"] and row["sd"] != 0
     ]
+
+
+def held(paper):
+    """What was held exactly, with what its release would say: the largest test quantity first."""
+    rows = paper.record["adjustment"].get("held", [])
+    if not rows:
+        return []
+    rows = sorted(rows, key=lambda row: -abs(row["w"] or 0.0))
+    shown = []
+    for row in rows[:MOST_ROWS]:
+        unit = row["unit"]
+        small = numbers.unit(SMALL_UNITS.get(unit, ""))
+        of_release = {
+            f"released_{key}": _in_small(paper, row[key], unit, small) for key in ("change", "sd")
+        }
+        shown.append(_reading(paper, row) | of_release)
+    block = paper.table(
+        "held",
+        shown,
+        [
+            Column("observation"),
+            Column("between"),
+            Column("value", align="right"),
+            Column("released_change", align="right"),
+            Column("released_sd", align="right"),
+            Column("small_unit", heading="unit"),
+            Column("w", decimals=1),
+            Column("mdb", align="right"),
+            Column("effect_m", "mm", decimals=1),
+            Column("row", decimals=0),
+        ],
+        critical=paper.number(paper.record["adjustment"]["critical_w"], digits=3),
+    )
+    return with_note(paper, block, shown, rows)
 
 
 def table(paper, name, rows, columns=("residual", "w"), **values):
@@ -55,7 +89,9 @@ def _reading(paper, row):
     between = " – ".join(map(str, row["ids"]))
     element = _element(paper, row["element"])
     small = numbers.unit(SMALL_UNITS.get(unit, ""))
-    shown = {key: _in_small(paper, row[key], unit, small) for key in ("residual", "mdb")}
+    shown = {
+        key: _in_small(paper, row[key], unit, small) for key in ("residual", "mdb") if key in row
+    }
     return row | {
         "observation": observation_name(paper.words, row),
         "declared_sd": paper.number(row["sd"], SMALL_UNITS.get(unit, ""), digits=2),
@@ -109,6 +145,7 @@ def control(paper):
     if weak:
         limit = paper.number(WEAK, digits=1)
         found.append(paper.paragraph("weakly_controlled", count=weak, limit=limit))
+    found += held(paper)
     return found + table(
         paper,
         "weakest_readings",
