@@ -14,7 +14,7 @@ import numpy as np
 from tankcal.display import table_html, volume_text
 from tankcal.distributions import within
 from tankcal.gum import BudgetRow
-from tankcal.uncertainty import Source, coverage_factor, declared_source, effective_dof
+from tankcal.uncertainty import Combined, Source, combined, declared_source
 
 HALF_A_LITRE_M3 = 5e-4
 
@@ -134,10 +134,12 @@ class _Total:
 
     def __init__(self, sources, probability):
         self.sources, self.probability = sources, probability
-        self.variances = np.array([float(np.sum(one.columns_m3**2)) for one in sources])
+        self.found = combined(sources, 1)
+        self.variances = self.found.variances[0]
         self.variance = float(self.variances.sum())
-        self.u = self.variance**0.5
-        self.dof, self.k, self.expanded = self._expanded(self.variances)
+        self.u, self.dof = float(self.found.u[0]), float(self.found.effective_dof[0])
+        self.k = float(self.found.k(probability)[0])
+        self.expanded = self.k * self.u
 
     def lines(self, index):
         """The `BudgetRow`s of a source: one, or one for each of its correlated parts."""
@@ -166,7 +168,7 @@ class _Total:
             unit=source.unit or "",
             type=source.type,
             distribution=source.distribution,
-            dof=source.dof,
+            dof=source.u_dof,
             note=source.note,
             is_default=source.is_default,
             estimate=np.nan if source.estimate is None else source.estimate,
@@ -183,10 +185,5 @@ class _Total:
             return 1.0
         changed = self.variances.copy()
         changed[index] = variance
-        return float(self._expanded(changed)[2] / self.expanded)
-
-    def _expanded(self, variances):
-        """(dof, k, U) of these variances."""
-        dof = effective_dof(np.sqrt(variances)[None, :], [one.dof for one in self.sources])
-        k = float(coverage_factor(self.probability, dof)[0])
-        return float(dof[0]), k, k * float(np.sqrt(variances.sum()))
+        halved = Combined(changed[None, :], self.found.dof)
+        return float(halved.expanded(self.probability)[0] / self.expanded)

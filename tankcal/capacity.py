@@ -2,7 +2,7 @@
 
 The covariance of all rows is factor @ factor.T with one column for each uncertain input, so rows,
 differences of rows (deliveries) and the budget all come from the same few columns.
-Source: JCGM 100:2008 5.2, JCGM 102:2011 6.2; degrees of freedom by Welch-Satterthwaite.
+Source: JCGM 100:2008 5.2, JCGM 102:2011 6.2; u, degrees of freedom and k by `uncertainty.Combined`.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ import numpy as np
 
 from tankcal.display import volume_text
 from tankcal.errors import HeightError
-from tankcal.uncertainty import Source, coverage_factor, effective_dof
+from tankcal.uncertainty import Source, combined
 
 SAME_ROW = 1e-9  # of a weight: a dip this near to a row is that row
 SAME_M = 1e-9  # dips nearer than this are the same
@@ -67,17 +67,17 @@ class Capacity:
     @cached_property
     def u_m3(self):
         """(rows,) standard uncertainty of each volume."""
-        return np.linalg.norm(self._by_source, axis=1)
+        return self._combined_rows.u
 
     @cached_property
     def dof(self):
         """(rows,) effective degrees of freedom, inf where only such inputs contribute."""
-        return effective_dof(self._by_source, self._dof_by_source)
+        return self._combined_rows.effective_dof
 
     @cached_property
     def k(self):
         """(rows,) coverage factor."""
-        return coverage_factor(self.probability, self.dof)
+        return self._combined_rows.k(self.probability)
 
     @cached_property
     def U_m3(self):
@@ -85,9 +85,9 @@ class Capacity:
         return self.k * self.u_m3
 
     @cached_property
-    def _by_source(self):
-        """(rows, sources) standard uncertainty of each volume by each source."""
-        return _norms([source.columns_m3 for source in self.sources], len(self.height_m))
+    def _combined_rows(self):
+        """`uncertainty.Combined` of all rows."""
+        return combined(self.sources, len(self.height_m))
 
     def at(self, height_m):
         """The volume at a dip, interpolated linearly between rows as a gauge does.
@@ -114,11 +114,9 @@ class Capacity:
 
     def _combined(self, terms):
         weights = sum(sign * self.weights([height])[0] for height, sign in terms)
-        columns = [(weights @ source.columns_m3)[None, :] for source in self.sources]
-        by_source = _norms(columns, 1)
-        u = float(np.linalg.norm(by_source))
-        dof = float(effective_dof(by_source, self._dof_by_source)[0])
-        k = float(coverage_factor(self.probability, dof))
+        found = combined([source.weighted(weights[None, :]) for source in self.sources], 1)
+        u, dof = float(found.u[0]), float(found.effective_dof[0])
+        k = float(found.k(self.probability)[0])
         for_use = bool(np.all(self.for_use([height for height, _ in terms])))
         return Quantity(float(weights @ self.volume_m3), u, dof, k, k * u, for_use)
 
@@ -156,13 +154,3 @@ class Capacity:
     def rows_of(self, height_m):
         """Numbers of the rows that a dip is read from: its own, or the two that it lies between."""
         return np.flatnonzero(self.weights([height_m])[0] > SAME_ROW)
-
-    @property
-    def _dof_by_source(self):
-        return [source.dof for source in self.sources]
-
-
-def _norms(columns, rows):
-    """(rows, n) norm of each row of n arrays (rows, c), each with its own c."""
-    norms = [np.sqrt(np.einsum("ij,ij->i", one, one)) for one in columns]
-    return np.reshape(norms, (len(columns), rows)).T

@@ -6,8 +6,10 @@ certificate says with `standard`, `within` or `expanded`.
     u    what the law of propagation uses, with the degrees of freedom `dof` (JCGM 100:2008 G.4)
     sd   the standard deviation of the distribution, which Monte Carlo draws from
 
-Both are the same but for Student's t, whose u is its scale: s/sqrt(n) of n readings, not
-sqrt(dof/(dof - 2)) times as much. The same t gives the same u whichever of the two was said.
+Both are the same but for Student's t of which the scale is declared: its u is s/sqrt(n) of n
+readings, not sqrt(dof/(dof - 2)) times as much, and u itself is unsure by its dof. Of a t that is
+declared by its standard deviation, u is that: dof is its shape only, and u is not unsure
+(`u_dof` inf; Kacker & Jones 2003, Metrologia 40, 235, section 4). u is what was declared, always.
 Source: JCGM 100:2008 4.2, 4.3, G.3, G.4; JCGM 101:2008 6.4.
 """
 
@@ -57,6 +59,11 @@ class Distribution:
         """Standard uncertainty for the law of propagation, in the unit of the input."""
         return self.sd
 
+    @property
+    def u_dof(self):
+        """Degrees of freedom of u in the formula of Welch-Satterthwaite."""
+        return self.dof
+
     def quantile(self, p):
         """Values below which the input lies with probability p, of any shape, each in [0, 1].
 
@@ -96,9 +103,13 @@ class Normal(Distribution):
 
 @dataclass(frozen=True)
 class StudentT(Distribution):
-    """Scaled and shifted t with `dof` degrees of freedom, finite (JCGM 101 6.4.9)."""
+    """Scaled and shifted t with `dof` degrees of freedom, finite (JCGM 101 6.4.9).
+
+    by_sd  declared by its standard deviation: that is u then, and dof is the shape alone
+    """
 
     scale: float
+    by_sd: bool = field(default=False, kw_only=True)
 
     def __post_init__(self):
         super().__post_init__()
@@ -107,8 +118,13 @@ class StudentT(Distribution):
 
     @property
     def u(self):
-        """The scale, as JCGM 100 4.2.3 has it."""
-        return self.scale
+        """The scale, as JCGM 100 4.2.3 has it; the standard deviation where that was declared."""
+        return self.sd if self.by_sd else self.scale
+
+    @property
+    def u_dof(self):
+        """The dof; inf of a declared standard deviation, which is not an estimate."""
+        return np.inf if self.by_sd else self.dof
 
     @property
     def sd(self):
@@ -330,7 +346,9 @@ def standard(u, name="normal", *, dof=np.inf, mean=0.0, u_is="scale"):
         raise ValueError(f"distribution {name!r}: expected one of {', '.join(NAMES[:-1])}")
     if u_is == "sd" and not dof > 2:
         raise ValueError(f"Student's t with {dof} degrees of freedom has no standard deviation")
-    return StudentT(u * np.sqrt(1 - 2 / dof) if u_is == "sd" else u, mean=mean, dof=dof)
+    if u_is == "sd":
+        return StudentT(u * np.sqrt(1 - 2 / dof), mean=mean, dof=dof, by_sd=True)
+    return StudentT(u, mean=mean, dof=dof)
 
 
 def within(half_width, name="rectangular", *, mean=0.0, dof=np.inf, inexactness=0.0):

@@ -166,7 +166,7 @@ def test_an_adjustment_alone_assumes_nothing(tmp_path):
 @pytest.mark.parametrize(
     ("row", "u"),
     [
-        # closed form: JCGM 100 4.3.3, 4.3.7, 4.3.9; arc sine a/sqrt(2); t: sd sqrt((dof - 2)/dof)
+        # closed form: JCGM 100 4.3.3, 4.3.7, 4.3.9; arc sine a/sqrt(2); t: what is declared
         ((3.0,), 3.0),
         ((3.0, "standard", None, "rectangular"), 3.0),
         ((3.0, "half_width", None, "rectangular"), 3 / math.sqrt(3)),
@@ -176,7 +176,7 @@ def test_an_adjustment_alone_assumes_nothing(tmp_path):
         ((3.0, "expanded", 2.0, "normal", 50.0), 1.5),
         ((3.0, "expanded", 1.0), 3.0),
         ((3.0, "scale", None, "t", 1.0), 3.0),
-        ((3.0, "sd", None, "t", 4.0), 3 * math.sqrt(2 / 4)),
+        ((3.0, "sd", None, "t", 4.0), 3.0),
         ((0.0, "sd", None, "t", 4.0), 0.0),
     ],
 )

@@ -21,6 +21,8 @@ from tankcal.distributions import (
     standard,
     within,
 )
+from tankcal.gum import Input, Inputs, propagate
+from tankcal.monte_carlo import Goal, simulate
 
 P = np.array([1e-12, 1e-6, 0.025, 0.3, 0.5, 0.501, 0.7, 0.975, 1 - 1e-6])
 ALL = [
@@ -147,11 +149,40 @@ def test_a_normal_whose_u_was_estimated_is_a_t():
     assert one.sd == pytest.approx(0.3 * np.sqrt(2))
 
 
-def test_one_t_has_one_u_whichever_was_said():
+def test_u_of_a_t_is_what_was_declared():
     by_scale = standard(0.3, "t", dof=4)
     by_sd = standard(by_scale.sd, "t", dof=4, u_is="sd")
-    assert by_sd.u == pytest.approx(by_scale.u, rel=1e-15)
+    assert by_scale.u == 0.3
+    assert by_sd.u == pytest.approx(by_scale.sd, rel=1e-15)  # 30 mm stay 30 mm
     assert by_sd.sd == pytest.approx(by_scale.sd, rel=1e-15)
+    assert by_sd.quantile(0.9) == pytest.approx(by_scale.quantile(0.9), rel=1e-15)  # one shape
+    assert (by_scale.u_dof, by_sd.u_dof) == (4, np.inf)
+
+
+def test_thermal_expansion_of_nist():
+    """Published: NIST TN 1900, example E13, by the NIST Uncertainty Machine.
+
+    Its figures, as the tests of Sandia's Suncal quote them: GUM 1.7266e-5, u 1.76e-6; Monte Carlo
+    1.7268e-5, u 1.74e-6, 1/K. The inputs are Student's t with 3 degrees of freedom, by their sds.
+    """
+    declared = {
+        "L0": (1.4999, 1e-4),
+        "L1": (1.5021, 2e-4),
+        "T0": (288.15, 0.02),
+        "T1": (373.1, 0.05),
+    }
+    ts = [standard(u, "t", dof=3, mean=x, u_is="sd") for x, u in declared.values()]
+
+    def alpha(x):
+        l0, l1, t0, t1 = x
+        return (l1 - l0) / (l0 * (t1 - t0))
+
+    by_gum = propagate(alpha, Inputs([Input(n, t) for n, t in zip(declared, ts, strict=True)]))
+    assert by_gum.values[0] == pytest.approx(1.7266e-5, abs=0.5e-9)
+    assert by_gum.u[0] == pytest.approx(1.76e-6, abs=0.005e-6)
+    drawn = simulate(lambda x: alpha(x.T)[:, None], ts, goal=Goal(plain_draws=200_000))
+    assert drawn.value[0] == pytest.approx(1.7268e-5, rel=1e-3)
+    assert drawn.u[0] == pytest.approx(1.74e-6, rel=1e-2)  # few draws have so heavy tails
 
 
 def test_an_expanded_uncertainty():

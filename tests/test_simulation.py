@@ -9,13 +9,16 @@ from scipy.special import ndtri
 from scipy.stats import t as student
 
 import tankcal
+from tankcal.budgets import budget
 from tankcal.distributions import standard
 from tankcal.gum import Combination
+from tankcal.job.model import DeclaredInput
 from tankcal.monte_carlo import Goal
 from tankcal.simulation import simulate_table
 from tankcal.simulation.curvature import curvature
 from tankcal.simulation.variation import VARIED, varied
 from tankcal.tanks import body_of
+from tankcal.uncertainty import declared_source
 
 Z = ndtri(0.975)
 SPHERE = {"sphere.diameter_m": 4.0, "table.step_m": 0.005}
@@ -139,6 +142,27 @@ def test_student_and_rectangular_inputs_have_their_exact_law(tmp_path, figure):
             worst = max(worst, off / table.u_m3[row])
     figure("ends against the exact law, off by u of the row", worst)
     assert worst < 0.01
+
+
+def test_a_declared_sd_is_u_of_the_budget_and_sd_of_the_draws(tmp_path):
+    """The u of the budget was sd sqrt((dof - 2)/dof), 17.3 for 30 with 3 degrees of freedom."""
+    result = run(
+        tmp_path / "job",
+        uncertainty=[("plate_thickness", 0, "mm"), ("scale", 0, "ppm")],
+        sd_mm=0.01,
+        settings={"table.step_m": 1.0},
+    )
+    declared = DeclaredInput("scale", 3e-3, "ppm", 3000.0, distribution="t", dof=3.0, u_is="sd")
+    slope = result.body.derivatives(result.table.height_m)["scale"]
+    table = replace(result.table, sources=(declared_source(declared, slope),))
+    found = simulated(replace(result, table=table))
+    top = budget(table, table.height_m[-1])
+    assert (top.lines[0].u, top.lines[0].distribution) == (3000.0, "t")
+    assert top.u_m3 == pytest.approx(3e-3 * slope[-1])
+    assert found.found.u[-1] == pytest.approx(top.u_m3, rel=1e-3)
+    half = student.ppf(0.975, 3) * top.u_m3 / np.sqrt(3)
+    assert (found.found.high - found.found.low)[-1] / 2 == pytest.approx(half, rel=2e-3)
+    assert top.k == pytest.approx(Z)  # an sd is known: its degrees of freedom are a shape
 
 
 def test_one_input_of_three_degrees_of_freedom_gives_a_student_interval(tmp_path):

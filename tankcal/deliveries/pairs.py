@@ -75,7 +75,7 @@ class Groups:
     def __init__(self, sources):
         widths = [source.columns_m3.shape[1] for source in sources]
         owner = np.repeat(np.arange(len(sources)), widths)
-        dof = np.array([source.dof for source in sources], dtype=float)
+        dof = np.array([source.u_dof for source in sources], dtype=float)
         finite = np.flatnonzero(np.isfinite(dof) & (np.array(widths, dtype=int) > 0))
         self.columns = np.flatnonzero(np.isin(owner, finite))
         self.members = (owner[self.columns, None] == finite).astype(float)

@@ -77,7 +77,7 @@ class Inputs:
         self.correlation = _checked(matrix, self.names)
         self.estimates = np.array([one.distribution.mean for one in self.inputs])
         self.u = np.array([one.distribution.u for one in self.inputs])
-        self.dof = np.array([one.distribution.dof for one in self.inputs])
+        self.dof = np.array([one.distribution.u_dof for one in self.inputs])
 
     def __len__(self):
         return len(self.inputs)

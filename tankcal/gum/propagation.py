@@ -4,13 +4,7 @@
 
 Nothing of rows x rows is formed unless `covariance` is asked for.
 
-Degrees of freedom (Welch-Satterthwaite, JCGM 100 G.4): inputs that are correlated were found
-together and are one component, whose variance includes their covariances and whose degrees of
-freedom are theirs: Result 2 and section 4.1 of Willink 2007, Metrologia 44, 340. With c' S c of
-a covariance S estimated from nu + 1 sets of readings that is exact, for it is a chi-square of nu.
-Where correlated inputs have unequal degrees of freedom, which that source leaves out, their
-estimates are taken to err together, 1/sqrt(nu) by shares of the variance, never under the least
-of them.
+Degrees of freedom: inputs that are correlated are one component (`uncertainty.together_dof`).
 """
 
 from dataclasses import dataclass
@@ -20,7 +14,7 @@ import numpy as np
 
 from tankcal.gum.inputs import Inputs
 from tankcal.gum.sensitivities import check_sensitivities, outputs_of, sensitivities_of
-from tankcal.uncertainty import coverage_factor, effective_dof
+from tankcal.uncertainty import Combined, together_dof
 
 
 @dataclass(frozen=True)
@@ -36,6 +30,13 @@ class Propagation:
     values: np.ndarray
     sensitivities: np.ndarray
 
+    @cached_property
+    def combination(self):
+        """`uncertainty.Combined` of the outputs; each group of correlated inputs is a component."""
+        groups = self.inputs.groups
+        dof = np.array([together_dof(self.inputs.dof[group]) for group in groups])
+        return Combined(self._group_variances, dof)
+
     @property
     def factor(self):
         """(rows, c) J L: the covariance of the outputs is factor factor'."""
@@ -44,7 +45,7 @@ class Propagation:
     @property
     def u(self):
         """(rows,) combined standard uncertainty."""
-        return np.sqrt(np.sum(self._group_variances, axis=1))
+        return self.combination.u
 
     @property
     def covariance(self):
@@ -62,16 +63,15 @@ class Propagation:
     @property
     def dof(self):
         """(rows,) effective degrees of freedom; inf where only such inputs contribute."""
-        dof = [self._group_dof(group) for group in self.inputs.groups]
-        return effective_dof(np.sqrt(self._group_variances), np.stack(dof, axis=1))
+        return self.combination.effective_dof
 
     def k(self, probability):
         """(rows,) coverage factor for that coverage probability, of Student's t."""
-        return coverage_factor(probability, self.dof)
+        return self.combination.k(probability)
 
     def expanded(self, probability):
         """(rows,) expanded uncertainty U = k u."""
-        return self.k(probability) * self.u
+        return self.combination.expanded(probability)
 
     def shares(self):
         """(rows, n) part of the variance that each input brings, its covariances halved.
@@ -124,21 +124,6 @@ class Propagation:
         for group, block, own in columns:
             parts[:, group] = self.sensitivities[:, group] * (own @ block.T)
         return parts
-
-    def _group_dof(self, group):
-        """(rows,) degrees of freedom of a group of correlated inputs."""
-        dof = self.inputs.dof[group]
-        if np.all(dof == dof[0]):
-            return np.full(len(self.values), dof[0])
-        parts = self._parts()[:, group]
-        total = np.abs(np.sum(parts, axis=1))
-        best = 1 / np.sqrt(dof.max())
-        further = np.abs(parts) @ (1 / np.sqrt(dof) - best)
-        share = np.divide(further, total, out=np.zeros_like(total), where=total > 0)
-        together = best + share
-        found = np.full(len(total), np.inf)
-        np.divide(1, together**2, out=found, where=together > 0)
-        return np.maximum(found, dof.min())
 
 
 def propagate(model, inputs, sensitivities=None):

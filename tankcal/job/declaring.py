@@ -46,6 +46,7 @@ def _declared(table):
             distribution=distribution or "normal",
             dof=np.inf if dof is None else dof,
             note=note or "",
+            u_is="sd" if spread[1] == "sd" else "scale",
         )
         for name, unit, type, distribution, dof, note, spread in rows
     )

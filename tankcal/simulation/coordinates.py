@@ -63,4 +63,4 @@ def _distribution(source):
     """Of readings Student's t (JCGM 101:2008 6.4.9), normal for infinitely many."""
     if source.dof < source.contrasts < np.inf:
         return UnsureNormal(1.0, source.contrasts, dof=source.dof)
-    return standard(1.0, source.distribution, dof=source.dof)
+    return standard(1.0, source.distribution, dof=source.dof, u_is=source.u_is)

@@ -1,6 +1,6 @@
 """uncertainty.csv: each input once, in its own unit, of a credible size, and of use here."""
 
-from tankcal.distributions import FAMILIES, expanded, standard, within
+from tankcal.distributions import FAMILIES, expanded, within
 from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.common import refuse_repeated
 from tankcal.job.contract import INPUTS
@@ -35,13 +35,11 @@ def spreads(inputs):
 
 
 def standard_u(u, u_is, k, distribution, dof):
-    """Standard uncertainty of a sound row, in its unit; of a t distribution its scale."""
+    """Standard uncertainty of a sound row, in its unit; of a t distribution what u_is says."""
     if u_is == "half_width":
         return within(u, distribution).u
     if u_is == "expanded":
         return expanded(u, k=k).u
-    if u_is == "sd":
-        return standard(u, distribution, dof=dof, u_is=u_is).u
     return u
 
 

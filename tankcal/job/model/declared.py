@@ -10,7 +10,8 @@ class DeclaredInput:
     """A standard uncertainty that the survey itself does not carry: a row of uncertainty.csv.
 
     u is SI (dimensionless for "scale", "tilt" and "deadwood", m, K, 1/K, Pa, kg, kg/m3, m3), of a
-    t distribution its scale; `u_as_read` is the same in `unit`, as the user wrote it.
+    t distribution what `u_is` says, "scale" or "sd"; `u_as_read` is the same in
+    `unit`, as the user wrote it.
     is_default  True: nobody declared it, tankcal assumes it
     """
 
@@ -23,6 +24,7 @@ class DeclaredInput:
     dof: float = np.inf
     note: str = ""
     is_default: bool = False
+    u_is: str = "scale"
 
 
 @dataclass(frozen=True)
