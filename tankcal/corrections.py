@@ -9,6 +9,8 @@ from tankcal.job import Switches
 from tankcal.messages import message
 from tankcal.tanks import body_of, thermal_scale
 
+# Named by title and edition alone: the bodies of paid standards were not read, so no clause is.
+ISO_7507 = "ISO 7507-1:2003"
 INSIDE_PLATE = message("inside_plate", "r_inside = r − t")
 INSIDE_PAINT = message("inside_paint", "r_inside = r − t − paint")
 NONE = Switches(**{field.name: field.name == "tilt" for field in fields(Switches)})
@@ -68,7 +70,7 @@ def _known(job, survey):
     """(code, whether it bears on the job, formula, source) of each correction, in their order."""
     of_shell = _of_shell(job, survey) if job.tank.kind == "vertical" else ()
     declared = message("sum_of_volumes", "sum of the declared volumes")
-    deadwood = ("deadwood", bool(job.deadwood), declared, "ISO 7507-1")
+    deadwood = ("deadwood", bool(job.deadwood), declared, ISO_7507)
     return [*_of_lengths(job), *of_shell, deadwood]
 
 
@@ -77,18 +79,18 @@ def _of_lengths(job):
     solid = job.horizontal or job.sphere
     plates = any(c.thickness_m for c in job.courses) or (solid and solid.thickness_m)
     return (
-        ("plate", outside and bool(plates), INSIDE_PLATE, "ISO 7507-1"),
+        ("plate", outside and bool(plates), INSIDE_PLATE, ISO_7507),
         (
             "paint",
             outside and any(c.paint_m for c in job.courses),
             INSIDE_PAINT,
-            "ISO 7507-1",
+            ISO_7507,
         ),
         (
             "temperature",
             job.survey.shell_temperature_c is not None,
             _thermal_formula(job),
-            "ISO 7507-1",
+            ISO_7507,
         ),
     )
 
@@ -121,16 +123,16 @@ def _of_shell(job, wall):
                 "horizontal_cut",
                 "horizontal cut: area of the cut square to the axis times √(1 + m²); contained",
             ),
-            "ISO 7507-1",
+            ISO_7507,
         ),
         (
             "head",
             bool(table.liquid_density_kg_m3 or survey.liquid_density_kg_m3),
             head,
-            "ISO 7507-1; API MPMS 2.2",
+            f"{ISO_7507}; API MPMS 2.2A",
         ),
-        ("bottom", job.bottom.form != "flat", BOTTOM_FORMULAS[job.bottom.form], "ISO 7507-1"),
-        ("roof", roof is not None, _roof_formula(roof), "ISO 7507-1; API MPMS 2.2"),
+        ("bottom", job.bottom.form != "flat", BOTTOM_FORMULAS[job.bottom.form], ISO_7507),
+        ("roof", roof is not None, _roof_formula(roof), f"{ISO_7507}; API MPMS 2.2A"),
     )
 
 

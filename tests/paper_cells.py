@@ -2,6 +2,7 @@
 
 found = paper_blocks(record_path)                 blocks of certificate and working papers
 blocks_of_cells(notebook)                         blocks of any notebook
+of_part(found, "certificate")                     those of one part
 texts(found)                                      every text in them
 table_of(found, "Capacity at each height")        rows of the table whose caption begins so
 """
@@ -17,6 +18,15 @@ from tankcal.report.notebook import joined
 def paper_blocks(record_path):
     """The data of every block that the cells show, in order."""
     return blocks_of_cells(joined(str(record_path), missing(records.load(record_path))))
+
+
+def of_part(found, part):
+    """The blocks of one part: from its document block on to the next."""
+    shown, current = [], ""
+    for block in found:
+        current = block["part"] if block["kind"] == "document" else current
+        shown += [block] if current == part else []
+    return shown
 
 
 def blocks_of_cells(notebook):

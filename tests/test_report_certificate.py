@@ -9,8 +9,9 @@ from test_report import pages
 
 from tankcal.job.contract import KEYS
 from tankcal.report import blocks, certificate, sketch
+from tankcal.report.dip_point import dip_point, dip_point_text
 from tankcal.report.letterhead import Letterhead
-from tankcal.report.paper import Paper
+from tankcal.report.paper import Column, Paper
 from tankcal.report.pdf import pdf
 from tankcal.words import load_words
 
@@ -180,3 +181,55 @@ def test_every_page_bears_the_record(example_record):
     assert document["footer"].startswith("Page {page} of {pages} · Record ")
     (held,) = document["attachments"]
     assert held["sha256"].startswith(document["footer"].rpartition(" ")[2])
+
+
+# ---- the tank and its dip point
+
+
+def tank_facts(record, tmp_path):
+    path = tmp_path / "record.json"
+    path.write_text(json.dumps(record), encoding="utf-8")
+    return {
+        label: text
+        for block in paper_blocks(path)
+        if block["kind"] == "key_values"
+        for label, text in block["items"]
+    }
+
+
+def test_nominal_values_are_printed_as_they_were_chosen(example_record, tmp_path):
+    record = json.loads(example_record.read_text(encoding="utf-8"))
+    record["job"]["tank"]["nominal_volume_m3"] = 60.0
+    said = tank_facts(record, tmp_path)
+    assert said["Nominal volume"] == "60\xa0m³"
+    assert said["Nominal diameter"] == "13.000\xa0m"
+    assert said["Dip point"] == "not declared"
+
+
+def test_the_dip_point_is_stated_and_drawn_where_it_was_declared(paper):
+    """A right triangle of 3, 4 and 5 m from the axis, in a tank of 6.5 m radius."""
+    drawn, heights = paper(), []
+    axis = drawn.record["shell"]
+    for share in (1.0, 0.5):
+        east, north = axis["x_m"] + 3 * share, axis["y_m"] - 4 * share
+        drawn.record["job"]["datum"] |= {"dip_x_m": east, "dip_y_m": north}
+        said = dip_point_text(drawn).replace("\xa0", " ")
+        assert said.endswith(f"; {5 * share:.3f} m from the axis of the tank, at azimuth 143 °")
+        heights.append(dip_point(drawn.record).share)
+    radius = drawn.record["courses"][0]["inside_radius_m"]
+    assert heights == pytest.approx([5 / radius, 2.5 / radius])
+    lines = sketch.sketch(drawn).axes[0].lines
+    gauges = [
+        line for line in lines if len(set(line.get_xdata())) == 1 and len(line.get_xdata()) == 2
+    ]
+    (x,) = {float(line.get_xdata()[0]) for line in gauges}
+    assert x == pytest.approx(3.0 + 2.5 / radius)  # the axis at 3.0 inches, the wall at 4.0
+
+
+def test_an_uncertainty_has_two_digits_in_litres_too(paper):
+    shown = paper()
+    assert shown.number(0.4168, "L", u=0.4168) == "420\xa0L"
+    assert shown.number(1249.6438, "L", u=0.4168).replace(",", "") == "1249644\xa0L"
+    rows = [{"V": 1.2496438, "U": 0.4168}, {"V": 0.0334, "U": 0.00123}]
+    assert shown.column_texts(rows, Column("U", "L", u="U")) == ["420", "1.2"]
+    assert shown.column_texts(rows, Column("V", "L", u="U"))[0].replace(",", "") == "1250"

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
-from paper_cells import paper_blocks, table_of, texts
+from paper_cells import of_part, paper_blocks, table_of, texts
 from uncertain_job import HOSTILE, as_before, write_uncertain_job
 
 import tankcal
@@ -392,6 +392,41 @@ def test_the_differences_of_the_ends_are_drawn(record):
         assert [abs(one) for one in signed] == pytest.approx(rows[key], abs=1e-9)
 
 
+# ---- the sentence on k
+
+
+@pytest.mark.parametrize(
+    ("k", "dof", "simulated", "said"),
+    [
+        ([2.0, 2.0, 2.0], [None] * 3, [False] * 3, "k = 2.00, which for a normal distribution"),
+        ([2.0, 2.26, 2.26], [None, 9.0, 9.0], [True, False, False], "k = 2.26, which for a t-"),
+        ([2.0, 2.26, 2.01], [None, 9.0, 4e3], [False] * 3, "ν_eff = 9 to ∞ effective"),
+        ([2.0, 2.26, 2.01], [1.0, 9.0, 4e3], [True] * 3, None),
+    ],
+)
+def test_the_usual_sentence_on_k_is_of_the_rows_whose_U_is_k_u(record, k, dof, simulated, said):
+    interval = ["monte_carlo" if one else "gum" for one in simulated]
+    columns = {"k": k, "dof": dof, "U_m3": [0.1, 0.2, 0.3], "interval": interval}
+    found = method.on_k(Paper(changed(record, **columns)))
+    assert len(found) == (said is not None)
+    for sentence in found:
+        assert said in sentence
+        assert "coverage probability of approximately 95\xa0%." in sentence
+
+
+def test_what_not_validated_means_is_said_below_the_deliveries(record):
+    paper = Paper(record)
+    plain = [one for one in paper.record["budgets"] if one["monte_carlo"] is not None]
+    for one in plain:
+        one["monte_carlo"] |= {"validated": False, "d_low": 0.014, "d_high": 0.002}
+        one["U_m3"] = 0.5
+    _, why = monte_carlo.delivery_blocks(paper)
+    assert "at most 0.014\xa0m³ away, 2.8\xa0% of U" in why.data["text"]
+    for one in plain:
+        one["monte_carlo"]["validated"] = True
+    assert len(monte_carlo.delivery_blocks(paper)) == 1
+
+
 # ---- the decision rule
 
 
@@ -416,6 +451,26 @@ def test_the_verdict_of_the_rule_in_words(found, record):
     assert "Probability of conformity below 0.01 %." in whole
     simulated = "it and some deliveries down to the lowest dip are simulated by Monte Carlo."
     assert f"The worst delivery is sought by the law of propagation; {simulated}" in whole
+
+
+def test_the_verdict_of_a_rule_that_nobody_read_stays_out_of_the_certificate(found, record):
+    """Its name, its verdict and its limits are in the working papers alone."""
+    assert record["rule"]["verified"] is False
+    certificate = " ".join(texts(of_part(found, "certificate")))
+    papers = " ".join(texts(of_part(found, "working-papers")))
+    for words in ("DOES NOT CONFORM", "Probability of conformity", "at most 1\xa0% of the volume"):
+        assert words not in certificate
+        assert words in papers
+    assert "no statement of conformity, and it is not on the certificate" in papers
+
+
+def test_the_verdict_of_a_rule_that_was_read_is_on_the_certificate(record):
+    other = copy.deepcopy(record)
+    other["rule"]["verified"] = True
+    shown = [block.data for block in rule.blocks_of_verdict(Paper(other))]
+    assert shown[0] == {"kind": "heading", "text": "Decision rule", "level": 1}
+    assert "DOES NOT CONFORM." in texts(shown)
+    assert [block.data["kind"] for block in rule.blocks_of_unread(Paper(other))] == ["key_values"]
 
 
 def test_limits_that_nothing_was_held_against_are_named(record):

@@ -145,7 +145,7 @@ def test_the_certificate_tells_method_and_inputs(book, record):
     said = texts(book["Certificate"])
     assert "Monte Carlo" in said  # in place of k
     sentences = method.sentences(Paper(record), '"Monte Carlo"')
-    assert len(sentences) == 2
+    assert len(sentences) == 3  # what U is, the sentence on k, Monte Carlo
     assert set(sentences) <= set(said)
     assert all(text in said for _, text in method.inputs(Paper(record)) if text)
 

@@ -28,7 +28,8 @@ class Column:
 
     key       key of the value in each row; its heading is word `table_headings.<key>`
     unit      unit in which it is shown, one of numbers.UNITS; "" for text and bare numbers
-    u         key of the standard or expanded uncertainty that sets the decimals (two digits of it)
+    u         key of the standard or expanded uncertainty that sets the decimals (two digits of it);
+              whole digits are rounded off in the column of that uncertainty alone
     least     but never fewer decimals than this
     most      nor more than this, where an uncertainty may be the rounding of what is exact
     decimals  this many decimals; beside u: where no row has an uncertainty; or
@@ -83,12 +84,16 @@ class PlainPaper:
         return self.words["labels"].get(key, str(key).replace("_", " "))
 
     def number(self, value, unit="", decimals=None, u=None, digits=None):
-        """A number with its unit; None gives None, so that a field not given can be left out."""
+        """A number with its unit; None gives None, so that a field not given can be left out.
+
+        Beside its uncertainty `u` it keeps its whole digits; an uncertainty itself, `u` of its own
+        value, has two digits in every unit: 420 L.
+        """
         if value is None:
             return None
         shown = numbers.unit(unit)
         if u is not None:
-            decimals = decimals_of(u * shown.factor)
+            decimals = decimals_of(u * shown.factor, least=None if u == value else 0)
         if decimals is not None:
             text = fixed(value * shown.factor, decimals, self.marks)
         else:
@@ -109,7 +114,9 @@ class PlainPaper:
         return dates["form"].format(day=day.day, month=dates[str(day.month)], year=day.year)
 
     def plain(self, value, unit=""):
-        """A number that somebody chose: six digits at most, no zeros at its end."""
+        """A number that somebody chose: at most six digits, no zeros at its end; or None."""
+        if value is None:
+            return None
         text = shortest(value, self.marks)
         return f"{text}{_SPACE}{unit}" if unit else text
 
@@ -187,7 +194,8 @@ class PlainPaper:
             decimals = [decimals_of_height(value or 0.0) for value in values]
         if column.u is not None:
             of_rows = [(row.get(column.u) or 0.0) * factor for row in rows]
-            limits = {"least": column.least, "most": column.most}
+            least = None if column.u == column.key else column.least  # 420 L has two digits
+            limits = {"least": least, "most": column.most}
             if column.decimals is not None:
                 limits["unknown"] = column.decimals
             decimals = decimals_of_rows(of_rows, **limits)

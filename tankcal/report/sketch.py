@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Rectangle
 
 from tankcal.plots import INK, PALE, RED, STYLE, WIDTH
+from tankcal.report.dip_point import dip_point
 
 _GREY = "#445566"
 _LEFT, _RIGHT = 2.0, 4.0  # of the tank on the page
@@ -17,6 +18,8 @@ _OF_COURSE = 0.15  # least height of a course that is named
 _ABOVE = 0.36  # room for the gauge above the tank
 _ROUNDING = 0.3  # of the ends of a lying tank
 _SMALL = 7.5
+_NEAR_WALL = 0.93  # of the radius: a gauge at the wall is drawn beside it
+_WITH_DIP_POINT = ("vertical", "horizontal")  # kinds whose dip point can be declared
 _ARROW = {"arrowstyle": "<->", "color": _GREY, "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0}
 
 
@@ -56,11 +59,20 @@ def _upright(paper):
             _course(ax, paper, course, per_m)
         _level_of(ax, paper, per_m)
         _critical_zone(ax, paper, per_m)
-        _gauge(ax, paper, _RIGHT - 0.3, top, _zero_y(record, per_m))
+        _gauge(ax, paper, _dip_x(record), top, _zero_y(record, per_m))
         _measure(ax, _LEFT - 0.35, _BOTTOM, top, _of(paper, "shell", courses[-1]["top_m"]))
         nominal = _of(paper, "diameter", tank["nominal_diameter_m"])
         _across(ax, nominal)
     return figure
+
+
+def _dip_x(record):
+    """Where the gauge stands: the dip point is seen to the right of the axis of the tank."""
+    found = dip_point(record)
+    if found is None:
+        return _RIGHT - 0.3
+    middle, half = (_LEFT + _RIGHT) / 2, (_RIGHT - _LEFT) / 2
+    return middle + min(found.share, _NEAR_WALL) * half
 
 
 def _zero_y(record, per_m):
@@ -101,7 +113,7 @@ def _level_of(ax, paper, per_m):
     y = _zero_y(record, per_m) + per_m * top_m
     ax.plot([_LEFT, _RIGHT], [y, y], color=RED, linewidth=0.8, linestyle=(0, (4, 2)))
     label = paper.word("sketch.top", value=paper.height(top_m))
-    _text(ax, _LEFT + 0.06, y - 0.08, label, "left", RED)
+    _text(ax, _LEFT + 0.12, y - 0.1, label, "left", RED)
 
 
 def _critical_zone(ax, paper, per_m):
@@ -121,16 +133,20 @@ def _critical_zone(ax, paper, per_m):
 def _gauge(ax, paper, x, top, zero):
     """The gauge: its zero below, and the reference height above the tank."""
     upper = top + 0.22
-    ax.plot([x, x], [zero, upper], color=_GREY, linewidth=0.7)
+    record = paper.record
+    known = dip_point(record) is not None or record["job"]["tank"]["kind"] not in _WITH_DIP_POINT
+    line = "-" if known else (0, (5, 3))  # its place was not declared
+    ax.plot([x, x], [zero, upper], color=_GREY, linewidth=0.7, linestyle=line)
     ax.plot([x - 0.12, x + 0.12], [zero, zero], color=RED, linewidth=2.2)
     ax.plot([x - 0.06, x + 0.06], [upper, upper], color=_GREY, linewidth=1.2)
-    record = paper.record
     height_m = record["job"]["datum"]["reference_height_m"]
     label = paper.word("sketch.reference_height_open") if height_m is None else _of(
         paper, "reference_height", height_m)  # fmt: skip
     _text(ax, x + 0.12, upper, label, "left")
     named = paper.word(f"zeros.{record['capacity']['zero']}")
-    _text(ax, x + 0.16, zero - 0.12, paper.word("sketch.zero", zero=named), "left", RED)
+    _text(
+        ax, x + 0.16, max(zero, _BOTTOM) - 0.12, paper.word("sketch.zero", zero=named), "left", RED
+    )
 
 
 def _lying(paper):
@@ -145,10 +161,11 @@ def _lying(paper):
         shape = FancyBboxPatch(corner, length - 0.5, high, boxstyle=rounded, **style)
         flat = sizes.get("end_a") == sizes.get("end_b") == "flat"
         ax.add_patch(Rectangle((_LEFT, _BOTTOM), length, high, **style) if flat else shape)
-        _gauge(ax, paper, _RIGHT - 0.3, _BOTTOM + high, _BOTTOM)
+        end = 0.0 if flat else 0.25 + _ROUNDING
+        x = _LEFT + end + dip_point(paper.record).share * (length - 2 * end)
+        _gauge(ax, paper, x, _BOTTOM + high, _BOTTOM)
         inside = _of(paper, "inside_diameter", sizes["section_height"])
         _measure(ax, _LEFT - 0.35, _BOTTOM, _BOTTOM + high, inside)
-        end = 0.0 if flat else 0.25 + _ROUNDING
         of_cylinder = _of(paper, "length", sizes["cylinder_length"])
         _across(ax, of_cylinder, _LEFT + end, _LEFT + length - end)
     return figure

@@ -1,8 +1,11 @@
 """How the uncertainty was found, and from which inputs: sentences and lists."""
 
+from math import inf
+
+from tankcal.digits import shortest
 from tankcal.report import blocks, numbers
 from tankcal.report.paper import Column
-from tankcal.report.uncertainty.stated import MARK, by_monte_carlo, stated_rows
+from tankcal.report.uncertainty.stated import MARK, by_monte_carlo, k_of_rows, stated_rows
 
 FROM_SURVEY = (
     "instrument_scale",
@@ -27,12 +30,36 @@ def sentences(paper, mark=MARK):
     low, high = (paper.number(of(capacity["k"]), decimals=2) for of in (min, max))
     one_k = paper.word("texts.k_one", k=low)
     k = one_k if low == high else paper.word("texts.k_range", low=low, high=high)
-    found = [paper.word("texts.uncertainty", coverage=paper.coverage(), k=k)]
+    found = [paper.word("texts.uncertainty", coverage=paper.coverage(), k=k), *on_k(paper)]
     if paper.record.get("monte_carlo"):
         found.append(_simulated(paper, mark))
     elif paper.record["job"]["table"].get("monte_carlo") is False:
         found.append(paper.word("texts.monte_carlo_off"))
     return found
+
+
+def on_k(paper):
+    """The sentence on k of a calibration certificate, as EA-4/02 words it; [] without any k."""
+    capacity = paper.record["capacity"]
+    rows = zip(k_of_rows(capacity), capacity["dof"], capacity["U_m3"], strict=True)
+    known = [(k, inf if dof is None else dof) for k, dof, U in rows if k is not None and U]
+    if not known:
+        return []
+    ks, dofs = zip(*known, strict=True)
+    k = _between(paper, [paper.number(of(ks), decimals=2) for of in (min, max)])
+    if min(dofs) == inf:
+        return [paper.word("texts.k_normal", k=k, coverage=paper.coverage())]
+    dof = _between(paper, [_dof(paper, of(dofs)) for of in (min, max)])
+    return [paper.word("texts.k_t", k=k, dof=dof, coverage=paper.coverage())]
+
+
+def _between(paper, ends):
+    low, high = ends
+    return low if low == high else paper.word("texts.between_values", low=low, high=high)
+
+
+def _dof(paper, value):
+    return "∞" if value == inf else shortest(value, paper.marks, digits=3)
 
 
 def _simulated(paper, mark):
@@ -130,6 +157,7 @@ def stated_blocks(paper):
         Column("volume_m3", unit, u="U_m3", least=numbers.unit(unit).least),
         Column("U_m3", unit, u="U_m3"),
         Column("k", decimals=2, nothing=""),
+        Column("dof", digits=2, nothing="∞", align="right"),
         Column("relative", "share", digits=2, align="right"),
         Column("remark", nothing=""),
     ]

@@ -2,7 +2,7 @@
 
 from itertools import groupby
 
-from tankcal.report import numbers
+from tankcal.report import blocks, numbers
 from tankcal.report.paper import Column
 from tankcal.report.uncertainty import method
 from tankcal.words import name_of_input
@@ -113,4 +113,20 @@ def delivery_blocks(paper):
         *_differences("m3"),
         Column("validated", words="validated", heading="interval_code"),
     ]
-    return [paper.table("simulated_deliveries", rows, columns)]
+    return [paper.table("simulated_deliveries", rows, columns), *_why(paper, rows)]
+
+
+def _why(paper, rows):
+    """What it means that deliveries are not validated; nothing where all are."""
+    failed = [one for one in rows if not one["validated"] and one["U_m3"]]
+    if not failed:
+        return []
+    off = [max(one["d_low"], one["d_high"]) for one in failed]
+    share = max(d / one["U_m3"] for d, one in zip(off, failed, strict=True))
+    sentence = paper.word(
+        "texts.why_not_validated",
+        digits=paper.record["monte_carlo"]["digits"],
+        difference=paper.number(max(off), "m3", digits=2),
+        share=paper.number(share, "share", digits=2),
+    )
+    return [blocks.paragraph(sentence)]

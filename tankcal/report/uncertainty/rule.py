@@ -39,8 +39,24 @@ def _by_law(paper):
     return [paper.word("texts.by_law_only")] if is_bound and paper.record["monte_carlo"] else []
 
 
+def is_read(paper):
+    """Whether every value of the rule was read in the legal text; else it certifies nothing."""
+    return paper.record["rule"]["verified"]
+
+
 def blocks_of_verdict(paper):
-    """The chapter of the certificate."""
+    """The chapter of the certificate; nothing of a rule that nobody has read in the legal text."""
+    return [paper.heading("rule"), *_verdict(paper)] if is_read(paper) else []
+
+
+def blocks_of_unread(paper):
+    """What the working papers say of such a rule, the verdict that the certificate leaves out."""
+    if is_read(paper):
+        return [paper.facts(facts(paper))]
+    return [paper.paragraph("rule_unread"), *_verdict(paper)]
+
+
+def _verdict(paper):
     found = [paper.facts(facts(paper))]
     texts = sentences(paper)
     return [*found, blocks.listing(texts)] if texts else found

@@ -43,8 +43,8 @@ def uneven_rows(capacity):
 def stated_rows(record):
     """The volumes and deliveries of `budgets` as rows of a table, as they are stated.
 
-    Keys low_m, high_m, volume_m3, U_m3, k (None: Monte Carlo's), relative (None: no volume),
-    low_m3, high_m3 (None where the interval is even about the volume), simulated, for_use,
+    Keys low_m, high_m, volume_m3, U_m3, k (None: Monte Carlo's), dof (None: infinite), relative
+    (None: no volume), low_m3, high_m3 (None where even about the volume), simulated, for_use,
     minimum_m, the minimum height of which it is the worst delivery (None: of none), and stated_m3
     and note, as stated.csv has them.
     """
@@ -60,6 +60,7 @@ def _stated(record, one):
         **{key: one[key] for key in ("low_m", "high_m", "volume_m3", "for_use")},
         "U_m3": U,
         "k": None if simulated else one["k"],
+        "dof": one.get("dof"),
         "relative": U / volume if volume else None,
         "low_m3": low,
         "high_m3": high,
