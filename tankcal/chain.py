@@ -1,6 +1,7 @@
 """The main job on one screen: a checked job in; wall, parts and the capacity table out."""
 
 from collections.abc import Callable
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from html import escape
 from typing import TYPE_CHECKING
@@ -19,12 +20,15 @@ from tankcal.display import table_html, volume_text
 from tankcal.doubts import incomplete_certificate, of_adjustment, refuse_undetermined
 from tankcal.errors import HeightError, InputError, Problem, SolutionError
 from tankcal.job import Job
+from tankcal.job.tables import in_book
 from tankcal.meshes import parse_mesh
 from tankcal.plausibility import refuse_other_side
+from tankcal.messages import message
 from tankcal.rules import RuleVerdict
 from tankcal.scan import Scan, scanned
 from tankcal.service import shell_factor, shell_temperature_c
 from tankcal.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
+from tankcal.simulation.running import SIMULATING
 from tankcal.statements import Statements, pairs_to_simulate, statements, verdict_of
 from tankcal.surveys import Adjustment, adjust_survey, wall_points
 from tankcal.tabling import doubts_of_table, tabled
@@ -188,7 +192,9 @@ class Result:
         """
         reference = self.job.datum.reference_height_m
         if reference is None:
-            raise HeightError("no ullage without datum.reference_height_m in the job")
+            raise HeightError(
+                message("no_ullage", "no ullage without datum.reference_height_m in the job")
+            )
         return self.at(float(dips.ullage_m(reference, ullage_m)))
 
     def delivery(self, low_m: float, high_m: float) -> Quantity:
@@ -214,9 +220,15 @@ def run(
     anything but a `Job`.
     """
     _refuse_other(job, "run")
+    with _telling(job):
+        return _run(job, progress or (lambda text: None), counting, simulated)
+
+
+def _run(job, tell, counting, simulated):
     if job.tank is None:
-        raise InputError(Problem("job.toml", "no tank: only its survey can be adjusted"))
-    tell = progress or (lambda text: None)
+        raise InputError(
+            Problem("job.toml", message("no_tank", "no tank: only its survey can be adjusted"))
+        )
     adjustment = None
     if job.measurements is not None:
         job, adjustment = _adjusted(job, tell)
@@ -225,20 +237,20 @@ def run(
     except SolutionError as error:
         if adjustment is None or not adjustment.warnings:
             raise
-        told = map(str, adjustment.warnings[:TOLD])
-        raise SolutionError("\n".join([str(error), *told])) from error
+        told = (one.text for one in _placed(job, adjustment.warnings[:TOLD]))
+        raise SolutionError(*error.args, *told) from error
     wall = survey if isinstance(survey, Wall) else None
     if wall is not None and adjustment is not None:
         refuse_other_side(job, wall, adjustment)
     made = tabled(job, survey, tell)
     body, zero, table = made.body, made.zero_m, made.table
-    tell("stating volumes and deliveries")
+    tell(message("stating", "stating volumes and deliveries"))
     stated = statements(job, table, made.straightness.largest_m3)
     simulation = None
     intervals = gum_intervals(table.volume_m3, table.u_m3, table.U_m3)
     wanted = job.table.monte_carlo if simulated is None else simulated
     if wanted and table.sources:
-        tell("simulating the table")
+        tell(SIMULATING)
         pairs = pairs_to_simulate(stated, job, body, table)
         simulation = simulate_table(job, survey, body, zero, table, pairs, tell=counting)
         intervals = simulation.intervals(table)
@@ -267,12 +279,28 @@ def _warnings(job, adjustment, survey, made):
     if adjustment is not None:
         left_open = of_adjustment(job, adjustment.datum, adjustment.causes)
         of_survey = (*adjustment.warnings, *left_open)
-    return (
+    warnings = (
         *job.warnings,
         *of_survey,
         *doubts_of_table(job, survey, made),
         *incomplete_certificate(job),
     )
+    return _placed(job, warnings)
+
+
+def _placed(job, problems):
+    """Problems by workbook and sheet where the job stands in one."""
+    if not job.source.endswith(".xlsx"):
+        return tuple(problems)
+    return tuple(in_book(one, job.source) for one in problems)
+
+
+@contextmanager
+def _telling(job):
+    try:
+        yield
+    except InputError as error:
+        raise InputError(_placed(job, error.problems)) from error
 
 
 def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjustment:
@@ -284,8 +312,15 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjus
     """
     _refuse_other(job, "adjust_job")
     if job.measurements is None:
-        raise InputError(Problem("job.toml", "no measurements: there is nothing to adjust"))
-    return adjust_survey(job.measurements, progress or (lambda text: None))
+        raise InputError(
+            Problem(
+                "job.toml",
+                message("no_measurements", "no measurements: there is nothing to adjust"),
+            )
+        )
+    with _telling(job):
+        adjustment = adjust_survey(job.measurements, progress or (lambda text: None))
+    return replace(adjustment, warnings=_placed(job, adjustment.warnings))
 
 
 def _refuse_other(job, name):
@@ -296,7 +331,10 @@ def _refuse_other(job, name):
 def _adjusted(job, tell):
     """The job with the points of its adjusted survey, and the adjustment."""
     if job.points is not None and not job.points.from_adjustment:
-        expected = "given beside a survey; expected one of them: the points are adjusted from it"
+        expected = message(
+            "points_beside_survey",
+            "given beside a survey; expected one of them: the points are adjusted from it",
+        )
         raise InputError(Problem("points.csv", expected))
     adjustment = adjust_survey(job.measurements, tell)
     refuse_undetermined(adjustment.datum)
@@ -309,10 +347,14 @@ def _survey(job, tell, dof):
     if job.tank.kind == "vertical":
         return find_wall(job, tell, dof)
     if job.mesh is not None:
-        tell(f"checking the mesh {job.mesh.file}")
+        tell(message("checking_mesh", "checking the mesh {file}", file=job.mesh.file))
         return parse_mesh(job.mesh.file, job.mesh.data, job.mesh.unit_m)
     if job.points is not None:
-        tell(f"fitting the wall to {len(job.points.names)} points")
+        tell(
+            message(
+                "fitting_wall", "fitting the wall to {count} points", count=len(job.points.names)
+            )
+        )
         return scanned(job, dof)
     return None
 

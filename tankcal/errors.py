@@ -5,11 +5,23 @@
 
 from dataclasses import dataclass
 
+from tankcal.messages import message
+
+SHEET = "sheet "  # how the file of a problem in a workbook begins
+
 
 class TankcalError(Exception):
     """Anything that tankcal raises on purpose; `exit_status` is what the command line returns."""
 
     exit_status = 1
+
+    @property
+    def texts(self):
+        """What it says, line by line; a Message among them can be said in another language."""
+        return self.args
+
+    def __str__(self):
+        return "\n".join(map(str, self.args))
 
 
 @dataclass(frozen=True)
@@ -21,6 +33,7 @@ class Problem:
     row       line of the file or row of the sheet, counted as an editor shows it (heading = 1)
     column    heading of the column, or the key ("tank.nominal_height_m")
     cell      of a sheet ("C7"), when it is known
+    book      file name of the workbook that the sheet stands in
     """
 
     file: str
@@ -28,16 +41,28 @@ class Problem:
     row: int | None = None
     column: str | None = None
     cell: str | None = None
+    book: str | None = None
+
+    @property
+    def text(self):
+        """The whole line as a Message."""
+        return message("problem", "{place}: {text}", place=self.place, text=self.expected)
+
+    @property
+    def place(self):
+        """Where it is, from the file to the column, as texts."""
+        place = [self.book] if self.book else []
+        is_sheet = self.file.startswith(SHEET)
+        name = self.file.removeprefix(SHEET)
+        place.append(message("in_sheet", "sheet {sheet}", sheet=name) if is_sheet else name)
+        if self.cell is not None:
+            place.append(message("in_cell", "cell {cell}", cell=self.cell))
+        elif self.row is not None:
+            place.append(message("in_row", "row {row}", row=str(self.row)))
+        return [*place, self.column] if self.column else place
 
     def __str__(self):
-        place = [self.file]
-        if self.cell is not None:
-            place.append(f"cell {self.cell}")
-        elif self.row is not None:
-            place.append(f"row {self.row}")
-        if self.column:
-            place.append(self.column)
-        return ", ".join(place) + ": " + self.expected
+        return str(self.text)
 
 
 class InputError(TankcalError):
@@ -48,6 +73,11 @@ class InputError(TankcalError):
     def __init__(self, problems):
         self.problems = tuple([problems] if isinstance(problems, Problem) else problems)
         super().__init__("\n".join(str(problem) for problem in self.problems))
+
+    @property
+    def texts(self):
+        """The lines of its problems, as Messages."""
+        return tuple(problem.text for problem in self.problems)
 
 
 class SolutionError(TankcalError):

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 
 
 def refuse_foreign(directory, known):
@@ -15,14 +16,20 @@ def refuse_foreign(directory, known):
         return
     name = directory.resolve().name
     if not directory.is_dir():
-        raise InputError(Problem(name, "is a file; expected a folder for the results"))
+        raise InputError(
+            Problem(name, message("out_is_a_file", "is a file; expected a folder for the results"))
+        )
     foreign = sorted(path.name for path in directory.iterdir() if path.name not in known)
     if foreign:
         raise InputError(
             Problem(
                 name,
-                f"holds {foreign[0]!r}, which tankcal did not write; expected an empty folder or "
-                "one with earlier results only: move your files away or choose another --out",
+                message(
+                    "out_is_foreign",
+                    "holds {foreign!r}, which tankcal did not write; expected an empty folder or "
+                    "one with earlier results only: move your files away or choose another --out",
+                    foreign=foreign[0],
+                ),
             )
         )
 

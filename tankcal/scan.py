@@ -9,6 +9,7 @@ from tankcal.cylinders import lying_cylinder
 from tankcal.doubts import noise_is_estimated, origin_of
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.plausibility import refuse_misfit
+from tankcal.messages import message
 from tankcal.primitives import fit_sphere
 from tankcal.sections import covariance_of
 
@@ -82,7 +83,10 @@ def _told(job, xyz_m, chosen):
     try:
         return _fitted(job, xyz_m, chosen)
     except SolutionError as error:
-        problem = Problem(origin_of(job.points), f"the points make no wall: {error}")
+        problem = Problem(
+            origin_of(job.points),
+            message("no_wall", "the points make no wall: {error}", error=error.args[0]),
+        )
         raise InputError(problem) from error
 
 

@@ -20,6 +20,7 @@ from tankcal.dips import (
 from tankcal.doubts import against_nominal, not_in_u
 from tankcal.plausibility import doubts_of_mesh, doubts_of_scan, doubts_of_wall
 from tankcal.scan import Scan
+from tankcal.messages import message
 from tankcal.tanks import body_of, critical_zone, zero_height
 from tankcal.wall import Wall, warnings_of
 
@@ -59,10 +60,10 @@ def tabled(job, survey, tell=lambda text: None):
     survey  its `wall.Wall`, `scan.Scan` or mesh, None where sizes alone tell of the tank
     tell    called with a line of text as each step begins
     """
-    tell("integrating volumes")
+    tell(message("integrating", "integrating volumes"))
     body = body_of(job, survey)
     zero = zero_height(job, survey)
-    tell("propagating the covariance to every row of the table")
+    tell(message("propagating", "propagating the covariance to every row of the table"))
     top = body.highest_m - zero
     kinks = np.unique([kink - zero for kink in body.kinks_m if 0 < kink - zero < top])
     exact = _exact(body, zero)

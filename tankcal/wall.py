@@ -17,6 +17,7 @@ from tankcal.doubts import (
 )
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.form import Form
+from tankcal.messages import message
 from tankcal.outlines import polar
 from tankcal.sections import (
     Section,
@@ -62,13 +63,25 @@ def find_wall(job, tell, dof=np.inf, form=None):
     Raises InputError when a course is left with too few points, SolutionError when there is no
     wall.
     """
-    tell(f"separating the wall from clutter in {len(job.points.names)} points")
+    tell(
+        message(
+            "separating",
+            "separating the wall from clutter in {count} points",
+            count=len(job.points.names),
+        )
+    )
     heights = np.cumsum([0.0] + [course.height_m for course in job.courses])
     sds, estimated = radial_sds(job.points), noise_is_estimated(job)
     shell = _shell(job, heights, sds)
     accepted = np.flatnonzero(shell.reason == "")
     joints = heights / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
-    tell(f"fitting sections through {len(accepted)} points of the wall")
+    tell(
+        message(
+            "fitting_sections",
+            "fitting sections through {count} points of the wall",
+            count=len(accepted),
+        )
+    )
     groups = _groups(job, shell, accepted, joints)
     given = _given_covariance(job.points, accepted)
     factor = (shell.noise_m / _median_sd(sds)) ** 2 if estimated else 1.0
@@ -93,8 +106,12 @@ def _shell(job, heights, sds):
         )
     except SolutionError as error:
         if job.points.from_adjustment:
-            hint = "and bottom_z_m; targets.csv tells points of the wall from others"
-            raise SolutionError(f"{error}, {hint}") from error
+            hint = message(
+                "told_by_targets",
+                "{error}, and bottom_z_m; targets.csv tells points of the wall from others",
+                error=error.args[0],
+            )
+            raise SolutionError(hint) from error
         raise
 
 
@@ -131,17 +148,36 @@ def _refuse_weak(groups, courses, height, points):
         count, tall = len(group.members), np.ptp(height[group.members])
         if count < FEWEST_POINTS:
             problems.append(
-                f"section {group.name} has {count} points on the wall, expected at least "
-                f"{FEWEST_POINTS} ({ADVISED_POINTS} or more are advised)"
+                message(
+                    "section_of_few",
+                    "section {name} has {count} points on the wall, expected at least {fewest} "
+                    "({advised} or more are advised)",
+                    name=group.name,
+                    count=count,
+                    fewest=FEWEST_POINTS,
+                    advised=ADVISED_POINTS,
+                )
             )
         if tall > 1.2 * courses[group.course].height_m:
+            height_m = courses[group.course].height_m
             problems.append(
-                f"section {group.name} is {tall:.3f} m tall, expected points within one course "
-                f"({courses[group.course].height_m:.3f} m)"
+                message(
+                    "section_too_tall",
+                    "section {name} is {tall:.3f} m tall, expected points within one course "
+                    "({height_m:.3f} m)",
+                    name=group.name,
+                    tall=tall,
+                    height_m=height_m,
+                )
             )
     seen = {group.course for group in groups}
     problems += [
-        f"course {course.name} has no section: expected {FEWEST_POINTS} points or more on its wall"
+        message(
+            "course_without_section",
+            "course {name} has no section: expected {fewest} points or more on its wall",
+            name=course.name,
+            fewest=FEWEST_POINTS,
+        )
         for index, course in enumerate(courses)
         if index not in seen
     ]

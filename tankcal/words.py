@@ -1,11 +1,14 @@
 """Codes of the record as sentences, in the reader's language (report_templates/words/)."""
 
 import tomllib
+from numbers import Integral, Number
 
 from tankcal.digits import NOTHING, Marks, fixed, shortest
 from tankcal.errors import TankcalError
+from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
+from tankcal.job.form_words import word_of
 from tankcal.languages import DEFAULT
-from tankcal.messages import filled
+from tankcal.messages import as_plain, filled
 from tankcal.shipped import shipped
 
 
@@ -69,7 +72,7 @@ def choice_sentence(words, choice):
 
 # ---- texts that the record has in English, with a code and the values in them
 
-MESSAGES = ("warnings", "formulas", "datum")  # groups of their templates
+MESSAGES = ("warnings", "formulas", "datum", "problems")  # groups of their templates
 
 
 def message_sentence(words, text, code, values):
@@ -84,6 +87,12 @@ def message_sentence(words, text, code, values):
         number=lambda value, form: _number(value, form, marks_of(words)),
         said=lambda one: message_sentence(words, one["text"], one["code"], one["values"]),
     )
+
+
+def said(words, text):
+    """A text in the reader's language, if it is a Message; any other text as it is."""
+    known = as_plain(text)
+    return message_sentence(words, str(text), known["code"], known["values"])
 
 
 def in_language(words, record):
@@ -121,6 +130,10 @@ def _said(words, row, key, of=""):
 
 def _number(value, form, marks):
     """A number in a form of Python, ".1f", ".3g", "+g" or "" for a count, with these marks."""
+    if value is not None and not isinstance(value, Number):
+        return str(value)
+    if not form and not isinstance(value, Integral):
+        return shortest(value, marks, digits=12)
     sign = "+" if form.startswith("+") and value > 0 else ""
     digits = form.strip("+.fg")
     if form.endswith("g"):
@@ -130,6 +143,12 @@ def _number(value, form, marks):
 
 def _named(words, key, value):
     """Codes among the values of a message as their names."""
+    if key == "row" or key.endswith("_row"):
+        return str(value)  # no count
+    if key == "note":
+        return _notes(words).get(value, value)
+    if key == "choice":
+        return word_of(words["language"].get("code"), value)
     if key == "kind":
         known = words["observations"]  # some by the table that they stand in
         return known.get(value, known.get(f"{value.replace(' ', '_')}s", value))
@@ -142,6 +161,19 @@ def _named(words, key, value):
         labels = words["page"] | words["labels"]
         return "; ".join(labels.get(one, one) for one in value)
     return value
+
+
+def _notes(words):
+    """{English note of a key or column of a job: the same in this language}."""
+    translated = words.get("input", {}).get("notes", {})
+    of_fields = {"keys": KEYS, "columns": COLUMNS, "entries": REGISTER_KEYS}
+    return {
+        field.note: translated[group][f"{owner}.{field.name}"]
+        for group, owners in of_fields.items()
+        for owner, fields in owners.items()
+        for field in fields
+        if f"{owner}.{field.name}" in translated.get(group, ())
+    }
 
 
 _DECLARED = ("head",)  # choices whose number the job gave: it is not rounded

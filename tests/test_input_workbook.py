@@ -312,7 +312,7 @@ def test_a_number_typed_as_text(form):
     problems = spoilt(form, change)
     for problem, (text, words) in zip(problems, TEXT_NUMBERS.items(), strict=True):
         place, _, said = str(problem).partition(": ")
-        assert place == f"sheet points, cell C{problem.row}, x_m"
+        assert place == f"form.xlsx, sheet points, cell C{problem.row}, x_m"
         assert said.startswith(f"found the text '{text}'; expected a number")
         assert words in said
 
@@ -384,7 +384,11 @@ MISTAKES = [
 @pytest.mark.parametrize(("change", "place", "words"), MISTAKES)
 def test_each_mistake_names_its_sheet_and_cell(form, change, place, words):
     told = [str(problem) for problem in spoilt(form, change)]
-    here = [line for line in told if line.startswith(f"{place}: ") and words in line]
+    here = [
+        line
+        for line in told
+        if line.removeprefix("form.xlsx, ").startswith(f"{place}: ") and words in line
+    ]
     assert len(here) == 1, told
 
 

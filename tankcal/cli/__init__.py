@@ -7,7 +7,9 @@ import sys
 import tankcal
 from tankcal.cli import camera, linting, planning, reporting, running, starting
 from tankcal.cli.machine import failure, print_json
+from tankcal.cli.showing import complain, speak
 from tankcal.errors import TankcalError
+from tankcal.messages import message
 
 DESCRIPTION = """\
 tankcal calibrates storage tanks: from surveyed points of the wall to the capacity
@@ -36,6 +38,7 @@ the job format: docs/job-format.md; axes, signs and units: docs/conventions.md""
 
 def main(arguments=None):
     """Run the command line; returns the exit status."""
+    speak()
     options = _options(arguments)
     if options.command is None:
         options.shown.print_help()
@@ -46,8 +49,8 @@ def main(arguments=None):
         if getattr(options, "json", False):
             print_json(**failure(error))
             return error.exit_status
-        for line in str(error).splitlines():
-            print(f"tankcal: {line}", file=sys.stderr)
+        for text in error.texts:
+            complain(text)
         return error.exit_status
     except BrokenPipeError:  # the reader of our output went away: nothing to say to nobody
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -58,7 +61,7 @@ def main(arguments=None):
     except BaseException as error:
         if not _interrupted(error):
             raise
-        print("tankcal: stopped; nothing was written", file=sys.stderr)
+        complain(message("stopped", "stopped; nothing was written"))
         return 130
 
 

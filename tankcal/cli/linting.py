@@ -2,8 +2,9 @@
 
 from tankcal.cli.arguments import positive
 from tankcal.cli.machine import add_json, print_json, problem_of
-from tankcal.cli.showing import counted, prepare_for_small_work
+from tankcal.cli.showing import prepare_for_small_work, say
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 
 MOST_FINDINGS = 50  # that are shown at once
 
@@ -37,7 +38,7 @@ def _lint(options):
     from tankcal.linter import Nominal, lint
 
     if options.nominal_diameter is not None and options.nominal_height is None:
-        expected = "given without --nominal-height; expected both"
+        expected = message("nominal_height_too", "given without --nominal-height; expected both")
         raise InputError(Problem("--nominal-diameter", expected))
     nominal = Nominal(options.nominal_volume, options.nominal_diameter, options.nominal_height)
     report = lint(options.file, nominal, options.sheet)
@@ -45,15 +46,38 @@ def _lint(options):
         print_json(exit_status=2 if report.errors else 0, **_plain(report))
         return 2 if report.errors else 0
     for finding in report.findings[:MOST_FINDINGS]:
-        print(finding)
+        say(finding.text)
     more = len(report.findings) - MOST_FINDINGS
     if more > 0:
-        print(f"and {more} more findings; mend these first")
+        say(message("more_findings", "and {more} more findings; mend these first", more=more))
     warnings = len(report.findings) - report.errors
     for summary in report.summaries:
-        print(summary)
-    print(f"{counted(report.errors, 'error')}, {counted(warnings, 'warning')}")
+        say(summary)
+    say(
+        message(
+            "found_in_table",
+            "{errors}, {warnings}",
+            errors=_errors(report.errors),
+            warnings=_warnings(warnings),
+        )
+    )
     return 2 if report.errors else 0
+
+
+def _errors(count):
+    if count == 0:
+        return message("no_errors", "no errors")
+    if count == 1:
+        return message("one_error", "1 error")
+    return message("some_errors", "{count} errors", count=count)
+
+
+def _warnings(count):
+    if count == 0:
+        return message("no_warnings", "no warnings")
+    if count == 1:
+        return message("one_warning", "1 warning")
+    return message("some_warnings", "{count} warnings", count=count)
 
 
 def _plain(report):

@@ -35,6 +35,7 @@ def failure(error):
 def problem_of(problem):
     """A `Problem` as the record writes warnings: place, text in English, code and values."""
     return {
+        "book": problem.book,
         "file": problem.file,
         "row": problem.row,
         "column": problem.column,

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tankcal.cli.showing import Progress, listed
+from tankcal.cli.showing import Progress, listed, speak
 from tankcal.languages import LANGUAGES
 
 
@@ -57,6 +57,8 @@ def _report(options):
     letterhead = letterhead_of(options)
     source = outputs.record_file(options.record)
     out = Path(options.out) if options.out else source.parent
+    if options.language in LANGUAGES:
+        speak(options.language)
     paths = outputs.rebuild(source, out, show.part, options.language, letterhead)
     show.end()
     listed(out, paths)

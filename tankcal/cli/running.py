@@ -5,9 +5,18 @@ from pathlib import Path
 import tankcal
 from tankcal.cli.machine import add_json, print_json, problem_of
 from tankcal.cli.reporting import add_letterhead, letterhead_of
-from tankcal.cli.showing import Progress, counted, listed, prepare_for_small_work, warn
-from tankcal.digits import PROGRAM, decimals_of_height, fixed, with_digits, written
+from tankcal.cli.showing import (
+    Progress,
+    listed,
+    marks,
+    prepare_for_small_work,
+    read_job,
+    say,
+    warn,
+)
+from tankcal.digits import decimals_of_height, fixed, with_digits, written
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 
 
 def add(commands):
@@ -84,9 +93,9 @@ def _tell(out, paths, warnings, result, adjustment):
     """Warnings, a summary and the files, for a person."""
     warn(warnings)
     if adjustment is not None:
-        print(_summary(adjustment))
+        say(_summary(adjustment))
     if result is not None:
-        print(_capacity(result))
+        say(_capacity(result))
     listed(out, paths)
 
 
@@ -132,8 +141,7 @@ def _compute(source, out, quiet, strict=False, letterhead=None, tell=_tell):
     from tankcal import outputs
 
     show = Progress(quiet)
-    show.step(f"reading {source}")
-    job = tankcal.load(source)
+    job = read_job(source, show)
     outputs.refuse_foreign(out)
     result = tankcal.run(job, show.step, counting=show.part)
     adjustment = result.adjustment
@@ -148,17 +156,28 @@ def _capacity(result):
     """One line: what the tank holds to the digits of U, and how many points say so."""
     top_m = result.table.height_m[-1]
     top, stated = result.at(top_m), result.intervals
-    volume = written(top.value_m3, stated.U_m3[-1], PROGRAM, least=0)
-    how = f"k = {fixed(top.k, 2, PROGRAM)}" if stated.by_gum[-1] else "by Monte Carlo"
+    volume = written(top.value_m3, stated.U_m3[-1], marks(), least=0)
+    how = message("by_monte_carlo", "by Monte Carlo")
+    if stated.by_gum[-1]:
+        how = message("with_k", "k = {factor:.2f}", factor=top.k)
     points = ""
     if result.accepted is not None:
         accepted = len(result.accepted)
-        surveyed = len(result.job.points.names)
-        points = f", {accepted} points of the wall, {surveyed - accepted} rejected"
-    return (
-        f"{result.job.tank.id}: {volume.value} m3 at "
-        f"{fixed(top_m, decimals_of_height(top_m), PROGRAM)} m, U = {volume.uncertainty} m3 "
-        f"({how}){points}"
+        points = message(
+            "points_of_wall",
+            ", {accepted} points of the wall, {rejected} rejected",
+            accepted=accepted,
+            rejected=len(result.job.points.names) - accepted,
+        )
+    return message(
+        "holds",
+        "{tank}: {volume} m3 at {height} m, U = {uncertainty} m3 ({how}){points}",
+        tank=result.job.tank.id,
+        volume=volume.value,
+        height=fixed(top_m, decimals_of_height(top_m), marks()),
+        uncertainty=volume.uncertainty,
+        how=how,
+        points=points,
     )
 
 
@@ -167,8 +186,7 @@ def _adjust(source, out, quiet, strict, letterhead, tell=_tell):
     from tankcal import outputs
 
     show = Progress(quiet)
-    show.step(f"reading {source}")
-    job = tankcal.load(source, only="adjustment")
+    job = read_job(source, show, only="adjustment")
     outputs.refuse_foreign(out)
     adjustment = tankcal.adjust_job(job, show.step)
     if strict:
@@ -181,17 +199,24 @@ def _adjust(source, out, quiet, strict, letterhead, tell=_tell):
 def _refuse_failed(adjustment):
     """Raise when there is an adjustment that is in doubt, or whose global test failed."""
     if adjustment is not None and adjustment.doubts:
-        raise SolutionError(
-            "\n".join([*map(str, adjustment.doubts), "nothing was written (--strict)"])
-        )
+        nothing = message("strict_nothing", "nothing was written (--strict)")
+        raise SolutionError(*(one.text for one in adjustment.doubts), nothing)
     if adjustment is None or adjustment.redundancy <= 0:
         return
     test = adjustment.adjusted.test()
     if not test.passed:
         raise SolutionError(
-            f"the global test of the adjustment failed: v'Pv = {test.chi2:.1f}, expected "
-            f"{test.low:.1f} to {test.high:.1f} ({test.dof} degrees of freedom, sigma0 = "
-            f"{adjustment.sigma0:.3f}); nothing was written (--strict)"
+            message(
+                "strict_test_failed",
+                "the global test of the adjustment failed: v'Pv = {chi2:.1f}, expected {low:.1f} "
+                "to {high:.1f} ({dof} degrees of freedom, sigma0 = {sigma0:.3f}); nothing was "
+                "written (--strict)",
+                chi2=test.chi2,
+                low=test.low,
+                high=test.high,
+                dof=test.dof,
+                sigma0=adjustment.sigma0,
+            )
         )
 
 
@@ -199,19 +224,51 @@ def _summary(adjustment):
     """One line: how well the survey fits, and how good its points are."""
     from tankcal.network.quality import precision
 
-    test, sigma0 = "nothing redundant, not tested", ""
-    if adjustment.redundancy > 0:
-        passed = adjustment.adjusted.test().passed
-        test = f"global test {'passed' if passed else 'FAILED'}"
-        sigma0 = f"sigma0 = {adjustment.sigma0:.3f}, "
     removed = len({(one.kind, one.ids, one.row) for one in adjustment.removed})
     free = ~adjustment.fixed.all(axis=1)
     mean = ""
     if free.any():
         found = precision(adjustment.xyz_m[free], adjustment.covariance_m2[free])
-        mean = f", mean sd {with_digits(1000 * found.mean_sd_m, 3, PROGRAM)} mm"
-    return (
-        f"adjustment: {sigma0}redundancy {adjustment.redundancy}, {test}, "
-        f"{counted(removed, 'observation')} set aside, "
-        f"{counted(len(adjustment.names), 'point')}{mean}"
+        sd = with_digits(1000 * found.mean_sd_m, 3, marks())
+        mean = message("mean_sd", ", mean sd {sd} mm", sd=sd)
+    return message(
+        "adjusted",
+        "adjustment: {fit}, {set_aside}, {points}{mean}",
+        fit=_fit_of(adjustment),
+        set_aside=_set_aside(removed),
+        points=_points(len(adjustment.names)),
+        mean=mean,
     )
+
+
+def _fit_of(adjustment):
+    if adjustment.redundancy <= 0:
+        return message(
+            "not_tested",
+            "redundancy {dof}, nothing redundant, not tested",
+            dof=adjustment.redundancy,
+        )
+    test = message("test_is_passed", "global test passed")
+    if not adjustment.adjusted.test().passed:
+        test = message("test_is_failed", "global test FAILED")
+    return message(
+        "fit",
+        "sigma0 = {sigma0:.3f}, redundancy {dof}, {test}",
+        sigma0=adjustment.sigma0,
+        dof=adjustment.redundancy,
+        test=test,
+    )
+
+
+def _set_aside(count):
+    if count == 0:
+        return message("none_set_aside", "no observations set aside")
+    if count == 1:
+        return message("one_set_aside", "1 observation set aside")
+    return message("some_set_aside", "{count} observations set aside", count=count)
+
+
+def _points(count):
+    if count == 1:
+        return message("one_point", "1 point")
+    return message("some_points", "{count} points", count=count)

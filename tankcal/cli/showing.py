@@ -1,7 +1,64 @@
-"""Progress, warnings and lists of files, as the terminal shows them."""
+"""What the terminal shows, in the language of the job: progress, warnings, lists of files."""
 
 import os
 import sys
+
+from tankcal.languages import DEFAULT, nearest_language
+from tankcal.messages import Message, message
+
+_LOCALE = ("LC_ALL", "LC_MESSAGES", "LANG")  # the first that is set counts
+_spoken = {}  # the words of the language that is spoken; nothing: English as it was made
+
+
+def speak(language=None):
+    """From now on say what is said in this language; None: in that of the environment."""
+    _spoken.clear()
+    if language is None:
+        setting = next((os.environ[name] for name in _LOCALE if os.environ.get(name)), "")
+        language = nearest_language(setting) or DEFAULT
+    if language != DEFAULT:
+        from tankcal.words import load_words
+
+        _spoken.update(load_words(language))
+
+
+def said(text):
+    """A text in the language that is spoken; one without a code is as it is."""
+    if not (_spoken and isinstance(text, Message)):
+        return str(text)
+    from tankcal.words import said as said_in
+
+    return said_in(_spoken, text)
+
+
+def marks():
+    """What stands between the digits of numbers in that language (digits.Marks)."""
+    from tankcal.digits import PROGRAM, Marks
+
+    return Marks(**_spoken["language"]["marks"]) if _spoken else PROGRAM
+
+
+def say(text):
+    """Print a line of the terminal."""
+    print(said(text))
+
+
+def complain(text):
+    """Lines on standard error."""
+    for line in said(text).splitlines():
+        print(f"tankcal: {line}", file=sys.stderr)
+
+
+def read_job(source, show, **options):
+    """The checked Job of a folder or workbook; from now on its language is spoken."""
+    from tankcal.cli.asked_language import asked_language
+    from tankcal.job import load
+
+    language = asked_language(source)
+    if language is not None:
+        speak(language)
+    show.step(message("reading_job", "reading {file}", file=str(source)))
+    return load(source, **options)
 
 
 def prepare_for_small_work():
@@ -13,12 +70,13 @@ def prepare_for_small_work():
 def warn(warnings):
     """Warnings on standard error."""
     for warning in warnings:
-        print(f"tankcal: warning: {warning}", file=sys.stderr)
+        text = getattr(warning, "text", warning)
+        complain(message("warning", "warning: {text}", text=text))
 
 
 def listed(out, paths):
     """Print what was written."""
-    print(f"results in {out}:")
+    say(message("results_in", "results in {folder}:", folder=str(out)))
     for path in paths:
         print(f"  {path}")
 
@@ -42,11 +100,12 @@ class Progress:
     def part(self, text, done, total):
         if self.quiet:
             return
+        line = f"tankcal: {said(text)}"
         if text != self.now:
             self.end()
-            print(f"tankcal: {text}", end="" if self.live else "\n", file=sys.stderr, flush=True)
+            print(line, end="" if self.live else "\n", file=sys.stderr, flush=True)
         if self.live and total:
-            print(f"\rtankcal: {text} {done}/{total}", end="", file=sys.stderr, flush=True)
+            print(f"\r{line} {done}/{total}", end="", file=sys.stderr, flush=True)
         self.now = text
 
     def end(self):

@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+from tankcal.cli.showing import say, speak
 from tankcal.languages import DEFAULT, LANGUAGES
+from tankcal.messages import message
 
 
 def add(commands):
@@ -40,13 +42,29 @@ def add(commands):
 def _new(options):
     from tankcal.starter import write_input_workbook, write_starter
 
+    if options.language != DEFAULT:
+        speak(options.language)
     directory = Path(options.directory)
     form = (options.kind, options.survey, options.language)
     if options.workbook:
         path = write_input_workbook(directory, *form)
-        print(f"wrote {path}: fill it in, save it, then")
+        say(message("wrote_workbook", "wrote {file}: fill it in, save it, then", file=str(path)))
         print(f"  tankcal run {path}")
         return
     write_starter(directory, *form)
-    print(f"wrote {directory}: fill in job.toml and the CSV files, or job.xlsx instead, then")
-    print(f"  tankcal run {directory}     or     tankcal run {directory / 'job.xlsx'}")
+    say(
+        message(
+            "wrote_folder",
+            "wrote {file}: fill in job.toml and the CSV files, or job.xlsx instead, then",
+            file=str(directory),
+        )
+    )
+    book = directory / "job.xlsx"
+    say(
+        message(
+            "run_either",
+            "  tankcal run {folder}     or     tankcal run {file}",
+            folder=str(directory),
+            file=str(book),
+        )
+    )

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.job.tables import fingerprint, read_bytes
+from tankcal.messages import message
 from tankcal.rules.model import Rule
 
 MAX_MESH_BYTES = 200_000_000
@@ -41,12 +42,17 @@ def read_mesh_file(folder, name, log):
     except (OSError, ValueError):
         exists = False
     if not exists:
-        log.problem(name, "missing file; expected the mesh of mesh.file beside the job")
+        log.problem(
+            name,
+            message(
+                "missing_mesh_file", "missing file; expected the mesh of mesh.file beside the job"
+            ),
+        )
         return None
     data = read_bytes(path, log, MAX_MESH_BYTES)
     if data is None:
         return None
     if not data.strip():
-        log.problem(name, "empty; expected a closed mesh")
+        log.problem(name, message("empty_mesh_file", "empty; expected a closed mesh"))
         return None
     return fingerprint(name, data), data

@@ -14,6 +14,7 @@ from tankcal.job.entries import read_register
 from tankcal.job.folder import MAX_SETTINGS_BYTES
 from tankcal.job.folder import read_register as raw_register
 from tankcal.job.tables import Log, RawJob, nearest, read_bytes, shown
+from tankcal.messages import listed, message
 
 CAMERAS_FILE = "cameras.toml"
 NO_SETTINGS = dict.fromkeys((*PARAMETER_KEYS, *SECOND_NAMES.values(), "default"))
@@ -37,7 +38,9 @@ def read_cameras(path, warn=None, in_pixels=True):
         path = path / CAMERAS_FILE
         missing = str(path)
     if not path.exists():
-        log.problem(missing, "not found; expected a file with [cameras.NAME]")
+        log.problem(
+            missing, message("no_cameras_file", "not found; expected a file with [cameras.NAME]")
+        )
     log.stop_if_problems()
     values = _values(path, log, in_pixels)
     log.stop_if_problems()
@@ -74,17 +77,28 @@ def choose(setups, names, file=CAMERAS_FILE):
     problems = []
     for place, name in enumerate(names):
         if name not in known:
-            expected = f"found {shown(name)}; expected a camera of it{nearest(name, known)}"
-            problems.append(Problem(file, f"{expected}: {_listed(known)}"))
+            expected = message(
+                "no_such_camera",
+                "found {found}; expected a camera of it{hint}: {listed}",
+                found=shown(name),
+                hint=nearest(name, known),
+                listed=listed(known, 20),
+            )
+            problems.append(Problem(file, expected))
         elif name in names[:place]:
-            problems.append(Problem(file, f"{shown(name)} was named twice; expected once"))
+            problems.append(
+                Problem(
+                    file,
+                    message(
+                        "camera_named_twice",
+                        "{found} was named twice; expected once",
+                        found=shown(name),
+                    ),
+                )
+            )
     if problems:
         raise InputError(problems)
     return tuple(setups[known.index(name)] for name in names) or tuple(setups)
-
-
-def _listed(known):
-    return ", ".join(known[:20]) + (f" and {len(known) - 20} more" if len(known) > 20 else "")
 
 
 def _values(path, log, in_pixels):
@@ -97,7 +111,9 @@ def _values(path, log, in_pixels):
     values = read_register(raw, "cameras", log)
     check_calibrations(SurveyFiles(None, {}, {"cameras": values}, raw, log), in_pixels)
     if not values and not log.problems:
-        log.problem(path.name, "no camera; expected sections [cameras.NAME]")
+        log.problem(
+            path.name, message("no_camera_sections", "no camera; expected sections [cameras.NAME]")
+        )
     return values
 
 

@@ -11,6 +11,7 @@ import zlib
 import numpy as np
 
 from tankcal.job.tables import COVARIANCE_FILE, shown
+from tankcal.messages import message
 
 MAX_POINTS = 2500  # the matrix is 450 MB then
 TOLERANCE = 1e-8  # of a correlation
@@ -20,7 +21,12 @@ _MATRIX, _NAMES = "covariance_m2", "points"
 def read_covariance(data, names, log):
     """The (3n, 3n) covariance in m2 of the points called `names`, or None after telling `log`."""
     if len(names) > MAX_POINTS:
-        expected = f"{len(names)} points; expected at most {MAX_POINTS} with a full covariance"
+        expected = message(
+            "covariance_too_many",
+            "{count} points; expected at most {most} with a full covariance",
+            count=len(names),
+            most=MAX_POINTS,
+        )
         log.problem(COVARIANCE_FILE, expected)
         return None
     arrays = _load(data, len(names), log)
@@ -32,9 +38,14 @@ def read_covariance(data, names, log):
     if complaint:
         log.problem(COVARIANCE_FILE, complaint, None, _NAMES)
     if matrix.shape != (size, size) or matrix.dtype.kind != "f":
-        expected = (
-            f"found {matrix.dtype.name} of shape {matrix.shape}; expected floating-point numbers"
-            f" of shape {(size, size)}: x, y, z of {len(names)} points"
+        expected = message(
+            "covariance_shape",
+            "found {name} of shape {shape}; expected floating-point numbers of shape {value}: x, "
+            "y, z of {count} points",
+            name=matrix.dtype.name,
+            shape=str(matrix.shape),
+            value=str((size, size)),
+            count=len(names),
         )
         log.problem(COVARIANCE_FILE, expected, None, _MATRIX)
         return None
@@ -53,13 +64,23 @@ def _load(data, n, log):
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             unpacked = sum(member.file_size for member in archive.infolist())
         if unpacked > largest:
-            expected = f"unpacks to {unpacked} bytes, more than {n} points need"
+            expected = message(
+                "covariance_unpacks",
+                "unpacks to {unpacked} bytes, more than {n} points need",
+                unpacked=unpacked,
+                n=n,
+            )
             log.problem(COVARIANCE_FILE, expected, None, _MATRIX)
             return None
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             missing = [name for name in (_MATRIX, _NAMES) if name not in archive.files]
             for name in missing:
-                log.problem(COVARIANCE_FILE, "missing array", None, name)
+                log.problem(
+                    COVARIANCE_FILE,
+                    message("covariance_array_missing", "missing array"),
+                    None,
+                    name,
+                )
             if not missing:
                 return {name: archive[name] for name in (_MATRIX, _NAMES)}
     except (ValueError, OSError, EOFError, KeyError, TypeError, SyntaxError, MemoryError):
@@ -70,35 +91,57 @@ def _load(data, n, log):
 
 
 def _tell_damaged(log):
-    expected = f"cannot be read; expected a numpy .npz with plain arrays {_MATRIX} and {_NAMES}"
+    expected = message(
+        "covariance_damaged",
+        "cannot be read; expected a numpy .npz with plain arrays {matrix} and {names}",
+        matrix=_MATRIX,
+        names=_NAMES,
+    )
     log.problem(COVARIANCE_FILE, expected)
 
 
 def _complaint_about_names(found, names):
     if found.dtype.kind != "U" or found.shape != (len(names),):
-        return f"expected the {len(names)} names of points.csv as text, in its order"
+        return message(
+            "covariance_names",
+            "expected the {count} names of points.csv as text, in its order",
+            count=len(names),
+        )
     for position, (one, other) in enumerate(zip(found.tolist(), names, strict=True), 1):
         if other is not None and one != other:
-            return f"name {position} is {shown(one)}; expected {shown(other)} as in points.csv"
+            return message(
+                "covariance_other_name",
+                "name {position} is {found}; expected {wanted} as in points.csv",
+                position=position,
+                found=shown(one),
+                wanted=shown(other),
+            )
     return None
 
 
 def _complaint_about_matrix(matrix):
     if not np.all(np.isfinite(matrix)):
-        return "holds NaN or infinite values; expected finite numbers"
+        return message(
+            "covariance_infinite", "holds NaN or infinite values; expected finite numbers"
+        )
     variance = np.diagonal(matrix)
     if np.any(variance < 0) or np.any(variance > 1.0):
-        return (
-            f"variances from {variance.min():g} to {variance.max():g} m2; expected 0 to 1 m2"
-            " (the square of metres: is it in mm2?)"
+        return message(
+            "covariance_variances",
+            "variances from {low:g} to {high:g} m2; expected 0 to 1 m2 (the square of metres: is "
+            "it in mm2?)",
+            low=variance.min(),
+            high=variance.max(),
         )
     sd = np.sqrt(variance)
     scale = np.where(sd > 0, sd, 1.0)
     correlation = matrix / scale[:, None] / scale[None, :]
     if np.any(np.abs(correlation - correlation.T) > TOLERANCE):
-        return "is not symmetric; expected a covariance matrix"
+        return message("covariance_not_symmetric", "is not symmetric; expected a covariance matrix")
     try:
         np.linalg.cholesky(correlation + TOLERANCE * len(matrix) * np.eye(len(matrix)))
     except np.linalg.LinAlgError:
-        return "is not a covariance matrix; expected no negative eigenvalue"
+        return message(
+            "covariance_not_definite", "is not a covariance matrix; expected no negative eigenvalue"
+        )
     return None

@@ -8,7 +8,9 @@ import numpy as np
 from tankcal.job.contract import COLUMNS, KEYS, KINDS, OPEN_SECTIONS, REGISTER_KEYS
 from tankcal.job.contract.registers import FAMILIES, SHORT_KEYS
 from tankcal.job.fields import IN_TOML, MAX_NAME, Field, Refused, is_blank, read_value
+from tankcal.job.form_words import NO, YES, meant
 from tankcal.job.tables import nearest, shown
+from tankcal.messages import message
 from tankcal.numerals import NUMBER
 
 
@@ -52,7 +54,11 @@ def read_settings(raw, log, is_whole=True):
         given = raw.settings.get(section, {})
         is_foreign = not any(field.suits(kind) for field in fields)
         if is_foreign and not all(_says_nothing(value) for value in given.values()):
-            expected = f"{_only_for(fields[0], kind)}; remove the section"
+            expected = message(
+                "remove_section",
+                "{only_for}; remove the section",
+                only_for=_only_for(fields[0], kind),
+            )
             log.problem(raw.settings_file, expected, raw.sections.get(section), f"[{section}]")
         values[section] = {
             field.name: None
@@ -89,14 +95,18 @@ def read_register(raw, name, log):
         try:
             name_read = read_value(Field(owner, "name", ""), owner)
             if name_read != owner:
-                expected = f"found {shown(owner)}; expected {shown(name_read)}, without more spaces"
+                expected = message(
+                    "spaces_in_name",
+                    "found {found}; expected {wanted}, without more spaces",
+                    found=shown(owner),
+                    wanted=shown(name_read),
+                )
                 log.problem(register.file, expected, row, owner)
         except Refused as refusal:
-            log.problem(register.file, str(refusal), row, owner)
+            log.problem(register.file, refusal.text, row, owner)
         for key, value in entries.items():
             if key not in known and key.partition(".")[0] not in FAMILIES.get(name, ()):
-                expected = f"unknown key{nearest(key, known)}"
-                log.problem(register.file, expected, value.row, f"{owner}.{key}")
+                log.problem(register.file, _unknown_key(key, known), value.row, f"{owner}.{key}")
         _refuse_two_spellings(register.file, name, owner, entries, log)
         values[owner] = {}
         for field in fields:
@@ -121,7 +131,7 @@ def _read_family(file, owner, family, field, entries, log):
             own = read_value(Field(key, "name", ""), own)
             found[own] = read_value(field, value.raw)
         except Refused as refusal:
-            log.problem(file, str(refusal), value.row, f"{owner}.{key}")
+            log.problem(file, refusal.text, value.row, f"{owner}.{key}")
     return found
 
 
@@ -138,7 +148,11 @@ def _is_filled(entries, key):
 def _refuse_two_spellings(file, register, owner, entries, log):
     for key, short in SHORT_KEYS[register].items():
         if _is_filled(entries, key) and _is_filled(entries, short):
-            expected = f"given beside {key}; expected one of them: they are the same parameter"
+            expected = message(
+                "short_spelling_too",
+                "given beside {key}; expected one of them: they are the same parameter",
+                key=key,
+            )
             log.problem(file, expected, entries[short].row, f"{owner}.{short}")
 
 
@@ -146,27 +160,44 @@ def kind_of(raw):
     """The kind of tank, or None where the settings do not tell it; nothing is told to a log."""
     value = (raw.settings or {}).get("tank", {}).get("kind")
     kind = value.raw.strip() if value and isinstance(value.raw, str) else None
-    return kind if kind in KINDS else None
+    if kind is None or kind in KINDS:
+        return kind
+    return meant(kind, KINDS)
 
 
 def _says_nothing(value):
     """Whether a setting may stand in a job of a kind that it is not for: blank, 0 or false."""
+    if isinstance(value.raw, str) and meant(value.raw, (YES, NO)) == NO:
+        return True
     return is_blank(value.raw) or (isinstance(value.raw, int | float) and value.raw == 0)
 
 
 def _only_for(field, kind):
-    return f"only for a tank of kind {' or '.join(field.kinds)}, this one is {kind}"
+    return message(
+        "only_for_kinds",
+        "only for a tank of kind {kinds}; this one is {of_kind}",
+        kinds=[*field.kinds],
+        of_kind=kind,
+    )
 
 
 def _refuse_unknown(file, section, entries, section_row, log):
     if section not in KEYS:
-        log.problem(file, f"unknown section{nearest(section, KEYS)}", section_row, f"[{section}]")
+        log.problem(
+            file,
+            message("unknown_section", "unknown section{hint}", hint=nearest(section, KEYS)),
+            section_row,
+            f"[{section}]",
+        )
         return
     known = [field.name for field in KEYS[section]]
     for key, value in entries.items():
         if key not in known and not _is_own(section, key, known):
-            expected = f"unknown key{nearest(key, known)}"
-            log.problem(file, expected, value.row, f"{section}.{key}")
+            log.problem(file, _unknown_key(key, known), value.row, f"{section}.{key}")
+
+
+def _unknown_key(key, known):
+    return message("unknown_key", "unknown key{hint}", hint=nearest(key, known))
 
 
 def _own_fields(section, fields, given):
@@ -193,17 +224,25 @@ def read_setting(file, name, field, value, kind, log, is_required, row=None):
     """
     if value is None or (is_blank(value.raw) and value.raw not in field.choices):
         if is_required:
-            found = "missing" if value is None else "blank"
-            log.problem(file, f"{found}; expected {field.wanted()}", _row_of(value, row), name)
+            wanted = field.wanted()
+            expected = message("missing_key", "missing; expected {wanted}", wanted=wanted)
+            if value is not None:
+                expected = message("blank_key", "blank; expected {wanted}", wanted=wanted)
+            log.problem(file, expected, _row_of(value, row), name)
         return None
     if not field.suits(kind):
         if not _says_nothing(value):
-            log.problem(file, f"{_only_for(field, kind)}; remove it", _row_of(value, row), name)
+            log.problem(
+                file,
+                message("remove_key", "{only_for}; remove it", only_for=_only_for(field, kind)),
+                _row_of(value, row),
+                name,
+            )
         return None
     try:
         return read_value(field, value.raw, IN_TOML if file.endswith(".toml") else None)
     except Refused as refusal:
-        log.problem(file, str(refusal), _row_of(value, row), name)
+        log.problem(file, refusal.text, _row_of(value, row), name)
         return None
 
 
@@ -215,7 +254,12 @@ def read_section(file, section, fields, given, row, log):
     known = [field.name for field in fields]
     for key, value in given.items():
         if key not in known:
-            expected = f"unknown key; expected {', '.join(known)}{nearest(key, known)}"
+            expected = message(
+                "unknown_key_of_section",
+                "unknown key; expected {known}{hint}",
+                known=[*known],
+                hint=nearest(key, known),
+            )
             log.problem(file, expected, value.row or row, f"{section}.{key}")
     return {
         field.name: read_setting(
@@ -246,7 +290,12 @@ def read_columns(name, table, log, fields=None):
     known = [field.name for field in fields]
     for heading in table.headings:
         if heading not in known:
-            expected = f"unknown column{nearest(heading, known)}; expected {', '.join(known)}"
+            expected = message(
+                "unknown_column",
+                "unknown column{hint}; expected {known}",
+                hint=nearest(heading, known),
+                known=[*known],
+            )
             log.problem(table.file, expected, table.heading_row, heading)
     columns = {}
     for field in fields:
@@ -254,7 +303,9 @@ def read_columns(name, table, log, fields=None):
         if field.name in table.headings:
             columns[field.name] = _column(table, field, log)
         elif field.required:
-            expected = f"missing column; expected {field.wanted()}"
+            expected = message(
+                "missing_column", "missing column; expected {wanted}", wanted=field.wanted()
+            )
             log.problem(table.file, expected, table.heading_row, field.name)
     return ColumnValues(table.file, table.row_numbers, table.skipped, columns)
 
@@ -272,14 +323,23 @@ def _column(table, field, log):
         if is_blank(raw):
             if filled:
                 row = table.row_numbers[place]
-                log.problem(table.file, f"blank; expected {field.expectation()}", row, field.name)
+                log.problem(
+                    table.file,
+                    message(
+                        "blank_cell",
+                        "blank; expected {expectation}",
+                        expectation=field.expectation(),
+                    ),
+                    row,
+                    field.name,
+                )
         elif type(raw) is str and raw in read:
             values[place] = read[raw]  # names and choices come again and again
         else:
             try:
                 values[place] = read[raw] = read_value(field, raw, table.decimal)
             except Refused as refusal:
-                log.problem(table.file, str(refusal), table.row_numbers[place], field.name)
+                log.problem(table.file, refusal.text, table.row_numbers[place], field.name)
     return values
 
 

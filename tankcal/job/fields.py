@@ -10,8 +10,10 @@ import re
 import unicodedata
 from dataclasses import dataclass
 
+from tankcal.job.form_words import NO, YES, meant
 from tankcal.job.misread import hint_of_date, hint_of_number, hint_of_text
 from tankcal.job.tables import BadCell, Percent, nearest, shown
+from tankcal.messages import message
 from tankcal.naming import MAX_NAME, is_name
 from tankcal.numerals import NUMBER
 
@@ -19,8 +21,6 @@ MAX_TEXT = 300
 MAX_LIST = 50  # numbers or pairs
 IN_TOML = "toml"  # in place of a decimal mark: a number is a number, and never a cell
 MAX_NAMES = 5000
-NAME_RULE = "a letter, digit or underscore first, then letters, digits, spaces or _ - . ( ) / #"
-TANK_ID_RULE = "letters, digits, spaces or _ - . ( ), no .. and no . or - first"
 
 _TANK_ID = re.compile(r"(?!.*\.\.)[\w(][\w .()-]*")
 _RULE_NAME = re.compile(r"(?!.*\.\.)\w[\w .()-]*")
@@ -34,7 +34,11 @@ _ISO_DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 
 
 class Refused(ValueError):
-    """The value is not what the field takes; the text says what was found and expected."""
+    """The value is not what the field takes; `text` says what was found and expected."""
+
+    @property
+    def text(self):
+        return self.args[0]
 
 
 @dataclass(frozen=True)
@@ -83,41 +87,96 @@ class Field:
     def expectation(self):
         """What is expected, in words: "a number above 0, at most 300"."""
         if self.kind == "choice":
-            return " or ".join(repr(choice) for choice in self.choices)
+            return _one_of(self.choices)
         if self.kind == "number":
-            words = "".join(f", or {choice!r}" for choice in self.choices)
-            return "a number" + self._bounds() + words
+            return self._expected_number()
         if self.kind == "dms":
-            return f"degrees, minutes and seconds such as 123 04 05.6{self._bounds(' degrees')}"
+            return message(
+                "a_dms",
+                "degrees, minutes and seconds such as 123 04 05.6{bounds}",
+                bounds=self._bounds_in_degrees(),
+            )
         if self.kind == "numbers":
-            return f"numbers{self._bounds()}, such as 700; 850 (in a .toml file also [700, 850])"
-        return {
-            "text": f"text of at most {MAX_TEXT} characters in one line",
-            "name": f"a name of at most {MAX_NAME} characters ({NAME_RULE})",
-            "tank id": f"a name of at most {MAX_NAME} characters ({TANK_ID_RULE})",
-            "flag": "true or false",
-            "date": "a date such as 2024-05-31",
-            "ranges": "pairs such as 0-0.3; 2.1-2.4 (in a .toml file also [[0, 0.3], [2.1, 2.4]])",
-            "names": 'names such as P7; P9 (in a .toml file also ["P7", "P9"])',
-            "rule name": "the name of a rule of tankcal, or of a .toml file in the job's folder",
-            "mesh file": "the plain name of a .stl, .obj, .ply or .off file, in the job's folder",
-        }[self.kind]
+            return message(
+                "several_numbers",
+                "numbers{bounds}, such as 700; 850 (in a .toml file also [700, 850])",
+                bounds=self._bounds(),
+            )
+        return _EXPECTED[self.kind]
 
     def wanted(self):
         """What is expected where nothing stands: "height of the course (a number above 0)"."""
-        is_plain = self.kind in ("text", "name", "tank id")
-        return self.note if is_plain else f"{self.note} ({self.expectation()})"
+        if self.kind in ("text", "name", "tank id"):
+            return message("noted", "{note}", note=self.note)
+        return message("wanted", "{note} ({expected})", note=self.note, expected=self.expectation())
 
-    def _bounds(self, unit=""):
-        if self.low == -self.high and self.high >= 1e5:  # bounds that only keep nonsense out
+    def _expected_number(self):
+        number = message("a_number", "a number{bounds}", bounds=self._bounds())
+        if not self.choices:
+            return number
+        words = _one_of(self.choices)
+        return message("a_number_or", "{number}, or {words}", number=number, words=words)
+
+    def _bounds(self):
+        low, high = self.low, self.high
+        if low == -high and high >= 1e5:  # bounds that only keep nonsense out
             return ""
-        if math.isinf(self.high):
-            return f" above {self.low:g}" if self.above_low else f" of {self.low:g} or more"
+        if math.isinf(high) and self.above_low:
+            return message("bound_above", " above {low:g}", low=low)
+        if math.isinf(high):
+            return message("bound_of_or_more", " of {low:g} or more", low=low)
         if self.above_low:
-            return f" above {self.low:g}, at most {self.high:g}{unit}"
-        if unit:
-            return f", from {self.low:g} to {self.high:g}{unit}"
-        return f" from {self.low:g} to {self.high:g}"
+            return message(
+                "bound_above_at_most", " above {low:g}, at most {high:g}", low=low, high=high
+            )
+        return message("bound_from_to", " from {low:g} to {high:g}", low=low, high=high)
+
+    def _bounds_in_degrees(self):
+        return message(
+            "bound_in_degrees",
+            ", from {low:g} to {high:g} degrees",
+            low=self.low,
+            high=self.high,
+        )
+
+
+_EXPECTED = {
+    "text": message("a_text", "text of at most {most} characters in one line", most=MAX_TEXT),
+    "name": message(
+        "a_name",
+        "a name of at most {most} characters (a letter, digit or underscore first, then letters, "
+        "digits, spaces or _ - . ( ) / #)",
+        most=MAX_NAME,
+    ),
+    "tank id": message(
+        "a_tank_id",
+        "a name of at most {most} characters (letters, digits, spaces or _ - . ( ), no .. and no "
+        ". or - first)",
+        most=MAX_NAME,
+    ),
+    "flag": message("a_flag", "true or false"),
+    "date": message("a_date", "a date such as 2024-05-31"),
+    "ranges": message(
+        "some_ranges",
+        "pairs such as 0-0.3; 2.1-2.4 (in a .toml file also [[0, 0.3], [2.1, 2.4]])",
+    ),
+    "names": message("some_names", 'names such as P7; P9 (in a .toml file also ["P7", "P9"])'),
+    "rule name": message(
+        "a_rule_name", "the name of a rule of tankcal, or of a .toml file in the job's folder"
+    ),
+    "mesh file": message(
+        "a_mesh_file",
+        "the plain name of a .stl, .obj, .ply or .off file, in the job's folder",
+    ),
+}
+
+
+def _one_of(choices):
+    """ "'a' or 'b' or 'c'"; in another language by the words that its forms have for them."""
+    *others, last = (message("choice", "{choice!r}", choice=one) for one in choices)
+    for one in reversed(others):
+        last = message("either_or", "{one} or {other}", one=one, other=last)
+    return last
 
 
 def is_blank(raw):
@@ -132,7 +191,14 @@ def read_value(field, raw, decimal=None):
     number is a number. Raises Refused.
     """
     if isinstance(raw, BadCell):
-        raise Refused(f"{raw.complaint}; expected {field.expectation()}")
+        raise Refused(
+            message(
+                "complaint",
+                "{complaint}; expected {expected}",
+                complaint=raw.complaint,
+                expected=field.expectation(),
+            )
+        )
     reader = {
         "number": _read_number,
         "choice": _read_choice,
@@ -146,6 +212,19 @@ def read_value(field, raw, decimal=None):
     return reader(field, raw, decimal)
 
 
+def _refused(field, found, hint=""):
+    """Refused of a value that is not what the field takes."""
+    return Refused(
+        message(
+            "found_expected",
+            "found {found}; expected {expected}{hint}",
+            found=found,
+            expected=field.expectation(),
+            hint=hint,
+        )
+    )
+
+
 def _read_number(field, raw, decimal):
     if field.choices and isinstance(raw, str) and raw.strip() in field.choices:
         return raw.strip()
@@ -154,35 +233,37 @@ def _read_number(field, raw, decimal):
     elif isinstance(raw, int | float) and not isinstance(raw, bool | Percent):
         value = _float(raw)
     else:
-        found, hint = _kind_of(raw) + shown(raw), hint_of_number(raw)
-        raise Refused(f"found {found}; expected {field.expectation()}{hint}")
+        raise _refused(field, _kind_of(raw), hint_of_number(raw))
     if not math.isfinite(value):
-        raise Refused(f"found {shown(raw)}; expected {field.expectation()}, not NaN or infinite")
+        raise _refused(field, shown(raw), message("not_infinite", ", not NaN or infinite"))
     if value > field.high or value < field.low or (field.above_low and value == field.low):
         hint = _other_unit(field, value)
-        raise Refused(f"found {shown(raw)}; expected {field.expectation()}{hint}")
+        raise _refused(field, shown(raw), hint)
     return value
 
 
 def _number_of_text(field, raw, decimal):
-    wanted = field.expectation()
     text = raw.strip(" \t")
     if len(text) > MAX_NAME:
-        raise Refused(f"found {shown(raw)}; expected {wanted}")
+        raise _refused(field, shown(raw))
     plain = text.replace(",", ".") if decimal != "." else text
     is_number = NUMBER.fullmatch(plain) is not None
     if decimal in (None, IN_TOML):
         hint = hint_of_text(text, in_cell=decimal is None)
-        raise Refused(f"found the text {shown(raw)}; expected {wanted}{hint}")
+        found = message("the_text", "the text {found}", found=shown(raw))
+        raise _refused(field, found, hint)
     if is_number and not (decimal == "," and "." in text):
         return float(plain)
     if decimal == "." and NUMBER.fullmatch(text.replace(",", ".")):
-        hint = " with a decimal point; for decimal commas set [csv] decimal = ','"
+        hint = message(
+            "with_decimal_point",
+            " with a decimal point; for decimal commas set [csv] decimal = ','",
+        )
     elif decimal == "," and NUMBER.fullmatch(text):
-        hint = " with a decimal comma, as [csv] decimal says"
+        hint = message("with_decimal_comma", " with a decimal comma, as [csv] decimal says")
     else:
         hint = ""
-    raise Refused(f"found {shown(raw)}; expected {wanted}{hint}")
+    raise _refused(field, shown(raw), hint)
 
 
 def _float(raw):
@@ -193,35 +274,42 @@ def _float(raw):
 
 
 def _kind_of(raw):
+    """A value as found, with its kind where that is what is wrong with it."""
+    found = shown(raw)
     if isinstance(raw, bool):
-        return "the truth value "
+        return message("the_truth_value", "the truth value {found}", found=found)
     if isinstance(raw, datetime.date):
-        return "the date "
+        return message("the_date", "the date {found}", found=found)
     if isinstance(raw, datetime.time | datetime.timedelta):
-        return "the time "
-    return "the percentage " if isinstance(raw, Percent) else ""
+        return message("the_time", "the time {found}", found=found)
+    if isinstance(raw, Percent):
+        return message("the_percentage", "the percentage {found}", found=found)
+    return found
 
 
 def _other_unit(field, value):
     if "_per_" in field.name:
         return ""
     if field.name.endswith("_deg") and field.high < abs(value) <= field.high * 10 / 9:
-        return " (is it in gon?)"
+        return message("is_in_gon", " (is it in gon?)")
     if field.name.startswith("zenith_") and value > field.high:
-        return " (in the second face? give the mean of both)"
-    unit = {"_m": "metres", "_mm": "millimetres"}.get("_" + field.name.rpartition("_")[2])
-    return f" (in {unit}: is it in another unit?)" if unit else ""
+        return message("second_face", " (in the second face? give the mean of both)")
+    if field.name.endswith("_mm"):
+        return message("in_millimetres", " (in millimetres: is it in another unit?)")
+    if field.name.endswith("_m"):
+        return message("in_metres", " (in metres: is it in another unit?)")
+    return ""
 
 
 def _read_text(field, raw, _decimal):
     if isinstance(raw, str):
         text = raw.replace("\u00a0", " ").strip()
     elif isinstance(raw, bool | dict | list):
-        raise Refused(f"found {_kind_of(raw)}{shown(raw)}; expected {field.expectation()}")
+        raise _refused(field, _kind_of(raw))
     elif isinstance(raw, float) and raw.is_integer() and abs(raw) < 1e15:
         text = str(int(raw))
     elif isinstance(raw, int) and abs(raw) >= 1e15:
-        raise Refused(f"found {shown(raw)}; expected {field.expectation()}")
+        raise _refused(field, shown(raw))
     elif isinstance(raw, datetime.datetime) and raw.time() == datetime.time(0):
         text = raw.date().isoformat()
     else:
@@ -235,7 +323,7 @@ def _read_text(field, raw, _decimal):
         pattern = patterns[field.kind]
         sound = len(text) <= MAX_NAME and pattern.fullmatch(text) is not None
     if not sound:
-        raise Refused(f"found {shown(text)}; expected {field.expectation()}")
+        raise _refused(field, shown(text))
     return text
 
 
@@ -246,18 +334,23 @@ def _is_writing(char):
 def _read_choice(field, raw, _decimal):
     is_padded = isinstance(raw, str) and raw not in field.choices
     text = raw.strip() if is_padded else raw
+    if is_padded and text not in field.choices:
+        text = meant(text, field.choices) or text
     if text not in field.choices:
         hint = nearest(text, field.choices) if isinstance(text, str) else ""
-        raise Refused(f"found {shown(raw)}; expected {field.expectation()}{hint}")
+        raise _refused(field, shown(raw), hint)
     return text
 
 
 def _read_flag(field, raw, _decimal):
     if isinstance(raw, bool):
         return raw
-    if isinstance(raw, str) and raw.strip().lower() in ("true", "false"):
-        return raw.strip().lower() == "true"
-    raise Refused(f"found {shown(raw)}; expected {field.expectation()}")
+    if isinstance(raw, str):
+        word = raw.strip().lower()
+        word = word if word in (YES, NO) else meant(word, (YES, NO))
+        if word is not None:
+            return word == YES
+    raise _refused(field, shown(raw))
 
 
 def _read_date(field, raw, _decimal):
@@ -271,53 +364,74 @@ def _read_date(field, raw, _decimal):
             return datetime.date.fromisoformat(text).isoformat()
     except ValueError:
         pass
-    raise Refused(f"found {shown(raw)}; expected {field.expectation()}{hint_of_date(raw)}")
+    raise _refused(field, shown(raw), hint_of_date(raw))
 
 
 def _read_numbers(field, raw, decimal):
     """Tuple of a list of numbers, of a text such as 700; 850, or of one number."""
     parts = raw.split(";") if isinstance(raw, str) else raw if isinstance(raw, list) else [raw]
     if not parts or len(parts) > MAX_LIST:
-        raise Refused(f"found {shown(raw)}; expected 1 to {MAX_LIST} {field.expectation()}")
+        raise Refused(
+            message(
+                "found_not_so_many",
+                "found {found}; expected 1 to {most} {expected}",
+                found=shown(raw),
+                most=MAX_LIST,
+                expected=field.expectation(),
+            )
+        )
     is_text = isinstance(raw, str)
     mark = "." if is_text else decimal
     try:
         return tuple(_read_number(field, part.strip() if is_text else part, mark) for part in parts)
     except Refused as refusal:
-        found = str(refusal).partition("; expected")[0]
-        raise Refused(f"{found}; expected {field.expectation()}") from None
+        raise _refused(field, refusal.text.values["found"]) from None
 
 
 def _read_names(field, raw, _decimal):
     """Tuple of texts of a list, of a text such as P7; P9, or of one number that is a name."""
     parts = raw.split(";") if isinstance(raw, str) else raw if isinstance(raw, list) else [raw]
     if len(parts) > MAX_NAMES:
-        raise Refused(f"{len(parts)} of them; expected at most {MAX_NAMES}")
+        raise Refused(
+            message(
+                "too_many_of_them",
+                "{count} of them; expected at most {most}",
+                count=len(parts),
+                most=MAX_NAMES,
+            )
+        )
     text = Field(field.name, "text", field.note)
     names = []
     for part in parts:
         if is_blank(part) or isinstance(part, dict | list):
-            raise Refused(f"found {shown(raw)}; expected {field.expectation()}")
+            raise _refused(field, shown(raw))
         names.append(_read_text(text, part, None))
     return tuple(names)
 
 
 def _read_dms(field, raw, _decimal):
     """Degrees of a text such as 123 04 05.6, 123-04-05.6 or 123°04'05.6\"; negative: -0 30 00."""
-    wanted = field.expectation()
     if not isinstance(raw, str):
-        raise Refused(f"found {_kind_of(raw)}{shown(raw)}; expected the text of {wanted}")
+        raise Refused(
+            message(
+                "expected_text_of",
+                "found {found}; expected the text of {expected}",
+                found=_kind_of(raw),
+                expected=field.expectation(),
+            )
+        )
     match = _DMS.fullmatch(raw.replace("\u00a0", " ").strip())
     if match is None:
-        raise Refused(f"found {shown(raw)}; expected {wanted}")
+        raise _refused(field, shown(raw))
     sign, degrees, minutes, seconds = match.groups()
     seconds = float((seconds or "0").replace(",", "."))  # a thousands mark it cannot be
     if int(minutes) >= 60 or seconds >= 60:
-        raise Refused(f"found {shown(raw)}; expected {wanted}, minutes and seconds below 60")
+        hint = message("minutes_below_60", ", minutes and seconds below 60")
+        raise _refused(field, shown(raw), hint)
     value = (int(degrees) * 3600 + int(minutes) * 60 + seconds) / 3600
     value = -value if sign == "-" else value
     if not field.low <= value <= field.high:
-        raise Refused(f"found {shown(raw)}; expected {wanted}")
+        raise _refused(field, shown(raw))
     return value
 
 
@@ -329,7 +443,7 @@ def _read_ranges(field, raw, _decimal):
         pairs = [match.groups() for match in matches] if all(matches) else None
     is_list = isinstance(pairs, list) and 0 < len(pairs) <= MAX_LIST
     if not is_list or not all(isinstance(pair, list | tuple) and len(pair) == 2 for pair in pairs):
-        raise Refused(f"found {_kind_of(raw)}{shown(raw)}; expected {field.expectation()}")
+        raise _refused(field, _kind_of(raw))
     decimal = "." if isinstance(raw, str) else None
     number = Field(field.name, "number", field.note, low=0, high=200)
     return tuple(tuple(_read_number(number, end, decimal) for end in pair) for pair in pairs)

@@ -22,6 +22,7 @@ from tankcal.job.tables import (
     read_bytes,
     shown,
 )
+from tankcal.messages import message
 
 MAX_SETTINGS_BYTES = 1_000_000
 MAX_SETTINGS_LINE = 4000  # characters
@@ -37,7 +38,14 @@ def read_folder(folder, log):
     try:
         names = sorted(item.name for item in folder.iterdir())
     except OSError as error:
-        log.problem(folder.name, f"the folder cannot be read ({error.strerror})")
+        log.problem(
+            folder.name,
+            message(
+                "folder_cannot_be_read",
+                "the folder cannot be read ({strerror})",
+                strerror=error.strerror,
+            ),
+        )
         names = []
     _refuse_unknown_files(names, log)
     files = []
@@ -54,7 +62,10 @@ def read_folder(folder, log):
         if data is not None:
             settings, sections = read_toml(SETTINGS_FILE, data, log)
     else:
-        log.problem(SETTINGS_FILE, "missing file; every job folder has one" + _hint(names))
+        expected = message(
+            "no_settings_file", "missing file; every job folder has one{hint}", hint=_hint(names)
+        )
+        log.problem(SETTINGS_FILE, expected)
     marks = csv_marks(SETTINGS_FILE, settings or {}, log)
     tables = {}
     for table in TABLES:
@@ -87,7 +98,11 @@ def read_folder(folder, log):
 
 def _hint(names):
     books = [name for name in names if name.endswith(".xlsx") and name[0] not in ".~"]
-    return f" (or give the workbook itself: {books[0]})" if books else ""
+    return (
+        message("or_the_workbook", " (or give the workbook itself: {book})", book=books[0])
+        if books
+        else ""
+    )
 
 
 def _has_plain_heading(data):
@@ -107,31 +122,57 @@ def _refuse_unknown_files(names, log):
         if ending == "csv":
             listed = ", ".join(known)
             log.problem(
-                name, f"unknown file; the CSV files of a job are {listed}{nearest(name, known)}"
+                name,
+                message(
+                    "unknown_file",
+                    "unknown file; the CSV files of a job are {listed}{hint}",
+                    listed=listed,
+                    hint=nearest(name, known),
+                ),
             )
 
 
 def decode(file, data, log):
     """The text of a UTF-8 file (a byte order mark is allowed), or None after telling `log`."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        log.problem(file, f"written as UTF-16; save it as {_utf8(file)}", 1)
+        log.problem(
+            file,
+            message("is_utf16", "written as UTF-16; save it as {wanted}", wanted=_utf8(file)),
+            1,
+        )
         return None
     if b"\0" in data:
         row = data[: data.index(b"\0")].count(b"\n") + 1
-        log.problem(file, "a zero byte; expected text (UTF-8): is this really a text file?", row)
+        log.problem(
+            file,
+            message("zero_byte", "a zero byte; expected text (UTF-8): is this really a text file?"),
+            row,
+        )
         return None
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         # error.start counts without the byte order mark, which holds no line break
         row = data[: error.start].count(b"\n") + 1
-        log.problem(file, f"a letter that is not UTF-8; save the file as {_utf8(file)}", row)
+        log.problem(
+            file,
+            message(
+                "no_utf8",
+                "a letter that is not UTF-8; save the file as {wanted}",
+                wanted=_utf8(file),
+            ),
+            row,
+        )
         return None
 
 
 def _utf8(file):
     """What programs call the text that is expected of a file."""
-    return "UTF-8 text" if file.lower().endswith(".toml") else "'CSV UTF-8' or plain UTF-8 text"
+    return (
+        message("utf8_text", "UTF-8 text")
+        if file.lower().endswith(".toml")
+        else message("utf8_csv", "'CSV UTF-8' or plain UTF-8 text")
+    )
 
 
 def _lines(text):
@@ -157,13 +198,21 @@ def read_register(file, data, log, register=None):
     entries, places = {}, {}
     for section, inside in content.items():
         if section != register or not isinstance(inside, dict):
-            expected = f"stands outside; expected sections such as [{register}.NAME]"
+            expected = message(
+                "outside_register",
+                "stands outside; expected sections such as [{register}.NAME]",
+                register=register,
+            )
             log.problem(file, expected, rows.get(section), section)
             continue
         for name, given in inside.items():
             where = re.sub(r"[\s\"']", "", f"{register}.{name}")
             if not isinstance(given, dict):
-                expected = f"stands in no [{register}.NAME]; expected inside one"
+                expected = message(
+                    "in_no_register",
+                    "stands in no [{register}.NAME]; expected inside one",
+                    register=register,
+                )
                 log.problem(file, expected, rows.get(where), name)
                 continue
             entries[name] = {
@@ -190,7 +239,13 @@ def parsed_toml(file, data, log):
         return None
     for number, line in enumerate(_lines(text), 1):
         if len(line) > MAX_SETTINGS_LINE:
-            log.problem(file, f"a line of more than {MAX_SETTINGS_LINE} characters", number)
+            log.problem(
+                file,
+                message(
+                    "long_line", "a line of more than {most} characters", most=MAX_SETTINGS_LINE
+                ),
+                number,
+            )
             return None
     content = _content(file, text, log)
     return None if content is None else (content, _toml_rows(text))
@@ -210,11 +265,19 @@ def _content(file, text, log):
             number = _DECIMAL_COMMA.fullmatch(lines[row - 1]) if row else None
             if number is None:
                 reason = _reason(error)
-                expected = f'cannot be read: {reason}; expected lines such as key = "text"'
+                expected = message(
+                    "toml_cannot_be_read",
+                    'cannot be read: {reason}; expected lines such as key = "text"',
+                    reason=reason,
+                )
                 log.problem(file, expected, row)
                 return None
             found = shown(f"{number[1]},{number[2]}".strip())
-            expected = f"found {found}; expected a decimal point, as in every .toml file"
+            expected = message(
+                "comma_in_toml",
+                "found {found}; expected a decimal point, as in every .toml file",
+                found=found,
+            )
             log.problem(file, expected, row)
             lines[row - 1] = f"{number[1]}.{number[2]}"
     return None
@@ -227,7 +290,7 @@ def _row_of(error):
 
 def _reason(error):
     if isinstance(error, RecursionError):
-        return "too deeply nested"
+        return message("too_deep", "too deeply nested")
     return re.sub(r"\s*\(at .*\)$", "", str(error))
 
 
@@ -262,7 +325,9 @@ def flattened(file, data, rows, log):
             elif section:
                 settings[section][key] = Value(value, rows.get(name))
             else:
-                expected = "stands in no [section]; expected inside one, such as [tank]"
+                expected = message(
+                    "in_no_section", "stands in no [section]; expected inside one, such as [tank]"
+                )
                 log.problem(file, expected, rows.get(name), name)
     return settings, sections
 
@@ -278,7 +343,10 @@ def csv_marks(file, settings, log):
         return None
     if separator == decimal:
         row = next(iter(settings["csv"].values())).row
-        expected = "separator and decimal are both a comma; expected two marks, such as ; and ,"
+        expected = message(
+            "two_commas",
+            "separator and decimal are both a comma; expected two marks, such as ; and ,",
+        )
         log.problem(file, expected, row, "csv.separator")
         return None
     return separator, decimal
@@ -291,8 +359,10 @@ def read_csv(file, data, separator, decimal, log, settings_file=SETTINGS_FILE):
         return None
     hint = ""
     if separator == "," and decimal == ".":
-        hint = (
-            f"; for decimal commas set [csv] separator = ';' and decimal = ',' in {settings_file}"
+        hint = message(
+            "for_decimal_commas",
+            "; for decimal commas set [csv] separator = ';' and decimal = ',' in {settings_file}",
+            settings_file=settings_file,
         )
     return make_table(file, _csv_rows(file, text, separator, log), decimal, log, hint)
 
@@ -311,5 +381,11 @@ def _csv_rows(file, text, separator, log):
         try:
             yield number, next(csv.reader([line], delimiter=separator, strict=True))
         except csv.Error:
-            log.problem(file, "quotation marks that do not pair up within the row", number)
+            log.problem(
+                file,
+                message(
+                    "odd_quotation_marks", "quotation marks that do not pair up within the row"
+                ),
+                number,
+            )
             yield number, None

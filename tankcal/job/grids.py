@@ -4,6 +4,7 @@ from bisect import bisect_left
 
 from tankcal.job.excel import MAX_COLUMNS, column_letters
 from tankcal.job.tables import shown
+from tankcal.messages import message
 
 
 def table_rows(place, grid, log):
@@ -16,7 +17,15 @@ def table_rows(place, grid, log):
     rows = [(number, cells) for number, cells in grid.rows if not _is_comment(cells)]
     for number, cells in rows:
         if len(cells) > MAX_COLUMNS:
-            log.problem(place, f"cells beyond column {column_letters(MAX_COLUMNS)}", number)
+            log.problem(
+                place,
+                message(
+                    "beyond_last_column",
+                    "cells beyond column {last}",
+                    last=column_letters(MAX_COLUMNS),
+                ),
+                number,
+            )
             del cells[MAX_COLUMNS:]
     _tell_merged(place, grid, rows, log)
     _tell_hidden(place, grid, rows, log)
@@ -26,9 +35,11 @@ def table_rows(place, grid, log):
         return rows, 1
     for number, cells in rows:
         if not _is_blank(cells[0]):
-            expected = (
-                f"found {shown(cells[0])} in a column without a heading; expected nothing there,"
-                " or # to switch the row off"
+            expected = message(
+                "in_column_of_marks",
+                "found {found} in a column without a heading; expected nothing there, or # to "
+                "switch the row off",
+                found=shown(cells[0]),
             )
             log.place_columns(place, {"": "A"})
             log.problem(place, expected, number, "")
@@ -59,23 +70,48 @@ def _tell_merged(place, grid, rows, log):
         nearest_row = bisect_left(numbers, top)
         if nearest_row < len(numbers) and numbers[nearest_row] <= bottom:
             cells = f"{column_letters(left)}{top}:{column_letters(right)}{bottom}"
-            expected = f"the cells {cells} are merged; expected one cell for each value: unmerge"
-            log.problem(place, f"{expected} them", top)
+            expected = message(
+                "merged_cells",
+                "the cells {cells} are merged; expected one cell for each value: unmerge them",
+                cells=cells,
+            )
+            log.problem(place, expected, top)
 
 
 def _tell_hidden(place, grid, rows, log):
     hidden = [number for number, _ in rows if number in grid.hidden_rows]
-    expected = "hidden, and not blank; expected rows that show: unhide or delete"
     for first, last in _runs(hidden):
-        named = "the row is" if first == last else f"the rows {first} to {last} are"
-        log.problem(place, f"{named} {expected} {'it' if first == last else 'them'}", first)
+        expected = message(
+            "hidden_row",
+            "the row is hidden, and not blank; expected rows that show: unhide or delete it",
+        )
+        if last > first:
+            expected = message(
+                "hidden_rows",
+                "the rows {first} to {last} are hidden, and not blank; expected rows that show: "
+                "unhide or delete them",
+                first=first,
+                last=last,
+            )
+        log.problem(place, expected, first)
     for first, last in grid.hidden_columns:
         if any(cell is not None for _, cells in rows for cell in cells[first - 1 : last]):
-            named = f"column {column_letters(first)}"
+            left, right = column_letters(first), column_letters(last)
+            expected = message(
+                "hidden_column",
+                "column {left} is hidden, and not blank; expected columns that show: unhide or "
+                "delete it",
+                left=left,
+            )
             if last > first:
-                named = f"one of the columns {column_letters(first)} to {column_letters(last)}"
-            expected = "hidden, and not blank; expected columns that show: unhide or delete it"
-            log.problem(place, f"{named} is {expected}")
+                expected = message(
+                    "hidden_columns",
+                    "one of the columns {left} to {right} is hidden, and not blank; expected "
+                    "columns that show: unhide or delete it",
+                    left=left,
+                    right=right,
+                )
+            log.problem(place, expected)
 
 
 def _runs(numbers):

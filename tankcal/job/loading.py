@@ -14,7 +14,7 @@ from tankcal.job.making import make_frame, make_job
 from tankcal.job.measuring import make_measurements
 from tankcal.job.model import Job
 from tankcal.job.rule_files import find_rule
-from tankcal.job.sheets import expected_sheets, read_workbook
+from tankcal.job.sheets import missing_sheet, read_workbook
 from tankcal.job.tables import (
     COVARIANCE_FILE,
     REGISTERS,
@@ -24,6 +24,7 @@ from tankcal.job.tables import (
     TANK_TABLES,
     Log,
 )
+from tankcal.messages import message
 
 OTHER_WORKBOOKS = (".xls", ".xlsm", ".xlsb", ".xltx", ".ods", ".numbers")
 
@@ -61,7 +62,7 @@ def load(path: str | PathLike, only: str | None = None) -> Job:
 
 def _read(path, log):
     """RawJob, or None after telling `log` what `path` is instead of a job."""
-    expected = "expected a job folder, its job.toml or a workbook (.xlsx)"
+    expected = message("expected_job", "expected a job folder, its job.toml or a workbook (.xlsx)")
     try:
         if path.is_dir():
             return read_folder(path, log)
@@ -69,12 +70,21 @@ def _read(path, log):
             return read_folder(path.parent, log)
         if path.suffix.lower() == ".xlsx" and path.is_file():
             return read_workbook(path, log)
-        found = f"found a {path.suffix or 'nameless'} file" if path.exists() else "not found"
+        found = message("not_found", "not found")
+        if path.exists():
+            suffix = path.suffix
+            found = message("found_file_ending", "found a {suffix} file", suffix=suffix)
+            if not suffix:
+                found = message("found_nameless_file", "found a nameless file")
         if path.suffix.lower() in OTHER_WORKBOOKS and path.is_file():
-            expected = "open it in Excel or LibreOffice and save it as .xlsx"
+            expected = message(
+                "save_as_xlsx", "open it in Excel or LibreOffice and save it as .xlsx"
+            )
     except (OSError, ValueError):
-        found = "an impossible name"
-    log.problem(path.name or ".", f"{found}; {expected}")
+        found = message("an_impossible_name", "an impossible name")
+    log.problem(
+        path.name or ".", message("no_job", "{found}; {expected}", found=found, expected=expected)
+    )
     return None
 
 
@@ -93,7 +103,14 @@ def _read_tables(raw, is_whole, log):
         is_empty = table is None or not (table.rows or table.skipped)
         if allowed is not None and name not in allowed:
             if not is_empty:
-                log.problem(table.file, f"not for a tank of kind {kind}; remove the table")
+                log.problem(
+                    table.file,
+                    message(
+                        "not_for_this_kind",
+                        "not for a tank of kind {of_kind}; remove the table",
+                        of_kind=kind,
+                    ),
+                )
             tables[name] = None
             continue
         if table is None or (is_empty and name not in TANK_TABLES):
@@ -113,10 +130,18 @@ def _tell_missing_tables(raw, tables, kind, log):
 
 def _missing(raw, name):
     if raw.file_of(name).startswith("sheet "):
-        return f"missing sheet; {expected_sheets()}"
+        return missing_sheet()
     needed = ", ".join(field.name for field in COLUMNS[name] if field.required)
-    instead = ", or the files of a survey, such as distances.csv" if name == "points" else ""
-    return f"missing file; expected one with the columns {needed}{instead}"
+    if name == "points":
+        return message(
+            "missing_points_file",
+            "missing file; expected one with the columns {columns}, or the files of a survey, "
+            "such as distances.csv",
+            columns=needed,
+        )
+    return message(
+        "missing_file", "missing file; expected one with the columns {columns}", columns=needed
+    )
 
 
 def _attached(raw, values, points, log):
@@ -138,10 +163,16 @@ def _covariance(raw, points, log):
     if points is None:
         is_unreadable = "points" in raw.tables and raw.tables["points"] is None
         if not is_unreadable:
-            expected = "given without points that it belongs to; expected points.csv beside it"
+            expected = message(
+                "covariance_without_points",
+                "given without points that it belongs to; expected points.csv beside it",
+            )
             log.problem(COVARIANCE_FILE, expected)
         return None
     if points.columns["sx_mm"] is not None:
-        expected = "given beside sx_mm, sy_mm, sz_mm of the points; expected one of them"
+        expected = message(
+            "covariance_beside_sds",
+            "given beside sx_mm, sy_mm, sz_mm of the points; expected one of them",
+        )
         log.problem(COVARIANCE_FILE, expected)
     return read_covariance(raw.covariance, points.of("point"), log)

@@ -4,6 +4,8 @@ import datetime
 import re
 import unicodedata
 
+from tankcal.messages import message
+
 _WITH_UNIT = re.compile(
     r"([+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?)([^\W\d_].{0,11}|[%°'\"′″].{0,5})?"
 )
@@ -23,23 +25,43 @@ def hint_of_text(text, in_cell=True):
     marks = len(re.findall("[.,]", number))
     if not in_cell:
         whole = number.replace(",", ".") if marks < 2 else "it"
-        return f", stored as a number: write {whole} without quotation marks"
+        return message(
+            "without_quotation_marks",
+            ", stored as a number: write {whole} without quotation marks",
+            whole=whole,
+        )
     if unit is not None:
-        return f", stored as a number: type {number} alone, the unit stands in the heading"
+        return message(
+            "number_alone",
+            ", stored as a number: type {number} alone, the unit stands in the heading",
+            number=number,
+        )
     if marks > 1:
-        return ", stored as a number: type it again without marks between thousands"
-    return (
-        f", stored as a number: type {number} again without quotation marks or apostrophe, in a"
-        " cell that is not of text format"
+        return message(
+            "without_thousands",
+            ", stored as a number: type it again without marks between thousands",
+        )
+    return message(
+        "no_text_cell",
+        ", stored as a number: type {number} again without quotation marks or apostrophe, in a "
+        "cell that is not of text format",
+        number=number,
     )
 
 
 def hint_of_number(raw):
     """How to mend a cell that holds a number's place as a date or a percentage."""
     if isinstance(raw, float):
-        return f" without percent format (the cell holds {float(raw):.12g})"
+        return message(
+            "without_percent",
+            " without percent format (the cell holds {cell:.12g})",
+            cell=float(raw),
+        )
     if isinstance(raw, datetime.date | datetime.time | datetime.timedelta):
-        return " (spreadsheets take 12/5 for a date: give the cell a number format, type it again)"
+        return message(
+            "taken_for_a_date",
+            " (spreadsheets take 12/5 for a date: give the cell a number format, type it again)",
+        )
     return ""
 
 
@@ -47,5 +69,5 @@ def hint_of_date(raw):
     """How to mend a cell that holds the number of a day in place of a date."""
     low, high = _DAYS_OF_OUR_TIME
     if isinstance(raw, int | float) and not isinstance(raw, bool) and low < raw < high:
-        return ": give the cell a date format"
+        return message("give_date_format", ": give the cell a date format")
     return ""

@@ -9,6 +9,7 @@ from tankcal.job.entries import read_section
 from tankcal.job.fields import is_blank
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
 from tankcal.job.tables import Log, fingerprint, nearest, read_bytes
+from tankcal.messages import message
 from tankcal.rules.model import TANKS, DeviationLimit, Rule, UncertaintyLimit
 from tankcal.shipped import shipped
 
@@ -42,10 +43,15 @@ def find_rule(raw, name, log):
     path = raw.folder / name
     is_file_name = name.lower().endswith(_ENDING)
     if not (is_file_name and path.exists()):
-        missing = "no such file beside the job" if is_file_name else f"found {name!r}"
-        expected = (
-            f"{missing}; expected a .toml file there, or one of {', '.join(shipped_names())}"
-            f"{nearest(name.removesuffix(_ENDING), shipped_names())}"
+        missing = message("found_rule", "found {name!r}", name=name)
+        if is_file_name:
+            missing = message("no_rule_file", "no such file beside the job")
+        expected = message(
+            "no_such_rule",
+            "{missing}; expected a .toml file there, or one of {rules}{hint}",
+            missing=missing,
+            rules=[*shipped_names()],
+            hint=nearest(name.removesuffix(_ENDING), shipped_names()),
         )
         log.problem(raw.settings_file, expected, value.row, "table.rule")
         return None
@@ -68,8 +74,10 @@ def parse_rule(file, data, log):
         row = sections.get(section)
         if part not in LIMITS or "." in name:
             hint = nearest(part, (*LIMITS, "rule"))
-            expected = (
-                f"unknown section; expected [rule], [uncertainty.NAME] or [deviation.NAME]{hint}"
+            expected = message(
+                "unknown_section_of_rule",
+                "unknown section; expected [rule], [uncertainty.NAME] or [deviation.NAME]{hint}",
+                hint=hint,
             )
             log.problem(file, expected, row, f"[{section}]")
         elif name:
@@ -77,10 +85,16 @@ def parse_rule(file, data, log):
             _tell_contradictions(file, part, section, values, given, row, log)
             limits[part].append((name, values))
         elif given:
-            expected = f"stands in no limit; expected inside one, such as [{part}.volumes]"
+            expected = message(
+                "in_no_limit",
+                "stands in no limit; expected inside one, such as [{part}.volumes]",
+                part=part,
+            )
             log.problem(file, expected, row, f"[{section}]")
     if len(log.problems) == told and not any(limits.values()):
-        log.problem(file, "no limits; expected sections such as [uncertainty.volumes]")
+        log.problem(
+            file, message("no_limits", "no limits; expected sections such as [uncertainty.volumes]")
+        )
     return _rule(head, limits) if len(log.problems) == told else None
 
 
@@ -96,22 +110,46 @@ def _tell_contradictions(file, part, section, values, given, row, log):
 
     for tank in values["tanks"] or ():
         if tank not in TANKS:
-            expected = f"found {tank!r}; expected some of {', '.join(TANKS)}{nearest(tank, TANKS)}"
+            expected = message(
+                "unknown_tanks",
+                "found {tank!r}; expected some of {tanks}{hint}",
+                tank=tank,
+                tanks=[*TANKS],
+                hint=nearest(tank, TANKS),
+            )
             tell("tanks", expected)
     if part == "deviation":
         if is_given("limit_percent") and is_given("limit_m3"):
-            tell("limit_m3", "stands beside limit_percent; expected one of them")
+            tell(
+                "limit_m3",
+                message("two_limits", "stands beside limit_percent; expected one of them"),
+            )
         elif not (is_given("limit_percent") or is_given("limit_m3")):
-            tell("limit_percent", "missing; expected limit_percent or limit_m3")
+            tell(
+                "limit_percent",
+                message("neither_limit", "missing; expected limit_percent or limit_m3"),
+            )
         return
     is_delivery = values["of"] == "deliveries"
     if is_delivery and not is_given("minimum_height_m"):
-        tell("minimum_height_m", "missing; expected the least height of a delivery (a number)")
+        tell(
+            "minimum_height_m",
+            message(
+                "no_least_height", "missing; expected the least height of a delivery (a number)"
+            ),
+        )
     if values["of"] in ("volumes", "capacity"):
         if is_given("minimum_height_m"):
-            tell("minimum_height_m", "is for deliveries; expected of = 'deliveries' beside it")
+            tell(
+                "minimum_height_m",
+                message(
+                    "only_for_deliveries", "is for deliveries; expected of = 'deliveries' beside it"
+                ),
+            )
         if not is_given("limit_percent"):
-            tell("limit_percent", "missing; expected a limit in percent")
+            tell(
+                "limit_percent", message("no_limit_percent", "missing; expected a limit in percent")
+            )
 
 
 def _rule(head, limits):

@@ -16,6 +16,7 @@ from tankcal.job.tables import (
     read_bytes,
     shown,
 )
+from tankcal.messages import message
 
 SETTINGS_SHEET = "job"
 README_SHEET = "read me"
@@ -26,19 +27,20 @@ SECTION = "section"
 
 def read_workbook(path, log):
     """RawJob of a workbook (a Path), or None after telling `log` why it cannot be read."""
+    log.book = path.name
     data = read_bytes(path, log, MAX_FILE_BYTES)
     if data is None:
         return None
     try:
         found = read_sheets(data, is_read)
     except Unreadable as reason:
-        log.problem(path.name, str(reason))
+        log.problem(path.name, reason.args[0])
         return None
     sheets = _known_sheets(path.name, found, log)
     tables = {name: _table(name, sheet, log) for name, sheet in sheets.items()}
     settings, sections = None, {}
     if SETTINGS_SHEET not in tables:
-        log.problem(f"sheet {SETTINGS_SHEET}", "missing sheet; " + expected_sheets())
+        log.problem(f"sheet {SETTINGS_SHEET}", missing_sheet())
     elif tables[SETTINGS_SHEET] is not None:
         settings, sections = _settings(tables[SETTINGS_SHEET], SECTION, log)
     files = (fingerprint(path.name, data),)
@@ -52,11 +54,19 @@ def read_workbook(path, log):
     return RawJob(path.name, path.parent, place, settings, sections, wanted, None, files, registers)
 
 
+def missing_sheet():
+    """What is said of a sheet that is not there."""
+    return message("missing_sheet", "missing sheet; {sheets}", sheets=expected_sheets())
+
+
 def expected_sheets():
     """One phrase that names the sheets of a workbook."""
-    return (
-        f"a workbook has the sheets {SETTINGS_SHEET}, {', '.join(TANK_TABLES)} (the last five"
-        " optional), or those of a survey in place of the points"
+    return message(
+        "sheets_of_workbook",
+        "a workbook has the sheets {settings}, {tables} (the last five optional), or those of a "
+        "survey in place of the points",
+        settings=SETTINGS_SHEET,
+        tables=[*TANK_TABLES],
     )
 
 
@@ -72,15 +82,29 @@ def _known_sheets(file, found, log):
     for sheet in found:
         name = sheet.title.strip().lower()
         if name in sheets:
-            log.problem(file, f"two sheets are called {shown(name)}; expected one")
+            log.problem(
+                file,
+                message(
+                    "two_sheets", "two sheets are called {found}; expected one", found=shown(name)
+                ),
+            )
         elif name in known:
             sheets[name] = sheet
         elif name == COVARIANCE_FILE.rpartition(".")[0]:
-            log.problem(f"sheet {name}", "a full covariance needs the job as a folder")
+            log.problem(
+                f"sheet {name}",
+                message("covariance_in_workbook", "a full covariance needs the job as a folder"),
+            )
         else:
             hint = nearest(name, known)
-            expected = f"unknown sheet {shown(sheet.title)}{hint}; {expected_sheets()}"
-            log.problem(file, expected + "; name it '# notes' to keep it")
+            expected = message(
+                "unknown_sheet",
+                "unknown sheet {found}{hint}; {sheets}; name it '# notes' to keep it",
+                found=shown(sheet.title),
+                hint=hint,
+                sheets=expected_sheets(),
+            )
+            log.problem(file, expected)
     return sheets
 
 
@@ -88,7 +112,12 @@ def _table(name, sheet, log):
     """Table of a sheet, or None after telling `log` why it cannot be read."""
     place = f"sheet {name}"
     if sheet.is_hidden:
-        log.problem(place, "the sheet is hidden; expected one that shows: unhide or delete it")
+        log.problem(
+            place,
+            message(
+                "hidden_sheet", "the sheet is hidden; expected one that shows: unhide or delete it"
+            ),
+        )
     rows, first_column = table_rows(place, sheet.grid, log)
     letters = placed_columns(rows, first_column)
     if name == SETTINGS_SHEET or name in REGISTERS:
@@ -115,11 +144,21 @@ def _settings(table, owner, log):
     known = (*needed, *REMARKS)
     for heading in table.headings:
         if heading not in known:
-            expected = f"unknown column{nearest(heading, known)}; expected {', '.join(known)}"
+            expected = message(
+                "unknown_column_of_settings",
+                "unknown column{hint}; expected {known}",
+                hint=nearest(heading, known),
+                known=[*known],
+            )
             log.problem(table.file, expected, table.heading_row, heading)
     missing = [heading for heading in needed if heading not in table.headings]
     for heading in missing:
-        log.problem(table.file, "missing column", table.heading_row, heading)
+        log.problem(
+            table.file,
+            message("missing_column_of_settings", "missing column"),
+            table.heading_row,
+            heading,
+        )
     if missing:
         return None, {}
     place = [table.headings.index(heading) for heading in needed]
@@ -131,15 +170,23 @@ def _settings(table, owner, log):
         if owner != SECTION and isinstance(section, int | float):
             section = f"{section:.15g}"  # a camera called 1
         if not isinstance(section, str) or not isinstance(key, str):
-            expected = f"a value without {owner} or key; expected both"
-            expected += ", such as tank and id" if owner == SECTION else ""
+            expected = message(
+                "no_owner_or_key", "a value without {owner} or key; expected both", owner=owner
+            )
+            if owner == SECTION:
+                expected = message(
+                    "no_section_or_key",
+                    "a value without section or key; expected both, such as tank and id",
+                )
             log.problem(table.file, expected, row, KEY if isinstance(section, str) else owner)
             continue
         section = section.strip("[] ")
         known = settings.setdefault(section, {})
         sections.setdefault(section, row)
         if key in known:
-            expected = f"given twice; the first stands in row {known[key].row}"
+            expected = message(
+                "key_twice", "given twice; the first stands in row {row}", row=known[key].row
+            )
             log.problem(table.file, expected, row, f"{section}.{key}")
         else:
             known[key] = Value(value, row)

@@ -7,10 +7,11 @@ is wrong to a `Log`, so that all problems of a job come in one run.
 
 import difflib
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from tankcal.errors import InputError, Problem
+from tankcal.errors import SHEET, InputError, Problem
+from tankcal.messages import message
 
 TANK_TABLES = (
     *("points", "courses", "bottom", "deadwood"),
@@ -35,9 +36,13 @@ SEPARATORS = (",", ";", "\t")
 def shown(value):
     """The value as a message shows it: one printable line of at most 60 characters."""
     if isinstance(value, dict | list | tuple):
-        return "a list" if isinstance(value, list | tuple) else "a section"
+        return (
+            message("a_list", "a list")
+            if isinstance(value, list | tuple)
+            else message("a_section", "a section")
+        )
     if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 200:
-        return "a number of very many digits"
+        return message("a_long_number", "a number of very many digits")
     text = value if isinstance(value, str) else str(value)
     clipped = text if len(text) <= 60 else text[:57] + "..."
     return _printable(f"'{clipped}'" if isinstance(value, str) else clipped)
@@ -47,7 +52,9 @@ def nearest(word, known):
     """' (did you mean x?)' when one of the known words is close to `word`, else ''."""
     spelt = {one.lower(): one for one in known}
     close = difflib.get_close_matches(str(word)[:80].lower(), [*spelt], n=1, cutoff=0.6)
-    return f" (did you mean {spelt[close[0]]}?)" if close else ""
+    return (
+        message("did_you_mean", " (did you mean {spelt}?)", spelt=spelt[close[0]]) if close else ""
+    )
 
 
 def _printable(text):
@@ -57,9 +64,13 @@ def _printable(text):
 
 
 class Log:
-    """Collects what is wrong (`problems`) and what only deserves a look (`warnings`)."""
+    """Collects what is wrong (`problems`) and what only deserves a look (`warnings`).
 
-    def __init__(self):
+    book  name of the workbook that the sheets stand in
+    """
+
+    def __init__(self, book=None):
+        self.book = book
         self.problems = []
         self.warnings = []
         self._letters = {}
@@ -86,7 +97,8 @@ class Log:
             letter = letters.get(column, letters.get(None))
             cell = None if letter is None else f"{letter}{row}"
         column = None if column is None else _printable(str(column)[:80])
-        return Problem(_printable(str(file)[:120]), _printable(expected), row, column, cell)
+        book = self.book if file.startswith(SHEET) else None
+        return Problem(_printable(str(file)[:120]), _printable(expected), row, column, cell, book)
 
     def stop_if_problems(self):
         """Raise InputError with every problem, by file and row; the longest lists are cut."""
@@ -101,7 +113,10 @@ class Log:
             listed += problems[:MAX_PROBLEMS_PER_FILE]
             more = len(problems) - MAX_PROBLEMS_PER_FILE
             if more > 0:
-                listed.append(Problem(file, f"and {more} more problems; mend these first"))
+                expected = message(
+                    "more_problems", "and {more} more problems; mend these first", more=more
+                )
+                listed.append(Problem(file, expected, book=problems[0].book))
         raise InputError(listed)
 
 
@@ -186,21 +201,41 @@ class RawJob:
         return f"{table}.toml" if table in REGISTERS else f"{table}.csv"
 
 
+def in_book(problem, book):
+    """A problem of a job that stands in a workbook: its file is a sheet there."""
+    if problem.file.startswith(SHEET):
+        return replace(problem, book=book)
+    name, _, ending = problem.file.rpartition(".")
+    known = {**dict.fromkeys(TABLES, "csv"), **dict.fromkeys(("job", *REGISTERS), "toml")}
+    if known.get(name) != ending:
+        return problem
+    return replace(problem, file=f"{SHEET}{name}", book=book)
+
+
 def read_bytes(path, log, limit=MAX_FILE_BYTES):
     """The bytes of a file, or None after telling `log` why it cannot be read."""
     try:
         if not path.exists():
-            return log.problem(path.name, "not found; expected a file")
+            return log.problem(path.name, message("file_not_found", "not found; expected a file"))
         if not path.is_file():
-            log.problem(path.name, "expected a file, found something else")
+            log.problem(path.name, message("no_file", "expected a file, found something else"))
             return None
         size = path.stat().st_size
         if size <= limit:
             return path.read_bytes()
-        log.problem(path.name, f"{size / 1e6:.0f} MB, expected at most {limit / 1e6:.0f} MB")
+        expected = message(
+            "file_too_large",
+            "{size:.0f} MB, expected at most {limit:.0f} MB",
+            size=size / 1e6,
+            limit=limit / 1e6,
+        )
+        log.problem(path.name, expected)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "impossible name"
-        log.problem(path.name, f"the file cannot be read ({reason})")
+        reason = getattr(error, "strerror", None) or message("impossible_name", "impossible name")
+        log.problem(
+            path.name,
+            message("file_cannot_be_read", "the file cannot be read ({reason})", reason=reason),
+        )
     return None
 
 
@@ -231,17 +266,34 @@ def make_table(file, numbered_rows, decimal, log, hint=""):
             if headings is None:
                 return None
         elif len(cells) > len(headings):
-            expected = f"{len(cells)} cells, expected {len(headings)} as in the heading{hint}"
+            expected = message(
+                "too_many_cells",
+                "{count} cells, expected {in_heading} as in the heading{hint}",
+                count=len(cells),
+                in_heading=len(headings),
+                hint=hint,
+            )
             log.problem(file, expected, number)
             skipped += 1
         elif width < len(headings):
-            log.problem(file, f"{width} cells, expected {len(headings)} as in the heading", number)
+            log.problem(
+                file,
+                message(
+                    "too_few_cells",
+                    "{width} cells, expected {count} as in the heading",
+                    width=width,
+                    count=len(headings),
+                ),
+                number,
+            )
             skipped += 1
         else:
             rows.append(tuple(cells + [None] * (len(headings) - len(cells))))
             numbers.append(number)
     if headings is None:
-        log.problem(file, "empty; expected a row of headings and the rows below it")
+        log.problem(
+            file, message("empty_table", "empty; expected a row of headings and the rows below it")
+        )
         return None
     return Table(file, headings, heading_row, tuple(rows), tuple(numbers), decimal, skipped)
 
@@ -253,18 +305,32 @@ def _headings(file, cells, number, log):
                 name = "tab" if separator == "\t" else separator
                 log.problem(
                     file,
-                    f"the cells are separated by '{name}'; expected the comma, or what"
-                    " job.toml says under [csv] separator",
+                    message(
+                        "other_separator",
+                        "the cells are separated by '{name}'; expected the comma, or what "
+                        "job.toml says under [csv] separator",
+                        name=name,
+                    ),
                     number,
                 )
                 return None
     sound = True
     for position, cell in enumerate(cells):
         if not isinstance(cell, str) or not cell:
-            found = "no heading" if cell in (None, "") else "a heading that is no text"
-            log.problem(file, f"column {position + 1} has {found}", number)
+            column = position + 1
+            expected = message(
+                "heading_no_text", "column {column} has a heading that is no text", column=column
+            )
+            if cell in (None, ""):
+                expected = message("no_heading", "column {column} has no heading", column=column)
+            log.problem(file, expected, number)
             sound = False
         elif cell in cells[:position]:
-            log.problem(file, "this heading stands there twice; expected once", number, cell)
+            log.problem(
+                file,
+                message("heading_twice", "this heading stands there twice; expected once"),
+                number,
+                cell,
+            )
             sound = False
     return tuple(cells) if sound else None

@@ -1,6 +1,6 @@
 """From a file to findings."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from tankcal.linter.layout import tables_of
 from tankcal.linter.parts import MOST_PARTS, check_parts
 from tankcal.linter.totals import NOTHING_NOMINAL, Nominal, check_totals, units_of
 from tankcal.linter.volumes import volumes_of
+from tankcal.messages import message
 
 _PART_OF_LARGEST = 0.5  # of its rows: smaller tables beside it are not capacity tables
 _ROWS_OF_SLOPE = 10
@@ -26,8 +27,17 @@ class Finding:
     problem: Problem
 
     def __str__(self):
-        text = f"{self.severity}: {self.problem.expected}"
-        return str(Problem(self.problem.file, text, self.problem.row, self.problem.column))
+        return str(self.text)
+
+    @property
+    def text(self):
+        """The whole line as a Message."""
+        said = self.problem.expected
+        if self.severity == "error":
+            text = message("is_error", "error: {text}", text=said)
+        else:
+            text = message("is_warning", "warning: {text}", text=said)
+        return replace(self.problem, expected=text).text
 
 
 @dataclass(frozen=True, repr=False)

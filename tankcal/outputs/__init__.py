@@ -11,6 +11,7 @@ from tankcal import record as records
 from tankcal.errors import InputError, Problem, TankcalError
 from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.languages import LANGUAGES
+from tankcal.messages import message
 from tankcal.outputs import tables
 
 if TYPE_CHECKING:
@@ -66,7 +67,12 @@ def rebuild(record_path, directory, progress=None, language=None, letterhead=Non
     """
     source = record_file(record_path)
     if language not in (None, *LANGUAGES):
-        expected = f"found {language!r}; expected one of {', '.join(LANGUAGES)}"
+        expected = message(
+            "unknown_language",
+            "found {language!r}; expected one of {languages}",
+            language=language,
+            languages=[*LANGUAGES],
+        )
         raise InputError(Problem("--language", expected))
     records.load(source)
 
@@ -80,7 +86,12 @@ def rebuild(record_path, directory, progress=None, language=None, letterhead=Non
     except TankcalError:
         raise
     except (LookupError, TypeError, ValueError, AttributeError) as error:
-        found = f"does not hold what a record does ({type(error).__name__}: {error})"
+        found = message(
+            "no_record",
+            "does not hold what a record does ({name}: {error})",
+            name=type(error).__name__,
+            error=str(error),
+        )
         raise InputError(Problem(source.name, found)) from error
 
 
@@ -94,7 +105,7 @@ def _write(prepare, directory, progress, language=None, letterhead=None):
     refuse_foreign(directory)
     tell = progress or (lambda text, done, total: None)
     with folders.replaced(directory) as temporary:
-        tell("writing the record and the workbook", 0, 1)
+        tell(message("writing_record", "writing the record and the workbook"), 0, 1)
         prepare(temporary)
         record = records.load(temporary / RECORD)
         tables.write_tables(record, temporary)
@@ -104,7 +115,7 @@ def _write(prepare, directory, progress, language=None, letterhead=None):
         report.build(
             temporary / RECORD,
             temporary,
-            lambda done, total: tell("writing the report", done, total),
+            lambda done, total: tell(message("writing_report", "writing the report"), done, total),
             language,
             letterhead,
         )

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
 
 __all__ = [
@@ -41,5 +42,8 @@ def load(path):
     try:
         record = json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise InputError(Problem(name, f"cannot be read as a record: {error}")) from error
+        expected = message(
+            "record_unreadable", "cannot be read as a record: {error}", error=str(error)
+        )
+        raise InputError(Problem(name, expected)) from error
     return migrated(record, name)

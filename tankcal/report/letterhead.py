@@ -14,6 +14,7 @@ from tankcal.job.entries import read_section
 from tankcal.job.fields import Field
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
 from tankcal.job.tables import Log, nearest, read_bytes
+from tankcal.messages import message
 from tankcal.report import LETTERHEAD
 from tankcal.report.logo import logo_problem
 
@@ -76,7 +77,11 @@ def _parsed(path, data, log):
         return None
     for section in settings:
         if section not in _SECTIONS and (section or settings[section]):
-            expected = f"unknown section; expected [laboratory] or [colours]{_hint(section)}"
+            expected = message(
+                "unknown_section_of_letterhead",
+                "unknown section; expected [laboratory] or [colours]{hint}",
+                hint=_hint(section),
+            )
             log.problem(path.name, expected, rows.get(section), f"[{section}]")
     found = {
         name: read_section(path.name, name, fields, settings.get(name, {}), rows.get(name), log)
@@ -108,11 +113,17 @@ def _colour(file, field, values, given, log):
 def colour_problem(name, colour):
     """What is wrong with a colour, or None: no #rrggbb, or, of text, too light for white paper."""
     if not isinstance(colour, str) or not _COLOUR.fullmatch(colour):
-        return f"found {colour!r}; expected a colour such as #1a2b3c"
+        return message(
+            "no_colour", "found {colour!r}; expected a colour such as #1a2b3c", colour=colour
+        )
     if name == "ink" and contrast_with_white(colour) < LEAST_CONTRAST:
-        return (
-            f"{colour} is too light for text: its contrast with white paper is "
-            f"{contrast_with_white(colour):.1f}, expected at least {LEAST_CONTRAST}"
+        return message(
+            "colour_too_light",
+            "{colour} is too light for text: its contrast with white paper is {contrast:.1f}, "
+            "expected at least {least}",
+            colour=colour,
+            contrast=contrast_with_white(colour),
+            least=LEAST_CONTRAST,
         )
     return None
 
@@ -132,11 +143,17 @@ def _logo(path, laboratory, given, log):
     row = given["logo"].row
     kind = Path(name).suffix.lower().removeprefix(".")
     if kind not in ("svg", "png") or Path(name).name != name:
-        expected = f"found {name!r}; expected the name of an .svg or .png file beside this one"
+        expected = message(
+            "no_logo_name",
+            "found {name!r}; expected the name of an .svg or .png file beside this one",
+            name=name,
+        )
         log.problem(path.name, expected, row, "laboratory.logo")
         return None
     if not (path.parent / name).is_file():
-        expected = f"no file {name!r} beside this one; expected the logo"
+        expected = message(
+            "no_logo_file", "no file {name!r} beside this one; expected the logo", name=name
+        )
         log.problem(path.name, expected, row, "laboratory.logo")
         return None
     data = read_bytes(path.parent / name, log)
@@ -155,7 +172,16 @@ def read_saved(path):
     try:
         data = json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise InputError(Problem(name, f"cannot be read as a letterhead: {error}")) from error
+        raise InputError(
+            Problem(
+                name,
+                message(
+                    "letterhead_unreadable",
+                    "cannot be read as a letterhead: {error}",
+                    error=str(error),
+                ),
+            )
+        ) from error
     problem = data_problem(data)
     if problem:
         raise InputError(Problem(name, problem))

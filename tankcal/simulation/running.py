@@ -5,9 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.deliveries import Deliveries, deliveries
+from tankcal.messages import message
 from tankcal.monte_carlo import Goal, Simulation, Verdict, verdict
 from tankcal.simulation.intervals import judged_intervals
 from tankcal.simulation.model import Model
+
+SIMULATING = message("simulating", "simulating the table")
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, tel
     Raises HeightError for a dip outside the table.
     """
     goal = replace(goal or Goal(), probability=table.probability)
-    telling = tell and (lambda text, done, total: tell("simulating the table", done, total))
+    telling = tell and (lambda text, done, total: tell(SIMULATING, done, total))
     low, high = np.array(pairs, dtype=float).reshape(-1, 2).T
     model = Model(job, survey, body, zero_m, table, table.weights(high) - table.weights(low))
     found = model.simulated(goal, telling)

@@ -82,21 +82,22 @@ def _write_entry(sheet, row, owner, entry, texts, look):
     sheet.write_string(row, _UNIT, parted(field.name)[1], look.unit)
     sheet.write_string(row, _OWNER, owner, look.code)
     sheet.write_string(row, _KEY, field.name, look.code)
-    _write_start(sheet, row, entry, look.cell(type_of_cell(field), entry.is_to_fill_in))
-    _write_example(sheet, row, entry.example, look)
+    cell = look.cell(type_of_cell(field), entry.is_to_fill_in)
+    _write_start(sheet, row, field, texts.value(field, entry.start), cell)
+    _write_example(sheet, row, texts.value(field, entry.example), look)
     rule = rule_of(field, field.choices, xl_rowcol_to_cell(row, _VALUE), texts)
     if rule is not None:
         sheet.data_validation(row, _VALUE, row, _VALUE, rule)
     sheet.set_row(row, max(15.0, LINE_PT * lines_of(entry.note, _WIDTHS[_NOTE] * 0.9) + 4))
 
 
-def _write_start(sheet, row, entry, cell):
-    if not entry.start:
+def _write_start(sheet, row, field, start, cell):
+    if not start:
         sheet.write_blank(row, _VALUE, None, cell)
-    elif entry.field.kind == "number" and is_number(entry.start):
-        sheet.write_number(row, _VALUE, float(entry.start), cell)
+    elif field.kind == "number" and is_number(start):
+        sheet.write_number(row, _VALUE, float(start), cell)
     else:
-        sheet.write_string(row, _VALUE, entry.start, cell)
+        sheet.write_string(row, _VALUE, start, cell)
 
 
 def _write_example(sheet, row, example, look):

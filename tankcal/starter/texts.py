@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from tankcal.digits import shortest
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
 from tankcal.job.fields import MAX_NAME, MAX_TEXT
+from tankcal.job.form_words import word_of
 from tankcal.languages import DEFAULT
 from tankcal.starter.notes import REGISTER_NOTES, SECTION_NOTES, TABLE_NOTES
 from tankcal.starter.units import parted
@@ -63,6 +64,14 @@ class Texts:
         return self.of("expected", _bounds(field), low=low, high=high, unit=_bracketed(field)) + (
             self.of("expected", "or_word", word=", ".join(field.choices)) if field.choices else ""
         )
+
+    def choice(self, word):
+        """One of the choices, "true" or "false" as the form offers it."""
+        return word_of(self.words["language"]["code"], word)
+
+    def value(self, field, given):
+        """What stands in a cell of a field: its choices in the words of the form."""
+        return self.choice(given) if field.kind in ("choice", "flag") else given
 
     def assumption(self, declarable):
         """What is assumed for an input that is not declared; "" for nothing."""

@@ -4,6 +4,7 @@ import datetime
 import math
 
 from tankcal.job.fields import MAX_NAME, MAX_TEXT
+from tankcal.job.form_words import NO, YES
 from tankcal.starter.texts import is_wide
 
 LONGEST_LIST = 255  # letters: Excel drops a longer one
@@ -24,7 +25,7 @@ def rule_of(field, choices, cell, texts):
     choices  what may be chosen, in place of the field's own
     cell     the first cell of the range, as "C7"
     """
-    condition = _condition(field, choices, cell)
+    condition = _condition(field, choices, cell, texts)
     if condition is None:
         return None
     return condition | {
@@ -35,11 +36,11 @@ def rule_of(field, choices, cell, texts):
     }
 
 
-def _condition(field, choices, cell):
+def _condition(field, choices, cell, texts):
     if field.kind == "flag":
-        return {"validate": "list", "source": ["true", "false"]}
+        return {"validate": "list", "source": [texts.choice(YES), texts.choice(NO)]}
     if field.kind == "choice":
-        listed = list(choices)
+        listed = [texts.choice(one) for one in choices]
         return {"validate": "list", "source": listed} if _fits(listed) else None
     if field.kind == "number":
         return _of_number(field, cell)

@@ -52,12 +52,12 @@ def adjust_survey(measurements, tell=None):
     except SolutionError as error:
         if not measurements.settings.explain:
             raise
-        tell("looking for what is wrong")
+        tell(message("looking_for_faults", "looking for what is wrong"))
         told = _why_not(measurements, str(error))
         if not told:
             raise
         raise SolutionError("\n".join([str(error), *map(str, told)])) from error
-    tell("working out what the residuals say")
+    tell(message("judging_residuals", "working out what the residuals say"))
     return replace(_complete(*found, measurements), depth=depth)
 
 
@@ -65,15 +65,26 @@ def _adjusted(measurements, tell, snooping=None, most=100, like=None):
     """Searched, Gathered and Frame of measurements; like: network.Adjusted that is close to it."""
     gathered = gather(measurements)
     if not gathered.survey.points:
-        raise InputError(Problem("job.toml", "the survey has no observations to be adjusted"))
-    tell(f"finding approximate values of {len(gathered.survey.points)} points")
+        raise InputError(
+            Problem(
+                "job.toml",
+                message("nothing_observed", "the survey has no observations to be adjusted"),
+            )
+        )
+    tell(
+        message(
+            "finding_starts",
+            "finding approximate values of {count} points",
+            count=len(gathered.survey.points),
+        )
+    )
     survey = None if like is None else started_like(like, gathered, measurements)
     survey = survey or started(gathered, measurements)
     swapped = swapped_at_start(survey, gathered.known)
     if swapped:
         raise SolutionError("\n".join(map(str, swapped)))
     frame = framed(survey, gathered, measurements.settings)
-    tell(f"adjusting {_count(frame.survey)} observations")
+    tell(message("adjusting", "adjusting {count} observations", count=_count(frame.survey)))
     wanted = measurements.settings.snooping if snooping is None else snooping
     gross = gross_readings(frame.survey) if wanted else None
     options = {**frame.options, "max_iterations": most}

@@ -11,6 +11,7 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.focus import as_in_focus
+from tankcal.messages import message
 from tankcal.surveys.results import DepthOfField
 
 CLOSE_MM = 1e-6  # change of a correction that is none
@@ -38,12 +39,24 @@ def in_depth(measurements, adjust, tell):
             size = corrected - given.xy_mm
             largest, rms = np.abs(size).max(initial=0.0), np.sqrt(np.mean(size**2))
             return found, now, DepthOfField(rounds, change, float(largest), float(rms), left)
-        tell(f"correcting image points for their depth: round {rounds}, {1e3 * change:.3g} um")
+        tell(
+            message(
+                "focusing",
+                "correcting image points for their depth: round {rounds}, {change:.3g} um",
+                rounds=rounds,
+                change=1000.0 * change,
+            )
+        )
         now = replace(measurements, image_points=replace(given, xy_mm=corrected))
         found = adjust(now, found[0].adjusted)
     raise SolutionError(
-        f"the corrections for the depth of field still change by {1e3 * change:.3g} um after "
-        f"{MOST_ROUNDS} adjustments: adjustment.depth_of_field"
+        message(
+            "focus_unsteady",
+            "the corrections for the depth of field still change by {change:.3g} um after "
+            "{rounds} adjustments: adjustment.depth_of_field",
+            change=1000.0 * change,
+            rounds=MOST_ROUNDS,
+        )
     )
 
 

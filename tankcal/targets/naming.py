@@ -98,7 +98,7 @@ def _rows(path, fields, log):
                     raise Refused(f"blank; expected {field.expectation()}")
                 values.append(read_value(field, cells[place], table.decimal))
             except Refused as refusal:
-                log.problem(table.file, str(refusal), row, field.name)
+                log.problem(table.file, refusal.text, row, field.name)
         if len(values) == len(fields):
             yield table.file, row, values
 

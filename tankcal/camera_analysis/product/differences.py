@@ -117,7 +117,7 @@ def _row(table, number, columns, fields, log):
         try:
             given[name] = read_value(fields[name], raw, table.decimal)
         except Refused as refusal:
-            log.problem(table.file, str(refusal), row, name)
+            log.problem(table.file, refusal.text, row, name)
             given[name] = None if name == "point" else np.nan
     for difference, pair in zip(_DIFFERENCES, _PAIRS, strict=True):
         both = [name in given for name in pair]

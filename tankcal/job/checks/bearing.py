@@ -3,9 +3,11 @@
 from tankcal.job.checks.bottom import bottom_form
 from tankcal.job.checks.common import has_wall_points
 from tankcal.job.contract import INPUTS
+from tankcal.messages import message
 
-NOT_SUBTRACTED = "expected only with side = outside: nothing is subtracted"
-SWITCHED_OFF = "corrections.{} is false"
+NOT_SUBTRACTED = message(
+    "nothing_subtracted", "expected only with side = outside: nothing is subtracted"
+)
 
 
 def useless_inputs(values, tables, kind):
@@ -14,7 +16,7 @@ def useless_inputs(values, tables, kind):
     values, tables  of the job; what is blank or bad there counts as not given
     """
     others = {
-        name: f"it has no bearing on a tank of kind {kind}"
+        name: message("no_bearing", "it has no bearing on a tank of kind {of_kind}", of_kind=kind)
         for name, known in INPUTS.items()
         if kind not in known.kinds
     }
@@ -28,30 +30,46 @@ def useless_inputs(values, tables, kind):
     return others | {name: why for name, why in rules.items() if why}
 
 
+def _switched_off(correction):
+    return message("switched_off", "corrections.{correction} is false", correction=correction)
+
+
 def _of_temperature(values):
     """{input: "" or why it has no effect}; so do all below."""
     given = values["survey"]["shell_temperature_c"] is not None
     expands = given and values["corrections"]["temperature"] is not False
-    why = "" if expands else "expected only with a temperature correction"
+    why = (
+        ""
+        if expands
+        else message("no_temperature_correction", "expected only with a temperature correction")
+    )
     return {"shell_temperature": why, "expansion": why}
 
 
 def _of_deadwood(values, deadwood):
     if values["corrections"]["deadwood"] is False:
-        return SWITCHED_OFF.format("deadwood")
+        return _switched_off("deadwood")
     is_there = deadwood is not None and any(
         volume != 0 and u is None
         for volume, u in zip(deadwood.of("volume_m3"), deadwood.of("u_m3"), strict=True)
     )
-    return "" if is_there else "expected only with deadwood that has no u_m3 of its own"
+    return (
+        ""
+        if is_there
+        else message("no_vague_deadwood", "expected only with deadwood that has no u_m3 of its own")
+    )
 
 
 def _of_vertical(values, tables):
     survey, switches = values["survey"], values["corrections"]
     head = values["table"]["liquid_density_kg_m3"] and switches["head"] is not False
     no_liquid = not survey["liquid_level_m"] or switches["head"] is False
-    no_head = "expected only with a liquid head: table.liquid_density_kg_m3"
-    no_survey_liquid = "expected only with survey.liquid_level_m above 0"
+    no_head = message(
+        "no_liquid_head", "expected only with a liquid head: table.liquid_density_kg_m3"
+    )
+    no_survey_liquid = message(
+        "no_survey_liquid", "expected only with survey.liquid_level_m above 0"
+    )
     no_roof = values["roof"]["mass_kg"] is None or switches["roof"] is False
     return _of_plates(values, tables["courses"], head or not no_liquid) | {
         "course_heights": _of_heights(tables["courses"]),
@@ -60,17 +78,22 @@ def _of_vertical(values, tables):
         "survey_level": no_survey_liquid if no_liquid else "",
         "survey_density": no_survey_liquid if no_liquid else "",
         "bottom": _of_bottom(values, tables["bottom"]),
-        "roof_mass": "expected only with a floating roof: [roof]" if no_roof else "",
-        "tilt": SWITCHED_OFF.format("tilt") if switches["tilt"] is False else "",
+        "roof_mass": message("no_floating_roof", "expected only with a floating roof: [roof]")
+        if no_roof
+        else "",
+        "tilt": _switched_off("tilt") if switches["tilt"] is False else "",
     }
 
 
 def _of_bottom(values, bottom):
     if values["corrections"]["bottom"] is False:
-        return SWITCHED_OFF.format("bottom")
+        return _switched_off("bottom")
     return {
-        "liquid": "expected u_m3 in bottom.csv instead",
-        "flat": "expected only with a bottom that is not flat: of a flat one datum says it all",
+        "liquid": message("u_in_bottom", "expected u_m3 in bottom.csv instead"),
+        "flat": message(
+            "bottom_is_flat",
+            "expected only with a bottom that is not flat: of a flat one datum says it all",
+        ),
     }.get(bottom_form(values, bottom), "")
 
 
@@ -85,24 +108,32 @@ def _of_plates(values, courses, is_loaded):
     if courses is not None and not courses.skipped:
         for name, column in (("plate_thickness", "thickness_mm"), ("paint", "paint_mm")):
             if not why[name] and not any(courses.of(column)):
-                why[name] = f"expected only with {column} above 0 in courses.csv"
+                why[name] = message(
+                    "no_such_thickness",
+                    "expected only with {column} above 0 in courses.csv",
+                    column=column,
+                )
     return why
 
 
 def _of_heights(courses):
     is_one = courses is not None and len(courses.rows) + courses.skipped == 1
-    return "expected only with two courses or more" if is_one else ""
+    return message("only_one_course", "expected only with two courses or more") if is_one else ""
 
 
 def _of_horizontal(values, has_points):
     given, no_tilt = values["horizontal"], values["corrections"]["tilt"] is False
     leans = has_points or (given["tilt_mm_per_m"] and not no_tilt)
     all_flat = given["end_a"] == given["end_b"] == "flat"
-    switched_off = SWITCHED_OFF.format("tilt") if no_tilt else ""
+    switched_off = _switched_off("tilt") if no_tilt else ""
     return _of_wall(given, values, has_points) | {
-        "end_depth": "expected only with an end that is not flat" if all_flat else "",
+        "end_depth": message("ends_are_flat", "expected only with an end that is not flat")
+        if all_flat
+        else "",
         "tilt": _from_points(has_points) or switched_off,
-        "dip_position": "" if leans else "expected only for a tank that leans",
+        "dip_position": ""
+        if leans
+        else message("does_not_lean", "expected only for a tank that leans"),
     }
 
 
@@ -110,13 +141,21 @@ def _of_wall(given, values, has_points):
     """What horizontal cylinders and spheres share."""
     switched_off = values["corrections"]["plate"] is False
     outside = values["survey"]["side"] == "outside" and not switched_off
-    nothing = "expected only with side = outside and a thickness_mm: nothing is subtracted"
+    nothing = message(
+        "no_plates", "expected only with side = outside and a thickness_mm: nothing is subtracted"
+    )
     return {
         "diameter": _from_points(has_points),
-        "offset": "" if has_points else "expected only beside points; without them: diameter",
+        "offset": ""
+        if has_points
+        else message("no_points", "expected only beside points; without them: diameter"),
         "plate_thickness": "" if outside and given["thickness_mm"] else nothing,
     }
 
 
 def _from_points(has_points):
-    return "it comes from the points, with their uncertainty" if has_points else ""
+    return (
+        message("from_points", "it comes from the points, with their uncertainty")
+        if has_points
+        else ""
+    )

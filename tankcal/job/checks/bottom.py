@@ -33,12 +33,21 @@ def check_bottom(values, table, points, extent, raw, log):
     _check_centre(form, values, raw, log)
     if form not in ("points", "liquid"):
         if has_rows(table):
-            expected = f"rows beside bottom.form = {form}; expected points or liquid, or no rows"
+            expected = message(
+                "bottom_rows_unused",
+                "rows beside bottom.form = {form}; expected points or liquid, or no rows",
+                form=form,
+            )
             log.problem(table.file, expected)
         return
     wanted = SURVEYED if form == "points" else MEASURED
     if not has_rows(table):
-        expected = f"no rows; expected {', '.join(wanted)}, as bottom.form = {form} says"
+        expected = message(
+            "bottom_rows_missing",
+            "no rows; expected {wanted}, as bottom.form = {form} says",
+            wanted=[*wanted],
+            form=form,
+        )
         log.problem(raw.file_of("bottom"), expected)
     elif _has_its_columns(table, form, wanted, log):
         if form == "points":
@@ -51,12 +60,21 @@ def _has_its_columns(table, form, wanted, log):
     """Has the table all columns of its form, and none of the other one?"""
     surveyed, measured = _given(table, (*SURVEYED, "s_mm")), _given(table, (*MEASURED, "u_m3"))
     if surveyed and measured:
-        expected = f"given beside {measured[0]}; expected surveyed points or measured volumes"
-        log.problem(table.file, f"{expected}, never both", None, surveyed[0])
+        expected = message(
+            "bottom_of_two_forms",
+            "given beside {measured}; expected surveyed points or measured volumes, never both",
+            measured=measured[0],
+        )
+        log.problem(table.file, expected, None, surveyed[0])
         return False
     missing = [name for name in wanted if table.columns[name] is None]
     for name in missing:
-        expected = f"not given; expected {', '.join(wanted)} for a bottom of form {form}"
+        expected = message(
+            "bottom_column_missing",
+            "not given; expected {wanted} for a bottom of form {form}",
+            wanted=[*wanted],
+            form=form,
+        )
         log.problem(table.file, expected, None, name)
     return not missing
 
@@ -66,20 +84,35 @@ def _check_centre(form, values, raw, log):
     diameter = values["tank"]["nominal_diameter_m"]
     if form not in ("cone", "dish"):
         if centre is not None:
-            expected = f"given for a bottom of form {form}; expected only for a cone or a dish"
+            expected = message(
+                "bottom_centre_unused",
+                "given for a bottom of form {form}; expected only for a cone or a dish",
+                form=form,
+            )
             tell(log.problem, raw, "bottom", "centre_z_m", expected)
         return
     if is_not_given(raw, "bottom", "centre_z_m"):
-        expected = f"missing; expected the z of the centre of the {form}"
+        expected = message(
+            "bottom_centre_missing",
+            "missing; expected the z of the centre of the {form}",
+            form=form,
+        )
         tell(log.problem, raw, "bottom", "centre_z_m", expected)
     if None in (centre, edge, diameter):
         return
     rise = centre - edge
-    where = f"{abs(rise):g} m {'above' if rise > 0 else 'below'} its edge (datum.bottom_z_m)"
     deepest = diameter if form == "cone" else diameter / 2
     if not -deepest <= rise <= diameter / 4:
-        expected = f"{where}; expected at most {diameter / 4:g} m above, {deepest:g} m below:"
-        tell(log.problem, raw, "bottom", "centre_z_m", f"{expected} another unit or frame?")
+        highest = diameter / 4
+        expected = message(
+            "bottom_centre_far",
+            "{rise:+g} m from its edge (datum.bottom_z_m); expected at most {highest:g} m above, "
+            "{deepest:g} m below: another unit or frame?",
+            rise=rise,
+            highest=highest,
+            deepest=deepest,
+        )
+        tell(log.problem, raw, "bottom", "centre_z_m", expected)
     elif abs(rise) > STEEP_FACTOR * diameter:
         expected = message(
             "bottom_steep",
@@ -98,17 +131,31 @@ def _check_centre(form, values, raw, log):
 def _check_points(table, wall, values, log):
     xyz, diameter = places_of(table), values["tank"]["nominal_diameter_m"]
     if len(table.rows) + table.skipped < MIN_POINTS:
-        log.problem(table.file, f"{len(table.rows)} points; expected {MIN_POINTS} or more")
+        expected = message(
+            "bottom_few_points",
+            "{count} points; expected {fewest} or more",
+            count=len(table.rows),
+            fewest=MIN_POINTS,
+        )
+        log.problem(table.file, expected)
         return
     if len(table.rows) > MAX_POINTS:
-        expected = f"{len(table.rows)} points; expected at most {MAX_POINTS}: thin the scan first"
+        expected = message(
+            "bottom_many_points",
+            "{count} points; expected at most {most}: thin the scan first",
+            count=len(table.rows),
+            most=MAX_POINTS,
+        )
         log.problem(table.file, expected)
     if not len(xyz) or len(xyz) < len(table.rows) or diameter is None:
         return
     plan = xyz[:, :2] - xyz[:, :2].mean(axis=0)
     spread = float(np.linalg.svd(plan, compute_uv=False)[1] / np.sqrt(len(xyz)))
     if spread < NARROW * diameter:
-        expected = "all points lie in one place or on one line; expected them all over the bottom"
+        expected = message(
+            "bottom_points_on_a_line",
+            "all points lie in one place or on one line; expected them all over the bottom",
+        )
         log.problem(table.file, expected, None, "x_m")
         return
     if spread < PARTIAL * diameter:
@@ -128,7 +175,11 @@ def _refuse_same_places(table, xyz, log):
     first_row = {}
     for row, place in zip(table.rows, map(tuple, xyz[:, :2]), strict=True):
         if place in first_row:
-            expected = f"the same x and y as row {first_row[place]}; expected one point there"
+            expected = message(
+                "bottom_point_twice",
+                "the same x and y as row {first_row}; expected one point there",
+                first_row=first_row[place],
+            )
             log.problem(table.file, expected, row, "x_m")
         first_row.setdefault(place, row)
 
@@ -142,23 +193,25 @@ def _check_places(table, xyz, wall, diameter, log):
     allowed = OUTSIDE_FACTOR * diameter / 2 + OUTSIDE_M
     if np.min(high - low) < 0.85 * diameter:  # not seen from all around: the centre is vague
         allowed = diameter + OUTSIDE_M
-    complaint = "m from the axis; expected within the tank, a radius of"
-    texts = [f"{far:.4g} {complaint} {diameter / 2:g} m" for far in distance]
-    hint = "in millimetres, or in another frame than the points of the wall?"
-    _tell_rows(table, "x_m", distance > allowed, texts, hint, log)
+    radius = diameter / 2
+    texts = [
+        message(
+            "bottom_point_outside",
+            "{far:.4g} m from the axis; expected within the tank, a radius of {radius:g} m",
+            far=far,
+            radius=radius,
+        )
+        for far in distance
+    ]
+    _tell_rows(table, "x_m", distance > allowed, texts, log)
 
 
 def _check_depths(table, rise, diameter, log):
     highest = max(LEAST_DEPTH_M, RISE_FACTOR * diameter)
     deepest = max(LEAST_DEPTH_M, diameter)
-    texts = [
-        f"{abs(z):.4g} m {'above' if z > 0 else 'below'} datum.bottom_z_m; expected at most"
-        f" {highest:.4g} m above, {deepest:.4g} m below"
-        for z in rise
-    ]
+    texts = [_off_edge(z, highest, deepest) for z in rise]
     bad = (rise > highest) | (rise < -deepest)
-    hint = "in millimetres, or in another frame than the points of the wall?"
-    _tell_rows(table, "z_m", bad, texts, hint, log)
+    _tell_rows(table, "z_m", bad, texts, log)
     steep = np.min(rise) < -max(LEAST_DEPTH_M, STEEP_FACTOR * diameter)
     if steep and not np.any(bad):
         expected = message(
@@ -169,10 +222,37 @@ def _check_depths(table, rise, diameter, log):
         log.warning(table.file, expected, table.rows[int(np.argmin(rise))], "z_m")
 
 
-def _tell_rows(table, column, bad, texts, hint, log):
+def _off_edge(z, highest, deepest):
+    if z > 0:
+        return message(
+            "bottom_point_high",
+            "{z:.4g} m above datum.bottom_z_m; expected at most {highest:.4g} m above, "
+            "{deepest:.4g} m below",
+            z=z,
+            highest=highest,
+            deepest=deepest,
+        )
+    depth = -z
+    return message(
+        "bottom_point_deep",
+        "{depth:.4g} m below datum.bottom_z_m; expected at most {highest:.4g} m above, "
+        "{deepest:.4g} m below",
+        depth=depth,
+        highest=highest,
+        deepest=deepest,
+    )
+
+
+def _tell_rows(table, column, bad, texts, log):
     """A problem for each bad row, or one for the column where more than half of the rows are."""
     if 2 * np.sum(bad) > len(bad):
-        log.problem(table.file, f"{texts[int(np.argmax(bad))]}: {hint}", None, column)
+        first = texts[int(np.argmax(bad))]
+        expected = message(
+            "bottom_other_frame",
+            "{first}: in millimetres, or in another frame than the points of the wall?",
+            first=first,
+        )
+        log.problem(table.file, expected, None, column)
         return
     for row, text, is_bad in zip(table.rows, texts, bad, strict=True):
         if is_bad:
@@ -182,7 +262,15 @@ def _tell_rows(table, column, bad, texts, hint, log):
 def _check_volumes(table, values, extent, log):
     levels, volumes = table.of("level_m"), table.of("volume_m3")
     if len(table.rows) + table.skipped < MIN_LEVELS:
-        log.problem(table.file, f"{len(levels)} level; expected {MIN_LEVELS} or more")
+        log.problem(
+            table.file,
+            message(
+                "bottom_few_levels",
+                "{count} level; expected {fewest} or more",
+                count=len(levels),
+                fewest=MIN_LEVELS,
+            ),
+        )
         return
     if None in levels or None in volumes or table.skipped:
         return
@@ -192,7 +280,12 @@ def _check_volumes(table, values, extent, log):
         for row, before, after in pairs:
             is_dry = name == "volume_m3" and after == before == 0
             if after <= before and not is_dry:
-                expected = f"found {after:g} after {before:g}; expected ascending numbers"
+                expected = message(
+                    "bottom_not_ascending",
+                    "found {after:g} after {before:g}; expected ascending numbers",
+                    after=after,
+                    before=before,
+                )
                 log.problem(table.file, expected, row, name)
                 sound = False
     if sound:
@@ -204,13 +297,26 @@ def _check_reach(table, levels, volumes, values, extent, log):
     """Rows from the table's zero up to the shell at least, so that nothing is extrapolated."""
     shell, zero = values["datum"]["bottom_z_m"], zero_z(values)
     if levels[0] > 0 and volumes[0] > 0:
-        expected = f"begins at {levels[0]:g}; expected a row at dip 0 or below it, or a volume of 0"
+        expected = message(
+            "bottom_begins_late",
+            "begins at {levels:g}; expected a row at dip 0 or below it, or a volume of 0",
+            levels=levels[0],
+        )
         log.problem(table.file, expected, table.rows[0], "level_m")
     if None not in (shell, zero) and levels[-1] < shell - zero:
-        expected = f"ends at {levels[-1]:g}; expected levels up to the shell, {shell - zero:g} m"
+        expected = message(
+            "bottom_ends_early",
+            "ends at {levels:g}; expected levels up to the shell, {shell:g} m",
+            levels=levels[-1],
+            shell=shell - zero,
+        )
         log.problem(table.file, expected, table.rows[-1], "level_m")
     if extent.top_m is not None and levels[-1] > extent.top_m:
-        expected = f"found {levels[-1]:g}; expected dips within the shell: in millimetres?"
+        expected = message(
+            "bottom_ends_late",
+            "found {levels:g}; expected dips within the shell: in millimetres?",
+            levels=levels[-1],
+        )
         log.problem(table.file, expected, table.rows[-1], "level_m")
 
 
@@ -220,13 +326,19 @@ def _check_slices(table, levels, volumes, extent, log):
     full = extent.area_m2 * np.diff(levels)
     filled = np.diff(volumes) / full
     texts = [
-        f"{dv:.4g} m3 more than the row above; the full cross-section holds {v:.4g} m3 there"
+        message(
+            "bottom_overfull",
+            "{dv:.4g} m3 more than the row above; the full cross-section holds {v:.4g} m3 there, "
+            "expected about that: in litres?",
+            dv=dv,
+            v=v,
+        )
         for dv, v in zip(np.diff(volumes), full, strict=True)
     ]
     bad = np.append(False, filled > OVERFULL)
     for row, text, is_bad in zip(table.rows, ["", *texts], bad, strict=True):
         if is_bad:
-            log.problem(table.file, f"{text}, expected about that: in litres?", row, "volume_m3")
+            log.problem(table.file, text, row, "volume_m3")
     if not np.any(bad) and filled[-1] < EMPTY:
         expected = message(
             "bottom_hardly_filled",
@@ -238,5 +350,10 @@ def _check_slices(table, levels, volumes, extent, log):
         log.warning(table.file, expected, table.rows[-1], "volume_m3")
     largest_heel = extent.area_m2 * max(LEAST_DEPTH_M, np.sqrt(extent.area_m2))
     if not np.any(bad) and volumes[0] > largest_heel:
-        expected = f"found {volumes[0]:g}; expected a heel of at most {largest_heel:.4g} m3"
+        expected = message(
+            "bottom_heel",
+            "found {heel:g}; expected a heel of at most {largest:.4g} m3",
+            heel=volumes[0],
+            largest=largest_heel,
+        )
         log.problem(table.file, expected, table.rows[0], "volume_m3")

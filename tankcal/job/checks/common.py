@@ -50,6 +50,11 @@ def refuse_repeated(table, column, log):
             first_row[name] = row
 
 
+def missing_beside(other):
+    """What is said of a key that has to be given where another one is."""
+    return message("missing_beside", "missing; expected beside {other}", other=other)
+
+
 def tiny_sd(unit, largest):
     """What is said of standard deviations of which the largest is tiny in their unit."""
     if unit == "mm":

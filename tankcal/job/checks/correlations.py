@@ -2,6 +2,7 @@
 
 from tankcal.distributions import Normal
 from tankcal.gum import Input, Inputs
+from tankcal.messages import message
 
 
 def check_correlations(table, inputs, raw, log):
@@ -15,14 +16,28 @@ def check_correlations(table, inputs, raw, log):
     for row, one, other, r in zip(table.rows, *map(table.of, ("input", "with", "r")), strict=True):
         for column, name in (("input", one), ("with", other)):
             if None not in (known, name) and name not in known:
-                expected = f"found {name}; expected an input of {raw.file_of('uncertainty')}"
+                expected = message(
+                    "correlation_unknown",
+                    "found {name}; expected an input of {of}",
+                    name=name,
+                    of=raw.file_of("uncertainty"),
+                )
                 log.problem(table.file, expected, row, column)
         if one is not None and one == other:
-            log.problem(table.file, f"found {one} again; expected another input", row, "with")
+            expected = message(
+                "correlation_with_itself", "found {one} again; expected another input", one=one
+            )
+            log.problem(table.file, expected, row, "with")
         pair = frozenset((one, other))
         if None not in pair and pair in first_row:
-            expected = f"{one} and {other} are there already, in row {first_row[pair]}"
-            log.problem(table.file, f"{expected}; expected once", row, "with")
+            expected = message(
+                "correlation_twice",
+                "{one} and {other} are there already, in row {first_row}; expected once",
+                one=one,
+                other=other,
+                first_row=first_row[pair],
+            )
+            log.problem(table.file, expected, row, "with")
         first_row.setdefault(pair, row)
         pairs[one, other] = r
     if len(log.problems) == before and not (table.skipped or None in _flat(pairs)):
@@ -48,5 +63,9 @@ def _check_together(table, pairs, log):
     try:
         Inputs([Input(name, Normal(1.0)) for name in names], pairs)
     except ValueError as error:
-        expected = f"{error}; expected coefficients that can hold together"
+        expected = message(
+            "correlations_impossible",
+            "{error}; expected coefficients that can hold together",
+            error=str(error),
+        )
         log.problem(table.file, expected, None, "r")

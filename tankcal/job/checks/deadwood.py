@@ -18,7 +18,12 @@ def check_deadwood(table, extent, log):
         if None in (bottom, top):
             continue
         if bottom > top:
-            expected = f"found {top:g} below bottom_m = {bottom:g}; expected a top above it"
+            expected = message(
+                "deadwood_upside_down",
+                "found {top:g} below bottom_m = {bottom:g}; expected a top above it",
+                top=top,
+                bottom=bottom,
+            )
             log.problem(table.file, expected, row, "top_m")
             continue
         _check_place(table, row, bottom, top, volume, extent, log)
@@ -36,10 +41,13 @@ def check_deadwood(table, extent, log):
 
 
 def _check_place(table, row, bottom, top, volume, extent, log):
-    unit = "dips in metres, from the table's zero"
     if extent.top_m is not None and top > extent.top_m + TOLERANCE_M:
-        expected = (
-            f"found {top:g}; expected at most {extent.top_m:.4g}, the top of the tank: {unit}"
+        expected = message(
+            "deadwood_too_high",
+            "found {top:g}; expected at most {top_m:.4g}, the top of the tank: dips in metres, "
+            "from the table's zero",
+            top=top,
+            top_m=extent.top_m,
         )
         log.problem(table.file, expected, row, "top_m")
     lowest = extent.lowest_m
@@ -48,8 +56,12 @@ def _check_place(table, row, bottom, top, volume, extent, log):
     if volume is not None and volume > 0:
         lowest -= SUMP_M
     if bottom < lowest - TOLERANCE_M:
-        expected = (
-            f"found {bottom:g}; expected {lowest:.4g} or more, the tank's lowest point: {unit}"
+        expected = message(
+            "deadwood_too_low",
+            "found {bottom:g}; expected {lowest:.4g} or more, the tank's lowest point: dips in "
+            "metres, from the table's zero",
+            bottom=bottom,
+            lowest=lowest,
         )
         log.problem(table.file, expected, row, "bottom_m")
 
@@ -62,8 +74,13 @@ def _check_volume(table, row, height, volume, extent, log):
         return
     full = extent.area_m2 * max(height, LEAST_HEIGHT_M)
     if abs(volume) > SLACK * full:
-        found = f"found {volume:g}; the whole tank holds {full:.4g} m3 between bottom_m and top_m"
-        expected = f"{found}, expected less, in cubic metres: in litres?"
+        expected = message(
+            "deadwood_too_large",
+            "found {volume:g}; the whole tank holds {full:.4g} m3 between bottom_m and top_m, "
+            "expected less, in cubic metres: in litres?",
+            volume=volume,
+            full=full,
+        )
         log.problem(table.file, expected, row, "volume_m3")
     elif abs(volume) > LARGE_SHARE * full:
         expected = message(

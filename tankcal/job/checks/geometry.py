@@ -48,7 +48,12 @@ def check_scan(points, values, kind, raw, log):
     xyz = places_of(points)
     unplaced = points.skipped + len(points.rows) - len(xyz)
     if len(xyz) + unplaced < MIN_POINTS_OF_SCAN.get(kind, 0):
-        expected = f"{len(xyz)} points; expected {MIN_POINTS_OF_SCAN[kind]} or more of the wall"
+        expected = message(
+            "scan_of_few_points",
+            "{count} points; expected {fewest} or more of the wall",
+            count=len(xyz),
+            fewest=MIN_POINTS_OF_SCAN[kind],
+        )
         log.problem(points.file, expected)
         return
     if len(xyz) < MIN_POINTS_PER_COURSE or kind is None:
@@ -63,19 +68,37 @@ def check_scan(points, values, kind, raw, log):
         if not check_extent(points, "x_m", across, key, nominal, log):
             return
     elif across > LARGEST_SPHERE_M:
-        expected = f"the points are {across:.4g} m apart; expected at most {LARGEST_SPHERE_M} m"
-        log.problem(points.file, f"{expected}: in millimetres?", None, "x_m")
+        expected = message(
+            "scan_too_wide",
+            "the points are {across:.4g} m apart; expected at most {most} m: in millimetres?",
+            across=across,
+            most=LARGEST_SPHERE_M,
+        )
+        log.problem(points.file, expected, None, "x_m")
         return
     plate, rise = values["datum"]["dip_plate_z_m"], high[2] - low[2]
     if plate is not None and not low[2] - rise - 1 <= plate <= high[2]:
-        expected = f"found {plate:g}; the points lie from z = {low[2]:.4g} to {high[2]:.4g} m,"
-        tell(log.problem, raw, "datum", "dip_plate_z_m", f"{expected} expected it about there")
+        expected = message(
+            "plate_far_from_points",
+            "found {plate:g}; the points lie from z = {low:.4g} to {high:.4g} m, expected it "
+            "about there",
+            plate=plate,
+            low=low[2],
+            high=high[2],
+        )
+        tell(log.problem, raw, "datum", "dip_plate_z_m", expected)
 
 
 def check_extent(points, column, extent, key, nominal, log):
     """Is the points' extent of the size of the drawing's? Returns False after telling a problem."""
     ratio = extent / nominal
-    found = f"the points are {extent:.4g} m apart (most of them), {key} is {nominal:g} m"
+    found = message(
+        "extent_beside_nominal",
+        "the points are {extent:.4g} m apart (most of them), {key} is {nominal:g} m",
+        extent=extent,
+        key=key,
+        nominal=nominal,
+    )
     if 1 / UNIT_FACTOR <= ratio <= UNIT_FACTOR:
         if ratio > DOUBTFUL_EXTENT:
             expected = message(
@@ -88,32 +111,49 @@ def check_extent(points, column, extent, key, nominal, log):
             )
             log.warning(points.file, expected, None, column)
         return True
-    large, small = ("the points", key) if ratio > 1 else (key, "the points")
+    the_points = message("the_points", "the points")
+    large, small = (the_points, key) if ratio > 1 else (key, the_points)
     factor = max(ratio, 1 / ratio) if ratio > 0 else np.inf
     if 200 <= factor <= 5000:
-        guess = f"about 1000 to 1: {large} in millimetres?"
+        guess = message("thousand_to_one", "about 1000 to 1: {large} in millimetres?", large=large)
     elif 20 <= factor < 200:
-        guess = f"about 100 to 1: {large} in centimetres?"
+        guess = message("hundred_to_one", "about 100 to 1: {large} in centimetres?", large=large)
     else:
-        guess = f"{large} too large or {small} too small"
-    log.problem(points.file, f"{found}; expected the same size in metres: {guess}", None, column)
+        guess = message(
+            "large_beside_small", "{large} too large or {small} too small", large=large, small=small
+        )
+    expected = message(
+        "other_size", "{found}; expected the same size in metres: {guess}", found=found, guess=guess
+    )
+    log.problem(points.file, expected, None, column)
     return False
 
 
 def _check_points_in_courses(z, unplaced, edges, courses, raw, log):
     """Enough points in each course, even if all points that could not be read lie there?"""
     if not np.any((z >= edges[0]) & (z <= edges[-1])):
-        expected = (
-            f"no point lies on the shell, which goes from z = {edges[0]:g} to {edges[-1]:g} m;"
-            f" expected points there, found z from {z.min():g} to {z.max():g} m"
+        expected = message(
+            "no_point_on_shell",
+            "no point lies on the shell, which goes from z = {shell_low:g} to {shell_high:g} m; "
+            "expected points there, found z from {low:g} to {high:g} m",
+            shell_low=edges[0],
+            shell_high=edges[-1],
+            low=z.min(),
+            high=z.max(),
         )
         tell(log.problem, raw, "datum", "bottom_z_m", expected)
         return
     counts, _ = np.histogram(z, bins=edges)
     for row, name, count in zip(courses.rows, courses.of("course"), counts, strict=True):
         if count + unplaced < MIN_POINTS_PER_COURSE:
-            expected = f"{count} points lie in course {name}, expected {MIN_POINTS_PER_COURSE}"
-            log.problem(courses.file, expected + " or more", row, "course")
+            expected = message(
+                "too_few_points_in_course",
+                "{count} points lie in course {name}, expected {fewest} or more",
+                count=count,
+                name=name,
+                fewest=MIN_POINTS_PER_COURSE,
+            )
+            log.problem(courses.file, expected, row, "course")
         elif count + unplaced < FEW_POINTS_PER_COURSE:
             expected = message(
                 "few_points_in_course",

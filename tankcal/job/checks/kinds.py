@@ -1,6 +1,6 @@
 """Sizes of horizontal cylinders and spheres: complete, consistent, and said once."""
 
-from tankcal.job.checks.common import is_not_given, tell
+from tankcal.job.checks.common import is_not_given, missing_beside, tell
 from tankcal.messages import message
 
 STRONG_TILT_MM_PER_M = 50
@@ -20,16 +20,34 @@ def check_horizontal(values, has_points, raw, log):
     _check_thickness(given, values["survey"]["side"], "horizontal", raw, log)
     if has_points:
         _refuse_given(given, (*SIZES, "tilt_mm_per_m"), raw, log)
-        for key, what in (
-            ("azimuth_deg", "the direction from A to B, clockwise from +y"),
-            ("dip_from_a_m", "the place of the dip point, for the points tell a tilt"),
+        for key, expected in (
+            (
+                "azimuth_deg",
+                message(
+                    "azimuth_missing",
+                    "missing; expected the direction from A to B, clockwise from +y",
+                ),
+            ),
+            (
+                "dip_from_a_m",
+                message(
+                    "dip_missing_beside_points",
+                    "missing; expected the place of the dip point, for the points tell a tilt",
+                ),
+            ),
         ):
             if is_not_given(raw, "horizontal", key):
-                tell_problem(key, f"missing; expected {what}")
+                tell_problem(key, expected)
     else:
         _check_sizes(given, raw, log)
         if given["azimuth_deg"] is not None:
-            tell_problem("azimuth_deg", "given without points.csv; expected only beside points")
+            tell_problem(
+                "azimuth_deg",
+                message(
+                    "azimuth_without_points",
+                    "given without points.csv; expected only beside points",
+                ),
+            )
     for end in ("end_a", "end_b"):
         _check_end(given, end, has_points, raw, log)
     _check_dip(given, raw, log)
@@ -38,7 +56,10 @@ def check_horizontal(values, has_points, raw, log):
 def _refuse_given(given, keys, raw, log, section="horizontal"):
     for key in keys:
         if given[key] is not None:
-            expected = "given beside points.csv; expected one of them: it comes from the points"
+            expected = message(
+                "size_beside_points",
+                "given beside points.csv; expected one of them: it comes from the points",
+            )
             tell(log.problem, raw, section, key, expected)
 
 
@@ -51,25 +72,36 @@ def _check_sizes(given, raw, log):
     if not missing("diameter_m"):
         for key in ("width_m", "height_m"):
             if not missing(key):
-                expected = "given beside diameter_m; expected the diameter, or width and height"
+                expected = message(
+                    "size_beside_diameter",
+                    "given beside diameter_m; expected the diameter, or width and height",
+                )
                 tell(log.problem, raw, "horizontal", key, expected)
         return
     if missing("width_m") and missing("height_m"):
-        expected = "missing; expected it, or width_m and height_m, or points.csv"
+        expected = message(
+            "horizontal_size_missing",
+            "missing; expected it, or width_m and height_m, or points.csv",
+        )
         tell(log.problem, raw, "horizontal", "diameter_m", expected)
         return
     for key, other in (("width_m", "height_m"), ("height_m", "width_m")):
         if missing(key):
-            tell(log.problem, raw, "horizontal", key, f"missing; expected beside {other}")
+            tell(log.problem, raw, "horizontal", key, missing_beside(other))
 
 
 def _check_thickness(given, side, section, raw, log):
     """Plates count for what was measured outside only, and there they must be said."""
     if side == "outside" and is_not_given(raw, section, "thickness_mm"):
-        expected = "missing beside survey.side = outside; expected plate and paint (0: none)"
+        expected = message(
+            "thickness_missing",
+            "missing beside survey.side = outside; expected plate and paint (0: none)",
+        )
         tell(log.problem, raw, section, "thickness_mm", expected)
     elif side != "outside" and given["thickness_mm"]:
-        expected = "expected only beside survey.side = outside: nothing is subtracted"
+        expected = message(
+            "thickness_unused", "expected only beside survey.side = outside: nothing is subtracted"
+        )
         tell(log.problem, raw, section, "thickness_mm", expected)
 
 
@@ -83,17 +115,43 @@ def _check_end(given, end, has_points, raw, log):
     if form is None:
         return
     if form in ROUND_ONLY and None not in (height, width) and height != width:
-        tell_problem(end, f"found {form}; expected another form: it is for round cylinders only")
+        tell_problem(
+            end,
+            message(
+                "round_ends_only",
+                "found {form}; expected another form: it is for round cylinders only",
+                form=form,
+            ),
+        )
     needs_depth = form in ("conical", "ellipsoidal", "spherical")
     if needs_depth and is_not_given(raw, "horizontal", f"{end}_depth_m"):
-        tell_problem(f"{end}_depth_m", f"missing; expected the depth of the {form} end")
+        tell_problem(
+            f"{end}_depth_m",
+            message(
+                "end_depth_missing", "missing; expected the depth of the {form} end", form=form
+            ),
+        )
     if depth is not None and not needs_depth:
-        why = "its radii tell it" if form == "torispherical" else "it has none"
-        tell_problem(f"{end}_depth_m", f"given for a {form} end; expected a blank: {why}")
+        expected = message(
+            "end_has_no_depth", "given for a {form} end; expected a blank: it has none", form=form
+        )
+        if form == "torispherical":
+            expected = message(
+                "end_depth_from_radii",
+                "given for a {form} end; expected a blank: its radii tell it",
+                form=form,
+            )
+        tell_problem(f"{end}_depth_m", expected)
     elif depth is not None and height is not None:
         deepest = height / 2 if form == "spherical" else DEEPEST_END * height
         if depth > deepest * (1 + 1e-9):
-            expected = f"found {depth:g}; expected at most {deepest:g} m for a {form} end"
+            expected = message(
+                "end_too_deep",
+                "found {depth:g}; expected at most {deepest:g} m for a {form} end",
+                depth=depth,
+                deepest=deepest,
+                form=form,
+            )
             tell_problem(f"{end}_depth_m", expected)
     _check_radii(given, end, form, None if has_points else height, raw, log)
 
@@ -102,19 +160,33 @@ def _check_radii(given, end, form, diameter, raw, log):
     for radius in RADII:
         key = f"{end}_{radius}"
         if form == "torispherical" and is_not_given(raw, "horizontal", key):
-            expected = "missing; expected for a torispherical end"
+            expected = message("end_radius_missing", "missing; expected for a torispherical end")
             tell(log.problem, raw, "horizontal", key, expected)
         elif form != "torispherical" and given[key] is not None:
-            expected = f"given for a {form} end; expected only for a torispherical one"
+            expected = message(
+                "end_radius_unused",
+                "given for a {form} end; expected only for a torispherical one",
+                form=form,
+            )
             tell(log.problem, raw, "horizontal", key, expected)
     dish, knuckle = (given[f"{end}_{radius}"] for radius in RADII)
     if form != "torispherical" or None in (dish, knuckle, diameter):
         return
     if dish <= diameter / 2:
-        expected = f"found {dish:g}; expected more than half the diameter, {diameter / 2:g} m"
+        expected = message(
+            "dish_too_small",
+            "found {dish:g}; expected more than half the diameter, {half:g} m",
+            dish=dish,
+            half=diameter / 2,
+        )
         tell(log.problem, raw, "horizontal", f"{end}_dish_radius_m", expected)
     if knuckle > diameter / 2:
-        expected = f"found {knuckle:g}; expected at most half the diameter, {diameter / 2:g} m"
+        expected = message(
+            "knuckle_too_large",
+            "found {knuckle:g}; expected at most half the diameter, {half:g} m",
+            knuckle=knuckle,
+            half=diameter / 2,
+        )
         tell(log.problem, raw, "horizontal", f"{end}_knuckle_radius_m", expected)
 
 
@@ -125,17 +197,29 @@ def _check_dip(given, raw, log):
         is_plumb = given["dip_direction"] != "square" and None not in (tilt, height)
         at_top = dip + (tilt / 1000 * height if is_plumb else 0.0)
         if not (dip <= length and 0 <= at_top <= length):
-            expected = (
-                f"found {dip:g}; expected a dip within the cylinder, 0 to {length:g} m from A"
+            expected = message(
+                "dip_outside",
+                "found {dip:g}; expected a dip within the cylinder, 0 to {length:g} m from A",
+                dip=dip,
+                length=length,
             )
             if dip <= length:
-                expected += f", but it would leave the top at {at_top:.3f} m"
+                expected = message(
+                    "dip_leaves_top",
+                    "found {dip:g}; expected a dip within the cylinder, 0 to {length:g} m from "
+                    "A, but it would leave the top at {at_top:.3f} m",
+                    dip=dip,
+                    length=length,
+                    at_top=at_top,
+                )
             tell(log.problem, raw, "horizontal", "dip_from_a_m", expected)
     if given["roll_deg"] and given["diameter_m"] is not None:
         expected = message("roll_of_round_tank", "of no effect on a round cylinder")
         tell(log.warning, raw, "horizontal", "roll_deg", expected)
     if tilt and is_not_given(raw, "horizontal", "dip_from_a_m"):
-        expected = "missing; expected the place of the dip point, for the tank leans"
+        expected = message(
+            "dip_missing", "missing; expected the place of the dip point, for the tank leans"
+        )
         tell(log.problem, raw, "horizontal", "dip_from_a_m", expected)
     if tilt and abs(tilt) > STRONG_TILT_MM_PER_M:
         expected = message(
@@ -153,4 +237,10 @@ def check_sphere(values, has_points, raw, log):
     if has_points:
         _refuse_given(given, ("diameter_m",), raw, log, "sphere")
     elif is_not_given(raw, "sphere", "diameter_m"):
-        tell(log.problem, raw, "sphere", "diameter_m", "missing; expected it, or points.csv")
+        tell(
+            log.problem,
+            raw,
+            "sphere",
+            "diameter_m",
+            message("sphere_size_missing", "missing; expected it, or points.csv"),
+        )

@@ -10,10 +10,18 @@ TINY_SD_MM = 0.01
 def check_points(points, log):
     """Point names once, places once (a warning), credible and complete standard deviations."""
     if not points.rows and not points.skipped:
-        log.problem(points.file, "no rows; expected one row for each surveyed point")
+        log.problem(
+            points.file,
+            message("no_points_at_all", "no rows; expected one row for each surveyed point"),
+        )
         return
     if len(points.rows) > MAX_POINTS:
-        expected = f"{len(points.rows)} points; expected at most {MAX_POINTS}: thin the scan first"
+        expected = message(
+            "points_too_many",
+            "{count} points; expected at most {most}: thin the scan first",
+            count=len(points.rows),
+            most=MAX_POINTS,
+        )
         log.problem(points.file, expected)
     refuse_repeated(points, "point", log)
     _warn_same_places(points, log)
@@ -22,7 +30,11 @@ def check_points(points, log):
     given = [name for name in sds if points.columns[name] is not None]
     for name in sds:
         if given and name not in given:
-            expected = f"not given; expected beside {given[0]}, for all points or for none"
+            expected = message(
+                "sd_of_some_axes",
+                "not given; expected beside {given}, for all points or for none",
+                given=given[0],
+            )
             log.problem(points.file, expected, None, name)
     for name in given:
         found = [sd for sd in points.of(name) if sd is not None]
@@ -54,5 +66,8 @@ def _refuse_some_sections(points, log):
         return
     for row, section in zip(points.rows, sections, strict=True):
         if not section:
-            expected = "blank; expected a section for every point or for none (placed by height)"
+            expected = message(
+                "section_of_some_points",
+                "blank; expected a section for every point or for none (placed by height)",
+            )
             log.problem(points.file, expected, row, "section")

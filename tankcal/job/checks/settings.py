@@ -1,6 +1,12 @@
 """Settings that hang together: heights of the datum, the survey's liquid, densities, points."""
 
-from tankcal.job.checks.common import has_wall_points, is_not_given, loads_the_shell, tell
+from tankcal.job.checks.common import (
+    has_wall_points,
+    is_not_given,
+    loads_the_shell,
+    missing_beside,
+    tell,
+)
 from tankcal.job.plausibility import DENSITIES_KG_M3
 from tankcal.messages import message
 
@@ -20,16 +26,24 @@ def check_settings(values, tables, extent, kind, raw, log):
     _check_dip_plate(values, tables, kind, raw, log)
     for given, lacking in (("dip_x_m", "dip_y_m"), ("dip_y_m", "dip_x_m")):
         if datum[given] is not None and is_not_given(raw, "datum", lacking):
-            tell(log.problem, raw, "datum", lacking, f"missing; expected beside {given}")
+            tell(log.problem, raw, "datum", lacking, missing_beside(given))
     _check_survey_liquid(values["survey"], extent, raw, log)
     _check_densities(values, raw, log)
     if table["other_densities_kg_m3"] and not loads_the_shell(values):
-        expected = "given with corrections.head = false; expected one or the other"
+        expected = message(
+            "densities_without_head",
+            "given with corrections.head = false; expected one or the other",
+        )
         tell(log.problem, raw, "table", "other_densities_kg_m3", expected)
     _check_deliveries(table["minimum_delivery_m"] or (), extent, raw, log)
     issued, surveyed = values["certificate"].get("date_of_issue"), values["survey"]["date"]
     if issued and surveyed and issued < surveyed:
-        expected = f"found {issued}, before the survey of {surveyed}; expected no earlier day"
+        expected = message(
+            "issued_before_survey",
+            "found {issued}, before the survey of {surveyed}; expected no earlier day",
+            issued=issued,
+            surveyed=surveyed,
+        )
         tell(log.problem, raw, "certificate", "date_of_issue", expected)
 
 
@@ -38,11 +52,17 @@ def _check_deliveries(heights, extent, raw, log):
     for place, height in enumerate(heights):
         expected = ""
         if extent.height_m is not None and height > extent.height_m:
-            expected = f"expected at most the height of the tank, {extent.height_m:g} m"
+            expected = message(
+                "delivery_too_high",
+                "found {height:g}; expected at most the height of the tank, {height_m:g} m",
+                height=height,
+                height_m=extent.height_m,
+            )
         elif height in heights[:place]:
-            expected = "expected it once"
+            expected = message(
+                "delivery_twice", "found {height:g}; expected it once", height=height
+            )
         if expected:
-            expected = f"found {height:g}; {expected}"
             tell(log.problem, raw, "table", "minimum_delivery_m", expected)
 
 
@@ -54,13 +74,27 @@ def _check_dip_plate(values, tables, kind, raw, log):
     low, high = min(bottoms), max(bottoms)
     if low - MAX_DIP_OFFSET_M <= plate <= high + MAX_DIP_OFFSET_M:
         return
-    where = f"{plate - high:g} m above" if plate > high else f"{low - plate:g} m below"
     edge = values["datum"]["bottom_z_m"]
-    of_edge = "" if edge is None else f" (bottom_z_m = {edge:g})"
-    expected = (
-        f"{where} the bottom{of_edge}; expected at most {MAX_DIP_OFFSET_M:g} m: another unit or"
-        " frame?"
-    )
+    of_edge = "" if edge is None else message("of_edge", " (bottom_z_m = {edge:g})", edge=edge)
+    above, below = plate - high, low - plate
+    if above > 0:
+        expected = message(
+            "plate_above_bottom",
+            "{above:g} m above the bottom{of_edge}; expected at most {most:g} m: another unit or "
+            "frame?",
+            above=above,
+            of_edge=of_edge,
+            most=MAX_DIP_OFFSET_M,
+        )
+    else:
+        expected = message(
+            "plate_below_bottom",
+            "{below:g} m below the bottom{of_edge}; expected at most {most:g} m: another unit or "
+            "frame?",
+            below=below,
+            of_edge=of_edge,
+            most=MAX_DIP_OFFSET_M,
+        )
     tell(log.problem, raw, "datum", "dip_plate_z_m", expected)
 
 
@@ -78,15 +112,25 @@ def bottoms_z(values, tables, kind):
 def _check_survey_liquid(survey, extent, raw, log):
     level, density = survey["liquid_level_m"], survey["liquid_density_kg_m3"]
     if density and is_not_given(raw, "survey", "liquid_level_m"):
-        expected = "a density without liquid_level_m; set both to 0 when the tank was empty"
+        expected = message(
+            "density_without_level",
+            "a density without liquid_level_m; set both to 0 when the tank was empty",
+        )
         tell(log.problem, raw, "survey", "liquid_density_kg_m3", expected)
     if level and (density == 0 or is_not_given(raw, "survey", "liquid_density_kg_m3")):
-        expected = f"missing beside liquid_level_m = {level:g}; expected the liquid's density"
+        expected = message(
+            "level_without_density",
+            "missing beside liquid_level_m = {level:g}; expected the liquid's density",
+            level=level,
+        )
         tell(log.problem, raw, "survey", "liquid_density_kg_m3", expected)
     if level and extent.top_m is not None and level > extent.top_m:
-        expected = (
-            f"found {level:g}; expected at most the top of the shell, {extent.top_m:g} m above the"
-            " table's zero: in another unit?"
+        expected = message(
+            "level_above_shell",
+            "found {level:g}; expected at most the top of the shell, {top_m:g} m above the "
+            "table's zero: in another unit?",
+            level=level,
+            top_m=extent.top_m,
         )
         tell(log.problem, raw, "survey", "liquid_level_m", expected)
 
@@ -99,7 +143,11 @@ def _check_densities(values, raw, log):
             if not density:
                 continue
             if density < RELATIVE_DENSITY:
-                expected = f"found {density:g}; expected kg/m3, such as 850: is it in g/cm3?"
+                expected = message(
+                    "density_in_g_cm3",
+                    "found {density:g}; expected kg/m3, such as 850: is it in g/cm3?",
+                    density=density,
+                )
                 tell(log.problem, raw, section, key, expected)
             elif not lightest <= density <= heaviest:
                 expected = message(
@@ -113,7 +161,10 @@ def _check_densities(values, raw, log):
     table = values["table"]
     all_of_table = [*(table["other_densities_kg_m3"] or ()), table["liquid_density_kg_m3"]]
     if len(set(all_of_table)) < len(all_of_table):
-        expected = "a density twice, or the one of liquid_density_kg_m3 again; expected others"
+        expected = message(
+            "density_twice",
+            "a density twice, or the one of liquid_density_kg_m3 again; expected others",
+        )
         tell(log.problem, raw, "table", "other_densities_kg_m3", expected)
     own, of_roof = table["liquid_density_kg_m3"], values["roof"]["reference_density_kg_m3"]
     if own and of_roof and own != of_roof:

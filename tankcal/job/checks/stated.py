@@ -1,6 +1,7 @@
 """stated.csv: dips within the tank, the upper one first, and volumes that it can hold."""
 
 from tankcal.job.checks.geometry import UNIT_FACTOR
+from tankcal.messages import message
 
 _ROUNDING_M = 1e-9
 
@@ -14,10 +15,19 @@ def check_stated(table, extent, log):
         if high is None:
             continue
         if low is not None and low >= high:
-            expected = f"found {low:g}; expected a dip below high_m = {high:g}"
+            expected = message(
+                "stated_upside_down",
+                "found {low:g}; expected a dip below high_m = {high:g}",
+                low=low,
+                high=high,
+            )
             log.problem(table.file, expected, row, "low_m")
         elif (high, low) in first_row:
-            expected = f"this dip is there already, in row {first_row[high, low]}; expected once"
+            expected = message(
+                "stated_twice",
+                "this dip is there already, in row {first_row}; expected once",
+                first_row=first_row[high, low],
+            )
             log.problem(table.file, expected, row, "high_m")
         elif volume is not None:
             _check_volume(table, row, high, low, volume, extent, log)
@@ -28,7 +38,12 @@ def _check_within(table, row, high, low, extent, log):
     top = extent.height_m if extent.top_m is None else extent.top_m
     for column, dip in (("high_m", high), ("low_m", low)):
         if None not in (dip, top) and dip > top + _ROUNDING_M:
-            expected = f"found {dip:g}; expected at most {top:.5g}, the top of the tank, in metres"
+            expected = message(
+                "stated_above_top",
+                "found {dip:g}; expected at most {top:.5g}, the top of the tank, in metres",
+                dip=dip,
+                top=top,
+            )
             log.problem(table.file, expected, row, column)
 
 
@@ -39,6 +54,18 @@ def _check_volume(table, row, high, low, volume, extent, log):
         return
     full = extent.area_m2 * height
     if volume > UNIT_FACTOR * full:
-        what = "the whole tank" if low is None else "the tank between low_m and high_m"
-        expected = f"found {volume:g}; {what} holds about {full:.4g} m3, expected m3: in litres?"
+        expected = message(
+            "stated_too_much",
+            "found {volume:g}; the whole tank holds about {full:.4g} m3, expected m3: in litres?",
+            volume=volume,
+            full=full,
+        )
+        if low is not None:
+            expected = message(
+                "delivered_too_much",
+                "found {volume:g}; the tank between low_m and high_m holds about {full:.4g} m3, "
+                "expected m3: in litres?",
+                volume=volume,
+                full=full,
+            )
         log.problem(table.file, expected, row, "volume_m3")

@@ -8,6 +8,8 @@ import io
 import re
 import zipfile
 
+from tankcal.messages import message
+
 MAX_FILE_BYTES = 50_000_000
 MAX_UNPACKED_BYTES = 100_000_000
 MAX_MEMBERS = 5000
@@ -18,24 +20,39 @@ CHUNK_BYTES = 1_000_000
 _BLANK_CELL = re.compile(rb"<c r=[^<>]*(?:/>|></c>)")
 _BLANK_ROW = re.compile(rb"<row r=[^<>]*(?:/>|>\s*</row>)")
 _OLE = b"\xd0\xcf\x11\xe0"
-_NOT_A_WORKBOOK = "not an Excel workbook (.xlsx)"
-_SAVE_AGAIN = "open it in Excel or LibreOffice and save it as .xlsx"
-_DAMAGED = "damaged: open it in Excel or LibreOffice and save it again"
-_HUGE = (
-    "delete the empty rows and columns that are formatted below and beside the data, or hand in a"
-    " folder with CSV files"
+_NOT_A_WORKBOOK = message("not_a_workbook", "not an Excel workbook (.xlsx)")
+_SAVE_AGAIN = message("save_again", "open it in Excel or LibreOffice and save it as .xlsx")
+_DAMAGED = message("damaged_workbook", "damaged: open it in Excel or LibreOffice and save it again")
+_HUGE = message(
+    "delete_formatted_rows",
+    "delete the empty rows and columns that are formatted below and beside the data, or hand in "
+    "a folder with CSV files",
+)
+_MACROS = message("holds_macros", "holds macros; save it as .xlsx (a workbook without macros)")
+_LINKS = message(
+    "holds_links",
+    "holds links to other workbooks; put values in place of those formulas (in Excel: Data, Edit "
+    "Links, Break Link) and save it again",
+)
+_CONNECTIONS = message(
+    "holds_connections", "holds connections to data elsewhere; remove them and save it again"
 )
 # beginnings of names of parts, in small letters, and what a file with such a part is
 _REFUSED_PARTS = {
-    "xl/vbaproject": "holds macros; save it as .xlsx (a workbook without macros)",
-    "xl/macrosheets/": "holds macros; save it as .xlsx (a workbook without macros)",
-    "xl/externallinks/": "holds links to other workbooks; put values in place of those formulas"
-    " (in Excel: Data, Edit Links, Break Link) and save it again",
-    "xl/connections": "holds connections to data elsewhere; remove them and save it again",
-    "xl/querytables/": "holds connections to data elsewhere; remove them and save it again",
-    "xl/embeddings/": "holds embedded files; remove them and save it again",
-    "xl/activex/": "holds controls (ActiveX); remove them and save it again",
-    "xl/workbook.bin": f"a binary workbook (.xlsb); {_SAVE_AGAIN}",
+    "xl/vbaproject": _MACROS,
+    "xl/macrosheets/": _MACROS,
+    "xl/externallinks/": _LINKS,
+    "xl/connections": _CONNECTIONS,
+    "xl/querytables/": _CONNECTIONS,
+    "xl/embeddings/": message(
+        "holds_embedded_files", "holds embedded files; remove them and save it again"
+    ),
+    "xl/activex/": message(
+        "holds_controls", "holds controls (ActiveX); remove them and save it again"
+    ),
+    "xl/workbook.bin": message(
+        "is_xlsb", "a binary workbook (.xlsb); {save_again}", save_again=_SAVE_AGAIN
+    ),
 }
 
 
@@ -52,7 +69,10 @@ def open_archive(data):
     """ZipFile of the bytes of a workbook. Raises Unreadable."""
     if data.startswith(_OLE):
         raise Unreadable(
-            "an old .xls or a workbook with a password; save it as .xlsx without password"
+            message(
+                "is_old_xls",
+                "an old .xls or a workbook with a password; save it as .xlsx without password",
+            )
         )
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
@@ -62,7 +82,13 @@ def open_archive(data):
     except Unreadable:
         raise
     except Exception:  # zipfile and zlib raise whatever a damaged part happens to trip over
-        raise Unreadable(f"{_NOT_A_WORKBOOK}, or damaged") from None
+        raise Unreadable(
+            message(
+                "not_a_workbook_or_damaged",
+                "{not_a_workbook}, or damaged",
+                not_a_workbook=_NOT_A_WORKBOOK,
+            )
+        ) from None
     return archive
 
 
@@ -84,27 +110,53 @@ def without_blanks(chunk):
 def _refuse_directory(members, packed_bytes):
     unpacked = sum(member.file_size for member in members)
     if len(members) > MAX_MEMBERS:
-        raise Unreadable(f"{len(members)} parts inside, expected at most {MAX_MEMBERS}")
+        raise Unreadable(
+            message(
+                "too_many_parts",
+                "{count} parts inside, expected at most {most}",
+                count=len(members),
+                most=MAX_MEMBERS,
+            )
+        )
     if unpacked > MAX_UNPACKED_BYTES:
         raise Unreadable(
-            f"unpacks to {unpacked / 1e6:.0f} MB, expected at most {MAX_UNPACKED_BYTES / 1e6:.0f}"
-            f" MB: {_HUGE}"
+            message(
+                "unpacks_too_large",
+                "unpacks to {unpacked:.0f} MB, expected at most {most:.0f} MB: {huge}",
+                unpacked=unpacked / 1e6,
+                most=MAX_UNPACKED_BYTES / 1e6,
+                huge=_HUGE,
+            )
         )
     if unpacked > RATIO_FROM_BYTES and unpacked > MAX_RATIO * packed_bytes:
         raise Unreadable(
-            f"unpacks to more than {MAX_RATIO} times its size, which no workbook of a job does"
+            message(
+                "unpacks_too_often",
+                "unpacks to more than {most} times its size, which no workbook of a job does",
+                most=MAX_RATIO,
+            )
         )
     usual = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
     if any(member.flag_bits & 1 or member.compress_type not in usual for member in members):
-        raise Unreadable(f"packed in an unusual way; {_SAVE_AGAIN}")
+        raise Unreadable(
+            message(
+                "packed_unusually", "packed in an unusual way; {save_again}", save_again=_SAVE_AGAIN
+            )
+        )
     if len({member.filename for member in members}) < len(members):
-        raise Unreadable(f"holds the same part twice; {_SAVE_AGAIN}")
+        raise Unreadable(
+            message(
+                "same_part_twice", "holds the same part twice; {save_again}", save_again=_SAVE_AGAIN
+            )
+        )
 
 
 def _refuse_kind(archive):
     names = archive.namelist()
     if "mimetype" in names and b"opendocument" in archive.read("mimetype")[:100]:
-        raise Unreadable(f"an OpenDocument file (.ods); {_SAVE_AGAIN}")
+        raise Unreadable(
+            message("is_ods", "an OpenDocument file (.ods); {save_again}", save_again=_SAVE_AGAIN)
+        )
     for name in names:
         for beginning, reason in _REFUSED_PARTS.items():
             if name.lower().startswith(beginning):
@@ -126,15 +178,32 @@ def _refuse_content(archive):
             if b"<!DOCTYPE" in joined or b"<!ENTITY" in joined or b"\0" in chunk:
                 raise _foreign_declarations()
             if len(chunk) == CHUNK_BYTES and b">" not in chunk:
-                raise Unreadable(f"holds a text of more than a million characters; {_SAVE_AGAIN}")
+                raise Unreadable(
+                    message(
+                        "text_too_long",
+                        "holds a text of more than a million characters; {save_again}",
+                        save_again=_SAVE_AGAIN,
+                    )
+                )
             tags += without_blanks(chunk).count(b"<")
             if tags > MAX_TAGS:
-                raise Unreadable(f"holds more cells than a job needs: {_HUGE}")
+                raise Unreadable(
+                    message(
+                        "too_many_cells_in_workbook",
+                        "holds more cells than a job needs: {huge}",
+                        huge=_HUGE,
+                    )
+                )
             before = chunk
 
 
 def _foreign_declarations():
-    return Unreadable("holds XML declarations that no workbook needs (DOCTYPE, ENTITY, encoding)")
+    return Unreadable(
+        message(
+            "xml_declarations",
+            "holds XML declarations that no workbook needs (DOCTYPE, ENTITY, encoding)",
+        )
+    )
 
 
 def _is_disguised(start):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from tankcal.job.excel.archive import damaged
 from tankcal.job.excel.markup import parse
 from tankcal.job.tables import BadCell, Percent, shown
+from tankcal.messages import message
 
 _ESCAPED = re.compile(r"_x([0-9A-Fa-f]{4})_")
 _NOT_SHOWN = re.compile(r'"[^"]*"|\\.|\[[^\]]*\]')  # within a number format
@@ -19,7 +20,12 @@ def uncalculated():
 
     It looks blank; without this an optional cell would count as not given.
     """
-    return BadCell("a formula without its result; open the workbook in Excel or LibreOffice, save")
+    return BadCell(
+        message(
+            "not_calculated",
+            "a formula without its result; open the workbook in Excel or LibreOffice, save",
+        )
+    )
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,7 @@ class Values:
         if kind == "b":
             return content.strip() in ("1", "true")
         if kind == "e":
-            return BadCell(f"the cell shows {shown(content)}")
+            return BadCell(message("cell_shows", "the cell shows {found}", found=shown(content)))
         if kind == "d":
             return _iso_date(content)
         raise damaged()
@@ -66,7 +72,13 @@ class Values:
         try:
             return from_excel(value, self.epoch, timedelta=shown_as == DURATION)
         except (OverflowError, ValueError):
-            return BadCell(f"the cell shows {value:g} as a date, and there is no such day")
+            return BadCell(
+                message(
+                    "no_such_day",
+                    "the cell shows {value:g} as a date, and there is no such day",
+                    value=value,
+                )
+            )
 
 
 def _iso_date(content):

@@ -8,6 +8,7 @@ from tankcal.job.excel.archive import Unreadable, damaged
 from tankcal.job.excel.markup import parse
 from tankcal.job.excel.values import uncalculated
 from tankcal.job.tables import shown
+from tankcal.messages import message
 
 MAX_COLUMNS = 100
 MAX_ROWS = 100_000  # that are not blank
@@ -104,8 +105,12 @@ class _Cells:
         if row is None:
             if len(self.rows) == MAX_ROWS:
                 raise Unreadable(
-                    f"more than {MAX_ROWS} rows in sheet {shown(self.title)}; hand in a folder with"
-                    " CSV files"
+                    message(
+                        "too_many_rows",
+                        "more than {most} rows in sheet {found}; hand in a folder with CSV files",
+                        most=MAX_ROWS,
+                        found=shown(self.title),
+                    )
                 )
             row = self.rows[self.row_number] = []
         place = min(self.column, MAX_COLUMNS + 1)

@@ -1,0 +1,59 @@
+"""The language that a job asks for, found before all else, so that its problems are told in it."""
+
+from pathlib import Path
+
+from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
+from tankcal.job.folder import MAX_SETTINGS_BYTES, parsed_toml
+from tankcal.job.grids import table_rows
+from tankcal.job.sheets import KEY, SECTION, SETTINGS_SHEET, VALUE
+from tankcal.job.tables import SETTINGS_FILE, Log, read_bytes
+from tankcal.languages import DEFAULT, LANGUAGES, nearest_language
+from tankcal.words import load_words
+
+
+def asked_language(path):
+    """The language of a job as `load` takes it, or None where none can be read.
+
+    Nothing is told: what is wrong with the job, `load` says.
+    """
+    path, log = Path(path), Log()
+    try:
+        if path.suffix.lower() == ".xlsx":
+            given = _in_workbook(path, log)
+        else:
+            given = _in_settings(path / SETTINGS_FILE if path.is_dir() else path, log)
+    except (OSError, ValueError, Unreadable):
+        return None
+    return nearest_language(given)
+
+
+def _in_settings(path, log):
+    data = read_bytes(path, log, MAX_SETTINGS_BYTES)
+    parsed = None if data is None else parsed_toml(path.name, data, log)
+    section = {} if parsed is None else parsed[0].get("table")
+    return section.get("language") if isinstance(section, dict) else None
+
+
+def _in_workbook(path, log):
+    data = read_bytes(path, log, MAX_FILE_BYTES)
+    if data is None:
+        return None
+    for sheet in read_sheets(data, lambda title: title.strip().lower() == SETTINGS_SHEET):
+        rows, _ = table_rows(sheet.title, sheet.grid, log)
+        headings = rows[0][1] if rows else []
+        if {SECTION, KEY, VALUE} <= {one for one in headings if isinstance(one, str)}:
+            place = [headings.index(one) for one in (SECTION, KEY, VALUE)]
+            for _, cells in rows[1:]:
+                section, key, value = (cells[position] for position in place)
+                if (section, key) == ("table", "language"):
+                    return value if nearest_language(value) else _of_form(cells)
+    return None
+
+
+def _of_form(cells):
+    """The language that a form explains the key in."""
+    for language in LANGUAGES:
+        notes = load_words(language)["input"].get("notes", {})
+        if language != DEFAULT and notes["keys"]["table.language"] in cells:
+            return language
+    return None

@@ -1,0 +1,98 @@
+"""The words that forms in Portuguese and Spanish have for choices and for yes and no.
+
+A form may hold them in place of the English ones. The first word is the one that a form offers.
+"""
+
+import unicodedata
+
+YES, NO = "true", "false"
+FORM_WORDS = {
+    "pt-BR": {
+        YES: ("sim", "verdadeiro"),
+        NO: ("não", "falso"),
+        "outside": ("fora", "por fora", "externo", "exterior"),
+        "inside": ("dentro", "por dentro", "interno", "interior"),
+        "sphere": ("esfera", "esférico"),
+        "mesh": ("malha",),
+        "flat": ("plano",),
+        "leaning": ("inclinado",),
+        "cone": ("cone", "cônico"),
+        "dish": ("calota",),
+        "points": ("pontos",),
+        "liquid": ("líquido",),
+        "conical": ("cônico",),
+        "ellipsoidal": ("elipsoidal", "elíptico", "semielíptico"),
+        "torispherical": ("torisférico",),
+        "spherical": ("esférico",),
+        "plumb": ("prumo", "a prumo", "vertical"),
+        "square": ("esquadro", "perpendicular"),
+        "air": ("ar", "no ar"),
+        "vacuum": ("vácuo", "no vácuo"),
+        "standard": ("padrão", "incerteza-padrão"),
+        "expanded": ("expandida",),
+        "half_width": ("semiamplitude", "semilargura"),
+        "rectangular": ("retangular",),
+        "adjust": ("ajustar",),
+        "check": ("verificar",),
+        "spatial": ("espacial", "inclinada"),
+        "control": ("apoio",),
+        "fixed_photo": ("foto fixa",),
+        "minimal": ("mínimo", "mínimas"),
+        "inner": ("interno", "internas", "livre"),
+    },
+    "es": {
+        YES: ("sí", "verdadero"),
+        NO: ("no", "falso"),
+        "outside": ("fuera", "por fuera", "externo", "exterior"),
+        "inside": ("dentro", "por dentro", "interno", "interior"),
+        "sphere": ("esfera", "esférico"),
+        "mesh": ("malla",),
+        "flat": ("plano",),
+        "leaning": ("inclinado",),
+        "cone": ("cono", "cónico"),
+        "dish": ("casquete",),
+        "points": ("puntos",),
+        "liquid": ("líquido",),
+        "conical": ("cónico",),
+        "ellipsoidal": ("elipsoidal", "elíptico", "semielíptico"),
+        "torispherical": ("torisférico",),
+        "spherical": ("esférico",),
+        "plumb": ("plomada", "a plomo", "vertical"),
+        "square": ("escuadra", "perpendicular"),
+        "air": ("aire", "en aire"),
+        "vacuum": ("vacío", "en vacío"),
+        "standard": ("estándar", "típica"),
+        "expanded": ("expandida",),
+        "half_width": ("semiamplitud",),
+        "rectangular": ("rectangular",),
+        "adjust": ("ajustar",),
+        "check": ("comprobar",),
+        "spatial": ("espacial", "inclinada"),
+        "control": ("control", "apoyo"),
+        "fixed_photo": ("foto fija",),
+        "minimal": ("mínimo", "mínimas"),
+        "inner": ("interno", "internas", "libre"),
+    },
+}
+
+
+def word_of(language, choice):
+    """How a form in this language calls a choice; as it is where it has no word of its own."""
+    return FORM_WORDS.get(language, {}).get(choice, (choice,))[0]
+
+
+def meant(word, choices):
+    """The one of the choices that a word of any form means, or None: none of them, or several."""
+    plain = _plain(word)
+    found = {
+        choice
+        for words in FORM_WORDS.values()
+        for choice in choices
+        if plain in map(_plain, words.get(choice, ()))
+    }
+    return found.pop() if len(found) == 1 else None
+
+
+def _plain(word):
+    letters = unicodedata.normalize("NFKD", word.strip().lower().replace("_", " "))
+    return "".join(letter for letter in letters if not unicodedata.combining(letter))
