@@ -22,8 +22,8 @@ from tankcal.errors import HeightError, InputError, Problem, SolutionError
 from tankcal.job import Job
 from tankcal.job.tables import in_book
 from tankcal.meshes import parse_mesh
-from tankcal.plausibility import refuse_other_side
 from tankcal.messages import message
+from tankcal.plausibility import refuse_other_side
 from tankcal.rules import RuleVerdict
 from tankcal.scan import Scan, scanned
 from tankcal.service import shell_factor, shell_temperature_c

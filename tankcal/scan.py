@@ -8,8 +8,8 @@ from tankcal.body import Factor, survey_factors
 from tankcal.cylinders import lying_cylinder
 from tankcal.doubts import noise_is_estimated, origin_of
 from tankcal.errors import InputError, Problem, SolutionError
-from tankcal.plausibility import refuse_misfit
 from tankcal.messages import message
+from tankcal.plausibility import refuse_misfit
 from tankcal.primitives import fit_sphere
 from tankcal.sections import covariance_of
 

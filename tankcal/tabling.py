@@ -18,9 +18,9 @@ from tankcal.dips import (
     table_heights,
 )
 from tankcal.doubts import against_nominal, not_in_u
+from tankcal.messages import message
 from tankcal.plausibility import doubts_of_mesh, doubts_of_scan, doubts_of_wall
 from tankcal.scan import Scan
-from tankcal.messages import message
 from tankcal.tanks import body_of, critical_zone, zero_height
 from tankcal.wall import Wall, warnings_of
 
