@@ -15,6 +15,7 @@ from tankcal.volumes import ShellVolume
 
 OWN_SCALE = "instrument_scale"  # kind of a cause that stands for the input "scale"
 MEASURED = ("diameter", "length", "end_depth", "dip_position", "plate_thickness")  # at its warmth
+ROUNDED_M = 0.001  # that the last dip of a table, a whole millimetre, stands above the top at most
 LEVELS = 9  # from empty to full, at which inputs are asked whether they move the volume
 LEAST_SHARE = 1e-6  # rounding of the share that a named cause has in the covariance
 
@@ -232,16 +233,34 @@ class Body:
         return next((part for part in inner if isinstance(part, ShellPart)), None)
 
     def volume_m3(self, levels_m):
-        """(rows,) volume below each level."""
-        return sum(part.volume_m3(levels_m) for part in self.parts)
+        """(rows,) volume below each level.
+
+        Above its top, where the last whole millimetre of a dip may stand, the tank goes on as wide
+        as it is there: a closed one not at all. Raises HeightError for levels farther off.
+        """
+        inside = self._inside(levels_m)
+        volume = sum(part.volume_m3(inside) for part in self.parts)
+        over = np.asarray(levels_m, dtype=float) - inside
+        if not np.any(over):
+            return volume
+        top = np.array([self.highest_m])
+        return volume + over * sum(part.area_m2(top) for part in self.parts)
 
     def area_m2(self, levels_m):
         """(rows,) derivative of the volume by the level: the free surface."""
+        levels_m = self._inside(levels_m)
         return sum(part.area_m2(levels_m) for part in self.parts)
 
     def derivatives(self, levels_m):
         """{input: (rows,) or (rows, c)} of all parts together, m3 per SI unit."""
+        levels_m = self._inside(levels_m)
         return summed(part.derivatives(levels_m) for part in self.parts)
+
+    def _inside(self, levels_m):
+        """The levels; the top for those less than a millimetre above it."""
+        levels = np.asarray(levels_m, dtype=float)
+        over = (levels > self.highest_m) & (levels < self.highest_m + ROUNDED_M)
+        return np.where(over, self.highest_m, levels)
 
     def moved_m3(self, levels_m, step_m):
         """(rows,) volumes when the table's zero stands step_m higher, a number or (rows,).
@@ -281,7 +300,7 @@ class Body:
 
     def sources(self, levels_m):
         """One `Source` for each cause of uncertainty: the parts' own, then what was declared."""
-        return self._sources(levels_m, self.derivatives(levels_m))
+        return self._sources(self._inside(levels_m), self.derivatives(levels_m))
 
     def rows(self, levels_m):
         """(volumes, areas, sources) of a table, each as its own method gives it, at one go.
@@ -289,14 +308,15 @@ class Body:
         The derivative by "datum" is that by the level, so it serves as the area, too; not that of
         a part that counts from a level up, which goes with the zero.
         """
-        derivatives = [part.derivatives(levels_m) for part in self.parts]
+        inside = self._inside(levels_m)
+        derivatives = [part.derivatives(inside) for part in self.parts]
         area = sum(
             found["datum"]
             if "datum" in found and not isinstance(part, Above)
-            else part.area_m2(levels_m)
+            else part.area_m2(inside)
             for part, found in zip(self.parts, derivatives, strict=True)
         )
-        return self.volume_m3(levels_m), area, self._sources(levels_m, summed(derivatives))
+        return self.volume_m3(levels_m), area, self._sources(inside, summed(derivatives))
 
     def _sources(self, levels_m, derivatives):
         own = [source for part in self.parts for source in part.sources(levels_m)]

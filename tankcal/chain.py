@@ -19,6 +19,7 @@ from tankcal.dips import Dips, ProportionalParts, Straightness, proportional_par
 from tankcal.display import table_html, volume_text
 from tankcal.doubts import incomplete_certificate, of_adjustment, refuse_undetermined
 from tankcal.errors import HeightError, InputError, Problem, SolutionError
+from tankcal.falling import refuse_falling
 from tankcal.job import Job
 from tankcal.job.tables import in_book
 from tankcal.meshes import parse_mesh
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MILLIMETRE, PARTS = 0.001, 10  # of a step of the tables that proportional parts are for
+PARTS_OF_U, PARTS_M3 = 0.05, 0.0005  # error of proportional parts: a share of U, or half a litre
+VAST_M3 = 1e12  # stands for a U without end
 TOLD = 10  # warnings of the adjustment that are told when there is no wall
 
 
@@ -262,9 +265,9 @@ def _run(job, tell, counting, simulated):
         zero_m=zero,
         table=table,
         straightness=made.straightness,
-        proportional_parts=() if wall is None else _parts(job.table, made),
-        corrections=corrections_of(job, survey),
-        by_density=_by_density(job, survey, made.levels_m),
+        proportional_parts=() if wall is None else _parts(job.table, made, intervals.U_m3),
+        corrections=corrections_of(job, survey, made.over_m),
+        by_density=_by_density(job, survey, made.levels_m, zero),
         stated=stated,
         simulation=simulation,
         intervals=intervals,
@@ -359,19 +362,28 @@ def _survey(job, tell, dof):
     return None
 
 
-def _parts(spec, made):
+def _parts(spec, made, U_m3):
+    """Proportional parts of a centimetre table where their error is a small part of U."""
     if spec.step_m is None or abs(spec.step_m - PARTS * MILLIMETRE) > 1e-9:
         return ()
-    edges = [0.0, *made.kinks_m, made.top_m]
-    return proportional_parts(made.volume_m3, edges, spec.step_m, PARTS)
+    edges = np.unique(np.round([0.0, *made.kinks_m, made.top_m], 3))
+    allowed = np.maximum(PARTS_OF_U * np.minimum(U_m3, VAST_M3), PARTS_M3)
+
+    def bound_m3(dips_m):
+        return np.interp(dips_m, made.table.height_m, allowed)
+
+    return proportional_parts(made.volume_m3, edges, spec.step_m, PARTS, bound_m3)
 
 
-def _by_density(job, survey, levels):
+def _by_density(job, survey, levels, zero_m):
     """The same rows for each further density of the liquid: another head, another draught."""
-    return {
-        density: body_of(_filled_with(job, density), survey, uncertain=False).volume_m3(levels)
-        for density in job.table.other_densities_kg_m3
-    }
+    found = {}
+    for density in job.table.other_densities_kg_m3:
+        filled = _filled_with(job, density)
+        body = body_of(filled, survey, uncertain=False)
+        found[density] = body.volume_m3(levels)
+        refuse_falling(filled, body, zero_m, levels - zero_m, found[density])
+    return found
 
 
 def _filled_with(job, density):

@@ -31,14 +31,16 @@ class Correction:
     source: str
 
 
-def corrections_of(job, survey):
+def corrections_of(job, survey, over_m=0.0):
     """Every correction that bears on the job, in the order in which they are made.
+
+    over_m  how far the top row, a whole millimetre, stands above the top of the tank
 
     Each size is that of the tank with this correction and those before it, less the tank without
     it. The tilt is in the surveyed sections already: its size is what a cut square to the axis
     would lack.
     """
-    made, volume = NONE, _at_top(job, survey, NONE)
+    made, volume = NONE, _at_top(job, survey, NONE, over_m)
     found = []
     reference = volume
     for code, bears, formula, source in _known(job, survey):
@@ -47,7 +49,7 @@ def corrections_of(job, survey):
         if code == "tilt":
             found.append(_tilt(job, survey, reference, formula, source))
             continue
-        with_it = _at_top(job, survey, replace(made, **{code: True}))
+        with_it = _at_top(job, survey, replace(made, **{code: True}), over_m)
         size = with_it - volume
         on = getattr(job.switches, code)
         if on:
@@ -56,9 +58,9 @@ def corrections_of(job, survey):
     return tuple(found)
 
 
-def _at_top(job, survey, switches):
+def _at_top(job, survey, switches, over_m):
     body = body_of(job, survey, switches, uncertain=False)
-    return float(body.volume_m3(np.array([body.highest_m]))[0])
+    return float(body.volume_m3(np.array([body.highest_m + over_m]))[0])
 
 
 def _tilt(job, wall, volume, formula, source):

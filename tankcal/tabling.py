@@ -16,13 +16,17 @@ from tankcal.dips import (
     choose_rows,
     interpolation_errors,
     table_heights,
+    whole_top,
 )
 from tankcal.doubts import against_nominal, not_in_u
+from tankcal.falling import refuse_falling
 from tankcal.messages import message
 from tankcal.plausibility import doubts_of_mesh, doubts_of_scan, doubts_of_wall
 from tankcal.scan import Scan
 from tankcal.tanks import body_of, critical_zone, zero_height
 from tankcal.wall import Wall, warnings_of
+
+CLOSED = 1e-3  # of its largest free surface: one that is smaller at the top counts as none
 
 
 @dataclass(frozen=True)
@@ -46,8 +50,13 @@ class Tabled:
 
     @property
     def top_m(self):
-        """Dip of the full tank."""
-        return self.body.highest_m - self.zero_m
+        """Dip of the last row: that of the full tank as a whole millimetre."""
+        return float(self.table.height_m[-1])
+
+    @property
+    def over_m(self):
+        """How far the last row stands above the top of the tank; below 0: below it."""
+        return float(self.levels_m[-1] - self.body.highest_m)
 
     def volume_m3(self, dips_m):
         """(n,) exact volumes at dips."""
@@ -64,20 +73,23 @@ def tabled(job, survey, tell=lambda text: None):
     body = body_of(job, survey)
     zero = zero_height(job, survey)
     tell(message("propagating", "propagating the covariance to every row of the table"))
-    top = body.highest_m - zero
+    spec = job.table
+    top = whole_top(body.highest_m - zero, spec.height_unit, closed=_is_closed(body))
     kinks = np.unique([kink - zero for kink in body.kinks_m if 0 < kink - zero < top])
     exact = _exact(body, zero)
-    heights = _rows(job.table, exact, top, kinks)
-    levels = _levels(heights, zero, body)
+    heights = _rows(spec, exact, top, kinks)
+    levels = heights + zero
     volumes, areas, sources = body.rows(levels)
     table = Capacity(
         height_m=heights,
         volume_m3=volumes,
         area_m2=areas,
         sources=sources,
-        probability=job.table.coverage_probability,
+        probability=spec.coverage_probability,
         critical_m=critical_zone(job),
     )
+    dips = np.union1d(heights, kinks)
+    refuse_falling(job, body, zero, dips, exact(dips))
     straightness = interpolation_errors(exact, heights, kinks)
     return Tabled(body, zero, levels, kinks, table, straightness)
 
@@ -101,12 +113,14 @@ def _doubts_of_survey(job, survey, top_m):
 
 def _exact(body, zero_m):
     """Function from dips to exact volumes."""
-    return lambda dips_m: body.volume_m3(_levels(dips_m, zero_m, body))
+    return lambda dips_m: body.volume_m3(dips_m + zero_m)
 
 
-def _levels(heights_m, zero_m, body):
-    """Levels of dips in the frame of the parts; the top is the top, whatever its last bit is."""
-    return np.minimum(heights_m + zero_m, body.highest_m)
+def _is_closed(body):
+    """Whether a tank narrows to nothing at its top, as a sphere or a lying cylinder does."""
+    span = np.linspace(body.lowest_m, body.highest_m, 9)
+    areas = body.area_m2(span)
+    return bool(areas[-1] < CLOSED * areas.max())
 
 
 def _rows(spec, exact, top_m, kinks_m):

@@ -1,6 +1,7 @@
 """Rows, units, straight lines between rows, proportional parts and the way back from a volume."""
 
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from tankcal.dips import (
     ullage_m,
     volume_from_m3,
     volume_to_m3,
+    whole_top,
 )
 from tankcal.dips.straightness import INCH_STEPS_M, LADDERS_M, METRIC_STEPS_M
 from tankcal.errors import HeightError, InputError
@@ -356,6 +358,59 @@ def test_parts_of_inches_and_edges_that_are_refused():
     assert len(found.part_m3) == 7
     with pytest.raises(HeightError, match="ascending"):
         proportional_parts(lying, [0.0, 2.0, 1.0])
+
+
+def cone_and_shell(h, depth=0.25, radius=6.5):
+    """Closed form: a cone of that depth under a cylinder, filled from its tip."""
+    h = np.asarray(h, dtype=float)
+    cone = np.pi * radius**2 / (3 * depth**2) * np.minimum(h, depth) ** 3
+    return cone + np.pi * radius**2 * np.maximum(h - depth, 0.0)
+
+
+def test_parts_of_a_cone_keep_their_bound_or_are_not_given():
+    """The mean of the whole stretch would be off by 2.5 m3; no printed part is, by more than 2 L.
+
+    Second method: every millimetre of every zone, row plus part, against the closed form.
+    """
+    (whole,) = proportional_parts(cone_and_shell, [0.0, 9.75])
+    assert abs(whole.deviation_m3) > 0.5
+    zones = proportional_parts(
+        cone_and_shell, [0.0, 0.25, 9.75], bound_m3=lambda dips: np.full(len(dips), 0.002)
+    )
+    assert (zones[-1].bottom_m, zones[-1].top_m) == (0.25, 9.75)
+    assert all(zone.top_m - zone.bottom_m >= 0.0999 for zone in zones)
+    for zone in zones:
+        marks = np.arange(round(1000 * zone.bottom_m), round(1000 * zone.top_m) + 1)
+        rows, part = marks // 10 / 100, np.insert(zone.part_m3, 0, 0.0)[marks % 10]
+        assert np.abs(cone_and_shell(rows) + part - cone_and_shell(marks / 1000)).max() < 0.002
+
+
+def test_a_stretch_is_cut_into_the_longest_zones_that_keep_the_bound():
+    """Property: zones of a widening tank meet, and each one row longer would break the bound."""
+
+    def widening(h):
+        return 100 * h + 0.5 * np.asarray(h) ** 2
+
+    def bound(dips):
+        return np.full(len(dips), 0.005)
+
+    zones = proportional_parts(widening, [0.0, 10.0], bound_m3=bound)
+    assert zones[0].bottom_m == 0.0
+    assert len(zones) > 3
+    for zone, above in pairwise(zones):
+        assert zone.top_m == above.bottom_m
+        assert abs(zone.deviation_m3) <= 0.005
+        (longer,) = proportional_parts(widening, [zone.bottom_m, zone.top_m + 0.01])
+        assert abs(longer.deviation_m3) > 0.005
+
+
+def test_the_top_of_a_table_is_a_mark_of_the_tape():
+    assert whole_top(9.49996) == 9.5
+    assert whole_top(9.4994) == 9.499
+    assert whole_top(2.9994, closed=True) == whole_top(3.0, closed=True) == 3.0
+    assert whole_top(2.9991, "m", closed=True) == 3.0  # full from there on
+    assert whole_top(9.14396, "ft-in-8") == pytest.approx(9.144, abs=1e-12)  # 30 ft
+    assert whole_top(9.5004, "ft-in-16") == 9.5004  # no mark within half a millimetre
 
 
 # ullage and the dip of a volume

@@ -1,6 +1,7 @@
 """The shipped example: the published circles come back from the reconstructed points."""
 
 import csv
+import json
 import shutil
 import subprocess
 import sys
@@ -8,6 +9,10 @@ import sys
 import numpy as np
 import pytest
 from conftest import EXAMPLE
+
+from tankcal.linter import lint
+from tankcal.outputs.tables import write_tables
+from tankcal.workbook import write as write_workbook
 
 
 def published(name):
@@ -74,3 +79,14 @@ def test_what_is_invented_is_listed():
     text = (EXAMPLE / "README.md").read_text(encoding="utf-8")
     for word in ("sign of each", "heights of the sections", "courses", "plates", "temperatures"):
         assert word in text
+
+
+def test_the_linter_finds_nothing_in_the_tables_that_are_handed_out(example_record, tmp_path):
+    """Rows in steps up to the top: the last one, too, is what the others make expected."""
+    record = json.loads(example_record.read_text(encoding="utf-8"))
+    write_tables(record, tmp_path)
+    write_workbook(record, tmp_path / "capacity.xlsx")
+    for name in ("capacity.csv", "capacity.xlsx"):
+        report = lint(tmp_path / name)
+        assert [str(one) for one in report.findings] == []
+        assert "to 9.5 m" in report.summaries[0]

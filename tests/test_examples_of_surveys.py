@@ -14,6 +14,10 @@ from conftest import EXAMPLE
 
 import tankcal
 from tankcal.camera import PARAMETERS
+from tankcal.linter import lint
+from tankcal.outputs.tables import write_tables
+from tankcal.record import record_of
+from tankcal.workbook import write as write_workbook
 
 PHOTOS, STATIONS = EXAMPLE.parent / "silva-1995-photos", EXAMPLE.parent / "total-station"
 EXAMPLES = {"photos": PHOTOS, "stations": STATIONS}
@@ -246,3 +250,11 @@ def test_the_script_writes_the_same_tables_again(folder, tmp_path):
             path.unlink()
     subprocess.run([sys.executable, here / "simulate.py"], check=True)
     assert {path: path.read_bytes() for path in before} == before
+
+
+def test_the_linter_finds_nothing_in_the_tables_that_are_handed_out(one, tmp_path):
+    record = record_of(one[1])
+    write_tables(record, tmp_path)
+    write_workbook(record, tmp_path / "capacity.xlsx")
+    for name in ("capacity.csv", "capacity.xlsx"):
+        assert [str(found) for found in lint(tmp_path / name).findings] == []

@@ -290,6 +290,23 @@ def test_a_hollow_a_heap_and_a_turned_mesh():
     assert mesh_part(touching).volume_m3([1.0])[0] == pytest.approx(1.125)
 
 
+@pytest.mark.parametrize(("many", "bodies"), [(40, 40), (999, None)])
+def test_nested_hollows_are_told_apart_or_refused_at_once(many, bodies):
+    """Closed form: shells of alternating sign; of a thousand in one another nobody waits."""
+    sizes = 1 + np.arange(many) / many
+    nested = [
+        cube(low=(-size / 2,) * 3, size=size, inverted=bool((many - 1 - k) % 2))
+        for k, size in enumerate(sizes)
+    ]
+    if bodies is None:
+        with pytest.raises(InputError, match="boxes of 999 bodies meet one another 997002 times"):
+            closed_mesh(*together(*nested))
+        return
+    signs = (-1.0) ** (many - 1 - np.arange(many))
+    found = mesh_part(closed_mesh(*together(*nested)))
+    assert found.capacity_m3 == pytest.approx(np.sum(signs * sizes**3), rel=1e-12)
+
+
 def test_bars_that_cross_without_a_vertex_inside_are_counted_twice_as_documented():
     """The limit of the checks: two bars of 3 x 1 x 1 that share a unit cube hold 5 m3, not 6."""
     first, faces = cube()

@@ -12,6 +12,7 @@ from tankcal.chain import run
 from tankcal.circles import fit_circle
 from tankcal.errors import HeightError, InputError
 from tankcal.job import DeclaredInput
+from tankcal.record import record_of
 from tankcal.solids import End, LyingTank
 
 RADIUS, HEIGHT = 6.5, 9.5
@@ -217,6 +218,8 @@ def test_sections_square_to_the_axis_times_the_factor_give_the_same_table(tmp_pa
         radius = fit_circle(across, np.full(2 * len(across), 1e-6)).radius_m
         square.append(np.pi * radius**2 * np.hypot(1, slope))
     tops = np.cumsum([0.0] + [course.height_m * cos for course in job.courses])
+    assert found.table.height_m[-1] == pytest.approx(tops[-1], abs=5e-4)
+    tops[-1] = found.table.height_m[-1]  # a whole millimetre, the shell as wide as below it
     below = np.clip(found.table.height_m[:, None] - tops[:-1], 0, np.diff(tops))
     assert found.table.volume_m3 == pytest.approx(below @ square, rel=1e-6)
     percent = 100 * (1 - cos)
@@ -239,8 +242,12 @@ def test_heights_expand_only_where_it_is_asked_for(tmp_path):
     warm = {"survey.shell_temperature_c": -80.0 + 40.0, "table.height_expansion": True}
     found = inside_cylinder(tmp_path / "job", warm)
     stretch = 1 + 1.1e-5 * 60
-    assert found.table.height_m[-1] == pytest.approx(HEIGHT * stretch, rel=1e-12)
-    assert found.table.volume_m3[-1] == pytest.approx(PLAN * HEIGHT * stretch**3, rel=1e-6)
+    assert found.table.height_m[-1] == 9.506  # of 9.50627: whole millimetres
+    assert found.table.volume_m3[-1] == pytest.approx(PLAN * 9.506 * stretch**2, rel=1e-6)
+    assert found.body.highest_m == pytest.approx(HEIGHT * stretch, rel=1e-12)
+    assert found.body.volume_m3([found.body.highest_m]) == pytest.approx(
+        PLAN * HEIGHT * stretch**3, rel=1e-6
+    )
 
 
 # ---- the table
@@ -271,6 +278,53 @@ def test_proportional_parts_go_from_joint_to_joint(tmp_path):
         np.arange(5) * 1.9, abs=1e-9
     )
     assert found.proportional_parts[0].part_m3[4] == pytest.approx(0.005 * PLAN, rel=1e-6)
+
+
+def test_parts_over_a_cone_keep_to_a_small_part_of_u(tmp_path):
+    """Closed form of the cone: no mean of a zone is off by more than U / 20, or half a litre."""
+    settings = {
+        "bottom.form": "cone",
+        "bottom.centre_z_m": -0.25,
+        "datum.dip_plate_z_m": -0.25,
+    }
+    inputs = [("datum", 2, "mm")]
+    found = inside_cylinder(tmp_path / "job", settings, uncertainty=inputs)
+    zones, U = found.proportional_parts, found.intervals.U_m3
+    assert [zone.bottom_m for zone in zones[-5:]] == [0.25, 2.15, 4.05, 5.95, 7.85]
+    for zone in zones:
+        marks = np.arange(round(1000 * zone.bottom_m), round(1000 * zone.top_m) + 1)
+        part = np.insert(zone.part_m3, 0, 0.0)[marks % 10]
+        depth = np.array([marks // 10 / 100, marks / 1000])
+        rows, exact = PLAN * (
+            np.minimum(depth, 0.25) ** 3 / (3 * 0.25**2) + np.maximum(depth - 0.25, 0)
+        )
+        allowed = np.maximum(0.05 * np.interp(marks / 1000, found.table.height_m, U), 5e-4)
+        assert np.all(np.abs(rows + part - exact) <= allowed + 1e-4)
+
+
+def test_a_top_that_leans_is_the_nominal_one(tmp_path):
+    """9.5 m that lean by 3 mm/m reach 9.49996 m: 9.5 m to whoever measures it.
+
+    Closed form: the row is that of a shell that goes on as wide; the corrections lead to it.
+    """
+    found = inside_cylinder(tmp_path / "job", tilt=(0.003, 0.0), radius=lambda theta, z: RADIUS)
+    table, cut = found.table, PLAN * np.hypot(1.0, 0.003)
+    assert table.height_m[-1] == 9.5
+    assert found.straightness.largest_m3 < 1e-6
+    assert table.volume_m3[-1] - table.volume_m3[-2] == pytest.approx(0.01 * cut, rel=1e-4)
+    record = record_of(found)
+    net = record["gross"]["volume_m3"] + sum(
+        one["size_m3"] for one in record["corrections"] if one["code"] != "tilt"
+    )
+    assert net == pytest.approx(table.volume_m3[-1], abs=1e-6)
+
+
+def test_a_closed_tank_is_full_at_the_last_whole_millimetre(tmp_path):
+    """Closed form: the last row of a sphere of 11.9994 m is the whole sphere, at 12 m."""
+    settings = INSIDE | {"sphere.diameter_m": 11.9994}
+    found = result_of(tmp_path / "job", kind="sphere", settings=settings)
+    assert found.table.height_m[-1] == 12.0
+    assert found.table.volume_m3[-1] == pytest.approx(np.pi / 6 * 11.9994**3, rel=1e-12)
 
 
 def test_a_nominal_volume_far_off_is_warned_of(tmp_path):
@@ -317,7 +371,7 @@ def test_a_solid_expands_in_all_directions(tmp_path):
     settings = {**INSIDE, "survey.shell_temperature_c": 30.0}
     found = result_of(tmp_path / "job", kind="sphere", settings=settings)
     scale = 1 - 1.1e-5 * 10
-    assert found.table.height_m[-1] == pytest.approx(20 * scale, rel=1e-12)
+    assert found.table.height_m[-1] == 19.998  # of 19.9978: whole millimetres
     assert found.table.volume_m3[-1] == pytest.approx(np.pi * (20 * scale) ** 3 / 6, rel=1e-12)
 
 
@@ -459,3 +513,24 @@ def test_deadwood_and_a_dip_plate_in_a_lying_tank(tmp_path):
     assert found.table.volume_m3[0] == pytest.approx(bare.at(0.1).value_m3, rel=1e-12)  # the heel
     assert found.at(1.0).value_m3 == pytest.approx(bare.at(1.1).value_m3 - 0.1, rel=1e-12)
     assert sizes(found) == {"deadwood": pytest.approx(-0.2)}
+
+
+# ---- no table falls
+
+
+def test_no_table_that_falls_leaves_the_house(tmp_path):
+    """A slab of 4.1 m3 where 3 cm of the tank hold 3.98 m3, between two rows."""
+    deadwood = [("pipe", 1.0, 1.0, 0.02), ("slab", 0.5, 0.53, -4.1)]
+    with pytest.raises(InputError, match="falls from") as caught:
+        inside_cylinder(tmp_path / "job", {"table.step_m": 0.5}, deadwood=deadwood)
+    (problem,) = caught.value.problems
+    assert (problem.file, problem.column) == ("deadwood.csv", "volume_m3")
+    assert "deadwood slab" in problem.expected
+
+
+def test_no_table_of_another_density_falls(tmp_path):
+    """A roof that the table's liquid carries and a lighter one does not."""
+    settings = {"table.step_m": 0.1, "table.other_densities_kg_m3": [500.0]}
+    roof = {"mass_kg": 8000.0, "critical_bottom_m": 1.0, "critical_top_m": 1.1}
+    with pytest.raises(InputError, match="floating roof"):
+        inside_cylinder(tmp_path / "job", settings, roof=roof)

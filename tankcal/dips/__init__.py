@@ -1,18 +1,19 @@
 """Dips: the rows of a table, their labels and units, what lies between them, and the way back.
 
 units         volumes in m3, L and bbl; dips in metres or in feet and inches, as numbers and text
-rows          heights of the rows, rounding, proportional parts
+rows          heights of the rows, rounding
+parts         proportional parts: what the millimetres of a dip add to a row
 straightness  how far straight lines between rows are from the exact volume; the step that this asks
 reading       ullage, and the dip of a volume
 """
 
+from tankcal.dips.parts import ProportionalParts, proportional_parts
 from tankcal.dips.reading import Dips, dips_of, ullage_m
 from tankcal.dips.rows import (
     MOST_ROWS,
-    ProportionalParts,
-    proportional_parts,
     rounded,
     table_heights,
+    whole_top,
 )
 from tankcal.dips.straightness import (
     LADDERS_M,
@@ -54,4 +55,5 @@ __all__ = [
     "ullage_m",
     "volume_from_m3",
     "volume_to_m3",
+    "whole_top",
 ]

@@ -1,18 +1,18 @@
-"""Rows of a table: their heights, their rounding, and the parts for the digits between them.
+"""Rows of a table: their heights and their rounding.
 
 Dips are metres above the table's zero. Every row is computed from its own number, n * step, and
 rounded from its own exact volume: nothing is added up row by row.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from tankcal.dips.units import HEIGHT_STEPS_M
 from tankcal.errors import HeightError, InputError, Problem
 
 MOST_ROWS = 25_000
 _PER_METRE = 1_000_000_000  # steps and rows are whole nanometres, so that rows are exact decimals
 _LAST_STEP_M = 1e-6
+NEAR_MARK_M = 0.0005
 
 
 def table_heights(step_m, top_m, fine_step_m=None, fine_zones=()):
@@ -26,11 +26,11 @@ def table_heights(step_m, top_m, fine_step_m=None, fine_zones=()):
     a zone outside the table.
     """
     _check_steps(step_m, top_m, fine_step_m, fine_zones)
-    pieces = [_multiples(step_m, 0, int(np.floor(top_m / step_m + 1e-9)))]
+    pieces = [multiples_of(step_m, 0, int(np.floor(top_m / step_m + 1e-9)))]
     for low_m, high_m in fine_zones:
         first = int(np.floor(low_m / fine_step_m + 1e-9))
         last = int(np.ceil(min(high_m, top_m) / fine_step_m - 1e-9))
-        pieces.append(_multiples(fine_step_m, first, last))
+        pieces.append(multiples_of(fine_step_m, first, last))
     heights = np.unique(np.concatenate(pieces))
     heights = heights[heights <= top_m + 2e-9 * step_m]
     if top_m - heights[-1] > _LAST_STEP_M:
@@ -40,7 +40,26 @@ def table_heights(step_m, top_m, fine_step_m=None, fine_zones=()):
     return heights
 
 
-def _multiples(step_m, first, last):
+def whole_top(top_m, height_unit="m", *, closed=False):
+    """Dip of the last row of a table, m: a mark of the tape that stands for the top of the tank.
+
+    An open shell ends at the nearest whole millimetre, for 9.49996 m (9.5 m that lean) is 9.5 m
+    to everybody who measures it; a tank that closes at its top is full from the next one on. In
+    feet and inches the top is a mark when it is within half a millimetre of it, else as it is.
+
+    top_m  dip of the full tank; closed  whether it has no free surface there
+    """
+    step = float(HEIGHT_STEPS_M[height_unit])
+    if height_unit == "m" and closed:
+        number = np.ceil(top_m / step - _LAST_STEP_M / step)
+    else:
+        number = np.round(top_m / step)
+    mark = float(multiples_of(step, number, number)[0])
+    on_a_mark = height_unit == "m" or abs(mark - top_m) <= NEAR_MARK_M
+    return mark if number > 0 and on_a_mark else float(top_m)
+
+
+def multiples_of(step_m, first, last):
     """first * step, ..., last * step, each the nearest number to the exact product."""
     numbers = np.arange(first, last + 1, dtype=float)
     step = step_m * _PER_METRE
@@ -85,59 +104,3 @@ def rounded(values, decimals):
     Correct for the number as stored: 2.675, which is stored a little below, gives 2.67.
     """
     return np.array([round(float(value), decimals) for value in values])
-
-
-@dataclass(frozen=True)
-class ProportionalParts:
-    """Mean volumes of 1, 2, ... parts of a step between two heights (a course), and their price.
-
-    part_m3       (parts - 1,) to be added to the row below a dip
-    deviation_m3  largest, by size, of (row + part - exact volume), with its sign
-    at_m          the dip where it is
-    """
-
-    bottom_m: float
-    top_m: float
-    part_m3: np.ndarray
-    deviation_m3: float
-    at_m: float
-
-
-def proportional_parts(volume_m3, edges_m, row_step_m=0.01, parts=10):
-    """Tuple of `ProportionalParts`, one for each stretch between neighbouring edges.
-
-    part j = j / parts * row_step * (V(top) - V(bottom)) / (top - bottom)
-
-    volume_m3   function of (n,) dips, m, to (n,) volumes, m3
-    edges_m     (k + 1,) dips of bottom, joints and top, ascending
-    row_step_m  of the table; parts  of a step (10: millimetres of a cm table, 8: eighths of inches)
-    The deviation is taken at every mark between rows of the stretch, against the exact volume.
-    Raises HeightError for edges that do not ascend from 0 or higher.
-    """
-    edges = np.asarray(edges_m, dtype=float)
-    if len(edges) < 2 or edges[0] < 0 or not np.all(np.diff(edges) > 0):
-        raise HeightError(f"edges of courses {edges.tolist()}: expected ascending, from 0")
-    at_edges = volume_m3(edges)
-    return tuple(
-        _parts_of_stretch(volume_m3, edges[i : i + 2], at_edges[i : i + 2], row_step_m, parts)
-        for i in range(len(edges) - 1)
-    )
-
-
-def _parts_of_stretch(volume_m3, edges, at_edges, row_step_m, parts):
-    mark_m = row_step_m / parts
-    mean_m3 = mark_m * np.diff(at_edges)[0] / np.diff(edges)[0]
-    first, last = int(np.ceil(edges[0] / mark_m - 1e-9)), int(np.floor(edges[1] / mark_m + 1e-9))
-    number = np.arange(first, last + 1)
-    marks = np.clip(_multiples(mark_m, first, last), *edges)
-    rows = _multiples(row_step_m, 0, last // parts)[number // parts]
-    deviation = volume_m3(rows) + (number % parts) * mean_m3 - volume_m3(marks)
-    deviation = np.where(number % parts == 0, 0.0, deviation)
-    worst = int(np.argmax(np.abs(deviation))) if len(number) else None
-    return ProportionalParts(
-        bottom_m=float(edges[0]),
-        top_m=float(edges[1]),
-        part_m3=np.arange(1, parts) * mean_m3,
-        deviation_m3=0.0 if worst is None else float(deviation[worst]),
-        at_m=float(edges[0] if worst is None else marks[worst]),
-    )

@@ -160,7 +160,7 @@ def _trimmed(cells):
 
 def _without_heading(rows):
     body = [row for row in rows if all(has_digit(cell) for cell in row[1][:2]) and row[1][1:]]
-    if len(body) < 0.5 * len(rows):
+    if not body or len(body) < 0.5 * len(rows):
         return ()
     nothing = heading_of(None)
     pair = Pair(0, 1, replace(nothing, text="column 1"), replace(nothing, text="column 2"))

@@ -10,7 +10,11 @@ from tankcal.outlines import FULL_TURN
 
 SMALLEST_M, LARGEST_M = 0.05, 1000.0  # largest extent of a tank: beyond, the unit is wrong
 MOST_BODIES = 1000
-PROBES = 50  # vertices of a body that are tested for lying inside another
+MOST_PAIRS = 10_000  # of bodies, each seen from the other, whose boxes meet
+PROBES = 50  # vertices of a body that are tested for lying inside another, of few bodies
+FEWEST_PROBES = 4
+MOST_WINDINGS = 200_000_000  # of a face about a vertex, in all these tests: some twenty seconds
+AT_ONCE = 100_000
 ON_SURFACE = 1e-3  # a winding number this far from 0 and 1: the point is on the surface
 FLAT = 1e-12  # of the size: a body so thin holds nothing, a point so near lies on a face
 COARSE_M = 1e-4  # between neighbouring float32 numbers
@@ -22,11 +26,12 @@ def closed_mesh(vertices, faces, *, unit_m=1.0, name="mesh"):
 
     Checked: finite numbers; a believable size; every edge passed as often in one direction as in
     the other (closed, consistently oriented); no face twice; every body has a volume, and faces
-    outwards, or inwards when it is a hollow in another; no vertex (of 50) of a body inside another
-    that holds not all of it; a free surface that is nowhere negative. Repaired and noted: equal
-    vertices are one, faces without three corners go, a mesh that is inside out as a whole is
-    turned. Not checked: faces that cross without a vertex inside and leave the free surface
-    positive; such a mesh counts the volume that it encloses twice, twice.
+    outwards, or inwards when it is a hollow in another; no vertex (of 50, of 4 at least where there
+    are many bodies) of a body inside another that holds not all of it; a free surface that is
+    nowhere negative. Repaired and noted: equal vertices are one, faces without three corners go, a
+    mesh that is inside out as a whole is turned. Not checked: faces that cross without a vertex
+    inside and leave the free surface positive; such a mesh counts the volume that it encloses
+    twice, twice.
 
     vertices  (n, 3) x, y, z, z up, in units of unit_m metres
     faces     (m, 3) indices of corners
@@ -192,10 +197,14 @@ def _depths(vertices, faces, label, bodies, name):
     own = [vertices[np.unique(group)] for group in groups]
     low, high = np.array([v.min(axis=0) for v in own]), np.array([v.max(axis=0) for v in own])
     meet = np.all((low[:, None] <= high[None]) & (low[None] <= high[:, None]), axis=2)
-    for i, j in np.argwhere(meet & ~np.eye(bodies, dtype=bool)):
+    pairs = np.argwhere(meet & ~np.eye(bodies, dtype=bool))
+    some = _probes(pairs, [len(v) for v in own], [len(group) for group in groups], name)
+    for i, j in pairs:
         near = np.flatnonzero(np.all((own[i] >= low[j]) & (own[i] <= high[j]), axis=1))
-        probes = near[np.linspace(0, len(near) - 1, min(PROBES, len(near))).astype(int)]
-        turns = np.abs([_winding(own[i][probe], vertices[groups[j]]) for probe in probes])
+        if len(near) == 0:
+            continue
+        probes = near[np.linspace(0, len(near) - 1, min(some, len(near))).astype(int)]
+        turns = np.abs(_windings(own[i][probes], vertices[groups[j]]))
         inside = np.any(turns > 1 - ON_SURFACE)
         outside = np.any(turns < ON_SURFACE) or len(near) < len(own[i])
         if inside and outside:
@@ -205,17 +214,45 @@ def _depths(vertices, faces, label, bodies, name):
     return depth
 
 
-def _winding(point, corners):
-    """How often a closed surface (m, 3, 3) goes round a point (van Oosterom & Strackee 1983).
+def _probes(pairs, vertices, faces, name):
+    """How many vertices of a body are tested; InputError where even the fewest take too long."""
+    if len(pairs) > MOST_PAIRS:
+        raise problem(
+            name,
+            f"the boxes of {len(vertices)} bodies meet one another {len(pairs)} times; expected at "
+            f"most {MOST_PAIRS}: a shell, and what stands in it",
+        )
+    first, second = pairs.T
+    most, size = np.array(vertices)[first], np.array(faces, dtype=float)[second]
+    for some in (PROBES, 20, 10, FEWEST_PROBES):
+        if np.sum(size * np.minimum(some, most)) <= MOST_WINDINGS:
+            return some
+    raise problem(
+        name,
+        f"{sum(faces)} faces of {len(vertices)} bodies whose boxes meet {len(pairs)} times are too "
+        "many to tell which lies in which; expected fewer bodies, or fewer faces",
+    )
 
-    A face that the point lies on counts nothing: on a surface the result is a fraction.
+
+def _windings(points, corners):
+    """(n,) how often a closed surface (m, 3, 3) goes round points (n, 3).
+
+    Source: van Oosterom & Strackee 1983. A face that the point lies on counts nothing: on a surface
+    the result is a fraction.
     """
-    a, b, c = (corners - point).transpose(1, 0, 2)
-    la, lb, lc = (np.sqrt(np.sum(side**2, axis=1)) for side in (a, b, c))
-    above = np.sum(a * np.cross(b, c), axis=1)
-    ab, bc, ca = (np.sum(p * q, axis=1) for p, q in ((a, b), (b, c), (c, a)))
+    some = max(1, AT_ONCE // len(corners))
+    batches = [points[start : start + some] for start in range(0, len(points), some)]
+    return np.concatenate([_solid_angles(batch, corners) for batch in batches]) / FULL_TURN
+
+
+def _solid_angles(points, corners):
+    """(n,) halves of the solid angles of a surface (m, 3, 3), seen from points (n, 3)."""
+    a, b, c = np.moveaxis(corners[None] - points[:, None, None], 2, 0)
+    la, lb, lc = (np.sqrt(np.sum(side**2, axis=2)) for side in (a, b, c))
+    above = np.sum(a * np.cross(b, c), axis=2)
+    ab, bc, ca = (np.sum(p * q, axis=2) for p, q in ((a, b), (b, c), (c, a)))
     half = np.arctan2(above, la * lb * lc + ab * lc + bc * la + ca * lb)
-    return np.sum(half, where=np.abs(above) > FLAT * la * lb * lc) / FULL_TURN
+    return np.sum(half, axis=1, where=np.abs(above) > FLAT * la * lb * lc)
 
 
 def _refuse_negative(mesh, name):

@@ -110,7 +110,8 @@ def _made(plan, measurements):
     points = wall_points(adjustment, measurements, plan.job.survey.side)
     job = replace(plan.job, points=among_themselves(points), measurements=None)
     wall = find_wall(job, lambda text: None, adjustment.dof, plan.form)
-    return adjustment, float(tabled(job, wall).table.volume_m3[-1])
+    body = tabled(job, wall).body
+    return adjustment, float(body.volume_m3(np.array([body.highest_m]))[0])
 
 
 def _spoilt(measurements, share, rng):

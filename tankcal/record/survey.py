@@ -229,8 +229,10 @@ def courses_of(result):
         zip(job.courses, result.body.shell.volume.courses, strict=True)
     ):
         own = [section for section in result.wall.sections if section.group.course == index]
-        height = shape.top_m - shape.bottom_m
-        volume, u = _partial(result, shape.bottom_m, shape.top_m)
+        is_last = index == len(job.courses) - 1
+        top_m = result.zero_m + result.table.height_m[-1] if is_last else shape.top_m
+        height = top_m - shape.bottom_m
+        volume, u = _partial(result, shape.bottom_m, top_m)
         in_course = [
             bottom + shape.bottom_m <= job.points.xyz_m[i, 2] < bottom + shape.top_m
             for i in rejected
@@ -239,7 +241,7 @@ def courses_of(result):
             {
                 "course": course.name,
                 "bottom_m": shape.bottom_m,
-                "top_m": shape.top_m,
+                "top_m": top_m,
                 "height_m": course.height_m,
                 "thickness_m": course.thickness_m,
                 "paint_m": course.paint_m,

@@ -11,6 +11,8 @@ from tankcal.record.statements import intervals_of
 from tankcal.record.survey import adjustment_in
 from tankcal.snooping import CRITICAL_W
 
+LEAST_PART_M3 = 1e-4  # last place of a printed part: an error below it is not told apart
+
 SIGHTS = {  # of a total station, a theodolite or a level: a tape beside photographs is none
     "direction", "horizontal angle", "vertical angle", "zenith angle", "azimuth",
     "height difference", "slope distance",
@@ -57,8 +59,12 @@ def proportional_parts_of(result):
     return {
         "parts": PARTS,
         "zones": [asdict(zone) for zone in zones],
-        "largest_m3": max((abs(zone.deviation_m3) for zone in zones), default=None),
+        "largest_m3": max((_printed_error_m3(zone) for zone in zones), default=None),
     }
+
+
+def _printed_error_m3(zone):
+    return max(abs(zone.deviation_m3), LEAST_PART_M3)
 
 
 def densities_of(result):
@@ -81,8 +87,11 @@ def gross_of(result):
     shell = result.gross
     if shell is None:
         return None
-    volume = float(shell.volume_m3(shell.height_m)[0])
-    return {"volume_m3": volume, "area_m2": volume / shell.height_m}
+    top_row_m = result.table.height_m[-1] + result.zero_m
+    over_m = top_row_m - result.body.highest_m  # as the corrections, so that they add up
+    area = float(shell.area_m2(shell.height_m)[0])
+    volume = float(shell.volume_m3(shell.height_m)[0]) + over_m * area
+    return {"volume_m3": volume, "area_m2": volume / (shell.height_m + over_m)}
 
 
 def choices_of(result):

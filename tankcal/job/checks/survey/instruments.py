@@ -50,7 +50,8 @@ def _check_temperatures(files, distances, instruments):
         [
             bool((instruments.get(name) or {}).get("expansion_per_k"))
             for name in distances.of("instrument")
-        ]
+        ],
+        dtype=bool,
     )
     without = expands & np.isnan(temperature)
     idle = ~expands & ~np.isnan(temperature) & files.sound(distances)
