@@ -162,7 +162,7 @@ def test_the_sketch_shows_zero_reference_height_levels_and_courses(example_recor
     paper = Paper(example_record)
     block = paper.figure(sketch.sketch(paper), "sketch")
     for words in (
-        "reference height 9.800 m", "top of the table 9.49996 m", "nominal diameter 13.000 m",
+        "reference height 9.800 m", "top of the table 9.500 m", "nominal diameter 13.000 m",
         "zero of heights: bottom of the first course", "course 5: 1.900 m, plate 6.30 mm",
     ):  # fmt: skip
         assert words in block.data["svg"].replace("\xa0", " ")

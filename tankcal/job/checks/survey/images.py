@@ -150,8 +150,9 @@ def _check_format(files, images, imagery, told):
     for place in np.flatnonzero(outside.any(axis=1)):
         axis = int(np.argmax(outside[place]))
         column = (("column_px", "line_px") if in_px[place] else ("x_mm", "y_mm"))[axis]
-        if in_px[place]:
-            count = round(size[place, axis] / pixel[place, axis])
+        pixels = size[place, axis] / pixel[place, axis]
+        if in_px[place] and np.isfinite(pixels):
+            count = round(pixels)
             allowed = f"-0.5 to {count - 0.5:g} pixels"
         else:
             allowed = f"at most {size[place, axis] / 2:g} mm from the middle"
