@@ -62,6 +62,14 @@ def contribution(result, kind):
     return np.linalg.norm(np.concatenate(found))
 
 
+def test_a_wall_seen_from_the_other_side_than_was_said_is_refused(job, survey):
+    job = replace(job, measurements=with_control(survey))
+    assert job.survey.side == "outside"
+    with pytest.raises(InputError, match=r"survey.side: found inside, and all 8 set-ups") as told:
+        run(replace(job, survey=replace(job.survey, side="inside")), simulated=False)
+    assert told.value.problems[0].expected.code == "stations_on_other_side"
+
+
 def test_a_survey_is_adjusted_first_and_its_points_go_on(job, survey):
     job = replace(job, measurements=with_control(survey))
     steps = []

@@ -4,8 +4,10 @@ The truth of these tests is the property itself: what slipped is known. A slip t
 by more than its uncertainty must be told; what is plausible must not be.
 """
 
+import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,11 +15,20 @@ from job_builder import job_parts, write_folder
 from messages_told import lines
 from plausible_jobs import plausible_jobs
 from shapes import azimuths
+from surveyed import known
 
 import tankcal
+from tankcal.cli.running import _tell
 from tankcal.errors import InputError
 from tankcal.job.contract import COLUMNS, KEYS
+from tankcal.job.measurements import Setup
 from tankcal.job.plausibility import CODES, TABLE
+from tankcal.record import record_of
+from tankcal.report import certificate
+from tankcal.report.paper import Paper
+from tankcal.shipped import shipped
+from tankcal.surveys.results import Reading
+from tankcal.surveys.scales import check_readings_off, scale_of_control
 from tankcal.words import load_words
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -315,6 +326,80 @@ def assert_told(tmp_path, parts, code, key):
         True, key,
     )  # fmt: skip
     assert "\n" not in str(line)
+
+
+# ---- where it is told
+
+
+def test_a_doubt_stands_on_the_first_page_and_last_in_the_terminal(tmp_path, capsys):
+    slip = settings(datum__reference_height_m=8.9, table__language="pt-BR")
+    result = tankcal.run(tankcal.load(write_folder(tmp_path / "job", sound("vertical", **slip))))
+    _tell(tmp_path / "out", [tmp_path / "record.json"], result.warnings, result, None)
+    err = capsys.readouterr().err.splitlines()
+    (line,) = err[err.index(next(one for one in err if "DOUBTFUL" in one)) + 1 :]
+    assert "datum.reference_height_m" in line
+    record = record_of(result)
+    kinds = [block.data for block in certificate.doubtful_input(Paper(record))]
+    assert [one["kind"] for one in kinds] == ["notice", "paragraph", "list"]
+    (told,) = kinds[2]["items"]
+    assert "8,9 m, e o topo do tanque" in told
+    cells = json.loads((shipped("report_templates") / "certificate.ipynb").read_text("utf-8"))
+    sources = ["".join(cell["source"]) for cell in cells["cells"]]
+    place = next(i for i, text in enumerate(sources) if "doubtful_input" in text)
+    assert "blocks.result(" in sources[place - 1]
+
+
+def test_a_certificate_without_doubts_says_nothing_of_them(tmp_path):
+    result = tankcal.run(tankcal.load(write_folder(tmp_path / "job", sound("sphere"))))
+    assert certificate.doubtful_input(Paper(record_of(result))) == []
+
+
+# ---- a survey
+
+
+def reading(kind, ids, value, residual, check=False):
+    """A length with an sd of 1 mm, unit m."""
+    nan = float("nan")
+    return Reading(
+        kind, ids, "", "slope_distances.csv", 7, 1, "m", value, residual, 0.001, 1.0,
+        residual / 0.001, nan, nan, nan, check=check,
+    )  # fmt: skip
+
+
+def of_control(factor, readings=()):
+    """`scale_of_control` of two held points 20 m apart that were adjusted `factor` apart."""
+    table = known(["A", "B"], [[0, 0, 1], [20, 0, 1]], 0.002)
+    adjusted = SimpleNamespace(
+        survey=SimpleNamespace(points=("A", "B")),
+        xyz_m=np.array([[0.0, 0, 1], [20 * factor, 0, 1]]),
+    )
+    setups = (Setup("S1", "A"),)
+    return scale_of_control(adjusted, readings, SimpleNamespace(control=table, setups=setups))
+
+
+def test_lengths_a_thousandth_too_long_are_told_by_two_control_points():
+    (line,) = of_control(1.001)
+    assert (line.file, line.expected.code) == ("control.csv", "control_scale")
+    assert "+1000 ppm" in str(line)
+    assert "A-B" in str(line)
+    (line,) = of_control(1.0, [reading("slope distance", ("S1", "B"), 20.02, -0.02)])
+    assert "+999 ppm" in str(line)
+
+
+def test_lengths_within_their_sds_are_not_told():
+    sound = [reading("slope distance", ("S1", "B"), 20.0, -0.003)]
+    assert of_control(1.0002, sound) == []
+    opposite = [reading("slope distance", ("S1", "B"), 20.0, 0.02)]
+    assert of_control(1.001, opposite) == []  # no scale: a blunder, which the search tells
+
+
+def test_a_check_reading_that_denies_the_scale_is_told():
+    off = reading("distance", ("P1", "P5"), 6.44, 0.0069, check=True)
+    (line,) = check_readings_off([off, reading("distance", ("P1", "P5"), 6.44, 0.002, check=True)])
+    assert (line.file, line.row, line.expected.code) == (
+        "slope_distances.csv", 7, "check_reading_off",
+    )  # fmt: skip
+    assert check_readings_off([reading("distance", ("P1", "P5"), 6.44, 0.0069)]) == []
 
 
 # ---- the table

@@ -7,6 +7,7 @@ from tankcal.cli.machine import add_json, print_json, problem_of
 from tankcal.cli.reporting import add_letterhead, letterhead_of
 from tankcal.cli.showing import (
     Progress,
+    doubt,
     listed,
     marks,
     prepare_for_small_work,
@@ -16,6 +17,7 @@ from tankcal.cli.showing import (
 )
 from tankcal.digits import decimals_of_height, fixed, with_digits, written
 from tankcal.errors import SolutionError
+from tankcal.job.plausibility import CODES
 from tankcal.messages import message
 
 
@@ -90,13 +92,15 @@ def _demo(options):
 
 
 def _tell(out, paths, warnings, result, adjustment):
-    """Warnings, a summary and the files, for a person."""
-    warn(warnings)
+    """Warnings, a summary and the files, for a person; what is implausible comes last of all."""
+    doubts = [one for one in warnings if getattr(one.expected, "code", None) in CODES]
+    warn(one for one in warnings if one not in doubts)
     if adjustment is not None:
         say(_summary(adjustment))
     if result is not None:
         say(_capacity(result))
     listed(out, paths)
+    doubt(doubts)
 
 
 def _tell_machine(out, paths, warnings, result, adjustment):

@@ -74,6 +74,18 @@ def warn(warnings):
         complain(message("warning", "warning: {text}", text=text))
 
 
+def doubt(warnings):
+    """What is implausible of the numbers handed in, on standard error, under a line of its own."""
+    if warnings:
+        complain(
+            message(
+                "doubtful_input",
+                "DOUBTFUL INPUT, the result stands on it (so says the certificate's first page):",
+            )
+        )
+    warn(warnings)
+
+
 def listed(out, paths):
     """Print what was written."""
     say(message("results_in", "results in {folder}:", folder=str(out)))

@@ -3,6 +3,7 @@
 Printed when given, never invented: what is not given is a line to write on, or named as missing.
 """
 
+from tankcal.job.plausibility import CODES
 from tankcal.report import blocks
 from tankcal.report.survey import statistics
 
@@ -37,6 +38,31 @@ def _in_the_head(paper, key, certificate):
     if key == "laboratory":
         return bool(certificate.get(key) or paper.letterhead)
     return key == "laboratory_address" and paper.letterhead and not certificate.get(key)
+
+
+def doubtful_input(paper):
+    """What is implausible of the numbers handed in, under the result; [] where nothing is.
+
+    Such a number may move the volume by far more than U says: it stands where nobody misses it.
+    """
+    told = doubts_of(paper.record["warnings"])
+    if not told:
+        return []
+    return [
+        blocks.notice(paper.word("certificate.doubtful")),
+        blocks.paragraph(paper.word("certificate.implausible")),
+        blocks.listing(told),
+    ]
+
+
+def doubts_of(warnings):
+    """Lines of those warnings of a record that speak of implausible numbers."""
+    return [_line(one) for one in warnings if one.get("code") in CODES]
+
+
+def _line(warning):
+    place = ", ".join(part for part in (warning["file"], warning["column"]) if part)
+    return f"{place}: {warning['text']}"
 
 
 def calibration(paper):

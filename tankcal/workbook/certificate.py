@@ -1,6 +1,7 @@
 """The sheet Certificate: what was calibrated, the main result, and what was assumed."""
 
 from tankcal.digits import decimals_of, decimals_of_height
+from tankcal.report.certificate import doubts_of
 from tankcal.report.paper import Paper
 from tankcal.report.uncertainty import method, rule
 from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
@@ -24,6 +25,7 @@ def certificate_sheet(book, record):
         sheet.set_row(row, 26)
         row += 2
     row = _result(book, sheet, row, record)
+    row = _doubts(book, sheet, row, record)
     row = _entries(book, sheet, row, sentence(words, "headings", "tank"), _tank(record, words))
     row = _entries(book, sheet, row, book.word("headings.certificate"), _certificate(record, words))
     row = _entries(book, sheet, row, book.word("headings.survey"), _survey(record, words))
@@ -151,6 +153,18 @@ def _result(book, sheet, row, record):
     ):
         book.put(sheet, row + 2, column, value, num_format=shown, align="right", **line)
     return row + 4
+
+
+def _doubts(book, sheet, row, record):
+    """What is implausible of the numbers handed in; returns the next row."""
+    lines = doubts_of(record["warnings"])
+    if not lines:
+        return row
+    book.heading(sheet, row, book.words["certificate"]["doubtful"], len(_WIDTHS))
+    for text in lines:
+        row += 1
+        book.paragraph(sheet, row, text, _WIDTHS, bold=True, font_color=ACCENT)
+    return row + 2
 
 
 def _corrections(book, sheet, row, record):
