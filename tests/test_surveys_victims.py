@@ -7,9 +7,11 @@ import pytest
 from surveyed import by_instruments, by_photographs, changed, known, table, told
 
 from tankcal.cli import main
+from tankcal.errors import SolutionError
 from tankcal.job.measurements import Measurements
 from tankcal.network import adjust
 from tankcal.network.cleaning import CRITICAL, with_use
+from tankcal.network.reactions import HELD, reactions
 from tankcal.network.separability import alternatives
 from tankcal.record.adjustment import adjustment_of
 from tankcal.surveys import adjust_survey
@@ -110,7 +112,8 @@ def test_held_heights_that_contradict_a_line_of_levels():
             readings=(table("height_differences", [1.0, 1.001, 0.5, 0.5], 0.001, start, end),),
         )
     )
-    assert "is held fixed at" in text
+    assert "z of A is held fixed at 0.0000" in text
+    assert "z of B is held fixed at 1.0500" in text
 
 
 def test_a_search_keeps_what_it_found_when_a_step_fails(photos):
@@ -328,3 +331,93 @@ def test_every_held_coordinate_has_a_row_with_its_test(stations):
     assert record["held"][0]["sd"] == pytest.approx(sd, rel=1e-3)
     assert rows[0].w == pytest.approx((released - control.xyz_m[0, 0]) / sd, rel=1e-3)
     assert not [one for one in found.groups if one.kind == "control coordinate"]
+
+
+def test_sound_readings_are_not_given_up_for_a_held_coordinate_that_is_wrong():
+    """A point of many rays held 20 mm off: all its rays would go; it is asked, not gone on."""
+    measurements, truth = by_photographs(photos=16)
+    control = measurements.control
+    xyz = truth.xyz_m[[int(name[1:]) for name in control.point]]
+    xyz[3, 0] += 0.02
+    wrong = replace(control, xyz_m=xyz, sd_m=np.zeros_like(xyz))
+    with pytest.raises(SolutionError) as told_so:
+        adjust_survey(replace(measurements, control=wrong))
+    first, *causes = str(told_so.value).splitlines()
+    rays = 2 * measurements.image_points.point.count(control.point[3])
+    assert rays > 8
+    gone, left = (int(text.split()[0]) for text in (first.split("would set ")[1],
+                                                    first.split("no more than ")[1]))  # fmt: skip
+    assert gone >= rays > left
+    held_at = [line for line in causes if "is held fixed at" in line]
+    assert len(held_at) == 1
+    assert f"x of {control.point[3]} is held fixed at {xyz[3, 0]:.4f}" in held_at[0]
+
+
+def corners(error_m, seed=6):
+    """Four held corners, four points between them by 3 mm distances; x of one corner is wrong."""
+    rng = np.random.default_rng(seed)
+    outer = np.array([[0.0, 0], [100, 0], [100, 80], [0, 80]])
+    xy = np.vstack([outer, rng.uniform(15, 65, (4, 2))])
+    names = [*"ABCD", "P", "Q", "R", "S"]
+    pairs = [(i, j) for j in range(4, 8) for i in range(j)]
+    length = [np.linalg.norm(xy[i] - xy[j]) + rng.normal(0, 0.003) for i, j in pairs]
+    tapes = table(
+        "distances", length, 0.003, [names[i] for i, _ in pairs], [names[j] for _, j in pairs],
+        instrument=(None,) * len(pairs), horizontal=np.ones(len(pairs), dtype=bool),
+    )  # fmt: skip
+    control = known(names, np.pad(xy, ((0, 0), (0, 1))), 0.0)
+    control.sd_m[4:, :2] = np.nan
+    control.xyz_m[1, 0] += error_m
+    return Measurements(control=control, readings=(tapes,))
+
+
+@pytest.mark.parametrize("error_m", [0.015, 0.025, 0.06])
+def test_every_held_coordinate_that_explains_as_much_is_named(error_m):
+    """Second method: each of the eight is released by hand, and what fits within 10.8 is named."""
+    measurements = corners(error_m)
+    off = replace(measurements.settings, snooping=False)
+    control, fits = measurements.control, {}
+    for i, name in enumerate("ABCD"):
+        for k, axis in enumerate("xy"):
+            sd = control.sd_m.copy()
+            sd[i, k] = np.nan
+            free = replace(measurements, control=replace(control, sd_m=sd), settings=off)
+            fits[f"{axis} of {name}"] = adjust_survey(free).adjusted.chi2
+    best = min(fits.values())
+    expected = {name for name, chi2 in fits.items() if chi2 - best < CRITICAL**2}
+    assert "x of B" in expected
+    text = told(replace(measurements, settings=off))
+    named = {name for name in fits if f"{name} is held fixed at" in text}
+    assert named == expected
+
+
+def test_a_wrong_corner_that_costs_many_readings_is_asked_for():
+    text = told(corners(0.2))
+    assert text.startswith("the search for blunders would set ")
+    assert "x of B is held fixed at 100.2000, and the readings put it at " in text
+
+
+def test_a_reading_of_a_held_point_may_be_right_and_the_point_wrong():
+    """Property: what was set aside is told with the held coordinates that explain it as well."""
+    measurements = corners(0.0)
+    tapes = measurements.readings[0]
+    value = tapes.value.copy()
+    place = next(i for i, ends in enumerate(zip(tapes.start, tapes.end, strict=True))
+                 if ends == ("B", "P"))  # fmt: skip
+    value[place] += 0.03
+    found = adjust_survey(changed(measurements, "distances", value=value))
+    held_too = reactions(
+        found.adjusted.problem, found.adjusted.solution, found.adjusted.survey.fixed
+    )
+    for one in found.removed:
+        for source, row in alternatives(found.adjusted, 0, one.row - 2, held_too):
+            survey = found.adjusted.survey
+            uses = np.ones(len(tapes.value))
+            uses[[other.row - 2 for other in found.removed if other is not one]] = 0.0
+            fixed = survey.fixed.copy()
+            if source == HELD:
+                fixed.flat[row] = False
+            else:
+                uses[row] = 0.0
+            again = adjust(with_use(replace(survey, fixed=fixed), {0: uses})).residuals[0]
+            assert again.whole[again.rows == one.row - 2] < CRITICAL * 1.01

@@ -17,7 +17,7 @@ from tankcal.surveys.diagnoses import MIRROR, diagnosed
 from tankcal.surveys.focusing import in_depth
 from tankcal.surveys.frames import framed
 from tankcal.surveys.gathering import gather, held_trace, named_in
-from tankcal.surveys.holding import wrongly_held
+from tankcal.surveys.holding import strained, wrong_control, wrongly_held
 from tankcal.surveys.results import Adjustment
 from tankcal.surveys.rows import gone_with_their_points, readings_of
 from tankcal.surveys.scales import check_readings_off, scale_of_control
@@ -29,6 +29,7 @@ from tankcal.surveys.victims import SOME, one_sided, set_aside, undecided
 
 SUSPICIOUS = 4.0  # sigma0 above which whole files are doubted
 SEVERAL = 0.05  # share of the values set aside, above which they are as well
+SPARED = 2  # values fewer set aside, from which a held coordinate is doubted and not they
 NOISELESS = 1e-6  # sigma0 of rounding alone: what was measured scatters more
 TRIED = 25  # iterations of a survey that is only supposed
 FILES = ("image_points.csv", "photos.csv", "control.csv")  # first in the list of readings
@@ -105,7 +106,7 @@ def _why_not(measurements, message):
     return (
         lost
         or likely_mistake(measurements, np.inf, _tried)
-        or wrongly_held(measurements, np.inf, np.inf, _tried)
+        or wrong_control(measurements, np.inf, _tried)[0]
     )
 
 
@@ -133,12 +134,13 @@ def _complete(search, gathered, frame, measurements):
     warnings += [_kept(one, gathered.traces) for one in search.needed if one.w > CRITICAL]
     diagnoses = _diagnoses(adjusted, readings, groups, gathered, measurements)
     doubts = _causes(adjusted, readings, gathered, measurements, diagnoses)
-    rays = []
-    if not doubts:
+    rays, others = [], [one for one in search.removed if one.source != "image points"]
+    if doubts:
+        others = [one for one in others if one.kind.startswith("control coordinate")]
+    else:
         of_images = [one for one in search.removed if one.source == "image points"]
-        others = [one for one in search.removed if one.source != "image points"]
-        doubts = undecided(adjusted, others, traces, held)
         rays = undecided(adjusted, of_images, traces, held)  # one more or less: a warning
+    doubts += undecided(adjusted, others, traces, held)
     warnings = [*doubts, *warnings, *diagnoses, *rays]
     known = gathered.known
     acting = frame.held
@@ -210,7 +212,7 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
     gone = set_aside(adjusted.survey)
     told = one_sided(readings, gathered.known)
     if not (told or adjusted.sigma0 > SUSPICIOUS or gone > SOME * len(readings)):
-        return []
+        return strained(readings, gathered.known)
     close, sigma0 = partial(_tried, like=adjusted), adjusted.sigma0
     if gone:
         try:
@@ -222,7 +224,19 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
     misread = likely_mistake(measurements, sigma0, _tried) if bad else []
     if misread:
         raise SolutionError("\n".join(["the readings do not fit together", *map(str, misread)]))
-    return wrongly_held(measurements, sigma0, gone, close) + told
+    control, left = wrong_control(measurements, gone, close)
+    found = wrongly_held(measurements, sigma0, gone, close) + control + told
+    if gone - left >= SPARED:
+        text = message(
+            "held_or_readings",
+            "the search for blunders would set {gone} values aside, and no more than {left} were a"
+            " held coordinate wrong instead: correct that coordinate or leave its standard"
+            " deviation blank, or mark the readings use = check if they are the wrong ones",
+            gone=gone,
+            left=left,
+        )
+        raise SolutionError("\n".join(map(str, [text, *found])))
+    return found + (strained(readings, gathered.known) if not control else [])
 
 
 def _in_order(readings):
