@@ -23,15 +23,31 @@ SAME_M = 1e-9  # dips nearer than this are the same
 class Quantity:
     """A volume with its uncertainty: value, standard u, effective dof, factor k, expanded U.
 
-    for_use  False where a dip stands in a zone in which the table must not be used
+    k         None where U is not k u but Monte Carlo's
+    for_use   False where a dip stands in a zone in which the table must not be used
+    interval  whose U is: "gum", "monte_carlo"; "gum_not_simulated" of a delivery that Monte Carlo
+              did not look at, though it looked at the table
+    ends_m3   (low, high) of Monte Carlo's interval; None: value - U and value + U
     """
 
     value_m3: float
     u_m3: float
     dof: float
-    k: float
+    k: float | None
     U_m3: float
     for_use: bool = True
+    interval: str = "gum"
+    ends_m3: tuple[float, float] | None = None
+
+    @property
+    def low_m3(self) -> float:
+        """Lower end of the interval."""
+        return self.value_m3 - self.U_m3 if self.ends_m3 is None else self.ends_m3[0]
+
+    @property
+    def high_m3(self) -> float:
+        """Upper end of the interval."""
+        return self.value_m3 + self.U_m3 if self.ends_m3 is None else self.ends_m3[1]
 
     def __str__(self) -> str:
         return volume_text(self.value_m3, self.U_m3, self.k)

@@ -30,7 +30,14 @@ from tankcal.scan import Scan, scanned
 from tankcal.service import shell_factor, shell_temperature_c
 from tankcal.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
 from tankcal.simulation.running import SIMULATING
-from tankcal.statements import Statements, pairs_to_simulate, statements, verdict_of
+from tankcal.statements import (
+    Statements,
+    pairs_to_simulate,
+    stated_delivery,
+    stated_volume,
+    statements,
+    verdict_of,
+)
 from tankcal.surveys import Adjustment, adjust_survey, wall_points
 from tankcal.tabling import doubts_of_table, tabled
 from tankcal.tanks import body_of, shell_volume
@@ -149,22 +156,30 @@ class Result:
 
     @property
     def capacity(self) -> pd.DataFrame:
-        """The capacity table: height_m, volume_m3, u_m3, k, U_m3; with a floating roof for_use."""
-        table = self.table
+        """The capacity table, with the U that every paper states: the columns of capacity.csv.
+
+        height_m, volume_m3 and u_m3, the standard uncertainty; k, not a number where U is not k u
+        but Monte Carlo's; U_m3, low_m3 and high_m3; interval, "gum" or "monte_carlo": whose these
+        are; with a floating roof for_use.
+        """
+        table, stated = self.table, self.intervals
         columns = {
             "height_m": table.height_m,
             "volume_m3": table.volume_m3,
             "u_m3": table.u_m3,
-            "k": table.k,
-            "U_m3": table.U_m3,
+            "k": np.where(stated.by_gum, table.k, np.nan),
+            "U_m3": stated.U_m3,
+            "low_m3": stated.low_m3,
+            "high_m3": stated.high_m3,
+            "interval": np.where(stated.by_gum, "gum", "monte_carlo"),
         }
         if table.critical_m is not None:
             columns["for_use"] = table.for_use(table.height_m)
         return pd.DataFrame(columns)
 
     def at(self, height_m: float) -> Quantity:
-        """Volume at a dip, with its uncertainty (`capacity.Quantity`); HeightError outside."""
-        return self.table.at(height_m)
+        """Volume at a dip, with the U that is stated (`capacity.Quantity`); HeightError outside."""
+        return stated_volume(self.table, self.intervals, height_m)
 
     def in_service_m3(
         self,
@@ -202,7 +217,7 @@ class Result:
 
     def delivery(self, low_m: float, high_m: float) -> Quantity:
         """Volume between two dips, with its own uncertainty; HeightError outside."""
-        return self.table.delivery(low_m, high_m)
+        return stated_delivery(self.table, self.simulation, low_m, high_m)
 
 
 def run(

@@ -1,10 +1,11 @@
 """What is stated of a table beside its rows: budgets, the worst deliveries, a rule's verdict."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tankcal.budgets import Budget, budget, reading_sources
+from tankcal.capacity import SAME_M
 from tankcal.deliveries import WorstDeliveries, worst_deliveries
 from tankcal.errors import InputError, Problem
 from tankcal.job.tables import SETTINGS_FILE
@@ -57,6 +58,61 @@ def pairs_to_simulate(stated, job, body, table):
     """((low_m, high_m), ...) of the `Statements`, then of the deliveries a rule is decided by."""
     judged = () if job.rule is None else deliveries_judged(job.rule, table, _tank(job, body))
     return tuple(dict.fromkeys((*stated.pairs, *judged)))
+
+
+def stated_volume(table, intervals, height_m):
+    """The volume at a dip with the U that is printed (`capacity.Quantity`), reading left out.
+
+    That of its row; between two rows, of which one has Monte Carlo's, the largest of all.
+
+    Parameters
+    ----------
+    table : Capacity
+    intervals : simulation.Intervals
+        Of the rows of the table.
+    height_m : float
+        Dip, m; HeightError outside the table.
+    """
+    found, rows = table.at(height_m), table.rows_of(height_m)
+    if np.all(intervals.by_gum[rows]):
+        return found
+    U = Printed(intervals.U_m3, intervals.by_gum).of(table, None, height_m, found.U_m3)
+    if len(rows) == 1:
+        ends = float(intervals.low_m3[rows[0]]), float(intervals.high_m3[rows[0]])
+        return _by_monte_carlo(found, U, ends)
+    return found if found.U_m3 == U else _by_monte_carlo(found, U, None)
+
+
+def stated_delivery(table, simulation, low_m, high_m):
+    """The volume between two dips with the U that is printed (`capacity.Quantity`).
+
+    Reading is left out. One that was not simulated has the U of the law of propagation, and says
+    so. HeightError outside the table.
+
+    Parameters
+    ----------
+    table : Capacity
+    simulation : simulation.TableSimulation or None
+    low_m, high_m : float
+        Dips, m.
+    """
+    found = table.delivery(low_m, high_m)
+    if simulation is None:
+        return found
+    one = simulation.delivered
+    same = np.isclose(one.low_m, low_m, rtol=0, atol=SAME_M)
+    same &= np.isclose(one.high_m, high_m, rtol=0, atol=SAME_M)
+    if not np.any(same):
+        return replace(found, interval="gum_not_simulated")
+    place, of_delivered = int(np.argmax(same)), simulation.of_delivered
+    if of_delivered.by_gum[place]:
+        return found
+    ends = float(of_delivered.low_m3[place]), float(of_delivered.high_m3[place])
+    return _by_monte_carlo(found, float(of_delivered.U_m3[place]), ends)
+
+
+def _by_monte_carlo(found, U_m3, ends_m3):
+    return replace(found, k=None, U_m3=U_m3, interval="monte_carlo", ends_m3=ends_m3)
 
 
 def verdict_of(job, body, table, intervals, simulation):

@@ -1,14 +1,21 @@
 """Of every volume that is stated: low <= V <= high, and low < high where anything is uncertain."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
+import openpyxl
+import pandas as pd
 import pytest
 from job_builder import write_job
 
 import tankcal
+from tankcal import workbook
 from tankcal.errors import ProgramError
+from tankcal.job import StatedVolume
 from tankcal.monte_carlo import Verdict
+from tankcal.outputs.tables import write_tables
+from tankcal.record import record_of, save
 from tankcal.record.statements import budgets_of
 from tankcal.simulation.intervals import gum_intervals, judged_intervals
 
@@ -54,6 +61,67 @@ def test_every_interval_holds_its_volume(kind, tmp_path):
     assert np.all(holds(delivered.low_m3, one.volume_m3, delivered.high_m3, one.u_m3))
     for stated in budgets_of(result):
         assert holds(*(stated[key] for key in ("low_m3", "volume_m3", "high_m3", "u_m3")))
+
+
+@pytest.fixture(scope="module")
+def sphere(tmp_path_factory):
+    """A sphere whose lowest rows have Monte Carlo's interval, its job asking for a delivery."""
+    folder = tmp_path_factory.mktemp("sphere")
+    parts = KINDS["sphere"] | {"uncertainty": [("datum", 4.0, "mm")]}
+    job = tankcal.load(write_job(folder / "job", **parts))
+    asked = (StatedVolume(1.0, 0.02), StatedVolume(3.0, 1.0))
+    return tankcal.run(replace(job, stated=asked), simulated=True)
+
+
+def test_one_u_in_record_table_files_and_result(sphere, tmp_path):
+    """`result.capacity` and `at` had the law's U where the papers have Monte Carlo's."""
+    save(record_of(sphere), tmp_path / "record.json")
+    record = json.loads((tmp_path / "record.json").read_text(encoding="utf-8"))
+    write_tables(record, tmp_path)
+    written, table = pd.read_csv(tmp_path / "capacity.csv"), sphere.capacity
+    assert list(written.columns) == list(table.columns)
+    for key in ("height_m", "volume_m3", "u_m3", "k", "U_m3", "low_m3", "high_m3"):
+        ours, theirs = (one[key].to_numpy(float) for one in (table, written))
+        assert theirs == pytest.approx(ours, abs=5.1e-7, nan_ok=True), key
+    assert list(written.interval) == list(table.interval) == record["capacity"]["interval"]
+    assert list(table.U_m3) == record["capacity"]["stated_U_m3"]
+    simulated = table.interval == "monte_carlo"
+    assert 0 < simulated.sum() < len(table)
+    assert np.all(np.isnan(table.k) == simulated)
+    off = np.abs(table.U_m3 - sphere.table.U_m3)
+    assert np.all(off[~simulated] == 0)
+    assert off[simulated].max() > 0
+    workbook.write(record, tmp_path / "capacity.xlsx")
+    book = openpyxl.load_workbook(tmp_path / "capacity.xlsx")
+    ((sheet, cells),) = book.defined_names["capacity_U"].destinations
+    shown = [cell.value for (cell,) in book[sheet][cells]]
+    assert shown == pytest.approx(list(table.U_m3), abs=5.1e-4)
+
+
+def test_one_u_at_a_dip_and_in_words(sphere):
+    table = sphere.capacity
+    for row in (1, 2, 100, len(table) - 1):
+        found, own = sphere.at(table.height_m[row]), table.iloc[row]
+        assert (found.U_m3, found.interval) == (own.U_m3, own.interval)
+        assert found.low_m3 == pytest.approx(own.low_m3, abs=1e-12)
+        assert found.high_m3 == pytest.approx(own.high_m3, abs=1e-12)
+        assert (found.k is None) == np.isnan(own.k)
+    between = sphere.at((table.height_m[1] + table.height_m[2]) / 2)
+    assert between.U_m3 >= table.U_m3[1:3].max()  # of both, and of the law
+    top = sphere.at(table.height_m.iloc[-1])
+    assert str(top) in str(sphere)
+
+
+def test_one_u_of_a_delivery(sphere):
+    delivered = sphere.simulation.of_delivered
+    to_empty, whole = sphere.delivery(0.02, 1.0), sphere.delivery(1.0, 3.0)
+    for place, found in enumerate((to_empty, whole)):
+        assert found.U_m3 == delivered.U_m3[place]
+        assert (found.interval == "gum") == delivered.by_gum[place]
+        assert found.low_m3 == pytest.approx(delivered.low_m3[place], abs=1e-12)
+    other = sphere.delivery(1.1, 2.7)
+    assert other.interval == "gum_not_simulated"
+    assert other.U_m3 == sphere.table.delivery(1.1, 2.7).U_m3
 
 
 def judged(low, high, validated=False):

@@ -173,13 +173,14 @@ def test_an_earlier_record_has_no_such_sheets(record, tmp_path):
 def test_the_csv_table_has_the_interval_that_counts(record, tmp_path):
     write_tables(record, tmp_path)
     heads, *lines = (tmp_path / "capacity.csv").read_text(encoding="utf-8").splitlines()
-    assert heads.split(",")[:9] == [
-        "height_m", "volume_m3", "u_m3", "k", "U_m3", "low_m3", "high_m3", "interval",
-        "stated_U_m3",
+    assert heads.split(",")[:8] == [
+        "height_m", "volume_m3", "u_m3", "k", "U_m3", "low_m3", "high_m3", "interval"
     ]  # fmt: skip
     capacity = record["capacity"]
     rows = [line.split(",") for line in lines]
     assert [row[7] for row in rows] == capacity["interval"]
-    for place, key in ((4, "U_m3"), (5, "low_m3"), (6, "high_m3"), (8, "stated_U_m3")):
+    simulated = [one == "monte_carlo" for one in capacity["interval"]]
+    assert [row[3] == "" for row in rows] == simulated  # U is not k u there
+    for place, key in ((4, "stated_U_m3"), (5, "low_m3"), (6, "high_m3")):
         values = [float(row[place]) for row in rows]
         assert values == pytest.approx(capacity[key], abs=5.0001e-7), key

@@ -114,17 +114,17 @@ def _capacity_table(record):
     capacity, spec = record["capacity"], record["job"]["table"]
     if capacity is None:
         return pd.DataFrame()
-    digits = decimals_of_rows(capacity["U_m3"], least=LEAST_DECIMALS)
+    U, simulated = capacity["stated_U_m3"], [one != "gum" for one in capacity["interval"]]
+    digits = decimals_of_rows(U, least=LEAST_DECIMALS)
     columns = {
         "height_m": capacity["height_m"],
         "volume_m3": _to_digits(capacity["volume_m3"], digits),
         "u_m3": _to_digits(capacity["u_m3"], digits),
-        "k": capacity["k"],
-        "U_m3": _to_digits(capacity["U_m3"], digits),
+        "k": [None if one else k for one, k in zip(simulated, capacity["k"], strict=True)],
+        "U_m3": _to_digits(U, digits),
         "low_m3": _to_digits(capacity["low_m3"], digits),
         "high_m3": _to_digits(capacity["high_m3"], digits),
         "interval": capacity["interval"],
-        "stated_U_m3": _to_digits(capacity["stated_U_m3"], digits),
     }
     if spec["height_unit"] != "m":
         columns["dip"] = capacity["dip"]
