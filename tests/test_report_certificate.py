@@ -39,7 +39,7 @@ def test_what_is_not_given_is_a_line_to_write_on(paper):
     found = items(certificate.parties(paper()))
     labels = ("Laboratory", "Address", "Customer", "Address of the customer", "Date of issue")
     assert {found[label] for label in labels} == {""}
-    assert found["Place of calibration"] == "Fictive place"  # where the tank stands
+    assert found["Place of calibration"] == "Fictitious place"  # where the tank stands
 
 
 def test_what_cannot_be_written_in_by_hand_is_named_as_missing(paper):
