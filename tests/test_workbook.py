@@ -223,9 +223,15 @@ def test_a_record_with_nothing_rejected_corrected_or_warned_is_written(record, t
 # how it is made
 
 
-def test_the_book_opens_on_the_certificate(book):
+def test_the_book_opens_on_the_dip_calculator(book):
     assert book.sheetnames == SHEETS
-    assert book.active.title == "Certificate"
+    assert book.active.title == "Dip calculator"
+
+
+def test_printing_everything_prints_the_certificate_with_its_table(book):
+    """Hidden sheets are not printed with the whole workbook."""
+    shown = [sheet.title for sheet in book if sheet.sheet_state == "visible"]
+    assert shown == ["Certificate", "Capacity", "Proportional parts", "Dip calculator"]
 
 
 def test_every_sheet_prints_tank_and_page(book, record):

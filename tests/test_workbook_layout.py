@@ -181,6 +181,7 @@ def test_all_rows_of_the_capacity_table_have_one_height(records, language, tmp_p
         ((_, top, _, last),) = tables_of(sheet)
         heights = {sheet.row_dimensions[row].height for row in range(top + 1, last + 1)}
         assert len(heights) == 1, (kind, heights)
+        assert heights.pop() >= 1.5 * 10  # points, of digits that are 10 points high
     assert set(records["uncertain"]["capacity"]["interval"]) == {"gum", "monte_carlo"}
     assert not all(records["furnished"]["capacity"]["for_use"])
 

@@ -20,6 +20,17 @@ from tankcal.workbook.rule import rule_sheet
 from tankcal.workbook.survey import adjustment_sheet
 from tankcal.workbook.uncertainty import budget_sheet, deliveries_sheet, monte_carlo_sheet
 
+# What a gauger uses and an owner prints. The others are for reviewers and programs, and hidden:
+# printed with the whole workbook they are hundreds of pages.
+_SHOWN_OF_TANK = (
+    "certificate",
+    "capacity",
+    "proportional_parts",
+    "other_densities",
+    "dip_calculator",
+)
+_SHOWN_OF_SURVEY = ("adjustment", "points", "provenance")
+
 
 def write(record, path, language=None):
     """Write the workbook of `record` (record.json as parsed) to `path`; same record, same bytes.
@@ -31,7 +42,8 @@ def write(record, path, language=None):
     """
     words = load_words(language or language_of(record))
     record = in_language(words, record)
-    with Book(path, record, words) as book:
+    shown = _SHOWN_OF_TANK if record["capacity"] else _SHOWN_OF_SURVEY
+    with Book(path, record, words, shown=shown) as book:
         if record["capacity"]:
             _sheets_of_tank(book, record)
         else:

@@ -7,7 +7,7 @@ import xlsxwriter
 from xlsxwriter.exceptions import FileCreateError
 from xlsxwriter.utility import quote_sheetname, xl_range_abs
 
-from tankcal.workbook.look import ACCENT, FONT, LINE_PT, MUTED, day, lines_of, number_format
+from tankcal.workbook.look import ACCENT, FONT, LINE_PT, MUTED, ROW_PT, day, lines_of, number_format
 from tankcal.workbook.writer import Writer
 
 _A4 = 9
@@ -28,10 +28,12 @@ class Book(Writer):
     subject  what the workbook is about: the tank, or the survey alone
     notice   of the certificate, on every sheet; "" for none
     about    "capacity", "adjustment" or "plan", by which the file is called; None: by the record
+    shown    codes of the sheets that show, and are printed with the whole workbook; None: all
     """
 
-    def __init__(self, path, record, words, about=None):
+    def __init__(self, path, record, words, about=None, shown=None):
         self._path = path
+        self._shown = shown
         options = {
             "strings_to_formulas": False,
             "strings_to_urls": False,
@@ -115,7 +117,10 @@ class Book(Writer):
         """A new protected sheet with page set-up, header and footer."""
         name = self.sheet_name(code)
         sheet = self._file.add_worksheet(name)
+        if self._shown is not None and code not in self._shown:
+            sheet.hide()
         sheet.hide_gridlines(2)
+        sheet.set_default_row(ROW_PT)
         sheet.set_tab_color(_TAB[tab])
         sheet.set_paper(_A4)
         if landscape:

@@ -39,7 +39,6 @@ def capacity_sheet(book, record):
     if not all(capacity["for_use"]):
         columns["for_use"] = use_column(book, capacity)
     columns |= _intervals(book, capacity)
-    sheet.set_default_row(13.5)
     book.widths(sheet, *map(width_of, columns.values()))
     muted = [row for row, good in enumerate(capacity["for_use"]) if not good]
     last = book.table(sheet, _HEAD_ROW, "capacity_table", list(columns.values()), muted=muted)

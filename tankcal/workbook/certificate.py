@@ -14,7 +14,7 @@ _DATES = ("date", "date_of_issue")  # keys of the job whose values are dates
 
 
 def certificate_sheet(book, record):
-    """Write the sheet, which is the one the workbook opens on."""
+    """Write the sheet, the first of the workbook."""
     words = book.words
     sheet = book.sheet("certificate", tab="result")
     book.widths(sheet, *_WIDTHS)
@@ -33,7 +33,6 @@ def certificate_sheet(book, record):
     row = _corrections(book, sheet, row, record)
     row = _choices(book, sheet, row, record)
     _authorisation(book, sheet, row)
-    sheet.activate()
 
 
 def _label(words, key):

@@ -16,6 +16,7 @@ INPUT = "#FFF7DB"
 FONT = {"font_name": "Arial", "font_size": 10}  # or its equal in measure, on every machine
 DATE = 14  # Excel's built-in short date: in the order and with the marks of the reader's system
 LINE_PT = 15.0  # height of a line of text
+ROW_PT = 15.75  # of a row of one line: the 13.5 that XlsxWriter takes for Arial 10 clip its digits
 ANGLES = (("ω", "omega"), ("φ", "phi"), ("κ", "kappa"))  # their signs, and keys of the record
 _MOST_LINES = 27  # Excel allows a row 409 pt
 _UNIT_PX = 7  # of width of a column: one digit

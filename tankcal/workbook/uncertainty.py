@@ -180,7 +180,6 @@ def monte_carlo_sheet(book, record):
     """Every row: mean and u of the simulation, its interval beside the GUM's, the verdict."""
     paper = Paper(record, book.words)
     sheet = book.sheet("monte_carlo")
-    sheet.set_default_row(13.5)
     columns = _simulated(book, record)
     widths = set_widths(book, sheet, columns)
     row = _HEAD_ROW - 1

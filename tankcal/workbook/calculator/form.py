@@ -59,6 +59,7 @@ def calculator_sheets(book, record):
     _notes(book, sheet, last, table)
     sheet.set_selection(places.row("dip"), VALUES, places.row("dip"), VALUES)
     sheet.fit_to_pages(1, 1)
+    sheet.activate()
     _workings_sheet(book, workings, places, table, said)
 
 
@@ -211,8 +212,11 @@ def _notes(book, sheet, row, table):
         "deliveries": book.sheet_name("deliveries"),
         "factor": book.sheet_name("covariance_factor"),
         "workings": book.sheet_name(WORKINGS),
+        "budget": book.sheet_name("budget"),
+        "corrections": book.sheet_name("corrections"),
+        "capacity_mm": book.sheet_name("capacity_mm"),
     }
-    for key in ("volume", "service", "product", "delivery"):
+    for key in ("volume", "service", "product", "delivery", "hidden"):
         text = book.word(f"notes.{key}", of="calculator", **values)
         book.paragraph(sheet, row, text, _WIDTHS, font_color=MUTED)
         row += 1
