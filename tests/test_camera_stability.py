@@ -23,7 +23,7 @@ from tankcal.camera_analysis.stability.fits import (
 )
 from tankcal.camera_analysis.stability.grids import Grid, default_grid, parse
 from tankcal.camera_analysis.stability.plain import as_json, summary
-from tankcal.camera_analysis.stability.terrains import TERRAINS, Terrain, parse_terrain
+from tankcal.camera_analysis.stability.terrains import DRAWN, TERRAINS, Terrain, parse_terrain
 from tankcal.errors import InputError, SolutionError
 from tankcal.job import load
 from tankcal.job.calibrations import choose, read_cameras
@@ -40,6 +40,8 @@ ZROT = [
     *(5.42, 8.10, 7.63, 13.86, 8.12, 7.63, 2.70, 7.16, 11.31, 9.50),
 ]
 Q = np.array([4.4, 0.03, -0.02, -2e-3, 3e-5, 1e-6, 1e-8, 8e-4, -6e-4, 1e-4, 1e-5, 8e-4, -5e-4])
+SMALL_GRID = Grid(12, 9, (100, 100), 380)
+SPREAD = ("figure_px", "scatter_px")
 FORMS = [Form(one, other, 2.0) for one in CONVENTIONS for other in AFFINITIES]
 LENS = np.array([50.0, 0.02, -0.03, 1e-3, -2e-5, 1e-7, 0, 1e-4, -5e-5, 0, 0, 2e-4, 1e-4])
 
@@ -141,6 +143,18 @@ def test_the_seed_of_the_terrain_hardly_matters(seven, figure):
     figure("SPR on terrain I by eight seeds: mean and sd, px", f"{np.mean(figures):.3f}")
     assert 0 < np.std(figures) < 0.05
     assert figure_of(*pair, "spr", seed=3) == figures[3]
+
+
+def test_the_scatter_of_spr_says_what_one_terrain_is_worth(seven):
+    """Simulation: means of other terrains lie as far apart as the scatter over ten says."""
+    pair = [seven[0], seven[4]]
+    found = [compare(pair, "spr", SMALL_GRID, seed=seed).pairs[0] for seed in range(12)]
+    means, scatter = (np.array([getattr(one, key) for one in found]) for key in SPREAD)
+    assert np.std(means, ddof=1) == pytest.approx(scatter.mean() / np.sqrt(DRAWN), rel=0.75)
+    assert scatter.mean() > 3e-3  # three decimals of one terrain say nothing
+    flat = compare(pair, "spr", SMALL_GRID, terrain=Terrain(range_m=0.0)).pairs[0]
+    assert flat.scatter_px == 0  # all flat ground is the same
+    assert compare(pair, "rot", SMALL_GRID).pairs[0].scatter_px is None
 
 
 # closed forms
@@ -574,7 +588,7 @@ def test_the_summary_of_a_result(seven):
     assert [(one["a"], one["b"], one["similar"]) for one in given] == [
         *(("set1", "set2", True), ("set1", "set3", False), ("set2", "set3", False))
     ]
-    assert list(given[0]) == ["a", "b", "method", "figure_px", "similar"]
+    assert list(given[0]) == ["a", "b", "method", "figure_px", "scatter_px", "similar"]
 
 
 def test_each_convention_is_named(seven):

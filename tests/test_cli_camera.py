@@ -45,11 +45,11 @@ def test_compare_prints_a_list_of_pairs(capsys):
     assert run("compare", SEVEN, "--method", "zrot", "--as-published", "--json") == 0
     found = json.loads(capsys.readouterr().out)
     assert len(found) == 21
-    assert list(found[0]) == ["a", "b", "method", "figure_px", "similar"]
+    assert list(found[0]) == ["a", "b", "method", "figure_px", "scatter_px", "similar"]
     assert found[-1] == {
         "a": "set6", "b": "set7", "method": "zrot",
         "figure_px": pytest.approx(9.50, abs=0.025),  # published: Pessoa 2017, table 13
-        "similar": False,
+        "scatter_px": None, "similar": False,
     }  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from tankcal.camera import PARAMETERS, UNITS
 from tankcal.camera_papers.naming import numbered, short
-from tankcal.digits import NOTHING, fixed
+from tankcal.digits import NOTHING, decimals_of, fixed
 from tankcal.report import blocks, numbers
 from tankcal.report.plain import Column
 
@@ -10,6 +10,7 @@ KEYS = {name: f"{name}_{UNITS[name]}" if UNITS[name] else name for name in PARAM
 MOST_LISTED = 12  # pairs that a sentence lists
 INTERIOR = ("c", "x0", "y0")
 DISTORTION = (("K1", "K2", "K3", "K4"), ("P1", "P2", "P3", "P4", "A", "B"))
+MOST_DECIMALS = 3  # of a figure in pixels; fewer where it scatters from terrain to terrain
 _SAME = "\N{NO-BREAK SPACE}="
 _NOT_SAME = "\N{NO-BREAK SPACE}\N{FIGURE SPACE}"
 
@@ -125,7 +126,8 @@ def matrix(paper):
 def _cell(paper, row):
     if row is None:
         return NOTHING
-    return fixed(row["figure_px"], 3, paper.marks) + (_SAME if row["similar"] else _NOT_SAME)
+    decimals = min(decimals_of(row.get("scatter_px")), MOST_DECIMALS)
+    return fixed(row["figure_px"], decimals, paper.marks) + (_SAME if row["similar"] else _NOT_SAME)
 
 
 def pairs(paper):
@@ -133,10 +135,12 @@ def pairs(paper):
     drawn = [matrix(paper)] if len(paper.result["cameras"]) > 2 else []
     rows = [_row_of_pair(row) for row in paper.result["pairs"]]
     expected = any(row["expected_px"] is not None for row in rows)
+    scattered = any(row["scatter_px"] is not None for row in rows)
     columns = [
         Column("a"),
         Column("b"),
-        Column("figure_px", "px", decimals=3),
+        Column("figure_px", "px", u="scatter_px", most=MOST_DECIMALS, decimals=MOST_DECIMALS),
+        *([Column("scatter_px", "px", decimals=MOST_DECIMALS)] if scattered else []),
         Column("similar", words="similar"),
         *([Column("expected_px", "px", decimals=3)] if expected else []),
         Column("largest_px", "px", decimals=2),
@@ -161,7 +165,9 @@ def _row_of_pair(row):
     shift = row["shift_m"] or [None] * 3
     angles = dict(zip(("omega_deg", "phi_deg", "kappa_deg"), rotation, strict=True))
     shifts = {f"shift_{axis}_m": value for axis, value in zip("xyz", shift, strict=True)}
-    return row | angles | shifts | {"a": short(row["a"]), "b": short(row["b"])}
+    return (
+        {"scatter_px": None} | row | angles | shifts | {"a": short(row["a"]), "b": short(row["b"])}
+    )
 
 
 def calibrations(paper):

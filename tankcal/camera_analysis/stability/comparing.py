@@ -9,8 +9,9 @@ c1, c2 the focal lengths the figure of a pair, in pixels, is
     rot   sigma0 = sqrt(v'v/(2n - 3)) after the second bundle was rotated onto the first: a turn of
           the whole bundle, and most of a shift of the principal point, does not count
     spr   sigma0 = sqrt(v'v/(2n - 6)) of a resection by the second bundle of points that the first
-          one sees on a terrain: a turn and a shift of the camera do not count, nor does c on flat
-          ground. What is left is what an adjustment with free orientation would feel
+          one sees on a terrain, pooled over ten random ones: a turn and a shift of the camera do
+          not count, nor does c on flat ground. What is left is what an adjustment with free
+          orientation would feel
 
 mis is the same for both orders of a pair; the others, to first order, but for the factor c1/c2 of
 the image in which they are counted: the first one's (spr: the second one's). Two calibrations are
@@ -21,7 +22,7 @@ focal length of the first. Source: Pessoa 2017 (14-19); Habib et al. 2006.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -61,11 +62,13 @@ class Pair:
     """Two calibrations against each other; n grid points.
 
     a, b           names; a stands before b in the file and is the first set
-    figure_px      figure of the method
+    figure_px      figure of the method; of spr the root of the mean square over the terrains
+    scatter_px     standard deviation of that figure from terrain to terrain, spr; else None
     similar        whether it is below the threshold
     difference_px  (n, 2) second minus first, x to the right and y up, after the method's fit
     expected_px    figure that the declared standard deviations alone would make (root of the mean
                    square, whatever the figure), first order; None: not declared
+                   (what follows is of spr on the first terrain)
     scale          factor of the second set, zrot; else None
     rotation_rad   (3,) omega, phi, kappa of R with ray in second = R ray in first; rot, spr; else
                    None
@@ -81,6 +84,7 @@ class Pair:
     scale: float | None = None
     rotation_rad: np.ndarray | None = None
     shift_m: np.ndarray | None = None
+    scatter_px: float | None = None
 
 
 @dataclass(frozen=True)
@@ -140,10 +144,10 @@ def compare(
     check_size(len(setups), grid, UNKNOWNS[method], file)
     terrain = (terrain or TERRAINS["I"]) if method == "spr" else None
     sets = [_corrected(setup, grid, format_px) for setup in setups]
-    depth_m = None if terrain is None else terrain.depths_m(grid.size, seed)
+    depths_m = terrain and [terrain.depths_m(grid.size, seed, i) for i in range(terrain.drawn)]
     known = covariances or {}
     pairs = tuple(
-        _pair((first, second), method, as_published, threshold_px, (terrain, depth_m), known)
+        _pair((first, second), method, as_published, threshold_px, (terrain, depths_m), known)
         for i, second in enumerate(sets)
         for first in sets[:i]
     )
@@ -191,14 +195,15 @@ class _Set:
 
 @dataclass(frozen=True)
 class _Found:
-    """What a method finds of a pair; design_px: what its fit took out, (2n, u) or None."""
+    """What a method finds of a pair; designs_px: what its fits took out, each (2n, u) or None."""
 
     figure_px: float
     difference_px: np.ndarray
-    design_px: np.ndarray | None = None
+    designs_px: tuple = (None,)
     scale: float | None = None
     rotation_rad: np.ndarray | None = None
     shift_m: np.ndarray | None = None
+    scatter_px: float | None = None
 
 
 def _corrected(setup, grid, format_px):
@@ -230,15 +235,16 @@ def _pair(pair, method, as_published, threshold_px, ground, known):
         scale=found.scale,
         rotation_rad=found.rotation_rad,
         shift_m=found.shift_m,
+        scatter_px=found.scatter_px,
     )
 
 
-def _compared(pair, method, as_published, terrain, depth_m):
+def _compared(pair, method, as_published, terrain, depths_m):
     try:
         if method == "rot":
             return _by_rotation(*pair, as_published)
         if method == "spr":
-            return _by_resection(*pair, terrain, depth_m)
+            return _by_resections(*pair, terrain, depths_m)
     except SolutionError as error:
         raise SolutionError(f"{pair[0].name} and {pair[1].name}: {error}") from error
     return _by_coordinates(*pair, method, as_published)
@@ -261,7 +267,20 @@ def _by_rotation(first, second, as_published):
         second_mm, second_c = second.in_pixels_of(first), first.c_mm
     fit = rotation_between(first.ideal_mm, first.c_mm, second_mm, second_c, first.pixel_mm)
     return _Found(
-        fit.sigma0_px, fit.residuals_px, fit.design_px, rotation_rad=angles_of(fit.rotation.T)
+        fit.sigma0_px, fit.residuals_px, (fit.design_px,), rotation_rad=angles_of(fit.rotation.T)
+    )
+
+
+def _by_resections(first, second, terrain, depths_m):
+    """spr: on each of the terrains; everything but the figure is that of the first."""
+    found = [_by_resection(first, second, terrain, depth_m) for depth_m in depths_m]
+    figures = [one.figure_px for one in found]
+    scatter = float(np.std(figures, ddof=1)) if len(figures) > 1 else 0.0
+    return replace(
+        found[0],
+        figure_px=float(np.sqrt(np.mean(np.square(figures)))),
+        designs_px=tuple(design for one in found for design in one.designs_px),
+        scatter_px=scatter,
     )
 
 
@@ -271,7 +290,7 @@ def _by_resection(first, second, terrain, depth_m):
     return _Found(
         fit.sigma0_px,
         -fit.residuals_px,
-        fit.design_px,
+        (fit.design_px,),
         rotation_rad=angles_of(fit.rotation),
         shift_m=fit.position_m - terrain.position_m,
     )
@@ -300,7 +319,11 @@ def _expected(pair, method, as_published, found, known):
     points = len(first.ideal_mm)
     unknowns = UNKNOWNS[method]
     divisor = 2 * points - unknowns if unknowns else points
-    return expected_px(zip(in_pixels, covariances, strict=True), found.design_px, divisor)
+    of_terrains = [
+        expected_px(zip(in_pixels, covariances, strict=True), design, divisor)
+        for design in found.designs_px
+    ]
+    return float(np.sqrt(np.mean(np.square(of_terrains))))
 
 
 def _conventions(method, as_published, sets, grid, terrain, seed, pairs, known):
@@ -326,7 +349,10 @@ def _conventions(method, as_published, sets, grid, terrain, seed, pairs, known):
     if terrain is not None:
         values = {"position_m": list(terrain.position_m), "low_m": terrain.low_m}
         listed.append(
-            Convention("terrain_random", {**values, "range_m": terrain.range_m, "seed": seed})
+            Convention(
+                "terrain_random",
+                {**values, "range_m": terrain.range_m, "seed": seed, "terrains": terrain.drawn},
+            )
         )
     if any(pair.expected_px is not None for pair in pairs):
         full = [one.name for one in sets if one.name in known]

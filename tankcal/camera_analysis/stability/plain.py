@@ -15,18 +15,19 @@
                   direction {from, to}  second set brought onto the first; of spr: object points
                                         from the first set, resection of the second
                   pixel {x_um, y_um}    a pixel of this size, each axis by its own side
-                  terrain_random {position_m, low_m, range_m, seed}   (spr)
+                  terrain_random {position_m, low_m, range_m, seed, terrains}   (spr)
                   sds_uncorrelated | covariance_known {cameras}       (where expected_px is there)
     grid          {columns, rows, start_px: [x, y], step_px}
     threshold_px  similar when the figure is below it
-    terrain       {position_m: [x, y, z], low_m, range_m, seed}; null but for spr
+    terrain       {position_m: [x, y, z], low_m, range_m, seed, terrains}; null but for spr
     cameras       [{name, c_mm, x0_mm, y0_mm, K1_mm-2 ... B, sd: {the same keys: number or null},
                   convention, affinity, radial_balance_mm, format_px: [columns, lines],
                   pixel_um: [x, y]}]
     pairs         rows of the published tables: (2, 1), (3, 1), (3, 2), (4, 1) ... each
                   {a, b          names; a stands before b in the file
                   method
-                  figure_px, similar
+                  figure_px, similar      of spr pooled over the terrains
+                  scatter_px     its standard deviation from terrain to terrain (spr), else null
                   largest_px, mean_px, rmse_px    of the lengths of the differences
                   expected_px    figure that the declared sds alone would make; null: no sds
                   scale          of the second set (zrot), else null
@@ -70,13 +71,14 @@ def as_json(result):
 
 
 def summary(result):
-    """The pairs alone, [{a, b, method, figure_px, similar}], a before b in the file."""
+    """The pairs alone, [{a, b, method, figure_px, scatter_px, similar}], a before b in the file."""
     return [
         {
             "a": pair.a,
             "b": pair.b,
             "method": result.method,
             "figure_px": pair.figure_px,
+            "scatter_px": pair.scatter_px,
             "similar": pair.similar,
         }
         for pair in result.pairs
@@ -89,6 +91,7 @@ def _terrain(terrain, seed):
         "low_m": terrain.low_m,
         "range_m": terrain.range_m,
         "seed": seed,
+        "terrains": terrain.drawn,
     }
 
 
@@ -116,6 +119,7 @@ def _pair(pair, result):
         "b": pair.b,
         "method": result.method,
         "figure_px": pair.figure_px,
+        "scatter_px": pair.scatter_px,
         "similar": pair.similar,
         "largest_px": float(length.max()),
         "mean_px": float(length.mean()),

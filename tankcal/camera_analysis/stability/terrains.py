@@ -16,6 +16,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 
 SEED = 1
+DRAWN = 10  # terrains that a figure is pooled over
 _NUMBER = r"(-?[0-9]{1,6}(?:\.[0-9]{1,6})?)"
 _PAIR = re.compile(rf"{_NUMBER},{_NUMBER}")
 
@@ -32,10 +33,15 @@ class Terrain:
     low_m: float = 200.0
     range_m: float = 100.0
 
-    def depths_m(self, points, seed):
-        """(points,) of the ground below the camera; the same for the same seed."""
-        height = self.low_m + np.random.default_rng(seed).random(points) * self.range_m
-        return self.position_m[2] - height
+    @property
+    def drawn(self):
+        """How many terrains a figure is pooled over: flat ground is always the same."""
+        return DRAWN if self.range_m else 1
+
+    def depths_m(self, points, seed, number=0):
+        """(points,) of the ground below the camera; the same for the same seed and number."""
+        rng = np.random.default_rng((seed, number) if number else seed)
+        return self.position_m[2] - self.low_m - rng.random(points) * self.range_m
 
     def object_points_m(self, ideal_mm, c_mm, depth_m):
         """(n, 3) where the rays of ideal image points (n, 2) meet the ground, depths (n,) below."""
