@@ -42,10 +42,12 @@ def kept_files(version=None):
 def write_film(folder):
     """Photographs read on a comparator, with points and marks that were read twice or badly.
 
-    Distortion is known at two focus distances, control is in two systems, a point was seen once.
+    Distortion is known at two focus distances, control is in two systems and holds one height,
+    and a point was seen once.
     """
     film_job(folder, readings=2)
     (heading, *control) = _lines(folder / "control.csv")
+    control[0] = control[0].removesuffix(",2.0,2.0,2.0") + ",2.0,2.0,0"
     moved = [f"{name},{float(x) + 100:.4f},{rest}" for name, x, rest in _cells(control, 2)]
     rows = [f"{heading},system", *(f"{row}," for row in control), *(f"{row},B" for row in moved)]
     _write_lines(folder / "control.csv", rows)

@@ -22,8 +22,11 @@ from tankcal.camera import PARAMETERS, Form
 from tankcal.chain import adjust_job
 from tankcal.cli import main
 from tankcal.job.covariance import read_covariance
+from tankcal.outputs.csv_files import write_csv
+from tankcal.plain_data import rows_of
 from tankcal.record.adjusted import _edge_effect, adjusted_points_of
 from tankcal.record.adjustment import _group
+from tankcal.report import attachments
 from tankcal.report.document import blocks_of
 from tankcal.report.notebook import execute, joined
 from tankcal.report.paper import Paper
@@ -169,7 +172,7 @@ def text_of(pdf):
 def test_the_statistics_are_those_of_the_adjustment(whole):
     """Second method: chi2 and its bounds from the readings and scipy."""
     found = records.load(whole[1] / "record.json")["adjustment"]
-    used = [row for row in found["residuals"] if not row["removed"] and not row["check"]]
+    used = [row for row in rows_of(found["residuals"]) if not row["removed"] and not row["check"]]
     chi2 = sum((row["residual"] / row["sd"]) ** 2 for row in used)
     assert found["chi2"] == pytest.approx(chi2, rel=1e-6)
     assert len(used) == found["observations"]
@@ -308,7 +311,7 @@ def test_verdict_of_a_group(factor, redundancy, verdict):
 def test_a_reading_that_nothing_controls_is_named(station):
     """Closed form: a wall point seen from one set-up by three values has none to spare."""
     _, record, path = station
-    alone = [row for row in record["adjustment"]["residuals"] if not row["controlled"]]
+    alone = [row for row in rows_of(record["adjustment"]["residuals"]) if not row["controlled"]]
     assert len(alone) == 3 * 12
     assert {tuple(row["ids"]) for row in alone} >= {("set-up 0", "W1")}
     assert all(row["mdb"] is None for row in alone)
@@ -325,9 +328,9 @@ def test_csv_files_are_the_record_in_their_units(only):
     found = record["adjustment"]
     assert {path.name for path in folder.iterdir()} == ONLY
     table = pd.read_csv(folder / "residuals.csv", keep_default_na=False, na_values=[""])
-    assert len(table) == len(found["residuals"])
+    assert len(table) == len(found["residuals"]["kind"])
     image = table[table.kind == "image coordinate"]
-    rows = [row for row in found["residuals"] if row["kind"] == "image coordinate"]
+    rows = [row for row in rows_of(found["residuals"]) if row["kind"] == "image coordinate"]
     assert list(image.residual) == pytest.approx([1000 * row["residual"] for row in rows])
     assert set(image.unit) == {"um"}
     assert set(image.value_unit) == {"mm"}
@@ -368,7 +371,7 @@ def test_the_workbook_of_a_survey_alone(only):
         "Choices and provenance",
     ]  # fmt: skip
     sheet = book["Observations"]
-    assert sheet.max_row == 4 + len(record["adjustment"]["residuals"])
+    assert sheet.max_row == 4 + len(record["adjustment"]["residuals"]["kind"])
     (table,) = sheet.tables.values()
     assert table.autoFilter is not None
     use = [row[13].value for row in sheet.iter_rows(min_row=5)]
@@ -399,6 +402,58 @@ def test_very_many_readings_are_cut_to_the_worst(only, tmp_path, monkeypatch):
 
 
 # the papers
+
+
+def test_of_very_many_points_the_sheet_has_the_weakest(only, tmp_path, monkeypatch):
+    record = records.load(only[1] / "record.json")
+    monkeypatch.setattr(workbook.points, "MOST_ROWS", 10)
+    workbook.write(record, tmp_path / "cut.xlsx")
+    sheet = openpyxl.load_workbook(tmp_path / "cut.xlsx")["Adjusted points"]
+    names = [sheet.cell(row, 1).value for row in range(5, sheet.max_row + 1)]
+    trace = {row["point"]: np.trace(row["cov_m2"]) for row in record["points"]}
+    assert set(names) == set(sorted(trace, key=lambda name: -trace[name])[:10])
+    assert names == [row["point"] for row in record["points"] if row["point"] in names]
+
+
+def test_without_papers_there_is_what_they_are_made_of(job, only, tmp_path, capsys):
+    out = tmp_path / "out"
+    command = ["run", str(job), "--only", "adjustment", "--out", str(out), "--quiet"]
+    assert main([*command, "--no-papers"]) == 0
+    assert {path.name for path in out.iterdir()} == {
+        name for name in ONLY if name.endswith((".csv", ".json", ".npz"))
+    }
+    for path in out.iterdir():
+        if path.suffix != ".npz":
+            assert path.read_bytes() == (only[1] / path.name).read_bytes(), path.name
+    with pytest.raises(SystemExit, match="2"):
+        main([*command, "--no-papers", "--letterhead", "letterhead.toml"])
+
+
+def test_csv_files_are_those_of_pandas(tmp_path):
+    """Second method: pandas' own writer, which is slow."""
+    table = pd.DataFrame(
+        {
+            "point": ["a,b", 'c"d', "", "e\nf"],
+            "x": [1 / 3, -1e-9, np.nan, 2e12],
+            "n": [1, 2, 3, 4],
+            "row": pd.Series([7, None, 8, 9], dtype="Int64"),
+            "on": [True, False, True, False],
+        }
+    )
+    for style in ("%.6f", "%.12g"):
+        write_csv(table, tmp_path / "own.csv", style)
+        table.to_csv(tmp_path / "pandas.csv", index=False, float_format=style, lineterminator="\n")
+        own, other = (tmp_path / f"{name}.csv" for name in ("own", "pandas"))
+        assert own.read_bytes() == other.read_bytes()
+
+
+def test_what_is_too_large_stays_beside_the_pdf(tmp_path, monkeypatch):
+    (tmp_path / "record.json").write_bytes(b"12345")
+    assert [one.name for one in attachments.beside(tmp_path, {"record.json": ""})] == [
+        "record.json"
+    ]
+    monkeypatch.setattr(attachments, "LARGEST", 4)
+    assert attachments.beside(tmp_path, {"record.json": ""}) == []
 
 
 def test_the_papers_of_a_survey_alone(only):

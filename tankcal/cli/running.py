@@ -64,7 +64,13 @@ def _add_run(commands):
         help="write nothing when the global test of the adjustment fails, or when what was set "
         "aside as a blunder may not be the one (exit status 3)",
     )
-    add_letterhead(run)
+    of_papers = run.add_mutually_exclusive_group()
+    add_letterhead(of_papers)
+    of_papers.add_argument(
+        "--no-papers",
+        action="store_true",
+        help="write record and CSV files only; tankcal report makes workbook and papers of them",
+    )
     run.add_argument("--quiet", action="store_true", help="no progress, only problems")
     add_json(run)
     run.set_defaults(command=_run)
@@ -76,7 +82,8 @@ def _run(options):
     compute = _adjust if options.only == "adjustment" else _compute
     tell = _tell_machine if options.json else _tell
     quiet = options.quiet or options.json
-    compute(source, out, quiet, options.strict, letterhead_of(options), tell)
+    papers = letterhead_of(options), not options.no_papers
+    compute(source, out, quiet, options.strict, papers, tell)
 
 
 def _default_out(source):
@@ -140,7 +147,7 @@ def _fit(adjustment):
     }
 
 
-def _compute(source, out, quiet, strict=False, letterhead=None, tell=_tell):
+def _compute(source, out, quiet, strict=False, papers=(), tell=_tell):
     prepare_for_small_work()
     from tankcal import outputs
 
@@ -151,7 +158,7 @@ def _compute(source, out, quiet, strict=False, letterhead=None, tell=_tell):
     adjustment = result.adjustment
     if strict:
         _refuse_failed(adjustment)
-    paths = outputs.write(result, out, show.part, letterhead)
+    paths = outputs.write(result, out, show.part, *papers)
     show.end()
     tell(out, paths, result.warnings, result, adjustment)
 
@@ -185,7 +192,7 @@ def _capacity(result):
     )
 
 
-def _adjust(source, out, quiet, strict, letterhead, tell=_tell):
+def _adjust(source, out, quiet, strict, papers, tell=_tell):
     prepare_for_small_work()
     from tankcal import outputs
 
@@ -195,7 +202,7 @@ def _adjust(source, out, quiet, strict, letterhead, tell=_tell):
     adjustment = tankcal.adjust_job(job, show.step)
     if strict:
         _refuse_failed(adjustment)
-    paths = outputs.write_adjustment(job, adjustment, out, show.part, letterhead)
+    paths = outputs.write_adjustment(job, adjustment, out, show.part, *papers)
     show.end()
     tell(out, paths, dict.fromkeys((*job.warnings, *adjustment.warnings)), None, adjustment)
 

@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tankcal import folders, report, workbook
+from tankcal import folders, report
 from tankcal import record as records
 from tankcal.errors import InputError, Problem, TankcalError
 from tankcal.job.tables import COVARIANCE_FILE
@@ -28,6 +28,7 @@ def write(
     directory: str | PathLike,
     progress: Callable[[str, int, int], None] | None = None,
     letterhead: "Letterhead | None" = None,
+    papers: bool = True,
 ) -> list[Path]:
     """Write record, CSV files, workbook, notebook, PDFs and HTML of a `chain.Result`.
 
@@ -35,25 +36,30 @@ def write(
                 folder that holds anything else is refused
     progress    called as progress(text, done, total)
     letterhead  a report.letterhead.Letterhead, or None
+    papers      False: record and CSV files only; `rebuild` makes the others from the record
     Returns the paths. Raises InputError for a folder that is not tankcal's to replace.
     """
 
     def prepare(folder):
-        records.save(records.record_of(result), folder / RECORD)
+        record = records.record_of(result)
+        records.save(record, folder / RECORD)
         if result.adjustment is not None:
             tables.write_covariance(result.adjustment, folder)
+        return record
 
-    return _write(prepare, directory, progress, letterhead=letterhead)
+    return _write(prepare, directory, progress, letterhead=letterhead, papers=papers)
 
 
-def write_adjustment(job, adjustment, directory, progress=None, letterhead=None):
+def write_adjustment(job, adjustment, directory, progress=None, letterhead=None, papers=True):
     """The same for a survey that was only adjusted (`surveys.Adjustment` of a `Job`)."""
 
     def prepare(folder):
-        records.save(records.record_of_adjustment(job, adjustment), folder / RECORD)
+        record = records.record_of_adjustment(job, adjustment)
+        records.save(record, folder / RECORD)
         tables.write_covariance(adjustment, folder)
+        return record
 
-    return _write(prepare, directory, progress, letterhead=letterhead)
+    return _write(prepare, directory, progress, letterhead=letterhead, papers=papers)
 
 
 def rebuild(record_path, directory, progress=None, language=None, letterhead=None):
@@ -74,12 +80,13 @@ def rebuild(record_path, directory, progress=None, language=None, letterhead=Non
             languages=[*LANGUAGES],
         )
         raise InputError(Problem("--language", expected))
-    records.load(source)
+    record = records.load(source)
 
     def prepare(folder):
         for path in (source, source.with_name(COVARIANCE_FILE)):
             if path.exists():
                 shutil.copyfile(path, folder / (RECORD if path == source else path.name))
+        return record
 
     try:
         return _write(prepare, directory, progress, language, letterhead)
@@ -100,26 +107,35 @@ def record_file(path):
     return Path(path) / RECORD if Path(path).is_dir() else Path(path)
 
 
-def _write(prepare, directory, progress, language=None, letterhead=None):
-    """Write everything into `directory`; `prepare` puts the record into a folder."""
+def _write(prepare, directory, progress, language=None, letterhead=None, papers=True):
+    """Write everything into `directory`; `prepare` puts the record into a folder and gives it."""
     refuse_foreign(directory)
     tell = progress or (lambda text, done, total: None)
     with folders.replaced(directory) as temporary:
-        tell(message("writing_record", "writing the record and the workbook"), 0, 1)
-        prepare(temporary)
-        record = records.load(temporary / RECORD)
+        tell(message("writing_record", "writing the record and the tables"), 0, 1)
+        record = prepare(temporary)
         tables.write_tables(record, temporary)
-        of_tank, of_survey = WORKBOOKS
-        name = of_tank if record["capacity"] else of_survey
-        workbook.write(record, temporary / name, language)
-        report.build(
-            temporary / RECORD,
-            temporary,
-            lambda done, total: tell(message("writing_report", "writing the report"), done, total),
-            language,
-            letterhead,
-        )
+        if papers:
+            _write_papers(record, temporary, tell, language, letterhead)
     return [Path(directory) / name for name in FILES if (Path(directory) / name).exists()]
+
+
+def _write_papers(record, folder, tell, language, letterhead):
+    """Workbook, notebook, PDFs and HTML beside the record."""
+    from tankcal import workbook  # a second to import, which record and tables need not wait for
+
+    tell(message("writing_workbook", "writing the workbook"), 0, 1)
+    of_tank, of_survey = WORKBOOKS
+    name = of_tank if record["capacity"] else of_survey
+    workbook.write(record, folder / name, language)
+    report.build(
+        folder / RECORD,
+        folder,
+        lambda done, total: tell(message("writing_report", "writing the report"), done, total),
+        language,
+        letterhead,
+        record,
+    )
 
 
 def refuse_foreign(directory):

@@ -5,6 +5,7 @@ import pandas as pd
 
 from tankcal.digits import PROGRAM, decimals_of_rows, fixed
 from tankcal.job.covariance import MAX_POINTS
+from tankcal.outputs.csv_files import write_csv
 
 IN_SMALL_UNITS = {"mm": ("um", 1e3), "m": ("mm", 1e3), "rad": ("arcsec", 648000 / np.pi)}
 IN_LARGE_UNITS = {"rad": ("deg", 180 / np.pi)}
@@ -39,9 +40,7 @@ def write_tables(record, directory):
         if len(table):
             in_metres = name in ("points", "sections", "capacity")
             style = f"%.{LEAST_DECIMALS}f" if in_metres else "%.12g"
-            table.to_csv(
-                directory / f"{name}.csv", index=False, float_format=style, lineterminator="\n"
-            )
+            write_csv(table, directory / f"{name}.csv", style)
 
 
 def write_covariance(adjustment, directory):
@@ -188,39 +187,40 @@ def _groups_table(adjustment):
 
 def residuals_table(adjustment):
     """One row a reading: value in mm, m or degrees; residual, sd and mdb in um, mm or arcsec."""
-    readings = adjustment["residuals"]
-    width = max((len(row["ids"]) for row in readings), default=0)
-    rows = []
-    for row in readings:
-        large, of_value = IN_LARGE_UNITS.get(row["unit"], (row["unit"], 1.0))
-        small, factor = IN_SMALL_UNITS.get(row["unit"], (row["unit"], 1.0))
-        rows.append(
-            {
-                "kind": row["kind"],
-                **{f"id_{i + 1}": one for i, one in enumerate(_padded(row["ids"], width))},
-                "element": row["element"],
-                "value": _times(row["value"], of_value),
-                "value_unit": large,
-                **{key: _times(row[key], factor) for key in ("residual", "sd", "mdb")},
-                "unit": small,
-                "redundancy": row["redundancy"],
-                "w": row["w"],
-                "tau": row["tau"],
-                "effect_mm": _in_mm(row["effect_m"]),
-                "controlled": "yes" if row["controlled"] else "no",
-                "removed": "yes" if row["removed"] else "no",
-                "check": "yes" if row["check"] else "no",
-                "repeats": row["repeats"],
-                "file": row["file"],
-                "row": row["row"],
-            }
-        )
-    table = pd.DataFrame(rows)
-    return table.astype({"row": "Int64"}) if len(table) else table
+    found = adjustment["residuals"]
+    width = max(map(len, found["ids"]), default=0)
+    ids = zip(*(_padded(names, width) for names in found["ids"]), strict=True)
+    large = [IN_LARGE_UNITS.get(unit, (unit, 1.0)) for unit in found["unit"]]
+    small = [IN_SMALL_UNITS.get(unit, (unit, 1.0)) for unit in found["unit"]]
+    columns = {
+        "kind": found["kind"],
+        **{f"id_{number}": names for number, names in enumerate(ids, 1)},
+        "element": found["element"],
+        "value": _in_units(found["value"], large),
+        "value_unit": [unit for unit, _ in large],
+        **{key: _in_units(found[key], small) for key in ("residual", "sd", "mdb")},
+        "unit": [unit for unit, _ in small],
+        "redundancy": found["redundancy"],
+        "w": found["w"],
+        "tau": found["tau"],
+        "effect_mm": [_in_mm(value) for value in found["effect_m"]],
+        **{key: [_YES[one] for one in found[key]] for key in ("controlled", "removed", "check")},
+        "repeats": found["repeats"],
+        "file": found["file"],
+        "row": found["row"],
+    }
+    return pd.DataFrame(columns, dtype=object)
 
 
-def _times(value, factor):
-    return None if value is None else value * factor
+_YES = {True: "yes", False: "no"}
+
+
+def _in_units(values, units):
+    """Values times the factors of their units; None stays."""
+    return [
+        None if value is None else value * factor
+        for value, (_, factor) in zip(values, units, strict=True)
+    ]
 
 
 def _padded(ids, width):

@@ -1,6 +1,6 @@
 """The part of the record that says how the survey was adjusted, and how good that is."""
 
-from dataclasses import asdict
+from dataclasses import asdict, fields
 
 import numpy as np
 from scipy.special import gammaincinv
@@ -17,6 +17,7 @@ from tankcal.record.adjusted import (
     systems_of,
 )
 from tankcal.record.images import depth_of, fiducials_of, image_readings_of
+from tankcal.surveys.results import Reading
 
 CONFIDENCE = 0.95  # of the global test and of the intervals of variance factors
 ALPHA, POWER = 0.001, 0.80  # of the tests of single readings
@@ -35,7 +36,7 @@ def adjustment_of(adjustment, measurements=None):
         "groups": [_group(group) for group in adjustment.groups],
         "held": [_held(reading) for reading in adjustment.readings if _holds(reading)],
         "removed": [_reading(reading) for reading in adjustment.removed],
-        "residuals": [_reading(reading) for reading in adjustment.readings],
+        "residuals": _columns(adjustment.readings),
         "cameras": cameras_of(adjustment, measurements),
         "photos": photos_of(adjustment),
         "image_readings": image_readings_of(adjustment.repeats),
@@ -101,6 +102,14 @@ def _reading(reading):
     row["ids"] = list(reading.ids)
     row["controlled"] = _controlled(reading)
     return row
+
+
+def _columns(readings):
+    """{key: values} of all readings, the keys being those of `_reading`; there may be 200 000."""
+    columns = {one.name: [getattr(r, one.name) for r in readings] for one in fields(Reading)}
+    columns["ids"] = [list(names) for names in columns["ids"]]
+    columns["controlled"] = [_controlled(reading) for reading in readings]
+    return columns
 
 
 def _controlled(reading):

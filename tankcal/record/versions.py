@@ -9,7 +9,8 @@ import re
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import listed, message
-from tankcal.record.layout import missing_keys
+from tankcal.plain_data import columns_of
+from tankcal.record.layout import layout_of, missing_keys
 
 NAME = "tankcal-record"
 VERSION = 2
@@ -95,8 +96,13 @@ def _intervals_of_draft(volume_m3=(), U_m3=(), **_):
 
 
 def _from_1(record):
-    """Version 2 from version 1."""
-    return record | {"format": f"{NAME}/2"}
+    """Version 2 from version 1: readings in columns, what held coordinates react with unknown."""
+    adjustment = record["adjustment"]
+    if adjustment is not None:
+        names = layout_of(2)["adjustment"]["residuals"]
+        columns = columns_of(adjustment["residuals"], names)
+        adjustment = {"held": []} | adjustment | {"residuals": columns}
+    return record | {"format": f"{NAME}/2", "adjustment": adjustment}
 
 
 _STEPS = {1: _from_1}

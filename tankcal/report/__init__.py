@@ -11,7 +11,7 @@ _SINCE_UNCERTAINTY = ("budgets", "deliveries", "rule", "monte_carlo")
 _PARTS = (("certificate.pdf", "certificate"), ("working-papers.pdf", "working-papers"))
 
 
-def build(record_path, directory, progress=None, language=None, letterhead=None):
+def build(record_path, directory, progress=None, language=None, letterhead=None, record=None):
     """Write the files of FILES into `directory`, from the record alone; give their paths.
 
     A record without a capacity, of a survey that was only adjusted, has no certificate: it gets
@@ -22,6 +22,7 @@ def build(record_path, directory, progress=None, language=None, letterhead=None)
     progress      called as progress(done, total) while it works
     language      of the papers; None: that of the job
     letterhead    a letterhead.Letterhead, or None
+    record        the record as loaded from there, when it is at hand
 
     Raises TankcalError when a cell of the notebook fails or a page cannot be set; then none of the
     files is written.
@@ -35,7 +36,7 @@ def build(record_path, directory, progress=None, language=None, letterhead=None)
     beside = directory / "record.json"
     if Path(record_path).resolve() != beside.resolve():
         shutil.copyfile(record_path, beside)
-    record = records.load(beside)
+    record = records.load(beside) if record is None else record
     notebook = joined(
         beside.name,
         missing(record),

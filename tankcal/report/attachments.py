@@ -12,6 +12,7 @@ KINDS = {  # name of the file: MIME type, what it is to the paper (PDF 2.0, 7.11
     "capacity.xlsx": (_WORKBOOK, "data"),
     "adjustment.xlsx": (_WORKBOOK, "data"),
 }
+LARGEST = 20_000_000  # bytes: a larger file stays beside the PDF, which names its digest
 
 
 @dataclass(frozen=True)
@@ -30,12 +31,15 @@ class Attachment:
 
 
 def beside(folder, described):
-    """Attachments of the files in `folder` that are known; `described` is {name: description}."""
+    """Attachments of the files in `folder` that are known and not too large for a PDF.
+
+    described  {name: description}
+    """
     paths = [Path(folder) / name for name in KINDS]
     return [
         Attachment(path.name, *KINDS[path.name], described[path.name], sha256(path.read_bytes()))
         for path in paths
-        if path.is_file()
+        if path.is_file() and path.stat().st_size <= LARGEST
     ]
 
 

@@ -6,8 +6,10 @@ The cells of the templates use it; nothing here computes a number.
 >>> paper.table("courses", paper.record["courses"], [Column("course"), Column("height_m", "m", 3)])
 """
 
+from functools import cached_property
 from pathlib import Path
 
+from tankcal.plain_data import rows_of
 from tankcal.record import load
 from tankcal.report import attachments, blocks
 from tankcal.report.letterhead import read_saved
@@ -51,6 +53,11 @@ class Paper(PlainPaper):
             for choice in self.record["choices"]
             if code in (None, choice["code"])
         ]
+
+    @cached_property
+    def readings(self):
+        """Every reading of the adjustment, a dict each."""
+        return rows_of(self.record["adjustment"]["residuals"])
 
     # ---- blocks
 

@@ -2,11 +2,12 @@
 
 from math import pi
 
+from tankcal.plain_data import rows_of
 from tankcal.words import observation_name
 from tankcal.workbook.look import values_of
 from tankcal.workbook.tables import set_widths
 
-MOST_ROWS = 20_000  # of the sheet: those with the largest |w|
+MOST_ROWS = 5_000  # of the sheet: those with the largest |w|
 SMALL = {"mm": ("µm", 1e3), "m": ("mm", 1e3), "rad": ("″", 648000 / pi)}
 _LARGE = {"rad": ("°", 180 / pi)}
 _HEAD_ROW = 3
@@ -14,7 +15,7 @@ _HEAD_ROW = 3
 
 def observations_sheet(book, record):
     """One row a reading, to be filtered; those set aside stand back and say so."""
-    readings = record["adjustment"]["residuals"]
+    readings = rows_of(record["adjustment"]["residuals"])
     rows = readings
     subtitle = book.word("texts.residuals_subtitle")
     if len(rows) > MOST_ROWS:

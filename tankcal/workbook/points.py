@@ -5,6 +5,7 @@ from tankcal.words import sentence
 from tankcal.workbook.look import in_mm, sd_digits, values_of
 from tankcal.workbook.tables import set_widths
 
+MOST_ROWS = 5_000  # of the sheet: those that were not used, then the weakest
 _HEAD_ROW = 3
 
 
@@ -18,11 +19,14 @@ def points_sheet(book, record):
 
     Of an adjusted survey with sds and error ellipsoids; without a tank with nothing else.
     """
-    rows = record["points"]
     of_tank = record["capacity"] is not None
     code = "points" if of_tank else "adjusted_points"
-    used = sum(row["used"] for row in rows) if of_tank else 0
-    subtitle = book.word(f"texts.{code}_subtitle", count=len(rows), used=used)
+    used = sum(row["used"] for row in record["points"]) if of_tank else 0
+    subtitle = book.word(f"texts.{code}_subtitle", count=len(record["points"]), used=used)
+    record = record | {"points": _shown(record["points"])}
+    rows = record["points"]
+    if len(rows) == MOST_ROWS:
+        subtitle = book.word("texts.weakest_points", text=subtitle, shown=len(rows))
     sheet = book.sheet(code, subtitle, landscape=True)
     columns = [book.column("point", values_of(rows, "point"), None, 12)]
     if of_tank:
@@ -39,6 +43,19 @@ def points_sheet(book, record):
     if rows:
         book.table(sheet, _HEAD_ROW, "points", columns, muted=muted, autofilter=True)
     book.freeze(sheet, _HEAD_ROW, 1)
+
+
+def _shown(rows):
+    """The rows, in their order; of very many those not used, then those with the largest sds."""
+    if len(rows) < MOST_ROWS:
+        return rows
+
+    def rank(i):
+        covariance = rows[i]["cov_m2"]
+        variance = 0.0 if covariance is None else sum(covariance[k][k] for k in range(3))
+        return rows[i]["used"] is not False, -variance
+
+    return [rows[i] for i in sorted(sorted(range(len(rows)), key=rank)[:MOST_ROWS])]
 
 
 def _about_wall(book, record):

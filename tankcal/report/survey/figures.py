@@ -55,7 +55,7 @@ def plan(paper):
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH, 4.6))
         ax = figure.subplots()
-        _lines(ax, adjustment, places, origin)
+        _lines(ax, paper, places, origin)
         many = {"rasterized": len(points) > MANY}
         _ellipses(ax, points, xy - origin, factor)
         _marks(ax, paper, points, xy - origin, many)
@@ -96,11 +96,12 @@ def _axis(paper, axis, origin):
     return f"{text} − {paper.number(origin, 'm', decimals=0)}" if origin else text
 
 
-def _lines(ax, adjustment, places, origin):
+def _lines(ax, paper, places, origin):
     """Distances and sights between points, thin, where there are not too many to see any."""
-    station = {one["setup"]: one["station"] for one in adjustment["setups"]}
+    setups = paper.record["adjustment"]["setups"]
+    station = {one["setup"]: one["station"] for one in setups}
     ends = set()
-    for row in adjustment["residuals"]:
+    for row in paper.readings:
         if row["kind"] not in ("image coordinate", "plumb line") and len(row["ids"]) > 1:
             start = station.get(row["ids"][0], row["ids"][0])
             ends.add((start, row["ids"][-1]))
@@ -190,7 +191,7 @@ def _photo_names(photos, xy):
 def distributions(paper):
     """Histogram of w against the normal distribution, and of the redundancy numbers."""
     rows = [
-        row for row in paper.record["adjustment"]["residuals"]
+        row for row in paper.readings
         if not row["removed"] and not row["check"] and row["sd"] != 0
     ]  # fmt: skip
     w = np.array([row["w"] for row in rows if row["controlled"] and row["w"] is not None])
@@ -251,11 +252,10 @@ def photo_residuals(paper):
                     edgecolor=_GREY,
                 )
             )  # fmt: skip
-            ends = xy + factor * v
             many = {"rasterized": len(xy) > MANY}
-            ax.plot(
-                [xy[:, 0], ends[:, 0]], [xy[:, 1], ends[:, 1]], color=INK, linewidth=0.6, **many
-            )
+            ends = xy + factor * v
+            vectors = np.stack([xy, ends, np.full_like(xy, np.nan)], axis=1)  # one broken line
+            ax.plot(*vectors.reshape(-1, 2).T, color=INK, linewidth=0.6, **many)
             ax.plot(*xy.T, ".", color=INK, markersize=1.6, **many)
             ax.plot(*aside.T, "x", color=RED, markersize=3.5, markeredgewidth=0.8)
             ax.set(aspect="equal", xlim=(-1.03 * half[0], 1.03 * half[0]),
@@ -282,7 +282,7 @@ def _image_residuals(paper):
     """{photo: (xy (n, 2), residuals (n, 2), xy set aside (m, 2))}, mm, of the photos shown."""
     wanted = {one["photo"] for one in shown_photos(paper)}
     values, residuals, used = {}, {}, {}
-    for row in paper.record["adjustment"]["residuals"]:
+    for row in paper.readings:
         if row["kind"] == "image coordinate" and row["ids"][0] in wanted and not row["check"]:
             key = (row["ids"][0], row["ids"][1], row["row"])
             axis = "xy".index(row["element"])

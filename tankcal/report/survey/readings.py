@@ -14,9 +14,7 @@ _DECIMALS = {"mm": 1, "m": 2, "rad": 1}  # of residuals in um, mm and arc second
 def adjusted(paper):
     """Readings that took part: neither set aside nor only compared, nor held."""
     return [
-        row
-        for row in paper.record["adjustment"]["residuals"]
-        if not row["removed"] and not row["check"] and row["sd"] != 0
+        row for row in paper.readings if not row["removed"] and not row["check"] and row["sd"] != 0
     ]
 
 
@@ -164,5 +162,5 @@ def _weakest(paper):
 
 def compared(paper):
     """Readings that were only compared, the largest difference in its sd first."""
-    checks = [row for row in paper.record["adjustment"]["residuals"] if row["check"]]
+    checks = [row for row in paper.readings if row["check"]]
     return sorted(checks, key=lambda row: -abs(row["w"] or 0.0))
