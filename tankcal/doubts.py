@@ -15,6 +15,7 @@ WIDE_GAP_DEG = 45
 SHOWN = 5  # names in a message
 CERTIFICATE_NEEDS = ("number", "laboratory", "customer", "method")
 LARGE_NOISE_M, LARGE_JUMP_M, MANY_SNOOPED = 0.010, 0.020, 0.03
+CONFIRMED = 0.5  # scatter over given sds, or the other way round, from which on they agree
 VAGUE = 5.0  # times the median sd: what a point with one poor ray too few has
 OF_VERTICAL = message(
     "gives_vertical",
@@ -115,10 +116,12 @@ def vague_vertical(points):
     return _problems(points, [text])
 
 
-def vague_points(points, accepted, sds_m):
+def vague_points(points, accepted, sds_m, noise_m):
     """Points of the wall that the survey hardly determines, and a wall of such points.
 
-    accepted (m,) indices of the points of the wall; sds_m (n,) in plan, or None.
+    accepted (m,) indices of the points of the wall; sds_m (n,) in plan, or None; noise_m scatter
+    of the points about the shell's form. Large standard deviations that were handed in and that the
+    scatter confirms are no doubt: they are what the survey is, and U has them.
     """
     if sds_m is None:
         return []
@@ -138,7 +141,8 @@ def vague_points(points, accepted, sds_m):
                 points=listed([_with_sd(points.names[accepted[i]], own[i]) for i in worst], SHOWN),
             )
         )
-    if middle > LARGE_NOISE_M:
+    is_confirmed = CONFIRMED * middle < noise_m < middle / CONFIRMED
+    if middle > LARGE_NOISE_M and (points.from_adjustment or not is_confirmed):
         texts.append(
             message(
                 "points_noisy",

@@ -122,7 +122,7 @@ def warnings_of(job, wall):
     return (
         *weak_sections(job, groups, _azimuths(job, wall.shell, wall.accepted)),
         *doubts(job, wall.shell, wall.sections, sds),
-        *vague_points(job.points, wall.accepted, sds),
+        *vague_points(job.points, wall.accepted, sds, wall.shell.noise_m),
         *vague_vertical(job.points),
     )
 

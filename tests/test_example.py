@@ -12,6 +12,9 @@ from conftest import EXAMPLE
 
 from tankcal.linter import lint
 from tankcal.outputs.tables import write_tables
+from tankcal.record import record_of
+from tankcal.report import certificate
+from tankcal.report.paper import Paper
 from tankcal.workbook import write as write_workbook
 
 
@@ -44,6 +47,12 @@ def test_residual_magnitudes_published_s_table_11(example_result):
 
 def test_no_point_is_rejected(example_result):
     assert len(example_result.wall.accepted) == 24 * 5 - 1  # published: section 3 has 23 points
+
+
+def test_nothing_is_left_to_be_warned_of(example_result):
+    """A shop window: everything is declared that the certificate asks for."""
+    assert example_result.warnings == ()
+    assert certificate.statements(Paper(record_of(example_result))).data["items"][2:] == []
 
 
 def test_gross_volume_is_the_published_one(example_result):
