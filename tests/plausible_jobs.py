@@ -128,15 +128,12 @@ def _lying(rng):
         "datum.reference_height_m": diameter + float(rng.uniform(0.05, 3.0)),
     }
     form = rng.choice([*FORMS, "flat", "torispherical"])
+    dish, knuckle = float(rng.choice([0.8, 1.0])), float(rng.choice([0.06, 0.15]))
     for end in "ab":
         settings[f"horizontal.end_{end}"] = str(form)
         if form == "torispherical":
-            settings[f"horizontal.end_{end}_dish_radius_m"] = float(
-                diameter * rng.choice([0.8, 1.0])
-            )
-            settings[f"horizontal.end_{end}_knuckle_radius_m"] = float(
-                diameter * rng.choice([0.06, 0.15])
-            )
+            settings[f"horizontal.end_{end}_dish_radius_m"] = diameter * dish
+            settings[f"horizontal.end_{end}_knuckle_radius_m"] = diameter * knuckle
     if form in FORMS:
         depth = float(diameter * rng.uniform(*FORMS[form]))
         for end in "ab":

@@ -265,6 +265,10 @@ OF_KIND = [
      "end_depth_strange", "horizontal.end_b_depth_m"),
     ("dished", settings(horizontal__end_b_dish_radius_m=4.8), "end_radius_strange",
      "horizontal.end_b_dish_radius_m"),
+    ("dished", settings(horizontal__end_b_knuckle_radius_m=0.48), "end_radii_differ",
+     "horizontal.end_b_knuckle_radius_m"),
+    ("horizontal", settings(datum__dip_plate_z_m=0.2), "dip_plate_far", "datum.dip_plate_z_m"),
+    ("sphere", settings(sphere__diameter_m=20.5), "size_unlike_drawing", "sphere.diameter_m"),
     *((kind, settings(datum__dip_plate_z_m=0.5), "dip_plate_far", "datum.dip_plate_z_m")
       for kind in ("horizontal", "dished", "sphere")),
     ("horizontal", settings(datum__reference_height_m=1.9), "reference_below_top",

@@ -48,13 +48,13 @@ NEAR_JOINT_M = 0.025  # rings are surveyed on plates, not on welds
 LEVEL_M, RING_GAP_M, MOST_RINGS = 0.03, 0.08, 60
 TOP_MISS_M = 0.05
 RIM, RIM_MISS_M = 0.8, 0.25  # bottom points beyond this part of the radius lie near bottom_z_m
-DIP_PLATE_M = 0.3
+DIP_PLATE_M, DIP_PLATE = 0.3, 0.05  # and of the diameter of a lying tank or a sphere
 PLATE_ON_BOTTOM, PLATE_ON_BOTTOM_M = 0.5, 0.05  # of the rise at the dip point, and
 SLOPE_UP = 0.04  # rise of a cone over the radius; 1:120 is usual, up to 1:25 is plausible
 REFERENCE_BELOW_M, REFERENCE_ABOVE_M, REFERENCE_ABOVE = 0.05, 5.0, 0.2
 
 DIAMETER_MISS, DIAMETER_MISS_M = 0.01, 0.02
-SIZE_MISS, IMPOSSIBLE_MISS = 0.03, 0.3
+SIZE_MISS, SIZE_MISS_M, IMPOSSIBLE_MISS = 0.01, 0.02, 0.3
 VOLUME_MISS = 0.05
 LENGTH_OVER_DIAMETER, MOST_LENGTH_OVER_DIAMETER = (0.4, 16.0), 40.0
 END_DEPTH = {  # over the diameter
@@ -256,7 +256,8 @@ TABLE = (
     ),
     Plausible(
         "datum.dip_plate_z_m",
-        f"within {DIP_PLATE_M:g} m of the bottom; with a cone or a dish and the place of the dip"
+        f"within {DIP_PLATE_M:g} m of the bottom, of a lying tank or a sphere within"
+        f" {DIP_PLATE:g} D, too; with a cone or a dish and the place of the dip"
         f" point within {PLATE_ON_BOTTOM_M:g} m and half the rise of its surface there",
         "half a metre off",
         "the bottom",
@@ -286,9 +287,9 @@ TABLE = (
     ),
     Plausible(
         "tank.nominal_diameter_m",
-        f"{100 * SIZE_MISS:g} % from the given diameter, {100 * DIAMETER_MISS:g} % +"
-        f" {1000 * DIAMETER_MISS_M:g} mm from that of the points; {100 * IMPOSSIBLE_MISS:g} % is a"
-        " problem",
+        f"{100 * SIZE_MISS:g} % + {1000 * SIZE_MISS_M:g} mm from the given diameter,"
+        f" {100 * DIAMETER_MISS:g} % + {1000 * DIAMETER_MISS_M:g} mm from that of the points;"
+        f" {100 * IMPOSSIBLE_MISS:g} % is a problem",
         "radius for diameter, feet",
         "sizes and points",
         ("size_unlike_drawing", "points_unlike_drawing", "points_too_wide"),
@@ -305,7 +306,7 @@ TABLE = (
         f"{LENGTH_OVER_DIAMETER[0]:g} to {LENGTH_OVER_DIAMETER[1]:g} diameters; over"
         f" {MOST_LENGTH_OVER_DIAMETER:g} a problem",
         "decimetres, feet",
-        f"the diameter; checks.length_m within {100 * SIZE_MISS:g} %",
+        f"the diameter; checks.length_m within {100 * SIZE_MISS:g} % + {1000 * SIZE_MISS_M:g} mm",
         ("length_strange", "length_impossible"),
     ),
     Plausible(
@@ -323,8 +324,8 @@ TABLE = (
         f"dish {DISH_RADIUS[0]:g} to {DISH_RADIUS[1]:g}, knuckle {KNUCKLE_RADIUS[0]:g} to"
         f" {KNUCKLE_RADIUS[1]:g} diameters",
         "radius for diameter, twice as large",
-        "the diameter",
-        ("end_radius_strange",),
+        "the diameter, the other end",
+        ("end_radius_strange", "end_radii_differ"),
     ),
     Plausible(
         "horizontal.tilt_mm_per_m",

@@ -6,6 +6,7 @@ from tankcal.job.checks.common import has_rows, tell
 from tankcal.job.checks.geometry import places_of
 from tankcal.job.checks.settings import bottoms_z
 from tankcal.job.plausibility import (
+    DIP_PLATE,
     DIP_PLATE_M,
     RIM,
     RIM_MISS_M,
@@ -20,7 +21,7 @@ MIN_RIM = 6  # points of the bottom near the wall
 
 def check_levels(values, tables, extent, kind, raw, log):
     """Arguments as in `checks.check_tank`."""
-    _check_dip_plate(values, tables, kind, raw, log)
+    _check_dip_plate(values, tables, extent, kind, raw, log)
     _check_reference(values, extent, raw, log)
     if kind == "vertical":
         _check_top(values, raw, log)
@@ -38,18 +39,21 @@ def _check_reference(values, extent, raw, log):
         tell(log.warning, raw, "datum", "reference_height_m", text)
 
 
-def _check_dip_plate(values, tables, kind, raw, log):
+def _check_dip_plate(values, tables, extent, kind, raw, log):
     plate, bottoms = values["datum"]["dip_plate_z_m"], bottoms_z(values, tables, kind)
     if plate is None or not bottoms:
         return
     away = max(plate - max(bottoms), min(bottoms) - plate)
-    if away > DIP_PLATE_M * (1 + 1e-9):
+    most = DIP_PLATE_M
+    if kind in ("horizontal", "sphere") and extent.height_m is not None:
+        most = min(most, DIP_PLATE * extent.height_m)
+    if away > most * (1 + 1e-9):
         text = message(
             "dip_plate_far",
-            "{away_m:.3g} m from the bottom, expected at most {most_m:g} m: the whole table counts"
-            " from here",
+            "{away_m:.3g} m from the bottom, expected at most {most_m:.3g} m: the whole table"
+            " counts from here",
             away_m=away,
-            most_m=DIP_PLATE_M,
+            most_m=most,
         )
         tell(log.warning, raw, "datum", "dip_plate_z_m", text)
 

@@ -14,6 +14,7 @@ from tankcal.job.plausibility import (
     LENGTH_OVER_DIAMETER,
     MOST_LENGTH_OVER_DIAMETER,
     SIZE_MISS,
+    SIZE_MISS_M,
     SPHERE_M,
 )
 from tankcal.messages import message
@@ -60,11 +61,13 @@ def _check_lying(values, raw, log):
         _check_end(given, end, diameter, raw, log)
     if given["end_a"] == given["end_b"] in END_DEPTH:
         _check_pair(given, raw, log)
+    if given["end_a"] == given["end_b"] == "torispherical":
+        _check_radii_alike(given, raw, log)
 
 
 def _compare(found, nominal, section, key, drawn, raw, log):
     """A size against the drawing's."""
-    if None in (found, nominal) or abs(found / nominal - 1) <= SIZE_MISS:
+    if None in (found, nominal) or abs(found - nominal) <= SIZE_MISS * nominal + SIZE_MISS_M:
         return
     text = message(
         "size_unlike_drawing",
@@ -152,3 +155,20 @@ def _check_pair(given, raw, log):
         other_m=min(a, b),
     )
     tell(log.warning, raw, "horizontal", f"end_{deeper}_depth_m", text)
+
+
+def _check_radii_alike(given, raw, log):
+    for name, _ in RADII:
+        a, b = (given[f"end_{end}_{name}"] for end in "ab")
+        if None in (a, b) or not min(a, b) or max(a, b) / min(a, b) < ENDS_DIFFER:
+            continue
+        end, other = ("a", "b") if a > b else ("b", "a")
+        text = message(
+            "end_radii_differ",
+            "{found_m:g} m, and {other_m:g} m at end {other}: expected two torispherical ends to be"
+            " alike",
+            found_m=max(a, b),
+            other=other.upper(),
+            other_m=min(a, b),
+        )
+        tell(log.warning, raw, "horizontal", f"end_{end}_{name}", text)
