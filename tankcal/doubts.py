@@ -90,7 +90,7 @@ def of_adjustment(job, datum, causes):
 
 
 def _held(names):
-    if names == ("all",):
+    if "all" in names:
         return message("all_points", "all points")
     return listed(names, SHOWN)
 

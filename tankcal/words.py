@@ -256,7 +256,11 @@ def snooping_sentence(words, adjustment):
 def datum_sentences(words, adjustment):
     """What holds the frame, and what depends on that choice."""
     datum, texts = adjustment["datum"], words["texts"]
-    found = [texts[f"datum_{datum['choice']}"].format(held=listed(words, datum["held"]))]
+    held = [name for name in datum["held"] if datum["choice"] != "inner" or ":" not in name]
+    found = [texts[f"datum_{datum['choice']}"].format(held=listed(words, held))]
+    if len(held) < len(datum["held"]):
+        fixed = [name for name in datum["held"] if ":" in name]
+        found = [texts["datum_fixed"].format(held=listed(words, fixed)), *(found if held else [])]
     if datum["defect"]:
         words_of_defect = datum["words"].split(";")[0].rstrip(".")
         found.append(texts["datum_defect"].format(words=words_of_defect))

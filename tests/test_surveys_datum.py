@@ -173,3 +173,72 @@ def test_a_coordinate_may_be_unknown_or_approximate(photos):
     acting = [one for one in found.readings if one.kind == "control coordinate"]
     assert len(acting) == 24 - 1 - 3
     assert found.datum.held[0] == f"{photos.control.point[0]}:xy"
+
+
+SOME = {"P1": "xyz", "P7": "z"}  # held: of the six that are free, these leave two
+
+
+def partly_held(measurements):
+    """Measurements with the coordinates of SOME held, and all other control weighted."""
+    control = measurements.control
+    sd = control.sd_m.copy()
+    for name, axes in SOME.items():
+        sd[control.point.index(name), ["xyz".index(axis) for axis in axes]] = 0.0
+    return replace(measurements, control=replace(control, sd_m=sd))
+
+
+def test_inner_constraints_are_over_what_held_coordinates_leave_free(photos, figure):
+    """Invariance: held coordinates stay, their sds are 0, the shape is that of any other datum."""
+    measurements = partly_held(photos)
+    found, plain = chosen(measurements, "inner"), chosen(photos, "inner")
+    given = dict(zip(photos.control.point, photos.control.xyz_m, strict=True))
+    for name, axes in SOME.items():
+        place, columns = found.names.index(name), ["xyz".index(axis) for axis in axes]
+        assert found.xyz_m[place, columns] == pytest.approx(given[name][columns], abs=1e-12)
+        assert np.abs(found.covariance_m2[place][columns]).max() == 0
+        assert found.fixed[place, columns].all()
+    assert np.count_nonzero(found.fixed) == 4
+    assert found.redundancy == plain.redundancy
+    assert found.sigma0 == pytest.approx(plain.sigma0, rel=1e-9)
+    worst = np.abs(shape(found) / shape(plain) - 1).max()
+    figure("distances and their sds with held coordinates and inner constraints differ by",
+           f"{worst:.1e}")  # fmt: skip
+    assert worst < 1e-8
+    assert found.datum.held[:2] == ("P1:xyz", "P7:z")
+    assert not set(SOME) & set(found.check_points.names) - {"P7"}
+
+
+def test_the_trace_is_the_smallest_of_all_datums_that_hold_the_same(photos):
+    """Property: over the points of the constraints, among minimal datums with the same held."""
+    measurements = partly_held(photos)
+    over = tuple((name, "xyz") for name in ("P13", "P19", "P25", "P31", "P37", "P43"))
+    names = [name for name, _ in over]
+    least = np.trace(chosen(measurements, "inner", datum_points=over).full_covariance_m2(names))
+    held = tuple(SOME.items())
+    for more in ((("P37", "x"), ("P43", "x")), (("P37", "x"), ("P31", "x")),
+                 (("P25", "x"), ("P19", "x")), (("P37", "y"), ("P43", "y"))):  # fmt: skip
+        other = chosen(measurements, "minimal", datum_points=(*held, *more))
+        assert np.trace(other.full_covariance_m2(names)) > 1.0001 * least
+    plain = chosen(photos, "inner", datum_points=over)
+    assert np.trace(plain.full_covariance_m2(names)) < least  # nothing held: smaller still
+
+
+def test_held_control_that_fixes_all_leaves_nothing_for_inner_constraints(photos):
+    _, truth = by_photographs()
+    names = [int(name[1:]) for name in photos.control.point]
+    fixed = replace(photos, control=known(photos.control.point, truth.xyz_m[names], 0.0))
+    found, other = chosen(fixed, "inner"), adjust_survey(fixed)
+    assert found.xyz_m == pytest.approx(other.xyz_m, abs=1e-9)
+    assert found.covariance_m2 == pytest.approx(other.covariance_m2, rel=1e-6, abs=1e-14)
+    assert any("nothing is left for datum = inner" in str(one) for one in found.warnings)
+    assert [one.w for one in found.readings if one.kind == "control coordinate"] == pytest.approx(
+        [one.w for one in other.readings if one.kind == "control coordinate"], abs=1e-4
+    )
+
+
+@pytest.mark.parametrize("datum", ["minimal", "fixed_photo"])
+def test_held_control_that_a_datum_releases_is_told(photos, datum):
+    photo = {"fixed_photo": "S0"} if datum == "fixed_photo" else {}
+    found = chosen(partly_held(photos), datum, **photo)
+    text = "\n".join(map(str, found.warnings))
+    assert f"datum = {datum} does not hold them: they are compared only" in text

@@ -74,12 +74,13 @@ def _of_places(xyz):
     return out
 
 
-def unobserved(problem, unfelt=UNFELT, fixed=True):
+def unobserved(problem, unfelt=UNFELT, fixed=True, state=None, count=None):
     """Combinations (7, d) of the seven ways that neither observations nor fixed unknowns feel.
 
     unfelt  see UNFELT      fixed  False: as if only observations held anything
+    state   where they are asked for, None: the start      count  d, None: all below `unfelt`
     """
-    layout, state = problem.layout, problem.state
+    layout, state = problem.layout, problem.state if state is None else state
     idle = _idle(problem)
     whole = np.vstack([directions(layout, state), np.zeros(7)])
     felt, lengths = [np.zeros((1, 7))], np.zeros(len(whole))
@@ -106,7 +107,7 @@ def unobserved(problem, unfelt=UNFELT, fixed=True):
     moving = (square > 0) | whole.any(axis=0)  # heights at one place know no turn about Z
     size = np.sqrt(np.where(square > 0, square, 1.0))[moving]
     _, singular, vectors = np.linalg.svd(np.vstack(felt)[:, moving] / size)
-    rank = int(np.sum(singular > unfelt))
+    rank = len(size) - count if count is not None else int(np.sum(singular > unfelt))
     free = np.zeros((7, len(size) - rank))
     free[moving] = (vectors[rank:] / size).T
     return free
@@ -275,7 +276,11 @@ def held(problem, over, combinations, photo=None):
     else:
         mask[layout.photos[photo]] = 1.0
 
+    d = combinations.shape[1]
+
     def free(state):
-        return directions(layout, state) @ combinations
+        # what turns about held coordinates turns about where they are now, not at the start
+        ways = unobserved(problem, state=state, count=d) if state is not problem.state else None
+        return directions(layout, state) @ (combinations if ways is None else ways)
 
     return replace(problem, model=replace(problem.model, free=free, inner=mask[:-1]))

@@ -6,13 +6,14 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.errors import InputError, Problem, SolutionError
-from tankcal.messages import message
+from tankcal.messages import listed, message
 from tankcal.network.assembly import assemble
 from tankcal.network.datum import defect_in_words, directions, in_words, unobserved
 from tankcal.observations import ControlCoordinates
 from tankcal.surveys.results import DatumReport
 
 AXES = "xyz"
+SHOWN = 5  # names in a sentence
 SHARE = 1e-6  # of a way of moving in a combination, below which it is not in it
 STILL = 1e-9  # motion of all unknowns over the largest, below which nothing moves
 WEAK = 1e-6  # smallest pivot of held coordinates over the largest, below which they hold too little
@@ -105,7 +106,7 @@ def _known_frame(chosen, bare, gathered, settings, held, options):
     if settings.datum == "fixed_photo":
         return bare
     if settings.datum == "inner":
-        held = np.zeros_like(declared)
+        held = held.copy()
         over = options.get("over")
         if over is not None and declared[over].all() and len(over) > 2:
             held[over] = True
@@ -154,6 +155,7 @@ def _minimal(survey, bare, problem, free, gathered, settings):
         warnings.append(Problem("job.toml", text, None, "adjustment.datum_points"))
     xyz = np.where(held & np.isfinite(gathered.known.xyz_m), gathered.known.xyz_m, survey.xyz_m)
     chosen = replace(bare, xyz_m=xyz, fixed=bare.fixed | held)
+    warnings += _released(survey, _exact(gathered) & ~held, "minimal")
     return chosen, {}, held, _named(survey, held), warnings
 
 
@@ -174,34 +176,59 @@ def _photo(survey, bare, problem, free, gathered, settings):
     if left.shape[1]:
         raise SolutionError(in_words(left, problem))
     held = np.zeros((len(survey.points), 3), dtype=bool)
+    released = _released(survey, _exact(gathered), "fixed_photo")
     if free.shape[1] < 6:  # observations determine the rest: holding that, too, would strain them
         number = names.index(name)
-        return bare, {"datum": "inner", "photo": number}, held, (name,), []
-    return chosen, {}, held, (name,), []
+        return bare, {"datum": "inner", "photo": number}, held, (name,), released
+    return chosen, {}, held, (name,), released
 
 
 def _inner(survey, bare, problem, free, gathered, settings):
-    """Chosen points keep their places on the whole."""
-    held = np.zeros((len(survey.points), 3), dtype=bool)
+    """Chosen points keep their places on the whole, as far as held control leaves them free."""
+    known, held = gathered.known, _exact(gathered)
+    xyz = np.where(np.isfinite(known.xyz_m), known.xyz_m, survey.xyz_m)
     if not free.shape[1]:
-        return bare, {}, held, (), [_nothing_left("inner")]
+        warnings = [_nothing_left("inner"), *_released(survey, held, "inner")]
+        return bare, {}, np.zeros_like(held), (), warnings
+    chosen, fixed = replace(bare, xyz_m=xyz, fixed=bare.fixed | held), _named(survey, held)
+    problem = assemble(chosen)
+    left = _free(problem)
+    if not left.shape[1]:
+        return chosen, {}, held, fixed, [_nothing_left("inner")]
     if settings.datum_points:
         over = np.flatnonzero(_wanted(survey, settings).any(axis=1))
     else:
-        over = np.flatnonzero(np.isfinite(gathered.known.xyz_m).all(axis=1))
+        over = np.flatnonzero(np.isfinite(known.xyz_m).all(axis=1) & ~held.all(axis=1))
         over = over if len(over) > 2 else np.arange(len(survey.points))
-    rank = _rank(
-        _motions(problem, free).reshape(-1, 3, free.shape[1])[over].reshape(-1, free.shape[1])
-    )
-    if rank < free.shape[1]:
+    d = left.shape[1]
+    rank = _rank(_motions(problem, left).reshape(-1, 3, d)[over].reshape(-1, d))
+    if rank < d:
         raise SolutionError(
-            f"{defect_in_words(free, problem)}; inner constraints over {len(over)} points "
-            f"fix {rank} of {free.shape[1]}: take more points, not all on one line"
+            f"{defect_in_words(left, problem)}; inner constraints over {len(over)} points "
+            f"fix {rank} of {d}: take more points, not all on one line"
         )
-    known = gathered.known.xyz_m
-    xyz = np.where(np.isfinite(known), known, survey.xyz_m)
     names = tuple(survey.points[i] for i in over) if len(over) < len(survey.points) else ("all",)
-    return replace(bare, xyz_m=xyz), {"datum": "inner", "over": over}, held, names, []
+    return chosen, {"datum": "inner", "over": over}, held, (*fixed, *names), []
+
+
+def _exact(gathered):
+    """(points, 3) True for control coordinates that hold exactly and that something observes."""
+    known = gathered.known
+    return np.isfinite(known.xyz_m) & (known.sd_m == 0) & ~gathered.idle
+
+
+def _released(survey, held, choice):
+    """Problem rows that tell of control that holds exactly, and that a datum does not hold."""
+    if not held.any():
+        return []
+    text = message(
+        "held_released",
+        "{points} hold exactly in control.csv (sd 0), and datum = {choice} does not hold them: they"
+        " are compared only; choose datum = control or inner to hold them",
+        points=listed(_named(survey, held), SHOWN),
+        choice=choice,
+    )
+    return [Problem("job.toml", text, None, "adjustment.datum")]
 
 
 def _nothing_left(choice):
