@@ -12,12 +12,13 @@ import ast
 from tankcal import record as records
 from tankcal.report import missing
 from tankcal.report.blocks import Block
-from tankcal.report.notebook import joined
+from tankcal.report.notebook import TEMPLATES, joined
 
 
-def paper_blocks(record_path):
+def paper_blocks(record_path, templates=TEMPLATES[:2]):
     """The data of every block that the cells show, in order."""
-    return blocks_of_cells(joined(str(record_path), missing(records.load(record_path))))
+    lacks = missing(records.load(record_path))
+    return blocks_of_cells(joined(str(record_path), lacks, templates))
 
 
 def of_part(found, part):

@@ -86,6 +86,7 @@ def test_a_run_writes_everything(done, capsys):
         "report.ipynb",
         "certificate.pdf",
         "working-papers.pdf",
+        "field-table.pdf",
         "report.pdf",
         "report.html",
     }

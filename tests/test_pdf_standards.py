@@ -40,7 +40,8 @@ def test_every_pdf_conforms(verapdf, example_record, tmp_path, language):
     out.mkdir()
     (out / "capacity.xlsx").write_bytes(b"any workbook")
     build(example_record, out, language=language, letterhead=load(letterhead))
-    paths = [str(out / name) for name in ("certificate.pdf", "working-papers.pdf", "report.pdf")]
+    names = ("certificate", "working-papers", "field-table", "report")
+    paths = [str(out / f"{name}.pdf") for name in names]
     assert_conform(verapdf, paths)
 
 

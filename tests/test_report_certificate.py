@@ -4,11 +4,12 @@ import copy
 import json
 
 import pytest
-from paper_cells import paper_blocks, texts
+from paper_cells import of_part, paper_blocks, texts
 from test_report import pages
 
+from tankcal.digits import fixed
 from tankcal.job.contract import KEYS
-from tankcal.report import blocks, certificate, sketch
+from tankcal.report import blocks, certificate, field_table, sketch
 from tankcal.report.dip_point import dip_point, dip_point_text
 from tankcal.report.letterhead import Letterhead
 from tankcal.report.paper import Column, Paper
@@ -233,3 +234,29 @@ def test_an_uncertainty_has_two_digits_in_litres_too(paper):
     rows = [{"V": 1.2496438, "U": 0.4168}, {"V": 0.0334, "U": 0.00123}]
     assert shown.column_texts(rows, Column("U", "L", u="U")) == ["420", "1.2"]
     assert shown.column_texts(rows, Column("V", "L", u="U"))[0].replace(",", "") == "1250"
+
+
+# ---- the field table
+
+
+def test_the_field_table_has_every_row_without_uncertainty(example_record):
+    """What a gauger carries: every row of the table, dips and litres alone, and the zero."""
+    found = of_part(paper_blocks(example_record, ("field_table.ipynb",)), "field-table")
+    capacity = json.loads(example_record.read_text(encoding="utf-8"))["capacity"]
+    (table,) = (block for block in found if block["kind"] == "columns_table")
+    rows = table["rows"]
+    assert [row[1] for row in rows] == [fixed(volume, 3) for volume in capacity["volume_m3"]]
+    assert [column["heading"] for column in table["columns"]] == ["Height", "Volume"]
+    (parts,) = (block for block in found if block["kind"] == "table")
+    assert len(parts["columns"]) == 2 + 9
+    said = " ".join(texts(found))
+    for words in ("bottom of the first course", "Dip point", "RECONSTRUCTION-1", "it alone counts"):
+        assert words in said
+
+
+def test_rows_that_are_not_for_use_are_marked_in_the_field_table(paper):
+    marked = paper()
+    marked.record["capacity"]["for_use"][7] = False
+    note, table = (block.data for block in field_table.table(marked))
+    assert "†" in note["text"]
+    assert [row[2] for row in table["rows"]].index("†") == 7

@@ -5,10 +5,19 @@ Nothing here computes a number: the record's values are formatted (docs/report.m
 
 from pathlib import Path
 
-FILES = ("report.ipynb", "certificate.pdf", "working-papers.pdf", "report.pdf", "report.html")
+FILES = (
+    *("report.ipynb", "certificate.pdf", "working-papers.pdf", "field-table.pdf"),
+    *("report.pdf", "report.html"),
+)
 LETTERHEAD = "letterhead.json"  # there when a letterhead was given
 _SINCE_UNCERTAINTY = ("budgets", "deliveries", "rule", "monte_carlo")
-_PARTS = (("certificate.pdf", "certificate"), ("working-papers.pdf", "working-papers"))
+_PARTS = (
+    ("certificate.pdf", "certificate"),
+    ("working-papers.pdf", "working-papers"),
+    ("field-table.pdf", "field-table"),
+    ("report.pdf", ""),
+)
+_PARTS_OF_SURVEY = (("working-papers.pdf", "working-papers"),)
 
 
 def build(record_path, directory, progress=None, language=None, letterhead=None, record=None):
@@ -43,7 +52,7 @@ def build(record_path, directory, progress=None, language=None, letterhead=None,
         LANGUAGE=language,
         LETTERHEAD=letterhead and letterhead.save(directory),
     )
-    parts = (*_PARTS, ("report.pdf", "")) if record["capacity"] else _PARTS[1:]
+    parts = _PARTS if record["capacity"] else _PARTS_OF_SURVEY
     return set_papers(notebook, directory, parts, progress)
 
 
@@ -57,7 +66,8 @@ def set_papers(notebook, directory, parts, progress=None):
     """Execute a notebook in `directory` and write it there with its PDFs and web page.
 
     notebook   as `notebook.joined` gives it
-    parts      (name of the PDF, part of the notebook) of each PDF; part "" is all of it
+    parts      (name of the PDF, part of the notebook) of each PDF; part "" is all of it but the
+               field table, and so is the web page
     progress   called as progress(done, total) while it works
 
     Gives the paths, and raises, as `build` does.

@@ -41,7 +41,7 @@ class Block:
 def document(**properties):
     """The start of a document: part, title, author, date (ISO), language, notice, running lines.
 
-    part      "certificate", "working-papers", or "" for a notebook of one's own
+    part      "certificate", "working-papers", "field-table", or "" for a notebook of one's own
     running   [left, right] texts at the top of every page
     footer    text with {page} and {pages}
     letterhead   data of a letterhead.Letterhead, or None

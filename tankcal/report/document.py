@@ -7,14 +7,15 @@ from tankcal.report import blocks
 from tankcal.report.letterhead import data_problem
 from tankcal.report.markdown import nodes
 
-PARTS = ("certificate", "working-papers")
+PARTS = ("certificate", "working-papers", "field-table")
+BESIDE = ("field-table",)  # parts that say again what others say: not in the whole
 
 
 def blocks_of(notebook, part="", name="notebook"):
     """The blocks of the notebook, in order, as data; the first one is its `document`.
 
-    part   "" for everything, else the cells of that part: those tagged with it, and the untagged
-           cells that follow them
+    part   "" for everything but BESIDE, else the cells of that part: those tagged with it, and the
+           untagged cells that follow them
     name   title of a notebook that has no document block of its own
 
     Raises TankcalError for an unknown or empty part and for a cell that ended in an error.
@@ -56,7 +57,7 @@ def _cells(notebook, part):
     for number, cell in enumerate(notebook.cells, 1):
         tags = cell.metadata.get("tags", [])
         current = next((tag for tag in tags if tag in PARTS), current)
-        if not part or current in ("", part):
+        if current in ("", part) or (not part and current not in BESIDE):
             yield number, cell
 
 

@@ -16,7 +16,7 @@ class _BlocksExporter(Exporter):
     """What both exporters share: from the notebook to the blocks of the part that is wanted."""
 
     part = Unicode(
-        "", help='Which part: "certificate", "working-papers", or "" for everything.'
+        "", help='Which part: "certificate", "working-papers", "field-table", or "" for the whole.'
     ).tag(config=True)
 
     def _blocks(self, notebook, resources):

@@ -12,7 +12,7 @@ import nbformat
 from tankcal.errors import TankcalError
 from tankcal.shipped import shipped
 
-TEMPLATES = ("certificate.ipynb", "working_papers.ipynb")
+TEMPLATES = ("certificate.ipynb", "working_papers.ipynb", "field_table.ipynb")
 CELL_TIMEOUT_S = 600
 LONGEST_SOCKET = 90  # characters of a socket's path; systems end at 104 to 108
 

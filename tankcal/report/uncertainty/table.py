@@ -43,13 +43,13 @@ def capacity_blocks(paper):
     k_printed = set(paper.column_texts([row for row in rows if row["k"] is not None], k_column))
     if len(k_printed) > 1:
         columns.append(k_column)
-    refused = _use_columns(rows)
+    refused = use_columns(rows)
     columns += refused
     table = paper.table(
         _caption(simulated, k_printed),
         rows,
         columns,
-        across=_across(paper, rows, columns),
+        across=times_across(paper, rows, columns),
         coverage=paper.coverage(),
         k=min(k_printed, default=None),
     )
@@ -61,26 +61,26 @@ def density_blocks(paper):
     """The table for each further density of the liquid."""
     blocks = []
     of_table = capacity_rows(paper)
-    columns = [*volume_columns(paper)[:2], *_use_columns(of_table)]
+    columns = [*volume_columns(paper)[:2], *use_columns(of_table)]
     for other in paper.record["densities"]:
         volumes = zip(of_table, other["volume_m3"], strict=True)
         rows = [row | {"volume_m3": volume} for row, volume in volumes]
         density = paper.number(other["density_kg_m3"], "kg/m3", digits=4)
-        across = _across(paper, rows, columns, most=MOST_ACROSS_OF_DENSITIES)
+        across = times_across(paper, rows, columns, most=MOST_ACROSS_OF_DENSITIES)
         blocks.append(
             paper.table("capacity_density", rows, columns, across=across, density=density)
         )
     return blocks
 
 
-def _use_columns(rows):
+def use_columns(rows):
     """The column of the marks of rows that are not for use, where there are any."""
     if not any(row["for_use"] for row in rows):
         return []
     return [Column("for_use", nothing="", heading="by_monte_carlo")]
 
 
-def _across(paper, rows, columns, most=MOST_ACROSS):
+def times_across(paper, rows, columns, most=MOST_ACROSS):
     """How many times the columns stand side by side on a page: as often as they have room."""
     longest = [max(map(len, paper.column_texts(rows, column))) for column in columns]
     return max(1, min(most, LETTERS_OF_A_LINE // sum(1 + length for length in longest)))
