@@ -247,7 +247,7 @@ def test_broken_record_writes_nothing(example_record, tmp_path):
     del record["shell"]["tilt"]
     path = tmp_path / "record.json"
     path.write_text(json.dumps(record), encoding="utf-8")
-    with pytest.raises(TankcalError, match="without shell.tilt"):
+    with pytest.raises(TankcalError, match=r"without shell\.tilt"):
         build(path, tmp_path)
     assert [file.name for file in tmp_path.iterdir()] == ["record.json"]
 
