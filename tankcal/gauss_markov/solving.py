@@ -147,6 +147,8 @@ class _Work:
         for batch in self.plan.batches:
             add_rows(batch, batch.of(self.w[batch.group]), batch.of(self.jac[batch.group]), normals)
         diagonal = normals.t.diagonal()[:nr].copy()
+        if not np.isfinite(diagonal).all():
+            return None  # no derivative exists at this state
         untouched = diagonal == 0.0
         if untouched.any():
             diagonal[untouched] = 1.0

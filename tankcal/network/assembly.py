@@ -8,7 +8,7 @@ from tankcal.errors import SolutionError
 from tankcal.gauss_markov import Group, Model
 from tankcal.messages import message
 from tankcal.network.columns import eliminated_points, layout_of
-from tankcal.network.naming import in_words, name_of, name_of_exact
+from tankcal.network.naming import in_words, name_of, name_of_exact, told
 from tankcal.network.survey import FEWEST, SCOPES
 from tankcal.observations import (
     ControlCoordinates,
@@ -16,6 +16,7 @@ from tankcal.observations import (
     KnownUnknowns,
     Layout,
     PhotoOrientation,
+    Sights,
     State,
     as_conditions,
     exact_rows,
@@ -95,6 +96,7 @@ def assemble(survey):
         sources.append("known beforehand")
         rows_of.append(np.arange(len(one)))
     state = _state(survey, centre, values)
+    _refuse_coincident(survey, groups, state)
     model = Model(
         reduced=reduced,
         blocks=int(np.count_nonzero(eliminated)),
@@ -110,6 +112,18 @@ def assemble(survey):
         centre, set_aside, eliminated, table, exact, survey.points,
         () if survey.photos is None else survey.photos.names,
     )  # fmt: skip
+
+
+def _refuse_coincident(survey, groups, state):
+    """Raise when a sight starts with both its ends at one place: it has no derivatives there."""
+    for one in groups:
+        if isinstance(one, Sights):
+            bad = np.flatnonzero(one.without_length(state))
+            if len(bad):
+                raise SolutionError(
+                    f"the approximate places of the ends of {told(survey, one, bad[0])} are one"
+                    " and the same: the points hang on too little, or one has two names"
+                )
 
 
 def _groups(observations, layout):

@@ -1,6 +1,6 @@
 """How a piece of a survey grows by everything that was observed: photos, angles, tapes, levels."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -12,6 +12,7 @@ from tankcal.network.lateration import laid_out
 from tankcal.network.pieces import empty, joint
 from tankcal.network.plan import Plan
 from tankcal.network.polar import improved_in_plan
+from tankcal.network.positioning import positioned
 from tankcal.observations import HeightDifferences, Sights
 
 
@@ -19,7 +20,8 @@ from tankcal.observations import HeightDifferences, Sights
 class Clues:
     """Everything that was observed, as the search for start values needs it.
 
-    trial  number of the attempt: other samples are drawn in another one
+    trial   number of the attempt: other samples are drawn in another one
+    sought  what was found of single points already, see network.positioning
     """
 
     survey: object
@@ -28,6 +30,7 @@ class Clues:
     wall: Wall
     rng: np.random.Generator
     trial: int = 0
+    sought: dict = field(default_factory=dict, repr=False)
 
     @property
     def points(self):
@@ -52,7 +55,18 @@ def grown(clues, piece, least, free=False):
         wall = clues.wall or wall_of(piece.xyz_m)
         piece = grown_by_photos(clues.sights, piece, clues.rng, wall, least)
         if np.isfinite(piece.xyz_m).sum() + piece.oriented.sum() == before:
+            piece = _by_mixtures(clues, piece)
+        if np.isfinite(piece.xyz_m).sum() + piece.oriented.sum() == before:
             return piece
+
+
+def _by_mixtures(clues, piece):
+    """The Piece with points that only a mixture of readings to known ones fixes."""
+    if clues.silent or not np.isfinite(piece.xyz_m).any():
+        return piece
+    xyz = positioned(clues.survey, clues.plan, piece.xyz_m, clues.sought)
+    new = np.isfinite(xyz).all(axis=1) & ~piece.known
+    return replace(piece, xyz_m=xyz, by_photos=piece.by_photos & ~new)
 
 
 def _surveyed(clues, piece, free):

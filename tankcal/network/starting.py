@@ -19,7 +19,8 @@ from tankcal.network.mending import contradictions, guessed, mended, photo_error
 from tankcal.network.pieces import BAD_JOINT, joint
 from tankcal.network.plan import plan_of
 from tankcal.network.polar import oriented
-from tankcal.network.unstarted import hanging, refuse_missing
+from tankcal.network.positioning import sought_point
+from tankcal.network.unstarted import LISTED, hanging, not_fixed, refuse_missing
 
 TRIALS = 3  # with other samples, while the images contradict what was found
 ODDS = 0.05  # share of photos and known points that may be at odds with the images
@@ -168,16 +169,30 @@ def _filled(clues, piece, sure, hints, centre, reasons):
     zeros = oriented(clues.plan, xyz[:, :2])[: len(survey.sets)]
     zeros = np.where(clues.plan.at[: len(zeros)] < 0, 0.0, zeros)  # nothing was read on these
     sets = np.where(np.isfinite(survey.sets), survey.sets, zeros)
+    told = {}
     if np.isnan(xyz[:, :2]).any():
+        told = _told(clues, xyz, centre)
         _, apart = in_plan(clues.plan, xyz[:, :2], xyz[:, 2], clues.rng)
         reasons = reasons + [
-            hanging(survey, local.known, np.isfinite(xyz[:, 0])) for local in apart
+            hanging(survey, local.known, np.isfinite(xyz[:, 0]))
+            for local in apart
+            if not (local.known & np.isnan(xyz[:, 0]))[list(told)].any()
         ]
-    xyz = refuse_missing(survey, clues.sights, xyz, piece, sets, reasons)
+    xyz = refuse_missing(survey, clues.sights, xyz, piece, sets, reasons, told.get)
     xyz = np.where(untouched, survey.xyz_m, xyz + centre)
     if survey.fixed is not None:
         xyz = np.where(survey.fixed & np.isfinite(survey.xyz_m), survey.xyz_m, xyz)
     return replace(survey, xyz_m=xyz, photos=_photos(survey, piece, given, centre), sets=sets)
+
+
+def _told(clues, xyz_m, centre):
+    """{point: why} of points in plan that are tied to known ones, and not fixed by that."""
+    told = {}
+    for point in np.flatnonzero(np.isnan(xyz_m[:, :2]).any(axis=1))[:LISTED]:
+        found = sought_point(clues.survey, clues.plan, xyz_m, point, clues.sought)
+        if found.rows:
+            told[int(point)] = not_fixed(clues.survey, found, point, centre)
+    return told
 
 
 def _photos(survey, piece, given, centre):

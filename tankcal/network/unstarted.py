@@ -3,17 +3,24 @@
 import numpy as np
 
 from tankcal.errors import SolutionError
+from tankcal.network.positioning import SHOWN
 from tankcal.network.survey import FEWEST
 from tankcal.observations import Distances, HeightDifferences, VerticalAngles
 
 LISTED = 10
 
 
-def refuse_missing(survey, sights, xyz_m, piece, sets, reasons):
+class SeveralPlacesError(SolutionError):
+    """What was measured is met at several places: no mistake, but a reading too few."""
+
+
+def refuse_missing(survey, sights, xyz_m, piece, sets, reasons, why=lambda point: None):
     """Coordinates (points, 3) without gaps; points that nothing determines stand in the middle.
 
     Those have too few observations for an adjustment, too, which sets them aside by name. Raises
     SolutionError when a photo, a point that something determines, or a circle has no start.
+
+    why  why(point) -> what refuses a point without a place, see `not_fixed`; or None
     """
     hopeless = survey.values_of_points() < FEWEST
     missing = np.isnan(xyz_m) & ~hopeless[:, None]
@@ -33,9 +40,46 @@ def refuse_missing(survey, sights, xyz_m, piece, sets, reasons):
     if len(level):
         sentences.append(_no_heights(survey, level))
     if sentences:
-        raise SolutionError("; ".join(sentences + [one for one in reasons if one]))
+        errors = [one for one in map(why, whole[:LISTED]) if one is not None]
+        several = len(errors) == len(told) and all(
+            isinstance(one, SeveralPlacesError) for one in errors
+        )
+        kind = SeveralPlacesError if several and errors else SolutionError
+        raise kind("; ".join([*sentences, *map(str, errors), *(one for one in reasons if one)]))
     middle = np.nanmean(xyz_m, axis=0) if known.any() else np.zeros(3)
     return np.where(np.isnan(xyz_m), middle, xyz_m)
+
+
+def not_fixed(survey, found, point, centre_m):
+    """The SolutionError of a point that its ties to known ones do not fix, or None.
+
+    found  network.positioning.Sought        centre_m  (3,) added to its coordinates
+    """
+    name = survey.points[point]
+    if not found.unknowns:
+        return None
+    if found.rows < found.unknowns:
+        return SolutionError(
+            f"point {name} has {found.rows} reading{'s' * (found.rows != 1)} to known points, and "
+            f"{found.unknowns} are needed"
+        )
+    if len(found.rivals_m) > SHOWN or len(found.rivals_m) == 1:
+        return SolutionError(
+            f"the readings between point {name} and known points leave it free to move (lines or "
+            "circles that coincide, or hardly cross): another reading is needed"
+        )
+    if not len(found.rivals_m):
+        return SolutionError(
+            f"no place of point {name} agrees with the readings between it and known points"
+        )
+    places = [
+        "(" + ", ".join(f"{value:.2f}" for value in place[np.isfinite(place)]) + ")"
+        for place in found.rivals_m + centre_m
+    ]
+    return SeveralPlacesError(
+        f"point {name} may stand at {' or '.join(places)}, which fit as well: another reading is "
+        "needed, or approximate coordinates (in control.csv, standard deviations blank)"
+    )
 
 
 def hanging(survey, local, known):

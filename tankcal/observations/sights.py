@@ -44,6 +44,10 @@ class Sights(Observations):
             d[2] -= self.rise_m
         return d
 
+    def without_length(self, state):
+        """(n,) True where both ends are at one place, so that no derivative exists."""
+        raise NotImplementedError
+
     @staticmethod
     def of_ends(derivative):
         """Derivatives (n, 1, 6) by end and start from those by the difference (3, n)."""
@@ -69,6 +73,11 @@ class Distances(Sights):
         scale, offset = (np.append(c, -1)[self.instrument] for c in (layout.scale, layout.offset))
         return np.hstack([super().columns(layout), scale[:, None], offset[:, None]])
 
+    def without_length(self, state):
+        """(n,) True where both ends are at one place; in plan, if the distance is horizontal."""
+        x, y, z = self.line(state)
+        return (x == 0) & (y == 0) & (self.horizontal | (z == 0))
+
     def computed(self, state, derivatives):
         """The readings (n, 1)."""
         d = self.line(state)
@@ -86,6 +95,11 @@ class Distances(Sights):
 @dataclass(frozen=True)
 class _Angles(Sights):
     unit = "rad"
+
+    def without_length(self, state):
+        """(n,) True where both ends are at one place in plan: no angle has derivatives there."""
+        x, y, _ = self.line(state)
+        return (x == 0) & (y == 0)
 
     def difference(self, computed):
         """Computed minus observed, by the shorter way round."""
@@ -149,6 +163,11 @@ class HorizontalAngles(_Angles):
     @property
     def _per_row(self):
         return super()._per_row | {"origin"}
+
+    def without_length(self, state):
+        """(n,) True where the station is, in plan, where one of its targets is."""
+        back = state.xyz_m[self.origin, :2] == state.xyz_m[self.start, :2]
+        return super().without_length(state) | back.all(axis=1)
 
     def columns(self, layout):
         """Point end (3), point start (3), point origin (3)."""

@@ -10,6 +10,7 @@ from tankcal.messages import message
 from tankcal.network.cleaning import CRITICAL
 from tankcal.network.reactions import HELD, reactions
 from tankcal.network.soundness import hardly_determined
+from tankcal.network.unstarted import SeveralPlacesError
 from tankcal.surveys.causes import causes_of
 from tankcal.surveys.checks import check_points, check_readings, disagreeing
 from tankcal.surveys.cleaning import searched
@@ -51,7 +52,7 @@ def adjust_survey(measurements, tell=None):
     try:
         found, measurements, depth = in_depth(measurements, adjusted, tell)
     except SolutionError as error:
-        if not measurements.settings.explain:
+        if not measurements.settings.explain or isinstance(error, SeveralPlacesError):
             raise
         tell(message("looking_for_faults", "looking for what is wrong"))
         told = _why_not(measurements, str(error))
@@ -66,12 +67,8 @@ def _adjusted(measurements, tell, snooping=None, most=100, like=None):
     """Searched, Gathered and Frame of measurements; like: network.Adjusted that is close to it."""
     gathered = gather(measurements)
     if not gathered.survey.points:
-        raise InputError(
-            Problem(
-                "job.toml",
-                message("nothing_observed", "the survey has no observations to be adjusted"),
-            )
-        )
+        nothing = message("nothing_observed", "the survey has no observations to be adjusted")
+        raise InputError([Problem("job.toml", nothing), *gathered.warnings])
     tell(
         message(
             "finding_starts",

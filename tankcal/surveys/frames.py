@@ -15,7 +15,7 @@ from tankcal.surveys.results import DatumReport
 AXES = "xyz"
 SHOWN = 5  # names in a sentence
 SHARE = 1e-6  # of a way of moving in a combination, below which it is not in it
-STILL = 1e-9  # motion of all unknowns over the largest, below which nothing moves
+STILL = 1e-9  # motion of all unknowns over the sum of its parts, below which nothing moves
 WEAK = 1e-6  # smallest pivot of held coordinates over the largest, below which they hold too little
 
 
@@ -69,15 +69,16 @@ def framed(survey, gathered, settings):
 def _free(problem):
     """Ways (7, d) in which something can move that nothing observes.
 
-    A rotation about a line on which everything lies (heights alone, all at one place) moves
-    nothing: it is none of them.
+    A rotation about a line on which everything lies (heights alone, all at one place; one point
+    that hangs on one known point) moves nothing: it is none of them.
     """
     found = unobserved(problem)
     if not found.shape[1]:
         return found
-    moves = directions(problem.layout, problem.state) @ found
-    _, size, ways = np.linalg.svd(moves, full_matrices=False)
-    return found @ ways[size > STILL * max(size.max(), 1e-9)].T
+    ways = directions(problem.layout, problem.state)
+    _, size, turns = np.linalg.svd(ways @ found, full_matrices=False)
+    parts = np.linalg.norm(np.abs(ways) @ np.abs(found))  # what moves nothing is a sum that cancels
+    return found @ turns[size > STILL * max(parts, 1e-9)].T
 
 
 def without_control(survey, gathered):
