@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.network.polar import APART, NOISE, oriented
+from tankcal.network.polar import APART, oriented
 from tankcal.observations import Directions, HeightDifferences, Layout, Sights, State
 
 MOST = 12  # points that are looked for at a time
 STEPS = 40
+MET = 1e-4  # of the extent: sum of the misfits of a place at which all readings are met
 RADII = (0.25, 0.8)  # of the extent of the known ends, about which starts lie
 BEARINGS = 8
 STEEPLY = (-0.5, 0.0, 0.5)  # of the extent: heights of the starts
@@ -244,7 +245,7 @@ def _solved(ties):
         return Sought(nothing, np.zeros((0, 3)), ties.rows, ties.unknowns)
     places, misfit, jac = places[sound], misfit[sound], jac[sound]
     best = int(np.argmin(misfit))
-    fits = misfit <= max(NOISE * ties.extent, misfit[best])
+    fits = misfit <= max(MET * ties.extent, misfit[best])
     distinct = [best]
     for i in np.flatnonzero(fits)[np.argsort(misfit[fits], kind="stable")]:
         apart = np.linalg.norm(places[distinct, :axes] - places[i, :axes], axis=1)
