@@ -7,15 +7,14 @@ import numpy as np
 from tankcal.errors import SolutionError
 from tankcal.gauss_markov import Group, Model
 from tankcal.messages import message
+from tankcal.network.blocks import CORRELATED, correlated_groups, in_blocks, relative
 from tankcal.network.columns import eliminated_points, layout_of
 from tankcal.network.naming import in_words, name_of, name_of_exact, told
 from tankcal.network.survey import FEWEST, SCOPES
 from tankcal.observations import (
-    ControlCoordinates,
     ImageCoordinates,
     KnownUnknowns,
     Layout,
-    PhotoOrientation,
     Sights,
     State,
     as_conditions,
@@ -53,6 +52,7 @@ class Problem:
     interior_of            (photos, 13) place of each photo's parameters in State.interior
     exact                  tuple of Held: observations that hold exactly
     points                 names
+    blocks                 for each group of correlated observations, which come last, its Members
     """
 
     model: Model
@@ -68,6 +68,7 @@ class Problem:
     exact: tuple = ()
     points: tuple = ()
     photos: tuple = ()
+    blocks: tuple = ()
 
     def name_of_point(self, point):
         """Name of a point."""
@@ -75,7 +76,7 @@ class Problem:
 
     def relative(self, observations):
         """Observations in the survey's frame, as the model has them."""
-        return _relative(observations, self.centre_m)
+        return relative(observations, self.centre_m)
 
 
 def assemble(survey):
@@ -86,6 +87,11 @@ def assemble(survey):
     table, values, interior_free, known = _interior(survey)
     groups, sources, rows_of, exact = _others(survey, used, centre)
     eliminated = eliminated_points(survey, groups, used, exact)
+    for block in survey.correlated:
+        for source in np.unique(block.source):
+            one = survey.observations[source]
+            for name in one.ties:
+                eliminated[getattr(one, name)[block.row[block.source == source]]] = False
     layout, reduced = layout_of(survey, eliminated, used, interior_free, table)
     for one, rows in _image_groups(survey, used, layout, reduced, table):
         groups.append(one)
@@ -96,6 +102,11 @@ def assemble(survey):
         sources.append("known beforehand")
         rows_of.append(np.arange(len(one)))
     state = _state(survey, centre, values)
+    blocks = tuple(correlated_groups(survey, used, centre, state))
+    for one, _ in blocks:  # they come last: tables of residuals are those of the groups before
+        groups.append(one)
+        sources.append(CORRELATED)
+        rows_of.append(np.zeros(1, dtype=int))
     _refuse_coincident(survey, groups, state)
     model = Model(
         reduced=reduced,
@@ -111,6 +122,7 @@ def assemble(survey):
         model, state, layout, tuple(groups), tuple(sources), tuple(rows_of),
         centre, set_aside, eliminated, table, exact, survey.points,
         () if survey.photos is None else survey.photos.names,
+        tuple(members for _, members in blocks),
     )  # fmt: skip
 
 
@@ -188,12 +200,12 @@ def _others(survey, used, centre):
         holds = exact_rows(one)
         sharp = np.flatnonzero(keep & holds & (True if one.use is None else one.use > 0))
         if len(sharp):
-            taken = _relative(one.taken(sharp), centre)
+            taken = relative(one.taken(sharp), centre)
             exact.append(Held(taken, *as_conditions(taken), number, sharp))
             if holds.all():
                 continue
-        rows = np.flatnonzero(keep & ~holds)
-        groups.append(_relative(one if len(rows) == len(one) else one.taken(rows), centre))
+        rows = np.flatnonzero(keep & ~holds & ~in_blocks(survey, number))
+        groups.append(relative(one if len(rows) == len(one) else one.taken(rows), centre))
         sources.append(number)
         rows_of.append(rows)
     return groups, sources, rows_of, tuple(exact)
@@ -219,15 +231,6 @@ def _centre(survey):
         missing = [survey.points[i] for i in np.flatnonzero(~known)[:5]]
         raise SolutionError(f"no approximate coordinates for {', '.join(missing)}")
     return survey.xyz_m.mean(axis=0)
-
-
-def _relative(one, centre):
-    """An observation of coordinates, relative to the centre."""
-    if isinstance(one, ControlCoordinates):
-        return replace(one, value=one.value - centre[one.axis])
-    if isinstance(one, PhotoOrientation):
-        return replace(one, value=one.value - np.append(centre, np.zeros(3))[one.element])
-    return one
 
 
 def _interior(survey):

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.special import chdtri, ndtri, stdtrit
 
 from tankcal.gauss_markov.effects import own_leverage, own_responses, pulls, responses
+from tankcal.network.blocks import tested
 from tankcal.observations import lever
 
 EXACTLY = 1e9  # products: up to here effects are worked out for all points, in about 0.2 s
@@ -103,8 +104,54 @@ def tau_limit(alpha, dof):
 def residuals_of(problem, solution, alpha=0.001, power=0.80):
     """A tuple of Residuals, one for each group of a solved Problem, then what holds exactly."""
     delta0 = noncentrality(alpha, power)
-    tables = [_table(problem, solution, number, delta0) for number in range(len(problem.sources))]
-    return (*tables, *_of_exact(problem, solution, delta0))
+    ordinary = len(problem.sources) - len(problem.blocks)
+    tables = [_table(problem, solution, number, delta0) for number in range(ordinary)]
+    blocks = [
+        table
+        for number, members in enumerate(problem.blocks, start=ordinary)
+        for table in _of_block(problem, solution, number, members, delta0)
+    ]
+    return (*tables, *blocks, *_of_exact(problem, solution, delta0))
+
+
+def _of_block(problem, solution, number, members, delta0):
+    """Residuals of the values of a block of correlated observations, by the tables they are of.
+
+    A value of an observation that is not in the block, though another one is, does not occur.
+    """
+    found = tested(problem, solution, number, members, delta0)
+    parts = dict(zip(np.unique(members.source), _first_parts(members), strict=True))
+    for source, one in parts.items():
+        mine = np.flatnonzero(members.source == source)
+        rows, place = np.unique(members.row[mine], return_inverse=True)
+        shape = len(rows), one.rows
+
+        def filled(values, place=place, mine=mine, shape=shape, empty=0.0):
+            table = np.full(shape, empty)
+            column = members.component[mine] if shape[1] > 1 else 0
+            table[place, column] = values[mine]
+            return table
+
+        used, test = np.zeros(shape[0], dtype=bool), np.zeros(shape[0])
+        used[place], test[place] = members.share[mine] > 0, found.whole[mine]
+        change = filled(found.change)
+        yield Residuals(
+            kind=one.kind, unit=one.unit, source=source, rows=rows, used=used,
+            residual=filled(found.residual), sd=filled(found.sd),
+            redundancy=filled(found.redundancy), w=filled(found.w), whole=test,
+            mdb=filled(found.mdb), external=filled(found.external),
+            changes=lambda change=change: (change, None),
+        )  # fmt: skip
+
+
+def _first_parts(members):
+    """The observations of each source of a block, in the order of the sources."""
+    sources = [members.source[first] for first in np.flatnonzero(
+        np.append(True, np.diff(members.source) != 0))]  # fmt: skip
+    parts = {}
+    for source, (one, _) in zip(sources, members.whole.parts, strict=True):
+        parts.setdefault(source, one)
+    return [parts[source] for source in sorted(parts)]
 
 
 def _table(problem, solution, number, delta0):

@@ -40,7 +40,7 @@ def alternatives(adjusted, source, row, held=None):
     of_source = [k for k, one in enumerate(problem.sources) if one == source]
     number = next((k for k in of_source if row in problem.rows_of[k]), None)
     if number is None:
-        return []  # its points are no longer adjusted
+        return []  # its points are no longer adjusted, or it is correlated with others
     mine = np.flatnonzero(problem.rows_of[number] == row)
     whole = problem.observations[number].taken(mine)
     whole = whole.using(np.ones(1))
@@ -52,7 +52,7 @@ def alternatives(adjusted, source, row, held=None):
     moves = np.vstack([moves, np.zeros((1, moves.shape[1]))])
     inverse = np.linalg.inv(np.eye(whole.rows) + jac[0] @ moves[columns[0]])
     back, found = inverse @ e[0], []
-    for k, table in enumerate(adjusted.residuals[: len(problem.sources)]):
+    for k, table in enumerate(adjusted.residuals[: len(problem.sources) - len(problem.blocks)]):
         if table.source == "known beforehand":
             continue
         b = np.einsum("nmk,nkd->nmd", solution.jacobians[k], moves[problem.model.groups[k].columns])

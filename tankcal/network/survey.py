@@ -108,6 +108,8 @@ class Survey:
     sets          (s,) start azimuths of the zeros of the direction sets, rad
     instruments   tuple of Instrument
     systems       tuple of System
+    correlated    tuple of tankcal.observations.Block: values of the observations (none of them held
+                  exactly) that are correlated; no value stands in two
     repeated      {source: (chi-square (n,), degrees of freedom (n,))}: scatter of the readings that
                   were averaged into each observation; it counts in sigma0 and in the redundancy as
                   if they had been adjusted one by one. Sources as Residuals name them
@@ -123,6 +125,7 @@ class Survey:
     sets: np.ndarray = field(default_factory=lambda: np.zeros(0))
     instruments: tuple = ()
     systems: tuple = ()
+    correlated: tuple = ()
     repeated: dict = field(default_factory=dict)
 
     def values_of_points(self):

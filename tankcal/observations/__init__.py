@@ -7,7 +7,9 @@ from tankcal.observations.coordinates import (
     KnownUnknowns,
     PlumbLines,
     SystemCoordinates,
+    Vectors,
 )
+from tankcal.observations.correlated import Block, Correlated
 from tankcal.observations.held import HeldOrientation, as_conditions, exact_rows, lever
 from tankcal.observations.photographs import ImageCoordinates, PhotoOrientation, PhotoRotation
 from tankcal.observations.sights import (
@@ -21,7 +23,9 @@ from tankcal.observations.sights import (
 
 __all__ = [
     "Azimuths",
+    "Block",
     "ControlCoordinates",
+    "Correlated",
     "Directions",
     "Distances",
     "HeightDifferences",
@@ -37,6 +41,7 @@ __all__ = [
     "Sights",
     "State",
     "SystemCoordinates",
+    "Vectors",
     "VerticalAngles",
     "as_conditions",
     "exact_rows",

@@ -124,6 +124,26 @@ class PlumbLines(Observations):
 
 
 @dataclass(frozen=True)
+class Vectors(Observations):
+    """Vectors (n, 3), m, from `start` to `end` in the axes of the survey: GNSS baselines."""
+
+    start: np.ndarray
+    end: np.ndarray
+
+    kind, rows, ties = "vector", 3, ("start", "end")
+
+    def columns(self, layout):
+        """Point end (3), point start (3)."""
+        return np.hstack([layout.points[self.end], layout.points[self.start]])
+
+    def computed(self, state, derivatives):
+        """Differences in x, y and z (n, 3)."""
+        computed = state.xyz_m[self.end] - state.xyz_m[self.start]
+        rows = np.hstack([np.eye(3), -np.eye(3)])
+        return computed, np.tile(rows, (len(self), 1, 1)) if derivatives else None
+
+
+@dataclass(frozen=True)
 class KnownUnknowns(Observations):
     """Unknowns with a value and an sd known beforehand: interior parameters, scales, offsets.
 

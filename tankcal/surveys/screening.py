@@ -11,6 +11,7 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.network.assembly import assemble
+from tankcal.network.blocks import CORRELATED
 from tankcal.network.growing import sights_of
 from tankcal.network.resection import bearings, intersected
 from tankcal.observations import Directions, Distances
@@ -34,7 +35,7 @@ def gross_readings(survey):
     for one, source, rows in zip(
         problem.observations, problem.sources, problem.rows_of, strict=True
     ):
-        if source == "known beforehand" or not len(one):
+        if source in ("known beforehand", CORRELATED) or not len(one):
             continue
         w = np.empty((len(one), one.rows))
         one.fill(problem.state, w, np.empty((0, one.rows, 0)))
