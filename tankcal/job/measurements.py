@@ -213,7 +213,8 @@ class Readings:
     """One table of readings between points.
 
     table     "distances", "slope_distances", "directions", "zenith_angles", "azimuths",
-              "horizontal_angles", "vertical_angles", "height_differences" or "plumb_lines"
+              "horizontal_angles", "vertical_angles", "height_differences", "plumb_lines",
+              "vectors"
     value     (n,) m or rad; zeros for plumb lines      sd  (n,) m or rad; 0: fixed
     start     (n,) point, or None where a setup says it      end    (n,) point
     origin    (n,) of horizontal angles: where they count from; else ()
@@ -224,6 +225,8 @@ class Readings:
     temperature_c  (n,) nan where not given              target_height_m  (n,) 0 where not given
     check     (n,) True: compared, not adjusted
     sheet     what messages call the table when it stands in a workbook; else ""
+
+    Of vectors value and sd are (n, 3), and correlation (n, 3): of x with y, x with z, y with z.
     """
 
     table: str
@@ -241,11 +244,29 @@ class Readings:
     target_height_m: np.ndarray | None = None
     rows: tuple = ()
     sheet: str = ""
+    correlation: np.ndarray | None = None
 
     @property
     def file(self):
         """Name of its file, or of its sheet in a workbook, for messages."""
         return self.sheet or f"{self.table}.csv"
+
+
+@dataclass(frozen=True)
+class CorrelatedReadings:
+    """Pairs of values that are correlated, one in a row of correlated_readings.csv.
+
+    tables  (n, 2) names of their tables, "control" among them       r  (n,)
+    at      (n, 2) their rows there, counted as the file's editor counts
+    axis    (n, 2) 0 1 2 for x y z, of tables with one value a row: 0
+    """
+
+    tables: tuple
+    at: np.ndarray
+    axis: np.ndarray
+    r: np.ndarray
+    rows: tuple = ()
+    file: str = "correlated_readings.csv"
 
 
 @dataclass(frozen=True)
@@ -281,3 +302,4 @@ class Measurements:
     readings: tuple[Readings, ...] = ()
     nominal: NominalTank | None = None
     fiducials: tuple[FiducialFit, ...] = ()
+    correlated: CorrelatedReadings | None = None

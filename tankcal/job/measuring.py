@@ -9,6 +9,7 @@ from tankcal.job.datum import AXES, datum_point
 from tankcal.job.imagery import imagery_of
 from tankcal.job.measurements import (
     AdjustmentSettings,
+    CorrelatedReadings,
     ImageReadings,
     Instrument,
     KnownPoints,
@@ -54,6 +55,7 @@ def make_measurements(values, tables, registers):
         ),
         nominal=_nominal(values),
         fiducials=fits,
+        correlated=_correlated(tables["correlated_readings"]),
     )
 
 
@@ -207,6 +209,9 @@ def _readings(name, table):
         optional["instrument"] = tuple(table.of("instrument"))
         optional["horizontal"] = np.array([kind == "horizontal" for kind in table.of("kind")])
         optional["temperature_c"] = table.numbers("temperature_c")
+    if name == "vectors":
+        pairs = [table.numbers(f"r_{pair}") for pair in ("xy", "xz", "yz")]
+        optional["correlation"] = np.nan_to_num(np.column_stack(pairs))
     if "target_height_m" in table.columns:
         optional["target_height_m"] = np.nan_to_num(table.numbers("target_height_m"))
     return Readings(
@@ -222,9 +227,29 @@ def _readings(name, table):
     )
 
 
+def _correlated(table):
+    """CorrelatedReadings, or None."""
+    if not _has_rows(table):
+        return None
+    axes = [[AXES.index(value or "x") for value in table.of(f"value_{i}")] for i in "12"]
+    return CorrelatedReadings(
+        tables=tuple(zip(table.of("table_1"), table.of("table_2"), strict=True)),
+        at=np.column_stack([table.numbers("row_1"), table.numbers("row_2")]).astype(int),
+        axis=np.array(axes).T,
+        r=table.numbers("r"),
+        rows=table.rows,
+        file=table.file,
+    )
+
+
 def _values(name, table):
     if name in ANGLES:
         return angle_in_rad(table, ANGLES[name]), table.numbers("s_arcsec") * ARCSEC
+    if name == "vectors":
+        return tuple(
+            np.column_stack([table.numbers(f"{kind}{axis}_{unit}") for axis in AXES]) * factor
+            for kind, unit, factor in (("d", "m", 1.0), ("s", "mm", 1e-3))
+        )
     sd = table.numbers("s_mm") / 1000
     if name == "plumb_lines":
         return np.zeros(len(sd)), sd

@@ -13,7 +13,7 @@ from tankcal.network.pieces import empty, joint
 from tankcal.network.plan import Plan
 from tankcal.network.polar import improved_in_plan
 from tankcal.network.positioning import positioned
-from tankcal.observations import HeightDifferences, Sights
+from tankcal.observations import HeightDifferences, Sights, Vectors
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Clues:
     @property
     def silent(self):
         """True when nothing but photos (and coordinates) was observed."""
-        kinds = (Sights, HeightDifferences)
+        kinds = (Sights, HeightDifferences, Vectors)
         return not any(isinstance(one, kinds) for one in self.survey.observations)
 
 
@@ -51,6 +51,7 @@ def grown(clues, piece, least, free=False):
     """
     while True:
         before = np.isfinite(piece.xyz_m).sum() + piece.oriented.sum()
+        piece = _by_vectors(clues, piece, free)
         piece = _by_tapes(clues, _surveyed(clues, piece, free), free)
         wall = clues.wall or wall_of(piece.xyz_m)
         piece = grown_by_photos(clues.sights, piece, clues.rng, wall, least)
@@ -58,6 +59,31 @@ def grown(clues, piece, least, free=False):
             piece = _by_mixtures(clues, piece)
         if np.isfinite(piece.xyz_m).sum() + piece.oriented.sum() == before:
             return piece
+
+
+def _by_vectors(clues, piece, free):
+    """The Piece with points that hang on it by vectors, one after the other."""
+    groups = [one for one in clues.survey.observations if isinstance(one, Vectors) and len(one)]
+    if not groups:
+        return piece
+    used = [np.ones(len(one), dtype=bool) if one.use is None else one.use > 0 for one in groups]
+    start, end, value = (
+        np.concatenate([getattr(one, name)[use] for one, use in zip(groups, used, strict=True)])
+        for name in ("start", "end", "value")
+    )
+    xyz = piece.xyz_m.copy()
+    if free and len(start) and not np.isfinite(xyz).any():
+        xyz[start[0]] = 0.0
+    while True:
+        before = np.isfinite(xyz).sum()
+        for sign, here, there in ((1.0, start, end), (-1.0, end, start)):
+            ahead = np.isfinite(xyz[here]) & np.isnan(xyz[there])
+            row, axis = np.nonzero(ahead)
+            xyz[there[row], axis] = xyz[here[row], axis] + sign * value[row, axis]
+        if np.isfinite(xyz).sum() == before:
+            break
+    new = np.isfinite(xyz).all(axis=1) & ~piece.known
+    return replace(piece, xyz_m=xyz, by_photos=piece.by_photos & ~new)
 
 
 def _by_mixtures(clues, piece):

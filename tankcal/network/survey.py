@@ -141,6 +141,33 @@ class Survey:
                 count += one.rows * np.bincount(point, minlength=len(count))
         return count if self.fixed is None else count + self.fixed.sum(axis=1)
 
+    def without(self, sources):
+        """The survey without some of its tables of observations (numbers), correlations with them.
+
+        The others are counted anew, in `correlated` as well.
+        """
+        kept = [i for i in range(len(self.observations)) if i not in set(sources)]
+        number = np.full(len(self.observations), -1)
+        number[kept] = np.arange(len(kept))
+        blocks = []
+        for block in self.correlated:
+            stays = number[block.source] >= 0
+            if stays.any():
+                blocks.append(
+                    replace(
+                        block,
+                        source=number[block.source[stays]],
+                        row=block.row[stays],
+                        component=block.component[stays],
+                        covariance=block.covariance[np.ix_(stays, stays)],
+                    )
+                )
+        return replace(
+            self,
+            observations=tuple(self.observations[i] for i in kept),
+            correlated=tuple(blocks),
+        )
+
     def with_sds(self, factors):
         """The survey with the sds of groups multiplied; factors {source: factor}, see Residuals."""
         observations = tuple(
@@ -150,4 +177,9 @@ class Survey:
         images = self.image_points
         if images is not None:
             images = replace(images, sd_mm=images.sd_mm * factors.get("image points", 1.0))
-        return replace(self, observations=observations, image_points=images)
+        blocks = tuple(
+            replace(one, covariance=one.covariance * np.outer(size, size))
+            for one in self.correlated
+            for size in [np.array([factors.get(i, 1.0) for i in one.source.tolist()])]
+        )
+        return replace(self, observations=observations, image_points=images, correlated=blocks)

@@ -83,12 +83,12 @@ def _free(problem):
 
 def without_control(survey, gathered):
     """The survey without control in its own frame, weighted or fixed."""
-    observations = tuple(
-        replace(one, use=np.zeros(len(one))) if isinstance(one, ControlCoordinates) else one
-        for one in survey.observations
-    )
-    kept = tuple(one for one in observations if one.use is None or one.use.any())
-    return replace(survey, observations=kept, fixed=gathered.idle)
+    gone = [
+        number
+        for number, one in enumerate(survey.observations)
+        if isinstance(one, ControlCoordinates) or not (one.use is None or one.use.any())
+    ]
+    return replace(survey.without(gone), fixed=gathered.idle)
 
 
 def _moves(combinations, ways):

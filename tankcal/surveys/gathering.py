@@ -9,6 +9,7 @@ from tankcal.messages import listed, message
 from tankcal.network import ImagePoints, Instrument, Survey, System
 from tankcal.observations import ControlCoordinates, SystemCoordinates
 from tankcal.surveys.averaging import averaged, scatter_warnings
+from tankcal.surveys.correlating import blocks_of, rows_of
 from tankcal.surveys.pictures import gathered_photos, orientation_of
 from tankcal.surveys.poor import left_out, not_measured, sorted_out
 from tankcal.surveys.readings import (
@@ -141,14 +142,15 @@ def _gathered(measurements, excluded):
     if measurements.settings.datum == "control":
         fixed = np.nan_to_num(known.sd_m, nan=1.0) == 0
         fixed &= np.isfinite(known.xyz_m)
-        for one, trace in _control(measurements.control, numbers.points, warnings):
+        alone = rows_of(measurements.correlated, "control")
+        for one, trace in _control(measurements.control, numbers.points, warnings, alone):
             add(one, trace)
     systems, pairs = _systems(measurements.control, numbers.points)
     for one, trace in pairs:
         add(one, trace)
     bend = bend_per_m(measurements.settings.refraction)
     for readings in measurements.readings:
-        table = table_of(readings, numbers)
+        table = table_of(readings, numbers, rows_of(measurements.correlated, readings.table))
         for one, trace in observed(table, bend, warnings):
             add(one, trace)
         checks += compared_only(table, bend)
@@ -167,6 +169,7 @@ def _gathered(measurements, excluded):
         observations=tuple(observations), sets=np.full(len(numbers.sets), np.nan),
         instruments=_instruments(measurements, numbers), systems=systems,
         repeated={source: one.repeated for source, one in traces.items()},
+        correlated=blocks_of(measurements, observations, traces),
     )  # fmt: skip
     return Gathered(survey, traces, tuple(checks), known, None, {}, (), tuple(warnings))
 
@@ -242,7 +245,7 @@ def _coordinates(control, rows, points):
     return rows[where], point[where], axis, value[where, axis], sd[where, axis]
 
 
-def _control(control, points, warnings):
+def _control(control, points, warnings, alone=frozenset()):
     """Pairs (observations, Trace) of weighted control coordinates."""
     if control is None:
         return
@@ -250,7 +253,11 @@ def _control(control, points, warnings):
     free = sd > 0
     if free.any():
         row, point, axis, value, sd = (a[free] for a in (row, point, axis, value, sd))
-        means = averaged(3 * point + axis, value, sd)
+        label = 3 * point + axis
+        if alone:  # values that are correlated with others are not averaged
+            mine = np.isin([control.rows[i] for i in row], list(alone))
+            label = np.where(mine, 3 * len(points) + np.arange(len(label)), label)
+        means = averaged(label, value, sd)
         first = means.first
         trace = _control_trace(control, row[first], axis[first], means.repeats)
         trace = replace(trace, scatter=means.chi2.sum(axis=1))

@@ -11,6 +11,7 @@ from tankcal.observations import (
     HeightDifferences,
     HorizontalAngles,
     PlumbLines,
+    Vectors,
     VerticalAngles,
 )
 from tankcal.surveys.averaging import averaged, scatter_warnings, torn_apart
@@ -103,6 +104,7 @@ class Table:
     horizontal: np.ndarray
     check: np.ndarray
     ids: tuple
+    correlated: frozenset = frozenset()  # rows of the file that are correlated with others
 
     @property
     def angled(self):
@@ -110,8 +112,11 @@ class Table:
         return self.table == "horizontal_angles"
 
 
-def table_of(readings, numbers):
-    """The Table of job.Readings, distances corrected by the certificates of their instruments."""
+def table_of(readings, numbers, correlated=frozenset()):
+    """The Table of job.Readings, distances corrected by the certificates of their instruments.
+
+    correlated  rows of its file that are correlated with others: they are not averaged
+    """
     n = len(readings.value)
     setups = [numbers.setups[name] for name in readings.setup]
     start = [one.station for one in setups] if setups else readings.start
@@ -138,7 +143,7 @@ def table_of(readings, numbers):
         set=_numbered(zip(readings.setup or sets, sets, strict=True), numbers.sets),
         instrument=_numbered(tools, numbers.instruments), tools=tools,
         horizontal=np.asarray(horizontal, dtype=bool),
-        check=np.asarray(readings.check, dtype=bool), ids=tuple(ids),
+        check=np.asarray(readings.check, dtype=bool), ids=tuple(ids), correlated=correlated,
     )  # fmt: skip
 
 
@@ -160,6 +165,12 @@ def observed(table, bend, warnings):
     bend      see `bend_per_m`            warnings  list that warnings of scatter are added to
     """
     use = _between_known(table) & ~table.check
+    if table.table == "vectors":
+        yield from _one_by_one(table, np.flatnonzero(use), bend)
+        return
+    alone = np.isin(table.rows, list(table.correlated)) if table.rows else use & False
+    yield from _one_by_one(table, np.flatnonzero(use & alone), bend)
+    use &= ~alone
     for horizontal in (False, True):
         rows = np.flatnonzero(use & (table.horizontal == horizontal))
         if len(rows):
@@ -181,9 +192,24 @@ def observed(table, bend, warnings):
             )
 
 
+def _one_by_one(table, rows, bend):
+    """Pairs (observations, Trace) of rows (k,) that are not averaged with others: correlated."""
+    for horizontal in (False, True):
+        mine = rows[table.horizontal[rows] == horizontal]
+        if len(mine):
+            value, sd = (a[mine].reshape(len(mine), -1) for a in (table.value, table.sd))
+            yield (
+                _made(table, mine, value, sd, bend),
+                _trace(table, mine, np.ones(len(mine), dtype=int)),
+            )
+
+
 def compared_only(table, bend):
     """Pairs (observations, Trace) of the readings of a Table that are only compared."""
     use = _between_known(table) & table.check
+    if table.table == "vectors":
+        yield from _one_by_one(table, np.flatnonzero(use), bend)
+        return
     if table.table == "directions":
         use &= table.set >= 0
     for horizontal in (False, True):
@@ -218,6 +244,8 @@ def _labels(table, rows):
 def _made(table, rows, value, sd, bend):
     """The observations of some rows, with values and sds (n, m)."""
     kind, start, end = table.table, table.start[rows], table.end[rows]
+    if kind == "vectors":
+        return Vectors(value, sd, start, end)
     if kind == "plumb_lines":
         return PlumbLines(value, sd, start, end)
     value, sd = value[:, 0], sd[:, 0]
@@ -244,7 +272,7 @@ def _made(table, rows, value, sd, bend):
 def _trace(table, rows, repeats):
     names = {"zenith_angles": "zenith angles", "slope_distances": "slope distances"}
     group = tuple(table.tools[i] or names.get(table.table, "") for i in rows)
-    element = ("x", "y") if table.table == "plumb_lines" else ("",)
+    element = {"plumb_lines": ("x", "y"), "vectors": ("x", "y", "z")}.get(table.table, ("",))
     return Trace(
         table.file,
         tuple(table.rows[i] for i in rows) if table.rows else (None,) * len(rows),

@@ -12,6 +12,13 @@ USE = Field(
 )
 
 
+# tables whose rows may be correlated with others, besides control
+VALUES_OF = (
+    *("distances", "slope_distances", "directions", "zenith_angles", "azimuths"),
+    *("horizontal_angles", "vertical_angles", "height_differences", "vectors"),
+)
+
+
 def _name(name, note, required=True):
     return Field(name, "name", note, required=required)
 
@@ -247,6 +254,55 @@ PLUMB_LINES = (
     _sd_mm("their offset in x and in y"),
     USE,
 )
+VECTORS = (
+    _name("from", "one end"),
+    _name("to", "the other end"),
+    *(
+        _number(
+            f"d{axis}_m", f"{axis} of the second less {axis} of the first, metres", -1e8, 1e8, True
+        )
+        for axis in "xyz"
+    ),
+    *(
+        _number(f"s{axis}_mm", f"standard deviation of d{axis}, millimetres", 0, 1e7, True, True)
+        for axis in "xyz"
+    ),
+    *(
+        _number(f"r_{pair}", f"correlation of d{pair[0]} with d{pair[1]}; blank: 0", -1, 1)
+        for pair in ("xy", "xz", "yz")
+    ),
+    USE,
+)
+CORRELATED_READINGS = (
+    *(
+        field
+        for number, which in (("1", "one value"), ("2", "the other value"))
+        for field in (
+            Field(
+                f"table_{number}",
+                "choice",
+                f"{which}: the table in which it stands",
+                required=True,
+                choices=("control", *VALUES_OF),
+            ),
+            Field(
+                f"row_{number}",
+                "number",
+                f"{which}: its row there; the heading is row 1",
+                required=True,
+                low=2,
+                high=1e7,
+            ),
+            Field(
+                f"value_{number}",
+                "choice",
+                f"{which}: x, y or z of control and of vectors; blank: the only one of its row",
+                choices=("x", "y", "z"),
+            ),
+        )
+    ),
+    _number("r", "their correlation", -1, 1, True),
+)
 
 COLUMNS = {
     "targets": TARGETS,
@@ -266,6 +322,8 @@ COLUMNS = {
     "vertical_angles": VERTICAL_ANGLES,
     "height_differences": HEIGHT_DIFFERENCES,
     "plumb_lines": PLUMB_LINES,
+    "vectors": VECTORS,
+    "correlated_readings": CORRELATED_READINGS,
 }
 ANGLES = {
     "directions": "direction",
@@ -276,7 +334,7 @@ ANGLES = {
 }
 READINGS = (
     *("distances", "slope_distances", "directions", "zenith_angles", "azimuths"),
-    *("horizontal_angles", "vertical_angles", "height_differences", "plumb_lines"),
+    *("horizontal_angles", "vertical_angles", "height_differences", "plumb_lines", "vectors"),
 )
 # tables of each usual kind of survey; those of the other kind may be added
 SURVEYS = {

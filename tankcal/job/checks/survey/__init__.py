@@ -6,6 +6,7 @@ in excess) is told after it.
 
 from tankcal.job.checks.common import has_rows, has_survey, tell
 from tankcal.job.checks.survey.cameras import check_cameras
+from tankcal.job.checks.survey.correlated import check_correlated
 from tankcal.job.checks.survey.datum import check_datum
 from tankcal.job.checks.survey.doubtful import check_doubtful
 from tankcal.job.checks.survey.files import SurveyFiles
@@ -44,6 +45,7 @@ def check_survey(values, tables, registers, raw, is_whole, log):
     check_known(files)
     check_names(files)
     check_held(files)
+    check_correlated(files)
     check_datum(files)
     check_doubtful(files)
 

@@ -1,0 +1,59 @@
+"""correlated_readings.csv: pairs of values that exist, each pair once, and none with itself."""
+
+from tankcal.job.checks.common import has_rows
+
+OF_AXES = ("control", "vectors")  # tables with x, y and z in a row
+
+
+def check_correlated(files):
+    """Every pair names two values of two rows that are adjusted."""
+    table = files.tables["correlated_readings"]
+    if not has_rows(table):
+        return
+    first = {}
+    columns = [table.of(f"{what}_{i}") for i in "12" for what in ("table", "row", "value")]
+    for row, *cells in zip(table.rows, *columns, strict=True):
+        ends = []
+        for i, (name, at, axis) in enumerate((cells[:3], cells[3:]), start=1):
+            if name is None or at is None:
+                break  # told already
+            if not _is_there(files, table, row, i, name, at):
+                break
+            if not _has_axis(files, table, row, i, name, axis):
+                break
+            ends.append((name, int(at), axis))
+        if len(ends) < 2:
+            continue
+        if ends[0] == ends[1]:
+            expected = "a value with itself; expected two different values"
+            files.log.problem(table.file, expected, row, "row_2")
+            continue
+        before = first.setdefault(frozenset(ends), row)
+        if before != row:
+            expected = f"this pair is there already, in row {before}; expected once"
+            files.log.problem(table.file, expected, row, "row_2")
+
+
+def _is_there(files, table, row, i, name, at):
+    named = files.tables[name]
+    if named is None or at not in named.rows:
+        last = f"; it has rows 2 to {max(named.rows)}" if has_rows(named) else ""
+        expected = f"found {at:g}, and {name} has no such row{last}; expected a row of {name}"
+        files.log.problem(table.file, expected, row, f"row_{i}")
+        return False
+    place = list(named.rows).index(at)
+    if "use" in named.columns and named.of("use")[place] == "check":
+        expected = f"row {at:g} of {name} is only compared (use = check); expected one adjusted"
+        files.log.problem(table.file, expected, row, f"row_{i}")
+        return False
+    return True
+
+
+def _has_axis(files, table, row, i, name, axis):
+    if (name in OF_AXES) == (axis is not None):
+        return True
+    expected = f"expected x, y or z, which of the three values of a row of {name} it is"
+    if axis is not None:
+        expected = f"found {axis}; expected nothing: a row of {name} has one value"
+    files.log.problem(table.file, expected, row, f"value_{i}")
+    return False
