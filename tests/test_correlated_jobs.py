@@ -110,6 +110,24 @@ def test_a_wrong_vector_is_found_whole(tmp_path):
     assert {(one.file, one.row) for one in removed} == {("vectors.csv", 4)}
 
 
+def test_gross_readings_beside_correlated_ones(tmp_path):
+    """A distance fifty times too long is set aside; the correlated ones of its table stay themselves."""
+    length = {one: np.linalg.norm(np.subtract(PLACES[one[1]], PLACES[one[0]])) for one in LINES}
+
+    def with_distances(files):
+        rows = [f"A,C,{50 * length['AC']:.4f},10", *(
+            f"{a},{b},{length[a + b]:.4f},10" for a, b in ("BC", "BD", "DC", "AD"))]  # fmt: skip
+        files["distances.csv"] = "\n".join(["from,to,distance_m,s_mm", *rows]) + "\n"
+        files["correlated_readings.csv"] += "distances,3,,distances,4,,0.9\n"
+
+    written(tmp_path, change=with_distances)
+    adjustment = adjust_survey(measured(tmp_path))
+    assert {(one.file, one.row) for one in adjustment.removed} == {("distances.csv", 2)}
+    values = {one.row: one.value for one in adjustment.readings if one.file == "distances.csv"}
+    assert values[3] == pytest.approx(length["BC"], abs=1e-4)
+    assert values[4] == pytest.approx(length["BD"], abs=1e-4)
+
+
 def test_vectors_alone_hang_on_one_point(tmp_path):
     """Without redundancy and with one fixed point: its coordinates and the vectors, added."""
 

@@ -58,6 +58,15 @@ def searched(survey, options, gross=None):
     return Searched(found.adjusted, found.removed, found.rounds, found.needed)
 
 
+def _counted_anew(block, gross):
+    """A Block after readings were taken out of the tables; none of its own is among them."""
+    row = block.row.copy()
+    for source, gone in gross.items():
+        mine = block.source == source
+        row[mine] -= np.cumsum(gone)[row[mine]]
+    return replace(block, row=row)
+
+
 def _without(survey, options, gross):
     """network.Cleaned of a survey: first without some readings, then with these set aside."""
     thin = replace(
@@ -67,6 +76,7 @@ def _without(survey, options, gross):
             one.taken(~gross[number]) if number in gross else one
             for number, one in enumerate(survey.observations)
         ),
+        correlated=tuple(_counted_anew(one, gross) for one in survey.correlated),
     )
     first = snoop(thin, **options)
     uses = {}
