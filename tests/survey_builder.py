@@ -163,7 +163,10 @@ def _tables():
         "plumb_lines": [["from", "to", "s_mm"], ["W1", "W5", 0.3]],
         "vectors": [
             ["from", "to", "dx_m", "dy_m", "dz_m", "sx_mm", "sy_mm", "sz_mm", "r_xy", "r_yz"],
-            *(["S1", n, *map(float, vector("S1", n)), 3.0, 3.0, 5.0, 0.2, None] for n in ("W1", "S2")),
+            *(
+                ["S1", n, *map(float, vector("S1", n)), 3.0, 3.0, 5.0, 0.2, None]
+                for n in ("W1", "S2")
+            ),
         ],
         "correlated_readings": [
             ["table_1", "row_1", "value_1", "table_2", "row_2", "value_2", "r"],

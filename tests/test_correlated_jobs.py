@@ -111,7 +111,7 @@ def test_a_wrong_vector_is_found_whole(tmp_path):
 
 
 def test_gross_readings_beside_correlated_ones(tmp_path):
-    """A distance fifty times too long is set aside; the correlated ones of its table stay themselves."""
+    """A distance fifty times too long goes; correlated ones of its table stay themselves."""
     length = {one: np.linalg.norm(np.subtract(PLACES[one[1]], PLACES[one[0]])) for one in LINES}
 
     def with_distances(files):

@@ -265,7 +265,7 @@ def test_the_adjustment_alone_reads_what_there_is_of_the_tank(tmp_path):
 def test_the_adjustment_alone_of_a_tank_that_is_not_whole(tmp_path, settings):
     job = load(write_folder(tmp_path / "job", survey_parts(settings, tank=False)), "adjustment")
     assert (job.table, job.bottom.form, job.roof, job.mesh) == (None, "flat", None, None)
-    assert len(job.measurements.readings) == 9
+    assert len(job.measurements.readings) == 10
 
 
 def test_a_sphere_may_be_surveyed(tmp_path):
