@@ -318,3 +318,26 @@ def test_large_surveys_start_from_nothing(photos, points, blunders, figure):
     assert np.median(off) < 0.01
     assert np.quantile(off, 0.98) < 0.05
     assert np.abs(found.photos.xyz_m - stations).max() < 0.1
+
+
+@pytest.mark.parametrize("scale", [1.0, 10.0, 40.0])
+def test_one_oriented_photo_and_a_coordinate_of_another(scale):
+    """Simulation: the other photo's x alone says how large all is, whatever unit it comes in."""
+    survey, truth = photographed(3, photos=6)
+    place, photos = scale * truth.photo_xyz_m, survey.photos
+    fixed = np.zeros((6, 4), dtype=bool)
+    fixed[0], fixed[2, 0] = True, True
+    known = np.where(fixed[:, :3], place, np.nan)
+    rotation = np.where(fixed[:, 3, None, None], truth.rotation, np.nan)
+    found = approximate(
+        replace(
+            survey,
+            xyz_m=np.full_like(truth.xyz_m, np.nan),
+            observations=(),
+            instruments=(),
+            photos=replace(photos, xyz_m=known, rotation=rotation, fixed=fixed),
+        )
+    )
+    off = np.linalg.norm(found.xyz_m - scale * truth.xyz_m, axis=1)
+    assert off.max() < 0.03 * scale * 6.5
+    assert (found.photos.xyz_m[fixed[:, :3]] == known[fixed[:, :3]]).all()

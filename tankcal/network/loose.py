@@ -7,10 +7,10 @@ import numpy as np
 
 from tankcal.network.aligning import aligned
 from tankcal.network.clues import grown
-from tankcal.network.growing import grown_by_photos
+from tankcal.network.growing import grown_by_photos, with_points
 from tankcal.network.known import certain
 from tankcal.network.pairing import blind_piece
-from tankcal.network.pieces import BAD_JOINT, joint
+from tankcal.network.pieces import BAD_JOINT, Motion, joint
 
 
 def with_locals(clues, piece, places, least):
@@ -18,6 +18,7 @@ def with_locals(clues, piece, places, least):
 
     places  (photos, 3) projection centres that were given, nan where none was
     """
+    given = piece
     if not np.isfinite(piece.xyz_m[:, 0]).any() or not np.isfinite(piece.xyz_m[:, 2]).any():
         piece = grown(clues, piece, least, free=not piece.oriented.any())
     tried, loose, reasons = piece.oriented.copy(), [], []
@@ -34,6 +35,7 @@ def with_locals(clues, piece, places, least):
         piece = grown(clues, piece.filled_from(own.moved(motion)), least)
         piece, loose = _attached(clues, piece, [one for one in loose if one is not own], least)
     reasons += [_apart(clues.survey, own, piece) for own in loose]
+    piece = _to_scale(clues, piece, given, places)
     return grown(clues, piece, least, free=not np.isfinite(piece.xyz_m[:, 0]).any()), reasons
 
 
@@ -63,6 +65,34 @@ def _joined(clues, own, onto):
     if motion is None or motion.misfit_m > BAD_JOINT * max(own.extent * motion.scale, 1e-9):
         return None
     return onto.filled_from(own.moved(motion))
+
+
+def _to_scale(clues, piece, given, places):
+    """The Piece stretched about the only photo that was given whole, to what else is known.
+
+    given   Piece of what was known at first         places  see `with_locals`
+
+    Single coordinates of other photos and of points say how large it is: by relative orientation
+    alone its base has the length one.
+    """
+    one, plan = given.oriented, clues.plan
+    taped = piece.known[plan.start] & piece.known[plan.end] & ~plan.flat
+    if one.sum() != 1 or given.known.any() or taped.any() or piece.oriented.sum() < 2:
+        return piece
+    bare = replace(
+        piece,
+        xyz_m=np.full_like(piece.xyz_m, np.nan),
+        by_photos=np.ones_like(piece.by_photos),
+    )
+    bare, hinge = with_points(clues.sights, bare), given.place_m[one][0]
+    told = np.vstack([given.xyz_m, np.where(np.isfinite(given.place_m), given.place_m, places)])
+    away, wanted = np.vstack([bare.xyz_m, bare.place_m]) - hinge, told - hinge
+    both = np.isfinite(away) & np.isfinite(wanted)
+    square = float(np.sum(away[both] ** 2))
+    scale = float(np.sum(away[both] * wanted[both])) / square if square > 0 else 0.0
+    if not scale > 0:
+        return piece
+    return given.filled_from(bare.moved(Motion(np.eye(3), hinge * (1 - scale), scale, 0.0)))
 
 
 def _held(survey):
