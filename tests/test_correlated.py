@@ -124,6 +124,7 @@ def test_reliability_in_the_general_form(network):
     np.testing.assert_allclose(values_of(adjusted, "residual"), v, atol=1e-9)
     np.testing.assert_allclose(values_of(adjusted, "w"), p @ v / np.sqrt(free), rtol=1e-5)
     np.testing.assert_allclose(values_of(adjusted, "redundancy"), np.diag(qvv @ p), rtol=1e-6)
+    np.testing.assert_allclose(values_of(adjusted, "part_of_chi2"), v * (p @ v), atol=1e-7)
     mdb = noncentrality() / np.sqrt(free)
     np.testing.assert_allclose(values_of(adjusted, "mdb"), mdb, rtol=1e-6)
     moves = np.abs(cofactors @ a.T @ p * mdb).max(axis=0)

@@ -93,6 +93,8 @@ def test_vectors_of_a_job(tmp_path, correlated):
         np.testing.assert_allclose(found, cofactors[mine, mine], rtol=1e-6, atol=1e-13)
     assert adjustment.redundancy == 9
     assert adjustment.sigma0**2 * 9 == pytest.approx(chi2, rel=1e-6)
+    square = sum(one.factor**2 * one.redundancy for one in adjustment.groups)
+    assert square == pytest.approx(chi2, rel=1e-6)
     assert sum(one.redundancy for one in adjustment.readings) == pytest.approx(9, abs=1e-9)
 
 

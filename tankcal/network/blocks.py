@@ -134,6 +134,7 @@ class ValueTests:
     external: np.ndarray
     change: np.ndarray
     whole: np.ndarray
+    pull: np.ndarray
 
 
 def tested(problem, solution, number, members, delta0):
@@ -185,7 +186,9 @@ def tested(problem, solution, number, members, delta0):
             inverse = np.linalg.inv(total)
             whole[mine] = _together(inverse @ off, inverse, np.diag(inverse))
     sd = np.sqrt(np.diag(q))
-    return ValueTests(v, sd, redundancy, w, mdb, external, change * sd, whole)
+    pull = np.zeros(k)
+    pull[own] = right * sd[own]
+    return ValueTests(v, sd, redundancy, w, mdb, external, change * sd, whole, pull)
 
 
 def _observations(members):

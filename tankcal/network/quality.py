@@ -157,13 +157,13 @@ def components(residuals):
         redundancy = float(table.redundancy[used].sum())
         if redundancy < 1e-6:
             continue
-        square = float(np.sum((table.residual[used] / table.sd[used]) ** 2))
+        square = float(np.sum(table.part_of_chi2[used]))
         found.append(
             Component(
                 table.kind,
                 table.source,
                 redundancy,
-                float(np.sqrt(square / redundancy)),
+                float(np.sqrt(max(square, 0.0) / redundancy)),
                 float(1 / np.sqrt(2 * redundancy)),
             )
         )

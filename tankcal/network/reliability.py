@@ -49,6 +49,7 @@ class Residuals:
     elsewhere_m (n, m) bound in that case: no other point changes by more; None: effect_m is that of
                 all points
     exact       True: the group holds exactly (sd 0); residual and redundancy are 0
+    pull        (n, m) sd (Pv), of correlated values; None: v over sd
     changes     function -> change of a coordinate by a whitened error of one (exact: of one), own
                 or of all, and elsewhere or None; for effect_m, which costs more than all the rest
     """
@@ -67,6 +68,15 @@ class Residuals:
     external: np.ndarray
     exact: bool = False
     changes: object = field(default=None, repr=False)
+    pull: np.ndarray | None = None
+
+    @property
+    def part_of_chi2(self):
+        """(n, m) v (Pv): they add up to v'Pv, and each is expected to be its redundancy number."""
+        whitened = np.divide(
+            self.residual, self.sd, out=np.zeros_like(self.residual), where=self.sd > 0
+        )
+        return whitened * (whitened if self.pull is None else self.pull)
 
     @cached_property
     def _effects(self):
@@ -140,7 +150,7 @@ def _of_block(problem, solution, number, members, delta0):
             residual=filled(found.residual), sd=filled(found.sd),
             redundancy=filled(found.redundancy), w=filled(found.w), whole=test,
             mdb=filled(found.mdb), external=filled(found.external),
-            changes=lambda change=change: (change, None),
+            changes=lambda change=change: (change, None), pull=filled(found.pull),
         )  # fmt: skip
 
 

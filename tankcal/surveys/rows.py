@@ -150,22 +150,22 @@ def _group(kind, name, unit, parts, repeated):
     for (table, _), mine in zip(parts, used, strict=True):
         if table.source in repeated:
             scatter += [part[table.rows[mine]].sum() for part in repeated[table.source]]
-    residual, sd, share = (
+    residual, sd, share, parts_of_chi2 = (
         np.concatenate(
             [
                 getattr(table, field)[mask].ravel()
                 for (table, _), mask in zip(parts, used, strict=True)
             ]
         )
-        for field in ("residual", "sd", "redundancy")
+        for field in ("residual", "sd", "redundancy", "part_of_chi2")
     )
     count = sum(int(mine.sum()) * table.residual.shape[1] for table, mine in parts)
     redundancy = float(share.sum() + scatter[1])
     factor = factor_sd = np.nan
     weighs = sd > 0  # what holds exactly has neither residual nor redundancy
     if redundancy > UNCONTROLLED and weighs.any():
-        square = np.sum((residual[weighs] / sd[weighs]) ** 2) + scatter[0]
-        factor = float(np.sqrt(square / redundancy))
+        square = np.sum(parts_of_chi2[weighs]) + scatter[0]
+        factor = float(np.sqrt(max(square, 0.0) / redundancy))
         factor_sd = float(1.0 / np.sqrt(2.0 * redundancy))
     rms = float(np.sqrt(np.mean(residual**2))) if len(residual) else np.nan
     low, high = (float(sd.min()), float(sd.max())) if len(sd) else (None, None)
