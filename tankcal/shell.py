@@ -90,11 +90,12 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
     reason[candidates & ~wall] = "consensus"
     believed = np.ones(len(xyz_m)) if sd_m is None else np.maximum(sd_m, LEAST_NOISE_M)
     relative = believed / np.median(believed)
-    found = snoop(local, course, wall, axis, relative, WIDEST_SLOPE, snooping)
+    zeta = _within_course(xyz_m[:, 2], course, np.asarray(joints_m, dtype=float))
+    found = snoop(local, course, zeta, wall, axis, relative, WIDEST_SLOPE, snooping)
     tilt_known = np.sqrt(np.diag(found.slope_cofactor).max()) < VAGUE_TILT
     if not tilt_known:
         upright = np.array([*axis[:2], 0.0, 0.0])
-        found = snoop(local, course, wall, upright, relative, 1e-9, snooping)
+        found = snoop(local, course, zeta, wall, upright, relative, 1e-9, snooping)
     in_band, wall, axis = wall, found.wall, found.axis
     reason[(reason == "") & ~wall] = "snooping"
     if wall.sum() < LEAST_PART * candidates.sum():
@@ -117,6 +118,12 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
         noise_dof=found.noise_dof,
         tilt_known=bool(tilt_known),
     )
+
+
+def _within_course(z_m, course, joints_m):
+    """(n,) height within the course, -1 at its bottom to +1 at its top."""
+    low, high = joints_m[course], joints_m[course + 1]
+    return 2 * (z_m - low) / (high - low) - 1
 
 
 def _reasons(xyz_m, joints_m):

@@ -1,7 +1,8 @@
 """Data snooping about the smooth form of a shell: what is clutter, and what is a dent.
 
-The radii of the wall are fitted by one radius a course, an axis, and a form of azimuth and height
-that has the spectrum of real shells as its prior. Points that deny that form are rejected, the
+The radii of the wall are fitted by one radius a course, a taper within it, one radius more for each
+of three rings or more, an axis, and a form of azimuth and height that has the spectrum of
+real shells as its prior. Points that deny that form are rejected, the
 worst first, and those that agree with it after all come back.
 """
 
@@ -14,6 +15,9 @@ from tankcal.form import harmonics, mode_variances
 
 CRITICAL_W = 3.29  # two-sided, 0.1 % of sound points are rejected (Baarda 1968)
 MODES = 24  # highest mode of the form that the snooping allows for
+TAPER_M, RING_M = 0.010, 0.005  # prior sd of a radius: at the ends of a course; of a ring beside it
+FEWEST_OF_RING, WIDEST_GAP = 8, np.pi / 2  # points, and rad between two: they go round
+RING_SPAN, MIDDLE = 0.2, 0.15  # of half a course: between two rings; what is neither end
 REJECTED = 1e3  # factor on the sd of a rejected point: it is predicted, not fitted
 LEAST_NOISE_M = 1e-4  # a sound point is never rejected for less than a third of a millimetre
 
@@ -31,7 +35,7 @@ class Wall:
     noise_dof: float
 
 
-def snoop(local, course, candidates, axis, relative, slope_sd, snooping):
+def snoop(local, course, zeta, candidates, axis, relative, slope_sd, snooping):
     """Reject the worst points about the smooth form until all are sound; re-admit whom it spares.
 
     A pass rejects the points within a tenth of the worst and fits anew. When none is left to
@@ -39,10 +43,11 @@ def snoop(local, course, candidates, axis, relative, slope_sd, snooping):
     """
     index = np.flatnonzero(candidates)
     xyz, of, relative = local[index], course[index], relative[index]
+    uneven = unevenness(xyz, of, zeta[index], axis)
     accepted, returned = np.ones(len(index), dtype=bool), np.zeros(len(index), dtype=bool)
     state = None
     while True:
-        state = _fit_form(xyz, of, axis, relative, slope_sd, accepted, state)
+        state = _fit_form(xyz, of, uneven, axis, relative, slope_sd, accepted, state)
         size = np.abs(state.w)
         worst = accepted & (size > CRITICAL_W)
         sound = ~accepted & ~returned & (size <= CRITICAL_W)
@@ -74,7 +79,7 @@ class _FormFit:
     w: np.ndarray
 
 
-def _fit_form(xyz, course, axis, relative, slope_sd, accepted, before):
+def _fit_form(xyz, course, uneven, axis, relative, slope_sd, accepted, before):
     """Shell with form, its point noise and form amplitude as two variance components.
 
     Helmert's simple iteration: each standard deviation is scaled by the root of its group's sum of
@@ -90,10 +95,10 @@ def _fit_form(xyz, course, axis, relative, slope_sd, accepted, before):
         was = noise, form
         doubt = np.maximum(1.0, np.abs(residual) / (2 * noise * relative))
         sd = noise * relative * np.where(accepted, doubt, REJECTED)
-        fit = adjust(*shell_problem(xyz, course, axis, sd, form, slope_sd))
+        fit = adjust(*shell_problem(xyz, course, axis, sd, form, slope_sd, uneven))
         axis, residual = fit.unknowns[:4], fit.residuals[:n]
         noise = _noise(residual[accepted] / relative[accepted], fit.redundancy[:n][accepted])
-        form = max(form * _component(fit, slice(n, -2)), 0.1 * noise)
+        form = max(form * _component(fit, slice(n, n + 4 * (MODES - 1))), 0.1 * noise)
         if np.allclose(was, (noise, form), rtol=0.05):
             break
     return _FormFit(fit, noise, form, residual, _left_out(fit, residual, sd, noise * relative))
@@ -121,12 +126,69 @@ def _component(fit, group):
     return np.sqrt(np.sum(fit.normalised[group] ** 2) / max(redundancy, 1e-9))
 
 
-def shell_problem(xyz, course, axis, sd, form, slope_sd):
-    """Arguments of `adjust` for radii = R of the course + form(azimuth, height).
+@dataclass(frozen=True)
+class Uneven:
+    """How the mean radius departs from that of its course.
 
-    The form is the same at all heights but for a part that grows linearly with height; its modes
-    and the slope are unknowns with a prior (an observation of zero). Without `form` the shell is
-    round. sd (n,) of the radii.
+    columns  (n, c) derivative of the radii by each departure; sd_m (c,) of it, before any point
+    """
+
+    columns: np.ndarray
+    sd_m: np.ndarray
+
+
+def unevenness(xyz, course, zeta, axis):
+    """`Uneven`: a taper for each course that shows one, a radius for each of three rings or more.
+
+    zeta  (n,) height within the course, -1 at its bottom to +1 at its top
+
+    Only points that go round tell it, in the lower and the upper part of a course: with fewer, what
+    stands before the wall (treads of a stair, the rim of a nozzle) would bear itself out.
+    """
+    offset, _ = from_axis(xyz, axis)
+    azimuth = np.arctan2(offset[:, 0], offset[:, 1])
+    columns, sds = [np.zeros((len(xyz), 0))], []
+    for one in np.unique(course):
+        own = np.flatnonzero(course == one)
+        ends = own[zeta[own] < -MIDDLE], own[zeta[own] > MIDDLE]
+        if not all(_goes_round(azimuth[end]) for end in ends):
+            continue
+        columns.append(_column(len(xyz), own, zeta[own]))
+        sds.append(TAPER_M)
+        rings = _rings(own, zeta, azimuth)
+        if len(rings) > 2:
+            columns += [_column(len(xyz), ring, 1.0) for ring in rings]
+            sds += len(rings) * [RING_M]
+    return Uneven(np.hstack(columns), np.array(sds))
+
+
+def _column(count, members, value):
+    column = np.zeros((count, 1))
+    column[members, 0] = value
+    return column
+
+
+def _rings(members, zeta, azimuth):
+    """Lists of the points of a course that stand at one height, all round it."""
+    order = members[np.argsort(zeta[members], kind="stable")]
+    rings = np.split(order, np.flatnonzero(np.diff(zeta[order]) > RING_SPAN) + 1)
+    level = [ring for ring in rings if np.ptp(zeta[ring]) <= 2 * RING_SPAN]
+    return [ring for ring in level if _goes_round(azimuth[ring])]
+
+
+def _goes_round(azimuth):
+    if len(azimuth) < FEWEST_OF_RING:
+        return False
+    around = np.sort(azimuth)
+    return np.diff(around, append=around[0] + 2 * np.pi).max() < WIDEST_GAP
+
+
+def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
+    """Arguments of `adjust` for radii = R of the course + uneven + form(azimuth, height).
+
+    The form is the same at all heights but for a part that grows linearly with height; its modes,
+    the slope and what is `Uneven` are unknowns with a prior (an observation of zero). Without
+    `form` the shell is round. sd (n,) of the radii.
     """
     courses, row_of = np.unique(course, return_inverse=True)
     n, modes = len(xyz), 0 if form is None else 2 * (MODES - 1)
@@ -134,9 +196,12 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd):
     height = xyz[:, 2] / max(np.abs(xyz[:, 2]).max(), 1e-9)
     by_radius = np.zeros((n, len(courses)))
     by_radius[np.arange(n), row_of] = -1.0
-    priors = np.zeros((2 * modes + 2, first_mode + 2 * modes))
-    priors[: 2 * modes, first_mode:] = np.eye(2 * modes)
-    priors[2 * modes :, 2:4] = np.eye(2)
+    by_uneven = np.zeros((n, 0)) if uneven is None else uneven.columns
+    more, last_mode = by_uneven.shape[1], first_mode + 2 * modes
+    priors = np.zeros((2 * modes + 2 + more, last_mode + more))
+    priors[: 2 * modes, first_mode:last_mode] = np.eye(2 * modes)
+    priors[2 * modes : 2 * modes + 2, 2:4] = np.eye(2)
+    priors[2 * modes + 2 :, last_mode:] = np.eye(more)
 
     def model(x, observations):
         offset, distance = from_axis(xyz, x[:4])
@@ -148,20 +213,22 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd):
             waves = harmonics(azimuth, MODES)[:, 3:]
             by_form = np.hstack([waves, waves * height[:, None]])
             slopes = harmonics(azimuth, MODES, derivative=1)[:, 3:]
-            form_now = by_form @ x[first_mode:]
-            turn = np.hstack([slopes, slopes * height[:, None]]) @ x[first_mode:] / distance
+            form_now = by_form @ x[first_mode:last_mode]
+            by_azimuth = np.hstack([slopes, slopes * height[:, None]])
+            turn = by_azimuth @ x[first_mode:last_mode] / distance
         by_xy = -np.column_stack([sin - turn * cos, cos + turn * sin])
         by_axis = np.hstack([by_xy, by_xy * xyz[:, 2:]])
-        top = np.hstack([by_axis, by_radius, -by_form])
-        misclosure = distance - x[4:first_mode][row_of] - form_now
-        modelled = np.concatenate([misclosure, x[first_mode:], x[2:4]])
+        top = np.hstack([by_axis, by_radius, -by_form, -by_uneven])
+        misclosure = distance - x[4:first_mode][row_of] - form_now - by_uneven @ x[last_mode:]
+        modelled = np.concatenate([misclosure, x[first_mode:last_mode], x[2:4], x[last_mode:]])
         return modelled - observations, np.vstack([top, priors]), None
 
     distance = from_axis(xyz, axis)[1]
     radii = [np.median(distance[row_of == i]) for i in range(len(courses))]
-    start = np.concatenate([axis, radii, np.zeros(2 * modes)])
+    start = np.concatenate([axis, radii, np.zeros(2 * modes + more)])
+    uneven_variances = np.zeros(0) if uneven is None else uneven.sd_m**2
     prior = form**2 * mode_variances(MODES) if modes else np.zeros(0)
-    variances = np.concatenate([sd**2, prior, prior, np.full(2, slope_sd**2)])
+    variances = np.concatenate([sd**2, prior, prior, np.full(2, slope_sd**2), uneven_variances])
     return model, start, np.zeros(len(variances)), variances
 
 

@@ -135,3 +135,65 @@ def test_a_spiral_stair_before_the_wall_takes_no_wall_point_with_it():
     shell = find_shell(np.vstack([xyz, steps]), JOINTS, 6.5)
     assert np.sum(shell.reason[:400] != "") <= 3
     assert np.sum(shell.reason[400:] != "") >= 18
+
+
+def two_rings(apart_m, seed, bars=0):
+    """Two rings of 24 points in each of five courses, and ends of level bars, sd 1 mm."""
+    rng, pieces = np.random.default_rng(seed), []
+    for bottom in JOINTS[:-1]:
+        for part, count in ((0.25, 24), (0.75, 24), (0.9, bars)):
+            azimuth = 0.01 + 2 * np.pi * np.arange(count) / max(count, 1)
+            radius = 6.5 + 2 * apart_m * (part - 0.5) + rng.normal(0, 0.001, count)
+            z = np.full(count, bottom + part * np.diff(JOINTS)[0])
+            pieces.append(np.column_stack([radius * np.sin(azimuth), radius * np.cos(azimuth), z]))
+    return np.vstack(pieces)
+
+
+@pytest.mark.parametrize("bars", [0, 2])
+def test_rings_of_one_course_may_differ_in_radius(bars):
+    """Property: as many sound points go where the rings are 20 mm apart as where they are not.
+
+    0.1 % of them is what the test costs; with one radius a course every second point went.
+    """
+    for seed in range(2):
+        even = find_shell(two_rings(0.0, seed, bars), JOINTS, 6.5)
+        assert np.sum(even.reason != "") <= 1
+        for apart in (0.006, 0.020):
+            found = find_shell(two_rings(apart, seed, bars), JOINTS, 6.5)
+            assert np.array_equal(found.reason, even.reason)
+            assert found.noise_m == pytest.approx(0.001, rel=0.15)
+
+
+def three_rings(wider_m, seed):
+    """Three rings of 24 points in each course, the middle one wider, sd 1 mm."""
+    rng, pieces = np.random.default_rng(seed), []
+    azimuth = 2 * np.pi * np.arange(24) / 24
+    for bottom in JOINTS[:-1]:
+        for part, wider in ((0.1, 0.0), (0.5, wider_m), (0.9, 0.0)):
+            radius = 6.5 + wider + rng.normal(0, 0.001, 24)
+            z = np.full(24, bottom + part * np.diff(JOINTS)[0])
+            pieces.append(np.column_stack([radius * np.sin(azimuth), radius * np.cos(azimuth), z]))
+    return np.vstack(pieces)
+
+
+def test_a_barrel_of_three_rings_keeps_its_points():
+    """The ring at mid height is 6 mm wider than its neighbours: no taper, and no blunder."""
+    even, barrel = (find_shell(three_rings(wider, 1), JOINTS, 6.5) for wider in (0.0, 0.006))
+    assert np.sum(barrel.reason != "") <= np.sum(even.reason != "") + 1
+    assert barrel.noise_m == pytest.approx(0.001, rel=0.15)
+
+
+def test_a_nozzle_and_a_stair_beside_rings_that_differ_still_go():
+    """Six treads at heights of their own, 20 to 45 mm off, and the rim of a nozzle 30 mm off."""
+    azimuth = np.linspace(1.0, 1.8, 6)
+    treads = 6.5 + np.linspace(0.020, 0.045, 6)
+    stair = np.column_stack(
+        [treads * np.sin(azimuth), treads * np.cos(azimuth), 2.8 + 1.2 * (azimuth - 1.0)]
+    )
+    turn = 2 * np.pi * np.arange(6) / 6
+    about = 4.0 + 0.15 / 6.5 * np.cos(turn)
+    rim = np.column_stack([6.53 * np.sin(about), 6.53 * np.cos(about), 8.5 + 0.15 * np.sin(turn)])
+    wall_points = two_rings(0.012, 0)
+    found = find_shell(np.vstack([wall_points, stair, rim]), JOINTS, 6.5)
+    assert np.all(found.reason[-12:] == "snooping")
+    assert np.sum(found.reason[:-12] != "") <= 2
