@@ -5,7 +5,7 @@ The truth of these tests is the property itself: what was spoilt, and where, is 
 
 import numpy as np
 import pytest
-from job_builder import job_parts, write_folder
+from job_builder import job_parts, write_folder, write_job
 from messages_told import lines
 from spoilt import FORMS, places, problems_of, settings_place, table_file, write
 
@@ -308,6 +308,8 @@ SETTINGS_OF_KINDS = [
     ("horizontal", {"survey.side": None}, "survey.side", "missing"),
     ("horizontal", {"datum.bottom_z_m": 1.0}, "datum.bottom_z_m", "this one is horizontal"),
     ("horizontal", {"datum.dip_plate_z_m": 1.1}, "datum.dip_plate_z_m", "above the bottom"),
+    ("horizontal", {"datum.dip_plate_z_m": -0.1}, "datum.dip_plate_z_m", "below the inside bottom"),
+    ("sphere", {"datum.dip_plate_z_m": -0.1}, "datum.dip_plate_z_m", "below the inside bottom"),
     ("horizontal", {"table.step_m": 2.5}, "table.step_m", "the height, 2.4 m"),
     ("horizontal", {"material.e_gpa": 200.0}, "material.e_gpa", "of kind vertical"),
     ("horizontal", {"corrections.head": True}, "corrections.head", "of kind vertical"),
@@ -560,3 +562,11 @@ def test_all_problems_of_the_parts_come_together(tmp_path):
         "top_m",
         "input",
     }
+
+
+def test_a_bottom_does_not_rise_above_the_shell(tmp_path):
+    settings = {"bottom.form": "cone", "bottom.centre_z_m": 3.2}  # of 13 m: less than a quarter
+    low = {"height": 2.0, "courses": 1}
+    (problem,) = problems_of(write_job(tmp_path / "job", settings=settings, **low))
+    assert problem.column == "bottom.centre_z_m"
+    assert "at most 2 m above" in problem.expected

@@ -21,6 +21,7 @@ from tankcal.meshes import (
     shell_bands,
     write_mesh,
 )
+from tankcal.meshes.files import parse_mesh
 from tankcal.meshes.part import sums_below
 from tankcal.volumes import ShellVolume
 
@@ -447,6 +448,51 @@ def test_bad_files_are_told_in_one_line(name, content, expected, tmp_path):
         read_mesh(tmp_path / name)
     assert str(error.value).startswith(f"{name}: ")
     assert len(str(error.value).splitlines()) == 1
+
+
+def _text_of(kind):
+    """A cube as text of a mesh file, and the row at which its corners begin."""
+    corners = [" ".join(map(str, xyz)) for xyz in CUBE_VERTICES.tolist()]
+    if kind == "off":
+        faces = ["3 {} {} {}".format(*face) for face in CUBE_FACES.tolist()]
+        return ["OFF", "8 12 0", *corners, *faces], 2
+    if kind == "obj":
+        faces = ["f {} {} {}".format(*(face + 1)) for face in CUBE_FACES]
+        return ["o tank", *(f"v {corner}" for corner in corners), *faces], 1
+    head = [
+        "ply", "format ascii 1.0", "element vertex 8",
+        *(f"property float {axis}" for axis in "xyz"),
+        "element face 12", "property list uchar int vertex_indices", "end_header",
+    ]  # fmt: skip
+    faces = ["3 {} {} {}".format(*face) for face in CUBE_FACES.tolist()]
+    return [*head, *corners, *faces], len(head)
+
+
+@pytest.mark.parametrize("kind", ["off", "obj", "ply"])
+def test_what_says_nothing_in_a_mesh_file_changes_nothing(kind):
+    """Property: blank rows, comments, names in quotation marks, tabs and any line end."""
+    lines, start = _text_of(kind)
+    comment = {"off": "# x", "obj": "# x", "ply": "comment x"}[kind]
+    changes = {
+        "as it is": lines,
+        "blank rows": [*lines[:1], "", *lines[1 : start + 2], "  ", *lines[start + 2 :], "", ""],
+        "blank first": ["", *lines],
+        "comments": [*lines[:1], comment, *lines[1 : start + 2], comment, *lines[start + 2 :]],
+        "spaces": [f" {line}  " for line in lines],
+    }
+    if kind == "obj":
+        named = ['g "shell, 5" pipe"', 'usemtl "st eel"', "mtllib 'a b.mtl'"]
+        changes["names"] = ['o "my tank"', *lines[1:4], *named, *lines[4:]]
+        changes["beside"] = [*lines[:2], lines[2] + " # corner", *lines[3:-1], lines[-1] + " # end"]
+        changes["broken"] = [*lines[:-1], lines[-1].replace(" ", " \\\n", 1)]
+    if kind == "off":
+        changes["beside"] = ["# made by hand", "off", "8 12 0 # all", *lines[2:]]
+    for name, rows in changes.items():
+        for end in ("\n", "\r\n", "\r"):
+            found = parse_mesh(f"tank.{kind}", end.join(rows).encode())
+            assert (len(found.faces), found.bodies) == (12, 1), (name, end)
+    found = parse_mesh(f"tank.{kind}", "\n".join(lines).replace(" ", "\t").encode())
+    assert len(found.faces) == 12
 
 
 def dented_shell(seed=3, inset=0.008, scale=1.0004):

@@ -36,6 +36,12 @@ def test_byte_order_mark_and_line_ends(start, end):
     assert table.rows == (("é",), ("B",))
 
 
+def test_spaces_before_quotation_marks_are_none_of_the_cell():
+    table, problems = csv_table(b'"a", "b"\n"1", "x, y"\n')
+    assert not problems
+    assert (table.headings, table.rows) == (("a", "b"), (("1", "x, y"),))
+
+
 @pytest.mark.parametrize(
     ("data", "row", "words"),
     [

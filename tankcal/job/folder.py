@@ -379,7 +379,10 @@ def _csv_rows(file, text, separator, log):
             yield number, line.split(separator)
             continue
         try:
-            yield number, next(csv.reader([line], delimiter=separator, strict=True))
+            yield (
+                number,
+                next(csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True)),
+            )
         except csv.Error:
             log.problem(
                 file,

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from tankcal.meshes.checks import closed_mesh, problem
+from tankcal.meshes.cleaning import cleaned
 
 FILE_KINDS = ("stl", "obj", "ply", "off")
 
@@ -34,7 +35,7 @@ def parse_mesh(name, data, unit_m=1.0):
         raise problem(name, f"expected one of {', '.join('.' + k for k in FILE_KINDS)}")
     try:
         found = trimesh.load_mesh(
-            io.BytesIO(data), file_type=kind, process=False, skip_materials=True
+            io.BytesIO(cleaned(kind, data)), file_type=kind, process=False, skip_materials=True
         )
         vertices, faces = np.array(found.vertices), np.array(found.faces)
     except Exception as error:  # whatever a parser stumbles over

@@ -102,8 +102,9 @@ def _check_centre(form, values, raw, log):
         return
     rise = centre - edge
     deepest = diameter if form == "cone" else diameter / 2
-    if not -deepest <= rise <= diameter / 4:
-        highest = diameter / 4
+    height = values["tank"]["nominal_height_m"]
+    highest = diameter / 4 if height is None else min(diameter / 4, height)
+    if not -deepest <= rise <= highest:
         expected = message(
             "bottom_centre_far",
             "{rise:+g} m from its edge (datum.bottom_z_m); expected at most {highest:g} m above, "

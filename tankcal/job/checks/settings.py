@@ -72,6 +72,14 @@ def _check_dip_plate(values, tables, kind, raw, log):
     if plate is None or not bottoms:
         return
     low, high = min(bottoms), max(bottoms)
+    if kind in ("horizontal", "sphere") and plate < low:
+        expected = message(
+            "plate_below_tank",
+            "{below:g} m below the inside bottom; expected 0 or above: no liquid stands below it",
+            below=low - plate,
+        )
+        tell(log.problem, raw, "datum", "dip_plate_z_m", expected)
+        return
     if low - MAX_DIP_OFFSET_M <= plate <= high + MAX_DIP_OFFSET_M:
         return
     edge = values["datum"]["bottom_z_m"]
