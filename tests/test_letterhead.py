@@ -224,3 +224,33 @@ def test_the_colours_are_those_of_the_letterhead(headed):
     plain = [found[0] | {"letterhead": None}, *found[1:4]]
     assert pdf(plain, headed) != pdf(found[:4], headed)
     assert json.loads((headed / LETTERHEAD).read_text(encoding="utf-8"))["name"] == NAME
+
+
+# ---- the accreditation mark
+
+
+def test_the_mark_is_read_beside_the_logo_or_as_a_place(laboratory):
+    text = '[laboratory]\nname = "Lab"\naccreditation_mark = "m.svg"\naccreditation_text = "Mark"'
+    found = load(laboratory(text, m_svg=SVG.format(CIRCLE).encode()))
+    assert (found.logo, found.mark.kind, found.mark.alt) == (None, "svg", "Mark")
+    empty = load(laboratory('[laboratory]\nname = "Lab"\naccreditation_place = true'))
+    assert empty.mark == "place"
+    (line,) = problems_of(laboratory(text.replace("m.svg", "no.svg")))
+    assert "laboratory.accreditation_mark" in line
+
+
+@pytest.mark.parametrize("is_certificate", [True, False])
+def test_the_mark_stands_on_the_certificate_alone(laboratory, tmp_path, is_certificate):
+    """A letterhead that was saved before there were marks is read, too."""
+    text = '[laboratory]\nname = "Lab"\naccreditation_mark = "m.svg"'
+    letterhead = load(laboratory(text, m_svg=SVG.format(CIRCLE).encode()))
+    letterhead.save(tmp_path)
+    part = "certificate" if is_certificate else "working-papers"
+    data = read_saved(tmp_path / LETTERHEAD)
+    document = blocks.document(title="T", part=part, letterhead=data)
+    head = blocks.masthead("T", number_label="No." if is_certificate else "", number="1")
+    assert pdf([document.data, head.data])
+    assert ("<img" in document._repr_mimebundle_()["text/html"]) is is_certificate
+    del data["mark"]
+    (tmp_path / LETTERHEAD).write_text(json.dumps(data), encoding="utf-8")
+    assert read_saved(tmp_path / LETTERHEAD)["mark"] is None

@@ -18,6 +18,7 @@ from tankcal.messages import message
 from tankcal.report import LETTERHEAD
 from tankcal.report.logo import logo_problem
 
+PLACE = "place"  # of a mark: an empty frame
 LEAST_CONTRAST = 4.5  # of text on white paper: WCAG 2.2, 1.4.3
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _LABORATORY = (
@@ -25,6 +26,9 @@ _LABORATORY = (
     Field("address", "names", "lines of its address, and whatever stands below it"),
     Field("logo", "text", "file of the logo beside this one, .svg or .png"),
     Field("logo_text", "text", "what the logo shows, for who cannot see it"),
+    Field("accreditation_mark", "text", "file of the accreditation mark beside this one"),
+    Field("accreditation_text", "text", "what the mark shows, for who cannot see it"),
+    Field("accreditation_place", "flag", "true: an empty frame where the mark is to be put"),
 )
 _COLOURS = (
     Field("ink", "text", "of titles, headings and thick rules, such as #1a2b3c", start="#1a2b3c"),
@@ -44,12 +48,16 @@ class Logo:
 
 @dataclass(frozen=True)
 class Letterhead:
-    """Name, lines of the address, Logo or None, and {"ink", "line"} as #rrggbb."""
+    """Name, lines of the address, Logo or None, and {"ink", "line"} as #rrggbb.
+
+    mark   accreditation mark of the certificate: Logo, PLACE for an empty frame, or None
+    """
 
     name: str
     address: tuple[str, ...]
     logo: Logo | None
     colours: dict
+    mark: Logo | str | None = None
 
     def data(self):
         """The letterhead as plain data: what a document block holds."""
@@ -92,10 +100,13 @@ def _parsed(path, data, log):
         field.name: _colour(path.name, field, found["colours"], told, log) for field in _COLOURS
     }
     laboratory = found["laboratory"]
-    logo = _logo(path, laboratory, settings.get("laboratory", {}), log)
+    given = settings.get("laboratory", {})
+    logo, mark = (_logo(path, laboratory, given, log, key) for key in ("logo", "accreditation"))
     if log.problems:
         return None
-    return Letterhead(laboratory["name"], laboratory["address"] or (), logo, colours)
+    if mark is None and laboratory["accreditation_place"]:
+        mark = PLACE
+    return Letterhead(laboratory["name"], laboratory["address"] or (), logo, colours, mark)
 
 
 def _hint(section):
@@ -136,11 +147,13 @@ def contrast_with_white(colour):
     return 1.05 / (sum(w * s for w, s in zip(weights, linear, strict=True)) + 0.05)
 
 
-def _logo(path, laboratory, given, log):
-    name = laboratory["logo"]
+def _logo(path, laboratory, given, log, which):
+    """The checked logo, or accreditation mark, of the laboratory; None where there is none."""
+    key = which if which == "logo" else f"{which}_mark"
+    name = laboratory[key]
     if name is None:
         return None
-    row = given["logo"].row
+    row = given[key].row
     kind = Path(name).suffix.lower().removeprefix(".")
     if kind not in ("svg", "png") or Path(name).name != name:
         expected = message(
@@ -148,13 +161,13 @@ def _logo(path, laboratory, given, log):
             "found {name!r}; expected the name of an .svg or .png file beside this one",
             name=name,
         )
-        log.problem(path.name, expected, row, "laboratory.logo")
+        log.problem(path.name, expected, row, f"laboratory.{key}")
         return None
     if not (path.parent / name).is_file():
         expected = message(
             "no_logo_file", "no file {name!r} beside this one; expected the logo", name=name
         )
-        log.problem(path.name, expected, row, "laboratory.logo")
+        log.problem(path.name, expected, row, f"laboratory.{key}")
         return None
     data = read_bytes(path.parent / name, log)
     problem = None if data is None else logo_problem(kind, data)
@@ -163,7 +176,7 @@ def _logo(path, laboratory, given, log):
     if data is None or problem:
         return None
     content = data.decode("utf-8-sig") if kind == "svg" else base64.b64encode(data).decode("ascii")
-    return Logo(kind, content, laboratory["logo_text"] or laboratory["name"])
+    return Logo(kind, content, laboratory[f"{which}_text"] or laboratory["name"])
 
 
 def read_saved(path):
@@ -182,6 +195,7 @@ def read_saved(path):
                 ),
             )
         ) from error
+    data = {"mark": None} | data if isinstance(data, dict) else data  # of before there were marks
     problem = data_problem(data)
     if problem:
         raise InputError(Problem(name, problem))
@@ -191,11 +205,17 @@ def read_saved(path):
 def data_problem(data):
     """What is wrong with the data of a letterhead, of a file or of a notebook; None: nothing."""
     shape = {"name": str, "address": list, "logo": dict | None, "colours": dict}
+    shape |= {"mark": dict | str | None} if isinstance(data, dict) and "mark" in data else {}
     if not _has_shape(data, shape) or not all(isinstance(one, str) for one in data["address"]):
         return f"is no letterhead: expected {', '.join(shape)}"
     if set(data["colours"]) != {field.name for field in _COLOURS}:
         return f"expected the colours {', '.join(field.name for field in _COLOURS)}"
     problems = [colour_problem(*item) for item in data["colours"].items()]
+    mark = data.get("mark")
+    if isinstance(mark, str):
+        problems.append(None if mark == PLACE else f"its mark is {mark!r}, expected {PLACE!r}")
+    else:
+        problems.append(_logo_problem(mark))
     return next(filter(None, [*problems, _logo_problem(data["logo"])]), None)
 
 

@@ -105,14 +105,16 @@ def _pictures_as_files(blocks):
 
 
 def _letterhead_with_file(letterhead, files):
-    """The letterhead with the name of its logo's file, which is added to `files`."""
-    logo = letterhead and letterhead["logo"]
-    if not logo:
-        return letterhead
-    name, content = f"logo.{logo['kind']}", logo["content"]
-    is_svg = logo["kind"] == "svg"
-    files[name] = content.encode("utf-8") if is_svg else base64.b64decode(content)
-    return letterhead | {"logo": {"file": name, "alt": logo["alt"]}}
+    """The letterhead with the names of the files of logo and mark, which are added to `files`."""
+    for key in ("logo", "mark"):
+        picture = letterhead and letterhead.get(key)
+        if not isinstance(picture, dict):
+            continue
+        name, content = f"{key}.{picture['kind']}", picture["content"]
+        is_svg = picture["kind"] == "svg"
+        files[name] = content.encode("utf-8") if is_svg else base64.b64decode(content)
+        letterhead = letterhead | {key: {"file": name, "alt": picture["alt"]}}
+    return letterhead
 
 
 def _timestamp(date):

@@ -14,21 +14,25 @@ def block_html(block):
 def _document(block):
     running = "".join(f"<span>{escape(text)}</span>" for text in block["running"])
     notice = _notice({"text": block["notice"]}) if block["notice"] else ""
-    head = _letterhead(block["letterhead"]) if block.get("letterhead") else ""
+    head = _letterhead(block["letterhead"], block["part"]) if block.get("letterhead") else ""
     return f'<header class="running">{running}</header>{head}{notice}'
 
 
-def _letterhead(letterhead):
-    """Logo, name and address of the laboratory; a logo is only ever a picture."""
-    logo = letterhead["logo"]
-    picture = ""
-    if logo:
-        picture = (
-            f'<img alt="{escape(logo["alt"])}" src="{_data_url(logo["kind"], logo["content"])}">'
-        )
+def _letterhead(letterhead, part):
+    """Logo, name and address of the laboratory; logo and mark are only ever pictures."""
+    picture = _picture(letterhead["logo"])
+    mark = letterhead.get("mark")
+    if part == "certificate" and isinstance(mark, dict):
+        picture += _picture(mark)
     address = "".join(f"<br>{escape(line)}" for line in letterhead["address"])
     name = escape(letterhead["name"])
     return f'<div class="letterhead">{picture}<p><strong>{name}</strong>{address}</p></div>'
+
+
+def _picture(logo):
+    if not logo:
+        return ""
+    return f'<img alt="{escape(logo["alt"])}" src="{_data_url(logo["kind"], logo["content"])}">'
 
 
 def _masthead(block):
