@@ -8,8 +8,10 @@ import pytest
 import typst
 from paper_pages import filled, lone_headings, pages_of, sparse_pages
 
-from tankcal.report import blocks
+from tankcal.languages import LANGUAGES
+from tankcal.report import blocks, build
 from tankcal.report.pdf import pdf
+from tankcal.words import load_words
 
 SQUARE = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">'
@@ -126,6 +128,17 @@ def test_a_label_does_not_touch_its_value(printed):
     of_label = [float(right) for _, right, word in edges if word == "i"]
     (value,) = (float(left) for left, _, word in edges if word == "value")
     assert value - max(of_label) >= 6.0
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_the_papers_of_the_example_have_full_pages(example_record, tmp_path, language):
+    build(example_record, tmp_path, language=language)
+    headings = {*load_words(language)["headings"].values()}
+    for name in ("certificate", "working-papers", "field-table"):
+        pages = pages_of(tmp_path / f"{name}.pdf")
+        assert sparse_pages(pages) == []
+        assert lone_headings(pages, headings) == []
 
 
 @pytest.mark.study
