@@ -18,13 +18,14 @@ Three conventions say which point that is, and on which side it stands:
     correction_subtracted  (x - x0) - d(x - x0) = xi         Pessoa 10
 
 The last two are solved for the measured coordinate x, so every convention is a function of the
-unknowns and the misclosure is always "computed minus measured", in the image as it was measured.
+unknowns and the misclosure is "computed minus measured", in the image as it was measured. With
+weights "ideal" it is counted in the ideal image: xi less the corrected measured coordinate.
 
 Image coordinates and c, x0, y0, R0 in mm; K1 mm^-2, K2 mm^-4 ...; P1, P2 mm^-1, P3 mm^-2, P4 mm^-4.
 Source: Silva 1995 (39-47, 58); Pessoa 2017 (3-6, 9, 10); Brown 1971.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,6 +36,7 @@ PARAMETERS = ("c", "x0", "y0", "K1", "K2", "K3", "K4", "P1", "P2", "P3", "P4", "
 _UNITS = ("mm", "mm", "mm", "mm-2", "mm-4", "mm-6", "mm-8", "mm-1", "mm-1", "mm-2", "mm-4", "", "")
 UNITS = dict(zip(PARAMETERS, _UNITS, strict=True))
 CONVENTIONS = {"distortion_of_ideal": 0.0, "correction_added": 1.0, "correction_subtracted": -1.0}
+WEIGHTS = ("measured", "ideal")
 # (dx by A x, dx by A y, dx by B y, dy by B x, dy by B y)
 AFFINITIES = {
     "both_y": (0.0, 1.0, 0.0, 0.0, 1.0),
@@ -50,11 +52,13 @@ class Form:
     convention         one of CONVENTIONS
     affinity           one of AFFINITIES
     radial_balance_mm  R0, the radius without radial distortion; 0 where none is named
+    weights            one of WEIGHTS: the image in which residuals are counted and weighed
     """
 
     convention: str = "distortion_of_ideal"
     affinity: str = "b1_b2"
     radial_balance_mm: float = 0.0
+    weights: str = "measured"
 
     @property
     def numbers(self):
@@ -98,7 +102,7 @@ def balanced_about(interior, form, radius_mm):
     plain = rescaled(
         interior, side, 1 - (side or 1) * _at_balance(interior, form.radial_balance_mm)
     )
-    target = Form(form.convention, form.affinity, float(radius_mm))
+    target = replace(form, radial_balance_mm=float(radius_mm))
     s = 1.0
     for _ in range(NEWTON_ROUNDS):
         found = rescaled(plain, side, 1 / s)

@@ -238,6 +238,49 @@ def _arrays(
         jac[:, row, 9:] = d[:, 6 + active]
 
 
+def ideal_rows(
+    xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac
+):
+    """The same as `image_rows` with misclosures of the ideal image: the ideal point of the ground
+    less that of the measured coordinate, which depends on the interior parameters, too.
+
+    With y the measured coordinate from the principal point, a correction gives p = y + side d(y),
+    so that dp = -(1 + side d') d(x0, y0) + side d_K; a distortion of the ideal point p + d(p) = y,
+    so that dp = (1 + d')^-1 (-d(x0, y0) - d_K).
+    """
+    p = (xyz[point] - photo_xyz[photo]).T
+    r = rotation.reshape(-1, 9)[photo].T
+    q = tuple(interior[photo].T)
+    in_camera = np.einsum("nij,jn->in", rotation[photo], p)
+    xi, eta, dxi, deta = ideal_point(*in_camera, r, q[0])
+    x, y = xy[:, 0] - q[1], xy[:, 1] - q[2]
+    if of_ideal:
+        side, (x, y) = 1.0, undistorted_by(x, y, q, (1.0, *form[1:]))
+    else:
+        side = form[0]
+    dx, dy, dxx, dxy, dyx, dyy = distort(x, y, q, form)
+    kx, ky = distortion_derivatives(x, y, q, form)
+    a, b, c, d = 1.0 + side * dxx, side * dxy, side * dyx, 1.0 + side * dyy
+    if of_ideal:
+        t = 1.0 / (a * d - b * c)
+        a, b, c, d = d * t, -b * t, -c * t, a * t  # of dp by dy
+        corrected_x, corrected_y = x, y
+        by_kx, by_ky = ten(a, b, kx, ky), ten(c, d, kx, ky)
+    else:
+        corrected_x, corrected_y = x + side * dx, y + side * dy
+        zero = 0.0 * x
+        by_kx, by_ky = ten(-side, zero, kx, ky), ten(zero, -side, kx, ky)
+    w[:] = np.column_stack([xi - corrected_x, eta - corrected_y]) * weight
+    if len(jac) == 0:
+        return
+    for row, derivatives in ((0, (*dxi, a, b, *by_kx)), (1, (*deta, c, d, *by_ky))):
+        found = np.stack(derivatives, axis=1) * weight[:, row, None]
+        jac[:, row, :3] = found[:, :3]
+        jac[:, row, 3:6] = -found[:, :3]
+        jac[:, row, 6:9] = found[:, 3:6]
+        jac[:, row, 9:] = found[:, 6 + active]
+
+
 def image_rows(*arguments):
     """Whitened misclosures of image coordinates, computed minus measured, and their derivatives.
 

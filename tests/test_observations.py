@@ -77,12 +77,12 @@ FOUR = np.zeros(4), np.ones(4)
 TOOLS = np.array([0, 1, -1, 0])
 
 
-def images(form):
+def images(form, value=0.0):
     point, photo = (a.ravel() for a in np.meshgrid(np.arange(POINTS), np.arange(PHOTOS)))
     table = np.tile(np.arange(13), (PHOTOS, 1))
     n = len(point)
     return ImageCoordinates(
-        np.zeros((n, 2)), np.ones((n, 2)), point, photo, form, np.arange(13), table
+        np.full((n, 2), value), np.ones((n, 2)), point, photo, form, np.arange(13), table
     )
 
 
@@ -92,6 +92,13 @@ KINDS = {
         for convention in CONVENTIONS
         for affinity in AFFINITIES
         for balance in (0.0, 30.0)
+    },
+    **{
+        f"ideal image {convention} {affinity}": images(
+            Form(convention, affinity, 30.0, "ideal"), value=[21.0, -34.0]
+        )
+        for convention in CONVENTIONS
+        for affinity in AFFINITIES
     },
     "orientation": PhotoOrientation(
         np.zeros(6), np.ones(6), np.array([0, 1, 2, 0, 1, 2]), np.arange(6)

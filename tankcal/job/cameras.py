@@ -136,13 +136,14 @@ def _pair(values, factor=1.0):
     return None if values is None else factor * np.array([*values, *values][:2], dtype=float)
 
 
-def make_camera(name, given, settings):
-    """CameraSetup of a checked camera."""
+def make_camera(name, given, settings, weights="measured"):
+    """CameraSetup of a checked camera; `weights` as `camera.Form` has them."""
     parameters = parameters_of(given, settings)
     form = Form(
         convention=given["convention"] or ASSUMED_CONVENTION,
         affinity=affinity_of(given),
         radial_balance_mm=given["radial_balance_mm"] or 0.0,
+        weights=weights,
     )
     roles = [_role(parameter) for parameter in parameters]
     camera = Camera(

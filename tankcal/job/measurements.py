@@ -31,6 +31,7 @@ class AdjustmentSettings:
                   compares wrong suppositions on purpose leaves it out
     reading_limit_mm  sd of one of repeated readings beyond which they are rejected; None: never
     depth_of_field    whether radial distortion follows the depth of each point
+    image_weights     "measured" or "ideal": the image in which residuals are weighed (camera.Form)
     """
 
     datum: str = "control"
@@ -43,6 +44,7 @@ class AdjustmentSettings:
     explain: bool = True
     reading_limit_mm: float | None = None
     depth_of_field: bool = False
+    image_weights: str = "measured"
 
 
 @dataclass(frozen=True)

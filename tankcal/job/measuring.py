@@ -33,8 +33,9 @@ def make_measurements(values, tables, registers):
     tables     {name: ColumnValues or None}
     registers  {"cameras" or "instruments": {name: {key: value}}}
     """
+    weights = values["adjustment"]["image_weights"] or "measured"
     cameras = tuple(
-        make_camera(name, given, values["adjustment.camera"])
+        make_camera(name, given, values["adjustment.camera"], weights)
         for name, given in registers["cameras"].items()
     )
     images, fits = _image_points(tables, registers["cameras"], values["adjustment"])
@@ -73,6 +74,7 @@ def _settings(given):
         snooping=given["snooping"] is not False,
         scale=given["scale"] or "a_priori",
         refraction=given["refraction"],
+        image_weights=given["image_weights"] or "measured",
         reading_limit_mm=None if limit is None else limit / 1000,
         depth_of_field=bool(given["depth_of_field"]),
     )

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tankcal.imaging import image_rows
+from tankcal.imaging import ideal_rows, image_rows
 from tankcal.observations.base import Observations
 from tankcal.rotations import (
     angle_axes,
@@ -49,8 +49,11 @@ class ImageCoordinates(Observations):
         """Image coordinates (n, 2) in mm and their derivatives."""
         w = np.empty((len(self), 2))
         jac = np.empty((len(self) if derivatives else 0, 2, 9 + len(self.active)))
-        self._rows(state, np.zeros_like(w), np.ones_like(w), w, jac)
-        return w, jac
+        if self.form.weights == "measured":
+            self._rows(state, np.zeros_like(w), np.ones_like(w), w, jac)
+            return w, jac
+        self._rows(state, self.value, np.ones_like(w), w, jac)
+        return w + self.value, jac  # the misclosure of the ideal image, as if of the measured
 
     def fill(self, state, w, jac):
         """Whitened misclosures and derivatives, without arrays in between."""
@@ -58,7 +61,8 @@ class ImageCoordinates(Observations):
 
     def _rows(self, state, value, weight, w, jac):
         of_ideal = self.form.convention == "distortion_of_ideal"
-        image_rows(
+        rows = image_rows if self.form.weights == "measured" else ideal_rows
+        rows(
             state.xyz_m, state.photo_xyz_m, state.rotation, state.interior[self.interior_of],
             tuple(self.form.numbers), of_ideal, self.point, self.photo, value, weight,
             self.active, w, jac,

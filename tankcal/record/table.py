@@ -126,7 +126,9 @@ def adjustment_choices(adjustment, measurements):
     test = "none"
     if adjustment.redundancy > 0:
         test = "passed" if adjustment.adjusted.test().passed else "failed"
+    weights = getattr(settings, "image_weights", "measured")
     return {
+        **({"image_weights": weights} if photographs else {}),
         "survey": "both" if photographs and others else "photographs" if photographs else "sights",
         "adjustment_datum": adjustment.datum.choice,
         "adjustment_snooping": CRITICAL if getattr(settings, "snooping", True) else "off",

@@ -191,6 +191,15 @@ ADJUSTMENT = (
         of_survey=True,
     ),
     Field(
+        "image_weights",
+        "choice",
+        "image in which residuals are counted and weighed: measured or ideal (after the"
+        " correction); blank: measured",
+        kinds=WITH_POINTS,
+        choices=("measured", "ideal"),
+        of_survey=True,
+    ),
+    Field(
         "refraction",
         "number",
         "coefficient of refraction for zenith and vertical angles and slope distances, such as"

@@ -240,4 +240,4 @@ SHORT_KEYS = {
 REGISTER_KEYS = {"cameras": CAMERA, "instruments": INSTRUMENT}
 REGISTERS_OF_SURVEY = {"photos": ("cameras", "instruments"), "total-station": ("instruments",)}
 # keys of [adjustment] that need photographs
-OF_PHOTOS = ("fixed_photo", "image_sd_um", "reading_limit_um", "depth_of_field")
+OF_PHOTOS = ("fixed_photo", "image_sd_um", "reading_limit_um", "depth_of_field", "image_weights")
