@@ -1,6 +1,7 @@
 """correlated_readings.csv: pairs of values that exist, each pair once, and none with itself."""
 
 from tankcal.job.checks.common import has_rows
+from tankcal.messages import message
 
 OF_AXES = ("control", "vectors")  # tables with x, y and z in a row
 
@@ -25,25 +26,41 @@ def check_correlated(files):
         if len(ends) < 2:
             continue
         if ends[0] == ends[1]:
-            expected = "a value with itself; expected two different values"
+            expected = message(
+                "correlated_with_itself", "a value with itself; expected two different values"
+            )
             files.log.problem(table.file, expected, row, "row_2")
             continue
         before = first.setdefault(frozenset(ends), row)
         if before != row:
-            expected = f"this pair is there already, in row {before}; expected once"
+            expected = message(
+                "correlated_twice",
+                "this pair is there already, in row {before}; expected once",
+                before=before,
+            )
             files.log.problem(table.file, expected, row, "row_2")
 
 
 def _is_there(files, table, row, i, name, at):
     named = files.tables[name]
     if named is None or at not in named.rows:
-        last = f"; it has rows 2 to {max(named.rows)}" if has_rows(named) else ""
-        expected = f"found {at:g}, and {name} has no such row{last}; expected a row of {name}"
+        expected = message(
+            "correlated_no_such_row",
+            "found {at:g}, and {table} has no such row; expected a row of that table, the heading"
+            " being row 1",
+            at=at,
+            table=name,
+        )
         files.log.problem(table.file, expected, row, f"row_{i}")
         return False
     place = list(named.rows).index(at)
     if "use" in named.columns and named.of("use")[place] == "check":
-        expected = f"row {at:g} of {name} is only compared (use = check); expected one adjusted"
+        expected = message(
+            "correlated_only_compared",
+            "row {at:g} of {table} is only compared (use = check); expected one that is adjusted",
+            at=at,
+            table=name,
+        )
         files.log.problem(table.file, expected, row, f"row_{i}")
         return False
     return True
@@ -52,8 +69,18 @@ def _is_there(files, table, row, i, name, at):
 def _has_axis(files, table, row, i, name, axis):
     if (name in OF_AXES) == (axis is not None):
         return True
-    expected = f"expected x, y or z, which of the three values of a row of {name} it is"
-    if axis is not None:
-        expected = f"found {axis}; expected nothing: a row of {name} has one value"
+    if axis is None:
+        expected = message(
+            "correlated_which_axis",
+            "expected x, y or z, which of the three values of a row of {table} it is",
+            table=name,
+        )
+    else:
+        expected = message(
+            "correlated_one_value",
+            "found {axis}; expected nothing: a row of {table} has one value",
+            axis=axis,
+            table=name,
+        )
     files.log.problem(table.file, expected, row, f"value_{i}")
     return False
