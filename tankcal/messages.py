@@ -39,6 +39,12 @@ def joined(parts):
     return message("and", "{first} and {last}", first=first, last=last) if first else last
 
 
+def either(parts):
+    """The same with "or"."""
+    *first, last = parts
+    return message("or", "{first} or {last}", first=first, last=last) if first else last
+
+
 def filled(template, values, number=format, said=str):
     """A template with its values; those of a list stand in a row.
 

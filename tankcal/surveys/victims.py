@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import betainc
 
 from tankcal.errors import Problem
-from tankcal.messages import listed, message
+from tankcal.messages import either, listed, message
 from tankcal.network.reactions import HELD
 from tankcal.network.separability import alternatives
 from tankcal.surveys.spelling import in_photo
@@ -156,8 +156,7 @@ def _either(names):
     """Readings of which each may be the wrong one."""
     if len(names) > LISTED:
         return message("one_of", "one of {names}", names=listed(names, LISTED))
-    *first, last = names
-    return message("or", "{first} or {last}", first=first, last=last) if first else last
+    return either(names)
 
 
 def _named(adjusted, traces, source, row):

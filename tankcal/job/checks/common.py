@@ -55,6 +55,15 @@ def missing_beside(other):
     return message("missing_beside", "missing; expected beside {other}", other=other)
 
 
+def same_parameter(other):
+    """What is said of a key that stands beside another name of the same parameter."""
+    return message(
+        "same_parameter",
+        "given beside {other}; expected one of them: they are the same parameter",
+        other=other,
+    )
+
+
 def tiny_sd(unit, largest):
     """What is said of standard deviations of which the largest is tiny in their unit."""
     if unit == "mm":

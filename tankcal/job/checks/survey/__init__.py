@@ -33,7 +33,10 @@ def check_survey(values, tables, registers, raw, is_whole, log):
         _tell_nothing_to_adjust(values, tables, raw, is_whole, log)
         return
     if is_whole and has_rows(tables["points"]):
-        expected = "given beside a survey; expected one of them: a survey's points are adjusted"
+        expected = message(
+            "points_and_survey",
+            "given beside a survey; expected one of them: a survey's points are adjusted",
+        )
         log.problem(tables["points"].file, expected)
     told = frozenset((problem.file, problem.row) for problem in log.problems)
     files = SurveyFiles(values, tables, registers, raw, log, told)
@@ -55,7 +58,9 @@ def _tell_nothing_to_adjust(values, tables, raw, is_whole, log):
     if is_unreadable:
         return
     if not is_whole:
-        expected = "nothing to adjust; expected image points, distances or other observations"
+        expected = message(
+            "no_survey", "nothing to adjust; expected image points, distances or other observations"
+        )
         log.problem(raw.settings_file, expected)
         return
     expected = message(

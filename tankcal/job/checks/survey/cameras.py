@@ -10,7 +10,7 @@ from tankcal.job.cameras import (
     is_adjusted,
     parameters_of,
 )
-from tankcal.job.checks.common import tell
+from tankcal.job.checks.common import same_parameter, tell
 from tankcal.job.checks.survey.focus import check_focus
 from tankcal.job.contract.registers import PARAMETER_KEYS, SECOND_NAMES, sd_key
 from tankcal.messages import message
@@ -64,19 +64,28 @@ def _check_pixels(files, name, given, in_pixels):
         return
     if given["pixel_um"] is None:
         if in_pixels and not files.is_given("cameras", name, "pixel_um"):
-            expected = "missing beside format_mm; expected the size of a pixel, or format_px"
+            expected = message(
+                "pixel_missing",
+                "missing beside format_mm; expected the size of a pixel, or format_px",
+            )
             files.tell_key(files.log.problem, "cameras", name, "pixel_um", expected)
         return
     pixels = np.array(given["format_mm"]) / np.broadcast_to(given["pixel_um"], 2) * 1000
     if np.any(np.abs(pixels - np.round(pixels)) > PART_OF_PIXEL):
-        expected = f"of {pixels[0]:.8g} x {pixels[1]:.8g} pixels; expected whole ones, or format_px"
+        columns, lines = pixels
+        expected = message(
+            "pixels_not_whole",
+            "of {columns:.8g} x {lines:.8g} pixels; expected whole ones, or format_px",
+            columns=columns,
+            lines=lines,
+        )
         files.tell_key(files.log.problem, "cameras", name, "format_mm", expected)
 
 
 def _refuse_two_names(files, settings):
     for name, second in SECOND_NAMES.items():
         if settings[name] is not None and settings[second] is not None:
-            expected = f"given beside {name}; expected one of them: they are the same parameter"
+            expected = same_parameter(name)
             tell(files.log.problem, files.raw, "adjustment.camera", second, expected)
 
 
@@ -90,9 +99,13 @@ def _refuse_two_blocks(files, settings):
             continue
         for name, parameter in zip(cameras, same, strict=True):
             if (parameter.value or 0.0, parameter.sd) != (same[0].value or 0.0, same[0].sd):
-                expected = (
-                    f"of another value or standard deviation than {next(iter(cameras))!r} has;"
-                    f" expected the same: adjustment.camera.{parameter.setting} is block weighted"
+                first = next(iter(cameras))
+                expected = message(
+                    "block_of_two_values",
+                    "of another value or standard deviation than {first!r} has; expected the "
+                    "same: adjustment.camera.{setting} is block weighted",
+                    first=first,
+                    setting=parameter.setting,
                 )
                 files.tell_key(files.log.problem, "cameras", name, parameter.key, expected)
 
@@ -105,26 +118,49 @@ def _check_format(files, name, given):
 
     for key, allowed in (("format_mm", (2,)), ("format_px", (2,)), ("pixel_um", (1, 2))):
         if given[key] is not None and len(given[key]) not in allowed:
-            problem(key, f"{len(given[key])} numbers; expected two, such as [6000, 4000]")
+            expected = message(
+                "format_of_two",
+                "{count} numbers; expected two, such as [6000, 4000]",
+                count=len(given[key]),
+            )
+            problem(key, expected)
             return False
     has_mm, has_px, has_pixel = (
         files.is_given("cameras", name, key) for key in ("format_mm", "format_px", "pixel_um")
     )
     if not has_mm and not has_px:
-        problem("format_mm", "missing; expected [width, height], or format_px with pixel_um")
+        problem(
+            "format_mm",
+            message(
+                "format_missing", "missing; expected [width, height], or format_px with pixel_um"
+            ),
+        )
         return False
     if has_px and not has_mm and not has_pixel:
-        problem("pixel_um", "missing beside format_px; expected the size of a pixel, micrometres")
+        problem(
+            "pixel_um",
+            message(
+                "pixel_missing_beside_px",
+                "missing beside format_px; expected the size of a pixel, micrometres",
+            ),
+        )
         return False
     size = format_of(given)[0]
     if size is None:
         return False  # what is wrong is told
     in_px, in_mm = given["format_px"], given["format_mm"]
     if in_px is not None and any(number != round(number) for number in in_px):
-        problem("format_px", "expected whole numbers of pixels")
+        problem("format_px", message("whole_pixels", "expected whole numbers of pixels"))
     if in_px is not None and in_mm is not None and np.any(np.abs(size / in_mm - 1) > SAME_SIZE):
-        expected = f"format_px times pixel_um is {size[0]:g} x {size[1]:g} mm;"
-        problem("format_mm", f"{expected} expected the same, or one of the three left out")
+        width, height = size
+        expected = message(
+            "two_formats",
+            "format_px times pixel_um is {width:g} x {height:g} mm; expected the same, or one of "
+            "the three left out",
+            width=width,
+            height=height,
+        )
+        problem("format_mm", expected)
         return False
     return _check_unit(files, name, given, size)
 
@@ -134,10 +170,24 @@ def _check_unit(files, name, given, size_mm):
     pixel = given["pixel_um"]
     if pixel is None or (min(pixel) >= SMALLEST_PIXEL_UM and max(size_mm) <= LARGEST_FORMAT_MM):
         return True
-    found = f"{min(pixel):g} micrometres makes a format of {size_mm[0]:.4g} x {size_mm[1]:.4g} mm"
-    is_small = min(pixel) < SMALLEST_PIXEL_UM
-    unit = "millimetres" if is_small else "another unit"
-    expected = f"found {found}; expected micrometres: is it in {unit}?"
+    side_um, (width, height) = min(pixel), size_mm
+    expected = message(
+        "pixel_in_other_unit",
+        "found {side_um:g} micrometres makes a format of {width:.4g} x {height:.4g} mm; expected "
+        "micrometres: is it in another unit?",
+        side_um=side_um,
+        width=width,
+        height=height,
+    )
+    if side_um < SMALLEST_PIXEL_UM:
+        expected = message(
+            "pixel_in_millimetres",
+            "found {side_um:g} micrometres makes a format of {width:.4g} x {height:.4g} mm; "
+            "expected micrometres: is it in millimetres?",
+            side_um=side_um,
+            width=width,
+            height=height,
+        )
     files.tell_key(files.log.problem, "cameras", name, "pixel_um", expected)
     return False
 
@@ -147,13 +197,22 @@ def _check_affinity(files, name, given):
     for first, second in SECOND_NAMES.items():
         for one, other in ((first, second), (sd_key(first), sd_key(second))):
             if given[one] is not None and given[other] is not None:
-                expected = f"given beside {one}; expected one of them: they are the same parameter"
+                expected = same_parameter(one)
                 files.tell_key(files.log.problem, "cameras", name, other, expected)
         if given[second] and affinity_of(given) != "b1_b2":
-            expected = f"given with affinity = {form}; expected {first}, or affinity = b1_b2"
+            expected = message(
+                "affinity_of_other_form",
+                "given with affinity = {form}; expected {first}, or affinity = b1_b2",
+                form=form,
+                first=first,
+            )
             files.tell_key(files.log.problem, "cameras", name, second, expected)
         if given[first] and not files.is_given("cameras", name, "affinity"):
-            expected = f"missing beside {first}; expected the form: both_y, both_x or b1_b2"
+            expected = message(
+                "affinity_missing",
+                "missing beside {first}; expected the form: both_y, both_x or b1_b2",
+                first=first,
+            )
             files.tell_key(files.log.problem, "cameras", name, "affinity", expected)
 
 
@@ -163,9 +222,11 @@ def _check_convention(files, name, given, parameters):
     lens = [parameter for parameter in parameters if parameter.name[0] in "KPAB"]
     with_value = [one.key for one in lens if one.value and one.name[0] in "KP"]
     if with_value:
-        expected = (
-            f"missing beside {', '.join(with_value)}; expected correction_added,"
-            " correction_subtracted or distortion_of_ideal: sources differ in sign"
+        expected = message(
+            "convention_missing",
+            "missing beside {keys}; expected correction_added, correction_subtracted or "
+            "distortion_of_ideal: sources differ in sign",
+            keys=[*with_value],
         )
         files.tell_key(files.log.problem, "cameras", name, "convention", expected)
     elif any(parameter.value or is_adjusted(parameter) for parameter in lens):
@@ -186,10 +247,18 @@ def _check_states(files, name, parameters):
             _warn_held(files, name, parameter)
         elif parameter.state == "weighted" and parameter.sd is None:
             if not files.is_given("cameras", name, parameter.sd_key):
-                expected = f"missing; expected it above 0, for the parameter is {asked}"
+                expected = message(
+                    "parameter_sd_missing",
+                    "missing; expected it above 0, for the parameter is {asked}",
+                    asked=asked,
+                )
                 files.tell_key(files.log.problem, "cameras", name, parameter.sd_key, expected)
         elif parameter.sd == 0 and parameter.is_own and _asks_free(files, parameter):
-            expected = f"found 0, which holds it, but {section} says free; expected one of them"
+            expected = message(
+                "held_and_free",
+                "found 0, which holds it, but {section} says free; expected one of them",
+                section=section,
+            )
             files.tell_key(files.log.problem, "cameras", name, parameter.sd_key, expected)
         elif parameter.sd and parameter.state != "weighted":
             unused.append(parameter)
@@ -241,9 +310,14 @@ def _check_principal_distance(files, name, given, size_mm):
         files.tell_key(files.log.warning, "cameras", name, "c_mm", expected)
         return
     low, high = (across * limit for limit in POSSIBLE_LENGTHS)
-    expected = (
-        f"found {c:g} with a format of {across:.4g} mm across; expected {low:.3g} to {high:.5g} mm:"
-        " in another unit?"
+    expected = message(
+        "principal_distance_impossible",
+        "found {c:g} with a format of {across:.4g} mm across; expected {low:.3g} to {high:.5g} "
+        "mm: in another unit?",
+        c=c,
+        across=across,
+        low=low,
+        high=high,
     )
     files.tell_key(files.log.problem, "cameras", name, "c_mm", expected)
 
@@ -255,12 +329,26 @@ def _is_between(value, limits):
 
 def _check_principal_point(files, name, given, size_mm):
     """The principal point is in the frame."""
-    for key, side, length in zip(("x0_mm", "y0_mm"), ("width", "height"), size_mm, strict=True):
+    for key, length in zip(("x0_mm", "y0_mm"), size_mm, strict=True):
         if abs(given[key] or 0.0) > length / 2:
-            expected = (
-                f"found {given[key]:g}, outside the format, whose {side} is {length:.4g} mm;"
-                f" expected at most {length / 2:.4g} from its middle: in another unit?"
+            found, half = given[key], length / 2
+            expected = message(
+                "principal_point_too_high",
+                "found {found:g}, outside the format, whose height is {length:.4g} mm; expected "
+                "at most {half:.4g} from its middle: in another unit?",
+                found=found,
+                length=length,
+                half=half,
             )
+            if key == "x0_mm":
+                expected = message(
+                    "principal_point_too_wide",
+                    "found {found:g}, outside the format, whose width is {length:.4g} mm; "
+                    "expected at most {half:.4g} from its middle: in another unit?",
+                    found=found,
+                    length=length,
+                    half=half,
+                )
             files.tell_key(files.log.problem, "cameras", name, key, expected)
 
 
@@ -308,8 +396,11 @@ def _check_sds(files, name, given, size_mm):
     across = float(np.hypot(*size_mm))
     for key in map(sd_key, ("c", "x0", "y0")):
         if (given[key] or 0.0) > across:
-            expected = (
-                f"found {given[key]:g} with a format of {across:.4g} mm across; expected less: in"
-                " another unit? For an unknown value, leave it out"
+            expected = message(
+                "camera_sd_too_large",
+                "found {given:g} with a format of {across:.4g} mm across; expected less: in "
+                "another unit? For an unknown value, leave it out",
+                given=given[key],
+                across=across,
             )
             files.tell_key(files.log.problem, "cameras", name, key, expected)

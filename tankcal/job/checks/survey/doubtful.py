@@ -57,9 +57,12 @@ def _check_size(files, places):
         return
     usual = float(np.median(np.linalg.norm(known - np.median(known, axis=0), axis=1)))
     if usual > MUCH_LARGER * size:
-        expected = (
-            f"the known points lie {usual:.4g} m from their middle as a rule, and the tank measures"
-            f" {size:.4g} m; expected metres: in millimetres?"
+        expected = message(
+            "known_in_millimetres",
+            "the known points lie {usual:.4g} m from their middle as a rule, and the tank "
+            "measures {size:.4g} m; expected metres: in millimetres?",
+            usual=usual,
+            size=size,
         )
         files.log.problem(files.tables["control"].file, expected, None, "x_m")
 
@@ -78,23 +81,41 @@ def _check_distances(files, places, table):
     there = ~np.isnan(distance)
     if not there.any():
         return
-    typical, extent, of = float(np.median(distance[there])), places.extent_m, "the known points"
+    typical, extent = float(np.median(distance[there])), places.extent_m
+    of = message("the_known_points", "the known points")
     for i in np.flatnonzero(there & (distance > MUCH_LARGER * typical)):
-        expected = (
-            f"found {distance[i]:.4g} m where half of the distances are below {typical:.4g} m; "
-            "expected metres: in millimetres?"
+        found = distance[i]
+        expected = message(
+            "distance_in_millimetres",
+            "found {found:.4g} m where half of the distances are below {typical:.4g} m; expected "
+            "metres: in millimetres?",
+            found=found,
+            typical=typical,
         )
         files.log.problem(table.file, expected, table.rows[i], "distance_m")
     if extent is None:
-        extent, of = _tank_size_m(files), "the tank"
+        extent = _tank_size_m(files)
+        of = message("the_tank", "the tank")
     ratio = _ratio_to_known(places) if table is files.tables["distances"] else 0.0
     found = ""
     if extent and typical > MUCH_LARGER * extent:
-        found = f"half of them are above {typical:.4g} m, but {of} extend over {extent:.4g} m"
+        found = message(
+            "distances_beside_extent",
+            "half of them are above {typical:.4g} m, but {of} extend over {extent:.4g} m",
+            typical=typical,
+            of=of,
+            extent=extent,
+        )
     elif THOUSANDFOLD[0] < ratio < THOUSANDFOLD[1]:
-        found = f"those between known points are {ratio:.4g} times what follows from coordinates"
+        found = message(
+            "distances_beside_known",
+            "those between known points are {ratio:.4g} times what follows from coordinates",
+            ratio=ratio,
+        )
     if found:
-        expected = f"{found}; expected metres: in millimetres?"
+        expected = message(
+            "distances_in_millimetres", "{found}; expected metres: in millimetres?", found=found
+        )
         files.log.problem(table.file, expected, None, "distance_m")
 
 

@@ -10,7 +10,7 @@ from tankcal.job.checks.survey.files import refuse_undefined, tell_rows
 from tankcal.job.contract.registers import MARKS
 from tankcal.job.imagery import cameras_of_photos, readings_of_marks
 from tankcal.job.tables import nearest
-from tankcal.messages import listed, message
+from tankcal.messages import either, joined, listed, message
 
 LEVEL = 0.001  # of the tests of all photos together
 GROWTH = 2.0  # of the sd of an image coordinate: a fourfold variance (Silva)
@@ -46,10 +46,18 @@ def _check_marks(files, name, given):
     for mark, place in given[MARKS].items():
         key = f"{MARKS}.{mark}"
         if len(place) != 2:
-            expected = f"{len(place)} numbers; expected two, such as [-83.012, 0.021]"
+            expected = message(
+                "mark_of_two",
+                "{count} numbers; expected two, such as [-83.012, 0.021]",
+                count=len(place),
+            )
             files.tell_key(files.log.problem, "cameras", name, key, expected)
         elif place in places:
-            expected = f"at the place of mark {places[place]!r}; expected each at its own"
+            expected = message(
+                "marks_in_one_place",
+                "at the place of mark {other!r}; expected each at its own",
+                other=places[place],
+            )
             files.tell_key(files.log.problem, "cameras", name, key, expected)
         places.setdefault(place, mark)
 
@@ -69,9 +77,11 @@ def _refuse_missing_sd(files, table):
     if files.values is None or not lacking.any():
         return
     if is_not_given(files.raw, "adjustment", "image_sd_um"):
-        expected = (
-            f"missing; expected it for the rows of {table.file} without s_um, the first of them row"
-            f" {table.rows[int(np.argmax(lacking))]}"
+        expected = message(
+            "mark_sd_missing",
+            "missing; expected it for the rows of {file} without s_um, the first of them row {row}",
+            file=table.file,
+            row=table.rows[int(np.argmax(lacking))],
         )
         tell(files.log.problem, files.raw, "adjustment", "image_sd_um", expected)
 
@@ -88,12 +98,21 @@ def _refuse_unknown_marks(files, table, of_photos):
         elif f"{MARKS}.{mark}" not in _keys(files, camera) and (camera, mark) not in told:
             told.add((camera, mark))
             hint = nearest(mark, given[MARKS])
-            expected = f"found {mark!r}; expected a mark of camera {camera!r} in cameras.toml{hint}"
+            expected = message(
+                "mark_unknown",
+                "found {mark!r}; expected a mark of camera {camera!r} in cameras.toml{hint}",
+                mark=mark,
+                camera=camera,
+                hint=hint,
+            )
             files.log.problem(table.file, expected, row, "mark")
     for camera, row in bare.items():
-        expected = (
-            f"marks of camera {camera!r}, which has none in cameras.toml; expected their calibrated"
-            f" coordinates there, as [cameras.{camera}.{MARKS}]"
+        expected = message(
+            "marks_not_calibrated",
+            "marks of camera {camera!r}, which has none in cameras.toml; expected their "
+            "calibrated coordinates there, as [cameras.{camera}.{marks}]",
+            camera=camera,
+            marks=MARKS,
         )
         files.log.problem(table.file, expected, row, "mark")
 
@@ -133,9 +152,17 @@ def _is_possible(files, table, photo, read):
     row = table.rows[read.rows[0]] if len(read.rows) else None
     names, fewest = list(dict.fromkeys(read.names)), KINDS[read.kind]
     if len(names) < fewest:
-        left = " left" if read.rejected else ""
-        expected = f"photo {photo!r} has {len(names)} marks{left}; expected {fewest} or more"
-        expected += f" for fiducial_transformation = {read.kind}"
+        left = message("left_over", " left") if read.rejected else ""
+        expected = message(
+            "marks_too_few",
+            "photo {photo!r} has {count} marks{left}; expected {fewest} or more for "
+            "fiducial_transformation = {of_kind}",
+            photo=photo,
+            count=len(names),
+            left=left,
+            fewest=fewest,
+            of_kind=read.kind,
+        )
         row = row if row is not None else read.rejected[0].row
         files.log.problem(table.file, expected, row, "mark")
         return False
@@ -145,7 +172,12 @@ def _is_possible(files, table, photo, read):
         try:
             read.fit(photo, None)
         except SolutionError as error:
-            files.log.problem(table.file, f"photo {photo!r}: {error}", row, "mark")
+            files.log.problem(
+                table.file,
+                message("of_photo", "photo {photo!r}: {error}", photo=photo, error=error.args[0]),
+                row,
+                "mark",
+            )
             return False
         return True
     if found.marks:
@@ -156,31 +188,71 @@ def _is_possible(files, table, photo, read):
 
 def _suspected(photo, found, names):
     """One line about a comparator.Suspicion."""
-    named = [" and ".join(repr(names[i]) for i in group) for group in found.marks]
-    start = f"the marks of photo {photo!r} "
+    named = [joined([repr(names[i]) for i in group]) for group in found.marks]
     if found.what == "unit":
-        return (
-            f"{start}were read {1 / found.size:.4g} times as large as they are calibrated; expected"
-            " millimetres both here and in cameras.toml"
+        times = 1 / found.size
+        return message(
+            "marks_in_other_unit",
+            "the marks of photo {photo!r} were read {times:.4g} times as large as they are "
+            "calibrated; expected millimetres both here and in cameras.toml",
+            photo=photo,
+            times=times,
         )
     if found.what == "sheared":
         share = 100 * (found.size - 1)
-        return f"{start}make a transformation sheared by {share:.2g} %: marks confused?"
-    if found.what == "exchanged" and found.size < GROSS:
-        return (
-            f"{start}make no comparator's transformation unless {', or '.join(named)} change names"
+        return message(
+            "marks_sheared",
+            "the marks of photo {photo!r} make a transformation sheared by {share:.2g} %: marks "
+            "confused?",
+            photo=photo,
+            share=share,
         )
-    start += f"miss their calibrated places by {100 * found.size:.2g} % of their extent"
+    if found.what == "exchanged" and found.size < GROSS:
+        marks = either(named)
+        return message(
+            "marks_exchanged",
+            "the marks of photo {photo!r} make no comparator's transformation unless {marks} "
+            "change names",
+            photo=photo,
+            marks=marks,
+        )
+    share = 100 * found.size
+    start = message(
+        "marks_off",
+        "the marks of photo {photo!r} miss their calibrated places by {share:.2g} % of their "
+        "extent",
+        photo=photo,
+        share=share,
+    )
     if found.what == "mirrored":
-        return (
-            f"{start}, and fit mirrored: the plate was read from the other side; turn x over, or"
-            " fiducial_transformation = affine does it"
+        return message(
+            "marks_mirrored",
+            "{start}, and fit mirrored: the plate was read from the other side; turn x over, or "
+            "fiducial_transformation = affine does it",
+            start=start,
         )
     if found.what == "exchanged":
-        return f"{start}, and fit when {', or '.join(named)} are exchanged"
+        marks = either(named)
+        return message(
+            "marks_fit_exchanged",
+            "{start}, and fit when {marks} are exchanged",
+            start=start,
+            marks=marks,
+        )
+    worst = named[0]
     if found.what == "wrong":
-        return f"{start}; without {named[0]} the others fit: is it misread, or another mark?"
-    return f"{start}, most of all {named[0]}: marks confused, misread, or of another camera?"
+        return message(
+            "mark_wrong",
+            "{start}; without {worst} the others fit: is it misread, or another mark?",
+            start=start,
+            worst=worst,
+        )
+    return message(
+        "marks_confused",
+        "{start}, most of all {worst}: marks confused, misread, or of another camera?",
+        start=start,
+        worst=worst,
+    )
 
 
 def _test_fit(files, table, photo, fit, read, photos):
@@ -266,11 +338,22 @@ def _check_images_of_comparator(files, table, of_photos):
         seen.setdefault(photo, row)
     for photo, row in seen.items():
         if photo in of_photos and photo not in read and of_photos[photo][0] in cameras:
-            expected = f"photo {photo!r} has no marks in {table.file}, others of its camera have"
-            files.log.problem(images.file, f"{expected}; expected them for all", row, "photo")
+            expected = message(
+                "photo_without_marks",
+                "photo {photo!r} has no marks in {file}, others of its camera have; expected "
+                "them for all",
+                photo=photo,
+                file=table.file,
+            )
+            files.log.problem(images.file, expected, row, "photo")
             lacking.add(photo)
     in_px = ~np.isnan(images.numbers("column_px")) | ~np.isnan(images.numbers("s_px"))
     in_px &= np.array([photo in read for photo in images.of("photo")], dtype=bool)
-    expected = f"in pixels, in a photo whose marks are read in {table.file}; expected x_mm and y_mm"
-    tell_rows(files.log.problem, images, in_px, "column_px", f"{expected} of the same comparator")
+    expected = message(
+        "pixels_beside_marks",
+        "in pixels, in a photo whose marks are read in {file}; expected x_mm and y_mm of the "
+        "same comparator",
+        file=table.file,
+    )
+    tell_rows(files.log.problem, images, in_px, "column_px", expected)
     return lacking

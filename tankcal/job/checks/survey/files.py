@@ -7,6 +7,7 @@ import numpy as np
 from tankcal.job.entries import as_spelt
 from tankcal.job.fields import is_blank
 from tankcal.job.tables import REGISTERS, nearest
+from tankcal.messages import message
 
 MAX_HINTS = 50  # a suggestion for every one of thousands of names would cost minutes
 
@@ -70,13 +71,28 @@ def refuse_undefined(files, table, column, defined, where):
     file = files.raw.file_of(where)
     if first and not defined:
         row = min(first.values())
-        expected = f"{file} is missing or empty; expected it: this column names what stands there"
+        expected = message(
+            "register_missing",
+            "{file} is missing or empty; expected it: this column names what stands there",
+            file=file,
+        )
         files.log.problem(table.file, expected, row, column)
         return
     for number, (name, row) in enumerate(first.items()):
         hint = nearest(name, defined) if number < MAX_HINTS else ""
-        more = f"; {count[name]} rows name it" if count[name] > 1 else ""
-        expected = f"found {name!r}; expected a name that stands in {file}{hint}{more}"
+        more = (
+            message("rows_name_it", "; {count} rows name it", count=count[name])
+            if count[name] > 1
+            else ""
+        )
+        expected = message(
+            "name_undefined",
+            "found {name!r}; expected a name that stands in {file}{hint}{more}",
+            name=name,
+            file=file,
+            hint=hint,
+            more=more,
+        )
         files.log.problem(table.file, expected, row, column)
 
 
@@ -86,7 +102,8 @@ def tell_rows(to, table, is_told, column, expected):
     Once only where several do because the table has no such column, or nothing in it.
     """
     if np.count_nonzero(is_told) > 1 and table.columns.get(column) is None:
-        to(table.file, f"the column is missing or {expected.removeprefix('given ')}", None, column)
+        without = message("column_missing_or", "the column is missing or {what}", what=expected)
+        to(table.file, without, None, column)
         return
     for place in np.flatnonzero(is_told):
         to(table.file, expected, table.rows[place], column)

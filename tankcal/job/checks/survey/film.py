@@ -21,8 +21,14 @@ def check_film(files, imagery):
         for name in ("camera", "photo")
     }
     for is_told, expected in (
-        (has["camera"] & has["photo"], "camera and photo both given; expected one of them"),
-        (~has["camera"] & ~has["photo"], "blank; expected a camera, or a photo"),
+        (
+            has["camera"] & has["photo"],
+            message("film_of_both", "camera and photo both given; expected one of them"),
+        ),
+        (
+            ~has["camera"] & ~has["photo"],
+            message("film_of_none", "blank; expected a camera, or a photo"),
+        ),
     ):
         tell_rows(files.log.problem, table, sound & is_told, "camera", expected)
     refuse_undefined(files, table, "camera", files.registers["cameras"], "cameras")
@@ -31,8 +37,14 @@ def check_film(files, imagery):
     refuse_undefined(files, table, "photo", defined, "photos")
     for (kind, name), (surface, row) in surfaces_of(table).items():
         if not is_surface(surface):
-            expected = f"the {len(surface.xy_mm)} places of the film of {kind} {name!r} make no"
-            expected += " surface; expected 3 or more, each once, not on one line"
+            expected = message(
+                "film_without_surface",
+                "the {count} places of the film of {of_kind} {name!r} make no surface; expected "
+                "3 or more, each once, not on one line",
+                count=len(surface.xy_mm),
+                of_kind=kind,
+                name=name,
+            )
             files.log.problem(table.file, expected, row, "x_mm")
         elif 0 < np.abs(surface.height_mm).max() * 1000 < FLAT_UM:
             expected = message(

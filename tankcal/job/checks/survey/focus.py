@@ -30,12 +30,25 @@ def check_focus(files, name, given):
         return
     for key in (distances, *BESIDE):
         if not files.is_given("cameras", name, key):
-            problem(key, "missing beside focus_calibrations; expected it above 0")
+            problem(
+                key,
+                message("focus_missing", "missing beside focus_calibrations; expected it above 0"),
+            )
     if not any(files.is_given("cameras", name, key) for key in radial):
-        problem(radial[0], "missing; expected K1 at both distances: [1.1e-7, 1.3e-7]")
+        problem(
+            radial[0],
+            message("radial_missing", "missing; expected K1 at both distances: [1.1e-7, 1.3e-7]"),
+        )
     for key in (distances, *radial):
         if given[key] is not None and len(given[key]) != 2:
-            problem(key, f"{len(given[key])} numbers; expected two, one for each distance")
+            problem(
+                key,
+                message(
+                    "radial_of_two",
+                    "{count} numbers; expected two, one for each distance",
+                    count=len(given[key]),
+                ),
+            )
     _refuse_beside(files, name, given, problem)
     _check_sizes(given, distances, problem)
 
@@ -44,28 +57,53 @@ def _refuse_beside(files, name, given, problem):
     for parameter in RADIAL:
         key = PARAMETER_KEYS[parameter][0]
         if given[key] is not None:
-            problem(key, "given beside focus_calibrations, from which it follows; expected one")
+            problem(
+                key,
+                message(
+                    "beside_focus",
+                    "given beside focus_calibrations, from which it follows; expected one",
+                ),
+            )
     if given["radial_balance_mm"]:
-        problem("radial_balance_mm", "not with focus_calibrations; expected the plain form")
+        problem(
+            "radial_balance_mm",
+            message("balance_beside_focus", "not with focus_calibrations; expected the plain form"),
+        )
     if not files.is_given("cameras", name, "convention"):
-        problem("convention", "missing beside focus_calibrations; expected what their K do")
+        problem(
+            "convention",
+            message(
+                "convention_of_focus", "missing beside focus_calibrations; expected what their K do"
+            ),
+        )
 
 
 def _check_sizes(given, key, problem):
     distances, focal, c = given[key], given["lens_focal_length_mm"], given["c_mm"]
     if distances is not None and len(distances) == 2 and distances[0] == distances[1]:
-        problem(key, "twice the same; expected two distances")
+        problem(key, message("one_focus_twice", "twice the same; expected two distances"))
     if focal is None:
         return
     if c is not None and abs(focal / c - 1) > ALIKE:
-        expected = f"found {focal:g} with c_mm = {c:g}; expected about the same"
+        expected = message(
+            "focal_length_off",
+            "found {focal:g} with c_mm = {c:g}; expected about the same",
+            focal=focal,
+            c=c,
+        )
         problem("lens_focal_length_mm", expected)
         return
     for where, values in ((key, distances), ("focus_m", (given["focus_m"],))):
         for value in values or ():
             if value is not None and 1000 * value <= NEAREST * focal:
-                expected = f"found {value:g} m, within {NEAREST:g} focal lengths; expected metres"
-                problem(where, f"{expected} from the lens to the object")
+                expected = message(
+                    "focus_too_near",
+                    "found {value:g} m, within {nearest:g} focal lengths; expected metres from "
+                    "the lens to the object",
+                    value=value,
+                    nearest=NEAREST,
+                )
+                problem(where, expected)
 
 
 def check_depth_of_field(files):
@@ -75,7 +113,10 @@ def check_depth_of_field(files):
     cameras = files.registers["cameras"]
     lacking = [name for name, given in cameras.items() if lens_of(given) is None]
     if len(lacking) == len(cameras):
-        expected = "true, but no camera has focus_calibrations; expected them in cameras.toml"
+        expected = message(
+            "no_focus_at_all",
+            "true, but no camera has focus_calibrations; expected them in cameras.toml",
+        )
         tell(files.log.problem, files.raw, "adjustment", "depth_of_field", expected)
     elif lacking:
         expected = message(

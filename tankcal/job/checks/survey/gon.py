@@ -8,10 +8,11 @@ import numpy as np
 
 from tankcal.job.checks.common import has_rows
 from tankcal.job.contract.observations import ANGLES
+from tankcal.messages import message
 
 HALF_CIRCLE = {"deg": 180.0, "gon": 200.0}
 OTHER = {"deg": "gon", "gon": "deg"}
-IN_WORDS = {"deg": "degrees", "gon": "gon"}
+IN_WORDS = {"deg": message("degrees", "degrees"), "gon": message("gon", "gon")}
 OF_RECIPROCAL = 2.0  # degrees or gon; the two half circles are 20 apart
 OF_KNOWN_DEG = 1.0
 MIN_SIGHTS = 3
@@ -84,9 +85,15 @@ def _reciprocal(name, sights, unit):
     half, other = float(np.median(halves)), OTHER[unit]
     if abs(half - HALF_CIRCLE[other]) > OF_RECIPROCAL:
         return ""
-    return (
-        f"sights there and back make {half:.2f} as half a circle, which is {IN_WORDS[other]};"
-        f" expected {IN_WORDS[unit]}, or the column in {other}"
+    as_other, as_unit = IN_WORDS[other], IN_WORDS[unit]
+    return message(
+        "half_circle",
+        "sights there and back make {half:.2f} as half a circle, which is {as_other}; expected "
+        "{as_unit}, or the column in {unit}",
+        half=half,
+        as_other=as_other,
+        as_unit=as_unit,
+        unit=other,
     )
 
 
@@ -105,10 +112,18 @@ def _known(name, sights, unit, places):
     other = OTHER[unit]
     if misfit[other] > OF_KNOWN_DEG or misfit[unit] < 5 * max(misfit[other], 0.2):
         return ""
-    return (
-        f"between points of known coordinates the angles miss by {misfit[unit]:.2g} degrees (the"
-        f" middle one), but by {misfit[other]:.2g} when they are {IN_WORDS[other]}; expected"
-        f" {IN_WORDS[unit]}, or the column in {other}"
+    as_other, as_unit = IN_WORDS[other], IN_WORDS[unit]
+    here, there = misfit[unit], misfit[other]
+    return message(
+        "angles_of_known",
+        "between points of known coordinates the angles miss by {here:.2g} degrees (the middle "
+        "one), but by {there:.2g} when they are {as_other}; expected {as_unit}, or the column in "
+        "{unit}",
+        here=here,
+        there=there,
+        as_other=as_other,
+        as_unit=as_unit,
+        unit=other,
     )
 
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from tankcal.job.checks.common import has_rows
 from tankcal.job.contract.observations import ANGLES, READINGS
+from tankcal.messages import joined, message
 
 SAME_M, SAME_DEG = 1e-9, 1e-9
 # table: axes that must be held at all its points before its value is held already
@@ -61,10 +62,13 @@ def _refuse_between_held(files, name, table, places, held):
         points = [column[place] for column in ends]
         axes = "xy" if is_horizontal and is_horizontal[place] else AXES_OF[name]
         if all(set(axes) <= set(held.get(point, "")) for point in points):
-            named = " and ".join(repr(point) for point in points)
-            expected = (
-                f"found 0, but {named} are held already ({axes} in control.csv); expected a"
-                " standard deviation above 0, or no such row"
+            named = joined([repr(point) for point in points])
+            expected = message(
+                "held_already",
+                "found 0, but {named} are held already ({axes} in control.csv); expected a "
+                "standard deviation above 0, or no such row",
+                named=named,
+                axes=axes,
             )
             files.log.problem(table.file, expected, table.rows[place], sd)
 
@@ -88,8 +92,10 @@ def _refuse_two_values(files, name, table, places):
         key = (kinds[place] or "spatial", *(sorted(points) if name == "distances" else points))
         before = first.setdefault(key, place)
         if not np.allclose(values[before], values[place], rtol=0, atol=same, equal_nan=True):
-            expected = (
-                f"held at another value than in row {table.rows[before]}; expected one value, or"
-                " a standard deviation above 0"
+            expected = message(
+                "held_at_two",
+                "held at another value than in row {row}; expected one value, or a standard "
+                "deviation above 0",
+                row=table.rows[before],
             )
             files.log.problem(table.file, expected, table.rows[place], "to")

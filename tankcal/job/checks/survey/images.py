@@ -13,7 +13,6 @@ from tankcal.messages import message
 MIN_POINTS = 3
 ANGLES = ("omega", "phi", "kappa")
 COORDINATES = ("x_mm", "y_mm", "column_px", "line_px")
-IN_MM, IN_PX = "x_mm and y_mm", "column_px and line_px"
 
 
 def check_images(files):
@@ -37,8 +36,19 @@ def check_images(files):
         _check_counts(files, photos, images)
     if has_rows(photos) and not has_rows(images) and not files.is_unreadable("image_points"):
         names = photos.of("photo")
-        more = f" and {len(names) - 1} more photos" if len(names) > 1 else ""
-        expected = f"no rows; expected the image points of photo {names[0]!r}{more}"
+        first, count = names[0], len(names) - 1
+        expected = message(
+            "photo_without_rows",
+            "no rows; expected the image points of photo {first!r}",
+            first=first,
+        )
+        if count:
+            expected = message(
+                "photos_without_rows",
+                "no rows; expected the image points of photo {first!r} and {count} more photos",
+                first=first,
+                count=count,
+            )
         files.log.problem("image_points.csv", expected)
 
 
@@ -53,15 +63,20 @@ def _check_orientations(files, photos):
         for angle in ANGLES
     ]
     sound = files.sound(photos)
+    two_units = message("in_two_units", "in two units; expected one")
     for column, values, sds in elements:
         count, count_sd = (
             sum(~np.isnan(photos.numbers(name)) for name in names) for names in (values, sds)
         )
         in_two = sound & (count > 1)
-        tell_rows(files.log.problem, photos, in_two, column, "in two units; expected one")
+        tell_rows(files.log.problem, photos, in_two, column, two_units)
         in_two = sound & (count_sd > 1)
-        tell_rows(files.log.problem, photos, in_two, sds[0], "in two units; expected one")
-        expected = f"given without {column}; expected both, or no standard deviation"
+        tell_rows(files.log.problem, photos, in_two, sds[0], two_units)
+        expected = message(
+            "sd_without_value",
+            "given without {column}; expected both, or no standard deviation",
+            column=column,
+        )
         alone = sound & (count == 0) & (count_sd > 0)
         tell_rows(files.log.problem, photos, alone, sds[0], expected)
 
@@ -70,7 +85,11 @@ def _check_coordinates(files, images):
     """Each row in millimetres or in pixels, both coordinates."""
     log, sound = files.log, files.sound(images)
     if all(images.columns[name] is None for name in COORDINATES) and sound.any():
-        log.problem(images.file, f"missing columns; expected {IN_MM}, or {IN_PX}")
+        expected = message(
+            "image_columns_missing",
+            "missing columns; expected x_mm and y_mm, or column_px and line_px",
+        )
+        log.problem(images.file, expected)
         return
     x, y, column, line = (~np.isnan(images.numbers(name)) for name in COORDINATES)
     in_mm, in_px = x | y, column | line
@@ -79,10 +98,14 @@ def _check_coordinates(files, images):
         images,
         sound & in_mm & in_px,
         "x_mm",
-        f"{IN_MM} and {IN_PX} given; expected one of them",
+        message(
+            "image_in_two_units",
+            "x_mm and y_mm and column_px and line_px given; expected one of them",
+        ),
     )
     nothing = sound & ~in_mm & ~in_px
-    tell_rows(log.problem, images, nothing, "x_mm", f"blank; expected {IN_MM}, or {IN_PX}")
+    expected = message("image_blank", "blank; expected x_mm and y_mm, or column_px and line_px")
+    tell_rows(log.problem, images, nothing, "x_mm", expected)
     for one, other, name in (
         (x, y, "y_mm"),
         (y, x, "x_mm"),
@@ -94,7 +117,7 @@ def _check_coordinates(files, images):
             images,
             sound & one & ~other & ~(in_mm & in_px),
             name,
-            "blank; expected both coordinates",
+            message("image_of_one", "blank; expected both coordinates"),
         )
     _, pixel = image_frames(images, files.tables["photos"], files.registers["cameras"])
     in_px |= ~np.isnan(images.numbers("s_px")) & np.isnan(images.numbers("sx_um"))
@@ -109,7 +132,9 @@ def _tell_cameras_without_pixels(files, images, lacking):
     names = {of_photo.get(images.of("photo")[place]) for place in np.flatnonzero(lacking)}
     for name in sorted(names & set(cameras)):
         if not files.is_given("cameras", name, "pixel_um"):
-            expected = "missing; image points of this camera are in pixels"
+            expected = message(
+                "pixel_of_camera_missing", "missing; image points of this camera are in pixels"
+            )
             files.tell_key(files.log.problem, "cameras", name, "pixel_um", expected)
 
 
@@ -117,18 +142,22 @@ def _check_sds(files, images):
     sound = files.sound(images)
     sx, sy, s_px = (~np.isnan(images.numbers(name)) for name in ("sx_um", "sy_um", "s_px"))
     for one, other, name in ((sx, sy, "sy_um"), (sy, sx, "sx_um")):
-        expected = "blank; expected both sx_um and sy_um, or none"
+        expected = message("image_sd_of_one", "blank; expected both sx_um and sy_um, or none")
         tell_rows(files.log.problem, images, sound & one & ~other, name, expected)
-    expected = "given beside sx_um; expected one of them"
+    expected = message("image_sd_in_two_units", "given beside sx_um; expected one of them")
     tell_rows(files.log.problem, images, sound & (sx | sy) & s_px, "s_px", expected)
     lacking = sound & ~sx & ~sy & ~s_px
     if files.values is None or not lacking.any():
         return
     if is_not_given(files.raw, "adjustment", "image_sd_um"):
         row = images.rows[int(np.argmax(lacking))]
-        expected = (
-            "missing; expected the standard deviation of image coordinates, micrometres; rows of"
-            f" {images.file} that carry none: {int(lacking.sum())}, the first of them row {row}"
+        expected = message(
+            "image_sd_missing",
+            "missing; expected the standard deviation of image coordinates, micrometres; rows of "
+            "{file} that carry none: {count}, the first of them row {row}",
+            file=images.file,
+            count=int(lacking.sum()),
+            row=row,
         )
         tell(files.log.problem, files.raw, "adjustment", "image_sd_um", expected)
 
@@ -146,20 +175,30 @@ def _check_format(files, images, imagery, told):
     in_px = ~np.isnan(images.numbers("column_px"))
     hint = ""
     if of_corner.all() and not in_px.any():
-        hint = ": counted from a corner instead of the middle?"
+        hint = message("from_a_corner", ": counted from a corner instead of the middle?")
     for place in np.flatnonzero(outside.any(axis=1)):
         axis = int(np.argmax(outside[place]))
         column = (("column_px", "line_px") if in_px[place] else ("x_mm", "y_mm"))[axis]
         pixels = size[place, axis] / pixel[place, axis]
         if in_px[place] and np.isfinite(pixels):
-            count = round(pixels)
-            allowed = f"-0.5 to {count - 0.5:g} pixels"
+            last = round(pixels) - 0.5
+            allowed = message("pixels_allowed", "-0.5 to {last:g} pixels", last=last)
         else:
-            allowed = f"at most {size[place, axis] / 2:g} mm from the middle"
+            half = size[place, axis] / 2
+            allowed = message(
+                "millimetres_allowed", "at most {half:g} mm from the middle", half=half
+            )
         found = images.of(column)[place]
         if images.of("photo")[place] in imagery.fits:
-            found, hint = xy[place, axis], " after the transformation"
-        expected = f"found {found:g}, outside the format; expected {allowed}{hint}"
+            found = xy[place, axis]
+            hint = message("after_transformation", " after the transformation")
+        expected = message(
+            "outside_format",
+            "found {found:g}, outside the format; expected {allowed}{hint}",
+            found=found,
+            allowed=allowed,
+            hint=hint,
+        )
         files.log.problem(images.file, expected, images.rows[place], column)
 
 
@@ -191,8 +230,20 @@ def _check_counts(files, photos, images):
             )
             files.log.warning(photos.file, expected, row, "photo")
         elif known[place] < 6:
-            expected = (
-                f"photo {name!r} has {count} image point{'' if count == 1 else 's'}; expected"
-                f" {MIN_POINTS} or more, or a standard deviation for each of its six elements"
+            expected = message(
+                "photo_of_few_points",
+                "photo {name!r} has {count} image points; expected {fewest} or more, or a "
+                "standard deviation for each of its six elements",
+                name=name,
+                count=count,
+                fewest=MIN_POINTS,
             )
+            if count == 1:
+                expected = message(
+                    "photo_of_one_point",
+                    "photo {name!r} has 1 image point; expected {fewest} or more, or a standard "
+                    "deviation for each of its six elements",
+                    name=name,
+                    fewest=MIN_POINTS,
+                )
             files.log.problem(photos.file, expected, row, "photo")

@@ -39,7 +39,10 @@ def _check_instrument(files, name, given):
         )
         files.tell_key(files.log.warning, "instruments", name, "correction", expected)
     if expansion and not files.is_given("instruments", name, "certified_temperature_c"):
-        expected = "missing beside expansion_per_k; expected the temperature of the certificate"
+        expected = message(
+            "certified_temperature_missing",
+            "missing beside expansion_per_k; expected the temperature of the certificate",
+        )
         files.tell_key(files.log.problem, "instruments", name, "certified_temperature_c", expected)
 
 

@@ -31,8 +31,18 @@ def _refuse_point_twice(files, table):
     for row, point, system in zip(table.rows, table.of("point"), table.of("system"), strict=True):
         before = first.setdefault((point, system), row)
         if point is not None and before != row:
-            within = "" if system is None else f" in system {system!r}"
-            expected = f"{point!r} is there already{within}, in row {before}; expected once"
+            within = (
+                ""
+                if system is None
+                else message("within_system", " in system {system!r}", system=system)
+            )
+            expected = message(
+                "known_twice",
+                "{point!r} is there already{within}, in row {row}; expected once",
+                point=point,
+                within=within,
+                row=before,
+            )
             files.log.problem(table.file, expected, row, "point")
 
 
@@ -41,9 +51,13 @@ def _check_coordinates(files, table):
     for axis in "xyz":
         value, sd = (~np.isnan(table.numbers(name)) for name in (f"{axis}_m", f"s{axis}_mm"))
         known |= value
-        expected = f"given without {axis}_m; expected both, or no standard deviation"
+        expected = message(
+            "known_sd_without_value",
+            "given without {axis}_m; expected both, or no standard deviation",
+            axis=axis,
+        )
         tell_rows(files.log.problem, table, sound & sd & ~value, f"s{axis}_mm", expected)
-    expected = "no coordinate; expected one at least"
+    expected = message("no_coordinate", "no coordinate; expected one at least")
     tell_rows(files.log.problem, table, sound & ~known, "x_m", expected)
 
 

@@ -70,9 +70,23 @@ def _tell(files, spellings, places):
     for point in others:
         file, row, column, count = places[point]
         if count == 1:
-            other = "1 row" if places[most][3] == 1 else f"{places[most][3]} rows"
-            found = f"{point!r} stands in 1 row, {most!r} in {other}"
-            expected = f"{found}; expected one spelling of one point, or another name"
+            rows_of_other = places[most][3]
+            expected = message(
+                "spelt_once",
+                "{point!r} stands in 1 row, {other!r} in {rows} rows; expected one spelling of "
+                "one point, or another name",
+                point=point,
+                other=most,
+                rows=rows_of_other,
+            )
+            if rows_of_other == 1:
+                expected = message(
+                    "each_spelt_once",
+                    "{point!r} stands in 1 row, {other!r} in 1 row; expected one spelling of one "
+                    "point, or another name",
+                    point=point,
+                    other=most,
+                )
             files.log.problem(file, expected, row, column)
         else:
             expected = message(

@@ -6,7 +6,7 @@ from tankcal.job.checks.common import has_rows
 from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.instruments import TAKEN_FROM_SETUPS
 from tankcal.job.contract.observations import ANGLE_UNITS, ANGLES, READINGS
-from tankcal.messages import listed, message
+from tankcal.messages import either, listed, message
 
 BY_CHANCE = 0.1  # share of the rows: coarse readings repeat themselves
 MOST_REPEATED = 3  # rows that a warning names
@@ -31,17 +31,24 @@ def check_readings(files):
 def _check_angle(files, table, angle):
     """One of the units in each row; a column of one unit at least."""
     columns = [f"{angle}_{unit}" for unit in ANGLE_UNITS]
-    wanted = f"{columns[0]}, {columns[1]} or {columns[2]}"
+    wanted = either(columns)
     headings = files.raw.tables[files_name(table)].headings
     if not any(column in headings for column in columns):
-        files.log.problem(table.file, f"missing column; expected {wanted}", None, columns[0])
+        expected = message(
+            "angle_column_missing", "missing column; expected {wanted}", wanted=wanted
+        )
+        files.log.problem(table.file, expected, None, columns[0])
         return
     sound = files.sound(table)
     count = sum(~np.isnan(table.numbers(column)) for column in columns)
     first = next(column for column in columns if column in headings)
-    tell_rows(files.log.problem, table, sound & (count == 0), first, f"blank; expected {wanted}")
+    expected = message("angle_blank", "blank; expected {wanted}", wanted=wanted)
+    tell_rows(files.log.problem, table, sound & (count == 0), first, expected)
     twice = sound & (count > 1)
-    tell_rows(files.log.problem, table, twice, first, f"in two units; expected one of {wanted}")
+    expected = message(
+        "angle_in_two_units", "in two units; expected one of {wanted}", wanted=wanted
+    )
+    tell_rows(files.log.problem, table, twice, first, expected)
 
 
 def files_name(table):
@@ -67,9 +74,19 @@ def _refuse_same_ends(files, name, table):
         if len(set(given)) == len(given):
             continue
         twice = next(point for point in given if given.count(point) > 1)
-        expected = f"{what} between {twice!r} and itself; expected different points"
+        expected = message(
+            "between_itself",
+            "{kind} between {twice!r} and itself; expected different points",
+            kind=what,
+            twice=twice,
+        )
         if name in TAKEN_FROM_SETUPS:
-            expected = f"{what} from station {twice!r} to itself; expected another point"
+            expected = message(
+                "station_to_itself",
+                "{kind} from station {twice!r} to itself; expected another point",
+                kind=what,
+                twice=twice,
+            )
         files.log.problem(table.file, expected, row, "to")
 
 
