@@ -22,7 +22,7 @@ OF_VERTICAL = message(
     "plumb lines, height differences, vertical or zenith angles, or control points with known"
     " heights give it",
 )
-OF_SCALE = "distances, or control points that lie apart, give it"
+OF_SCALE = message("gives_scale", "distances, or control points that lie apart, give it")
 
 
 def noise_is_estimated(job):
@@ -47,11 +47,23 @@ def refuse_undetermined(datum):
     """
     missing = []
     if not datum.vertical:
-        missing.append(f"the vertical is not determined by any observation: {OF_VERTICAL}")
+        missing.append(
+            message(
+                "no_vertical",
+                "no capacity: the vertical is not determined by any observation: {remedy}",
+                remedy=OF_VERTICAL,
+            )
+        )
     if not datum.scale:
-        missing.append(f"the scale is not determined by any observation: {OF_SCALE}")
+        missing.append(
+            message(
+                "no_scale",
+                "no capacity: the scale is not determined by any observation: {remedy}",
+                remedy=OF_SCALE,
+            )
+        )
     if missing:
-        raise SolutionError("no capacity: " + "; ".join(missing))
+        raise SolutionError(*missing)
 
 
 def of_adjustment(job, datum, causes):

@@ -11,6 +11,7 @@ import numpy as np
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 from tankcal.snooping import LEAST_NOISE_M, from_axis, shell_problem, snoop
 
 WIDE_BAND, WALL_BAND = 0.03, 0.01  # of the nominal radius: start, and largest believed deviation
@@ -100,8 +101,13 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
     reason[(reason == "") & ~wall] = "snooping"
     if wall.sum() < LEAST_PART * candidates.sum():
         raise SolutionError(
-            f"only {wall.sum()} of {candidates.sum()} points between bottom and top lie on one "
-            "wall: no shell can be told from its surroundings; check nominal_diameter_m and points"
+            message(
+                "no_shell",
+                "only {found} of {all} points between bottom and top lie on one wall: no shell "
+                "can be told from its surroundings; check nominal_diameter_m and points",
+                found=wall.sum(),
+                all=candidates.sum(),
+            )
         )
 
     distance = from_axis(local, axis)[1]
@@ -153,7 +159,13 @@ def _repeated(xyz_m):
 def _consensus_circle(xy, nominal_radius):
     """(x, y, radius) of the three-point circle near the nominal radius that most points support."""
     if len(xy) < 5:
-        raise SolutionError(f"{len(xy)} points between bottom and top of the shell: too few")
+        raise SolutionError(
+            message(
+                "too_few_for_shell",
+                "{count} points between bottom and top of the shell: too few",
+                count=len(xy),
+            )
+        )
     rng = np.random.default_rng(20_11)
     triples = xy[rng.integers(len(xy), size=(SAMPLES, 3))]
     circles = _circles_through(triples)
@@ -166,9 +178,17 @@ def _consensus_circle(xy, nominal_radius):
     ]
     best = max(support, default=0.0)
     if best < LEAST_PART:
+        band, share = 100 * WIDE_BAND, 100 * best
         raise SolutionError(
-            f"no circle within {WIDE_BAND:.0%} of the nominal radius {nominal_radius:.3f} m holds "
-            f"half of the points (best {best:.0%}): check nominal_diameter_m, units and axes"
+            message(
+                "no_circle",
+                "no circle within {band:.0f} % of the nominal radius {nominal_m:.3f} m holds "
+                "half of the points (best {share:.0f} %): check nominal_diameter_m, units and "
+                "axes",
+                band=band,
+                nominal_m=nominal_radius,
+                share=share,
+            )
         )
     return circles[near][int(np.argmax(support))]
 
@@ -201,5 +221,11 @@ def _leaning_cylinder(local, course, candidates, circle, nominal_radius):
         nearest = np.abs(names[None, :] - course[:, None]).argmin(axis=1)
         wall = candidates & (np.abs(distance - radii[nearest]) < band)
         if wall.sum() < 5 + len(names):
-            raise SolutionError(f"only {wall.sum()} points lie on a cylinder: no wall was found")
+            raise SolutionError(
+                message(
+                    "no_cylinder",
+                    "only {count} points lie on a cylinder: no wall was found",
+                    count=wall.sum(),
+                )
+            )
     return wall, axis

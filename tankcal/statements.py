@@ -9,6 +9,7 @@ from tankcal.capacity import SAME_M
 from tankcal.deliveries import WorstDeliveries, worst_deliveries
 from tankcal.errors import InputError, Problem
 from tankcal.job.tables import SETTINGS_FILE
+from tankcal.messages import message
 from tankcal.rules import Printed, StatedVolume, deliveries_judged, judge
 
 MINIMA_M = (1.5, 2.0, 3.0)  # of deliveries, where the job names none
@@ -152,12 +153,18 @@ def _worst(job, table):
         for one in _minima(job)
     }
     if job.table.minimum_delivery_m is not None:
-        expected = (
-            f"expected at most {height:g} m between two dips of the table that are for use: "
-            "there is no such delivery"
-        )
         problems = [
-            Problem(SETTINGS_FILE, f"found {one:g}; {expected}", column="table.minimum_delivery_m")
+            Problem(
+                SETTINGS_FILE,
+                message(
+                    "no_such_delivery",
+                    "found {one:g}; expected at most {height:g} m between two dips of the table "
+                    "that are for use: there is no such delivery",
+                    one=one,
+                    height=height,
+                ),
+                column="table.minimum_delivery_m",
+            )
             for one, worst in found.items()
             if worst is None
         ]
@@ -172,7 +179,13 @@ def _refuse_outside(stated, table):
     problems = [
         Problem(
             one.file,
-            f"found {dip:g}; expected {table.height_m[0]:g} to {top:g}, the dips of the table",
+            message(
+                "stated_outside_table",
+                "found {dip:g}; expected {low:g} to {top:g}, the dips of the table",
+                dip=dip,
+                low=table.height_m[0],
+                top=top,
+            ),
             one.row,
             column,
         )

@@ -188,7 +188,7 @@ BAD_SETTINGS = [
     (
         {"adjustment.datum": "minimal", "adjustment.datum_points": ["W7"]},
         "datum_points",
-        "no x and y and z in control.csv",
+        "no x, y and z in control.csv",
     ),
     ({"adjustment.camera.K3": "weighted"}, "camera.K3", "'camera weighted'"),
     ({"adjustment.camera.k3": "off"}, "camera.k3", "did you mean K3?"),

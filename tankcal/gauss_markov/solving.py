@@ -11,6 +11,7 @@ from tankcal.gauss_markov.model import Normals
 from tankcal.gauss_markov.plan import plan
 from tankcal.gauss_markov.rank import diagnosis, weakness
 from tankcal.gauss_markov.solution import Factor, Solution
+from tankcal.messages import message
 from tankcal.threads import threads_for
 
 SMALL = 2e7  # rows times unknowns squared: below it a system without blocks is solved by QR
@@ -165,7 +166,9 @@ class _Work:
             free = self.model.free(state)
             ties = free * self.model.inner[:, None]
             if np.linalg.matrix_rank(ties.T @ free) < free.shape[1]:
-                raise SolutionError("what is to hold the datum does not fix it")
+                raise SolutionError(
+                    message("datum_not_fixed", "what is to hold the datum does not fix it")
+                )
             held = np.linalg.qr(free[:nr] / scale[:, None])[0]
         if self.plan.blocks == 0 and self.rows * nr * nr < SMALL:
             lower, sound, pull = self._dense_root(scale, untouched, damping, held, tangent)

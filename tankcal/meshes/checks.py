@@ -6,6 +6,7 @@ import scipy.sparse.csgraph
 
 from tankcal.errors import InputError, Problem
 from tankcal.meshes.part import Mesh, mesh_part, normals_of
+from tankcal.messages import message
 from tankcal.outlines import FULL_TURN
 
 SMALLEST_M, LARGEST_M = 0.05, 1000.0  # largest extent of a tank: beyond, the unit is wrong
@@ -63,14 +64,22 @@ def _place(xyz):
 def _arrays(vertices, faces, name):
     vertices, faces = np.asarray(vertices), np.asarray(faces)
     if faces.size == 0 or vertices.size == 0:
-        raise problem(name, "holds no triangles; expected a closed mesh")
+        raise problem(name, message("mesh_empty", "holds no triangles; expected a closed mesh"))
     if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype.kind not in "fiu":
         raise problem(name, f"vertices of shape {vertices.shape}; expected numbers (n, 3)")
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
         raise problem(name, f"faces of shape {faces.shape}; expected triangles (m, 3)")
     if faces.min() < 0 or faces.max() >= len(vertices):
         wrong = faces.min() if faces.min() < 0 else faces.max()
-        raise problem(name, f"a face names vertex {wrong}; expected 0 to {len(vertices) - 1}")
+        raise problem(
+            name,
+            message(
+                "mesh_vertex_missing",
+                "a face names vertex {wrong}; expected 0 to {largest}",
+                wrong=wrong,
+                largest=len(vertices) - 1,
+            ),
+        )
     vertices, faces = vertices.astype(float), faces.astype(np.int64)
     bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
     if len(bad):
@@ -81,11 +90,20 @@ def _arrays(vertices, faces, name):
 def _refuse_size(vertices, unit_m, name):
     extent = np.ptp(vertices, axis=0)
     if not SMALLEST_M <= extent.max() <= LARGEST_M:
+        x, y, z = extent
         raise problem(
             name,
-            "the mesh is {:.4g} x {:.4g} x {:.4g} m".format(*extent)
-            + f" with a unit of {unit_m:g} m; expected {SMALLEST_M:g} to {LARGEST_M:g} m: is the "
-            "unit right?",
+            message(
+                "mesh_size",
+                "the mesh is {x:.4g} x {y:.4g} x {z:.4g} m with a unit of {unit_m:g} m; expected "
+                "{least_m:g} to {most_m:g} m: is the unit right?",
+                x=x,
+                y=y,
+                z=z,
+                unit_m=unit_m,
+                least_m=SMALLEST_M,
+                most_m=LARGEST_M,
+            ),
         )
 
 
@@ -121,21 +139,43 @@ def _joined(vertices, faces):
 def _refuse_open(vertices, faces, name):
     """InputError for edges that are not passed as often each way, and faces twice; notes."""
     if len(faces) == 0:
-        raise problem(name, "holds no triangle of three corners; expected a closed mesh")
+        raise problem(
+            name,
+            message(
+                "mesh_without_triangles",
+                "holds no triangle of three corners; expected a closed mesh",
+            ),
+        )
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     key = np.minimum(start, end) * len(vertices) + np.maximum(start, end)
     keys, edge, uses = np.unique(key, return_inverse=True, return_counts=True)
     balance = np.bincount(edge, weights=np.sign(end - start))
-    for wrong, what, expected in (
-        (uses % 2 == 1, "open edges", "a closed (watertight) mesh"),
-        (balance != 0, "edges between faces of opposite orientation", "all to face outwards"),
-    ):
+    for is_open, wrong in ((True, uses % 2 == 1), (False, balance != 0)):
         if wrong.any():
             first, last = divmod(int(keys[wrong][0]), len(vertices))
+            count, start, end = wrong.sum(), _place(vertices[first]), _place(vertices[last])
+            if is_open:
+                raise problem(
+                    name,
+                    message(
+                        "mesh_open",
+                        "the mesh has {count} open edges, the first from {start} to {end} m; "
+                        "expected a closed (watertight) mesh",
+                        count=count,
+                        start=start,
+                        end=end,
+                    ),
+                )
             raise problem(
                 name,
-                f"the mesh has {wrong.sum()} {what}, the first from {_place(vertices[first])} to "
-                f"{_place(vertices[last])} m; expected {expected}",
+                message(
+                    "mesh_opposite",
+                    "the mesh has {count} edges between faces of opposite orientation, the first "
+                    "from {start} to {end} m; expected all to face outwards",
+                    count=count,
+                    start=start,
+                    end=end,
+                ),
             )
     turned = np.take_along_axis(faces, (faces.argmin(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     _, first, times = np.unique(turned, axis=0, return_index=True, return_counts=True)
@@ -143,7 +183,12 @@ def _refuse_open(vertices, faces, name):
         where = _place(vertices[faces[first[times > 1][0], 0]])
         raise problem(
             name,
-            f"{(times > 1).sum()} faces are there twice, the first at {where} m; expected once",
+            message(
+                "mesh_faces_twice",
+                "{count} faces are there twice, the first at {where} m; expected once",
+                count=(times > 1).sum(),
+                where=where,
+            ),
         )
     many = int((uses > 2).sum())
     return [f"at {many} edges more than two faces meet"] if many else []
@@ -156,7 +201,15 @@ def _bodies(vertices, faces, name):
     graph = scipy.sparse.coo_array(pairs, shape=(n, n))
     bodies, of_vertex = scipy.sparse.csgraph.connected_components(graph, directed=False)
     if bodies > MOST_BODIES:
-        raise problem(name, f"the mesh has {bodies} bodies; expected at most {MOST_BODIES}")
+        raise problem(
+            name,
+            message(
+                "mesh_bodies",
+                "the mesh has {bodies} bodies; expected at most {most}",
+                bodies=bodies,
+                most=MOST_BODIES,
+            ),
+        )
     return of_vertex[faces[:, 0]], bodies
 
 
@@ -173,7 +226,14 @@ def _turned_outwards(vertices, faces, label, bodies, name):
     empty = np.abs(volume) <= FLAT * surface * size
     if empty.any():
         where = _place(home[np.argmax(empty)])
-        raise problem(name, f"the body at {where} m encloses no volume; expected a closed body")
+        raise problem(
+            name,
+            message(
+                "mesh_body_flat",
+                "the body at {where} m encloses no volume; expected a closed body",
+                where=where,
+            ),
+        )
     expected = 1 - 2 * (_depths(vertices, faces, label, bodies, name) % 2)
     wrong = np.sign(volume) != expected
     if wrong.all():
@@ -181,8 +241,14 @@ def _turned_outwards(vertices, faces, label, bodies, name):
     if wrong.any():
         raise problem(
             name,
-            f"{wrong.sum()} of {bodies} bodies are inside out, the first at "
-            f"{_place(home[np.argmax(wrong)])} m; expected them to face outwards, hollows inwards",
+            message(
+                "mesh_inside_out",
+                "{count} of {bodies} bodies are inside out, the first at {place} m; expected "
+                "them to face outwards, hollows inwards",
+                count=wrong.sum(),
+                bodies=bodies,
+                place=_place(home[np.argmax(wrong)]),
+            ),
         )
     return faces, []
 
@@ -209,7 +275,14 @@ def _depths(vertices, faces, label, bodies, name):
         outside = np.any(turns < ON_SURFACE) or len(near) < len(own[i])
         if inside and outside:
             where = _place(own[i][probes[np.argmax(turns)]])
-            raise problem(name, f"two bodies overlap at {where} m; expected bodies apart")
+            raise problem(
+                name,
+                message(
+                    "mesh_overlap",
+                    "two bodies overlap at {where} m; expected bodies apart",
+                    where=where,
+                ),
+            )
         depth[i] += bool(inside)
     return depth
 
@@ -219,8 +292,14 @@ def _probes(pairs, vertices, faces, name):
     if len(pairs) > MOST_PAIRS:
         raise problem(
             name,
-            f"the boxes of {len(vertices)} bodies meet one another {len(pairs)} times; expected at "
-            f"most {MOST_PAIRS}: a shell, and what stands in it",
+            message(
+                "mesh_boxes_meet",
+                "the boxes of {count} bodies meet one another {times} times; expected at most "
+                "{most}: a shell, and what stands in it",
+                count=len(vertices),
+                times=len(pairs),
+                most=MOST_PAIRS,
+            ),
         )
     first, second = pairs.T
     most, size = np.array(vertices)[first], np.array(faces, dtype=float)[second]
@@ -229,8 +308,14 @@ def _probes(pairs, vertices, faces, name):
             return some
     raise problem(
         name,
-        f"{sum(faces)} faces of {len(vertices)} bodies whose boxes meet {len(pairs)} times are too "
-        "many to tell which lies in which; expected fewer bodies, or fewer faces",
+        message(
+            "mesh_too_many_faces",
+            "{faces} faces of {count} bodies whose boxes meet {times} times are too many to tell "
+            "which lies in which; expected fewer bodies, or fewer faces",
+            faces=sum(faces),
+            count=len(vertices),
+            times=len(pairs),
+        ),
     )
 
 
@@ -267,6 +352,11 @@ def _refuse_negative(mesh, name):
         z = heights[some][worst] + mesh.vertices_m[:, 2].min()
         raise problem(
             name,
-            f"the cut at z = {z:.4f} m has an area of {area[worst]:.4g} m2, the mesh crosses "
-            "itself; expected a surface that does not",
+            message(
+                "mesh_crosses_itself",
+                "the cut at z = {z:.4f} m has an area of {area:.4g} m2, the mesh crosses itself; "
+                "expected a surface that does not",
+                z=z,
+                area=area[worst],
+            ),
         )

@@ -7,6 +7,7 @@ import numpy as np
 
 from tankcal.meshes.checks import closed_mesh, problem
 from tankcal.meshes.cleaning import cleaned
+from tankcal.messages import message
 
 FILE_KINDS = ("stl", "obj", "ply", "off")
 
@@ -32,7 +33,10 @@ def parse_mesh(name, data, unit_m=1.0):
 
     kind = Path(name).suffix.lower().lstrip(".")
     if kind not in FILE_KINDS:
-        raise problem(name, f"expected one of {', '.join('.' + k for k in FILE_KINDS)}")
+        raise problem(
+            name,
+            message("mesh_ending", "expected one of {names}", names=["." + k for k in FILE_KINDS]),
+        )
     try:
         found = trimesh.load_mesh(
             io.BytesIO(cleaned(kind, data)), file_type=kind, process=False, skip_materials=True
@@ -40,7 +44,12 @@ def parse_mesh(name, data, unit_m=1.0):
         vertices, faces = np.array(found.vertices), np.array(found.faces)
     except Exception as error:  # whatever a parser stumbles over
         raise problem(
-            name, f"is no {kind.upper()} file that can be read; expected closed triangles"
+            name,
+            message(
+                "mesh_unreadable",
+                "is no {kind_of_file} file that can be read; expected closed triangles",
+                kind_of_file=kind.upper(),
+            ),
         ) from error
     return closed_mesh(vertices, faces, unit_m=unit_m, name=name)
 

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 from tankcal.network.adjusting import adjust
 from tankcal.network.reliability import tau_limit
 
@@ -94,7 +95,13 @@ def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, *
                 for source, rows in goes.items():
                     needed.setdefault(source, set()).update(rows.tolist())
             few = True
-    raise SolutionError(f"data snooping did not come to rest in {max_rounds} rounds")
+    raise SolutionError(
+        message(
+            "snooping_unsteady",
+            "data snooping did not come to rest in {rounds} rounds",
+            rounds=max_rounds,
+        )
+    )
 
 
 def _suspects(adjusted, limit):

@@ -170,7 +170,9 @@ def dependent(adjusted, quantities, fixed=False):
 def in_words(combinations, problem=None):
     """The datum defect in words, and what helps; see `defect_in_words`."""
     defect = defect_in_words(combinations, problem)
-    return f"{defect}; add control or choose datum = inner"
+    return message(
+        "defect_and_help", "{defect}; add control or choose datum = inner", defect=defect
+    )
 
 
 def defect_in_words(combinations, problem=None):

@@ -5,6 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
+from tankcal.messages import message
 from tankcal.network.aligning import aligned
 from tankcal.network.clues import grown
 from tankcal.network.growing import grown_by_photos, with_points
@@ -117,7 +118,10 @@ def _apart(survey, own, piece):
     if common > 3:
         why = f"but the {common} points that they share with the rest do not fit"
         return f"photos {some} hang together, {why}"
-    return (
-        f"photos {some} hang together, but share only {common} known points with the rest: 3 that "
-        "do not lie on a line, and more to tell their positions apart, are needed"
+    return message(
+        "photos_loose",
+        "photos {some} hang together, but share only {common} known points with the rest: 3 that "
+        "do not lie on a line, and more to tell their positions apart, are needed",
+        some=some,
+        common=common,
     )

@@ -24,9 +24,14 @@ def refuse_worthless_cameras(survey, problem, solution):
     for i in np.flatnonzero(~(sd < WORTHLESS * np.abs(value)))[:1]:
         camera = survey.cameras[survey.photos.camera[photo[i]]].name
         raise SolutionError(
-            f"c of {camera} is not determined: its sd would be {sd[i]:.2g} mm; c and the distances "
-            "of the photos can hardly be told apart: fix c or give it a standard deviation, or add "
-            "photos that are nearer, farther or aslant"
+            message(
+                "c_not_determined",
+                "c of {camera} is not determined: its sd would be {sd:.2g} mm; c and the "
+                "distances of the photos can hardly be told apart: fix c or give it a standard "
+                "deviation, or add photos that are nearer, farther or aslant",
+                camera=camera,
+                sd=sd[i],
+            )
         )
 
 

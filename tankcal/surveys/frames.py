@@ -142,9 +142,16 @@ def _minimal(survey, bare, problem, free, gathered, settings):
     rank = _rank(rows[wanted])
     if rank < d:
         raise SolutionError(
-            f"{defect_in_words(free, problem)}; the {len(wanted)} coordinates held "
-            f"({', '.join(_named(survey, held))}) fix {rank} of {d}: name others in datum_points, "
-            "add control or choose datum = inner"
+            message(
+                "held_too_few",
+                "{defect_in_words}; the {count} coordinates held ({points}) fix {rank} of {of}: "
+                "name others in datum_points, add control or choose datum = inner",
+                defect_in_words=defect_in_words(free, problem),
+                count=len(wanted),
+                points=[*_named(survey, held)],
+                rank=rank,
+                of=d,
+            )
         )
     if len(wanted) > d:
         text = message(
@@ -167,7 +174,10 @@ def _photo(survey, bare, problem, free, gathered, settings):
     if name not in names:
         raise InputError(
             Problem(
-                "job.toml", f"{name} is no photo of this survey", None, "adjustment.fixed_photo"
+                "job.toml",
+                message("not_a_photo", "{name} is no photo of this survey", name=name),
+                None,
+                "adjustment.fixed_photo",
             )
         )
     fixed = survey.photos.fixed.copy()
@@ -205,8 +215,15 @@ def _inner(survey, bare, problem, free, gathered, settings):
     rank = _rank(_motions(problem, left).reshape(-1, 3, d)[over].reshape(-1, d))
     if rank < d:
         raise SolutionError(
-            f"{defect_in_words(left, problem)}; inner constraints over {len(over)} points "
-            f"fix {rank} of {d}: take more points, not all on one line"
+            message(
+                "inner_too_few",
+                "{defect_in_words}; inner constraints over {count} points fix {rank} of {of}: "
+                "take more points, not all on one line",
+                defect_in_words=defect_in_words(left, problem),
+                count=len(over),
+                rank=rank,
+                of=d,
+            )
         )
     names = tuple(survey.points[i] for i in over) if len(over) < len(survey.points) else ("all",)
     return chosen, {"datum": "inner", "over": over}, held, (*fixed, *names), []
@@ -271,7 +288,12 @@ def _wanted(survey, settings):
             found[survey.points.index(name), [AXES.index(axis) for axis in axes]] = True
         else:
             missing.append(
-                Problem("job.toml", f"{name} is no adjusted point", None, "adjustment.datum_points")
+                Problem(
+                    "job.toml",
+                    message("not_adjusted_point", "{name} is no adjusted point", name=name),
+                    None,
+                    "adjustment.datum_points",
+                )
             )
     if missing:
         raise InputError(missing)

@@ -369,8 +369,12 @@ def _refuse_missing_sd(images, sd):
         raise InputError(
             Problem(
                 images.file,
-                f"{len(missing)} image points have no standard deviation; give sx_um and sy_um, or "
-                "adjustment.image_sd_um",
+                message(
+                    "sds_of_images_missing",
+                    "{count} image points have no standard deviation; give sx_um and sy_um, or "
+                    "adjustment.image_sd_um",
+                    count=len(missing),
+                ),
                 row,
                 "sx_um",
             )

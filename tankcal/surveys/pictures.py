@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 from tankcal.network import Photos
 from tankcal.observations import PhotoOrientation, PhotoRotation
 from tankcal.rotations import from_angles
@@ -49,8 +50,14 @@ def _refuse_poor(photos, seen):
     poor = [
         Problem(
             "photos.csv",
-            f"photo {one.name} has {len(seen[one.name])} image points; at least {FEWEST} are "
-            "needed, or all six elements of its orientation with standard deviations",
+            message(
+                "photo_hardly_seen",
+                "photo {name} has {count} image points; at least {fewest} are needed, or all six "
+                "elements of its orientation with standard deviations",
+                name=one.name,
+                count=len(seen[one.name]),
+                fewest=FEWEST,
+            ),
             one.row,
         )
         for one in photos

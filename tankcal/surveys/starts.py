@@ -182,8 +182,13 @@ def _systems(survey):
             common = np.isfinite(theirs).all(axis=1) & np.isfinite(survey.xyz_m).all(axis=1)
             if common.sum() < 3:
                 raise SolutionError(
-                    f"system {system.name}: its transformation needs 3 points with x, y and z "
-                    f"that are also measured, {common.sum()} were given"
+                    message(
+                        "system_of_few",
+                        "system {name}: its transformation needs 3 points with x, y and z that "
+                        "are also measured, {count} were given",
+                        name=system.name,
+                        count=common.sum(),
+                    )
                 )
             here, there = survey.xyz_m[common], theirs[common]
             rotation = similarity(here, there).rotation

@@ -5,6 +5,7 @@ import numpy as np
 from tankcal.circles import taubin_circle
 from tankcal.errors import SolutionError
 from tankcal.job.model import Points
+from tankcal.messages import message
 from tankcal.surveys.results import Cause
 
 LARGEST = 2500  # points whose full covariance is kept: 7500 x 7500 numbers, 450 MB
@@ -63,7 +64,11 @@ def off_the_wall(xyz_m, outwards_m):
         return xyz_m
     if len(xyz_m) < 3:
         raise SolutionError(
-            f"offsets of targets need 3 points of the wall, {len(xyz_m)} were given"
+            message(
+                "offsets_of_few",
+                "offsets of targets need 3 points of the wall, {count} were given",
+                count=len(xyz_m),
+            )
         )
     middle = xyz_m[:, :2].mean(axis=0)
     x, y, _ = taubin_circle(xyz_m[:, :2] - middle)
@@ -76,9 +81,19 @@ def off_the_wall(xyz_m, outwards_m):
 
 def _refuse_size(n):
     if not n:
-        raise SolutionError("no target of targets.csv was adjusted: no point is left for the wall")
+        raise SolutionError(
+            message(
+                "no_target_adjusted",
+                "no target of targets.csv was adjusted: no point is left for the wall",
+            )
+        )
     if n > LARGEST:
         raise SolutionError(
-            f"{n} points of the wall were adjusted; at most {LARGEST} can be taken on with their "
-            "full covariance: name the targets that are to be used in targets.csv"
+            message(
+                "wall_too_large",
+                "{n} points of the wall were adjusted; at most {largest} can be taken on with "
+                "their full covariance: name the targets that are to be used in targets.csv",
+                n=n,
+                largest=LARGEST,
+            )
         )

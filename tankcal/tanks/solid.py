@@ -8,6 +8,7 @@ from tankcal.body import Body, SolidPart
 from tankcal.errors import InputError, Problem
 from tankcal.heads import End
 from tankcal.meshes import mesh_part
+from tankcal.messages import message
 from tankcal.solids import LyingTank, Sphere
 from tankcal.tanks.estimates import estimates_of
 from tankcal.tanks.furniture import deadwood_part
@@ -60,11 +61,18 @@ def solid_zero(job):
     if job.mesh is not None or datum.dip_plate_z_m is None:
         return 0.0
     if datum.bottom_z_m is None:
-        expected = "not available beside a scan: dips count from the inside bottom; expected blank"
+        expected = message(
+            "plate_beside_scan",
+            "not available beside a scan: dips count from the inside bottom; expected blank",
+        )
         raise InputError(Problem("job.toml", expected, column="datum.dip_plate_z_m"))
     zero = datum.dip_plate_z_m - datum.bottom_z_m
     if zero < 0:
-        expected = f"found {datum.dip_plate_z_m:g}; expected a plate inside the tank, 0 or above"
+        expected = message(
+            "plate_below_solid",
+            "found {plate_m:g}; expected a plate inside the tank, 0 or above",
+            plate_m=datum.dip_plate_z_m,
+        )
         raise InputError(Problem("job.toml", expected, column="datum.dip_plate_z_m"))
     return zero
 
