@@ -4,7 +4,7 @@ import tomllib
 from numbers import Integral, Number
 
 from tankcal.digits import NOTHING, Marks, fixed, shortest
-from tankcal.errors import TankcalError
+from tankcal.errors import SHEET, TankcalError
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
 from tankcal.job.form_words import word_of
 from tankcal.languages import DEFAULT
@@ -100,7 +100,7 @@ def in_language(words, record):
     adjustment, corrections = record["adjustment"], record["corrections"]
     return {
         **record,
-        "warnings": [_said(words, one, "text") for one in record["warnings"]],
+        "warnings": [_placed(words, _said(words, one, "text")) for one in record["warnings"]],
         "corrections": [_said(words, one, "formula", "formula_") for one in corrections],
         "adjustment": adjustment and _adjustment_in_language(words, adjustment),
         "rule": record.get("rule") and _rule_in_language(words, record),
@@ -126,6 +126,15 @@ def _said(words, row, key, of=""):
     """A row of the record with the text in `key`; one of an older record has no code."""
     code, values = row.get(f"{of}code"), row.get(f"{of}values", {})
     return {**row, key: message_sentence(words, row[key], code, values)}
+
+
+def _placed(words, row):
+    """A row of the record whose sheet is named in the reader's language."""
+    if not row["file"].startswith(SHEET):
+        return row
+    sheet = row["file"].removeprefix(SHEET)
+    text = message_sentence(words, row["file"], "in_sheet", {"sheet": sheet})
+    return {**row, "file": text}
 
 
 def _number(value, form, marks):

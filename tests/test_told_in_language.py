@@ -16,7 +16,9 @@ from tankcal.job.form_words import meant, word_of
 from tankcal.job.tables import in_book
 from tankcal.languages import nearest_language
 from tankcal.messages import Message
+from tankcal.record import record_of
 from tankcal.starter import write_starter
+from tankcal.words import in_language, load_words
 
 OTHERS = ("pt-BR", "es")
 ENGLISH = re.compile(r"\b(the|expected|found|missing|blank|row|sheet|with|number|is|of)\b")
@@ -79,9 +81,12 @@ def test_warnings_of_a_workbook_name_it_and_its_words_are_read(tmp_path):
     path = write_workbook(tmp_path / "tanque.xlsx", settings=settings)
     job = tankcal.load(path)
     assert (job.survey.side, job.table.monte_carlo) == ("outside", False)
-    (told,) = (one for one in tankcal.run(job).warnings if "nominal_volume" in str(one.column))
+    result = tankcal.run(job)
+    (told,) = (one for one in result.warnings if "nominal_volume" in str(one.column))
     assert str(told).startswith("tanque.xlsx, sheet job, tank.nominal_volume_m3: ")
     assert asked_language(path) == "pt-BR"
+    record = in_language(load_words("pt-BR"), record_of(result))
+    assert {one["file"] for one in record["warnings"]} <= {"planilha job", "planilha uncertainty"}
     speak("pt-BR")
     assert said(told.text).startswith("tanque.xlsx, planilha job, tank.nominal_volume_m3: a capac")
 
