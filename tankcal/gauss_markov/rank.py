@@ -8,6 +8,7 @@ different units or nearly equal parameters stays far above it.
 import numpy as np
 
 from tankcal.gauss_markov.eliminating import add_rows, back_substitute, eliminate
+from tankcal.messages import message
 
 NOTHING = 1e-7
 FAINT = 1e-9  # eigenvalue of the scaled reduced system that makes a direction a candidate
@@ -21,14 +22,19 @@ def diagnosis(work, state, bad_block):
     if bad_block is not None:
         first = model.reduced + 3 * bad_block
         names = ", ".join(model.name_of(column) for column in range(first, first + 3))
-        return f"not determined by the observations: {names}"
+        return message("undetermined", "not determined by the observations: {names}", names=names)
     directions, lengths = undetermined(work, state)
     if model.free is not None:
         directions = _without(directions, model.free(state) * lengths[:, None])
     if not directions.shape[1]:
         return None
     told = _in_words(model, directions)
-    return f"rank defect {directions.shape[1]}: not determined by the observations: {told}"
+    return message(
+        "rank_defect",
+        "rank defect {defect}: not determined by the observations: {told}",
+        defect=directions.shape[1],
+        told=told,
+    )
 
 
 def weakness(work, state):
@@ -39,7 +45,11 @@ def weakness(work, state):
         directions = _without(directions, model.free(state) * lengths[:, None])
     if not directions.shape[1]:
         return ""
-    return f"; hardly determined by the observations: {_in_words(model, directions[:, :1])}"
+    return message(
+        "hardly_felt",
+        "; hardly determined by the observations: {unknowns}",
+        unknowns=_in_words(model, directions[:, :1]),
+    )
 
 
 def _in_words(model, directions):

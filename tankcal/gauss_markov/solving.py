@@ -49,7 +49,13 @@ def linearise(model, state):
         work = _Work(model)
         cost, factor = work.evaluate(state), work.factor(state, 0.0)
         if factor is None:
-            raise SolutionError(f"the normal equations have no factor{weakness(work, state)}")
+            raise SolutionError(
+                message(
+                    "no_factor",
+                    "the normal equations have no factor{weakness}",
+                    weakness=weakness(work, state),
+                )
+            )
         _refuse_untouched(model, factor)
         return Solution(work, state, cost, 0, factor, factor)
 
@@ -85,20 +91,29 @@ def _solved(work, state, max_iterations, tolerance):
         else:
             cost, damping = work.evaluate(state), _stronger(damping, resting)
     raise SolutionError(
-        f"the adjustment did not converge in {max_iterations} iterations{weakness(work, state)}"
+        message(
+            "not_converged",
+            "the adjustment did not converge in {most} iterations{weakness}",
+            most=max_iterations,
+            weakness=weakness(work, state),
+        )
     )
 
 
 def _refuse_untouched(model, factor):
     if len(factor.untouched):
         names = ", ".join(model.name_of(int(column)) for column in factor.untouched)
-        raise UndeterminedError(f"no observation says anything about: {names}")
+        raise UndeterminedError(
+            message("says_nothing", "no observation says anything about: {names}", names=names)
+        )
 
 
 def _stronger(damping, resting):
     damping = 10 * damping or resting
     if damping > STRONGEST_DAMPING:
-        raise SolutionError("the adjustment cannot be improved, and is not at a minimum")
+        raise SolutionError(
+            message("no_minimum", "the adjustment cannot be improved, and is not at a minimum")
+        )
     return damping
 
 

@@ -2,6 +2,7 @@
 
 from tankcal.errors import SolutionError
 from tankcal.gauss_markov import UndeterminedError, linearise, solve
+from tankcal.messages import message
 from tankcal.network.assembly import assemble
 from tankcal.network.datum import held, in_words, unobserved
 from tankcal.network.results import Adjusted
@@ -63,7 +64,13 @@ def _adjusted(survey, problem, datum, solved):
             _refuse_defect(problem)
         raise
     except SolutionError as error:
-        raise SolutionError(f"{error}{hanging_datum(problem)}") from error
+        text = message(
+            "and_hanging",
+            "{error}{datum}",
+            error=error.args[0],
+            datum=hanging_datum(problem),
+        )
+        raise SolutionError(text) from error
     if survey.photos is not None:
         refuse_worthless_cameras(survey, problem, solution)
     return Adjusted(survey, problem, solution)

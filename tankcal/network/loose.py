@@ -116,8 +116,12 @@ def _apart(survey, own, piece):
     names = [survey.photos.names[i] for i in np.flatnonzero(own.oriented & ~piece.oriented)]
     common, some = int((own.known & piece.known).sum()), ", ".join(names[:10])
     if common > 3:
-        why = f"but the {common} points that they share with the rest do not fit"
-        return f"photos {some} hang together, {why}"
+        why = message(
+            "shared_do_not_fit",
+            "but the {common} points that they share with the rest do not fit",
+            common=common,
+        )
+        return message("photos_apart", "photos {some} hang together, {why}", some=some, why=why)
     return message(
         "photos_loose",
         "photos {some} hang together, but share only {common} known points with the rest: 3 that "

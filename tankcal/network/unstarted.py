@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.errors import SolutionError
+from tankcal.messages import listed, message
 from tankcal.network.positioning import SHOWN
 from tankcal.network.survey import FEWEST
 from tankcal.observations import Distances, HeightDifferences, VerticalAngles
@@ -28,15 +29,35 @@ def refuse_missing(survey, sights, xyz_m, piece, sets, reasons, why=lambda point
     known = np.isfinite(xyz_m).all(axis=1)
     for photo in np.flatnonzero(~piece.oriented):
         count = known[sights[photo].point].sum()
-        few = ", which several positions explain" if count == 3 else ""
-        told.append(f"photo {survey.photos.names[photo]} ({count} known points{few})")
+        name = survey.photos.names[photo]
+        if count == 3:
+            told.append(
+                message(
+                    "photo_of_three",
+                    "photo {name} (3 known points, which several positions explain)",
+                    name=name,
+                )
+            )
+        else:
+            told.append(
+                message(
+                    "photo_of_points", "photo {name} ({count} known points)", name=name, count=count
+                )
+            )
     whole = np.flatnonzero(missing[:, :2].any(axis=1))
-    told += _listed("point", [survey.points[i] for i in whole])
+    points = [message("named_point", "point {point}", point=survey.points[i]) for i in whole]
+    told += points if len(points) <= LISTED else [listed(points, LISTED)]
     flat = np.isfinite(xyz_m[:, :2]).all(axis=1) & np.isnan(xyz_m[:, 2])
     level = np.flatnonzero(flat if (flat & ~hopeless).any() else flat & ~hopeless)
     if not told:
-        told += _listed("orientation of direction set", list(np.flatnonzero(np.isnan(sets)) + 1))
-    sentences = ["no approximate values for " + ", ".join(told)] if told else []
+        unknown = [
+            message("named_set", "orientation of direction set {number}", number=number)
+            for number in np.flatnonzero(np.isnan(sets)) + 1
+        ]
+        told += unknown if len(unknown) <= LISTED else [listed(unknown, LISTED)]
+    sentences = (
+        [message("not_started", "no approximate values for {told}", told=[*told])] if told else []
+    )
     if len(level):
         sentences.append(_no_heights(survey, level))
     if sentences:
@@ -45,7 +66,8 @@ def refuse_missing(survey, sights, xyz_m, piece, sets, reasons, why=lambda point
             isinstance(one, SeveralPlacesError) for one in errors
         )
         kind = SeveralPlacesError if several and errors else SolutionError
-        raise kind("; ".join([*sentences, *map(str, errors), *(one for one in reasons if one)]))
+        texts = [*sentences, *(one.args[0] for one in errors), *(one for one in reasons if one)]
+        raise kind(one_sentence(texts))
     middle = np.nanmean(xyz_m, axis=0) if known.any() else np.zeros(3)
     return np.where(np.isnan(xyz_m), middle, xyz_m)
 
@@ -85,32 +107,63 @@ def not_fixed(survey, found, point, centre_m):
 def hanging(survey, local, known):
     """A sentence about points (points,) of a local frame in plan that joins no known ones."""
     names = [str(survey.points[i]) for i in np.flatnonzero(local & ~known)]
-    some = ", ".join(names[:LISTED]) + (", ..." if len(names) > LISTED else "")
+    some = listed(names, LISTED)
     common = int((local & known).sum())
     if common > 1:
-        return (
-            f"points {some} may stand on either side of the line through the known ones: give one "
-            "of them approximate coordinates (in control.csv, standard deviations blank)"
+        return message(
+            "either_side",
+            "points {some} may stand on either side of the line through the known ones: give one "
+            "of them approximate coordinates (in control.csv, standard deviations blank)",
+            some=some,
         )
-    return (
-        f"points {some} hang together, but share only {common} known point{'s' * (common != 1)} "
-        "with the rest: 2 are needed, or 1 and an azimuth"
+    if common == 1:
+        return message(
+            "points_share_one",
+            "points {some} hang together, but share only 1 known point with the rest: 2 are "
+            "needed, or 1 and an azimuth",
+            some=some,
+        )
+    return message(
+        "points_share_few",
+        "points {some} hang together, but share only {common} known points with the rest: 2 are "
+        "needed, or 1 and an azimuth",
+        some=some,
+        common=common,
     )
 
 
-def _listed(what, names):
-    more = [f"{len(names) - LISTED} more"] if len(names) > LISTED else []
-    return [f"{what} {name}" for name in names[:LISTED]] + more
+def one_sentence(parts):
+    """Parts in a row, a semicolon between them."""
+    *first, last = parts
+    if not first:
+        return last
+    before = one_sentence(first)
+    return message("and_also", "{before}; {last}", before=before, last=last)
 
 
 def _no_heights(survey, level):
-    names = ", ".join(str(survey.points[i]) for i in level[:LISTED])
-    names += ", ..." if len(level) > LISTED else ""
+    names = listed([str(survey.points[i]) for i in level], LISTED)
     kinds = (HeightDifferences, VerticalAngles)
     observed = any(isinstance(one, kinds) and len(one) for one in survey.observations)
     spatial = any(isinstance(one, Distances) and not one.horizontal for one in survey.observations)
-    why = "no zenith angle, vertical angle or levelled height difference was observed"
+    why = message(
+        "no_height_observed",
+        "no zenith angle, vertical angle or levelled height difference was observed",
+    )
     if observed:
-        why = "they hang on no point with a known z"
-    end = "; distances are taken as spatial ones unless kind = horizontal" if spatial else ""
-    return f"the heights (z) of {names} are not determined: {why}; give their z as control{end}"
+        why = message("heights_hang_free", "they hang on no point with a known z")
+    end = (
+        message(
+            "distances_taken_spatial",
+            "; distances are taken as spatial ones unless kind = horizontal",
+        )
+        if spatial
+        else ""
+    )
+    return message(
+        "heights_not_determined",
+        "the heights (z) of {names} are not determined: {why}; give their z as control{end}",
+        names=names,
+        why=why,
+        end=end,
+    )

@@ -58,7 +58,7 @@ def adjust_survey(measurements, tell=None):
         told = _why_not(measurements, str(error))
         if not told:
             raise
-        raise SolutionError("\n".join([str(error), *map(str, told)])) from error
+        raise SolutionError(*error.args, *(one.text for one in told)) from error
     tell(message("judging_residuals", "working out what the residuals say"))
     return replace(_complete(*found, measurements), depth=depth)
 

@@ -41,7 +41,7 @@ def searched(survey, options, gross=None):
             "search_failed",
             "the search for blunders failed ({error}): nothing was set aside, blunders may be in"
             " the result",
-            error=str(error),
+            error=error.args[0],
         )
         return Searched(
             adjusted, (), 1, (), (Problem("job.toml", text, None, "adjustment.snooping"),)
