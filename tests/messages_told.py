@@ -1,10 +1,10 @@
-"""Warnings as tests read them, none of which may lack the code that paper translates it by."""
+"""Warnings and problems as tests read them: each has the code that it is translated by."""
 
 from tankcal.messages import Message
 
 
 def lines(problems):
-    """Warnings as the terminal shows them."""
+    """Warnings or problems as the terminal shows them."""
     uncoded = [str(one) for one in problems if not isinstance(one.expected, Message)]
     assert not uncoded
     return [str(one) for one in problems]

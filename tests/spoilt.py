@@ -2,6 +2,7 @@
 
 import pytest
 from job_builder import toml_text, write_book, write_folder
+from messages_told import lines
 
 from tankcal.errors import InputError
 from tankcal.job import load
@@ -17,9 +18,10 @@ def write(tmp_path, parts, form):
 
 
 def problems_of(path):
-    """The problems of a job, which must have some."""
+    """The problems of a job, which must have some, each with the code that others say it by."""
     with pytest.raises(InputError) as caught:
         load(path)
+    lines(caught.value.problems)
     return caught.value.problems
 
 

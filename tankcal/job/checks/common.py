@@ -44,7 +44,12 @@ def refuse_repeated(table, column, log):
         if name is None:
             continue
         if name in first_row:
-            expected = f"{name!r} is there already, in row {first_row[name]}; expected once"
+            expected = message(
+                "name_twice",
+                "{name!r} is there already, in row {first_row}; expected once",
+                name=name,
+                first_row=first_row[name],
+            )
             log.problem(table.file, expected, row, column)
         else:
             first_row[name] = row
