@@ -1,4 +1,4 @@
-"""What may be wrong in place of an image point that was set aside: pairs of coordinates as pairs."""
+"""What may be wrong in place of an image point that was set aside: coordinates as pairs."""
 
 from dataclasses import replace
 
