@@ -46,7 +46,7 @@ def main(arguments=None):
     try:
         return options.command(options) or 0
     except TankcalError as error:
-        if getattr(options, "json", False):
+        if getattr(options, "machine", False):
             print_json(**failure(error))
             return error.exit_status
         for text in error.texts:

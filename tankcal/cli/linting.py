@@ -42,7 +42,7 @@ def _lint(options):
         raise InputError(Problem("--nominal-diameter", expected))
     nominal = Nominal(options.nominal_volume, options.nominal_diameter, options.nominal_height)
     report = lint(options.file, nominal, options.sheet)
-    if options.json:
+    if options.machine:
         print_json(exit_status=2 if report.errors else 0, **_plain(report))
         return 2 if report.errors else 0
     for finding in report.findings[:MOST_FINDINGS]:

@@ -11,6 +11,7 @@ def add_json(parser):
     """The option `--json` of a command."""
     parser.add_argument(
         "--json",
+        dest="machine",
         action="store_true",
         help="print one JSON object instead of lines of text, when it fails too; implies --quiet",
     )

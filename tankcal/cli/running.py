@@ -81,8 +81,8 @@ def _run(options):
     source = Path(options.job)
     out = Path(options.out) if options.out else _default_out(source)
     compute = _adjust if options.only == "adjustment" else _compute
-    tell = _tell_machine if options.json else _tell
-    quiet = options.quiet or options.json
+    tell = _tell_machine if options.machine else _tell
+    quiet = options.quiet or options.machine
     papers = letterhead_of(options), not options.no_papers
     compute(source, out, quiet, options.strict, papers, tell)
 

@@ -58,6 +58,7 @@ class Writer:
         rule = {"bottom": 1, "bottom_color": ACCENT}
         look = self.format(bold=True, font_size=12, font_color=ACCENT, **rule)
         self.set_height(sheet, row, 21)
+        self.set_height(sheet, row + 1, 18)  # the rule would touch what stands under it
         for column in range(columns):
             sheet.write_blank(row, column, None, look)
         sheet.write_string(row, 0, text, look)
