@@ -76,6 +76,7 @@ def test_every_kind_of_block_has_html():
     [
         (lambda: blocks.table(["a", "b"], [["1"]]), "row 1 has 1 cells, the table 2 columns"),
         (lambda: blocks.table(["a"], [["1"]], align=["middle"]), "alignments"),
+        (lambda: blocks.table(["a"], [["1"]], formulas=[1]), "in columns 0 to 0: "),
         (lambda: blocks.table([["a", ""]]), "DataFrame"),
         (lambda: blocks.figure("<svg/>", "c", " "), "alt"),
         (lambda: blocks.figure("<svg/>", "c", "a", width=2), "up to 1"),
@@ -110,6 +111,7 @@ def test_the_same_figure_gives_the_same_bytes():
         (r"\frac{a,b}{2.5}", r"frac(a \, b, 2.5)"),
         (r"\sqrt{\bar{x}-1}", "sqrt(overline(x) minus 1)"),
         (r"\text{at 20 C}\cdot\alpha", 'upright("at 20 C") dot.op alpha'),
+        ("1{,}25", r'1 class("normal", \,) 25'),
     ],
 )
 def test_formula(latex, typst):

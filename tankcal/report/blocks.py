@@ -129,15 +129,17 @@ def key_values(items, caption=""):
     )
 
 
-def table(columns, rows=None, caption="", align=None, decimal_mark="."):
+def table(columns, rows=None, caption="", align=None, decimal_mark=".", formulas=()):
     """A table with one heading row; or, from a pandas DataFrame alone, the same.
 
     columns   a heading each, or [heading, unit]
     rows      lists of text, as long as `columns`; None is printed as a dash
     align     "left", "center", "right" or "decimal" for each column; default: numbers to the right
     decimal_mark  on which the numbers of a "decimal" column stand in line
+    formulas  numbers of the columns, from 0, whose known formulas are set (report/plain_formulas)
     """
-    return _table("table", columns, rows, caption, align, decimal_mark)
+    more = {"formulas": list(formulas)} if formulas else {}
+    return _table("table", columns, rows, caption, align, decimal_mark, **more)
 
 
 def columns_table(columns, rows=None, caption="", align=None, across=4, decimal_mark="."):
@@ -188,6 +190,9 @@ def _table(kind, columns, rows, caption, align, decimal_mark, **more):
     align = list(align or (_natural_alignment(cells, i, decimal_mark) for i in range(len(heads))))
     if len(align) != len(heads) or not set(align) <= set(ALIGNMENTS):
         raise TankcalError(f"{len(heads)} alignments of {', '.join(ALIGNMENTS)} expected: {align}")
+    formulas = more.get("formulas", [])
+    if not set(formulas) <= set(range(len(heads))):
+        raise TankcalError(f"formulas expected in columns 0 to {len(heads) - 1}: {formulas}")
     data = {"kind": kind, "caption": _text(caption), "align": align, "rows": cells, **more}
     data["decimal_mark"] = decimal_mark
     data["columns"] = [{"heading": _text(head), "unit": _text(unit)} for head, unit in heads]

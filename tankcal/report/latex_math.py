@@ -66,7 +66,7 @@ _FUNCTIONS = ("sin", "cos", "tan", "arctan", "ln", "log", "exp", "min", "max")
 _SPACES = {",": "thin", ";": "med", "quad": "quad", " ": "space"}
 _ACCENTS = {"bar": ("overline", "¯"), "hat": ("hat", "^")}
 _OPERATORS = "+-=()[]|/<>,.!':"
-_TOKEN = re.compile(r"\\([A-Za-z]+|.)|([0-9]+(?:\.[0-9]+)?)|(\S)|(\s+)", re.DOTALL)
+_TOKEN = re.compile(r"\\([A-Za-z]+|.)|([0-9]+(?:(?:\.|\{,\})[0-9]+)?)|(\S)|(\s+)", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,8 @@ class _Reader:
         if macro:
             return self.macro(macro)
         if number:
-            return number, f"<mn>{number}</mn>"
+            typst = number.replace("{,}", ' class("normal", \\,) ')  # no gap behind the comma
+            return typst, f"<mn>{number.replace('{,}', ',')}</mn>"
         if character == "{":
             inner = self.sequence(until="}")
             self.at += 1

@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 from tankcal.errors import TankcalError
 from tankcal.report import attachments
 from tankcal.report.blocks import WEB_ONLY
+from tankcal.report.plain_formulas import formula_nodes
 from tankcal.shipped import shipped
 
 STANDARDS = ["a-3a", "ua-1"]  # archival, and readable by a screen reader
@@ -29,7 +30,7 @@ def pdf(blocks, folder="."):
     Raises TankcalError when the page cannot be set (a character that no font has, a broken SVG),
     or a file to be attached is not the one that it was.
     """
-    blocks = [block for block in blocks if block["kind"] not in WEB_ONLY]
+    blocks = [_with_formulas(block) for block in blocks if block["kind"] not in WEB_ONLY]
     attached = attachments.contents(blocks, folder)
     files, blocks = _pictures_as_files(blocks)
     files |= {f"attached-{name}": content for name, content in attached.items()}
@@ -83,6 +84,18 @@ def _copy_fonts(folder):
     for pattern in FONT_FILES:
         for path in fonts.glob(pattern):
             shutil.copyfile(path, Path(folder) / path.name)
+
+
+def _with_formulas(block):
+    """A table with the nodes of each text in its columns of formulas: {column: {text: nodes}}.
+
+    They are made here from the text, so that no typst code is ever taken from a notebook.
+    """
+    if block["kind"] != "table":
+        return block
+    columns = block.get("formulas", ())
+    nodes = {i: {row[i]: formula_nodes(row[i]) for row in block["rows"]} for i in columns}
+    return block | {"formulas": nodes}
 
 
 def _pictures_as_files(blocks):

@@ -39,6 +39,7 @@ class Column:
     heading   key of another heading
     nothing   what is printed for a value that does not exist
     align     one of blocks.ALIGNMENTS; None: text to the left, numbers by their decimal marks
+    formulas  True: formulas of the record in this text are set as such
     """
 
     key: str
@@ -53,6 +54,7 @@ class Column:
     heading: str | None = None
     nothing: str = NOTHING
     align: str | None = None
+    formulas: bool = False
 
 
 class PlainPaper:
@@ -160,7 +162,8 @@ class PlainPaper:
         mark = self.marks.decimal
         if across:
             return blocks.columns_table(heads, cells, caption, align, across, mark)
-        return blocks.table(heads, cells, caption, align, mark)
+        formulas = [number for number, column in enumerate(columns) if column.formulas]
+        return blocks.table(heads, cells, caption, align, mark, formulas)
 
     def _unit_in_words(self, name):
         """A unit at the head of a column; one that holds a word is in the language."""

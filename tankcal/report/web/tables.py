@@ -2,6 +2,8 @@
 
 from html import escape
 
+from tankcal.report.plain_formulas import formula_nodes
+
 PIECE = 66  # rows: one column of a printed page
 SHORT = 20  # rows of a table that is printed on one page
 
@@ -75,20 +77,32 @@ def _table(block, rows, caption):
 
 def _rows(block):
     """The rows as HTML, for their numbers line up over the whole table."""
+    formulas = block.get("formulas", ())
     columns = [
-        _cells(column, align, block["decimal_mark"])
-        for column, align in zip(zip(*block["rows"], strict=True), block["align"], strict=False)
+        _cells(column, align, block["decimal_mark"], _with_formulas if i in formulas else escape)
+        for i, (column, align) in enumerate(
+            zip(zip(*block["rows"], strict=True), block["align"], strict=False)
+        )
     ]
     return [f"<tr>{''.join(cells)}</tr>" for cells in zip(*columns, strict=True)]
 
 
-def _cells(texts, align, mark):
+def _cells(texts, align, mark, shown):
     """The cells of one column; under "decimal", filled up so that the decimal marks line up."""
     fills = decimal_fills(texts, mark) if align == "decimal" else [""] * len(texts)
     return [
-        f'<td class="{align}">{escape(text)}{fill}</td>'
+        f'<td class="{align}">{shown(text)}{fill}</td>'
         for text, fill in zip(texts, fills, strict=True)
     ]
+
+
+def _with_formulas(text):
+    return "".join(
+        f'<math display="inline">{node["mathml"]}</math>'
+        if node["t"] == "math"
+        else escape(node["s"])
+        for node in formula_nodes(text)
+    )
 
 
 def _first_cell(block):
