@@ -11,6 +11,9 @@ and the distortion of a point (x, y), with r2 = x2 + y2, is the sum of
     affinity    A y, B y ("both_y", Silva 40-44);  A x, B x ("both_x", Pessoa 6);
                 A x + B y, 0 ("b1_b2")              written as (dx, dy)
 
+With the affinity "before_distortion" (DBAT) it is no part of the sum: in every convention the
+measured coordinate, from the principal point, is first replaced by (1 + A) x + B y, y.
+
 Three conventions say which point that is, and on which side it stands:
 
     distortion_of_ideal    x = x0 + xi + d(xi)               OpenCV, AICON
@@ -22,14 +25,14 @@ unknowns and the misclosure is "computed minus measured", in the image as it was
 weights "ideal" it is counted in the ideal image: xi less the corrected measured coordinate.
 
 Image coordinates and c, x0, y0, R0 in mm; K1 mm^-2, K2 mm^-4 ...; P1, P2 mm^-1, P3 mm^-2, P4 mm^-4.
-Source: Silva 1995 (39-47, 58); Pessoa 2017 (3-6, 9, 10); Brown 1971.
+Source: Silva 1995 (39-47, 58); Pessoa 2017 (3-6, 9, 10); Brown 1971; DBAT, res_euler_brown_1.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.imaging import distort, image_point, undistorted_by
+from tankcal.imaging import distort, image_point, led, undistorted_by
 
 NEWTON_ROUNDS = 50
 PARAMETERS = ("c", "x0", "y0", "K1", "K2", "K3", "K4", "P1", "P2", "P3", "P4", "A", "B")
@@ -37,11 +40,12 @@ _UNITS = ("mm", "mm", "mm", "mm-2", "mm-4", "mm-6", "mm-8", "mm-1", "mm-1", "mm-
 UNITS = dict(zip(PARAMETERS, _UNITS, strict=True))
 CONVENTIONS = {"distortion_of_ideal": 0.0, "correction_added": 1.0, "correction_subtracted": -1.0}
 WEIGHTS = ("measured", "ideal")
-# (dx by A x, dx by A y, dx by B y, dy by B x, dy by B y)
+# (dx by A x, dx by A y, dx by B y, dy by B x, dy by B y, A x + B y before the distortion)
 AFFINITIES = {
-    "both_y": (0.0, 1.0, 0.0, 0.0, 1.0),
-    "both_x": (1.0, 0.0, 0.0, 1.0, 0.0),
-    "b1_b2": (1.0, 0.0, 1.0, 0.0, 0.0),
+    "both_y": (0.0, 1.0, 0.0, 0.0, 1.0, 0.0),
+    "both_x": (1.0, 0.0, 0.0, 1.0, 0.0, 0.0),
+    "b1_b2": (1.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+    "before_distortion": (0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
 }
 
 
@@ -62,7 +66,7 @@ class Form:
 
     @property
     def numbers(self):
-        """(7,) side (0, +1, -1), the five affinity switches, R0^2: what the formulas take."""
+        """(8,) side (0, +1, -1), the six affinity switches, R0^2: what the formulas take."""
         side = CONVENTIONS[self.convention]
         return np.array([side, *AFFINITIES[self.affinity], self.radial_balance_mm**2])
 
@@ -76,7 +80,7 @@ def corrected(xy_mm, interior, form):
     """
     numbers = form.numbers
     q = tuple(np.asarray(interior, dtype=float).T)
-    x, y = xy_mm[:, 0] - q[1], xy_mm[:, 1] - q[2]
+    x, y = led(xy_mm[:, 0] - q[1], xy_mm[:, 1] - q[2], q, numbers)
     if form.convention != "distortion_of_ideal":
         dx, dy = distort(x, y, q, numbers)[:2]
         return np.column_stack([x + numbers[0] * dx, y + numbers[0] * dy])
@@ -100,12 +104,12 @@ def balanced_about(interior, form, radius_mm):
     """
     side = CONVENTIONS[form.convention]
     plain = rescaled(
-        interior, side, 1 - (side or 1) * _at_balance(interior, form.radial_balance_mm)
+        interior, form, 1 - (side or 1) * _at_balance(interior, form.radial_balance_mm)
     )
     target = replace(form, radial_balance_mm=float(radius_mm))
     s = 1.0
     for _ in range(NEWTON_ROUNDS):
-        found = rescaled(plain, side, 1 / s)
+        found = rescaled(plain, form, 1 / s)
         wanted = 1 - (side or 1) * _at_balance(found, radius_mm)
         if abs(wanted - s) < 1e-15:
             break
@@ -119,16 +123,18 @@ def _at_balance(interior, radius_mm):
     return float(np.polyval(np.append(np.asarray(interior)[6:2:-1], 0.0), e))
 
 
-def rescaled(interior, side, s):
+def rescaled(interior, form, s):
     """Interior parameters (13,) of the same camera when a scale s goes over to c.
 
-    side  0: s xi is the ideal point of the same image in place of xi; 1 or -1 (a correction): the
-          equation of the correction is divided by s
+    distortion_of_ideal: s xi is the ideal point of the same image in place of xi; else the equation
+    of the correction is divided by s. An affinity before the distortion stays what it is.
     """
     q = np.array(interior, dtype=float)
-    if side:
+    if CONVENTIONS[form.convention]:
         q[0] /= s
         q[[3, 4, 5, 6, 7, 8, 11, 12]] /= s
-        return q
-    powers = np.array([1, 0, 0, -3, -5, -7, -9, -2, -2, -2, -4, -1, -1], dtype=float)
-    return q * s**powers
+    else:
+        q *= s ** np.array([1, 0, 0, -3, -5, -7, -9, -2, -2, -2, -4, -1, -1], dtype=float)
+    if form.affinity == "before_distortion":
+        q[11:] = interior[11:]
+    return q

@@ -14,17 +14,22 @@ from tankcal.compiled import compiled, worthwhile
 NEWTON_STEPS = 6  # quadratic: a distortion of 30 % of the radius is solved to the last digit
 
 
+def led(x, y, q, form):
+    """The measured point (x, y), from the principal point, after the affinity before distortion."""
+    return (1.0 + form[6] * q[11]) * x + form[6] * q[12] * y, y
+
+
 def distort(x, y, q, form):
     """Distortion of points (x, y) from the principal point, and its derivatives by x and y.
 
     x, y  numbers or (n,) mm
     q     13 interior parameters in the order of PARAMETERS, numbers or (n,)
-    form  7 numbers, see Form.numbers
+    form  8 numbers, see Form.numbers
 
     Returns dx, dy, d dx/dx, d dx/dy, d dy/dx, d dy/dy.
     """
     k1, k2, k3, k4, p1, p2, p3, p4, a, b = q[3:13]
-    _, ax, ay, bxy, byx, by, e = form
+    _, ax, ay, bxy, byx, by, _, e = form
     r2 = x * x + y * y
     radial = r2 * (k1 + r2 * (k2 + r2 * (k3 + r2 * k4))) - e * (k1 + e * (k2 + e * (k3 + e * k4)))
     slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * (3.0 * k3 + r2 * 4.0 * k4)))
@@ -45,7 +50,7 @@ def distort(x, y, q, form):
 def distortion_derivatives(x, y, q, form):
     """Derivatives of the distortion by K1..K4, P1..P4, A, B: ten for dx and ten for dy."""
     p1, p2, p3, p4 = q[7:11]
-    _, ax, ay, bxy, byx, by, e = form
+    _, ax, ay, bxy, byx, by, _, e = form
     r2 = x * x + y * y
     k1, k2, k3, k4 = r2 - e, r2 * r2 - e * e, r2**3 - e**3, r2**4 - e**4
     m = 1.0 + r2 * (p3 + r2 * p4)
@@ -73,23 +78,35 @@ def undistorted_by(x, y, q, form):
 
 
 def image_point(x, y, q, form, of_ideal):
-    """The measured coordinate of an ideal point, and its derivatives by the ideal point.
+    """The measured coordinate of an ideal point, and its derivatives.
 
     x, y      numbers or (n,) mm, ideal, from the principal point
     of_ideal  True for "distortion_of_ideal"
 
     Returns the measured x and y (frame of the image), the point at which the distortion holds, the
-    side on which it stands there, and d x/d xi, d x/d eta, d y/d xi, d y/d eta.
+    derivatives d x/d xi, d x/d eta, d y/d xi, d y/d eta, and those by the distortion there, d x/d
+    dx, d x/d dy, d y/d dx, d y/d dy.
     """
     if of_ideal:
         dx, dy, dxx, dxy, dyx, dyy = distort(x, y, q, form)
-        return q[1] + x + dx, q[2] + y + dy, x, y, 1.0, 1.0 + dxx, dxy, dyx, 1.0 + dyy
-    side = form[0]
-    px, py = undistorted_by(x, y, q, form)
-    _, _, dxx, dxy, dyx, dyy = distort(px, py, q, form)
-    a, b, c, d = 1.0 + side * dxx, side * dxy, side * dyx, 1.0 + side * dyy
-    t = 1.0 / (a * d - b * c)
-    return q[1] + px, q[2] + py, px, py, -side, d * t, -b * t, -c * t, a * t
+        px, py, mx, my = x, y, q[1] + x + dx, q[2] + y + dy
+        a, b, c, d = 1.0 + dxx, dxy, dyx, 1.0 + dyy
+        e, f, g, h = 1.0, 0.0, 0.0, 1.0
+    else:
+        side = form[0]
+        px, py = undistorted_by(x, y, q, form)
+        _, _, dxx, dxy, dyx, dyy = distort(px, py, q, form)
+        a, b, c, d = 1.0 + side * dxx, side * dxy, side * dyx, 1.0 + side * dyy
+        t = 1.0 / (a * d - b * c)
+        mx, my = q[1] + px, q[2] + py
+        a, b, c, d = d * t, -b * t, -c * t, a * t
+        e, f, g, h = -side * a, -side * b, -side * c, -side * d
+    if form[6] == 0.0:
+        return mx, my, px, py, a, b, c, d, e, f, g, h
+    s, k = 1.0 / (1.0 + q[11]), q[12]  # what led does, undone
+    mx = q[1] + s * (mx - q[1] - k * (my - q[2]))
+    a, b, e, f = s * (a - k * c), s * (b - k * d), s * (e - k * g), s * (f - k * h)
+    return mx, my, px, py, a, b, c, d, e, f, g, h
 
 
 def ideal_point(u, v, w, r, c):
@@ -139,17 +156,16 @@ def one_image_point(p, r, q, form, of_ideal):
     v = r[3] * p[0] + r[4] * p[1] + r[5] * p[2]
     w = r[6] * p[0] + r[7] * p[1] + r[8] * p[2]
     xi, eta, dxi, deta = ideal_point(u, v, w, r, q[0])
-    x, y, px, py, side, a, b, c, d = image_point(xi, eta, q, form, of_ideal)
+    x, y, px, py, a, b, c, d, e, f, g, h = image_point(xi, eta, q, form, of_ideal)
     kx, ky = distortion_derivatives(px, py, q, form)
-    if of_ideal:
-        e, f, g, h = 1.0, 0.0, 0.0, 1.0
-    else:
-        e, f, g, h = side * a, side * b, side * c, side * d
+    by_kx = ten(e, f, kx, ky)
+    led_by = form[6] / (1.0 + form[6] * q[11])
+    by_a, by_b = by_kx[8] - led_by * (x - q[1]), by_kx[9] - led_by * (y - q[2])
     one, zero = 1.0 + 0.0 * x, 0.0 * x
     return (
         x,
         y,
-        seven(a, b, dxi, deta) + (one, zero) + ten(e, f, kx, ky),
+        seven(a, b, dxi, deta) + (one, zero) + by_kx[:8] + (by_a, by_b),
         seven(c, d, dxi, deta) + (zero, one) + ten(g, h, kx, ky),
     )
 
@@ -208,6 +224,7 @@ def _loop(
 
 
 _COMPILED = (
+    "led",
     "distort",
     "distortion_derivatives",
     "undistorted_by",
@@ -244,7 +261,8 @@ def ideal_rows(
     """The same as `image_rows` with misclosures of the ideal image: the ideal point of the ground
     less that of the measured coordinate, which depends on the interior parameters, too.
 
-    With y the measured coordinate from the principal point, a correction gives p = y + side d(y),
+    With y the measured coordinate from the principal point, after an affinity before the
+    distortion where there is one, a correction gives p = y + side d(y),
     so that dp = -(1 + side d') d(x0, y0) + side d_K; a distortion of the ideal point p + d(p) = y,
     so that dp = (1 + d')^-1 (-d(x0, y0) - d_K).
     """
@@ -253,7 +271,8 @@ def ideal_rows(
     q = tuple(interior[photo].T)
     in_camera = np.einsum("nij,jn->in", rotation[photo], p)
     xi, eta, dxi, deta = ideal_point(*in_camera, r, q[0])
-    x, y = xy[:, 0] - q[1], xy[:, 1] - q[2]
+    from_x, from_y = xy[:, 0] - q[1], xy[:, 1] - q[2]
+    x, y = led(from_x, from_y, q, form)
     if of_ideal:
         side, (x, y) = 1.0, undistorted_by(x, y, q, (1.0, *form[1:]))
     else:
@@ -273,7 +292,11 @@ def ideal_rows(
     w[:] = np.column_stack([xi - corrected_x, eta - corrected_y]) * weight
     if len(jac) == 0:
         return
-    for row, derivatives in ((0, (*dxi, a, b, *by_kx)), (1, (*deta, c, d, *by_ky))):
+    scale, skew = 1.0 + form[6] * q[11], form[6] * q[12]
+    by_a, by_b = form[6] * from_x, form[6] * from_y
+    for row, of_ground, by_x, by_y, by_k in ((0, dxi, a, b, by_kx), (1, deta, c, d, by_ky)):
+        derivatives = (*of_ground, by_x * scale, by_x * skew + by_y, *by_k[:8])
+        derivatives += (by_k[8] - by_x * by_a, by_k[9] - by_x * by_b)
         found = np.stack(derivatives, axis=1) * weight[:, row, None]
         jac[:, row, :3] = found[:, :3]
         jac[:, row, 3:6] = -found[:, :3]
@@ -286,7 +309,7 @@ def image_rows(*arguments):
 
     xyz        (points, 3) m            photo_xyz  (photos, 3) m
     rotation   (photos, 3, 3)           interior   (photos, 13) mm
-    form       tuple of 7, see Form     of_ideal   True for "distortion_of_ideal"
+    form       tuple of 8, see Form     of_ideal   True for "distortion_of_ideal"
     point      (n,)                     photo      (n,)
     xy         (n, 2) measured, mm
     weight     (n, 2) 1/sd, 1/mm        active     (k,) places of the parameters asked for

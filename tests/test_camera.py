@@ -38,9 +38,12 @@ def silva(x, y, q, affinity, balance):
     more = 1 + p3 * r2 + p4 * r2**2
     dx = x * radial + (p1 * (r2 + 2 * x**2) + 2 * p2 * x * y) * more
     dy = y * radial + (p2 * (r2 + 2 * y**2) + 2 * p1 * x * y) * more
-    ax, ay = {"both_y": (a * y, b * y), "both_x": (a * x, b * x), "b1_b2": (a * x + b * y, 0)}[
-        affinity
-    ]
+    ax, ay = {
+        "both_y": (a * y, b * y),
+        "both_x": (a * x, b * x),
+        "b1_b2": (a * x + b * y, 0),
+        "before_distortion": (0, 0),
+    }[affinity]
     return np.column_stack([dx + ax, dy + ay])
 
 
@@ -52,14 +55,33 @@ def test_each_convention_says_what_its_source_says(convention, affinity, balance
     form = Form(convention, affinity, balance)
     found = measured(IDEAL, Q, form)
     x, y = (found - Q[1:3]).T
+    if affinity == "before_distortion":  # DBAT, res_euler_brown_1
+        x = (1 + Q[11]) * x + Q[12] * y
     if convention == "distortion_of_ideal":
         expected = IDEAL + silva(*IDEAL.T, Q, affinity, balance)
-        assert found - Q[1:3] == pytest.approx(expected, abs=1e-12)
+        assert np.column_stack([x, y]) == pytest.approx(expected, abs=1e-12)
     else:
         sign = 1 if convention == "correction_added" else -1
         ideal = np.column_stack([x, y]) + sign * silva(x, y, Q, affinity, balance)
         assert ideal == pytest.approx(IDEAL, abs=1e-11)
     assert corrected(found, Q, form) == pytest.approx(IDEAL, abs=1e-11)
+
+
+def test_an_affinity_before_the_distortion(figure):
+    """Published (DBAT): A = [1 + as, sk; 0, 1] times the measured point, then distortion; back."""
+    c, x0, y0, k1, aspect, skew = 24.0, 0.15, -0.1, 2e-4, 4e-2, -3e-2
+    q = np.array([c, x0, y0, k1, *[0] * 7, aspect, skew])
+    u, v = RNG.uniform(-12, 12, (2, 50))
+    x, y = np.array([[1 + aspect, skew], [0, 1]]) @ [u - x0, v - y0]
+    ideal = np.column_stack([x, y]) * (1 + k1 * (x * x + y * y))[:, None]
+    form = Form("correction_added", "before_distortion")
+    seen = np.column_stack([u, v])
+    assert corrected(seen, q, form) == pytest.approx(ideal, abs=1e-13)
+    worst = np.abs(measured(ideal, q, form) - seen).max()
+    figure("affinity before the distortion, back from the ideal point", f"{worst:.1e} mm")
+    assert worst < 1e-12
+    away = np.abs(measured(ideal, q, Form("correction_added", "b1_b2")) - seen).max()
+    assert away > 1e-3  # of a sum of terms A and B are not the same
 
 
 def test_added_and_subtracted_differ_by_the_sign_of_all_parameters():

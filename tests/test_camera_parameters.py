@@ -237,6 +237,10 @@ def test_the_effect_of_a_radial_term_is_that_in_the_farthest_corner():
     assert found.rms_um < found.corner_um
     assert found.seen_um <= 1e3 * 1e-15 * (50 + np.hypot(1, 2)) ** 7
     assert own_shift("c", q, Form(), frame) is None
+    before = Form("correction_subtracted", "before_distortion")
+    linear = np.array([50.0, *[0] * 10, 2e-4, 0])  # closed form: A x, whatever the convention
+    assert own_shift("A", linear, before, frame).largest_um == pytest.approx(1e3 * 2e-4 * 90)
+    assert own_shift("B", linear, before, frame).largest_um == 0
     assert own_shift("y0", q, Form(), frame).rms_um == pytest.approx(2000)
 
 

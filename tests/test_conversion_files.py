@@ -172,7 +172,7 @@ POWERS = np.array([-1, -1, 2, 4, 6, 8, 1, 1, 2, 4, 0, 0])  # of 1/mm, of all but
 @given(
     st.lists(st.floats(-1e-3, 1e-3), min_size=12, max_size=12),
     st.floats(0.06, 190),
-    st.sampled_from(["both_y", "both_x", "b1_b2"]),
+    st.sampled_from(["both_y", "both_x", "b1_b2", "before_distortion"]),
     st.sampled_from(["distortion_of_ideal", "correction_added", "correction_subtracted"]),
     st.floats(0, 20),
     st.tuples(st.integers(1000, 9000), st.integers(1000, 9000)),

@@ -43,11 +43,12 @@ def again(survey, found):
     return weighed(replace(nearer, cameras=(replace(camera, values=values),)), camera.form.weights)
 
 
+@pytest.mark.parametrize("affinity", ["both_y", "before_distortion"])
 @pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize("weights", ["measured", "ideal"])
-def test_without_errors_both_give_the_truth(convention, weights):
+def test_without_errors_both_give_the_truth(convention, weights, affinity):
     """Simulation: the truth, to far below a standard deviation."""
-    survey, truth = photographed(0, form=Form(convention, "both_y"), noise=0.0, interior=STRONG)
+    survey, truth = photographed(0, form=Form(convention, affinity), noise=0.0, interior=STRONG)
     found = weighed(survey, weights)
     assert_allclose(found.xyz_m, truth.xyz_m, atol=1e-8)
     values = list(found.camera()[0].values())

@@ -91,7 +91,11 @@ def test_cofactors_are_the_inverse_of_the_whole_normal_matrix(adjusted):
     assert redundancy.sum() == pytest.approx(adjusted.dof, rel=1e-9)
 
 
-@pytest.mark.parametrize("make", [photographed, by_total_station])
+def photographed_as_dbat():
+    return photographed(form=Form("correction_added", "before_distortion"))
+
+
+@pytest.mark.parametrize("make", [photographed, photographed_as_dbat, by_total_station])
 def test_compiled_loops_and_arrays_agree(make, monkeypatch):
     survey = make()[0]
     found = []
@@ -126,10 +130,11 @@ def test_small_jobs_do_not_wait_for_a_compiler(monkeypatch):
     assert room.worthwhile()
 
 
+@pytest.mark.parametrize("affinity", ["b1_b2", "before_distortion"])
 @pytest.mark.parametrize("convention", CONVENTIONS)
-def test_finds_the_truth_without_noise(convention):
+def test_finds_the_truth_without_noise(convention, affinity):
     """Property: observations without error give the truth back, in every convention."""
-    survey, truth = photographed(form=Form(convention, "b1_b2"), noise=0.0)
+    survey, truth = photographed(form=Form(convention, affinity), noise=0.0)
     found = adjust(survey)
     assert found.solution.cost < 1e-12
     assert found.xyz_m == pytest.approx(truth.xyz_m, abs=1e-7)

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera import PARAMETERS, corrected
-from tankcal.imaging import distort
+from tankcal.camera import CONVENTIONS, PARAMETERS, corrected
+from tankcal.imaging import distort, led
 
 GRID = 21
 
@@ -75,7 +75,14 @@ def own_shift(name, interior, form, frame):
         return _shift(moved, points, frame)
     lacking = np.where(np.arange(len(q)) == number, 0.0, q)
     x, y = (points - q[1:3]).T
-    with_it, without_it = (np.array(distort(x, y, p, form.numbers)[:2]) for p in (q, lacking))
+    side = CONVENTIONS[form.convention] or 1.0
+
+    def shifted(p):
+        """(2, n) shift by an affinity before the distortion, and by the distortion after it."""
+        at = led(x, y, p, form.numbers)
+        return np.array(at) - (x, y) + side * np.array(distort(*at, p, form.numbers)[:2])
+
+    with_it, without_it = shifted(q), shifted(lacking)
     return _shift((with_it - without_it).T, points, frame)
 
 

@@ -6,8 +6,9 @@ affinities both_y and b1_b2, which differ by a scale of all,
 
     [1  A; 0  1 + B] = (1 + B) [1/(1 + B)  A/(1 + B); 0  1]
 
-so that c takes (1 + B). All else (the inverse of a polynomial is none; B of both_x turns the image)
-is fitted over the frame, and what is left is stated.
+so that c takes (1 + B). All else (the inverse of a polynomial is none; B of both_x turns the image;
+an affinity before_distortion moves the point at which the distortion holds) is fitted over the
+frame, and what is left is stated.
 
 Source: Silva 1995 (39-47, 58); Pessoa 2017 (3-6, 10); Boerlin & Grussenmeyer 2013 (DBAT).
 """
@@ -34,7 +35,7 @@ PUBLISHED = {
     "dbat": Form("correction_added", "b1_b2"),
     "plain": Form(),
 }
-TURNS_ROUND = (3, 4, 5, 6, 7, 8, 11, 12)  # K1..K4, P1, P2, A, B
+TURNS_ROUND = (3, 4, 5, 6, 7, 8)  # K1..K4, P1, P2; A and B where they are part of the distortion
 
 
 @dataclass(frozen=True)
@@ -210,18 +211,23 @@ def _by_formula(values, form, to_form):
     plain = balanced_about(values, form, 0.0)[0]
     if one != other:
         plain[list(TURNS_ROUND)] *= -1
-    plain = _with_affinity(plain, form.affinity, to_form.affinity, other)
+        if form.affinity != "before_distortion":
+            plain[11:] *= -1
+    plain = _with_affinity(plain, form.affinity, to_form)
     if plain is None:
         return None
     same = Form(to_form.convention, to_form.affinity)
     return balanced_about(plain, same, to_form.radial_balance_mm)[0]
 
 
-def _with_affinity(plain, affinity, wanted, side):
-    """(13,) with A and B of another affinity, or None where only a turn would do it."""
+def _with_affinity(plain, affinity, to_form):
+    """(13,) with A and B of another affinity, or None where there is no formula."""
     a, b = plain[11:]
+    wanted = to_form.affinity
     if affinity == wanted or (a == 0 and b == 0):
         return plain
+    if "before_distortion" in (affinity, wanted):
+        return None
     if affinity == "both_x":
         if b != 0:
             return None
@@ -233,15 +239,15 @@ def _with_affinity(plain, affinity, wanted, side):
             return plain if b == 0 else None
         if a != 0:
             return None
-    sign = side or 1.0
+    sign = CONVENTIONS[to_form.convention] or 1.0
     # with the sign of the convention: [1 a; 0 1 + b] of both_y, [1 + a b; 0 1] of b1_b2
     if affinity == "both_y":
         scale = 1 + sign * b
-        found = rescaled(plain, side, scale)
+        found = rescaled(plain, to_form, scale)
         found[11:] = sign * (1 / scale - 1), a / scale
     else:
         scale = 1 / (1 + sign * a)
-        found = rescaled(plain, side, 1 / scale)
+        found = rescaled(plain, to_form, 1 / scale)
         found[11:] = b * scale, sign * (scale - 1)
     return found
 

@@ -11,8 +11,7 @@ to first order. Source: JCGM 100; imaging formulas as in tankcal.imaging.
 
 import numpy as np
 
-from tankcal.camera import PARAMETERS
-from tankcal.imaging import distortion_derivatives, image_point
+from tankcal.imaging import one_image_point
 
 
 def ideal_derivatives(ideal_mm, interior, form):
@@ -23,19 +22,11 @@ def ideal_derivatives(ideal_mm, interior, form):
     """
     of_ideal = form.convention == "distortion_of_ideal"
     q = tuple(np.asarray(interior, dtype=float))
-    n = len(ideal_mm)
-    _, _, px, py, side, *slopes = image_point(*ideal_mm.T, q, form.numbers, of_ideal)
-    slope = np.stack([np.broadcast_to(one, n) for one in slopes], axis=1).reshape(n, 2, 2)
-    by_terms = np.stack(
-        [
-            np.column_stack([np.broadcast_to(one, n) for one in terms])
-            for terms in distortion_derivatives(px, py, q, form.numbers)
-        ],
-        axis=1,
-    )
-    measured = np.zeros((n, 2, len(PARAMETERS)))
-    measured[:, 0, 1] = measured[:, 1, 2] = 1.0
-    measured[:, :, 3:] = by_terms if of_ideal else side * (slope @ by_terms)
+    rays = (*(ideal_mm.T / q[0]), -np.ones(len(ideal_mm)))
+    rows = one_image_point(rays, np.eye(3).ravel(), q, form.numbers, of_ideal)[2:]
+    by_all = np.stack([np.column_stack(np.broadcast_arrays(*row)) for row in rows], axis=1)
+    slope, measured = by_all[:, :, :2] / q[0], by_all[:, :, 6:]
+    measured[:, :, 0] = 0.0
     return -np.linalg.solve(slope, measured)
 
 

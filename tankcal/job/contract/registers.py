@@ -147,7 +147,8 @@ CAMERA = (
     Field(
         "affinity",
         "choice",
-        "form of the affinity: both_y (silva), both_x (pessoa) or b1_b2; blank: b1_b2",
+        "form of the affinity: both_y (silva), both_x (pessoa), b1_b2 or before_distortion; blank: "
+        "b1_b2",
         choices=(*AFFINITIES, *AFFINITIES_BY_AUTHOR),
     ),
     Field(

@@ -210,7 +210,8 @@ def _check_affinity(files, name, given):
         if given[first] and not files.is_given("cameras", name, "affinity"):
             expected = message(
                 "affinity_missing",
-                "missing beside {first}; expected the form: both_y, both_x or b1_b2",
+                "missing beside {first}; expected the form: both_y, both_x, b1_b2 or "
+                "before_distortion",
                 first=first,
             )
             files.tell_key(files.log.problem, "cameras", name, "affinity", expected)
