@@ -16,7 +16,7 @@ from tankcal.volumes import ShellVolume
 
 class Declared:
     u_as_read, unit, note = 1.0, "x", ""
-    type, distribution, dof, is_default = "B", "normal", np.inf, False
+    type, distribution, dof, is_default, u_is = "B", "normal", np.inf, False, "scale"
 
     def __init__(self, name, u=1.0):
         self.name, self.u = name, u

@@ -149,7 +149,7 @@ def test_tables_are_in_the_language_that_the_job_asks_for(tmp_path, capsys):
 
 def test_tables_are_in_the_language_that_the_record_asks_for(record, tmp_path, capsys):
     found = json.loads(record.read_text(encoding="utf-8"))
-    found["job"]["table"] = {"language": "pt-BR"}
+    found["job"]["table"]["language"] = "pt-BR"
     (tmp_path / "record.json").write_text(json.dumps(found), encoding="utf-8")
     assert run("parameters", tmp_path / "record.json") == 0
     assert "Graus de liberdade" in capsys.readouterr().out

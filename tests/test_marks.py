@@ -86,7 +86,7 @@ def test_texts_of_the_workbook_with_portuguese_marks(example_record, words, monk
     record = json.loads(example_record.read_text(encoding="utf-8"))
     workbook.write(record, tmp_path / "capacity.xlsx")
     book = openpyxl.load_workbook(tmp_path / "capacity.xlsx", data_only=True)
-    top = f"{record['capacity']['height_m'][-1]:.5f}".replace(".", ",")
+    top = f"{record['capacity']['height_m'][-1]:.3f}".replace(".", ",")
     assert f"volume at {top}\N{NO-BREAK SPACE}m" in book["Uncertainty budget"]["A2"].value
     assert "from 0,000 m to 9,500 m" in book["Dip calculator"]["D5"].value.replace(
         "\N{NO-BREAK SPACE}", " "

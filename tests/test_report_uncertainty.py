@@ -235,7 +235,8 @@ def test_the_worst_delivery_of_each_minimum_height_is_told(found, record):
     rows = table_of(found, "Stated volumes")
     assert len(rows) == len(record["budgets"])
     assert [row[-1] for row in rows[-2:]] == [
-        "worst of 0.5\xa0m, by U/V", "worst of 1\xa0m, by U/V",
+        f"of all deliveries of {least}\xa0m or more, the one with the largest U/V"
+        for least in ("0.5", "1")
     ]  # fmt: skip
     worst = table_of(found, "The worst deliveries")
     at_minimum = [one["at_minimum"] for one in record["deliveries"]]

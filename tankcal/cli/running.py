@@ -17,7 +17,6 @@ from tankcal.cli.showing import (
 )
 from tankcal.digits import decimals_of_height, fixed, with_digits, written
 from tankcal.errors import SolutionError
-from tankcal.job.plausibility import CODES
 from tankcal.messages import message
 
 
@@ -101,6 +100,8 @@ def _demo(options):
 
 def _tell(out, paths, warnings, result, adjustment):
     """Warnings, a summary and the files, for a person; what is implausible comes last of all."""
+    from tankcal.job.plausibility import CODES
+
     doubts = [one for one in warnings if getattr(one.expected, "code", None) in CODES]
     warn(one for one in warnings if one not in doubts)
     if adjustment is not None:
