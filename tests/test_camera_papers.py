@@ -19,6 +19,7 @@ from tankcal.camera_analysis.stability import plain as stability_json
 from tankcal.camera_analysis.stability.comparing import compare
 from tankcal.camera_papers.naming import numbered, short
 from tankcal.camera_papers.paper import CameraPaper, load
+from tankcal.digits import decimals_of, fixed
 from tankcal.errors import InputError
 from tankcal.report.numbers import concise
 from tankcal.words import load_words
@@ -119,7 +120,10 @@ def test_lines_of_a_comparison(stability):
     assert matrix[0].endswith(" 0.000 =")  # the first two sets are the same
     figures = {(p["a"], p["b"]): p["figure_px"] for p in stability["pairs"]}
     first, second = (figures[one, HOSTILE[2]] for one in HOSTILE[:2])
-    assert matrix[1].split()[-2:] == [f"{first:.3f}", f"{second:.3f}"]
+    scatter = {(p["a"], p["b"]): p["scatter_px"] for p in stability["pairs"]}
+    shown = [min(decimals_of(scatter[one, HOSTILE[2]]), 3) for one in HOSTILE[:2]]
+    expected = [fixed(one, places) for one, places in zip((first, second), shown, strict=True)]
+    assert matrix[1].split()[-2:] == expected
     assert not any("\x1b" in line for line in lines)
 
 

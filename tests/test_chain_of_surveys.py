@@ -123,7 +123,9 @@ def test_no_capacity_without_a_vertical(job, survey):
 
 def test_what_is_undetermined_is_told_at_once():
     report = DatumReport("inner", 3, "", ("all",), vertical=False, scale=False)
-    with pytest.raises(SolutionError, match=r"vertical is not .*zenith.*scale is not .*distances"):
+    with pytest.raises(
+        SolutionError, match=r"(?s)vertical is not .*zenith.*scale is not .*distances"
+    ):
         refuse_undetermined(report)
     refuse_undetermined(replace(report, vertical=True, scale=True))
 
