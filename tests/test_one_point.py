@@ -112,9 +112,12 @@ def test_both_places_are_named_and_an_approximation_decides():
     assert off_m(adjust_survey(replace(job, control=about)), shots) < 1e-5
 
 
+PLAN_STEP, SPACE_STEP = 13, 43  # of the studies
+
+
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_some_of_all_combinations(count):
-    """Every so many of all combinations; the study below runs them all."""
+    """Every so many of all combinations; the studies below run more of them."""
     shots = [one for one in combined(IN_PLAN, 3) if len(one) == count]
     for one in shots[:: {1: 7, 2: 23, 3: 67}[count]]:
         assert_sound(one)
@@ -123,20 +126,23 @@ def test_some_of_all_combinations(count):
 @pytest.mark.study
 @pytest.mark.parametrize("first", [*IN_PLAN, *DIRECTIONS], ids=str)
 def test_every_combination_in_plan(first):
-    """All of one to four readings in plan, weighted and fixed known points, causes looked for."""
+    """One to four readings in plan, weighted and fixed known points, causes looked for.
+
+    One in PLAN_STEP of 7546 sets: with a step of 1 all of them, which takes hours.
+    """
     pool = [*IN_PLAN, *DIRECTIONS]
     rest = pool[pool.index(first) + 1 :]
-    for i, others in enumerate([(), *combined(rest, 3)]):
+    for i, others in enumerate([(), *combined(rest, 3)][::PLAN_STEP]):
         assert_sound([first, *others], sd=0.001 * (i % 2))
 
 
 @pytest.mark.study
 @pytest.mark.parametrize("first", [*IN_PLAN, *IN_SPACE], ids=str)
 def test_every_combination_in_space(first):
-    """All of one to four readings in space and in plan, directions left out."""
+    """One to four readings in space and in plan, directions left out; one in SPACE_STEP sets."""
     pool = [*IN_PLAN, *IN_SPACE]
     rest = pool[pool.index(first) + 1 :]
-    for others in [(), *combined(rest, 3)]:
+    for others in [(), *combined(rest, 3)][::SPACE_STEP]:
         shots = [first, *others]
         if any(one in IN_SPACE for one in shots):
             assert_sound(shots)
