@@ -130,6 +130,19 @@ def test_gross_readings_beside_correlated_ones(tmp_path):
     assert values[4] == pytest.approx(length["BD"], abs=1e-4)
 
 
+@pytest.mark.parametrize("datum", ["minimal", "inner"])
+@pytest.mark.parametrize("control_sd_mm", [0.0, 5.0])
+def test_a_datum_that_holds_no_distance_denies_no_control(tmp_path, datum, control_sd_mm):
+    """The distance of two given points differs from the adjusted one by the vectors' own noise."""
+
+    def change(files):
+        files["job.toml"] = files["job.toml"].replace('"control"', f'"{datum}"')
+
+    written(tmp_path, correlated=False, control_sd_mm=control_sd_mm, change=change)
+    told = {one.expected.code for one in adjust_survey(measured(tmp_path)).warnings}
+    assert "control_scale" not in told
+
+
 def test_vectors_alone_hang_on_one_point(tmp_path):
     """Without redundancy and with one fixed point: its coordinates and the vectors, added."""
 

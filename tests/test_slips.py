@@ -370,12 +370,13 @@ def reading(kind, ids, value, residual, check=False):
     )  # fmt: skip
 
 
-def of_control(factor, readings=()):
+def of_control(factor, readings=(), sd_m=0.0):
     """`scale_of_control` of two held points 20 m apart that were adjusted `factor` apart."""
     table = known(["A", "B"], [[0, 0, 1], [20, 0, 1]], 0.002)
     adjusted = SimpleNamespace(
         survey=SimpleNamespace(points=("A", "B")),
         xyz_m=np.array([[0.0, 0, 1], [20 * factor, 0, 1]]),
+        covariance_m2=lambda points: np.diag(3 * [0.0] + 3 * [sd_m**2]),
     )
     setups = (Setup("S1", "A"),)
     return scale_of_control(adjusted, readings, SimpleNamespace(control=table, setups=setups))
@@ -384,15 +385,16 @@ def of_control(factor, readings=()):
 def test_lengths_a_thousandth_too_long_are_told_by_two_control_points():
     (line,) = of_control(1.001)
     assert (line.file, line.expected.code) == ("control.csv", "control_scale")
-    assert "+1000 ppm" in str(line)
+    assert "+1000.0 ppm" in str(line)
     assert "A-B" in str(line)
     (line,) = of_control(1.0, [reading("slope distance", ("S1", "B"), 20.02, -0.02)])
-    assert "+999 ppm" in str(line)
+    assert "+999.0 ppm" in str(line)
 
 
 def test_lengths_within_their_sds_are_not_told():
     sound = [reading("slope distance", ("S1", "B"), 20.0, -0.003)]
     assert of_control(1.0002, sound) == []
+    assert of_control(1.001, sd_m=0.02) == []  # 20 mm: no more than the adjusted point's own sd
     opposite = [reading("slope distance", ("S1", "B"), 20.0, 0.02)]
     assert of_control(1.001, opposite) == []  # no scale: a blunder, which the search tells
 

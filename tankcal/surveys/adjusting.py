@@ -146,7 +146,7 @@ def _complete(search, gathered, frame, measurements):
     checked = check_points(adjusted, measurements, known, acting, scale)
     warnings += disagreeing(checked, measurements.check)
     warnings += check_readings_off(readings)
-    warnings += scale_of_control(adjusted, readings, measurements)
+    warnings += scale_of_control(adjusted, readings, measurements, scale)
     return Adjustment(
         names=names,
         xyz_m=adjusted.xyz_m[there],

@@ -40,17 +40,18 @@ def check_readings_off(readings):
     return problems[:LISTED]
 
 
-def scale_of_control(adjusted, readings, measurements):
+def scale_of_control(adjusted, readings, measurements, cov_scale=1.0):
     """A Problem row when the distances between points of control are not those that were given.
 
     What was set aside no longer holds the scale: the adjusted distances are compared with the given
-    ones, and so is every length that was read between two points of control.
+    ones, and so is every length that was read between two points of control. A difference counts
+    against the sds of both sides: a datum of one point, or of inner constraints, holds no distance.
     """
     table = measurements.control
     if table is None:
         return []
     place = _plan(table)
-    found = [*_adjusted(adjusted, place), *_read(readings, place, measurements)]
+    found = [*_adjusted(adjusted, place, cov_scale), *_read(readings, place, measurements)]
     off = [(ratio, names) for ratio, sd, names in found if abs(ratio) > DISAGREE * sd]
     signs = {np.sign(ratio) for ratio, _ in off}
     if not off or len(signs) > 1:
@@ -58,7 +59,7 @@ def scale_of_control(adjusted, readings, measurements):
     pairs = list(dict.fromkeys("-".join(sorted(names)) for _, names in off))
     text = message(
         "control_scale",
-        "the readings make the distances between points of control {scale_ppm:+.0f} ppm longer than"
+        "the readings make the distances between points of control {scale_ppm:+.1f} ppm longer than"
         " given ({points}): {hint}",
         scale_ppm=1e6 * float(np.median([ratio for ratio, _ in off])),
         points=listed(pairs, SHOWN),
@@ -77,15 +78,31 @@ def _plan(table):
     }
 
 
-def _adjusted(adjusted, place):
-    """(relative difference, its sd, names) of each pair: adjusted against given."""
+def _adjusted(adjusted, place, cov_scale):
+    """(relative difference, its sd, names) of each pair: adjusted against given.
+
+    The sd is too large where the points of control hold the adjusted ones, for the two are then
+    correlated: what is told is told on the safe side.
+    """
     index = {name: i for i, name in enumerate(adjusted.survey.points)}
-    for pair in combinations([name for name in place if name in index], 2):
-        a, b = (np.array(place[name]) for name in pair)
+    there = np.isfinite(adjusted.xyz_m).all(axis=1)
+    names = [name for name in place if name in index and there[index[name]]]
+    if len(names) < 2:
+        return
+    rows = [index[name] for name in names]
+    covariance = cov_scale * adjusted.covariance_m2(rows)
+    for i, j in combinations(range(len(names)), 2):
+        a, b = (np.array(place[names[at]]) for at in (i, j))
         given = np.hypot(*(a - b)[:2])
-        now = np.hypot(*np.diff(adjusted.xyz_m[[index[name] for name in pair], :2], axis=0)[0])
-        if given > LEAST_LENGTH_M and np.isfinite(now):
-            yield now / given - 1, np.hypot(LEAST_SD_M, np.hypot(a[2], b[2])) / given, pair
+        apart = np.diff(adjusted.xyz_m[[rows[i], rows[j]], :2], axis=0)[0]
+        now = np.hypot(*apart)
+        if given <= LEAST_LENGTH_M or now == 0:
+            continue
+        along = np.concatenate([-apart, apart]) / now
+        places = [3 * i, 3 * i + 1, 3 * j, 3 * j + 1]
+        variance = along @ covariance[np.ix_(places, places)] @ along
+        sd = np.sqrt(LEAST_SD_M**2 + a[2] ** 2 + b[2] ** 2 + max(variance, 0.0))
+        yield now / given - 1, sd / given, (names[i], names[j])
 
 
 def _read(readings, place, measurements):
