@@ -59,6 +59,7 @@ def assert_sound(shots, **options):
         return "refused"
     assert determined(shots), f"{shots}: nothing determines P"
     assert off_m(adjustment, shots) < 1e-5, f"{shots}: {adjustment.xyz_m}"
+    assert not len(elsewhere(shots)), f"{shots}: one of several places was taken"
     return "found"
 
 
@@ -74,6 +75,8 @@ def assert_sound(shots, **options):
         "distances A-P + azimuths A-P + height_differences B-P",
         "distances A-P + zenith_angles A-P + azimuths B-P + horizontal_angles P<C,A",
         "distances A-P + distances B-P + zenith_angles P-C + height_differences A-P",
+        "horizontal distances B-P + distances A-P + distances B-P + distances C-P",
+        "distances A-P + distances B-P + distances C-P + azimuths A-P",
     ],
 )
 def test_mixtures_that_fix_a_point(text):
@@ -90,6 +93,7 @@ def test_mixtures_that_fix_a_point(text):
         ("horizontal distances B-P + azimuths A-P + horizontal_angles A<B,P", "may stand at"),
         ("distances A-P + zenith_angles A-P + azimuths B-P", "may stand at"),
         ("azimuths B-P + azimuths P-B + horizontal_angles B<C,P", "free to move"),
+        ("distances A-P + distances B-P + distances C-P", "may stand at"),
     ],
 )
 def test_what_is_missing_is_told(text, told):

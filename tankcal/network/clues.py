@@ -12,8 +12,10 @@ from tankcal.network.lateration import laid_out
 from tankcal.network.pieces import empty, joint
 from tankcal.network.plan import Plan
 from tankcal.network.polar import improved_in_plan
-from tankcal.network.positioning import positioned
+from tankcal.network.positioning import misfit_of_places, positioned
 from tankcal.observations import HeightDifferences, Sights, Vectors
+
+AS_WELL = 1e-6  # of the extent: misfits this near to one another decide nothing
 
 
 @dataclass(frozen=True)
@@ -139,17 +141,37 @@ def _by_tapes(clues, piece, free):
     between = np.linalg.norm(piece.xyz_m[sides[:, 0]] - piece.xyz_m[sides[:, 1]], axis=1)
     ties = np.concatenate([start, sides[:, 0]]), np.concatenate([end, sides[:, 1]])
     for points, places in laid_out(*ties, np.concatenate([length, between]), 3, clues.rng):
-        motions = []
-        for mirror in ([1, 1, 1], [1, 1, -1]):
-            own = _told(clues, points, places * mirror)
-            motions.append((joint(own, piece, clues.rng), own))
-        motions = [one for one in motions if one[0] is not None]
-        if motions:
-            motion, own = min(motions, key=lambda one: one[0].misfit_m)
-            return piece.filled_from(own.moved(motion))
+        either = [_told(clues, points, places * mirror) for mirror in ([1, 1, 1], [1, 1, -1])]
         if free and not known.any():
-            return piece.filled_from(own)
+            return piece.filled_from(either[0])
+        joined = _joined(clues, piece, either)
+        if joined is not None:
+            return joined
     return piece
+
+
+def _joined(clues, piece, either):
+    """The Piece with one of two mirror images, the one that all readings speak for.
+
+    None where neither can be joined, or both fit as well: known points in one plane leave open on
+    which side of it the others lie.
+    """
+    motions = [joint(own, piece, clues.rng) for own in either]
+    found = []
+    for own, motion in zip(either, motions, strict=True):
+        if motion is None:
+            continue
+        filled = piece.filled_from(own.moved(motion))
+        new = np.flatnonzero(filled.known & ~piece.known)
+        misfit = misfit_of_places(clues.survey, clues.plan, filled.xyz_m, new)
+        found.append((misfit + motion.misfit_m, filled))
+    if not found:
+        return None
+    found.sort(key=lambda one: one[0])
+    best = found[0]
+    if len(found) > 1 and found[1][0] - best[0] < AS_WELL * best[1].extent:
+        return None
+    return best[1]
 
 
 def _told(clues, points, places):

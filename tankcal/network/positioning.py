@@ -73,6 +73,21 @@ def sought_point(survey, plan, xyz_m, point, sought_already):
     return first
 
 
+def misfit_of_places(survey, plan, xyz_m, points):
+    """Sum of the misfits, m, of readings between points (k,), at their places, and known ones."""
+    zeros = oriented(plan, xyz_m[:, :2])[: len(survey.sets)]
+    total = 0.0
+    for point in points:
+        open_m = xyz_m.copy()
+        open_m[point] = np.nan
+        ties = _Ties(survey, open_m, zeros, point, in_plan=False)
+        if ties.unknowns:
+            with np.errstate(all="ignore"):
+                off, _ = ties.trial(ties.turned(xyz_m[[point]][:, ties.axes]))
+            total += float(np.abs(off).sum())
+    return total
+
+
 def _tied(survey):
     """(points,) True for points that angles, distances or levels speak of."""
     found = np.zeros(len(survey.points), dtype=bool)
