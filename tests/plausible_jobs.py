@@ -22,7 +22,7 @@ METALS = {  # expansion, modulus, design stress MPa, thinnest plate mm
 }
 THINGS = [
     *(("coil", -1), ("serpentina de aquecimento", -1), ("columna central", -1), ("pipe 4 in", -1)),
-    *(("manhole 1", 1), ("boca de visita", 1), ("sump", 1), ("thing", 1), ("nozzle N1", -1)),
+    *(("manhole 1", 1), ("boca de visita", 1), ("sump", 1), ("door sheet", 1), ("thing", -1)),
 ]
 FORMS = {"ellipsoidal": (0.16, 0.3), "conical": (0.05, 0.25), "spherical": (0.07, 0.2)}
 

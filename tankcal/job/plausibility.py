@@ -10,7 +10,12 @@ from dataclasses import dataclass
 from tankcal.messages import message
 
 AMBIENT, HEATED, REFRIGERATED = SERVICES = ("ambient", "heated", "refrigerated")
-SHELLS = ("carbon_steel", "stainless_steel", "aluminium", "other")
+CARBON_STEEL, STAINLESS_STEEL, ALUMINIUM = METALS = (
+    "carbon_steel",
+    "stainless_steel",
+    "aluminium",
+)
+SHELLS = (*METALS, "other")
 
 FIRST_YEAR = 1900  # of a survey
 DAYS_AHEAD = 1  # of a survey, for time zones
@@ -32,10 +37,16 @@ E_GPA = {
     "aluminium": (62.0, 80.0),
 }
 
-WATER_STRESS_MPA, LEAST_STRESS_MPA = 350.0, 137.0  # of thin plates at most; of thick ones at least
+WATER_STRESS_MPA = 350.0  # in the thinnest plates
+LEAST_STRESS_MPA = {"carbon_steel": 137.0, "stainless_steel": 120.0, "aluminium": 55.0}  # of design
 LIGHT, HEAVY = 0.45, 1.0  # relative densities of the contents where the job gives none
-THICK_MM, THICK_FACTOR = 16.0, 2.0  # what a course may have over what the head needs
-THIN_MM, THIN_PER_M = 1.0, 0.05  # of a course, by the diameter in metres
+THICK_MM, THICK_FACTOR = 6.5, 1.4  # what a course may have over what head and code need
+CODE_MM, CODE_PER_M = 5.0, 0.08  # what codes ask for at least, by the diameter in metres
+THIN_MM = {  # of a course: least and by the diameter in metres; the lesser of two lines
+    "carbon_steel": ((2.0, 0.15), (4.0, 0.04)),
+    "stainless_steel": ((1.0, 0.05), (1.0, 0.05)),
+    "aluminium": ((2.0, 0.15), (4.0, 0.04)),
+}
 SOLID_PLATES_MM = {  # a lying cylinder or a sphere: least and most, each a + b times the diameter
     "horizontal": ((1.0, 0.4), (12.0, 8.0)),
     "sphere": ((1.0, 0.2), (6.0, 4.0)),
@@ -79,8 +90,9 @@ TAKES_ROOM = (
     *("tubería", "columna", "escalera", "mezclador"),
 )
 GIVES_ROOM = (
-    *("manhole", "manway", "sump", "boca de visita", "poço de drenagem", "boca de hombre"),
-    *("sumidero", "boca de inspeção"),
+    *("manhole", "manway", "sump", "nozzle", "door", "dome", "recess", "bulge", "hatch"),
+    *("boca de ", "poço", "bocal", "porta", "domo", "recesso", "escotilha", "pote", "bolsa"),
+    *("sumidero", "pozo", "boquilla", "tubuladura", "puerta", "escotilla", "receso"),
 )
 
 
@@ -102,15 +114,16 @@ class Plausible:
     codes: tuple[str, ...]
 
 
-def least_course_mm(diameter_m, head_m, density=LIGHT):
-    """Plate that water stress of 350 MPa asks for, or what small tanks are made of at least."""
+def least_course_mm(diameter_m, head_m, density=LIGHT, shell="carbon_steel"):
+    """Plate that water stress of 350 MPa asks for, or what tanks of the metal are made of."""
     needed = _head_mm(diameter_m, head_m, density, WATER_STRESS_MPA)
-    return max(THIN_MM + THIN_PER_M * diameter_m, needed)
+    return max(min(a + b * diameter_m for a, b in THIN_MM[shell]), needed)
 
 
-def most_course_mm(diameter_m, head_m, density=HEAVY):
-    """Twice the plate that a stress of 137 MPa asks for, and 16 mm."""
-    return THICK_MM + THICK_FACTOR * _head_mm(diameter_m, head_m, density, LEAST_STRESS_MPA)
+def most_course_mm(diameter_m, head_m, density=HEAVY, shell="carbon_steel"):
+    """1.4 times what the least design stress or a code asks for, and 6.5 mm for corrosion."""
+    needed = _head_mm(diameter_m, head_m, density, LEAST_STRESS_MPA[shell])
+    return THICK_MM + THICK_FACTOR * max(CODE_MM + CODE_PER_M * diameter_m, needed)
 
 
 def reference_doubt(reference_m, top_m, diameter_m):
@@ -155,6 +168,12 @@ def _line(kind):
     return f"({a:g} + {b:g} D) to ({c:g} + {d:g} D) mm, D in m"
 
 
+def _thinnest(shell):
+    a, b = THIN_MM[shell]
+    lines = [f"{least:g} + {per_m:g} D" for least, per_m in dict.fromkeys((a, b))]
+    return lines[0] + " mm" if len(lines) == 1 else f"the lesser of {' and '.join(lines)} mm"
+
+
 def _of_ends(form):
     low, high = END_DEPTH[form]
     return f"{form} {low:g} to {high:g}"
@@ -181,7 +200,7 @@ TABLE = (
         f" {_c(SHELL_C[REFRIGERATED])}",
         "degrees Fahrenheit",
         f"checks.air_temperature_c: {SHELL_OVER_AIR_K[0]:g} to {SHELL_OVER_AIR_K[1]:+g} K from it",
-        ("shell_temperature_strange", "shell_unlike_air"),
+        ("temperature_strange", "shell_unlike_air"),
     ),
     Plausible(
         "table.reference_temperature_c",
@@ -189,7 +208,7 @@ TABLE = (
         f" {_c(REFERENCE_C[REFRIGERATED])}",
         "degrees Fahrenheit (68, 60, 59)",
         "checks.service",
-        ("reference_temperature_strange",),
+        ("temperature_strange",),
     ),
     Plausible(
         "checks.air_temperature_c",
@@ -204,7 +223,7 @@ TABLE = (
         f" {_per_k('aluminium')}; needed with a shell of another kind than carbon steel",
         "ten times too small, that of aluminium",
         "checks.shell; blank: carbon steel",
-        ("expansion_strange", "expansion_missing"),
+        ("constant_strange", "constant_missing"),
     ),
     Plausible(
         "material.e_gpa",
@@ -212,14 +231,17 @@ TABLE = (
         + "; needed under a liquid head with a shell of another kind than carbon steel",
         "that of another metal",
         "checks.shell; blank: carbon steel",
-        ("modulus_strange", "modulus_missing"),
+        ("constant_strange", "constant_missing"),
     ),
     Plausible(
         "courses.thickness_mm",
-        f"from {THIN_MM:g} + {THIN_PER_M:g} D mm, or 4.9 D h G / {WATER_STRESS_MPA:g}, up to"
-        f" {THICK_MM:g} + {THICK_FACTOR:g} × 4.9 D h G / {LEAST_STRESS_MPA:g} (D diameter, h shell"
-        f" above the course's bottom, m; G relative density, {LIGHT:g} to {HEAVY:g} if not given)",
-        "ten times too thick or too thin, centimetres",
+        f"from {_thinnest('carbon_steel')} (stainless {_thinnest('stainless_steel')}), or"
+        f" 4.9 D h G / {WATER_STRESS_MPA:g}, up to {THICK_MM:g} mm + {THICK_FACTOR:g} times the"
+        f" larger of {CODE_MM:g} + {CODE_PER_M:g} D and 4.9 D h G / S (D diameter, h shell above"
+        f" the course's bottom, m; G relative density, {LIGHT:g} to {HEAVY:g} if not given; S"
+        f" {LEAST_STRESS_MPA['carbon_steel']:g} MPa, stainless"
+        f" {LEAST_STRESS_MPA['stainless_steel']:g}, aluminium {LEAST_STRESS_MPA['aluminium']:g})",
+        "two or three times too thick or too thin, centimetres",
         "the head that the plate carries",
         ("plate_thick", "plate_thin"),
     ),
@@ -280,10 +302,12 @@ TABLE = (
     ),
     Plausible(
         "deadwood.volume_m3",
-        "negative for coils, pipes, columns, stairs, mixers; positive for manholes and sumps",
-        "the wrong sign",
-        "the name, in English, Portuguese or Spanish",
-        ("deadwood_takes", "deadwood_gives", "deadwood_large"),
+        "negative for coils, pipes, columns, stairs, mixers and whatever has another name; positive"
+        " for manholes, doors, domes, sumps; at most a tenth of what the tank holds beside it, all"
+        " of that a problem",
+        "the wrong sign, litres",
+        "the name, in English, Portuguese or Spanish; the tank between bottom_m and top_m",
+        ("deadwood_takes", "deadwood_gives", "deadwood_sign_unsaid", "deadwood_large"),
     ),
     Plausible(
         "tank.nominal_diameter_m",
@@ -325,7 +349,7 @@ TABLE = (
         f" {KNUCKLE_RADIUS[1]:g} diameters",
         "radius for diameter, twice as large",
         "the diameter, the other end",
-        ("end_radius_strange", "end_radii_differ"),
+        ("end_radius_strange", "ends_differ"),
     ),
     Plausible(
         "horizontal.tilt_mm_per_m",

@@ -55,6 +55,14 @@ def refuse_repeated(table, column, log):
             first_row[name] = row
 
 
+def course_heights(courses):
+    """Heights of all courses, m; None where one is missing, bad or unreadable."""
+    if courses is None or courses.skipped:
+        return None
+    heights = courses.of("height_m")
+    return None if None in heights or not heights else heights
+
+
 def missing_beside(other):
     """What is said of a key that has to be given where another one is."""
     return message("missing_beside", "missing; expected beside {other}", other=other)

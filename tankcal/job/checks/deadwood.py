@@ -1,6 +1,9 @@
-"""deadwood.csv: things that are in the tank, of a size that fits into it."""
+"""deadwood.csv: things that are in the tank, of a size that fits into it, with the right sign."""
+
+import re
 
 from tankcal.job.checks.common import refuse_repeated
+from tankcal.job.plausibility import GIVES_ROOM, TAKES_ROOM
 from tankcal.messages import message
 
 TOLERANCE_M = 0.05  # by which a thing may stick out of the drawing's tank
@@ -13,8 +16,10 @@ SLACK = 1.05  # the drawing's cross-section is not the real one
 def check_deadwood(table, extent, log):
     """Names once; bottom below top, both in the tank; a volume that its slice can hold."""
     refuse_repeated(table, "name", log)
-    columns = (table.of(name) for name in ("bottom_m", "top_m", "volume_m3", "u_m3"))
-    for row, bottom, top, volume, u in zip(table.rows, *columns, strict=True):
+    columns = (table.of(name) for name in ("name", "bottom_m", "top_m", "volume_m3", "u_m3"))
+    for row, name, bottom, top, volume, u in zip(table.rows, *columns, strict=True):
+        if name is not None and volume:
+            _check_sign(table, row, name, volume, log)
         if None in (bottom, top):
             continue
         if bottom > top:
@@ -38,6 +43,42 @@ def check_deadwood(table, extent, log):
                 volume_m3=volume,
             )
             log.warning(table.file, expected, row, "u_m3")
+
+
+def _check_sign(table, row, name, volume, log):
+    """What gives room says so by its name; what takes it is negative."""
+    takes, gives = (_is_of(name, words) for words in (TAKES_ROOM, GIVES_ROOM))
+    values = {"volume_m3": volume, "name": name}
+    if volume > 0 and takes and not gives:
+        text = message(
+            "deadwood_takes",
+            "{volume_m3:+g} m3 gives room, and {name} is a thing that takes it: expected a"
+            " negative volume",
+            **values,
+        )
+    elif volume > 0 and not gives:
+        text = message(
+            "deadwood_sign_unsaid",
+            "{volume_m3:+g} m3 gives room, and the name {name} does not say how: expected a"
+            " negative volume for what stands in the tank, or the name of what gives room, such as"
+            " manhole or sump",
+            **values,
+        )
+    elif volume < 0 and gives:
+        text = message(
+            "deadwood_gives",
+            "{volume_m3:+g} m3 takes room, and {name} is a thing that gives it: expected a"
+            " positive volume",
+            **values,
+        )
+    else:
+        return
+    log.warning(table.file, text, row, "volume_m3")
+
+
+def _is_of(name, words):
+    """Does the name begin a word with one of these?"""
+    return any(re.search(rf"\b{re.escape(word)}", name.lower()) for word in words)
 
 
 def _check_place(table, row, bottom, top, volume, extent, log):

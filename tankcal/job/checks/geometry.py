@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.job.checks.common import tell
+from tankcal.job.checks.common import course_heights, tell
 from tankcal.messages import message
 
 MIN_POINTS_PER_COURSE = 5
@@ -34,10 +34,8 @@ def check_cylinder(points, courses, values, raw, log):
         same_unit = check_extent(points, "x_m", width, "tank.nominal_diameter_m", diameter, log)
     if height is not None and rise > UNIT_FACTOR * height:
         same_unit = check_extent(points, "z_m", rise, "tank.nominal_height_m", height, log)
-    heights = [None]
-    if courses is not None and not courses.skipped:
-        heights = courses.of("height_m")
-    if not same_unit or bottom is None or not heights or None in heights:
+    heights = course_heights(courses)
+    if not same_unit or bottom is None or heights is None:
         return
     edges = bottom + np.concatenate([[0.0], np.cumsum(heights)])
     _check_points_in_courses(xyz[:, 2], unplaced, edges, courses, raw, log)

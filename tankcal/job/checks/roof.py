@@ -3,6 +3,7 @@
 from tankcal.job.checks.common import is_not_given, missing_beside, tell
 from tankcal.job.checks.settings import RELATIVE_DENSITY
 from tankcal.job.contract import KEYS
+from tankcal.job.plausibility import ROOF_KG_M2
 from tankcal.messages import message
 
 LIGHTEST_KG_M2, HEAVIEST_KG_M2 = 1.0, 1000.0  # aluminium skins have 5, steel double decks 120
@@ -58,6 +59,18 @@ def _check_mass(roof, area, raw, log):
         )
         tell(log.problem, raw, "roof", "mass_kg", expected)
         return
+    least, most = (each * area for each in ROOF_KG_M2)
+    if not least <= mass <= most:
+        text = message(
+            "roof_mass_strange",
+            "{found_kg:g} kg, expected {least_kg:.3g} to {most_kg:.3g} kg for a roof of"
+            " {area_m2:.4g} m2: in another unit?",
+            found_kg=mass,
+            least_kg=least,
+            most_kg=most,
+            area_m2=area,
+        )
+        tell(log.warning, raw, "roof", "mass_kg", text)
     low, high = roof["critical_bottom_m"], roof["critical_top_m"]
     if None in (density, low, high) or density < RELATIVE_DENSITY:
         return

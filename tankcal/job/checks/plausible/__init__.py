@@ -1,7 +1,6 @@
 """Is each number plausible? The ranges and cross-checks of `tankcal.job.plausibility`."""
 
 from tankcal.job.checks.plausible.calendar import check_dates
-from tankcal.job.checks.plausible.contents import check_contents
 from tankcal.job.checks.plausible.levels import check_levels
 from tankcal.job.checks.plausible.material import check_material
 from tankcal.job.checks.plausible.plates import check_plates
@@ -18,6 +17,5 @@ def check_plausible(values, tables, extent, kind, raw, log):
     check_sizes(values, kind, raw, log)
     check_plates(values, tables["courses"], kind, raw, log)
     check_levels(values, tables, extent, kind, raw, log)
-    check_contents(values, tables["deadwood"], extent, raw, log)
     if kind == "vertical":
         check_rings(values, tables["points"], tables["courses"], log)

@@ -4,6 +4,7 @@ from tankcal.job.checks.common import is_not_given, loads_the_shell, tell
 from tankcal.job.plausibility import (
     AIR_C,
     AMBIENT,
+    CARBON_STEEL,
     E_GPA,
     EXPANSION_PER_K,
     REFERENCE_C,
@@ -13,7 +14,6 @@ from tankcal.job.plausibility import (
 from tankcal.messages import message
 
 FAHRENHEIT_ZERO, FAHRENHEIT_STEP = 32.0, 5 / 9
-CARBON_STEEL = "carbon_steel"
 
 
 def check_material(values, kind, raw, log):
@@ -48,20 +48,31 @@ def _check_temperatures(values, raw, log):
             celsius_c=_celsius(air),
         )
         tell(log.warning, raw, "checks", "air_temperature_c", text)
-    if _beyond(shell, SHELL_C[service]):
-        low, high = SHELL_C[service]
-        text = message(
-            "shell_temperature_strange",
-            "{found_c:g} degC of the shell on the survey day, expected {low_c:g} to {high_c:g}: in"
-            " degrees Fahrenheit, which would be {celsius_c:.1f} degC? For a tank that is hot or"
-            " cold by its service, say so in checks.service",
-            found_c=shell,
-            low_c=low,
-            high_c=high,
-            celsius_c=_celsius(shell),
-        )
-        tell(log.warning, raw, "survey", "shell_temperature_c", text)
-    elif None not in (shell, air) and service == AMBIENT and _beyond(shell - air, SHELL_OVER_AIR_K):
+    _check_range(reference, REFERENCE_C[service], "table", "reference_temperature_c", raw, log)
+    if _check_range(shell, SHELL_C[service], "survey", "shell_temperature_c", raw, log):
+        _check_beside_air(shell, air, service, raw, log)
+
+
+def _check_range(found, bounds, section, key, raw, log):
+    """Is a temperature one of the service? Returns False after telling a warning."""
+    if not _beyond(found, bounds):
+        return True
+    text = message(
+        "temperature_strange",
+        "{found_c:g} degC, expected {low_c:g} to {high_c:g}: in degrees Fahrenheit, which would be"
+        " {celsius_c:.1f} degC? For a tank that is hot or cold by its service, say so in"
+        " checks.service",
+        found_c=found,
+        low_c=bounds[0],
+        high_c=bounds[1],
+        celsius_c=_celsius(found),
+    )
+    tell(log.warning, raw, section, key, text)
+    return False
+
+
+def _check_beside_air(shell, air, service, raw, log):
+    if None not in (shell, air) and service == AMBIENT and _beyond(shell - air, SHELL_OVER_AIR_K):
         text = message(
             "shell_unlike_air",
             "{found_c:g} degC, and the air had {air_c:g} (checks.air_temperature_c): expected"
@@ -72,77 +83,55 @@ def _check_temperatures(values, raw, log):
             high_k=SHELL_OVER_AIR_K[1],
         )
         tell(log.warning, raw, "survey", "shell_temperature_c", text)
-    if _beyond(reference, REFERENCE_C[service]):
-        low, high = REFERENCE_C[service]
-        text = message(
-            "reference_temperature_strange",
-            "a table for {found_c:g} degC, expected {low_c:g} to {high_c:g}: in degrees Fahrenheit,"
-            " which would be {celsius_c:.1f} degC? For a tank that is hot or cold by its service,"
-            " say so in checks.service",
-            found_c=reference,
-            low_c=low,
-            high_c=high,
-            celsius_c=_celsius(reference),
-        )
-        tell(log.warning, raw, "table", "reference_temperature_c", text)
 
 
 def _check_expansion(values, shell, raw, log):
     found, bounds = values["material"]["expansion_per_k"], EXPANSION_PER_K.get(shell)
     if found is None:
         corrected = values["survey"]["shell_temperature_c"] is not None
-        is_on = corrected and values["corrections"]["temperature"] is not False
-        if shell != CARBON_STEEL and is_on and is_not_given(raw, "material", "expansion_per_k"):
-            text = message(
-                "expansion_missing",
-                "missing; expected the thermal expansion of {shell}, for what is taken where it is"
-                " blank is that of carbon steel",
-                shell=shell,
-            )
-            tell(log.problem, raw, "material", "expansion_per_k", text)
-        return
-    if bounds is None or not _beyond(found, bounds):
-        return
-    for other, (low, high) in EXPANSION_PER_K.items():
-        if other != shell and low <= found <= high:
-            hint = message(
-                "is_of_metal", "that of {shell}? Then say so in checks.shell", shell=other
-            )
-            break
-    else:
+        if corrected and values["corrections"]["temperature"] is not False:
+            _check_given("expansion_per_k", shell, raw, log)
+    elif bounds is not None and _beyond(found, bounds):
+        others = [one for one in EXPANSION_PER_K if not _beyond(found, EXPANSION_PER_K[one])]
         hint = message("power_of_ten", "is a digit or a power of ten wrong?")
-    text = message(
-        "expansion_strange",
-        "{found:g} 1/K, expected {low:g} to {high:g} for {shell}: {hint}",
-        found=found,
-        low=bounds[0],
-        high=bounds[1],
-        shell=shell,
-        hint=hint,
-    )
-    tell(log.warning, raw, "material", "expansion_per_k", text)
+        if others:
+            hint = message(
+                "is_of_metal", "that of {shell}? Then say so in checks.shell", shell=others[0]
+            )
+        _tell_strange("expansion_per_k", "1/K", found, bounds, shell, hint, raw, log)
 
 
 def _check_modulus(values, shell, raw, log):
     found, bounds = values["material"]["e_gpa"], E_GPA.get(shell)
     if found is None:
-        is_loaded = loads_the_shell(values) or values["survey"]["liquid_level_m"]
-        if shell != CARBON_STEEL and is_loaded and is_not_given(raw, "material", "e_gpa"):
-            text = message(
-                "modulus_missing",
-                "missing; expected Young's modulus of {shell}, for what is taken where it is blank"
-                " is that of carbon steel",
-                shell=shell,
-            )
-            tell(log.problem, raw, "material", "e_gpa", text)
+        if loads_the_shell(values) or values["survey"]["liquid_level_m"]:
+            _check_given("e_gpa", shell, raw, log)
     elif bounds is not None and _beyond(found, bounds):
-        text = message(
-            "modulus_strange",
-            "{found_gpa:g} GPa, expected {low_gpa:g} to {high_gpa:g} for {shell}: another metal?"
-            " Then say so in checks.shell",
-            found_gpa=found,
-            low_gpa=bounds[0],
-            high_gpa=bounds[1],
-            shell=shell,
-        )
-        tell(log.warning, raw, "material", "e_gpa", text)
+        hint = message("another_metal", "another metal? Then say so in checks.shell")
+        _tell_strange("e_gpa", "GPa", found, bounds, shell, hint, raw, log)
+
+
+def _check_given(key, shell, raw, log):
+    if shell == CARBON_STEEL or not is_not_given(raw, "material", key):
+        return
+    text = message(
+        "constant_missing",
+        "missing; expected that of {shell}, for what is taken where it is blank is that of carbon"
+        " steel",
+        shell=shell,
+    )
+    tell(log.problem, raw, "material", key, text)
+
+
+def _tell_strange(key, unit, found, bounds, shell, hint, raw, log):
+    text = message(
+        "constant_strange",
+        "{found:g} {unit}, expected {low:g} to {high:g} for {shell}: {hint}",
+        found=found,
+        unit=unit,
+        low=bounds[0],
+        high=bounds[1],
+        shell=shell,
+        hint=hint,
+    )
+    tell(log.warning, raw, "material", key, text)

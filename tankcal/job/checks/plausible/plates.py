@@ -2,10 +2,12 @@
 
 import numpy as np
 
-from tankcal.job.checks.common import tell
+from tankcal.job.checks.common import course_heights, tell
 from tankcal.job.plausibility import (
+    CARBON_STEEL,
     HEAVY,
     LEAST_PLATE_MM,
+    LEAST_STRESS_MPA,
     LIGHT,
     PAINT_MM,
     RISING_PLATES,
@@ -27,41 +29,36 @@ def check_plates(values, courses, kind, raw, log):
 
 
 def _check_courses(values, courses, log):
-    diameter, heights = values["tank"]["nominal_diameter_m"], courses.of("height_m")
+    diameter, heights = values["tank"]["nominal_diameter_m"], course_heights(courses)
     thickness = courses.of("thickness_mm")
-    if diameter is None or None in heights or None in thickness or courses.skipped:
+    if None in (diameter, heights) or None in thickness:
         return
     given = values["table"]["liquid_density_kg_m3"] or 0.0
     heaviest = max(HEAVY, given / WATER_KG_M3)
     lightest = given / WATER_KG_M3 if given else LIGHT
     above = np.cumsum(heights[::-1])[::-1]
-    is_metal = values["checks"]["shell"] != "other"
+    shell = values["checks"]["shell"] or CARBON_STEEL
     for row, plate, head in zip(courses.rows, thickness, above.tolist(), strict=True):
-        least = least_course_mm(diameter, head, lightest)
-        most = most_course_mm(diameter, head, heaviest)
-        if not is_metal or plate == 0:
+        if shell not in LEAST_STRESS_MPA or plate == 0:
             continue
+        least = least_course_mm(diameter, head, lightest, shell)
+        most = most_course_mm(diameter, head, heaviest, shell)
+        text = None
         if plate > most:
             text = message(
                 "plate_thick",
-                "{found_mm:g} mm, expected at most {most_mm:.3g} mm for {head_m:.4g} m of shell"
-                " above it and a diameter of {diameter_m:g} m: ten times too thick?",
-                found_mm=plate,
-                most_mm=most,
-                head_m=head,
-                diameter_m=diameter,
+                "{found_mm:g} mm, expected at most {limit_mm:.3g} mm for {head_m:.4g} m of shell"
+                " above it and a diameter of {diameter_m:g} m: two or ten times too thick?",
+                **_of_course(plate, most, head, diameter),
             )
-            log.warning(courses.file, text, row, "thickness_mm")
         elif plate < least:
             text = message(
                 "plate_thin",
-                "{found_mm:g} mm, expected {least_mm:.3g} mm or more for {head_m:.4g} m of shell"
-                " above it and a diameter of {diameter_m:g} m: in centimetres?",
-                found_mm=plate,
-                least_mm=least,
-                head_m=head,
-                diameter_m=diameter,
+                "{found_mm:g} mm, expected {limit_mm:.3g} mm or more for {head_m:.4g} m of shell"
+                " above it and a diameter of {diameter_m:g} m: in centimetres, or half of it?",
+                **_of_course(plate, least, head, diameter),
             )
+        if text is not None:
             log.warning(courses.file, text, row, "thickness_mm")
     if thickness and 0 < RISING_PLATES * thickness[0] < thickness[-1]:
         text = message(
@@ -73,6 +70,10 @@ def _check_courses(values, courses, log):
         )
         log.warning(courses.file, text, courses.rows[0], "thickness_mm")
     _check_paint(values, courses, log)
+
+
+def _of_course(plate, limit, head, diameter):
+    return {"found_mm": plate, "limit_mm": limit, "head_m": head, "diameter_m": diameter}
 
 
 def _check_paint(values, courses, log):

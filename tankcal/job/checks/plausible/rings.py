@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tankcal.job.checks.common import course_heights
 from tankcal.job.checks.geometry import MIN_POINTS_PER_COURSE, places_of
 from tankcal.job.plausibility import LEVEL_M, MOST_RINGS, NEAR_JOINT_M, RING_GAP_M
 from tankcal.messages import message
@@ -10,10 +11,8 @@ from tankcal.messages import message
 def check_rings(values, points, courses, log):
     """Rings are surveyed on plates: one at a joint speaks of wrong heights, or of their order."""
     bottom = values["datum"]["bottom_z_m"]
-    if points is None or courses is None or bottom is None or courses.skipped:
-        return
-    heights = courses.of("height_m")
-    if None in heights or len(heights) < 2:
+    heights = course_heights(courses)
+    if points is None or bottom is None or heights is None or len(heights) < 2:
         return
     rings = _rings(places_of(points)[:, 2]) - bottom
     if not len(rings):

@@ -20,6 +20,7 @@ from tankcal.job.plausibility import (
 from tankcal.messages import message
 
 RADII = (("dish_radius_m", DISH_RADIUS), ("knuckle_radius_m", KNUCKLE_RADIUS))
+ALIKE = dict.fromkeys(END_DEPTH, ("depth_m",)) | {"torispherical": [name for name, _ in RADII]}
 
 
 def check_sizes(values, kind, raw, log):
@@ -59,10 +60,8 @@ def _check_lying(values, raw, log):
         _check_length(length, diameter, raw, log)
     for end in "ab":
         _check_end(given, end, diameter, raw, log)
-    if given["end_a"] == given["end_b"] in END_DEPTH:
-        _check_pair(given, raw, log)
-    if given["end_a"] == given["end_b"] == "torispherical":
-        _check_radii_alike(given, raw, log)
+    if given["end_a"] == given["end_b"]:
+        _check_alike(given, ALIKE.get(given["end_a"], ()), raw, log)
 
 
 def _compare(found, nominal, section, key, drawn, raw, log):
@@ -141,31 +140,16 @@ def _check_end(given, end, diameter, raw, log):
             tell(log.warning, raw, "horizontal", f"end_{end}_{name}", text)
 
 
-def _check_pair(given, raw, log):
-    a, b = given["end_a_depth_m"], given["end_b_depth_m"]
-    if None in (a, b) or abs(a - b) < max(ENDS_DIFFER_M, (ENDS_DIFFER - 1) * min(a, b)):
-        return
-    deeper, other = ("a", "b") if a > b else ("b", "a")
-    text = message(
-        "ends_differ",
-        "{found_m:g} m, and end {other} is {other_m:g} m deep: expected two ends of one form to be"
-        " alike",
-        found_m=max(a, b),
-        other=other.upper(),
-        other_m=min(a, b),
-    )
-    tell(log.warning, raw, "horizontal", f"end_{deeper}_depth_m", text)
-
-
-def _check_radii_alike(given, raw, log):
-    for name, _ in RADII:
+def _check_alike(given, sizes, raw, log):
+    """Two ends of one form."""
+    for name in sizes:
         a, b = (given[f"end_{end}_{name}"] for end in "ab")
-        if None in (a, b) or not min(a, b) or max(a, b) / min(a, b) < ENDS_DIFFER:
+        if None in (a, b) or abs(a - b) < max(ENDS_DIFFER_M, (ENDS_DIFFER - 1) * min(a, b)):
             continue
         end, other = ("a", "b") if a > b else ("b", "a")
         text = message(
-            "end_radii_differ",
-            "{found_m:g} m, and {other_m:g} m at end {other}: expected two torispherical ends to be"
+            "ends_differ",
+            "{found_m:g} m, and {other_m:g} m at end {other}: expected two ends of one form to be"
             " alike",
             found_m=max(a, b),
             other=other.upper(),

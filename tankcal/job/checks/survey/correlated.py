@@ -18,9 +18,9 @@ def check_correlated(files):
         for i, (name, at, axis) in enumerate((cells[:3], cells[3:]), start=1):
             if name is None or at is None:
                 break  # told already
-            if not _is_there(files, table, row, i, name, at):
-                break
-            if not _has_axis(files, table, row, i, name, axis):
+            column, expected = _doubt_of_end(files.tables[name], name, at, axis)
+            if column:
+                files.log.problem(table.file, expected, row, f"{column}_{i}")
                 break
             ends.append((name, int(at), axis))
         if len(ends) < 2:
@@ -41,46 +41,38 @@ def check_correlated(files):
             files.log.problem(table.file, expected, row, "row_2")
 
 
-def _is_there(files, table, row, i, name, at):
-    named = files.tables[name]
+def _doubt_of_end(named, name, at, axis):
+    """Column ("row" or "value") and text of what is wrong with one end of a pair, or (None, None).
+
+    named  the table of that name, None: not there        at, axis  row and x, y or z, or None
+    """
     if named is None or at not in named.rows:
-        expected = message(
+        return "row", message(
             "correlated_no_such_row",
             "found {at:g}, and {table} has no such row; expected a row of that table, the heading"
             " being row 1",
             at=at,
             table=name,
         )
-        files.log.problem(table.file, expected, row, f"row_{i}")
-        return False
     place = list(named.rows).index(at)
     if "use" in named.columns and named.of("use")[place] == "check":
-        expected = message(
+        return "row", message(
             "correlated_only_compared",
             "row {at:g} of {table} is only compared (use = check); expected one that is adjusted",
             at=at,
             table=name,
         )
-        files.log.problem(table.file, expected, row, f"row_{i}")
-        return False
-    return True
-
-
-def _has_axis(files, table, row, i, name, axis):
     if (name in OF_AXES) == (axis is not None):
-        return True
+        return None, None
     if axis is None:
-        expected = message(
+        return "value", message(
             "correlated_which_axis",
             "expected x, y or z, which of the three values of a row of {table} it is",
             table=name,
         )
-    else:
-        expected = message(
-            "correlated_one_value",
-            "found {axis}; expected nothing: a row of {table} has one value",
-            axis=axis,
-            table=name,
-        )
-    files.log.problem(table.file, expected, row, f"value_{i}")
-    return False
+    return "value", message(
+        "correlated_one_value",
+        "found {axis}; expected nothing: a row of {table} has one value",
+        axis=axis,
+        table=name,
+    )
