@@ -503,6 +503,15 @@ def test_long_tables_are_cut_and_say_so(only):
     assert note.data["text"].startswith(f"50 of {len(rows)} rows")
 
 
+def test_a_plan_asks_for_its_extent_twice_however_many_points_it_has(only, monkeypatch):
+    """Asked for each of 26 321 points it took more than ten minutes."""
+    asked = []
+    extent = figures._extent
+    monkeypatch.setattr(figures, "_extent", lambda paper: asked.append(1) or extent(paper))
+    figures.plan(Paper(only[1] / "record.json"))
+    assert len(asked) == 2
+
+
 def test_figures_are_drawn_of_every_kind_of_survey(only, station):
     for path in (only[1] / "record.json", station[2]):
         paper = Paper(path)

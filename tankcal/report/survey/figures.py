@@ -51,7 +51,7 @@ def plan(paper):
     points = adjustment["points"]
     xy = np.array([places[one["point"]] for one in points])
     origin = np.floor(xy.min(axis=0) / 1000) * 1000 if np.abs(xy).max() > 1e5 else np.zeros(2)
-    factor = plan_factor(paper)
+    factor, extent = plan_factor(paper), _extent(paper)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH, 4.6))
         ax = figure.subplots()
@@ -69,10 +69,11 @@ def plan(paper):
         ax.set_axisbelow(True)
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=5, frameon=False)
         set_margins(figure, left=0.65, right=0.1, bottom=0.75, top=0.08)
-        labels = _names(paper, points, xy - origin, factor)
+        labels = _names(points, xy - origin, factor, extent)
         labels += _photo_names(adjustment["photos"], photos)
         marks = np.vstack([xy - origin, photos])
-        ellipses = [0.75 * _on_page(paper, factor * one["ellipse_m"][0]) for one in points]
+        largest = factor * np.array([one["ellipse_m"][0] for one in points])
+        ellipses = 0.75 * _on_page(largest, extent)
         room = np.maximum([*ellipses, *(0.0 for _ in photos)], MARK)
         write_labels(ax, labels, marks, size=6, room=room, color=_GREY, zorder=5, bbox=_BEHIND)
     return figure
@@ -128,24 +129,24 @@ def _marks(ax, paper, points, xy, many):
                     label=paper.word(f"plan.{kind}"))  # fmt: skip
 
 
-def _on_page(paper, length_m):
-    """A length in the plan in typographic points, about."""
-    return PLAN_POINTS * length_m / _extent(paper)
+def _on_page(length_m, extent_m):
+    """A length in a plan of that extent in typographic points, about."""
+    return PLAN_POINTS * length_m / extent_m
 
 
-def _names(paper, points, xy, factor):
+def _names(points, xy, factor, extent_m):
     """Names beside the ellipses, outwards; points above one another share a line.
 
     Those of stations, control and check points find their places first.
     """
     middle = xy.mean(axis=0)
-    groups = _at_one_place(points, xy, SAME_PLACE * _extent(paper))
+    groups = _at_one_place(points, xy, SAME_PLACE * extent_m)
     groups.sort(key=lambda numbers: all(points[n]["kind"] == "point" for n in numbers))
     found = []
     for numbers in groups:
         names = [points[n]["point"] for n in numbers]
         ellipse = factor * max(points[n]["ellipse_m"][0] for n in numbers)
-        clear = 3 + 0.75 * _on_page(paper, ellipse)
+        clear = 3 + 0.75 * _on_page(ellipse, extent_m)
         forms = tuple(_shortened(names, most) for most in (MOST_AT_A_PLACE, 1))
         away = tuple(np.sign(xy[numbers[0]] - middle) + 1e-3 * (xy[numbers[0]] - middle))
         found.append(Label(*xy[numbers[0]], forms, clear, away))
