@@ -9,6 +9,7 @@ from networks import photographed
 import tankcal.network.reliability
 from tankcal.camera import PARAMETERS
 from tankcal.errors import SolutionError
+from tankcal.gauss_markov.effects import cofactors_within, responses
 from tankcal.network import Instrument, adjust, correlations, snoop
 from tankcal.network.datum import dependent
 from tankcal.network.quality import compared
@@ -216,3 +217,19 @@ def test_which_quantities_depend_on_the_datum():
         assert not dependent(adjust(SURVEY), one).any()
     without = adjust(replace(SURVEY, observations=()), datum="inner")
     assert dependent(without, tape).all()
+
+
+@pytest.mark.parametrize("datum", CASES)
+def test_cofactors_of_an_observation_are_its_rows_times_its_responses(datum):
+    """Second method: the change of all unknowns, Q J', through the rows once more."""
+    found = sharply(CASES[datum], datum)
+    solution, model = found.solution, found.problem.model
+    for group, jac in zip(model.groups, solution.jacobians, strict=True):
+        columns, own = group.columns[:7], jac[:7]
+        changes = np.hstack([part for _, part in responses(solution, columns, own)])
+        changes = np.vstack([changes, np.zeros((1, changes.shape[1]))])
+        wide = np.einsum("nmk,nkd->nmd", own, changes[columns]).reshape(
+            *own.shape[:2], *own.shape[:2]
+        )
+        expected = np.array([wide[n, :, n, :] for n in range(len(own))])
+        np.testing.assert_allclose(cofactors_within(solution, columns, own), expected, atol=1e-9)

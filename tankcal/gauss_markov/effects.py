@@ -47,12 +47,13 @@ def _variances(solution, rows):
 
 def _through(solution, rows):
     """A matrix of rows in whitened blocks (sparse) and, with the blocks eliminated, (k, nr)."""
-    plan, normals = solution.plan, solution.factor.normals
+    plan = solution.plan
     reduced = rows[:, : plan.reduced].toarray()
     if not plan.blocks:
         return scipy.sparse.csr_array((rows.shape[0], 0)), reduced
-    own = scipy.sparse.csr_array(rows[:, plan.reduced :] @ _block_diagonal(solution))
-    return own, reduced - (own @ block_rows(plan, normals.wide)).toarray()
+    of_blocks = rows[:, plan.reduced :]
+    own = scipy.sparse.csr_array(of_blocks @ _block_diagonal(solution))
+    return own, reduced + of_blocks @ solution.following
 
 
 def responses(solution, columns, jac):
@@ -94,6 +95,19 @@ def _response(solution, rows):
     if solution.plan.blocks:
         found[solution.plan.reduced :] += (_block_diagonal(solution) @ own.T).toarray()
     return found
+
+
+def cofactors_within(solution, columns, jac):
+    """Cofactors J Q J' (n, m, m) of the rows of each observation among themselves; see variances.
+
+    For a few observations: the cofactors of all their unknowns are worked out at once.
+    """
+    free = columns >= 0
+    unknowns, place = np.unique(columns[free], return_inverse=True)
+    places = np.full(columns.shape, len(unknowns))
+    places[free] = place
+    q = np.pad(solution.cofactors(unknowns), (0, 1))
+    return jac @ q[places[:, :, None], places[:, None, :]] @ jac.transpose(0, 2, 1)
 
 
 def _block_diagonal(solution):
@@ -222,4 +236,4 @@ def following(solution):
     if not plan.blocks:
         return np.zeros((0, plan.reduced))
     found = -(_block_diagonal(solution) @ block_rows(plan, normals.wide))
-    return found.toarray() if 3 * plan.blocks * plan.reduced < DENSE else found
+    return found.toarray() if 3 * plan.blocks * plan.reduced < DENSE else found.tocsr()

@@ -19,7 +19,7 @@ Source: Foerstner 1983, Reliability and discernability of extended Gauss-Markov 
 import numpy as np
 from scipy.special import chdtri
 
-from tankcal.gauss_markov.effects import responses
+from tankcal.gauss_markov.effects import cofactors_within, responses
 from tankcal.network.cleaning import CRITICAL
 from tankcal.network.reactions import HELD
 from tankcal.network.reliability import UNCONTROLLED
@@ -55,7 +55,7 @@ def alternatives(adjusted, source, row, held=None):
     for k, table in enumerate(adjusted.residuals[: len(problem.sources) - len(problem.blocks)]):
         if table.source == "known beforehand":
             continue
-        b = np.einsum("nmk,nkd->nmd", solution.jacobians[k], moves[problem.model.groups[k].columns])
+        b = solution.jacobians[k] @ np.take(moves, problem.model.groups[k].columns, axis=0)
         for i, blocks in _near(solution, problem, table, k, b, inverse, back):
             own, instead = _tests(*blocks, inverse, back)
             if own is not None and instead is not None:
@@ -72,25 +72,15 @@ def alternatives(adjusted, source, row, held=None):
 def _near(solution, problem, table, number, b, inverse, back):
     """Observations that stand out with i back: place, (v_j, R_j, B)."""
     v = table.residual / table.sd - b @ back
-    r = table.redundancy + np.einsum("nmd,de,nme->nm", b, inverse, b)
+    r = table.redundancy + np.einsum("nmd,nmd->nm", b @ inverse, b)
     square = np.where(r > UNCONTROLLED, v**2 / np.maximum(r, UNCONTROLLED), 0.0).max(axis=1)
     near = np.flatnonzero(table.used & (square > WORTH) & (b != 0).any(axis=(1, 2)))
     near = near[np.argsort(-square[near], kind="stable")][:LOOKED_AT]
     if not len(near):
         return
     columns, jac = problem.model.groups[number].columns[near], solution.jacobians[number][near]
-    m = jac.shape[1]
-    for part, response in responses(solution, columns, jac):
-        response = np.vstack([response, np.zeros((1, response.shape[1]))])
-        for value in range(part.start, min(part.stop, len(near) * m)):
-            place, first = divmod(value, m)
-            if first == 0:
-                covariance = np.zeros((m, m))
-            covariance[:, first] = jac[place] @ response[columns[place], value - part.start]
-            if first == m - 1:
-                j = near[place]
-                cofactors = np.eye(m) - covariance + b[j] @ inverse @ b[j].T
-                yield j, (v[j], cofactors, b[j])
+    for j, own in zip(near, cofactors_within(solution, columns, jac), strict=True):
+        yield j, (v[j], np.eye(len(own)) - own + b[j] @ inverse @ b[j].T, b[j])
 
 
 def _tests(v, cofactors, b, inverse, back):
