@@ -107,6 +107,14 @@ def decimals_of(u, *, significant=2, least=0):
     return _decimals(_exact(u if _is_number(u) else 0.0), significant, least)
 
 
+def rounded(u, *, significant=2):
+    """u as it is printed: 417 is 420, which no number format makes of it; None where not known."""
+    if not _is_number(u):
+        return None
+    exact = _exact(u)
+    return float(_spread(exact, _decimals(exact, significant, None))) if exact else 0.0
+
+
 def bound_of_decimals(decimals, *, significant=2):
     """The u below which `decimals_of` gives that many decimals or more: 0.0995 for 3."""
     return (10**significant - 0.5) / 10.0**decimals

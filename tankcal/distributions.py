@@ -8,8 +8,8 @@ certificate says with `standard`, `within` or `expanded`.
 
 Both are the same but for Student's t of which the scale is declared: its u is s/sqrt(n) of n
 readings, not sqrt(dof/(dof - 2)) times as much, and u itself is unsure by its dof. Of a t that is
-declared by its standard deviation, u is that: dof is its shape only, and u is not unsure
-(`u_dof` inf; Kacker & Jones 2003, Metrologia 40, 235). u is what was declared, always.
+declared by its standard deviation, u is that: dof is its shape only, and u is not unsure, so
+that `u_dof` is infinite. u is what was declared, always.
 Source: JCGM 100:2008 4.2, 4.3, G.3, G.4; JCGM 101:2008 6.4.
 """
 

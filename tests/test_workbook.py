@@ -4,6 +4,7 @@ import copy
 import json
 import xml.etree.ElementTree as ET
 import zipfile
+from decimal import Decimal
 
 import openpyxl
 import pytest
@@ -107,6 +108,20 @@ def test_each_row_shows_two_digits_of_its_U_and_keeps_its_litres(book, record):
         if U > 0:
             assert _decimals(expanded) == decimals_of(U)
             assert _decimals(volume) == max(decimals_of(U), 3)
+
+
+def test_litres_have_a_U_of_two_digits(record, tmp_path):
+    """417 L are printed 420 L, as in the papers; no number format makes that of 417."""
+    spec = record["job"]["table"] | {"volume_unit": "L"}
+    in_litres = record | {"job": record["job"] | {"table": spec}}
+    sheet = written(in_litres, tmp_path)["Capacity"]
+    headings = {cell.value: cell.column for cell in sheet[4]}
+    column = headings["Expanded uncertainty U (L)"]
+    for row, U in enumerate(record["capacity"]["stated_U_m3"], start=5):
+        cell = sheet.cell(row, column)
+        assert cell.value == pytest.approx(1000 * U, rel=0.05)
+        shown = Decimal(f"{cell.value:.{_decimals(cell)}f}")
+        assert len(shown.normalize().as_tuple().digits) <= 2, (row, shown)
 
 
 def _decimals(cell):

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.uncertainty import coverage_factor
+from tankcal.uncertainty import coverage_factor, dof_of, least_of, sum_of_fourths
 
 CHUNK = 2048
 
@@ -70,7 +70,11 @@ def ratio_of(U, volume):
 
 
 class Groups:
-    """Columns of the factor by source, as Welch-Satterthwaite needs them."""
+    """Columns of the factor by source, and two norms of them from which degrees of freedom follow.
+
+    u and w, w^4 = sum of u_s^4 / dof_s, are norms of a difference of columns, so that the search
+    for the worst delivery bounds both by the triangle inequality; (u/w)^4 is the one rule.
+    """
 
     def __init__(self, sources):
         widths = [source.columns_m3.shape[1] for source in sources]
@@ -80,7 +84,7 @@ class Groups:
         self.columns = np.flatnonzero(np.isin(owner, finite))
         self.members = (owner[self.columns, None] == finite).astype(float)
         self.dof = dof[finite]
-        self.least_dof = self.dof.min(initial=np.inf)
+        self.least_dof = least_of(self.dof)
 
     def norms(self, difference):
         """(u, w) of (..., c) columns: u^2 = sum of squares, w^4 = sum of u_s^4 / dof_s."""
@@ -89,12 +93,11 @@ class Groups:
         if not len(self.dof):
             return u, np.zeros_like(u)
         by_source = squares[..., self.columns] @ self.members
-        return u, (by_source**2 @ (1 / self.dof)) ** 0.25
+        return u, sum_of_fourths(by_source, self.dof) ** 0.25
 
     def effective(self, u, w):
-        """Effective degrees of freedom (u/w)^4, never below the least of any source."""
-        ratio = np.divide(u, w, out=np.full(np.shape(u), np.inf), where=w > 0)
-        return np.maximum(ratio**4, self.least_dof) if len(self.dof) else ratio
+        """Effective degrees of freedom (u/w)^4, by the one rule (`uncertainty.dof_of`)."""
+        return dof_of(u**2, w**4, self.least_dof)
 
 
 @dataclass(frozen=True)

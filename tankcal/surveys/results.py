@@ -238,10 +238,14 @@ class Adjustment:
         return f"<tankcal.Adjustment of {self}>"
 
     def _repr_html_(self) -> str:
-        sd_mm = 1000 * np.sqrt(np.einsum("nii->ni", self.covariance_m2))
+        columns = self.points
         rows = [
-            [name, *(fixed(value, 4) for value in xyz), *(fixed(value, 2) for value in sd)]
-            for name, xyz, sd in zip(self.names[:_SHOWN], self.xyz_m, sd_mm, strict=False)
+            [
+                columns["point"][i],
+                *(fixed(columns[f"{axis}_m"][i], 4) for axis in "xyz"),
+                *(fixed(columns[f"s{axis}_mm"][i], 2) for axis in "xyz"),
+            ]
+            for i in range(min(len(self.names), _SHOWN))
         ]
         more = len(self.names) - _SHOWN
         headings = ["point", "x, m", "y, m", "z, m", "sx, mm", "sy, mm", "sz, mm"]

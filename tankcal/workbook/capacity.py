@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tankcal.digits import LITRE_DECIMALS, decimals_of_height, decimals_of_rows, shortest
+from tankcal.digits import LITRE_DECIMALS, decimals_of_height, decimals_of_rows, rounded, shortest
 from tankcal.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
 from tankcal.report.uncertainty.stated import stated_U_m3
 from tankcal.words import marks_of
@@ -38,6 +38,7 @@ def capacity_sheet(book, record):
     columns = {**_in_units_of_the_table(book, capacity, spec), **_columns(book, capacity)}
     if not all(capacity["for_use"]):
         columns["for_use"] = use_column(book, capacity)
+    columns |= _U_in_unit_of_the_table(book, capacity, spec["volume_unit"])
     columns |= _intervals(book, capacity)
     book.widths(sheet, *map(width_of, columns.values()))
     muted = [row for row, good in enumerate(capacity["for_use"]) if not good]
@@ -92,7 +93,20 @@ def _in_units_of_the_table(book, capacity, spec):
         unit = spec["volume_unit"]
         factor = float(1 / VOLUME_UNITS_M3[unit])
         volumes = [factor * volume for volume in capacity["volume_m3"]]
-        in_unit = [factor * U for U in stated_U_m3(capacity)]
-        digits = decimals_of_rows(in_unit, least=TABLE_DECIMALS[unit])
+        digits = decimals_of_rows(_U_in(unit, capacity), least=TABLE_DECIMALS[unit])
         columns["in_unit"] = book.column("volume_in", volumes, digits, 18, unit=unit)
     return columns
+
+
+def _U_in_unit_of_the_table(book, capacity, unit):
+    """{name: Column} of U in litres or barrels, if asked, with its two digits as on paper."""
+    if unit == "m3":
+        return {}
+    expanded = _U_in(unit, capacity)
+    shown = [rounded(U) for U in expanded]
+    digits = decimals_of_rows(expanded)
+    return {"U_in_unit": book.column("expanded_in", shown, digits, 12, unit=unit)}
+
+
+def _U_in(unit, capacity):
+    return [float(1 / VOLUME_UNITS_M3[unit]) * U for U in stated_U_m3(capacity)]

@@ -6,7 +6,10 @@ rows; k by Welch-Satterthwaite over the inputs that were found together (tankcal
 
 import math
 
+import numpy as np
+
 from tankcal.digits import LITRE_DECIMALS, NOTHING
+from tankcal.uncertainty import dof_of, least_of, sum_of_fourths
 from tankcal.workbook.calculator.cells import Line, if_number
 from tankcal.workbook.calculator.coverage import normal, student
 
@@ -67,12 +70,13 @@ def combining(table, label):
             Line(f"variance_{place}", formula, _if(table, variance), "0.00E+00", "m⁶", label=name)
         )
         shares.append(f"[variance_{place}]^2/{group.dof!r}")
-    fourth = sum(v**2 / group.dof for v, group in zip(variances, groups, strict=True))
+    dofs = [group.dof for group in groups]
+    least = least_of(dofs)
+    fourth = float(sum_of_fourths(np.array(variances), dofs))
     u = math.sqrt(sum(squares))
-    dof = max(u**4 / fourth, min(group.dof for group in groups)) if fourth > 0 else math.inf
+    dof = float(dof_of(sum(squares), fourth, least))
     z, k = table.coverage(dof)
     probability = table.job["table"]["coverage_probability"]
-    least = repr(min((group.dof for group in groups), default=0))
     every = f"[column_1]:[column_{len(squares)}]"
     found = "[delivery_state]=#delivery"
     shown_dof = dof if math.isfinite(dof) else float(_INFINITE)
@@ -90,7 +94,7 @@ def combining(table, label):
             "delivery_dof",
             if_number(
                 "[fourth]",
-                f"IF([fourth]>0,MAX([delivery_u]^4/[fourth],{least}),{_INFINITE})",
+                f"IF([fourth]>0,MAX([delivery_u]^4/[fourth],{least!r}),{_INFINITE})",
             ),
             _if(table, shown_dof),
             "0.0E+00",
