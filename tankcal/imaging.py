@@ -170,6 +170,53 @@ def one_image_point(p, r, q, form, of_ideal):
     )
 
 
+def one_ideal_point(p, r, q, measured, form, of_ideal):
+    """Misclosure of the ideal image: the ideal point of the ground less that of the measured
+    coordinate, which depends on the interior parameters, too, and all its derivatives.
+
+    p, r, q   as for one_image_point
+    measured  x and y, two numbers or (n,) mm
+
+    With y the measured coordinate from the principal point, after an affinity before the
+    distortion where there is one, a correction gives p = y + side d(y),
+    so that dp = -(1 + side d') d(x0, y0) + side d_K; a distortion of the ideal point p + d(p) = y,
+    so that dp = (1 + d')^-1 (-d(x0, y0) - d_K).
+    """
+    u = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
+    v = r[3] * p[0] + r[4] * p[1] + r[5] * p[2]
+    w = r[6] * p[0] + r[7] * p[1] + r[8] * p[2]
+    xi, eta, dxi, deta = ideal_point(u, v, w, r, q[0])
+    from_x, from_y = measured[0] - q[1], measured[1] - q[2]
+    x, y = led(from_x, from_y, q, form)
+    zero = 0.0 * x
+    if of_ideal:
+        x, y = undistorted_by(
+            x, y, q, (1.0, form[1], form[2], form[3], form[4], form[5], form[6], form[7])
+        )
+        _, _, dxx, dxy, dyx, dyy = distort(x, y, q, form)
+        a, b, c, d = 1.0 + dxx, dxy, dyx, 1.0 + dyy
+        t = 1.0 / (a * d - b * c)
+        a, b, c, d = d * t, -b * t, -c * t, a * t  # of dp by dy
+        corrected_x, corrected_y = x, y
+        e, f, g, h = a, b, c, d
+    else:
+        side = form[0]
+        dx, dy, dxx, dxy, dyx, dyy = distort(x, y, q, form)
+        a, b, c, d = 1.0 + side * dxx, side * dxy, side * dyx, 1.0 + side * dyy
+        corrected_x, corrected_y = x + side * dx, y + side * dy
+        e, f, g, h = zero - side, zero, zero, zero - side
+    kx, ky = distortion_derivatives(x, y, q, form)
+    by_kx, by_ky = ten(e, f, kx, ky), ten(g, h, kx, ky)
+    scale, skew = 1.0 + form[6] * q[11], form[6] * q[12]
+    by_a, by_b = form[6] * from_x, form[6] * from_y
+    return (
+        xi - corrected_x,
+        eta - corrected_y,
+        dxi + (a * scale, a * skew + b) + by_kx[:8] + (by_kx[8] - a * by_a, by_kx[9] - a * by_b),
+        deta + (c * scale, c * skew + d) + by_ky[:8] + (by_ky[8] - c * by_a, by_ky[9] - c * by_b),
+    )
+
+
 def seven(a, b, p, q):
     """a p + b q, element by element: seven numbers or arrays."""
     return (
@@ -193,21 +240,24 @@ def ten(a, b, p, q):
 
 
 def _loop(
-    xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac
-):
+    xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac,
+    in_ideal,
+):  # fmt: skip
     """image_rows, one image point after the other."""
     for i in range(len(point)):
         p, s, r, q = xyz[point[i]], photo_xyz[photo[i]], rotation[photo[i]], interior[photo[i]]
-        x, y, dx, dy = one_image_point(
-            (p[0] - s[0], p[1] - s[1], p[2] - s[2]),
-            (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2]),
-            (q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8], q[9], q[10], q[11], q[12]),
-            form,
-            of_ideal,
-        )
+        ground = (p[0] - s[0], p[1] - s[1], p[2] - s[2])
+        turn = (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2])
+        own = (q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8], q[9], q[10], q[11], q[12])
+        if in_ideal:
+            mx, my = xy[i, 0], xy[i, 1]
+            x, y, dx, dy = one_ideal_point(ground, turn, own, (mx, my), form, of_ideal)
+        else:
+            x, y, dx, dy = one_image_point(ground, turn, own, form, of_ideal)
+            x, y = x - xy[i, 0], y - xy[i, 1]
         wx, wy = weight[i, 0], weight[i, 1]
-        w[i, 0] = (x - xy[i, 0]) * wx
-        w[i, 1] = (y - xy[i, 1]) * wy
+        w[i, 0] = x * wx
+        w[i, 1] = y * wy
         if len(jac) == 0:
             continue
         gx, gy = jac[i, 0], jac[i, 1]
@@ -233,18 +283,25 @@ _COMPILED = (
     "seven",
     "ten",
     "one_image_point",
+    "one_ideal_point",
     "_loop",
 )
 
 
 def _arrays(
-    xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac
-):
+    xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac,
+    in_ideal,
+):  # fmt: skip
     """image_rows, over whole arrays."""
     p = (xyz[point] - photo_xyz[photo]).T
     r = rotation.reshape(-1, 9)[photo].T
-    x, y, dx, dy = one_image_point(tuple(p), tuple(r), tuple(interior[photo].T), form, of_ideal)
-    w[:] = (np.column_stack([x, y]) - xy) * weight
+    p, r, q = tuple(p), tuple(r), tuple(interior[photo].T)
+    if in_ideal:
+        x, y, dx, dy = one_ideal_point(p, r, q, tuple(xy.T), form, of_ideal)
+        w[:] = np.column_stack([x, y]) * weight
+    else:
+        x, y, dx, dy = one_image_point(p, r, q, form, of_ideal)
+        w[:] = (np.column_stack([x, y]) - xy) * weight
     if len(jac) == 0:
         return
     for row, derivatives in ((0, dx), (1, dy)):
@@ -255,56 +312,7 @@ def _arrays(
         jac[:, row, 9:] = d[:, 6 + active]
 
 
-def ideal_rows(
-    xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac
-):
-    """The same as `image_rows` with misclosures of the ideal image: the ideal point of the ground
-    less that of the measured coordinate, which depends on the interior parameters, too.
-
-    With y the measured coordinate from the principal point, after an affinity before the
-    distortion where there is one, a correction gives p = y + side d(y),
-    so that dp = -(1 + side d') d(x0, y0) + side d_K; a distortion of the ideal point p + d(p) = y,
-    so that dp = (1 + d')^-1 (-d(x0, y0) - d_K).
-    """
-    p = (xyz[point] - photo_xyz[photo]).T
-    r = rotation.reshape(-1, 9)[photo].T
-    q = tuple(interior[photo].T)
-    in_camera = np.einsum("nij,jn->in", rotation[photo], p)
-    xi, eta, dxi, deta = ideal_point(*in_camera, r, q[0])
-    from_x, from_y = xy[:, 0] - q[1], xy[:, 1] - q[2]
-    x, y = led(from_x, from_y, q, form)
-    if of_ideal:
-        side, (x, y) = 1.0, undistorted_by(x, y, q, (1.0, *form[1:]))
-    else:
-        side = form[0]
-    dx, dy, dxx, dxy, dyx, dyy = distort(x, y, q, form)
-    kx, ky = distortion_derivatives(x, y, q, form)
-    a, b, c, d = 1.0 + side * dxx, side * dxy, side * dyx, 1.0 + side * dyy
-    if of_ideal:
-        t = 1.0 / (a * d - b * c)
-        a, b, c, d = d * t, -b * t, -c * t, a * t  # of dp by dy
-        corrected_x, corrected_y = x, y
-        by_kx, by_ky = ten(a, b, kx, ky), ten(c, d, kx, ky)
-    else:
-        corrected_x, corrected_y = x + side * dx, y + side * dy
-        zero = 0.0 * x
-        by_kx, by_ky = ten(-side, zero, kx, ky), ten(zero, -side, kx, ky)
-    w[:] = np.column_stack([xi - corrected_x, eta - corrected_y]) * weight
-    if len(jac) == 0:
-        return
-    scale, skew = 1.0 + form[6] * q[11], form[6] * q[12]
-    by_a, by_b = form[6] * from_x, form[6] * from_y
-    for row, of_ground, by_x, by_y, by_k in ((0, dxi, a, b, by_kx), (1, deta, c, d, by_ky)):
-        derivatives = (*of_ground, by_x * scale, by_x * skew + by_y, *by_k[:8])
-        derivatives += (by_k[8] - by_x * by_a, by_k[9] - by_x * by_b)
-        found = np.stack(derivatives, axis=1) * weight[:, row, None]
-        jac[:, row, :3] = found[:, :3]
-        jac[:, row, 3:6] = -found[:, :3]
-        jac[:, row, 6:9] = found[:, 3:6]
-        jac[:, row, 9:] = found[:, 6 + active]
-
-
-def image_rows(*arguments):
+def image_rows(*arguments, in_ideal=False):
     """Whitened misclosures of image coordinates, computed minus measured, and their derivatives.
 
     xyz        (points, 3) m            photo_xyz  (photos, 3) m
@@ -314,10 +322,11 @@ def image_rows(*arguments):
     xy         (n, 2) measured, mm
     weight     (n, 2) 1/sd, 1/mm        active     (k,) places of the parameters asked for
     w          (n, 2) filled            jac        (n, 2, 9 + k) filled, or of length 0: left out
+    in_ideal   misclosures of the ideal image (one_ideal_point) instead of the measured one
 
     The derivatives are by point (3), photo (position 3, rotation 3), interior parameters (k).
     """
     if worthwhile(len(arguments[6])):
-        compiled(sys.modules[__name__], _COMPILED)._loop(*arguments)
+        compiled(sys.modules[__name__], _COMPILED)._loop(*arguments, in_ideal)
     else:
-        _arrays(*arguments)
+        _arrays(*arguments, in_ideal)

@@ -225,3 +225,51 @@ def test_a_covariance_that_is_none_is_told():
     ):
         with pytest.raises(SolutionError, match="covariance"):
             propagated(lambda values: values, GIVEN, bad)
+
+
+AS_DBAT = {  # px, py from the corner, mm; sds; reports of 14 January 2020, see below
+    3: [7.457, 3.61546, 2.61329, 0.00458861, -4.51351e-5, -2.05253e-6, -6.12803e-5, -4.41172e-5],
+    4: [7.45702, 3.61547, 2.61338, 0.00458999, -4.49945e-5, -2.06309e-6, -6.12476e-5, -4.42232e-5],
+}
+AS_ASPECT, SD_OF_ASPECT = {3: 0.000389598, 4: 0.000399377}, 2.09e-5
+DBAT_SIZE, DBAT_PIXEL = (2272, 1704), 0.0031911
+
+
+def of_dbat(number):
+    """(13,) of a report: y upwards, from the middle."""
+    c, px, py, k1, k2, k3, p1, p2 = AS_DBAT[number]
+    middle = np.array(DBAT_SIZE) / 2 * DBAT_PIXEL
+    x0, y0 = px - middle[0], middle[1] - py
+    return np.array([c, x0, y0, k1, k2, k3, 0, p1, -p2, 0, 0, AS_ASPECT[number], 0])
+
+
+def test_published_affinity_before_and_after_the_distortion(figure):
+    """Published: DBAT adjusted one calibration with as before the distortion (its model 3) and
+    after it (4). The first converted is the second, within a small part of its sd.
+
+    N. Boerlin & P. Grussenmeyer, Damped Bundle Adjustment Toolbox (copyright 2013-2019 the
+    authors), data/dbat/dbatexports, camcal-dbatreport-model3.txt and -model4.txt.
+    """
+    after = Form("correction_added", "b1_b2")
+    found = converted(of_dbat(3), PUBLISHED["dbat"], after, DBAT_SIZE, DBAT_PIXEL)
+    as_after = found.interior[11]
+    told = f"{as_after:.6e} for {AS_ASPECT[4]:.6e}, {found.error_px:.4f} px"
+    figure("as of DBAT's model 3 after the distortion", told)
+    assert abs(as_after - AS_ASPECT[4]) < SD_OF_ASPECT
+    back = converted(found.interior, after, PUBLISHED["dbat"], DBAT_SIZE, DBAT_PIXEL)
+    assert back.interior[11] == pytest.approx(AS_ASPECT[3], abs=0.1 * SD_OF_ASPECT)
+
+
+@pytest.mark.parametrize("convention", ["correction_added", "correction_subtracted"])
+def test_as_dbat_and_back_is_the_same_camera(convention):
+    """Closed form: signs turn round, A and B stay; a camera without affinity has none after it."""
+    given = Form(convention, "before_distortion", 2.0)
+    there = converted(of_dbat(3), given, PUBLISHED["dbat"], DBAT_SIZE, DBAT_PIXEL)
+    assert there.is_exact
+    assert there.interior[11] == AS_ASPECT[3]
+    back = converted(there.interior, PUBLISHED["dbat"], given, DBAT_SIZE, DBAT_PIXEL)
+    assert back.interior == pytest.approx(of_dbat(3), rel=1e-12, abs=1e-20)
+    plain = np.where(np.arange(13) < 11, of_dbat(3), 0.0)
+    there = converted(plain, Form(convention, "both_y"), PUBLISHED["dbat"], DBAT_SIZE, DBAT_PIXEL)
+    assert there.is_exact
+    assert not there.interior[11:].any()

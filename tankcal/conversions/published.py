@@ -32,7 +32,7 @@ from tankcal.errors import SolutionError
 PUBLISHED = {
     "silva": Form("correction_added", "both_y"),
     "pessoa": Form("correction_subtracted", "both_x"),
-    "dbat": Form("correction_added", "b1_b2"),
+    "dbat": Form("correction_added", "before_distortion"),  # its residual function 1
     "plain": Form(),
 }
 TURNS_ROUND = (3, 4, 5, 6, 7, 8)  # K1..K4, P1, P2; A and B where they are part of the distortion

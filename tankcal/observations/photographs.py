@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tankcal.imaging import ideal_rows, image_rows
+from tankcal.imaging import image_rows
 from tankcal.observations.base import Observations
 from tankcal.rotations import (
     angle_axes,
@@ -61,11 +61,10 @@ class ImageCoordinates(Observations):
 
     def _rows(self, state, value, weight, w, jac):
         of_ideal = self.form.convention == "distortion_of_ideal"
-        rows = image_rows if self.form.weights == "measured" else ideal_rows
-        rows(
+        image_rows(
             state.xyz_m, state.photo_xyz_m, state.rotation, state.interior[self.interior_of],
             tuple(self.form.numbers), of_ideal, self.point, self.photo, value, weight,
-            self.active, w, jac,
+            self.active, w, jac, in_ideal=self.form.weights == "ideal",
         )  # fmt: skip
 
 
