@@ -1,5 +1,6 @@
 """The starter job: an empty form that says what is missing, and a job when it is filled in."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -24,9 +25,11 @@ from tankcal.job.contract import (
 from tankcal.job.contract.rules import LIMITS, RULE
 from tankcal.job.rule_files import parse_rule, shipped_names
 from tankcal.job.tables import Log
+from tankcal.languages import DEFAULT, LANGUAGES
 from tankcal.rules import TANKS
 from tankcal.starter import write_starter
 
+OTHERS = [one for one in LANGUAGES if one != DEFAULT]
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "job-format.md"
 BLANKS = [
     "tank.id",
@@ -314,3 +317,47 @@ def test_the_example_of_the_documentation_is_a_job(tmp_path):
     (folder / "courses.csv").write_text(documented("csv"), encoding="utf-8")
     job = load(folder)
     assert (job.tank.id, len(job.courses), job.warnings) == ("T-17", 5, ())
+
+
+# ---- in other languages
+
+
+@pytest.mark.parametrize("language", OTHERS)
+@pytest.mark.parametrize("survey", [None, "photos", "total-station"])
+def test_every_comment_of_the_text_files_is_in_the_language(tmp_path, language, survey):
+    """Second method: the same form in both languages shares no comment but names and numbers."""
+    english = comments(write_starter_in(tmp_path / "en", "vertical", survey, "en"))
+    other = comments(write_starter_in(tmp_path / language, "vertical", survey, language))
+    assert len(other) == len(english) > 150
+    shared = [one for one in other if one in english and re.search("[a-z]{4}", one)]
+    assert shared == ["tankcal run ."]
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_form_asks_for_the_sizes_of_the_drawing(tmp_path, language, kind):
+    """What tells a slip of the hand: diameter, height and volume, in text and in the workbook."""
+    folder = write_starter_in(tmp_path / "job", kind, None, language)
+    settings = tomllib.loads((folder / "job.toml").read_text(encoding="utf-8"))
+    sheet = openpyxl.load_workbook(folder / "job.xlsx", read_only=True)["job"]
+    in_book = {cell for row in sheet.iter_rows(values_only=True) for cell in row}
+    for key in ("nominal_diameter_m", "nominal_height_m", "nominal_volume_m3"):
+        assert key in settings["tank"]
+        assert key in in_book
+
+
+def write_starter_in(folder, kind, survey, language):
+    write_starter(folder, kind, survey, language)
+    return folder
+
+
+def comments(folder):
+    """Every comment of the text files, without the key that it explains."""
+    lines = [
+        line
+        for path in sorted(folder.iterdir())
+        if path.suffix in (".toml", ".csv")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if "# " in line
+    ]
+    return [re.sub(r"^\w+: ", "", line.partition("# ")[2]).strip() for line in lines]

@@ -64,7 +64,7 @@ FORM_WORDS = {
         "liquid": ("líquido",),
         "conical": ("cónico",),
         "ellipsoidal": ("elipsoidal", "elíptico", "semielíptico"),
-        "torispherical": ("torisférico",),
+        "torispherical": ("toriesférico", "torisférico"),
         "spherical": ("esférico",),
         "plumb": ("plomada", "a plomo", "vertical"),
         "square": ("escuadra", "perpendicular"),

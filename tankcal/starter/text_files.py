@@ -6,38 +6,43 @@ import json
 import re
 
 from tankcal.job.contract import COLUMNS
-from tankcal.starter.notes import REGISTER_NOTES, SECTION_NOTES, TABLE_NOTES
+from tankcal.starter.texts import texts_in
 from tankcal.starter.units import is_number
+from tankcal.words import said
 
 
 def settings_text(form):
     """job.toml of a Form, every key with its note."""
+    texts = texts_in(form.language)
     tables = [f"{table}.csv" for table in form.tables]
     tables += [f"{register}.toml" for register in form.registers]
+    values = {"fill_in": texts.of("files", "fill_in"), "tables": ", ".join(tables)}
     lines = [
-        "# A tankcal job. Fill in every line marked FILL IN; leave the others or fill them in.",
-        '# "" is a blank. Numbers stand without quotation marks: nominal_diameter_m = 13.0',
-        f"# The units stand in the names. Then fill in {', '.join(tables)}",
-        "# (each says what it is for, and which may stay empty), and run:",
-        "#     tankcal run .",
+        f"# {texts.of('files', code, **values)}"
+        for code in ("title", "numbers", "units", "each_says")
     ]
+    lines.append("#     tankcal run .")
     for section, fields in form.keys.items():
-        lines += ["", f"# {SECTION_NOTES[section]}", f"[{section}]"]
+        lines += ["", f"# {texts.note('sections', section)}", f"[{section}]"]
         for field in fields:
             start = form.start(section, field)
-            note = _note(field, form.is_to_fill_in(section, field))
+            is_to_fill_in = form.is_to_fill_in(section, field)
+            note = _note(texts, field, texts.note("keys", section, field), is_to_fill_in)
             lines.append(_setting(field, start, note))
     return "\n".join(lines) + "\n"
 
 
 def register_text(register, form):
     """cameras.toml or instruments.toml of a Form: its entries, or an empty one."""
-    lines = [f"# {REGISTER_NOTES[register]}"]
+    texts = texts_in(form.language)
+    lines = [f"# {texts.note('registers', register)}"]
     for name, given in form.entries(register).items():
         lines += ["", f"[{register}.{_key(name)}]"]
         for field in form.fields(register, given):
             start = given.get(field.name, "")
-            lines.append(_setting(field, start, _note(field, field.required and not start)))
+            text = texts.note("entries", register, field) if field.note else ""
+            note = _note(texts, field, text, field.required and not start)
+            lines.append(_setting(field, start, note))
     return "\n".join(lines) + "\n"
 
 
@@ -55,12 +60,13 @@ def _key(name):
 
 def csv_text(table, form):
     """A CSV file of a Form: comments, and the row of headings."""
-    lines = [f"# {TABLE_NOTES[table]}; lines that begin with # are comments"]
+    texts = texts_in(form.language)
+    lines = [f"# {texts.note('tables', table)}; {texts.of('files', 'comments')}"]
     for field in COLUMNS[table]:
-        required = "" if field.required else " [may be blank]"
-        lines.append(f"# {field.name}: {field.note}{required}")
+        blank = "" if field.required else f" [{texts.of('files', 'may_be_blank')}]"
+        lines.append(f"# {field.name}: {texts.note('columns', table, field)}{blank}")
     if table == "uncertainty":
-        lines += [_input(name, one) for name, one in form.inputs.items()]
+        lines += [_input(texts, name, one) for name, one in form.inputs.items()]
     names = [field.name for field in COLUMNS[table]]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -68,11 +74,15 @@ def csv_text(table, form):
     return "\n".join([*lines, ",".join(names)]) + "\n" + text.getvalue()
 
 
-def _note(field, is_to_fill_in):
-    choices = f" ({field.expectation()})" if field.kind == "choice" and is_to_fill_in else ""
-    return f"{'FILL IN: ' if is_to_fill_in else ''}{field.note}{choices}"
+def _note(texts, field, text, is_to_fill_in):
+    """A note with, where something must be filled in, that word and what may be chosen."""
+    if not is_to_fill_in:
+        return text
+    choices = f" ({said(texts.words, field.expectation())})" if field.kind == "choice" else ""
+    return f"{texts.of('files', 'fill_in')}: {text}{choices}"
 
 
-def _input(name, declarable):
-    assumed = f"; not declared: {declarable.assumption}" if declarable.assumption else ""
-    return f"# {name}: {declarable.note}, {declarable.unit}{assumed}"
+def _input(texts, name, declarable):
+    assumed = texts.assumption(declarable)
+    ending = f"; {texts.of('files', 'not_declared', assumed=assumed)}" if assumed else ""
+    return f"# {name}: {texts.input_note(name, declarable)}, {declarable.unit}{ending}"

@@ -73,6 +73,12 @@ class Texts:
         """What stands in a cell of a field: its choices in the words of the form."""
         return self.choice(given) if field.kind in ("choice", "flag") else given
 
+    def input_note(self, name, declarable):
+        """What an input of uncertainty is."""
+        if self.words["language"]["code"] == DEFAULT:
+            return declarable.note
+        return self.words["inputs"]["deadwood_share" if name == "deadwood" else name]
+
     def assumption(self, declarable):
         """What is assumed for an input that is not declared; "" for nothing."""
         if declarable.default_share is not None:
