@@ -121,6 +121,40 @@ def test_a_figure_shrinks_to_its_page_but_not_too_far(printed, above, pages):
     assert "the caption" in found[-1]
 
 
+LETTERHEAD = {
+    "name": "Laboratory",
+    "address": [f"line {n} of the address" for n in range(4)],
+    "logo": None,
+    "colours": {"ink": "#0b3d2e", "line": "#8fb8a8"},
+}
+ADDRESS = "Avenida do Porto 1200, third floor, Harbour District, 59000-000 Natal, Brazil"
+
+
+@pytest.mark.parametrize(("parties", "facts"), [(3, 10), (6, 13), (9, 13), (10, 14)])
+def test_the_sketch_stands_on_the_first_page(tmp_path, parties, facts):
+    """However many addresses and facts there are above it."""
+    of_parties = [(f"party {n}", ADDRESS) for n in range(parties)]
+    made = [
+        blocks.document(title="T", letterhead=LETTERHEAD),
+        blocks.masthead("Certificate", "of a tank", number_label="Number", number="1"),
+        blocks.key_values(of_parties),
+        blocks.result("Capacity", "1260 m3", "at 20 degC"),
+        blocks.heading("Tank"),
+        blocks.key_values([(f"fact {n}", "a value of some letters") for n in range(facts)]),
+        blocks.figure(SQUARE, "the sketch", "a square", width=0.35),
+        blocks.heading("Calibration"),
+        *lines_above(60),
+    ]
+    path = tmp_path / "made.pdf"
+    path.write_bytes(pdf([block.data for block in made]))
+    first = pages_of(path)[0]
+    said = " ".join(line.text for line in first)
+    assert "the sketch" in said
+    assert all(f"fact {n}" in said for n in range(facts))
+    assert said.count("Avenida") == parties
+    assert filled(first) > 0.7
+
+
 def test_a_label_does_not_touch_its_value(printed):
     fact = blocks.key_values([("i " * 60, "value")])  # fills its column
     (page,) = printed(fact, options=("-bbox",))
