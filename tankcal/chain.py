@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -24,7 +25,7 @@ from tankcal.job import Job
 from tankcal.job.tables import in_book
 from tankcal.meshes import parse_mesh
 from tankcal.messages import message
-from tankcal.plausibility import refuse_other_side
+from tankcal.plausibility import is_within_wall, refuse_other_side
 from tankcal.rules import RuleVerdict
 from tankcal.scan import Scan, scanned
 from tankcal.service import shell_factor, shell_temperature_c
@@ -258,8 +259,10 @@ def _run(job, tell, counting, simulated):
         told = (one.text for one in _placed(job, adjustment.warnings[:TOLD]))
         raise SolutionError(*error.args, *told) from error
     wall = survey if isinstance(survey, Wall) else None
-    if wall is not None and adjustment is not None:
-        refuse_other_side(job, wall, adjustment)
+    if adjustment is not None and wall is not None:
+        refuse_other_side(job, partial(is_within_wall, wall), adjustment)
+    elif adjustment is not None and isinstance(survey, Scan):
+        refuse_other_side(job, survey.is_within, adjustment)
     made = tabled(job, survey, tell)
     body, zero, table = made.body, made.zero_m, made.table
     tell(message("stating", "stating volumes and deliveries"))

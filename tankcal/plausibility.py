@@ -16,6 +16,7 @@ from tankcal.job.plausibility import (
     PLATE_ON_BOTTOM,
     PLATE_ON_BOTTOM_M,
     reference_doubt,
+    side_doubt,
 )
 from tankcal.messages import message
 
@@ -41,7 +42,10 @@ def refuse_misfit(points, noise_m, diameter_m):
 def doubts_of_scan(job, scan, top_m):
     """Warnings of the points of a lying cylinder or a sphere."""
     diameter = float(dict(zip(scan.names, scan.values, strict=True))["diameter"])
-    problems = _against_drawing(job, diameter)
+    given = job.horizontal or job.sphere
+    plate = given.thickness_m if job.survey.side == "outside" else 0.0
+    inside = diameter - 2 * plate
+    problems = [*_against_drawing(job, diameter), *_of_side(job, inside, plate, 0.0)]
     if scan.noise_m > MISFIT * diameter + MISFIT_M:
         text = message(
             "points_misfit",
@@ -84,20 +88,39 @@ def doubts_of_wall(job, wall):
     radius = float(np.mean([section.circle.radius_m for section in wall.sections]))
     return [
         *_against_drawing(job, 2 * radius),
+        *_against_plates(job, wall),
         *_against_tape(job, wall),
         *_plate_on_bottom(job, wall, radius),
     ]
+
+
+def _first_course(wall, course):
+    """Radius of the first course as surveyed, its sd, thickness of plate and paint, m."""
+    circles = [one.circle for one in wall.sections if one.group.course == 0]
+    radius = float(np.mean([one.radius_m for one in circles]))
+    sd = float(np.sqrt(np.mean([one.cofactor_m2[2, 2] for one in circles])))
+    return radius, sd, course.thickness_m + course.paint_m
+
+
+def _against_plates(job, wall):
+    radius, sd, plate = _first_course(wall, job.courses[0])
+    inside = 2 * (radius - (plate if job.survey.side == "outside" else 0.0))
+    return _of_side(job, inside, plate, 2 * sd)
+
+
+def _of_side(job, inside_m, plate_m, sd_m):
+    nominal, side = job.tank.nominal_diameter_m, job.survey.side
+    text = side_doubt(inside_m, nominal, job.diameter_is, plate_m, side, sd_m)
+    return [] if text is None else [Problem("job.toml", text, column="checks.diameter_is")]
 
 
 def _against_tape(job, wall):
     measured = job.circumference_m
     if measured is None:
         return []
-    first = [one.circle for one in wall.sections if one.group.course == 0]
-    course = job.courses[0]
-    outside = course.thickness_m + course.paint_m if job.survey.side == "inside" else 0.0
-    radius = float(np.mean([one.radius_m for one in first])) + outside
-    sd = float(np.sqrt(np.mean([one.cofactor_m2[2, 2] for one in first]))) / radius
+    radius, sd, plate = _first_course(wall, job.courses[0])
+    radius += plate if job.survey.side == "inside" else 0.0
+    sd /= radius
     miss = 2 * np.pi * radius / measured - 1
     if abs(miss) <= CIRCUMFERENCE_MISS + CIRCUMFERENCE_SDS * sd:
         return []
@@ -136,15 +159,15 @@ def _plate_on_bottom(job, wall, radius_m):
     return [Problem("job.toml", text, column="bottom.centre_z_m")]
 
 
-def refuse_other_side(job, wall, adjustment):
-    """Raise InputError when everything was seen from the other side of the wall than was said."""
+def refuse_other_side(job, is_within, adjustment):
+    """Raise InputError when everything was seen from the other side of the wall than was said.
+
+    is_within  function from places (n, 3) to whether each lies within the wall
+    """
     seen_from = stations_of(adjustment, job.measurements)
     if len(seen_from) == 0:
         return
-    shell = wall.shell
-    axis = np.array(shell.axis_m) + np.outer(seen_from[:, 2] - shell.z_m, shell.slope)
-    radius = float(np.mean([section.circle.radius_m for section in wall.sections]))
-    is_inside = np.hypot(*(seen_from[:, :2] - axis).T) < radius
+    is_inside = is_within(seen_from)
     side, other = job.survey.side, "inside" if job.survey.side == "outside" else "outside"
     if np.all(is_inside) if side == "outside" else not np.any(is_inside):
         text = message(
@@ -156,6 +179,14 @@ def refuse_other_side(job, wall, adjustment):
             count=len(is_inside),
         )
         raise InputError(Problem("job.toml", text, column="survey.side"))
+
+
+def is_within_wall(wall, places_m):
+    """(n,) whether places lie within the mean radius of a vertical wall, at any height."""
+    shell = wall.shell
+    axis = np.array(shell.axis_m) + np.outer(places_m[:, 2] - shell.z_m, shell.slope)
+    radius = float(np.mean([section.circle.radius_m for section in wall.sections]))
+    return np.hypot(*(places_m[:, :2] - axis).T) < radius
 
 
 def stations_of(adjustment, measurements):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.body import Factor, survey_factors
-from tankcal.cylinders import lying_cylinder
+from tankcal.cylinders import FittedCylinder, lying_cylinder
 from tankcal.doubts import noise_is_estimated, origin_of
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
@@ -27,6 +27,7 @@ class Scan:
     factors      what the points leave uncertain about them (`body.Factor`)
     accepted     (m,) indices of the points that were used
     residuals_m  (n,) of all points, outwards positive; noise_m their standard deviation
+    fit          the sphere or cylinder; reach_m of the used points along the cylinder's axis
     """
 
     names: tuple[str, ...]
@@ -35,6 +36,14 @@ class Scan:
     accepted: np.ndarray
     residuals_m: np.ndarray
     noise_m: float
+    fit: object
+    reach_m: tuple[float, float] = (-np.inf, np.inf)
+
+    def is_within(self, places_m):
+        """(n,) whether places lie within the wall, and between the ends of what was surveyed."""
+        along = _along(self.fit, places_m)
+        low, high = self.reach_m
+        return (_offsets(self.fit, places_m) < 0) & (along > low) & (along < high)
 
 
 def scanned(job, dof=np.inf):
@@ -67,7 +76,31 @@ def scanned(job, dof=np.inf):
         np.flatnonzero(chosen),
         residuals,
         noise,
+        fit,
+        _reach(fit, job.points.xyz_m[chosen]),
     )
+
+
+def _offsets(fit, xyz_m):
+    """(n,) distance of points to a fitted sphere or cylinder, outwards positive."""
+    if isinstance(fit, FittedCylinder):
+        return np.hypot(*((xyz_m - fit.point_m) @ fit.tangents.T).T) - fit.radius_m
+    return np.linalg.norm(xyz_m - fit.centre_m, axis=1) - fit.radius_m
+
+
+def _along(fit, xyz_m):
+    """(n,) places along the axis of a cylinder, m; 0 for a sphere."""
+    if isinstance(fit, FittedCylinder):
+        return (xyz_m - fit.point_m) @ fit.direction
+    return np.zeros(len(xyz_m))
+
+
+def _reach(fit, xyz_m):
+    """Least and greatest place along a cylinder; without end for a sphere."""
+    if not isinstance(fit, FittedCylinder):
+        return -np.inf, np.inf
+    along = _along(fit, xyz_m)
+    return float(along.min()), float(along.max())
 
 
 def _effect(job, chosen, column_m):
@@ -109,11 +142,9 @@ def _fitted(job, xyz, chosen):
     own = _covariance(job.points, chosen)
     if job.sphere is not None:
         ball = fit_sphere(xyz[chosen], own)
-        residuals = np.linalg.norm(xyz - ball.centre_m, axis=1) - ball.radius_m
-        return ball, ("diameter",), [2 * ball.radius_m], 4 * ball.cofactor_m2[3:, 3:], residuals
+        cofactor = 4 * ball.cofactor_m2[3:, 3:]
+        return ball, ("diameter",), [2 * ball.radius_m], cofactor, _offsets(ball, xyz)
     lying = lying_cylinder(xyz[chosen], own, job.horizontal.azimuth_rad)
     fit = lying.cylinder
-    across = (xyz - fit.point_m) @ fit.tangents.T
-    residuals = np.hypot(*across.T) - fit.radius_m
     values = [lying.diameter_m, lying.tilt]
-    return fit, ("diameter", "tilt"), values, lying.cofactor, residuals
+    return fit, ("diameter", "tilt"), values, lying.cofactor, _offsets(fit, xyz)

@@ -18,6 +18,7 @@ from shapes import azimuths
 from surveyed import known
 
 import tankcal
+from tankcal import plausibility
 from tankcal.cli.running import _tell
 from tankcal.errors import InputError
 from tankcal.job.contract import COLUMNS, KEYS
@@ -26,6 +27,7 @@ from tankcal.job.plausibility import CODES, TABLE
 from tankcal.record import record_of
 from tankcal.report import certificate
 from tankcal.report.paper import Paper
+from tankcal.scan import scanned
 from tankcal.shipped import shipped
 from tankcal.surveys.results import Reading
 from tankcal.surveys.scales import check_readings_off, scale_of_control
@@ -72,6 +74,7 @@ VERTICAL = COMMON | {
     "datum.dip_plate_z_m": 0.01,
     "checks.top_z_m": 9.5,
     "checks.circumference_m": 40.841,
+    "checks.diameter_is": "outside",
     "tank.nominal_volume_m3": 1260.0,
     "table.liquid_density_kg_m3": 850.0,
     "material.e_gpa": 206.0,
@@ -79,6 +82,7 @@ VERTICAL = COMMON | {
 LYING = COMMON | {
     "tank.nominal_diameter_m": 2.4,
     "checks.length_m": 10.0,
+    "checks.diameter_is": "outside",
     "horizontal.end_a": "ellipsoidal",
     "horizontal.end_b": "ellipsoidal",
     "horizontal.end_a_depth_m": 0.6,
@@ -100,6 +104,7 @@ DISHED = {
 }
 SPHERE = COMMON | {
     "tank.nominal_diameter_m": 20.0,
+    "checks.diameter_is": "outside",
     "survey.side": "outside",
     "sphere.thickness_mm": 30.0,
     "datum.reference_height_m": 20.5,
@@ -213,6 +218,16 @@ OF_KIND = [
     ("vertical", {"paint_mm": 0.3} | settings(survey__side="inside"), "paint_of_inside",
      "paint_mm"),
     ("vertical", settings(survey__side="inside"), "circumference_off", "checks.circumference_m"),
+    ("vertical", settings(survey__side="inside", checks__circumference_m=None), "side_doubtful",
+     "checks.diameter_is"),
+    *((kind, settings(checks__diameter_is="inside", checks__circumference_m=None), "side_doubtful",
+       "checks.diameter_is") for kind in ("vertical", "horizontal", "tube", "sphere")),
+    ("tube", settings(checks__diameter_is="inside", horizontal__thickness_mm=16.0),
+     "side_doubtful", "checks.diameter_is"),
+    ("sphere", settings(checks__diameter_is="middle", sphere__thickness_mm=60.0),
+     "inside_unlike_drawing", "checks.diameter_is"),
+    ("vertical", settings(bottom__form="cone", bottom__centre_z_m=0.1), "bottom_slopes_unsaid",
+     "checks.bottom_slopes"),
     ("vertical", settings(checks__circumference_m=40.841 / 0.3048), "circumference_off",
      "checks.circumference_m"),
     ("vertical", settings(datum__bottom_z_m=0.5, datum__dip_plate_z_m=0.51), "top_not_met",
@@ -365,6 +380,27 @@ def test_a_certificate_without_doubts_says_nothing_of_them(tmp_path):
 
 
 # ---- a survey
+
+
+@pytest.mark.parametrize(
+    ("kind", "within", "without"),
+    [
+        ("tube", [5.0, 0.2, 0.4], [(5.0, 3.0, 0.0), (-3.0, 0.0, 0.0), (13.0, 0.0, 0.1)]),
+        ("sphere points", [3.0, 0.2, -4.0], [(0.0, 14.0, -9.0), (0.0, 0.0, 10.5)]),
+    ],
+)
+def test_places_within_the_wall_of_points(tmp_path, kind, within, without):
+    """Off the end of a lying tank is outside of it, on its axis, too."""
+    scan = scanned(tankcal.load(write_folder(tmp_path / "job", sound(kind))))
+    assert scan.is_within(np.array([within, *without])).tolist() == [True, *[False] * len(without)]
+
+
+def test_a_survey_from_the_other_side_of_a_solid_is_refused(monkeypatch):
+    monkeypatch.setattr(plausibility, "stations_of", lambda *_: np.array([[0.0, 0.0, 1.0]]))
+    job = SimpleNamespace(survey=SimpleNamespace(side="outside"), measurements=None)
+    with pytest.raises(InputError, match=r"survey\.side"):
+        plausibility.refuse_other_side(job, lambda places: places[:, 0] < 1, None)
+    plausibility.refuse_other_side(job, lambda places: places[:, 0] > 1, None)
 
 
 def reading(kind, ids, value, residual, check=False):

@@ -51,6 +51,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         horizontal=_horizontal(values["horizontal"], has_points) if kind == "horizontal" else None,
         sphere=_sphere(values["sphere"]) if kind == "sphere" else None,
         circumference_m=values["checks"]["circumference_m"],
+        diameter_is=values["checks"]["diameter_is"],
         mesh=_mesh(values["mesh"], attached.mesh[1]) if kind == "mesh" else None,
     )
 

@@ -16,6 +16,7 @@ CARBON_STEEL, STAINLESS_STEEL, ALUMINIUM = METALS = (
     "aluminium",
 )
 SHELLS = (*METALS, "other")
+INSIDE, MIDDLE, OUTSIDE = DIAMETERS = ("inside", "middle", "outside")
 
 FIRST_YEAR = 1900  # of a survey
 DAYS_AHEAD = 1  # of a survey, for time zones
@@ -83,6 +84,8 @@ ROOF_KG_M2 = (15.0, 500.0)
 MISFIT, MISFIT_M, IMPOSSIBLE_MISFIT = 0.002, 0.010, 0.02  # rms of residuals, over the diameter
 MISFIT_SDS = 3.0  # over the standard deviation that was given
 CIRCUMFERENCE_MISS, CIRCUMFERENCE_SDS = 4e-4, 3.0
+DRAWN_MISS, DRAWN_MISS_M = 1e-3, 0.004  # of an inside diameter that is known from the drawing
+OTHER_SIDE = (0.6, 1.6)  # of two plates: a miss that the other side of the wall explains
 
 TAKES_ROOM = (
     *("coil", "pipe", "tube", "column", "pillar", "ladder", "stair", "agitator", "mixer", "beam"),
@@ -124,6 +127,46 @@ def most_course_mm(diameter_m, head_m, density=HEAVY, shell="carbon_steel"):
     """1.4 times what the least design stress or a code asks for, and 6.5 mm for corrosion."""
     needed = _head_mm(diameter_m, head_m, density, LEAST_STRESS_MPA[shell])
     return THICK_MM + THICK_FACTOR * max(CODE_MM + CODE_PER_M * diameter_m, needed)
+
+
+def side_doubt(inside_m, nominal_m, drawn, plate_m, side, sd_m=0.0):
+    """Message about an inside diameter against the drawing's, to the plate; None: plausible.
+
+    inside_m  of the first course, as it was made of points or sizes, sd_m its standard deviation
+    drawn     what nominal_m is: inside, middle or outside; plate_m with the paint, 0: not known
+    side      that was declared: of a survey from the other one the miss is that of two plates
+    """
+    if drawn is None or nominal_m is None or (drawn != INSIDE and not plate_m):
+        return None
+    expected = nominal_m - {INSIDE: 0.0, MIDDLE: plate_m, OUTSIDE: 2 * plate_m}[drawn]
+    miss, step = inside_m - expected, 2 * plate_m
+    values = {
+        "inside_m": inside_m,
+        "side": side,
+        "nominal_m": nominal_m,
+        "drawn": drawn,
+        "miss_mm": 1000 * miss,
+    }
+    sign = -1 if side == OUTSIDE else 1
+    noise = CIRCUMFERENCE_MISS * nominal_m + CIRCUMFERENCE_SDS * sd_m
+    if step > 2 * noise and OTHER_SIDE[0] * step < sign * miss < OTHER_SIDE[1] * step:
+        return message(
+            "side_doubtful",
+            "{inside_m:.4f} m inside with survey.side = {side}, {miss_mm:+.0f} mm from the drawing"
+            " ({nominal_m:g} m {drawn}); measured {other} it would be {other_mm:+.0f} mm: which"
+            " side of the wall was it?",
+            other=INSIDE if side == OUTSIDE else OUTSIDE,
+            other_mm=1000 * (miss - sign * step),
+            **values,
+        )
+    if abs(miss) > DRAWN_MISS * nominal_m + DRAWN_MISS_M + CIRCUMFERENCE_SDS * sd_m:
+        return message(
+            "inside_unlike_drawing",
+            "{inside_m:.4f} m inside with survey.side = {side}, {miss_mm:+.0f} mm from the drawing"
+            " ({nominal_m:g} m {drawn}): are side, plates and scale right?",
+            **values,
+        )
+    return None
 
 
 def reference_doubt(reference_m, top_m, diameter_m):
@@ -297,7 +340,7 @@ TABLE = (
         "bottom.centre_z_m",
         f"at most {SLOPE_UP:g} of the radius above the edge",
         "cone up for down",
-        "checks.bottom_slopes (problem), the dip plate",
+        "checks.bottom_slopes (problem), asked for where it is blank; the dip plate",
         ("bottom_slopes_otherwise", "bottom_rises_much", "bottom_steep"),
     ),
     Plausible(
@@ -389,10 +432,21 @@ TABLE = (
     ),
     Plausible(
         "survey.side",
-        "set-ups and photographs on that side of the wall (problem)",
+        "set-ups and photographs on that side of the wall, be it of a vertical tank, a lying"
+        " cylinder or a sphere (problem)",
         "inside for outside",
         "the adjusted stations",
         ("stations_on_other_side",),
+    ),
+    Plausible(
+        "checks.diameter_is",
+        f"with it the inside diameter (of the first course) within {100 * DRAWN_MISS:g} % +"
+        f" {1000 * DRAWN_MISS_M:g} mm + {CIRCUMFERENCE_SDS:g} sd of the drawing's; not"
+        f" {OTHER_SIDE[0]:g} to {OTHER_SIDE[1]:g} times two plates off, the way that the other side"
+        f" explains, where two plates are over {2e6 * CIRCUMFERENCE_MISS:g} ppm of D + 6 sd",
+        "inside for outside, plates two times off",
+        "tank.nominal_diameter_m, plates and paint, survey.side",
+        ("side_doubtful", "inside_unlike_drawing"),
     ),
     Plausible(
         "checks.circumference_m",

@@ -2,7 +2,7 @@
 
 from tankcal.job.contract.kinds import VERTICAL, WITH_POINTS
 from tankcal.job.fields import Field
-from tankcal.job.plausibility import SERVICES, SHELLS
+from tankcal.job.plausibility import DIAMETERS, SERVICES, SHELLS
 
 HORIZONTAL_ONLY = ("horizontal",)
 SPHERE_ONLY = ("sphere",)
@@ -265,6 +265,14 @@ CHECKS = (
         kinds=VERTICAL,
         low=0.3,
         high=1000,
+    ),
+    Field(
+        "diameter_is",
+        "choice",
+        "what tank.nominal_diameter_m is by the drawing, to the millimetre: inside, middle (of the"
+        " plates of the first course) or outside; blank: not known",
+        kinds=WITH_POINTS,
+        choices=DIAMETERS,
     ),
     _length(
         "length_m",

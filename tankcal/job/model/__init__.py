@@ -67,6 +67,7 @@ class Job:
     correlations  (name, name, r) of declared inputs
     rule          the decision rule that the table is judged by, or None
     circumference_m  of the first course by tape, outside; only compared; None: not given
+    diameter_is   what the nominal diameter is: inside, middle or outside; only compared; or None
     """
 
     tank: Tank | None
@@ -95,3 +96,4 @@ class Job:
     stated: tuple[StatedVolume, ...] = ()
     rule: Rule | None = None
     circumference_m: float | None = None
+    diameter_is: str | None = None

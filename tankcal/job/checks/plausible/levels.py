@@ -101,6 +101,16 @@ def _check_slope(values, raw, log):
         )
         tell(log.warning, raw, "bottom", "centre_z_m", text)
 
+    elif drawn is None:
+        text = message(
+            "bottom_slopes_unsaid",
+            "blank; the bottom goes {found} to its centre by {rise_m:.3g} m, and nothing else says"
+            " that it does: expected up or down as the drawing has it",
+            found=found,
+            rise_m=abs(centre - edge),
+        )
+        tell(log.warning, raw, "checks", "bottom_slopes", text)
+
 
 def _check_rim(values, table, log):
     """Bottom points near the wall lie at the bottom of the shell."""

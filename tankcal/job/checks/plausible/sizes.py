@@ -16,6 +16,7 @@ from tankcal.job.plausibility import (
     SIZE_MISS,
     SIZE_MISS_M,
     SPHERE_M,
+    side_doubt,
 )
 from tankcal.messages import message
 
@@ -25,10 +26,25 @@ ALIKE = dict.fromkeys(END_DEPTH, ("depth_m",)) | {"torispherical": [name for nam
 
 def check_sizes(values, kind, raw, log):
     """Sizes of the kinds that are given by sizes."""
+    if kind in ("sphere", "horizontal"):
+        _check_inside(values, kind, raw, log)
     if kind == "sphere":
         _check_sphere(values, raw, log)
     if kind == "horizontal":
         _check_lying(values, raw, log)
+
+
+def _check_inside(values, kind, raw, log):
+    """A diameter that was measured, against a drawing that says which one its own is."""
+    found, side = values[kind]["diameter_m"], values["survey"]["side"]
+    plate = (values[kind]["thickness_mm"] or 0.0) / 1000
+    if None in (found, side):
+        return
+    inside = found - 2 * plate if side == "outside" else found
+    nominal, drawn = values["tank"]["nominal_diameter_m"], values["checks"]["diameter_is"]
+    text = side_doubt(inside, nominal, drawn, plate, side)
+    if text is not None:
+        tell(log.warning, raw, "checks", "diameter_is", text)
 
 
 def _check_sphere(values, raw, log):
