@@ -54,7 +54,7 @@ class Problem:
         place = [self.book] if self.book else []
         is_sheet = self.file.startswith(SHEET)
         name = self.file.removeprefix(SHEET)
-        place.append(message("in_sheet", "sheet {sheet}", sheet=name) if is_sheet else name)
+        place.append(message("in_sheet", "sheet {sheet}", sheet=name) if is_sheet else self.file)
         if self.cell is not None:
             place.append(message("in_cell", "cell {cell}", cell=self.cell))
         elif self.row is not None:

@@ -155,7 +155,7 @@ def _named(words, key, value):
     if key == "row" or key.endswith("_row"):
         return str(value)  # no count
     if key == "note":
-        return _notes(words).get(value, value)
+        return _notes(words).get(value, value) if isinstance(value, str) else value
     if key == "choice":
         return word_of(words["language"].get("code"), value)
     if key == "kind":

@@ -4,6 +4,7 @@ import json
 
 import pytest
 from conftest import EXAMPLE
+from messages_told import lines
 from plan_folders import with_setups
 
 from tankcal import cli
@@ -37,7 +38,7 @@ def changed(tmp_path):
 def told(folder):
     with pytest.raises(InputError) as error:
         predict(load_plan(folder))
-    return [str(one) for one in error.value.problems]
+    return lines(error.value.problems)
 
 
 def test_a_station_inside_the_wall(changed):
@@ -275,8 +276,8 @@ def test_the_command_line_with_changes(changed, tmp_path, capsys):
     assert main(["plan", str(few), "--quiet", "--changes", "--out", str(out)]) == 0
     assert "more changes" in capsys.readouterr().out
     assert {"changes.csv", "changes.png"} <= {path.name for path in out.iterdir()}
-    lines = (out / "changes.csv").read_text().splitlines()
-    assert lines[0] == "action,item,name,arc_m,off_m,height_m,cost,relative_u,difference,U_m3,why"
+    rows = (out / "changes.csv").read_text().splitlines()
+    assert rows[0] == "action,item,name,arc_m,off_m,height_m,cost,relative_u,difference,U_m3,why"
     assert (out / "changes.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -1,8 +1,20 @@
-"""Numbers on the command line."""
+"""Numbers and languages on the command line."""
 
 import argparse
 
+from tankcal.languages import LANGUAGES
 from tankcal.numerals import NUMBER, WHOLE_NUMBER
+
+
+def add_language(parser):
+    """--language, of what a command without a job prints."""
+    parser.add_argument(
+        "--language",
+        metavar="CODE",
+        choices=LANGUAGES,
+        help=f"of what is printed and written: {', '.join(LANGUAGES)} (default: that of the input "
+        "where it asks for one, else that of the environment)",
+    )
 
 
 def positive(text):

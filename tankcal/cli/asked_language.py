@@ -27,6 +27,17 @@ def asked_language(path):
     return nearest_language(given)
 
 
+def asked_of_plan(path):
+    """The same of a plan as `load_plan` takes it."""
+    from tankcal.planning.given import PLAN_FILE
+
+    path = Path(path)
+    try:
+        return nearest_language(_in_settings(path / PLAN_FILE if path.is_dir() else path, Log()))
+    except (OSError, ValueError):
+        return None
+
+
 def _in_settings(path, log):
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     parsed = None if data is None else parsed_toml(path.name, data, log)

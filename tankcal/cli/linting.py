@@ -1,8 +1,8 @@
 """`tankcal lint`: mistakes in any capacity table."""
 
-from tankcal.cli.arguments import positive
+from tankcal.cli.arguments import add_language, positive
 from tankcal.cli.machine import add_json, print_json, problem_of
-from tankcal.cli.showing import prepare_for_small_work, say
+from tankcal.cli.showing import prepare_for_small_work, say, speak
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
@@ -29,12 +29,14 @@ def add(commands):
         ("height", "M", "height that the last row is meant to have, m"),
     ):
         lint.add_argument(f"--nominal-{name}", metavar=unit, type=positive, help=what)
+    add_language(lint)
     add_json(lint)
     lint.set_defaults(command=_lint)
 
 
 def _lint(options):
     prepare_for_small_work()
+    speak(options.language)
     from tankcal.linter import Nominal, lint
 
     if options.nominal_diameter is not None and options.nominal_height is None:

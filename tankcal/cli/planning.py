@@ -2,9 +2,19 @@
 
 from pathlib import Path
 
-from tankcal.cli.arguments import several, share, whole
-from tankcal.cli.showing import Progress, listed, prepare_for_small_work, warn
-from tankcal.digits import PROGRAM, fixed, with_digits, written
+from tankcal.cli.arguments import add_language, several, share, whole
+from tankcal.cli.asked_language import asked_of_plan
+from tankcal.cli.showing import (
+    Progress,
+    listed,
+    marks,
+    prepare_for_small_work,
+    say,
+    speak,
+    warn,
+)
+from tankcal.digits import fixed, with_digits, written
+from tankcal.messages import message
 
 SHOWN = 12  # changes in the terminal
 
@@ -50,6 +60,7 @@ def add(commands):
         help="share of the simulated readings that are off by 20 sds, such as 0.01 (default: none)",
     )
     plan.add_argument("--seed", type=whole, default=1, help="of the simulation (default 1)")
+    add_language(plan)
     plan.add_argument("--quiet", action="store_true", help="no progress, only problems")
     plan.set_defaults(command=_plan)
 
@@ -60,15 +71,16 @@ def _plan(options):
     from tankcal.errors import TankcalError
     from tankcal.planning import load_plan, predict
 
+    speak(options.language or asked_of_plan(options.plan))
     _refuse_idle(options)
     show = Progress(options.quiet)
-    show.step(f"reading {options.plan}")
+    show.step(message("plan_reading", "reading {plan}", plan=options.plan))
     plan = load_plan(options.plan)
     if options.out is not None:
         planning_papers.refuse_foreign(options.out)
     if options.smallest:
         _refuse_unlimited(plan)
-    show.step("predicting the survey")
+    show.step(message("plan_predicting", "predicting the survey"))
     try:
         prediction = predict(plan)
     except TankcalError:
@@ -80,13 +92,13 @@ def _plan(options):
     if options.out is not None:
         written = planning_papers.write(
             prediction, options.out, show.step,
-            effects=effects, design=path, simulated=simulated,
+            effects=effects, design=path, simulated=simulated, language=options.language,
         )  # fmt: skip
     show.end()
     warn(prediction.warnings)
     found = (*_summary(prediction), *_changes(effects), *_design(path), *_scatter(simulated))
     for line in found:
-        print(line)
+        say(line)
     if written:
         listed(Path(options.out), written)
 
@@ -96,7 +108,12 @@ def _refuse_idle(options):
 
     if options.blunders and options.simulate is None:
         raise InputError(
-            Problem("--blunders", "nothing is simulated; expected --simulate N as well")
+            Problem(
+                "--blunders",
+                message(
+                    "plan_nothing_simulated", "nothing is simulated; expected --simulate N as well"
+                ),
+            )
         )
 
 
@@ -104,7 +121,9 @@ def _refuse_unlimited(plan):
     from tankcal.errors import InputError, Problem
 
     if plan.limits.relative_u is None:
-        expected = "missing; expected the U over volume that --smallest is to meet"
+        expected = message(
+            "plan_no_limit", "missing; expected the U over volume that --smallest is to meet"
+        )
         raise InputError(Problem("plan.toml", expected, None, "limits.relative_u"))
 
 
@@ -129,78 +148,171 @@ def _summary(prediction):
     plan, table = prediction.plan, prediction.table
     solution = prediction.predicted.adjusted.solution
     parts = [
-        (len(plan.photos), "photographs"), (len(plan.setups), "set-ups"), (len(plan.ties), "ties"),
-        (len(plan.known), "control points"), (len(plan.targets.names), "targets"),
-    ]  # fmt: skip
-    yield f"{plan.job.tank.id}: " + ", ".join(f"{count} {what}" for count, what in parts if count)
-    mean = with_digits(1000 * prediction.precision.mean_sd_m, 3, PROGRAM)
-    yield (
-        f"network: {solution.rows} observations, {solution.unknowns} unknowns, redundancy "
-        f"{solution.dof}; mean sd of a target {mean} mm"
+        message("plan_photographs", "{count} photographs", count=len(plan.photos)),
+        message("plan_setups", "{count} set-ups", count=len(plan.setups)),
+        message("plan_ties", "{count} ties", count=len(plan.ties)),
+        message("plan_control", "{count} control points", count=len(plan.known)),
+        message("plan_targets", "{count} targets", count=len(plan.targets.names)),
+    ]
+    parts = [part for part in parts if part.values["count"]]
+    yield message("plan_holds", "{tank}: {parts}", tank=plan.job.tank.id, parts=parts)
+    yield message(
+        "plan_network",
+        "network: {rows} observations, {unknowns} unknowns, redundancy {dof}; mean sd of a target "
+        "{sd} mm",
+        rows=solution.rows,
+        unknowns=solution.unknowns,
+        dof=solution.dof,
+        sd=with_digits(1000 * prediction.precision.mean_sd_m, 3, marks()),
     )
     if prediction.datum.words:
-        yield f"{prediction.datum.words}; held by {', '.join(prediction.datum.held)}"
-    for what, points in (("not determined", prediction.undetermined), ("weak", prediction.weak)):
-        if points:
-            first = ", ".join(one.name for one in points[:SHOWN])
-            yield f"{what}: {len(points)} points ({first}{', ...' * (len(points) > SHOWN)})"
-    top = written(table.volume_m3[-1], table.U_m3[-1], PROGRAM, least=0)
-    verdict = {None: "", True: ": met", False: ": NOT met"}[prediction.meets]
-    limit = plan.limits.relative_u
-    yield (
-        f"table: {top.value} m3 at {table.height_m[-1]:.3f} m, U = {top.uncertainty} m3 "
-        f"(k = {fixed(table.k[-1], 2, PROGRAM)}), {_percent(table.U_m3[-1] / table.volume_m3[-1])}"
-    )
+        yield message(
+            "plan_datum",
+            "{datum}; held by {held}",
+            datum=prediction.datum.words,
+            held=[*prediction.datum.held],
+        )
+    if prediction.undetermined:
+        yield message(
+            "plan_not_determined",
+            "not determined: {count} points ({points})",
+            count=len(prediction.undetermined),
+            points=_first(prediction.undetermined),
+        )
+    if prediction.weak:
+        yield message(
+            "plan_weak",
+            "weak: {count} points ({points})",
+            count=len(prediction.weak),
+            points=_first(prediction.weak),
+        )
+    yield _top(table)
     for one in prediction.tabled.stated.worst[:1]:
         worst = one.relative
-        yield (
-            f"worst delivery of {one.minimum_m:g} m or more: {worst.low_m:g} to {worst.high_m:g} m,"
-            f" U/V = {_percent(worst.relative)}"
+        yield message(
+            "plan_worst",
+            "worst delivery of {least:g} m or more: {low:g} to {high:g} m, U/V = {relative}",
+            least=one.minimum_m,
+            low=worst.low_m,
+            high=worst.high_m,
+            relative=_percent(worst.relative),
         )
-    if limit is not None:
-        yield f"limit {_percent(limit)}{verdict}"
+    if plan.limits.relative_u is not None:
+        yield _judged(_percent(plan.limits.relative_u), prediction.meets)
+
+
+def _top(table):
+    top = written(table.volume_m3[-1], table.U_m3[-1], marks(), least=0)
+    return message(
+        "plan_top",
+        "table: {volume} m3 at {height} m, U = {uncertainty} m3 (k = {factor:.2f}), {relative}",
+        volume=top.value,
+        height=fixed(table.height_m[-1], 3, marks()),
+        uncertainty=top.uncertainty,
+        factor=table.k[-1],
+        relative=_percent(table.U_m3[-1] / table.volume_m3[-1]),
+    )
+
+
+def _judged(limit, meets):
+    if meets is None:
+        return message("plan_limit", "limit {limit}", limit=limit)
+    if meets:
+        return message("plan_limit_met", "limit {limit}: met", limit=limit)
+    return message("plan_limit_missed", "limit {limit}: NOT met", limit=limit)
+
+
+def _first(points):
+    """The first names of points, and that there are more."""
+    return ", ".join(one.name for one in points[:SHOWN]) + ", ..." * (len(points) > SHOWN)
 
 
 def _changes(effects):
     for one in effects[:SHOWN]:
         if not one.why:
-            yield (
-                f"  {called(one.change)}: U/V {_percent(one.relative_u)} "
-                f"({1e6 * one.difference:+.1f} ppm, cost {one.change.cost:+g})"
+            yield message(
+                "plan_effect",
+                "  {change}: U/V {relative} ({difference:+.1f} ppm, cost {cost:+g})",
+                change=called(one.change),
+                relative=_percent(one.relative_u),
+                difference=1e6 * one.difference,
+                cost=one.change.cost,
             )
     if len(effects) > SHOWN:
-        yield f"  and {len(effects) - SHOWN} more changes"
+        yield message("plan_more_changes", "  and {more} more changes", more=len(effects) - SHOWN)
 
 
 def called(change):
-    """What is done to which item of a plan; rows of targets have theirs in their names."""
-    item = change.item.replace("_", " ").removesuffix(" row")
-    return f"{change.action} {item} {change.name}"
+    """What is done to which item of a plan."""
+    item = _item(change.item, change.name)
+    if change.action == "add":
+        return message("plan_add", "add {item}", item=item)
+    if change.action == "drop":
+        return message("plan_drop", "drop {item}", item=item)
+    return message("plan_repeat", "repeat {item}", item=item)
+
+
+def _item(item, name):
+    """An item of a plan (`planning.changes.ITEMS`); rows of targets and readings are named so."""
+    from tankcal.planning.changes import IMAGES, OF_COURSE, ROW
+
+    if item == "photo_station":
+        return message("plan_photo_station", "photo station {name}", name=name)
+    if item == "setup":
+        return message("plan_setup", "setup {name}", name=name)
+    if item == "tape":
+        return message("plan_tape", "tape {name}", name=name)
+    if item == "control_point":
+        return message("plan_control_point", "control point {name}", name=name)
+    if item == "target_row" and name.startswith(OF_COURSE):
+        course = name.removeprefix(OF_COURSE)
+        return message("plan_row_of_course", "target row in course {course}", course=course)
+    if item == "target_row":
+        return message("plan_row", "target row {section}", section=name.removeprefix(ROW))
+    if name == IMAGES:
+        return message("plan_all_images", "reading all image points")
+    return message("plan_all_sets", "reading all sets of the total station")
 
 
 def _design(path):
     if path is None:
         return
-    steps = ", ".join(f"{one.change.action} {one.change.name}" for one in path.steps) or "no change"
-    yield f"smallest design: {steps}"
-    yield (
-        f"  U/V {_percent(path.start_u)} before, {_percent(path.relative_u)} after; cost "
-        f"{path.start_cost:g} before, {path.cost:g} after; {path.tried} plans tried"
+    steps = [called(one.change) for one in path.steps]
+    yield message(
+        "plan_smallest",
+        "smallest design: {steps}",
+        steps=steps or message("plan_no_change", "no change"),
+    )
+    yield message(
+        "plan_smallest_worth",
+        "  U/V {before} before, {after} after; cost {start_cost:g} before, {cost:g} after; {tried} "
+        "plans tried",
+        before=_percent(path.start_u),
+        after=_percent(path.relative_u),
+        start_cost=path.start_cost,
+        cost=path.cost,
+        tried=path.tried,
     )
     if path.prediction.meets is False:
-        yield "  no plan that was tried meets the limit"
+        yield message("plan_none_meets", "  no plan that was tried meets the limit")
 
 
 def _scatter(found):
     if found is None:
         return
-    yield (
-        f"{found.runs} simulated surveys, scatter over prediction: coordinates {found.ratio:.3f}, "
-        f"volume {found.volume_ratio:.3f} (known to {found.volume_ratio_sd:.2g}); "
-        f"{found.set_aside.mean():.1f} values set aside in the mean, {len(found.failed)} surveys "
-        "without a solution"
+    yield message(
+        "plan_scatter",
+        "{runs} simulated surveys, scatter over prediction: coordinates {ratio:.3f}, volume "
+        "{volume_ratio:.3f} (known to {ratio_sd:.2g}); {aside:.1f} values set aside in the mean, "
+        "{failed} surveys without a solution",
+        runs=found.runs,
+        ratio=found.ratio,
+        volume_ratio=found.volume_ratio,
+        ratio_sd=found.volume_ratio_sd,
+        aside=found.set_aside.mean(),
+        failed=len(found.failed),
     )
 
 
 def _percent(share):
-    return f"{with_digits(100 * float(share), 3, PROGRAM)} %"
+    return f"{with_digits(100 * float(share), 3, marks())} %"

@@ -9,6 +9,7 @@ from tankcal.job.excel import MAX_COLUMNS, Unreadable, read_sheets
 from tankcal.job.folder import decode
 from tankcal.job.sheets import is_read
 from tankcal.job.tables import read_bytes, shown
+from tankcal.messages import message
 from tankcal.record import FORMAT, version_of
 
 MOST_COLUMNS, MOST_LINES = MAX_COLUMNS, 200_000
@@ -35,7 +36,11 @@ def read_grids(path, log):
     """Tuple of `Grid`; empty after telling `log` why the file cannot be read."""
     if not path.exists():
         log.problem(
-            path.name, "not found; expected a CSV file, a workbook (.xlsx) or a record.json"
+            path.name,
+            message(
+                "lint_not_found",
+                "not found; expected a CSV file, a workbook (.xlsx) or a record.json",
+            ),
         )
         return ()
     data = read_bytes(path, log)
@@ -55,11 +60,11 @@ def _workbook(file, data, log):
     try:
         sheets = read_sheets(data, is_read)
     except Unreadable as reason:
-        log.problem(file, str(reason))
+        log.problem(file, reason.args[0])
         return ()
     return tuple(
         Grid(
-            f"{file}, sheet {sheet.title}",
+            message("lint_sheet", "{file}, sheet {sheet}", file=file, sheet=sheet.title),
             tuple((number, tuple(cells)) for number, cells in sheet.grid.rows),
             sheet=sheet.title,
         )
@@ -78,12 +83,22 @@ def _record(file, text, log):
         is_ours = False
     if not is_ours:
         log.problem(
-            file, f"not a record of tankcal; expected format {FORMAT!r} or an older version of it"
+            file,
+            message(
+                "lint_no_record",
+                "not a record of tankcal; expected format {format!r} or an older version of it",
+                format=FORMAT,
+            ),
         )
         return ()
     if len(columns[0]) != len(columns[1]):
-        found = f"{len(columns[0])} heights and {len(columns[1])} volumes"
-        log.problem(file, f"{found}; expected as many of each", None, "capacity")
+        expected = message(
+            "lint_unequal_columns",
+            "{heights} heights and {volumes} volumes; expected as many of each",
+            heights=len(columns[0]),
+            volumes=len(columns[1]),
+        )
+        log.problem(file, expected, None, "capacity")
         return ()
     rows = [(0, ("height_m", "volume_m3"))]
     rows += [(number, cells) for number, cells in enumerate(zip(*columns, strict=True), 1)]
@@ -97,10 +112,18 @@ def _csv(file, text, log):
         if line.strip() and not line.lstrip(' \t"').startswith("#")
     ]
     if not lines:
-        log.problem(file, "empty; expected a table of heights and volumes")
+        log.problem(file, message("lint_empty", "empty; expected a table of heights and volumes"))
         return ()
     if len(lines) > MOST_LINES:
-        log.problem(file, f"{len(lines)} lines; expected at most {MOST_LINES}")
+        log.problem(
+            file,
+            message(
+                "lint_too_many_lines",
+                "{count} lines; expected at most {most}",
+                count=len(lines),
+                most=MOST_LINES,
+            ),
+        )
         return ()
     separator = max(_BY_CERTAINTY, key=lambda mark: _agreement(lines, mark))
     rows = []
@@ -108,10 +131,27 @@ def _csv(file, text, log):
         try:
             cells = next(csv.reader([line], delimiter=separator, strict=True))
         except csv.Error:
-            log.problem(file, f"found {shown(line)}; expected quotation marks in pairs", number)
+            log.problem(
+                file,
+                message(
+                    "lint_quotes",
+                    "found {found}; expected quotation marks in pairs",
+                    found=shown(line),
+                ),
+                number,
+            )
             continue
         if len(cells) > MOST_COLUMNS:
-            log.problem(file, f"{len(cells)} cells; expected at most {MOST_COLUMNS}", number)
+            log.problem(
+                file,
+                message(
+                    "lint_too_many_cells",
+                    "{count} cells; expected at most {most}",
+                    count=len(cells),
+                    most=MOST_COLUMNS,
+                ),
+                number,
+            )
         elif any(cell.strip() for cell in cells):
             rows.append((number, tuple(cells)))
     return (Grid(file, tuple(rows), True),)

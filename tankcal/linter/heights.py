@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.messages import message
+
 _FEWEST_ROWS = 3
 _EXACT = 1e-6  # of a step
 _SHORTEST_ZONE = 3  # steps
@@ -33,8 +35,13 @@ def series_of(table, log):
     """`Series` of a table; None after telling `log` that there are too few to judge."""
     entries = [entry for entry in table.entries if _is_readable(table, entry, log)]
     if len(entries) < _FEWEST_ROWS:
-        found = f"{len(entries)} rows of heights and volumes"
-        log.problem(table.name, f"{found}; expected {_FEWEST_ROWS} or more")
+        expected = message(
+            "lint_few_rows",
+            "{count} rows of heights and volumes; expected {fewest} or more",
+            count=len(entries),
+            fewest=_FEWEST_ROWS,
+        )
+        log.problem(table.name, expected)
         return None
     volumes = [entry.volume.value for entry in entries if entry.volume.value is not None]
     if _trend(volumes) < 0:
@@ -42,11 +49,20 @@ def series_of(table, log):
     direction = _trend([entry.height.value for entry in entries])
     height = direction * np.array([entry.height.value for entry in entries])
     if table.has_heading and table.is_ullage != (direction < 0):
-        found = "ullages rise" if table.is_ullage else "heights fall"
-        log.problem(table.name, f"{found} while volumes rise; expected the other way round")
+        expected = message(
+            "lint_heights_fall", "heights fall while volumes rise; expected the other way round"
+        )
+        if table.is_ullage:
+            expected = message(
+                "lint_ullages_rise", "ullages rise while volumes rise; expected the other way round"
+            )
+        log.problem(table.name, expected)
     step, tolerance = _usual_step(height, entries)
     if step is None:
-        log.problem(table.name, "the heights do not rise; expected rising heights, row by row")
+        log.problem(
+            table.name,
+            message("lint_no_rise", "the heights do not rise; expected rising heights, row by row"),
+        )
         return None
     teller = _Teller(table, entries, height, direction, log)
     height, keep = _in_order(teller, step, tolerance)
@@ -54,7 +70,13 @@ def series_of(table, log):
     entries, height = [entries[k] for k in order], height[order]
     if len(entries) < _FEWEST_ROWS:
         log.problem(
-            table.name, f"{len(entries)} heights that rise; expected {_FEWEST_ROWS} or more"
+            table.name,
+            message(
+                "lint_few_rising",
+                "{count} heights that rise; expected {fewest} or more",
+                count=len(entries),
+                fewest=_FEWEST_ROWS,
+            ),
         )
         return None
     teller = _Teller(table, entries, height, direction, log)
@@ -119,8 +141,13 @@ def _in_order(teller, step, tolerance):
     stray = sorted(set(range(len(height))) - set(chain))
     if len(stray) > _MOST_STRAY:
         keep[stray] = False
-        found = f"{len(stray)} of {len(height)} heights are out of order"
-        teller.problem(stray[0], f"{found}; expected heights that rise row by row")
+        expected = message(
+            "lint_many_astray",
+            "{count} of {all} heights are out of order; expected heights that rise row by row",
+            count=len(stray),
+            all=len(height),
+        )
+        teller.problem(stray[0], expected)
         return height, keep
     expected = {k: _place(k, chain, stray, height, step, tolerance) for k in stray}
     done = set()
@@ -129,17 +156,15 @@ def _in_order(teller, step, tolerance):
             continue
         partner = _partner(k, stray, expected, height, tolerance)
         twin = _twin(height[k], chain, teller.height, tolerance)
-        found = f"found {teller.shown(height[k])}"
+        found = teller.shown(height[k])
         if partner is not None:
             done.add(partner)
-            teller.problem(
-                k, f"{found}; rows {teller.row(k)} and {teller.row(partner)} are swapped"
-            )
+            teller.problem(k, _swapped(teller, height, k, k, partner))
         elif twin is not None and expected[k] is None:
             keep[k] = False
             _tell_twin(teller, k, twin)
         elif expected[k] is not None:
-            teller.problem(k, f"{found}; expected {teller.shown(expected[k])}")
+            teller.problem(k, _rather(found, teller.shown(expected[k])))
             height[k] = expected[k]
         else:
             _tell_astray(teller, k, height)
@@ -208,11 +233,39 @@ def _partner(k, stray, expected, height, tolerance):
 
 def _tell_twin(teller, k, twin):
     first, second = teller.entries[twin].volume, teller.entries[k].volume
-    found = f"height {teller.shown(teller.height[k])} stands in row {teller.row(twin)}, too"
+    found = message(
+        "lint_height_twice",
+        "height {height} stands in row {row}, too",
+        height=teller.shown(teller.height[k]),
+        row=teller.row(twin),
+    )
     if first.value == second.value:
-        teller.problem(k, f"{found}: a row stands twice")
-    else:
-        teller.problem(k, f"{found}, with volume {first.text}, here {second.text or 'none'}")
+        teller.problem(k, message("lint_row_twice", "{found}: a row stands twice", found=found))
+        return
+    expected = message(
+        "lint_two_volumes",
+        "{found}, with volume {there}, here {here}",
+        found=found,
+        there=first.text,
+        here=second.text or message("lint_none", "none"),
+    )
+    teller.problem(k, expected)
+
+
+def _rather(found, expected):
+    return message(
+        "lint_rather", "found {found}; expected {expected}", found=found, expected=expected
+    )
+
+
+def _swapped(teller, height, k, one, other):
+    return message(
+        "lint_rows_swapped",
+        "found {found}; rows {row} and {other_row} are swapped",
+        found=teller.shown(height[k]),
+        row=teller.row(one),
+        other_row=teller.row(other),
+    )
 
 
 def _tell_astray(teller, k, height):
@@ -223,13 +276,14 @@ def _tell_astray(teller, k, height):
         around = swapped[max(min(k, n) - 1, 0) : max(k, n) + 2]
         if np.all(np.diff(around) > 0):
             low, high = sorted((k, n))
-            teller.problem(
-                low,
-                f"found {teller.shown(height[low])}; "
-                f"rows {teller.row(low)} and {teller.row(high)} are swapped",
-            )
+            teller.problem(low, _swapped(teller, height, low, low, high))
             return
-    teller.problem(k, f"found {teller.shown(height[k])}; expected heights that rise row by row")
+    expected = message(
+        "lint_astray",
+        "found {found}; expected heights that rise row by row",
+        found=teller.shown(height[k]),
+    )
+    teller.problem(k, expected)
 
 
 def _even_steps(teller, step, tolerance):
@@ -242,8 +296,7 @@ def _even_steps(teller, step, tolerance):
         after = k + 2 >= len(height) or abs(height[k + 2] - height[k + 1] - step) <= tolerance
         if is_odd and before and after and abs(low + high - 2 * step) <= 2 * tolerance:
             expected = height[k - 1] + step
-            text = f"found {teller.shown(height[k])}; expected {teller.shown(expected)}"
-            teller.problem(k, text)
+            teller.problem(k, _rather(teller.shown(height[k]), teller.shown(expected)))
             height[k] = expected
     _tell_gaps(teller, height, tolerance)
     return height
@@ -266,14 +319,31 @@ def _tell_gaps(teller, height, tolerance):
             continue
         missing = round(steps[k] / largest) - 1
         fits = missing > 0 and abs(steps[k] - (missing + 1) * largest) <= 2 * tolerance
-        found = f"{teller.shown(height[k + 1])} follows {teller.shown(height[k])}"
+        found = message(
+            "lint_follows",
+            "{after} follows {before}",
+            after=teller.shown(height[k + 1]),
+            before=teller.shown(height[k]),
+        )
         if fits or k == last:
             count = max(missing, 1)
-            rows = "a row is missing" if count == 1 else f"{count} rows are missing"
-            expected = f"{teller.shown(height[k] + largest)} next: {rows}"
+            rows = message("lint_a_row_missing", "a row is missing")
+            if count > 1:
+                rows = message("lint_rows_missing", "{count} rows are missing", count=count)
+            expected = message(
+                "lint_next",
+                "{next} next: {rows}",
+                next=teller.shown(height[k] + largest),
+                rows=rows,
+            )
         else:
-            expected = f"a step of {largest:.9g}, as in the other rows"
-        teller.problem(k + 1, f"found that {found}; expected {expected}")
+            expected = message(
+                "lint_a_step", "a step of {step}, as in the other rows", step=f"{largest:.9g}"
+            )
+        text = message(
+            "lint_gap", "found that {found}; expected {expected}", found=found, expected=expected
+        )
+        teller.problem(k + 1, text)
 
 
 def _rounding(entries, height, tolerance):

@@ -19,6 +19,7 @@ from tankcal.linter.numbers import (
     read_number,
     style_of,
 )
+from tankcal.messages import message
 
 _FEW_SPLIT_ROWS = 5
 _FEET_DECIMALS = 4  # of a metre, in a label with decimals of an inch
@@ -158,12 +159,16 @@ def _trimmed(cells):
     return cells
 
 
+def _column(number):
+    return message("lint_column", "column {number}", number=str(number))
+
+
 def _without_heading(rows):
     body = [row for row in rows if all(has_digit(cell) for cell in row[1][:2]) and row[1][1:]]
     if not body or len(body) < 0.5 * len(rows):
         return ()
     nothing = heading_of(None)
-    pair = Pair(0, 1, replace(nothing, text="column 1"), replace(nothing, text="column 2"))
+    pair = Pair(0, 1, *(replace(nothing, text=_column(k)) for k in (1, 2)))
     width = max(len(_trimmed(cells)) for _, cells in body)
     return (Block((pair,), width, tuple(body), False, False),)
 
@@ -222,8 +227,14 @@ def _cells(grid, block, pairs, log):
     for row, cells in block.rows:
         is_split = grid.is_text and len(_trimmed(cells)) > block.width
         if is_split:
-            expected = f"{len(_trimmed(cells))} cells, expected {block.width} as in the heading"
-            log.problem(grid.name, f"{expected} (a decimal comma, or a thousands mark?)", row)
+            expected = message(
+                "lint_split_row",
+                "{count} cells, expected {width} as in the heading (a decimal comma, or a "
+                "thousands mark?)",
+                count=len(_trimmed(cells)),
+                width=block.width,
+            )
+            log.problem(grid.name, expected, row)
         for column, pair in zip(columns, pairs, strict=True):
             height = cells[pair.height] if pair.height < len(cells) else None
             volume = cells[pair.volume] if pair.volume < len(cells) else None
@@ -239,9 +250,13 @@ def _refuse_split_rows(grid, block):
     split = [(row, cells) for row, cells in block.rows if len(_trimmed(cells)) > block.width]
     if grid.is_text and len(split) > max(_FEW_SPLIT_ROWS, 0.2 * len(block.rows)):
         row, cells = split[0]
-        expected = (
-            f"{len(_trimmed(cells))} cells, expected {block.width} as in the heading, as in "
-            f"{len(split) - 1} more rows: write ; between the cells when decimals have a comma"
+        expected = message(
+            "lint_split_rows",
+            "{count} cells, expected {width} as in the heading, as in {more} more "
+            "rows: write ; between the cells when decimals have a comma",
+            count=len(_trimmed(cells)),
+            width=block.width,
+            more=len(split) - 1,
         )
         raise InputError(Problem(grid.name, expected, row))
 
@@ -252,7 +267,11 @@ def _names(pairs):
     named |= {p.volume: p.volume_heading.text for p in pairs}
     texts = list(named.values())
     return {
-        position: text if texts.count(text) == 1 else f"{text} (column {position + 1})"
+        position: text
+        if texts.count(text) == 1
+        else message(
+            "lint_column_of", "{heading} (column {column})", heading=text, column=position + 1
+        )
         for position, text in named.items()
     }
 

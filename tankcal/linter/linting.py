@@ -99,8 +99,13 @@ def _tables(file, grids, sheet, log):
     if sheet is not None:
         names = [grid.sheet for grid in grids if grid.sheet]
         if sheet not in names:
-            listed = ", ".join(names) or "none"
-            expected = f"no sheet {sheet!r}{nearest(sheet, names)}; the file has {listed}"
+            expected = message(
+                "lint_no_sheet",
+                "no sheet {sheet!r}{hint}; the file has {names}",
+                sheet=sheet,
+                hint=nearest(sheet, names),
+                names=", ".join(names) or message("lint_no_sheets", "none"),
+            )
             raise InputError(Problem(file, expected))
         grids = [grid for grid in grids if grid.sheet == sheet]
     found = []
@@ -111,8 +116,12 @@ def _tables(file, grids, sheet, log):
         found.append((size, tables, told))
     size, tables, told = max(found, key=lambda one: one[0], default=(0, (), Log()))
     if size == 0:
-        expected = "no table found; expected a column of heights and a column of volumes"
-        raise InputError(Problem(file, f"{expected}, with headings such as height_m, volume_m3"))
+        expected = message(
+            "lint_no_table",
+            "no table found; expected a column of heights and a column of volumes, with headings "
+            "such as height_m, volume_m3",
+        )
+        raise InputError(Problem(file, expected))
     log.problems += told.problems
     return tables
 
@@ -120,7 +129,12 @@ def _tables(file, grids, sheet, log):
 def _check(table, nominal, log):
     """(summary, (least, largest) area in m2) of one table, its faults told."""
     if not table.has_heading:
-        log.warning(table.name, "no heading: taken as heights in column 1, volumes in column 2")
+        log.warning(
+            table.name,
+            message(
+                "lint_no_heading", "no heading: taken as heights in column 1, volumes in column 2"
+            ),
+        )
     series = series_of(table, log)
     volumes = volumes_of(table, series, log) if series else None
     if volumes is None:
@@ -128,10 +142,15 @@ def _check(table, nominal, log):
     units = units_of(table, volumes, log)
     check_totals(table, volumes, units, series.step, nominal, log)
     low, high = sorted(abs(float(h)) * units.height_m for h in volumes.height[[0, -1]])
-    summary = (
-        f"{table.name}: {len(volumes.volume)} rows, {low:.6g} to {high:.6g} m, "
-        f"step {series.step * units.height_m:.6g} m, "
-        f"total {volumes.volume[-1] * units.volume_m3:.9g} m3"
+    summary = message(
+        "lint_summary",
+        "{table}: {rows} rows, {low:.6g} to {high:.6g} m, step {step:.6g} m, total {total:.9g} m3",
+        table=table.name,
+        rows=len(volumes.volume),
+        low=low,
+        high=high,
+        step=series.step * units.height_m,
+        total=volumes.volume[-1] * units.volume_m3,
     )
     return summary, _areas(volumes, units)
 

@@ -10,11 +10,12 @@ from itertools import pairwise
 from math import isfinite
 
 from tankcal.job.tables import BadCell, shown
+from tankcal.messages import message
 
 THOUSANDS = (",", ".", " ", "'", "\u2019", "\u00a0", "\u2009", "\u202f")
 MOST_DECIMALS = 15
 LARGEST = 1e12
-BLANK = "nothing stands here; expected a number"
+BLANK = message("lint_blank", "nothing stands here; expected a number")
 
 
 @dataclass(frozen=True)
@@ -78,8 +79,12 @@ def read_number(cell, style):
     if isinstance(cell, str):
         return _read_text(cell.strip(), style)
     if isinstance(cell, bool) or not isinstance(cell, int | float) or not isfinite(cell):
-        return Reading(None, complaint=f"found {shown(cell)}; expected a number")
+        return Reading(None, complaint=_no_number(cell))
     return _read_text(f"{cell:.15g}" if isinstance(cell, float) else str(cell), PLAIN, False)
+
+
+def _no_number(found):
+    return message("lint_no_number", "found {found}; expected a number", found=shown(found))
 
 
 def _read_text(text, style, is_typed=True):
@@ -92,17 +97,32 @@ def _read_text(text, style, is_typed=True):
             re.ASCII,
         )
         if groups is None:
-            return Reading(None, complaint=f"found {shown(text)}; expected a number")
+            return Reading(None, complaint=_no_number(text))
         plain, marks = text.replace(style.thousands, ""), True
     if style.decimal == ",":
         if "." in plain:
-            return Reading(None, complaint=f"found {shown(text)}; expected a decimal comma")
+            return Reading(
+                None,
+                complaint=message(
+                    "lint_decimal_comma",
+                    "found {found}; expected a decimal comma",
+                    found=shown(text),
+                ),
+            )
         plain = plain.replace(",", ".")
     if len(plain) > 40 or not _PLAIN_NUMBER.fullmatch(plain):
-        return Reading(None, complaint=f"found {shown(text)}; expected a number")
+        return Reading(None, complaint=_no_number(text))
     value = float(plain)
     if not abs(value) < LARGEST:
-        return Reading(None, complaint=f"found {shown(text)}; expected less than {LARGEST:g}")
+        return Reading(
+            None,
+            complaint=message(
+                "lint_too_large_number",
+                "found {found}; expected less than {most:g}",
+                found=shown(text),
+                most=LARGEST,
+            ),
+        )
     mantissa, _, exponent = plain.lower().partition("e")
     decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
     decimals = min(max(decimals, 0), MOST_DECIMALS)

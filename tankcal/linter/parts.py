@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from tankcal.messages import message
+
 MOST_PARTS = 15  # rows: 9 of a centimetre, 7 or 15 of an inch
 _AS_THE_TABLE = 0.02
 
@@ -30,7 +32,12 @@ def check_parts(table, main, log):
         rest = np.delete(values, worst).sum() / np.delete(marks, worst).sum()
         expected = rest * marks[worst]
         about = f"{expected:.{entry.volume.decimals}f}"
-        text = f"found {entry.volume.text}; expected about {about}, in proportion to the others"
+        text = message(
+            "lint_odd_part",
+            "found {found}; expected about {about}, in proportion to the others",
+            found=entry.volume.text,
+            about=about,
+        )
         log.problem(table.name, text, entry.row, entry.volume_column)
         return
     _check_size(table, entries, float(low.max()), float(high.min()), main, log)
@@ -42,8 +49,11 @@ def _check_size(table, entries, low, high, main, log):
     unit = table.volume_unit_m3 / table.height_unit_m
     least, most = main
     if high * unit < least * (1 - _AS_THE_TABLE) or low * unit > most * (1 + _AS_THE_TABLE):
-        text = (
-            f"parts of {0.5 * (low + high):.6g} a mark; expected {least / unit:.6g} to "
-            f"{most / unit:.6g}, as the table rises"
+        text = message(
+            "lint_parts_size",
+            "parts of {part:.6g} a mark; expected {least:.6g} to {most:.6g}, as the table rises",
+            part=0.5 * (low + high),
+            least=least / unit,
+            most=most / unit,
         )
         log.problem(table.name, text, entries[0].row, entries[0].volume_column)

@@ -2,6 +2,8 @@
 
 from itertools import pairwise
 
+from tankcal.messages import message
+
 
 def suggestion(text, expected, tolerance, decimals):
     """(number as text, what the slip was), or None.
@@ -13,11 +15,11 @@ def suggestion(text, expected, tolerance, decimals):
     changed places, a decimal mark moved, a digit missing, a digit too many.
     """
     for slip, candidates in (
-        ("one digit", _one_digit(text)),
-        ("two digits changed places", _transposed(text)),
-        ("the decimal mark", _moved_mark(text, decimals)),
-        ("a digit is missing", _inserted(text)),
-        ("a digit too many", _removed(text)),
+        (message("slip_one_digit", "one digit"), _one_digit(text)),
+        (message("slip_transposed", "two digits changed places"), _transposed(text)),
+        (message("slip_decimal_mark", "the decimal mark"), _moved_mark(text, decimals)),
+        (message("slip_digit_missing", "a digit is missing"), _inserted(text)),
+        (message("slip_digit_too_many", "a digit too many"), _removed(text)),
     ):
         good = [
             (abs(float(candidate) - expected), candidate)

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from itertools import product
 from math import log10, pi, sqrt
 
+from tankcal.messages import message
+
 _USUAL_HEIGHT_UNITS_M, _USUAL_VOLUME_UNITS_M3 = [1.0, 0.01, 0.001], [1.0, 0.001]
 _LEAST_VOLUME = 1e-9  # so that an empty table has proportions, too
 _LOWEST_M, _HIGHEST_M = 0.5, 40.0  # usual tanks
@@ -51,7 +53,12 @@ def units_of(table, volumes, log):
 
     height, volume = min(product(heights, sizes), key=oddity)
     if len(heights) * len(sizes) > 1:
-        text = f"no unit in a heading: taken as heights in {height:g} m, volumes in {volume:g} m3"
+        text = message(
+            "lint_no_units",
+            "no unit in a heading: taken as heights in {height:g} m, volumes in {volume:g} m3",
+            height=height,
+            volume=volume,
+        )
         log.warning(table.name, text)
     return Units(height, volume)
 
@@ -66,8 +73,12 @@ def check_totals(table, volumes, units, step, nominal, log):
     height_m = float(abs(volumes.height[-1] - volumes.height[0])) * units.height_m
     total_m3 = float(volumes.volume[-1]) * units.volume_m3
     if total_m3 <= 0:
-        found = f"the last volume is {volumes.volume[-1]:g}"
-        log.problem(table.name, f"{found}; expected the capacity of the tank")
+        expected = message(
+            "lint_no_capacity",
+            "the last volume is {volume:g}; expected the capacity of the tank",
+            volume=volumes.volume[-1],
+        )
+        log.problem(table.name, expected)
         return
     has_nominal = nominal.volume_m3 is not None or nominal.diameter_m is not None
     if not has_nominal:
@@ -84,9 +95,13 @@ def check_totals(table, volumes, units, step, nominal, log):
 def _check_proportions(table, height_m, total_m3, log):
     ratio = _slenderness(height_m, total_m3)
     if not _SLIMMEST < ratio < _FLATTEST:
-        text = (
-            f"{total_m3:.6g} m3 in {height_m:.6g} m of height is a cylinder of diameter "
-            f"{ratio * height_m:.4g} m; expected a tank: are the units right?"
+        text = message(
+            "lint_proportions",
+            "{total:.6g} m3 in {height:.6g} m of height is a cylinder of diameter "
+            "{diameter:.4g} m; expected a tank: are the units right?",
+            total=total_m3,
+            height=height_m,
+            diameter=ratio * height_m,
         )
         log.warning(table.name, text)
 
@@ -95,13 +110,33 @@ def _check_total(table, total_m3, expected_m3, close, log):
     ratio = total_m3 / expected_m3
     if abs(ratio - 1) <= close:
         return
-    text = f"total {total_m3:.6g} m3, expected about {expected_m3:.6g} m3 (nominal)"
-    power = round(log10(ratio))
+    power, hint = round(log10(ratio)), ""
     if power and abs(ratio / 10.0**power - 1) <= _FAR:
-        larger, factor = ("larger" if power > 0 else "smaller"), 10 ** abs(power)
-        text += f": {factor} times {larger}; are the units, or thousands marks, right?"
+        hint = _hint_of_factor(power)
+    text = message(
+        "lint_total",
+        "total {total:.6g} m3, expected about {nominal:.6g} m3 (nominal){hint}",
+        total=total_m3,
+        nominal=expected_m3,
+        hint=hint,
+    )
     tell = log.warning if abs(ratio - 1) <= _FAR else log.problem
     tell(table.name, text)
+
+
+def _hint_of_factor(power):
+    factor = 10 ** abs(power)
+    if power > 0:
+        return message(
+            "lint_times_larger",
+            ": {factor} times larger; are the units, or thousands marks, right?",
+            factor=factor,
+        )
+    return message(
+        "lint_times_smaller",
+        ": {factor} times smaller; are the units, or thousands marks, right?",
+        factor=factor,
+    )
 
 
 def _check_top(table, volumes, units, step, nominal_m, log):
@@ -111,9 +146,16 @@ def _check_top(table, volumes, units, step, nominal_m, log):
     expected_gap = min(step * units.height_m * (1 - 1e-6), _USUAL_GAP_M)
     if abs(gap) < max(expected_gap, _LEAST_GAP_M):
         return
-    text = f"the table ends at {top_m:.6g} m, nominal height {nominal_m:.6g} m"
+    hint = ""
     if gap > 0:
-        text += ": are the last rows missing?"
+        hint = message("lint_last_rows", ": are the last rows missing?")
+    text = message(
+        "lint_top",
+        "the table ends at {top:.6g} m, nominal height {nominal:.6g} m{hint}",
+        top=top_m,
+        nominal=nominal_m,
+        hint=hint,
+    )
     is_small = abs(gap) <= max(5 * step * units.height_m, _CLOSE_DIAMETER * nominal_m)
     tell = log.warning if is_small else log.problem
     tell(table.name, text)

@@ -8,6 +8,7 @@ import numpy as np
 from tankcal.linter.examination import examine
 from tankcal.linter.numbers import BLANK
 from tankcal.linter.suggestions import suggestion
+from tankcal.messages import message
 
 _USUAL = 0.98  # part of the rows that have at most the usual number of decimals
 _FINEST = 1e-9  # of the total: what lies below it is no rounding
@@ -54,7 +55,9 @@ def volumes_of(table, series, log):
         teller.tell(fault)
     _check_falls(teller, found.volume * quantum)
     if not found.complete:
-        log.warning(table.name, "too rough to be examined row by row to its end")
+        log.warning(
+            table.name, message("lint_rough", "too rough to be examined row by row to its end")
+        )
     joints = tuple(float(height[row]) for row in found.joints)
     return Volumes(height, volume, decimals, joints)
 
@@ -68,7 +71,11 @@ def _left_out(table, entries, log):
         rows = list(run)
         if is_blank and len(rows) >= _LONG_BLANK:
             first, last = entries[rows[0]], entries[rows[-1]]
-            text = f"no volumes from here to row {last.row}: are these heights not for use?"
+            text = message(
+                "lint_no_volumes",
+                "no volumes from here to row {last_row}: are these heights not for use?",
+                last_row=last.row,
+            )
             log.warning(table.name, text, first.row, first.volume_column)
             found.update(rows)
     return found
@@ -81,7 +88,9 @@ def _is_readable(table, entry, log):
             log.problem(table.name, reading.complaint, entry.row, entry.volume_column)
         return False
     if reading.value < 0:
-        expected = f"found {reading.text}; expected a volume of 0 or more"
+        expected = message(
+            "lint_negative", "found {found}; expected a volume of 0 or more", found=reading.text
+        )
         log.problem(table.name, expected, entry.row, entry.volume_column)
     return True
 
@@ -89,15 +98,31 @@ def _is_readable(table, entry, log):
 def _check_marks(table, entries, log):
     """Tell thousands marks, and in a workbook texts that look like numbers."""
     for having, what in (
-        ([e for e in entries if e.volume.marks], "a thousands mark"),
-        ([e for e in entries if e.volume.is_typed and not table.is_text], "a text, not a number"),
+        (
+            [e for e in entries if e.volume.marks],
+            message("lint_thousands_mark", "a thousands mark"),
+        ),
+        (
+            [e for e in entries if e.volume.is_typed and not table.is_text],
+            message("lint_a_text", "a text, not a number"),
+        ),
     ):
         if len(having) > 0.5 * sum(e.volume.value >= 1000 for e in entries):
-            text = f"{what} in {len(having)} volumes; expected numbers that any program can read"
+            text = message(
+                "lint_written_in_all",
+                "{what} in {count} volumes; expected numbers that any program can read",
+                what=what,
+                count=len(having),
+            )
             log.warning(table.name, text, having[0].row, having[0].volume_column)
         else:
             for entry in having:
-                text = f"found {what}; expected {entry.volume.text}, as the other rows are written"
+                text = message(
+                    "lint_written_so",
+                    "found {what}; expected {expected}, as the other rows are written",
+                    what=what,
+                    expected=entry.volume.text,
+                )
                 log.problem(table.name, text, entry.row, entry.volume_column)
 
 
@@ -117,19 +142,25 @@ def _check_rounding(table, entries, log):
     if keeps_zeros and len(short) <= max(1, len(entries) // 100):
         for entry in short:
             is_last = entry is entries[-1]
-            text = f"found {entry.volume.text}; expected {usual} decimals as in the other rows"
             tell = log.problem if is_last else log.warning
-            tell(
-                table.name,
-                text + (": is the last row cut?" if is_last else ""),
-                entry.row,
-                entry.volume_column,
-            )
+            text = _other_decimals(entry, usual)
+            if is_last:
+                text = message("lint_cut", "{text}: is the last row cut?", text=text)
+            tell(table.name, text, entry.row, entry.volume_column)
     for entry in entries:
         if entry.volume.decimals > usual:
-            text = f"found {entry.volume.text}; expected {usual} decimals as in the other rows"
+            text = _other_decimals(entry, usual)
             log.warning(table.name, text, entry.row, entry.volume_column)
     return usual
+
+
+def _other_decimals(entry, usual):
+    return message(
+        "lint_decimals",
+        "found {found}; expected {usual} decimals as in the other rows",
+        found=entry.volume.text,
+        usual=usual,
+    )
 
 
 def _check_falls(teller, mended):
@@ -137,8 +168,13 @@ def _check_falls(teller, mended):
     sound = np.flatnonzero(np.isfinite(mended))
     for before, row in pairwise(sound):
         if mended[row] < mended[before] - 0.5 * teller.quantum:
-            text = f"found {teller.text(row)} after {teller.text(before)}"
-            teller.problem(row, f"{text}; expected volumes that do not fall")
+            text = message(
+                "lint_falls",
+                "found {found} after {before}; expected volumes that do not fall",
+                found=teller.text(row),
+                before=teller.text(before),
+            )
+            teller.problem(row, text)
 
 
 class _Teller:
@@ -164,7 +200,13 @@ class _Teller:
         if fault.kind == "swap":
             self.problem(
                 fault.first,
-                f"found {self.text(fault.first)}; volumes of rows {first} and {last} are swapped",
+                message(
+                    "lint_volumes_swapped",
+                    "found {found}; volumes of rows {row} and {other_row} are swapped",
+                    found=self.text(fault.first),
+                    row=first,
+                    other_row=last,
+                ),
             )
         elif fault.kind == "row":
             self._tell_row(fault)
@@ -173,26 +215,40 @@ class _Teller:
 
     def _tell_row(self, fault):
         expected = self.volume[fault.first] - fault.size * self.quantum
-        text = f"found {self.text(fault.first)}; expected about {self.number(expected)}"
         tolerance = max(3.0, 0.02 * abs(fault.size)) * self.quantum
         slip = suggestion(self.text(fault.first), expected, tolerance, self.decimals)
-        if slip:
-            text += f": {slip[0]}? ({slip[1]})"
+        hint = (
+            ""
+            if not slip
+            else message("lint_slip", ": {number}? ({slip})", number=slip[0], slip=slip[1])
+        )
         is_beside_joint = fault.first in self.joints or fault.first + 1 in self.joints
         is_fitting = is_beside_joint and abs(fault.size) * self.quantum <= _EDGE * self._step(fault)
-        if is_fitting:
-            text += ", or the edge of a fitting"
+        text = message(
+            "lint_odd_volume",
+            "found {found}; expected about {expected}{hint}{fitting}",
+            found=self.text(fault.first),
+            expected=self.number(expected),
+            hint=hint,
+            fitting=_or_fitting(is_fitting),
+        )
         self.problem(fault.first, text, not is_fitting)
 
     def _tell_shift(self, fault, first, last):
-        amount = f"{self.number(abs(fault.size) * self.quantum)} too {_size_word(fault.size)}"
         is_open = fault.kind == "shift"
-        rows = f"from row {first} on" if is_open else f"rows {first} to {last}"
-        text = f"volumes are {amount} for the rows around, {rows}"
+        rows = message("lint_rows", "rows {row} to {last_row}", row=first, last_row=last)
+        if is_open:
+            rows = message("lint_from_row", "from row {row} on", row=first)
         is_fitting = is_open and fault.first > 0 and self._may_be_fitting(fault)
-        if is_fitting:
-            text += ", or the edge of a fitting"
-        self.problem(fault.first, f"found {self.text(fault.first)}; {text}", not is_fitting)
+        text = message(
+            "lint_shifted",
+            "found {found}; volumes are {amount} for the rows around, {rows}{fitting}",
+            found=self.text(fault.first),
+            amount=_amount(self.number(abs(fault.size) * self.quantum), fault.size),
+            rows=rows,
+            fitting=_or_fitting(is_fitting),
+        )
+        self.problem(fault.first, text, not is_fitting)
 
     def _may_be_fitting(self, fault):
         """Whether something in the tank may take up, or give, that volume within one step."""
@@ -205,5 +261,11 @@ class _Teller:
         return self.volume[fault.first] - fault.size * self.quantum - before
 
 
-def _size_word(size):
-    return "large" if size > 0 else "small"
+def _amount(number, size):
+    if size > 0:
+        return message("lint_too_large", "{number} too large", number=number)
+    return message("lint_too_small", "{number} too small", number=number)
+
+
+def _or_fitting(is_fitting):
+    return message("lint_fitting", ", or the edge of a fitting") if is_fitting else ""

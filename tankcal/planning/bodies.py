@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from tankcal.messages import message
+
 SHARED = 2  # points that two levelled set-ups need in common
 
 
@@ -36,8 +38,12 @@ def _linked(bodies):
 def in_words(found):
     """What parts `apart` found, in a sentence."""
     told = "; ".join(", ".join(names) for names in found)
-    return (
-        f"{len(found)} groups of set-ups hang together with no other: {told}; they share fewer than"
-        f" {SHARED} points and do not see each other: add marks or control points that neighbours"
-        " both see, or set-ups between them"
+    return message(
+        "plan_apart",
+        "{count} groups of set-ups hang together with no other: {told}; they "
+        "share fewer than {shared} points and do not see each other: add marks "
+        "or control points that neighbours both see, or set-ups between them",
+        count=len(found),
+        told=told,
+        shared=SHARED,
     )

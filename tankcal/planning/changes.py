@@ -9,6 +9,7 @@ from tankcal.planning.rings import around, row_heights_m, tape_of
 
 ITEMS = ("photo_station", "setup", "tape", "control_point", "target_row", "reading")
 IMAGES, SETS = "all image points", "all sets of the total station"  # what is read again
+ROW, OF_COURSE = "row ", "row in course "  # how the names of rows begin
 NEW = "N-"  # what the name of a thing that is added begins with
 MOST_READINGS = 100  # of one thing, as in plan.toml
 CONTROL_SD_M, TAPE_SD_M = 0.002, 0.001  # of what is added where the plan has none to follow
@@ -211,7 +212,7 @@ def _rows(plan):
     for course in dict.fromkeys(targets.course.tolist()):
         after = _with_row(plan, course)
         if after is not None:
-            name = f"row in course {plan.job.courses[course].name}"
+            name = f"{OF_COURSE}{plan.job.courses[course].name}"
             yield "add", "target_row", name, after
     for name in dict.fromkeys(targets.section):
         mine = np.array([one == name for one in targets.section])
@@ -221,7 +222,7 @@ def _rows(plan):
             known = tuple(one for one in plan.known if one.name not in gone)
             ties = tuple(one for one in plan.ties if not {one.start, one.end} & gone)
             after = replace(plan, targets=rest, known=known, ties=ties)
-            yield "drop", "target_row", f"row {name}", after
+            yield "drop", "target_row", f"{ROW}{name}", after
 
 
 def _with_row(plan, course):

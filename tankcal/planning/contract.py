@@ -2,14 +2,14 @@
 
 from tankcal.job.contract import COLUMNS
 from tankcal.job.fields import Field
+from tankcal.messages import message
 
 
 class Count(Field):
     """A whole number."""
 
-    def expectation(self):
-        """What is expected, in words."""
-        return super().expectation().replace("a number", "a whole number")
+    def _expected_number(self):
+        return message("a_whole_number", "a whole number{bounds}", bounds=self._bounds())
 
 
 def _number(name, note, low=-1e5, high=1e5, required=False, above_low=False, choices=()):
@@ -27,14 +27,27 @@ def _list(name, note, low, high, required=False):
 
 
 _RING = (
-    _count("stations", "how many stations stand around the tank", True),
+    _count(
+        "stations", message("plan_note_stations", "how many stations stand around the tank"), True
+    ),
     _number("distance_m", "from the wall, metres; or radius_m", 0, 1000, above_low=True),
     _number("radius_m", "from the axis of the tank, metres", 0, 1000),
-    _list("heights_m", "heights above the bottom of the shell, metres", -50, 200, True),
+    _list(
+        "heights_m",
+        message("plan_note_ring_heights", "heights above the bottom of the shell, metres"),
+        -50,
+        200,
+        True,
+    ),
     _number("start_azimuth_deg", "of the first station from the axis; blank: 0", -360, 360),
 )
 PATTERN = (
-    _count("generatrices", "vertical lines of targets, evenly spread", True, 2000),
+    _count(
+        "generatrices",
+        message("plan_note_generatrices", "vertical lines of targets, evenly spread"),
+        True,
+        2000,
+    ),
     _number("first_azimuth_deg", "of the first line from the axis; blank: 0", -360, 360),
     _count("levels", "rows of targets in each course, at its Gauss levels; blank: 2", high=5),
     _list("heights_m", "heights of the rows above the bottom, in place of levels", -100, 200),
@@ -48,7 +61,12 @@ PATTERN = (
     _number("common_form_mm", "the part of it that runs up the whole shell; blank: 0", 0, 500),
 )
 PHOTO_RINGS = (
-    Field("camera", "name", "the camera, as in cameras.toml", required=True),
+    Field(
+        "camera",
+        "name",
+        message("plan_note_camera", "the camera, as in cameras.toml"),
+        required=True,
+    ),
     *_RING,
     _list("directions_deg", "turns of the camera away from the axis; blank: 0", -360, 360),
     _number("aim_height_m", "height on the wall ahead of it; blank: half the shell", -50, 200),
@@ -58,7 +76,12 @@ PHOTO_RINGS = (
     _number("s_um", "standard deviation of a reading; blank: image_sd_um", 0, 1e4),
 )
 SETUP_RINGS = (
-    Field("instrument", "name", "the total station, as in instruments.toml", required=True),
+    Field(
+        "instrument",
+        "name",
+        message("plan_note_instrument", "the total station, as in instruments.toml"),
+        required=True,
+    ),
     *_RING,
     _number("s_direction_arcsec", "standard deviation of a direction; blank: none", 0, 1e5),
     _number("s_zenith_arcsec", "standard deviation of a zenith angle; blank: none", 0, 1e5),
@@ -67,19 +90,50 @@ SETUP_RINGS = (
     Field("sights", "flag", "sight the set-ups on either side; blank: true"),
 )
 TAPES = (
-    Field("name", "name", "of the tape, once in the plan", required=True),
-    Field("kind", "choice", "how it hangs", required=True, choices=("vertical", "horizontal")),
-    _number("azimuth_deg", "of its middle from the axis", -360, 360, True),
-    _number("length_m", "of the tape, metres", 0, 200, True, True),
-    _number("low_m", "its lowest end above the bottom of the shell", -50, 200, True),
+    Field(
+        "name",
+        "name",
+        message("plan_note_tape_name", "of the tape, once in the plan"),
+        required=True,
+    ),
+    Field(
+        "kind",
+        "choice",
+        message("plan_note_tape_kind", "how it hangs"),
+        required=True,
+        choices=("vertical", "horizontal"),
+    ),
+    _number(
+        "azimuth_deg",
+        message("plan_note_tape_azimuth", "of its middle from the axis"),
+        -360,
+        360,
+        True,
+    ),
+    _number(
+        "length_m", message("plan_note_tape_length", "of the tape, metres"), 0, 200, True, True
+    ),
+    _number(
+        "low_m",
+        message("plan_note_tape_low", "its lowest end above the bottom of the shell"),
+        -50,
+        200,
+        True,
+    ),
     _number("off_m", "from the wall; blank: 0.1", 0, 50),
-    _number("s_mm", "standard deviation of a reading", 0, 1e5, True),
+    _number("s_mm", message("plan_note_tape_sd", "standard deviation of a reading"), 0, 1e5, True),
     _count("readings", "how often it is read; blank: 1", high=100),
     Field("instrument", "name", "the tape, as in instruments.toml"),
 )
 OBSTACLES = (
-    Field("name", "name", "what it is", required=True),
-    Field("kind", "choice", "box or cylinder", required=True, choices=("box", "cylinder")),
+    Field("name", "name", message("plan_note_obstacle_name", "what it is"), required=True),
+    Field(
+        "kind",
+        "choice",
+        message("plan_note_obstacle_kind", "box or cylinder"),
+        required=True,
+        choices=("box", "cylinder"),
+    ),
     _list("from_m", "box: one corner, x, y, z", -1e8, 1e8),
     _list("to_m", "box: the opposite corner", -1e8, 1e8),
     _list("axis_m", "cylinder: x, y of its upright axis", -1e8, 1e8),

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import TankcalError
+from tankcal.messages import message
 from tankcal.planning.changes import ITEMS, Change, changes_of, cost_of
 from tankcal.planning.checks.placed import refuse_misplaced
 from tankcal.planning.checks.seen import refuse_blind
@@ -89,7 +90,7 @@ def what_helps(plan, changes=None, tell=None, before=None):
     tell = tell or (lambda text, done, total: None)
     found = []
     for number, one in enumerate(changes, 1):
-        tell("trying changes", number, len(changes))
+        tell(message("plan_trying_changes", "trying changes"), number, len(changes))
         found.append(_effect(one, before))
     return tuple(sorted(found, key=lambda one: one.relative_u))
 

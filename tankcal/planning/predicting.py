@@ -7,6 +7,7 @@ import numpy as np
 
 from tankcal.doubts import VAGUE
 from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.messages import message
 from tankcal.network.quality import precision
 from tankcal.planning.bodies import apart, in_words
 from tankcal.planning.checks.seen import refuse_blind
@@ -160,9 +161,12 @@ def _refuse_without_delivery(plan, tabled):
         least = min(plan.job.table.minimum_delivery_m or MINIMA_M)
         file, row, name = plan.limits.place
         tall = plan.shell.high_m - plan.shell.low_m
-        expected = (
-            f"no delivery of {least:g} m or more in a shell of {tall:g} m; expected top, or a "
-            "smaller table.minimum_delivery_m"
+        expected = message(
+            "plan_no_delivery",
+            "no delivery of {least:g} m or more in a shell of {tall:g} m; expected "
+            "top, or a smaller table.minimum_delivery_m",
+            least=least,
+            tall=tall,
         )
         raise InputError(Problem(file, expected, row, name))
 
@@ -173,7 +177,10 @@ def _refuse_exact(measurements):
     if measurements.image_points is not None:
         sds.append(measurements.image_points.sd_mm.ravel())
     if not any((one > 0).any() for one in sds):
-        expected = "an accuracy of zero for everything: expected standard deviations above 0"
+        expected = message(
+            "plan_all_exact",
+            "an accuracy of zero for everything: expected standard deviations above 0",
+        )
         raise InputError(Problem("plan.toml", expected))
 
 

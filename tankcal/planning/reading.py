@@ -42,6 +42,7 @@ from tankcal.job.tables import (
 from tankcal.job.tables import (
     TABLES as JOB_FILES,
 )
+from tankcal.messages import message
 from tankcal.numerals import NUMBER
 from tankcal.planning.assembling import assembled
 from tankcal.planning.checks.given import check_given
@@ -61,7 +62,9 @@ def load_plan(path):
     raw, given = _read(folder, log)
     values = read_settings(raw, log)
     if kind_of(raw) not in (None, "vertical"):
-        expected = "only an upright tank can be planned so far; expected vertical"
+        expected = message(
+            "plan_vertical_only", "only an upright tank can be planned so far; expected vertical"
+        )
         log.problem(PLAN_FILE, expected, None, "tank.kind")
     registers = {name: read_register(raw, name, log) for name in REGISTERS}
     tables = _job_tables(raw, log)
@@ -101,7 +104,12 @@ def _folder(path, log):
     if path.name == PLAN_FILE and path.is_file():
         return path.parent
     if not (path / PLAN_FILE).is_file():
-        expected = f"no {PLAN_FILE} there; expected a plan's folder, or its {PLAN_FILE}"
+        expected = message(
+            "plan_no_plan_file",
+            "no {file} there; expected a plan's folder, or its {same}",
+            file=PLAN_FILE,
+            same=PLAN_FILE,
+        )
         log.problem(path.name or ".", expected)
     return path
 
@@ -128,7 +136,12 @@ def _read(folder, log):
     tables, known = {}, [f"{name}.csv" for name in (*JOB_TABLES, *TABLES)]
     for path in sorted(folder.glob("*.csv")):
         if path.name not in known:
-            log.problem(path.name, f"unknown file; expected {', '.join(known)}")
+            log.problem(
+                path.name,
+                message(
+                    "plan_unknown_file", "unknown file; expected {known}", known=", ".join(known)
+                ),
+            )
             continue
         table = content(path.name)
         is_readable = table is not None and marks is not None
@@ -164,7 +177,12 @@ def _table(name, table, log):
 
 def _single(section, entries, rows, log):
     if not isinstance(entries, dict):
-        log.problem(PLAN_FILE, f"expected one [{section}]", rows.get(section), section)
+        log.problem(
+            PLAN_FILE,
+            message("plan_one_section", "expected one [{section}]", section=section),
+            rows.get(section),
+            section,
+        )
         entries = {}
     found = {key: rows.get(f"{section}.{key}") for key in entries}
     return _entry(section, SINGLE[section], entries, rows.get(section), found, log)
@@ -173,7 +191,16 @@ def _single(section, entries, rows, log):
 def _repeated(section, entries, text, log):
     """[Entry] of the [[section]] of a plan."""
     if not isinstance(entries, list) or not all(isinstance(one, dict) for one in entries):
-        log.problem(PLAN_FILE, f"expected [[{section}]], in double brackets", None, section)
+        log.problem(
+            PLAN_FILE,
+            message(
+                "plan_double_brackets",
+                "expected [[{section}]], in double brackets",
+                section=section,
+            ),
+            None,
+            section,
+        )
         return []
     found, places = [], _rows_of(section, text)
     for number, one in enumerate(entries):
@@ -200,7 +227,7 @@ def _entry(name, fields, entries, row, rows, log):
     known = [field.name for field in fields]
     for key in entries:
         if key not in known:
-            expected = f"unknown key{nearest(key, known)}"
+            expected = message("plan_unknown_key", "unknown key{hint}", hint=nearest(key, known))
             log.problem(PLAN_FILE, expected, rows.get(key) or row, f"{name}.{key}")
     values = {
         field.name: read_setting(
@@ -228,7 +255,12 @@ def _is_whole(value):
 
 
 def _not_whole(field, value):
-    return f"found {value:g}; expected {field.expectation()}"
+    return message(
+        "plan_not_whole",
+        "found {found:g}; expected {expected}",
+        found=value,
+        expected=field.expectation(),
+    )
 
 
 def _job_tables(raw, log):
@@ -238,7 +270,10 @@ def _job_tables(raw, log):
         if raw.tables.get(name) is not None:
             tables[name] = read_columns(name, raw.tables[name], log)
     if "courses" not in raw.tables:
-        log.problem("courses.csv", "missing file; expected the courses of the shell")
+        log.problem(
+            "courses.csv",
+            message("plan_courses_missing", "missing file; expected the courses of the shell"),
+        )
     return tables
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import SolutionError, TankcalError
+from tankcal.messages import message
 from tankcal.planning.predicting import Prediction
 from tankcal.planning.simulating import measured
 from tankcal.surveys import adjust_survey, wall_points
@@ -71,19 +72,25 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, tell=None):
     found, volumes, aside = [], [], []
     for run in range(1, runs + 1):
         if tell:
-            tell("simulating surveys", run, runs)
+            tell(message("plan_simulating", "simulating surveys"), run, runs)
         drawn = measured(prediction.plan, prediction.measurements, prediction.predicted, rng)
         try:
             adjustment, volume = _made(prediction.plan, _spoilt(drawn, blunders, rng))
         except TankcalError as error:
-            failed.append(str(error).splitlines()[0])
+            failed.append(error.texts[0])
             continue
         found.append(dict(zip(adjustment.names, adjustment.xyz_m, strict=True)))
         volumes.append(volume)
         aside.append(len(adjustment.removed))
     if len(found) < 2:
         raise SolutionError(
-            f"{len(failed)} of {runs} simulated surveys have no solution: {failed[0]}"
+            message(
+                "plan_simulations_failed",
+                "{failed} of {runs} simulated surveys have no solution: {first}",
+                failed=len(failed),
+                runs=runs,
+                first=failed[0],
+            )
         )
     names = tuple(name for name in found[0] if all(name in one for one in found))
     xyz = np.array([[one[name] for name in names] for one in found])

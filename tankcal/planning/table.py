@@ -8,6 +8,7 @@ import numpy as np
 from tankcal.doubts import refuse_undetermined
 from tankcal.errors import SolutionError
 from tankcal.job.model import Job, Points
+from tankcal.messages import message
 from tankcal.planning.covariance import PredictedCovariance
 from tankcal.statements import statements
 from tankcal.surveys.causes import causes_of
@@ -84,7 +85,9 @@ def _covered(plan, predicted):
     there = [i for i, name in enumerate(plan.targets.names) if name in place]
     there = [i for i in there if not adjusted.problem.set_aside[place[plan.targets.names[i]]]]
     if not there:
-        raise SolutionError("no target of the wall would be determined")
+        raise SolutionError(
+            message("plan_no_target_determined", "no target of the wall would be determined")
+        )
     points = np.array([place[plan.targets.names[i]] for i in there])
     return there, PredictedCovariance(adjusted, points)
 

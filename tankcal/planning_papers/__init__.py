@@ -6,6 +6,7 @@ Nothing here computes a number.
 from pathlib import Path
 
 from tankcal import folders
+from tankcal.messages import message
 from tankcal.planning_papers.paper import PlanPaper
 
 __all__ = ["DESIGN", "FILES", "JOB", "PlanPaper", "refuse_foreign", "write"]
@@ -49,12 +50,12 @@ def _write(paper, folder, tell):
     """The files of a PlanPaper."""
     from tankcal.planning_papers import empty_job, files, papers, workbook
 
-    tell("writing the empty job")
+    tell(message("plan_writing_job", "writing the empty job"))
     empty_job.write(paper.prediction, folder / JOB)
-    tell("writing the tables")
+    tell(message("plan_writing_tables", "writing the tables"))
     files.write(paper, folder, empty_job.fingerprints(folder / JOB))
     workbook.write(paper, folder / "field-sheets.xlsx")
-    tell("setting prediction and field sheets")
+    tell(message("plan_setting_papers", "setting prediction and field sheets"))
     papers.write(paper, folder)
 
 

@@ -8,6 +8,7 @@ from tankcal.errors import InputError, Problem
 from tankcal.job.contract import COLUMNS
 from tankcal.job.contract.registers import SHORT_KEYS
 from tankcal.languages import DEFAULT
+from tankcal.messages import message
 from tankcal.planning.model import TAPED
 from tankcal.planning.simulating import targets_of
 from tankcal.rotations import angles_of
@@ -48,8 +49,11 @@ def refuse_filled(folder, plan_file):
         raise InputError(
             Problem(
                 folder.name,
-                "is no longer the empty job that tankcal wrote; it will not be replaced: move it "
-                "away or choose another --out",
+                message(
+                    "plan_job_filled",
+                    "is no longer the empty job that tankcal wrote; it will not be replaced: "
+                    "move it away or choose another --out",
+                ),
             )
         )
 

@@ -3,12 +3,19 @@
 from tankcal.doubts import ADVISED_POINTS, FEWEST_POINTS
 from tankcal.job.checks.common import is_not_given, refuse_repeated
 from tankcal.job.tables import nearest
+from tankcal.messages import message
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.units import warn_of_units
 
 UNFIT = {  # kinds of instruments that cannot be meant
     "setup_rings": ("tape", "level"),
     "tapes": ("total_station", "theodolite", "level"),
+}
+_NAMED = {
+    "tape": message("plan_named_tape", "tape"),
+    "level": message("plan_named_level", "level"),
+    "total_station": message("plan_named_total_station", "total station"),
+    "theodolite": message("plan_named_theodolite", "theodolite"),
 }
 
 
@@ -22,14 +29,23 @@ def check_given(values, registers, given, raw, log):
         known = registers[register]
         for one in given.repeated[section]:
             if one[key] is not None and one[key] not in known:
-                expected = f"found {one[key]!r}; expected a name of {register}.toml"
-                one.tell(log.problem, key, expected + nearest(one[key], known))
+                expected = message(
+                    "plan_no_such_name",
+                    "found {found!r}; expected a name of {file}{hint}",
+                    found=one[key],
+                    file=f"{register}.toml",
+                    hint=nearest(one[key], known),
+                )
+                one.tell(log.problem, key, expected)
     _check_kinds(registers["instruments"], given, log)
     _check_pattern(given.single["pattern"], log)
     for section in ("photo_rings", "setup_rings"):
         for one in given.repeated[section]:
             if len(one.filled & {"distance_m", "radius_m"}) != 1:
-                expected = "expected one of distance_m (from the wall) and radius_m (from the axis)"
+                expected = message(
+                    "plan_one_radius",
+                    "expected one of distance_m (from the wall) and radius_m (from the axis)",
+                )
                 one.tell(log.problem, "distance_m", expected)
     _check_obstacles(given, log)
     _check_tapes(given, log)
@@ -44,8 +60,16 @@ def _check_kinds(instruments, given, log):
         for one in given.repeated[section]:
             kind = (instruments.get(one["instrument"]) or {}).get("kind")
             if kind in unfit:
-                expected = f"{one['instrument']} is a {kind.replace('_', ' ')}; expected "
-                expected += "a tape" if section == "tapes" else "a total station or a theodolite"
+                fit = message("plan_total_station", "a total station or a theodolite")
+                if section == "tapes":
+                    fit = message("plan_a_tape", "a tape")
+                expected = message(
+                    "plan_unfit_instrument",
+                    "{instrument} is a {named}; expected {fit}",
+                    instrument=one["instrument"],
+                    named=_NAMED[kind],
+                    fit=fit,
+                )
                 one.tell(log.problem, "instrument", expected)
 
 
@@ -53,17 +77,28 @@ def _check_pattern(pattern, log):
     """Lines enough for a section, heights or levels, and a form that is larger than its part."""
     lines = pattern["generatrices"]
     if lines in range(FEWEST_POINTS):
-        expected = (
-            f"found {lines:g}, the points of each section of the wall; expected at least "
-            f"{FEWEST_POINTS} ({ADVISED_POINTS} or more are advised)"
+        expected = message(
+            "plan_few_lines",
+            "found {lines:g}, the points of each section of the wall; expected at "
+            "least {fewest} ({advised} or more are advised)",
+            lines=lines,
+            fewest=FEWEST_POINTS,
+            advised=ADVISED_POINTS,
         )
         pattern.tell(log.problem, "generatrices", expected)
     if {"levels", "heights_m"} <= pattern.filled:
-        expected = "given together with heights_m; expected one of the two"
+        expected = message(
+            "plan_levels_or_heights", "given together with heights_m; expected one of the two"
+        )
         pattern.tell(log.problem, "levels", expected)
     whole, common = pattern["form_mm"] or 0.0, pattern["common_form_mm"] or 0.0
     if common > whole and not pattern.is_refused("form_mm"):
-        expected = f"found {common:g}; it is a part of form_mm: expected at most {whole:g}"
+        expected = message(
+            "plan_form_part",
+            "found {common:g}; it is a part of form_mm: expected at most {whole:g}",
+            common=common,
+            whole=whole,
+        )
         pattern.tell(log.problem, "common_form_mm", expected)
 
 
@@ -73,15 +108,31 @@ def _check_obstacles(given, log):
     for one in given.repeated["obstacles"]:
         for key, count in needed.get(one["kind"], {}).items():
             if not one.is_refused(key) and len(one[key] or ()) != count:
-                one.tell(log.problem, key, f"expected {count} numbers, metres")
+                one.tell(
+                    log.problem,
+                    key,
+                    message("plan_numbers_metres", "expected {count} numbers, metres", count=count),
+                )
         for key in numbers.get(one["kind"], ()):
             if key not in one.filled:
-                one.tell(log.problem, key, "missing; expected a number, metres")
+                one.tell(
+                    log.problem,
+                    key,
+                    message("plan_number_metres", "missing; expected a number, metres"),
+                )
         if None not in (one["low_m"], one["high_m"]) and one["high_m"] <= one["low_m"]:
-            expected = f"found {one['high_m']:g}; expected more than low_m, {one['low_m']:g}"
+            expected = message(
+                "plan_high_low",
+                "found {high:g}; expected more than low_m, {low:g}",
+                high=one["high_m"],
+                low=one["low_m"],
+            )
             one.tell(log.problem, "high_m", expected)
         if any(a == b for a, b in zip(one["from_m"] or (), one["to_m"] or (), strict=False)):
-            expected = "in a plane with from_m; expected a corner that differs in x, y and z"
+            expected = message(
+                "plan_flat_box",
+                "in a plane with from_m; expected a corner that differs in x, y and z",
+            )
             one.tell(log.problem, "to_m", expected)
 
 
@@ -89,7 +140,13 @@ def _check_tapes(given, log):
     seen = set()
     for one in given.repeated["tapes"]:
         if one["name"] in seen:
-            one.tell(log.problem, "name", f"found {one['name']!r} again; expected it once")
+            one.tell(
+                log.problem,
+                "name",
+                message(
+                    "plan_tape_twice", "found {found!r} again; expected it once", found=one["name"]
+                ),
+            )
         seen.add(one["name"])
 
 
@@ -100,13 +157,21 @@ def _check_tables(given, log):
             continue
         for row, start, end in zip(table.rows, table.of("from"), table.of("to"), strict=True):
             if start is not None and start == end:
-                expected = f"found {end!r} on both sides; expected two points"
+                expected = message(
+                    "plan_tie_to_itself",
+                    "found {end!r} on both sides; expected two points",
+                    end=end,
+                )
                 log.problem(table.file, expected, row, "to")
     if given.control is not None:
         refuse_repeated(given.control, "point", log)
         for row, system in zip(given.control.rows, given.control.of("system"), strict=True):
             if system is not None:
-                expected = f"found {system!r}; expected blank: a plan is in the survey's own frame"
+                expected = message(
+                    "plan_own_frame",
+                    "found {system!r}; expected blank: a plan is in the survey's own frame",
+                    system=system,
+                )
                 log.problem(given.control.file, expected, row, "system")
 
 
@@ -115,19 +180,34 @@ def _check_accuracies(values, given, raw, log):
     has_common = values is None or not is_not_given(raw, "adjustment", "image_sd_um")
     for one in given.repeated["photo_rings"]:
         if "s_um" not in one.filled and not has_common:
-            expected = "missing; expected s_um, or adjustment.image_sd_um"
+            expected = message(
+                "plan_image_sd_missing", "missing; expected s_um, or adjustment.image_sd_um"
+            )
             one.tell(log.problem, "s_um", expected)
         elif one["s_um"] == 0:
-            expected = "found 0; an image point cannot be exact: expected micrometres above 0"
+            expected = message(
+                "plan_exact_image",
+                "found 0; an image point cannot be exact: expected micrometres above 0",
+            )
             one.tell(log.problem, "s_um", expected)
     keys = ("s_direction_arcsec", "s_zenith_arcsec", "s_mm")
     for one in given.repeated["setup_rings"]:
         if not one.filled & {*keys}:
-            expected = f"measures nothing; expected at least one of {', '.join(keys)}"
+            expected = message(
+                "plan_measures_nothing",
+                "measures nothing; expected at least one of {keys}",
+                keys=", ".join(keys),
+            )
             log.problem(PLAN_FILE, expected, one.row, one.name)
         elif not any(one[key] or one.is_refused(key) for key in keys):
-            expected = "an accuracy of zero for everything: expected standard deviations above 0"
+            expected = message(
+                "plan_ring_exact",
+                "an accuracy of zero for everything: expected standard deviations above 0",
+            )
             log.problem(PLAN_FILE, expected, one.row, one.name)
         if "s_mm" in one.filled and "s_zenith_arcsec" not in one.filled:
-            expected = "missing; slope distances (s_mm) need zenith angles beside them"
+            expected = message(
+                "plan_zenith_missing",
+                "missing; slope distances (s_mm) need zenith angles beside them",
+            )
             one.tell(log.problem, "s_zenith_arcsec", expected)

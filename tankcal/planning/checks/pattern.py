@@ -15,8 +15,16 @@ def check_targets(plan, pattern, log):
     heights = plan.targets.height_m
     top = plan.shell.high_m - plan.shell.low_m
     for height in np.unique(heights[(heights > top) | (heights < 0)]):
-        where = "above the shell" if height > top else "below the shell"
-        expected = f"a row of targets at {height:g} m is {where}; expected 0 to {top:g} m"
+        where = message("plan_below_shell", "below the shell")
+        if height > top:
+            where = message("plan_above_shell", "above the shell")
+        expected = message(
+            "plan_row_off_shell",
+            "a row of targets at {height:g} m is {where}; expected 0 to {top:g} m",
+            height=height,
+            where=where,
+            top=top,
+        )
         pattern.tell(log.problem, "heights_m", expected)
     _check_lines(plan, pattern, log)
     _check_rows(plan, pattern, log)
@@ -33,16 +41,20 @@ def _check_lines(plan, pattern, log):
     gap = np.diff(azimuth[order], append=azimuth[order[0]] + 2 * np.pi) * radius
     after = np.roll(order, -1)
     touching = [
-        f"{names[one]} and {names[other]}"
+        message("plan_two_lines", "{one} and {other}", one=names[one], other=names[other])
         for one, other, off in zip(order, after, gap, strict=True)
         if off < TOUCH_M and one != other
     ]
     clearance = 1000 * targets.clearance_m
     if touching:
-        expected = (
-            f"lines {_first(touching)} are nearer than {1000 * TOUCH_M:g} mm to one another "
-            f"where they keep {clearance:g} mm from welds; expected fewer generatrices, another "
-            "first_azimuth_deg or a smaller weld_clearance_mm"
+        expected = message(
+            "plan_lines_touch",
+            "lines {names} are nearer than {touch_mm:g} mm to one another where they "
+            "keep {clearance:g} mm from welds; expected fewer generatrices, another "
+            "first_azimuth_deg or a smaller weld_clearance_mm",
+            names=_first(touching),
+            touch_mm=1000 * TOUCH_M,
+            clearance=clearance,
         )
         pattern.tell(log.problem, "generatrices", expected)
     welds = np.array(targets.welds_rad)
@@ -50,10 +62,14 @@ def _check_lines(plan, pattern, log):
     close = (off < targets.clearance_m - ROUNDING_M).any(axis=1)
     if close.any():
         near = _first([names[i] for i in np.flatnonzero(close)])
-        expected = (
-            f"lines {near} are as near as {1000 * off.min():.0f} mm to a weld, moved away from "
-            f"another one; expected welds further apart, or a weld_clearance_mm below "
-            f"{clearance:g}"
+        expected = message(
+            "plan_lines_on_weld",
+            "lines {names} are as near as {off_mm:.0f} mm to a weld, moved away from "
+            "another one; expected welds further apart, or a weld_clearance_mm below "
+            "{clearance:g}",
+            names=near,
+            off_mm=1000 * off.min(),
+            clearance=clearance,
         )
         pattern.tell(log.problem, "weld_azimuths_deg", expected)
 
@@ -65,8 +81,18 @@ def _check_rows(plan, pattern, log):
     rows = np.sort(pattern["heights_m"])
     touching = np.flatnonzero(np.diff(rows) < TOUCH_M)
     if len(touching):
-        pairs = _first([f"{rows[i]:g} and {rows[i + 1]:g} m" for i in touching])
-        expected = f"rows at {pairs}; expected rows at least {1000 * TOUCH_M:g} mm apart"
+        pairs = _first(
+            [
+                message("plan_two_rows", "{low:g} and {high:g} m", low=rows[i], high=rows[i + 1])
+                for i in touching
+            ]
+        )
+        expected = message(
+            "plan_rows_touch",
+            "rows at {pairs}; expected rows at least {touch_mm:g} mm apart",
+            pairs=pairs,
+            touch_mm=1000 * TOUCH_M,
+        )
         pattern.tell(log.problem, "heights_m", expected)
     clearance = plan.targets.clearance_m
     off = np.abs(rows[:, None] - joints_m(plan)).min(axis=1)
@@ -85,5 +111,4 @@ def _check_rows(plan, pattern, log):
 
 def _first(names):
     """The first names in a row, and how many more there are."""
-    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-    return ", ".join(names[:SHOWN]) + more
+    return message("plan_first", "{names}", names=listed(names, SHOWN))

@@ -20,7 +20,10 @@ WITHOUT_FORM = (
 def check_plan(plan, given, raw, log):
     """Places that cannot be: stations in the wall, targets above the shell, ties through it."""
     if not plan.photos and not plan.setups:
-        log.problem(PLAN_FILE, "no station; expected [[photo_rings]] or [[setup_rings]]")
+        log.problem(
+            PLAN_FILE,
+            message("plan_no_station", "no station; expected [[photo_rings]] or [[setup_rings]]"),
+        )
         return
     pattern = given.single["pattern"]
     check_targets(plan, pattern, log)
@@ -38,17 +41,34 @@ def _check_fixed_photo(plan, raw, log):
     name, names = settings.fixed_photo, [one.name for one in plan.photos]
     if settings.datum != "fixed_photo":
         if name is not None:
-            expected = f"given with datum = {settings.datum}; expected only with fixed_photo"
+            expected = message(
+                "plan_fixed_photo_unused",
+                "given with datum = {datum}; expected only with fixed_photo",
+                datum=settings.datum,
+            )
             tell(log.problem, raw, "adjustment", "fixed_photo", expected)
     elif not names:
-        expected = "found 'fixed_photo' in a plan without photographs; expected another datum"
+        expected = message(
+            "plan_fixed_without_photos",
+            "found 'fixed_photo' in a plan without photographs; expected another datum",
+        )
         tell(log.problem, raw, "adjustment", "datum", expected)
     elif is_not_given(raw, "adjustment", "fixed_photo"):
-        expected = f"missing; expected a photograph of the plan, such as {names[0]}"
+        expected = message(
+            "plan_fixed_photo_missing",
+            "missing; expected a photograph of the plan, such as {photo}",
+            photo=names[0],
+        )
         tell(log.problem, raw, "adjustment", "fixed_photo", expected)
     elif name not in names:
-        expected = f"found {name!r}; expected a photograph of the plan, such as {names[0]}"
-        tell(log.problem, raw, "adjustment", "fixed_photo", expected + nearest(name, names))
+        expected = message(
+            "plan_fixed_photo_unknown",
+            "found {found!r}; expected a photograph of the plan, such as {photo}{hint}",
+            found=name,
+            photo=names[0],
+            hint=nearest(name, names),
+        )
+        tell(log.problem, raw, "adjustment", "fixed_photo", expected)
 
 
 def refuse_misplaced(plan, name):
@@ -70,7 +90,14 @@ def _check_stations(plan, stands, log):
         if why and one.place not in told:
             told.add(one.place)
             file, row, name = one.place
-            log.problem(file, f"station {_station(one)} {why}", row, name)
+            log.problem(
+                file,
+                message(
+                    "plan_misplaced", "station {station} {why}", station=_station(one), why=why
+                ),
+                row,
+                name,
+            )
 
 
 def _station(one):
@@ -83,28 +110,45 @@ def _misplaced(plan, xyz):
     away = np.hypot(*(xyz[:2] - shell.axis_m))
     level = shell.low_m <= xyz[2] <= shell.high_m
     if abs(away - shell.radius_m) < NEAR_M and level:
-        return (
-            f"stands inside the wall: {away:.3f} m from the axis, the wall is at "
-            f"{shell.radius_m:.3f} m; expected it at least {NEAR_M:g} m off"
+        return message(
+            "plan_in_the_wall",
+            "stands inside the wall: {away:.3f} m from the axis, the wall is at "
+            "{radius:.3f} m; expected it at least {near:g} m off",
+            away=away,
+            radius=shell.radius_m,
+            near=NEAR_M,
         )
     if shell.outside and away < shell.radius_m and level:
-        return (
-            f"stands inside the tank, {away:.3f} m from its axis (radius {shell.radius_m:.3f} m), "
-            "but survey.side is outside; expected it outside the wall"
+        return message(
+            "plan_in_the_tank",
+            "stands inside the tank, {away:.3f} m from its axis (radius {radius:.3f} "
+            "m), but survey.side is outside; expected it outside the wall",
+            away=away,
+            radius=shell.radius_m,
         )
     if shell.outside and away < shell.radius_m and xyz[2] < shell.low_m:
-        return (
-            f"stands under the floor of the tank, {away:.3f} m from its axis, z = {xyz[2]:.3f} m; "
-            "expected it outside the wall"
+        return message(
+            "plan_under_the_floor",
+            "stands under the floor of the tank, {away:.3f} m from its axis, z = "
+            "{z:.3f} m; expected it outside the wall",
+            away=away,
+            z=xyz[2],
         )
     if not shell.outside and (away > shell.radius_m or not level):
-        return (
-            f"stands outside the tank, {away:.3f} m from its axis (radius {shell.radius_m:.3f} m), "
-            f"z = {xyz[2]:.3f} m, but survey.side is inside; expected it within the shell"
+        return message(
+            "plan_outside_the_tank",
+            "stands outside the tank, {away:.3f} m from its axis (radius "
+            "{radius:.3f} m), z = {z:.3f} m, but survey.side is inside; expected it "
+            "within the shell",
+            away=away,
+            radius=shell.radius_m,
+            z=xyz[2],
         )
     for obstacle in plan.obstacles:
         if _within(obstacle, xyz):
-            return f"stands in the obstacle {obstacle.name}"
+            return message(
+                "plan_in_an_obstacle", "stands in the obstacle {obstacle}", obstacle=obstacle.name
+            )
     return ""
 
 

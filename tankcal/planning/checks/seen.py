@@ -1,6 +1,7 @@
 """Photographs and set-ups that see too little."""
 
 from tankcal.job.tables import Log
+from tankcal.messages import message
 
 FEWEST = 3  # points that a photograph has to see
 
@@ -15,18 +16,32 @@ def refuse_blind(plan, seen):
         count, targets = (int(seen.on_photo[k, :n].sum()) for n in (None, len(plan.targets.names)))
         if count < FEWEST or not targets:
             found = _seen(count, targets)
-            blind.setdefault(photo.place, []).append((f"photograph {photo.name}", found))
+            blind.setdefault(photo.place, []).append(
+                (message("plan_a_photograph", "photograph {photo}", photo=photo.name), found)
+            )
     for k, setup in enumerate(plan.setups):
         if not seen.on_setup[k].any():
-            blind.setdefault(setup.place, []).append((f"set-up {setup.name}", "nothing"))
+            blind.setdefault(setup.place, []).append(
+                (message("plan_a_setup", "set-up {setup}", setup=setup.name), "nothing")
+            )
     for (file, row, name), ones in blind.items():
         who, found = ones[0]
-        more = f", and {len(ones) - 1} more of this ring" if len(ones) > 1 else ""
+        more = (
+            message("plan_more_of_ring", ", and {more} more of this ring", more=len(ones) - 1)
+            if len(ones) > 1
+            else ""
+        )
         log.problem(
             file,
-            f"{who} sees {found}{more}: targets are outside its frame, behind it, seen at too flat "
-            "an angle (limits.incidence_deg) or hidden; expected it to see 3 points or more,"
-            " targets among them",
+            message(
+                "plan_sees_too_little",
+                "{who} sees {found}{more}: targets are outside its frame, behind it, seen at too "
+                "flat an angle (limits.incidence_deg) or hidden; expected it to see 3 points or "
+                "more, targets among them",
+                who=who,
+                found=found,
+                more=more,
+            ),
             row,
             name,
         )
@@ -35,5 +50,13 @@ def refuse_blind(plan, seen):
 
 def _seen(count, targets):
     if not count:
-        return "nothing"
-    return f"{count} points only" if targets else f"no target (other points: {count})"
+        return _nothing()
+    return (
+        message("plan_points_only", "{count} points only", count=count)
+        if targets
+        else message("plan_no_target", "no target (other points: {count})", count=count)
+    )
+
+
+def _nothing():
+    return message("plan_nothing", "nothing")

@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.job.tables import nearest
+from tankcal.messages import joined, message
 from tankcal.planning.model import Pillar
 from tankcal.planning.rings import plate_m
 from tankcal.planning.visibility import GRAZE_M, cut
@@ -19,8 +20,13 @@ def check_tied(plan, given, log):
         for end in ("from", "to") if table is not None else ():
             for row, name in zip(table.rows, table.of(end), strict=True):
                 if name not in points:
-                    expected = f"found {name!r}; expected a target, or a point of control.csv"
-                    log.problem(table.file, expected + nearest(name, points), row, end)
+                    expected = message(
+                        "plan_no_such_end",
+                        "found {found!r}; expected a target, or a point of control.csv{hint}",
+                        found=name,
+                        hint=nearest(name, points),
+                    )
+                    log.problem(table.file, expected, row, end)
     _check_distances(plan, given, log)
     _check_plumb_lines(plan, given, log)
     if given.control is not None:
@@ -54,12 +60,21 @@ def _through(plan, ends, xyz):
         radius = shell.radius_m + min(plates) - plates[0] - THINNER_M
         tank = Pillar(shell.axis_m, radius, shell.low_m, shell.high_m, "tank")
         if cut(tank, xyz[0], xyz[1:])[0]:
-            return f"the line from {one} to {other} runs through the tank; expected it outside"
+            return message(
+                "plan_line_through_tank",
+                "the line from {one} to {other} runs through the tank; expected it outside",
+                one=one,
+                other=other,
+            )
         return ""
     away = np.hypot(*(xyz[:, :2] - shell.axis_m).T)
     beyond = [name for name, off in zip(ends, away, strict=True) if off > shell.radius_m + GRAZE_M]
     if beyond:
-        return f"{' and '.join(beyond)} beyond the wall of the tank; expected both ends within it"
+        return message(
+            "plan_tape_beyond_wall",
+            "{ends} beyond the wall of the tank; expected both ends within it",
+            ends=joined(beyond),
+        )
     return ""
 
 
@@ -67,9 +82,14 @@ def _check_plumb_lines(plan, given, log):
     for row, (one, other), xyz in _rows(plan, given.tables["plumb_lines"]):
         off = np.hypot(*(xyz[1, :2] - xyz[0, :2]))
         if off > OUT_OF_PLUMB_M:
-            expected = (
-                f"{one} and {other} are {off:.3f} m apart in plan; a plumb line hangs: expected at "
-                f"most {OUT_OF_PLUMB_M:g} m"
+            expected = message(
+                "plan_out_of_plumb",
+                "{one} and {other} are {off:.3f} m apart in plan; a plumb line hangs: "
+                "expected at most {most:g} m",
+                one=one,
+                other=other,
+                off=off,
+                most=OUT_OF_PLUMB_M,
             )
             log.problem("plumb_lines.csv", expected, row, "to")
 
@@ -85,12 +105,21 @@ def _check_control(plan, control, log):
             off = np.nan_to_num(xyz - own[name])
             if np.linalg.norm(off) > OFF_M:
                 where = ", ".join(f"{value:.3f}" for value in own[name])
-                expected = (
-                    f"{name} is given {np.linalg.norm(off):.3f} m from its place in the plan "
-                    f"({where}); expected it within {OFF_M:g} m, or blank"
+                expected = message(
+                    "plan_control_off",
+                    "{point} is given {off:.3f} m from its place in the plan ({where}); "
+                    "expected it within {most:g} m, or blank",
+                    point=name,
+                    off=np.linalg.norm(off),
+                    where=where,
+                    most=OFF_M,
                 )
                 column = f"{'xyz'[np.argmax(np.abs(off))]}_m"
                 log.problem(control.file, expected, row, column)
         elif name in acting and np.isnan(xyz).any():
-            expected = f"{name} is no target of the plan; expected all its coordinates"
+            expected = message(
+                "plan_control_no_target",
+                "{point} is no target of the plan; expected all its coordinates",
+                point=name,
+            )
             log.problem(control.file, expected, row, "point")
