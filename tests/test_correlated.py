@@ -8,9 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import chdtri
 
 from tankcal.network import Survey, adjust
+from tankcal.network.cleaning import CRITICAL
 from tankcal.network.reliability import noncentrality
+from tankcal.network.separability import alternatives
 from tankcal.observations import Block, ControlCoordinates, Distances, HeightDifferences, Vectors
 
 PLACES = np.array([[0, 0, 0], [900, 100, 20], [400, 800, -10], [1300, 900, 5.0]])
@@ -164,3 +167,89 @@ def test_without_correlations_nothing_changes(network):
         np.testing.assert_allclose(
             values_of(one, name), values_of(other, name), rtol=1e-5, atol=1e-9
         )
+
+
+ROWS = {
+    **{(0, i): range(3 * i, 3 * i + 3) for i in range(6)},
+    **{(1, i): range(18 + i, 19 + i) for i in range(6)},
+    **{(2, i): range(24 + i, 25 + i) for i in range(2)},
+    (3, 0): range(26, 27),
+}
+
+
+def test_a_vector_that_is_alone_in_its_block_is_tested_when_set_aside(network):
+    """Nothing of its block takes part; what the others say of it is told all the same."""
+    survey, covariances = network
+    q = covariances[0].copy()
+    q[12:15, :12] = q[12:15, 15:] = q[:12, 12:15] = q[15:, 12:15] = 0.0
+    rest = np.r_[:12, 15:18]
+    first = survey.correlated[0]
+    blocks = (
+        Block(*(part[rest] for part in (first.source, first.row, first.component)),
+              q[np.ix_(rest, rest)]),
+        Block(*(part[12:15] for part in (first.source, first.row, first.component)),
+              q[12:15, 12:15]),
+        *survey.correlated[1:],
+    )  # fmt: skip
+    use = np.ones(6)
+    use[4] = 0.0
+    thinner = (survey.observations[0].using(use), *survey.observations[1:])
+    adjusted = adjust(replace(survey, observations=thinner, correlated=blocks), tolerance=1e-6)
+    bias = np.zeros((27, 3))
+    bias[12:15] = np.eye(3)
+    _, cofactors, _, _, _, biases = dense(survey, (q, *covariances[1:]), bias)
+    table = next(one for one in adjusted.residuals if one.source == 0 and 4 in one.rows)
+    sds = np.sqrt(np.diag(cofactors)[12:])
+    np.testing.assert_allclose(table.w[0], -biases / sds, rtol=1e-5)
+    np.testing.assert_allclose(table.residual[0], -biases, rtol=1e-5)
+
+
+@pytest.mark.parametrize("single", [False, True], ids=["all correlated", "levels are not"])
+@pytest.mark.parametrize(("wrong", "size"), [((0, 4), 0.04), ((1, 2), 0.08), ((2, 1), 0.02)])
+def test_what_may_be_wrong_instead(network, single, wrong, size):
+    """Second method: of an observation and of another one biases are estimated, in all pairs.
+
+    The other one may be wrong instead where its own biases are significant, and those of the first
+    one are not beside them. Counts of values are differences of ranks.
+    """
+    survey, covariances = network
+    covariances = [one.copy() for one in covariances]
+    blocks = survey.correlated
+    if single:
+        covariances[2], blocks = np.diag(np.diag(covariances[2])), blocks[:2]
+    observations = list(survey.observations)
+    value = observations[wrong[0]].value.copy()
+    value[wrong[1]] += size
+    observations[wrong[0]] = replace(observations[wrong[0]], value=value)
+    survey = replace(survey, observations=tuple(observations), correlated=blocks)
+    _, _, v, p, a, _ = dense(survey, covariances)
+    root = np.linalg.cholesky(p).T
+
+    def chi2(*biases):
+        both = np.hstack([a, *(np.eye(27)[:, ROWS[one]] for one in biases)])
+        rest = v - both @ np.linalg.lstsq(root @ both, root @ v, rcond=1e-9)[0]
+        return rest @ p @ rest, np.linalg.matrix_rank(root @ both, tol=1e-6)
+
+    def significant(one, *beside):
+        (before, less), (after, more) = chi2(*beside), chi2(*beside, one)
+        limit = 0.0 if more == less else CRITICAL**2 if more == less + 1 else chdtri(
+            more - less, 0.001)  # fmt: skip
+        return before - after > limit + 1e-6
+
+    named = others = 0
+    for source, row in ROWS:
+        use = np.ones(len(observations[source]))
+        use[row] = 0.0
+        thinner = list(observations)
+        thinner[source] = thinner[source].using(use)
+        adjusted = adjust(replace(survey, observations=tuple(thinner)), tolerance=1e-6)
+        found = set(alternatives(adjusted, source, row))
+        expected = {
+            one
+            for one in ROWS
+            if one != (source, row) and significant(one) and not significant((source, row), one)
+        }
+        assert found == expected, (source, row)
+        named, others = named + len(found), others + len(ROWS) - 1 - len(found)
+    assert named
+    assert others

@@ -52,7 +52,10 @@ class Problem:
     interior_of            (photos, 13) place of each photo's parameters in State.interior
     exact                  tuple of Held: observations that hold exactly
     points                 names
-    blocks                 for each group of correlated observations, which come last, its Members
+    ordinary               number of groups before those of correlated observations; their tables of
+                           residuals come first as well
+    blocks                 pairs (number of a group of correlated observations, Members); these come
+                           last; None for the number where all of a block is set aside
     """
 
     model: Model
@@ -68,6 +71,7 @@ class Problem:
     exact: tuple = ()
     points: tuple = ()
     photos: tuple = ()
+    ordinary: int = 0
     blocks: tuple = ()
 
     def name_of_point(self, point):
@@ -102,11 +106,13 @@ def assemble(survey):
         sources.append("known beforehand")
         rows_of.append(np.arange(len(one)))
     state = _state(survey, centre, values)
-    blocks = tuple(correlated_groups(survey, used, centre, state))
-    for one, _ in blocks:  # they come last: tables of residuals are those of the groups before
-        groups.append(one)
-        sources.append(CORRELATED)
-        rows_of.append(np.zeros(1, dtype=int))
+    ordinary, blocks = len(groups), []
+    for one, members in correlated_groups(survey, used, centre, state):
+        blocks.append((None if one is None else len(groups), members))
+        if one is not None:
+            groups.append(one)
+            sources.append(CORRELATED)
+            rows_of.append(np.zeros(1, dtype=int))
     _refuse_coincident(survey, groups, state)
     model = Model(
         reduced=reduced,
@@ -122,7 +128,7 @@ def assemble(survey):
         model, state, layout, tuple(groups), tuple(sources), tuple(rows_of),
         centre, set_aside, eliminated, table, exact, survey.points,
         () if survey.photos is None else survey.photos.names,
-        tuple(members for _, members in blocks),
+        ordinary, tuple(blocks),
     )  # fmt: skip
 
 

@@ -58,9 +58,11 @@ def in_blocks(survey, number):
 
 
 def correlated_groups(survey, used, centre, state):
-    """Pairs (Correlated, Members) for the blocks of a survey that something of is adjusted.
+    """Pairs (Correlated, Members) for the blocks of a survey.
 
     used  (points,) points that take part        state  State, for its sizes
+
+    None for the Correlated of a block that is set aside as a whole: only its residuals matter.
     """
     all_of = _every_unknown(state)
     for block in survey.correlated:
@@ -82,11 +84,13 @@ def correlated_groups(survey, used, centre, state):
         whole = _made(*fields, covariance)
         members = Members(source, row, component, share, covariance, whole)
         acting = share > 0
-        if acting.any():
-            root = np.sqrt(share[acting])
-            thin = covariance[np.ix_(acting, acting)] / np.outer(root, root)
-            parts = (part[acting] for part in (source, row, component))
-            yield _made(survey, centre, all_of, *parts, thin), members
+        if not acting.any():
+            yield None, members
+            continue
+        root = np.sqrt(share[acting])
+        thin = covariance[np.ix_(acting, acting)] / np.outer(root, root)
+        parts = (part[acting] for part in (source, row, component))
+        yield _made(survey, centre, all_of, *parts, thin), members
 
 
 def _made(survey, centre, all_of, source, row, component, covariance):
@@ -137,20 +141,77 @@ class ValueTests:
     pull: np.ndarray
 
 
+@dataclass(frozen=True)
+class Acting:
+    """The values of a block that take part in the adjustment, k of all; L L' their covariance.
+
+    own    (k,) places in the block            t  (k,) L^-1 v
+    back   (k, k) L^-1                         a  (k, K) L^-1 A, and the column of each unknown (K,)
+    moves  (unknowns + 1, k) change of the unknowns by errors of one of t; a row of zeros at the end
+    covariance  (k, k)
+    """
+
+    own: np.ndarray
+    t: np.ndarray
+    back: np.ndarray
+    a: np.ndarray
+    columns: np.ndarray
+    moves: np.ndarray
+    covariance: np.ndarray
+
+    @property
+    def spread(self):
+        """(k, k) R: covariance of the residuals t."""
+        return np.eye(len(self.t)) - self.a @ self.moves[self.columns]
+
+
+def acting(problem, solution, number, members, v):
+    """The Acting of a block; number of its group or None, v (all,) its residuals."""
+    own = np.flatnonzero(members.share > 0)
+    if number is None:
+        none = np.zeros((0, 0))
+        columns = np.zeros(0, dtype=int)
+        return Acting(
+            own, np.zeros(0), none, none, columns, np.zeros((problem.model.unknowns + 1, 0)), none
+        )
+    group, a = problem.observations[number], solution.jacobians[number][0]
+    columns = problem.model.groups[number].columns
+    back = group.whitened(np.eye(len(own)))
+    moves = _moves(solution, columns, a)
+    return Acting(own, back @ v[own], back, a, columns[0], moves, group.covariance)
+
+
+def _moves(solution, columns, jac):
+    """Change (unknowns + 1, m) of the unknowns by an error of one of rows jac (m, K)."""
+    found = np.hstack([part for _, part in responses(solution, columns, jac[None])])
+    return np.vstack([found, np.zeros((1, found.shape[1]))])
+
+
+def expected(members, part, mine, v, jac):
+    """What the others and the correlation with them let expect of values that are set aside.
+
+    mine  (q,) places in the block      v, jac  (all,), (all, K) of the block's values
+
+    Returns the difference off (q,) to that and its derivatives (q, K), its covariance (q, q) as far
+    as the unknowns do not enter it, and the shares (q, k) of the others.
+    """
+    q, own = members.covariance, part.own
+    scale = np.sqrt(members.share[own])
+    between = q[np.ix_(own, mine)] / scale[:, None]
+    share = np.linalg.solve(part.covariance, between).T if len(own) else between.T
+    off, away = v[mine] - share @ v[own], jac[mine] - share @ jac[own]
+    return off, away, q[np.ix_(mine, mine)] - share @ between, share
+
+
 def tested(problem, solution, number, members, delta0):
     """The ValueTests of the values of a block; `whole` for each value that of its observation.
 
-    number  of its group in the problem
+    number  of its group in the problem; None: all of it is set aside
     """
-    columns = problem.model.groups[number].columns
     v, jac = members.whole.linearised(solution.state)
     whole_columns = members.whole.columns(problem.layout)
-    q, acting = members.covariance, members.share > 0
-    group = problem.observations[number]
-    t, a = group.whitened(v[acting]), solution.jacobians[number][0]
-    moves = np.hstack([part for _, part in responses(solution, columns, a[None])])
-    spread = np.eye(len(a)) - a @ np.vstack([moves, np.zeros((1, len(a)))])[columns[0]]
-    back = group.whitened(np.eye(len(t)))  # L^-1: column i is c of value i
+    part = acting(problem, solution, number, members, v)
+    q, own, back, spread = members.covariance, part.own, part.back, part.spread
     points = np.unique(problem.layout.points)
     points = points[points >= 0]
     k = len(v)
@@ -158,29 +219,23 @@ def tested(problem, solution, number, members, delta0):
     redundancy, change, whole = np.ones(k), np.zeros(k), np.zeros(k)
     inner = back.T @ spread @ back
     size = np.sum(back**2, axis=0)
-    free, right = np.diag(inner), back.T @ t
+    free, right = np.diag(inner), back.T @ part.t
     sound = free > UNCONTROLLED * size
     root = np.sqrt(np.where(sound, free, 1.0))
-    own = np.flatnonzero(acting)
     w[own] = np.where(sound, right / root, 0.0) / np.sqrt(members.share[own])
     mdb[own] = np.where(sound, delta0 / root, np.inf)
     external[own] = np.where(sound, delta0 * np.sqrt(np.maximum(size - free, 0.0)) / root, np.inf)
-    redundancy[own] = np.diag(np.linalg.cholesky(group.covariance) @ spread @ back)
-    change[own] = np.abs(moves[points] @ back).max(axis=0, initial=0.0)
-    for mine in _observations(members):
-        if acting[mine[0]]:
+    if len(own):
+        redundancy[own] = np.diag(np.linalg.cholesky(part.covariance) @ spread @ back)
+    change[own] = np.abs(part.moves[points] @ back).max(axis=0, initial=0.0)
+    for mine in observations_of(members):
+        if members.share[mine[0]] > 0:
             place = np.searchsorted(own, mine)
             test = _together(right[place], inner[np.ix_(place, place)], size[place])
             whole[mine] = test / np.sqrt(members.share[mine[0]])
-        else:  # what the others and the correlation with them let expect
-            scale = np.sqrt(members.share[own])
-            share = np.linalg.solve(group.covariance, q[np.ix_(own, mine)] / scale[:, None]).T
-            off = v[mine] - share @ v[own]
-            away = jac[mine] - share @ jac[own]
-            unexplained = q[np.ix_(mine, mine)] - share @ (q[np.ix_(own, mine)] / scale[:, None])
-            follow = np.hstack([part for _, part in responses(solution, whole_columns, away[None])])
-            follow = np.vstack([follow, np.zeros((1, len(mine)))])[whole_columns[0]]
-            total = unexplained + away @ follow
+        else:
+            off, away, unexplained, _ = expected(members, part, mine, v, jac)
+            total = unexplained + away @ _moves(solution, whole_columns, away)[whole_columns[0]]
             sds = np.sqrt(np.diag(total))
             w[mine], mdb[mine] = off / sds, delta0 * sds
             inverse = np.linalg.inv(total)
@@ -191,7 +246,7 @@ def tested(problem, solution, number, members, delta0):
     return ValueTests(v, sd, redundancy, w, mdb, external, change * sd, whole, pull)
 
 
-def _observations(members):
+def observations_of(members):
     """Places of the values of each observation."""
     key = np.column_stack([members.source, members.row])
     _, which = np.unique(key, axis=0, return_inverse=True)

@@ -114,11 +114,10 @@ def tau_limit(alpha, dof):
 def residuals_of(problem, solution, alpha=0.001, power=0.80):
     """A tuple of Residuals, one for each group of a solved Problem, then what holds exactly."""
     delta0 = noncentrality(alpha, power)
-    ordinary = len(problem.sources) - len(problem.blocks)
-    tables = [_table(problem, solution, number, delta0) for number in range(ordinary)]
+    tables = [_table(problem, solution, number, delta0) for number in range(problem.ordinary)]
     blocks = [
         table
-        for number, members in enumerate(problem.blocks, start=ordinary)
+        for number, members in problem.blocks
         for table in _of_block(problem, solution, number, members, delta0)
     ]
     return (*tables, *blocks, *_of_exact(problem, solution, delta0))
