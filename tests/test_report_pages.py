@@ -155,6 +155,25 @@ def test_the_sketch_stands_on_the_first_page(tmp_path, parties, facts):
     assert filled(first) > 0.7
 
 
+def test_a_first_page_without_facts_has_its_figure(printed):
+    made = (blocks.masthead("Papers"), blocks.figure(SQUARE, "the sketch", "a square", width=0.35))
+    (page,) = printed(*made)
+    assert "the sketch" in page
+
+
+def test_facts_keep_their_distance_from_what_is_above(tmp_path):
+    """A list too long for one block stands no closer below a paragraph than a short one."""
+    found = []
+    for count in (5, 20):
+        facts = blocks.key_values([(f"row {n}", "v") for n in range(count)])
+        path = tmp_path / f"{count}.pdf"
+        made = (blocks.document(title="T"), blocks.paragraph("above"), facts)
+        path.write_bytes(pdf([block.data for block in made]))
+        above, first = pages_of(path)[0][:2]
+        found.append(first.top - above.bottom)
+    assert found[1] == pytest.approx(found[0], abs=0.5)
+
+
 def test_a_label_does_not_touch_its_value(printed):
     fact = blocks.key_values([("i " * 60, "value")])  # fills its column
     (page,) = printed(fact, options=("-bbox",))
