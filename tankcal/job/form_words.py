@@ -47,6 +47,7 @@ FORM_WORDS = {
         "heated": ("aquecido",),
         "refrigerated": ("refrigerado",),
         "up": ("sobe",),
+        "middle": ("meio", "linha média"),
         "down": ("desce",),
     },
     "es": {
@@ -89,6 +90,7 @@ FORM_WORDS = {
         "heated": ("calentado",),
         "refrigerated": ("refrigerado",),
         "up": ("sube",),
+        "middle": ("mitad", "línea media"),
         "down": ("baja",),
     },
 }
