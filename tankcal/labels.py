@@ -84,5 +84,6 @@ def _free(label, place, taken, frame, size):
 
 def _overlaps(box, others):
     """(n,) whether a box [x0, y0, x1, y1] covers part of each of the others."""
-    low, high = np.maximum(box[:2], others[:, :2]), np.minimum(box[2:], others[:, 2:])
-    return (low < high).all(axis=1)
+    x0, y0, x1, y1 = others.T
+    beside = (x0 < box[2]) & (box[0] < x1)
+    return beside & (y0 < box[3]) & (box[1] < y1)

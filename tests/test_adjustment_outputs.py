@@ -1,6 +1,7 @@
 """What a user sees of an adjusted survey: record, CSV files, workbook, papers, command line."""
 
 import csv
+import gc
 import json
 import shutil
 import subprocess
@@ -23,7 +24,7 @@ from tankcal.chain import adjust_job
 from tankcal.cli import main
 from tankcal.job.covariance import read_covariance
 from tankcal.outputs.csv_files import write_csv
-from tankcal.plain_data import rows_of
+from tankcal.plain_data import rows_of, without_collection
 from tankcal.record.adjusted import _edge_effect, adjusted_points_of
 from tankcal.record.adjustment import _group
 from tankcal.report import attachments
@@ -501,6 +502,16 @@ def test_long_tables_are_cut_and_say_so(only):
     table, note = readings.table(paper, "removed_readings", rows)
     assert len(table.data["rows"]) == 50
     assert note.data["text"].startswith(f"50 of {len(rows)} rows")
+
+
+def test_writing_lets_the_garbage_collector_rest_and_wakes_it():
+    """With it the record of 180 000 readings took twice as long to make."""
+    with without_collection():
+        assert not gc.isenabled()
+    assert gc.isenabled()
+    with pytest.raises(ZeroDivisionError), without_collection():
+        print(1 / 0)
+    assert gc.isenabled()
 
 
 def test_a_plan_asks_for_its_extent_twice_however_many_points_it_has(only, monkeypatch):

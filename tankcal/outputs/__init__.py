@@ -13,6 +13,7 @@ from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.languages import LANGUAGES
 from tankcal.messages import message
 from tankcal.outputs import tables
+from tankcal.plain_data import without_collection
 
 if TYPE_CHECKING:
     from tankcal.chain import Result
@@ -113,8 +114,9 @@ def _write(prepare, directory, progress, language=None, letterhead=None, papers=
     tell = progress or (lambda text, done, total: None)
     with folders.replaced(directory) as temporary:
         tell(message("writing_record", "writing the record and the tables"), 0, 1)
-        record = prepare(temporary)
-        tables.write_tables(record, temporary)
+        with without_collection():
+            record = prepare(temporary)
+            tables.write_tables(record, temporary)
         if papers:
             _write_papers(record, temporary, tell, language, letterhead)
     return [Path(directory) / name for name in FILES if (Path(directory) / name).exists()]
@@ -127,7 +129,8 @@ def _write_papers(record, folder, tell, language, letterhead):
     tell(message("writing_workbook", "writing the workbook"), 0, 1)
     of_tank, of_survey = WORKBOOKS
     name = of_tank if record["capacity"] else of_survey
-    workbook.write(record, folder / name, language)
+    with without_collection():
+        workbook.write(record, folder / name, language)
     report.build(
         folder / RECORD,
         folder,

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.plain_data import without_collection
 from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
 
 __all__ = [
@@ -40,7 +41,8 @@ def load(path):
     """
     name = Path(path).name
     try:
-        record = json.loads(Path(path).read_text(encoding="utf-8"))
+        with without_collection():
+            record = json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         expected = message(
             "record_unreadable", "cannot be read as a record: {error}", error=str(error)

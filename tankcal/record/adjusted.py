@@ -8,6 +8,7 @@ from tankcal.camera_analysis.edges import Frame, own_shift
 from tankcal.camera_analysis.interiors import interiors_of
 from tankcal.network import correlations
 from tankcal.network.quality import ellipsoid_factor, ellipsoids, precision
+from tankcal.plain_data import plain, rows_of
 from tankcal.rotations import angle_derivatives, angles_of
 
 ELLIPSE = 0.95  # probability of the ellipses and ellipsoids that are drawn and listed
@@ -23,23 +24,20 @@ def adjusted_points_of(adjustment, measurements=None):
     azimuth, elevation = _direction(directions[:, :, 0])
     plan, plan_azimuth = _ellipses(covariance[:, :2, :2], dof)
     rays = _rays(adjustment)
-    kinds = _kinds(adjustment, measurements)
-    return [
-        {
-            "point": name,
-            "kind": kinds[i],
-            "rays": rays.get(name, 0),
-            "fixed": adjustment.fixed[i],
-            "spherical_sd_m": sd[i].mean(),
-            "quadratic_sd_m": np.sqrt(np.sum(sd[i] ** 2)),
-            "ellipsoid_m": axes[i],
-            "ellipsoid_azimuth_deg": azimuth[i],
-            "ellipsoid_elevation_deg": elevation[i],
-            "ellipse_m": plan[i],
-            "ellipse_azimuth_deg": plan_azimuth[i],
-        }
-        for i, name in enumerate(adjustment.names)
-    ]
+    columns = {
+        "point": adjustment.names,
+        "kind": _kinds(adjustment, measurements),
+        "rays": [rays.get(name, 0) for name in adjustment.names],
+        "fixed": adjustment.fixed,
+        "spherical_sd_m": sd.mean(axis=1),
+        "quadratic_sd_m": np.sqrt(np.sum(sd**2, axis=1)),
+        "ellipsoid_m": axes,
+        "ellipsoid_azimuth_deg": azimuth,
+        "ellipsoid_elevation_deg": elevation,
+        "ellipse_m": plan,
+        "ellipse_azimuth_deg": plan_azimuth,
+    }
+    return rows_of(plain(columns))
 
 
 def _direction(vectors):

@@ -67,7 +67,10 @@ def points_of_adjustment(adjustment):
             "used": False,
         }
         for name, xyz, covariance in zip(
-            adjustment.names, adjustment.xyz_m, adjustment.covariance_m2, strict=True
+            adjustment.names,
+            np.asarray(adjustment.xyz_m).tolist(),
+            np.asarray(adjustment.covariance_m2).tolist(),
+            strict=True,
         )
     ]
 

@@ -9,7 +9,7 @@ The cells of the templates use it; nothing here computes a number.
 from functools import cached_property
 from pathlib import Path
 
-from tankcal.plain_data import rows_of
+from tankcal.plain_data import rows_of, without_collection
 from tankcal.record import load
 from tankcal.report import attachments, blocks
 from tankcal.report.letterhead import read_saved
@@ -57,7 +57,8 @@ class Paper(PlainPaper):
     @cached_property
     def readings(self):
         """Every reading of the adjustment, a dict each."""
-        return rows_of(self.record["adjustment"]["residuals"])
+        with without_collection():
+            return rows_of(self.record["adjustment"]["residuals"])
 
     # ---- blocks
 

@@ -15,13 +15,13 @@ _HEAD_ROW = 3
 
 def observations_sheet(book, record):
     """One row a reading, to be filtered; those set aside stand back and say so."""
-    readings = rows_of(record["adjustment"]["residuals"])
-    rows = readings
+    readings = record["adjustment"]["residuals"]
+    count = len(readings["w"])
     subtitle = book.word("texts.residuals_subtitle")
-    if len(rows) > MOST_ROWS:
-        worst = sorted(range(len(rows)), key=lambda i: _rank(rows[i]))[:MOST_ROWS]
-        rows = [readings[i] for i in sorted(worst)]
-        subtitle = book.word("texts.worst_subtitle", shown=len(rows), all=len(readings))
+    if count > MOST_ROWS:
+        subtitle = book.word("texts.worst_subtitle", shown=MOST_ROWS, all=count)
+        readings = _worst(readings)
+    rows = rows_of(readings)
     sheet = book.sheet("observations", subtitle, landscape=True)
     columns = _columns(book, rows)
     set_widths(book, sheet, columns)
@@ -30,9 +30,14 @@ def observations_sheet(book, record):
     book.freeze(sheet, _HEAD_ROW, 1)
 
 
-def _rank(row):
-    """Set aside first, then by test quantity, the largest first."""
-    return (not row["removed"], -abs(row["w"] or 0.0))
+def _worst(readings):
+    """The worst readings, in their order: those set aside first, then by test quantity."""
+    rank = [
+        (not removed, -abs(w or 0.0))
+        for removed, w in zip(readings["removed"], readings["w"], strict=True)
+    ]
+    kept = sorted(sorted(range(len(rank)), key=rank.__getitem__)[:MOST_ROWS])
+    return {key: [values[i] for i in kept] for key, values in readings.items()}
 
 
 def _use(row):

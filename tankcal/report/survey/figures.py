@@ -229,7 +229,11 @@ def shown_photos(paper):
 
 def vectors_factor(paper):
     """How many times larger than the image its residuals are drawn."""
-    size = [np.abs(v).max(initial=0.0) for _, v, _ in _image_residuals(paper).values()]
+    return _vectors_factor(paper, _image_residuals(paper))
+
+
+def _vectors_factor(paper, of_photo):
+    size = [np.abs(v).max(initial=0.0) for _, v, _ in of_photo.values()]
     half = max(_half(paper))
     return round_factor(0.4 * half / max(size)) if max(size, default=0.0) > 0 else 1
 
@@ -237,7 +241,7 @@ def vectors_factor(paper):
 def photo_residuals(paper):
     """Residuals of the image points as vectors, one panel a photo; crosses were set aside."""
     photos, of_photo = shown_photos(paper), _image_residuals(paper)
-    factor, half = vectors_factor(paper), _half(paper)
+    factor, half = _vectors_factor(paper, of_photo), _half(paper)
     across = 4
     down = ceil(len(photos) / across)
     shape = half[1] / half[0]
