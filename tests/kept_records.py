@@ -16,8 +16,9 @@ from test_jobs_of_film import film_job
 from workbook_records import records_of_every_kind
 
 import tankcal
+from tankcal.layouts import keys_in
 from tankcal.record import VERSION, record_of, record_of_adjustment
-from tankcal.record.layout import keys_in, layout_file
+from tankcal.record.versions import RECORD
 
 KEPT = Path(__file__).with_name("records")
 FREE = (  # dicts whose keys a user or a message gives
@@ -106,7 +107,7 @@ def _main(what):
         records = records_with_every_key(Path(folder))
     if what == "layout":
         text = "\n".join(layout_made(records)) + "\n"
-        layout_file(VERSION).write_text(text, encoding="utf-8")
+        RECORD.layout_file(VERSION).write_text(text, encoding="utf-8")
         return
     (KEPT / str(VERSION)).mkdir(parents=True)
     for kind, record in records.items():

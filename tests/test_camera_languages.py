@@ -15,6 +15,7 @@ from tankcal import camera_papers
 from tankcal.camera_analysis.product.limits import read_limits, shipped_limits
 from tankcal.camera_analysis.stability import plain as stability_json
 from tankcal.camera_analysis.stability.comparing import compare
+from tankcal.camera_analysis.versions import KINDS
 from tankcal.camera_papers import paper as papers
 from tankcal.camera_papers.drawings import over_whole_decades
 from tankcal.camera_papers.naming import short
@@ -71,12 +72,12 @@ def texts_of_paper(result, folder, language=None):
     """Every text that the cells of the template show of a result."""
     path = folder / "camera.json"
     path.write_text(json.dumps(result), encoding="utf-8")
-    others = [kind for kind in papers.KINDS if kind != result["kind"]]
+    others = [kind for kind in KINDS if kind != result["kind"]]
     notebook = joined(str(path), others, (camera_papers.TEMPLATE,), LANGUAGE=language)
     return [text for block in blocks_of_cells(notebook) for text in shown_in(block)]
 
 
-@pytest.fixture(params=papers.KINDS)
+@pytest.fixture(params=KINDS)
 def result(request, results):
     return results[request.param] | {"made_from": MADE_FROM}
 

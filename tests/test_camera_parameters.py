@@ -13,6 +13,7 @@ from surveyed import by_photographs
 
 import tankcal
 from tankcal.camera import PARAMETERS, Form
+from tankcal.camera_analysis import FORMAT
 from tankcal.camera_analysis.edges import Frame, left_shifts, own_shift
 from tankcal.camera_analysis.interiors import interiors_of
 from tankcal.camera_analysis.parameters.analysing import analyse_job, analyse_record
@@ -569,7 +570,7 @@ def test_a_record_says_the_same_but_for_what_was_dropped(silva_result, silva_job
 def test_all_of_it_is_plain_data(silva_parameters):
     found = as_json(silva_parameters)
     assert list(found)[:3] == ["format", "kind", "camera"]
-    assert (found["format"], found["kind"]) == ("tankcal-camera/1", "parameters")
+    assert (found["format"], found["kind"]) == (FORMAT, "parameters")
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert [one["name"] for one in found["parameters"]] == list(NAMES)
     assert found["parameters"][0]["edge_um"] is None

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tankcal.camera_analysis import FORMAT
 from tankcal.camera_analysis.product.checking import check_product, chi2_limit, t_limit
 from tankcal.camera_analysis.product.differences import differences_of, read_differences
 from tankcal.camera_analysis.product.limits import Limit, LimitTable, read_limits, shipped_limits
@@ -398,7 +399,7 @@ def test_differences_of_an_adjustment_and_of_its_record_are_the_same():
 def test_the_json_says_what_the_check_says():
     d = np.column_stack([scattered(20, 0.4, 0.05), scattered(20, 0, 0.05, 1)])
     found = as_json(check_product(d, ("x", "y"), limits=shipped_limits()))
-    assert (found["format"], found["kind"]) == ("tankcal-camera/1", "product")
+    assert (found["format"], found["kind"]) == (FORMAT, "product")
     first = next(one for one in found["best"] if one["scale"] == "1000")
     assert (first["grade"], first["grade_unbiased"]) == ("C", "A")
     assert found["verdicts"][0]["as_is"]["why"] == ["share_too_small", "rmse_too_large"]

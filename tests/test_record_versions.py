@@ -12,8 +12,9 @@ from uncertain_job import as_before
 from tankcal import outputs, report
 from tankcal.cli import main
 from tankcal.errors import InputError
+from tankcal.layouts import missing_keys
 from tankcal.record import FORMAT, VERSION, load, migrated, version_of
-from tankcal.record.layout import layout_file, missing_keys
+from tankcal.record.versions import RECORD
 
 ALL = kept_files()
 QUICK = ("film.json.gz", "uncertain.json.gz", "photographed.json.gz")  # between them, every part
@@ -32,7 +33,7 @@ def made(records_of_kinds, tmp_path_factory):
 
 
 def listed_keys(version):
-    return layout_file(version).read_text(encoding="utf-8").split()
+    return RECORD.layout_file(version).read_text(encoding="utf-8").split()
 
 
 def kept(path):
@@ -48,7 +49,7 @@ def test_no_key_comes_or_goes_without_the_version(made):
 def test_a_record_has_every_key_of_its_version(made):
     for record in made.values():
         assert record["format"] == FORMAT
-        assert list(missing_keys(record, VERSION)) == []
+        assert list(missing_keys(record, RECORD.layout_file(VERSION))) == []
 
 
 def test_every_released_version_has_kept_records_with_all_its_keys():
@@ -68,7 +69,7 @@ def test_a_kept_record_is_read_as_one_of_this_version(path):
     read = migrated(record, "record.json")
     assert json.dumps(record) == before
     assert read["format"] == FORMAT
-    assert list(missing_keys(read, VERSION)) == []
+    assert list(missing_keys(read, RECORD.layout_file(VERSION))) == []
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,9 @@ Names are resolved when they are first used.
 
 from importlib import import_module
 
-FORMAT = "tankcal-camera/1"  # of the plain data that every analysis gives
+from tankcal.camera_analysis.versions import CAMERA
+
+FORMAT = CAMERA.format  # of the plain data that every analysis gives
 
 _ROOM_OF = {
     "analyse_job": "camera_analysis.parameters.analysing",

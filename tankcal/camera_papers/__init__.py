@@ -9,7 +9,8 @@ from importlib import import_module
 from pathlib import Path
 
 from tankcal import folders, report
-from tankcal.camera_papers.paper import KINDS, CameraPaper
+from tankcal.camera_analysis.versions import KINDS
+from tankcal.camera_papers.paper import CameraPaper
 from tankcal.camera_papers.provenance import made_from
 from tankcal.camera_papers.tables import write_csv
 from tankcal.camera_papers.terminal import lines_of

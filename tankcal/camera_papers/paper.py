@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from tankcal.camera_analysis import FORMAT
+from tankcal.camera_analysis.versions import CAMERA
 from tankcal.digits import NOTHING
 from tankcal.errors import InputError, Problem
 from tankcal.languages import DEFAULT
@@ -13,32 +13,20 @@ from tankcal.words import load_words
 
 _NAMES_OF_PARAMETERS = ("names", "with", "of")
 _MORE_DIGITS = ("F", "critical", "correlation")
-KINDS = ("stability", "parameters", "influence", "product")
 
 
 def load(path):
-    """Read a camera.json; raises InputError when it is no result of this format."""
+    """Read a camera.json of this version or an older one; raises InputError when it is none."""
     name = Path(path).name
     try:
         result = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(Problem(name, f"cannot be read as a result: {error}")) from error
-    return checked(result, name)
-
-
-def checked(result, name):
-    """`result` when it is of this format and of a known kind; raises InputError otherwise."""
-    found = result if isinstance(result, dict) else {}
-    if found.get("format") != FORMAT:
-        raise InputError(Problem(name, f"found format {found.get('format')!r}, not {FORMAT!r}"))
-    if found.get("kind") not in KINDS:
-        known = ", ".join(KINDS)
-        raise InputError(Problem(name, f"found kind {found.get('kind')!r}, not one of: {known}"))
-    return found
+    return CAMERA.migrated(result, name)
 
 
 class CameraPaper(PlainPaper):
-    """A result, a dict of format FORMAT, with the words of a language.
+    """A result, a dict as CAMERA says, with the words of a language.
 
     language  one of languages.LANGUAGES; None: English
 
@@ -46,7 +34,7 @@ class CameraPaper(PlainPaper):
     """
 
     def __init__(self, result, language=None):
-        self.result = checked(result, "camera.json")
+        self.result = CAMERA.migrated(result, CAMERA.file)
         words = load_words(language or DEFAULT)
         of_camera = words.pop("camera")
         super().__init__(

@@ -3,8 +3,7 @@
 import numpy as np
 
 from tankcal.plain_data import plain, plain_problems
-
-FORMAT = "tankcal-plan/1"
+from tankcal.planning.versions import PLAN
 
 
 def plain_of(prediction):
@@ -12,7 +11,7 @@ def plain_of(prediction):
     plan, table, stated = prediction.plan, prediction.table, prediction.tabled.stated
     return plain(
         {
-            "format": FORMAT,
+            "format": PLAN.format,
             "tank": plan.job.tank.id,
             "side": plan.job.survey.side,
             "survey": _survey(prediction),

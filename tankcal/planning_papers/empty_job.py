@@ -11,6 +11,7 @@ from tankcal.languages import DEFAULT
 from tankcal.messages import message
 from tankcal.planning.model import TAPED
 from tankcal.planning.simulating import targets_of
+from tankcal.planning.versions import PLAN
 from tankcal.rotations import angles_of
 from tankcal.starter import FilledForm, write_form
 
@@ -38,13 +39,18 @@ def fingerprints(folder):
 
 
 def refuse_filled(folder, plan_file):
-    """Raise InputError when the job in `folder` is not the empty one that `plan_file` tells of."""
+    """Raise InputError when the job in `folder` is not the empty one that `plan_file` tells of.
+
+    Nor is it when the file is of a version that cannot be read: then nobody knows.
+    """
     if not folder.exists():
         return
     try:
-        written = json.loads(plan_file.read_text(encoding="utf-8"))["job"]
-    except (OSError, ValueError, KeyError, TypeError):
+        plan = json.loads(plan_file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
         written = None
+    else:
+        written = PLAN.migrated(plan, plan_file.name)["job"]
     if not folder.is_dir() or fingerprints(folder) != written:
         raise InputError(
             Problem(

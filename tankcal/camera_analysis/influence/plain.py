@@ -1,6 +1,6 @@
 """What calibrations do to a block, as plain lists and dicts, ready for JSON.
 
-format         "tankcal-camera/1"            kind  "influence"
+format         "tankcal-camera/2"            kind  "influence"
 camera         name of the job's camera that was replaced
 states         those asked for: "fixed", "weighted", "free"
 calibrations   names, in their order

@@ -2,7 +2,7 @@
 
 Keys, in this order; every number is a float, null stands for what is not known or not finite.
 
-    format, kind      "tankcal-camera/1", "parameters"
+    format, kind      "tankcal-camera/2", "parameters"
     camera            name                   photos     names when the set is not the whole camera's
     from              "job" | "record"       convention, affinity, radial_balance_mm  of the model
     format_mm, pixel_mm  [w, h] or null      half_frame_mm [2], frame_known: declared, or only seen

@@ -1,6 +1,6 @@
 """A product check as plain lists and dicts, ready for JSON.
 
-format         "tankcal-camera/1"            kind  "product"
+format         "tankcal-camera/2"            kind  "product"
 alpha          level of the tests of bias (two-sided) and of precision (upper)
 n              number of points
 axes           [{axis: "x" | "y" | "z", part: "plan" | "height", n,

@@ -2,7 +2,7 @@
 
 `as_json(result)` gives
 
-    format, kind  "tankcal-camera/1", "stability"
+    format, kind  "tankcal-camera/2", "stability"
     method        "mis", "zrot", "rot" or "spr"
     as_published  whether Pessoa's own conventions are followed
     conventions   [{code, ...}], each choice that a figure depends on, in the order of reading:

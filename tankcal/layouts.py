@@ -1,37 +1,31 @@
-"""The layout of a record: which keys it has, as `layouts/N.txt` lists them for version N.
+"""The layout of plain data that is saved: which keys it has, as a file lists them.
 
 A key's path names the keys above it, `[]` being each row of a list: `adjustment.photos[].x_m`.
 `.*` stands for whatever keys a user or a message gives: `job.certificate.*`. Every key that is
-listed is there in each record that has what is above it.
+listed is there in all data that have what is above it.
 """
 
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 
 ANY = "*"
 
 
-def layout_file(version):
-    """Path of the list of keys of a version."""
-    return Path(__file__).with_name("layouts") / f"{version}.txt"
-
-
 @cache
-def layout_of(version):
-    """The keys of a version as a tree: {key: {key below it: ...}}, a row of a list being `[]`."""
+def layout_of(file):
+    """The keys that a Path lists as a tree: {key: {key below it: ...}}, a list's row being `[]`."""
     tree = {}
-    for path in layout_file(version).read_text(encoding="utf-8").split():
+    for path in file.read_text(encoding="utf-8").split():
         branch = tree
         for key in path.replace("[]", ".[]").split("."):
             branch = branch.setdefault(key, {})
     return tree
 
 
-def missing_keys(record, version) -> Iterator[str]:
-    """Paths of keys that a version lists and `record` lacks; of the rows of a list the first is
+def missing_keys(saved, file) -> Iterator[str]:
+    """Paths of keys that a Path lists and plain data lack; of the rows of a list the first is
     looked at, for one program wrote them all."""
-    return _missing(record, layout_of(version), "")
+    return _missing(saved, layout_of(file), "")
 
 
 def _missing(value, branch, path):
@@ -51,12 +45,12 @@ def _missing(value, branch, path):
             yield from _missing(value[key], below, place)
 
 
-def keys_in(record, free=()):
-    """Set of the paths of all keys that `record` has, in every row of its lists.
+def keys_in(saved, free=()):
+    """Set of the paths of all keys that plain data have, in every row of their lists.
 
     free  paths of dicts with any keys: "job.certificate"
     """
-    return set(_keys(record, "", frozenset(free)))
+    return set(_keys(saved, "", frozenset(free)))
 
 
 def _keys(value, path, free):
