@@ -189,3 +189,29 @@ def test_correlations_that_no_covariance_has(tmp_path):
     written(tmp_path, correlated=False, change=impossible)
     with pytest.raises(InputError, match="not possible together"):
         adjust_survey(measured(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("cells", "expected"),
+    [
+        ("5,5,5,site", "row_1: row 2 of control is in the system site; expected one in the system"),
+        ("0,5,5,", "value_1: x in row 2 of control has no standard deviation above 0"),
+        (",5,5,", "value_1: x in row 2 of control has no standard deviation above 0"),
+    ],
+)
+def test_control_that_has_no_correlations(tmp_path, cells, expected):
+    """Once these were left out without a word."""
+
+    def change(files):
+        heading, first, *rest = files["control.csv"].splitlines()
+        first = ",".join(first.split(",")[:4]) + "," + cells
+        rows = [f"{heading},system", first, *(f"{row}," for row in rest)]
+        files["control.csv"] = "\n".join(rows) + "\n"
+        files["correlated_readings.csv"] = (
+            "table_1,row_1,value_1,table_2,row_2,value_2,r\ncontrol,2,x,control,3,x,0.8\n"
+        )
+
+    written(tmp_path, change=change)
+    with pytest.raises(InputError) as error:
+        measured(tmp_path)
+    assert expected in str(error.value)

@@ -110,4 +110,30 @@ EXAMPLES_OF_TABLES = {
     "zenith_angles": [{"setup": "S1-1", "to": "P101", "zenith_deg": 88.1234, "s_arcsec": 3}],
     "height_differences": [{"from": "S1", "to": "P101", "dz_m": 0.5502, "s_mm": 0.5}],
     "plumb_lines": [{"from": "P101", "to": "P201", "s_mm": 1.0}],
+    "vectors": [
+        {
+            "from": "S1",
+            "to": "S2",
+            "dx_m": 18.4052,
+            "dy_m": -9.1127,
+            "dz_m": 0.3016,
+            "sx_mm": 3.0,
+            "sy_mm": 3.0,
+            "sz_mm": 6.0,
+            "r_xy": -0.12,
+            "r_xz": 0.08,
+            "r_yz": 0.25,
+        }
+    ],
+    "correlated_readings": [
+        {
+            "table_1": "control",
+            "row_1": 12,
+            "value_1": "x",
+            "table_2": "control",
+            "row_2": 13,
+            "value_2": "x",
+            "r": 0.6,
+        }
+    ],
 }

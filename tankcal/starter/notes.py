@@ -42,6 +42,8 @@ TABLE_NOTES = {
     "zenith_angles": "one row for each zenith angle, of both faces the mean",
     "height_differences": "one row for each levelled difference; may stay empty",
     "plumb_lines": "one row for each pair of points on one vertical line; may stay empty",
+    "vectors": "one row for each vector between two points (GNSS); may stay empty",
+    "correlated_readings": "one row for each pair of values that are correlated; may stay empty",
 }
 REGISTER_NOTES = {
     "cameras": "one section for each camera; put its name, as in photos.csv, in place of NAME",

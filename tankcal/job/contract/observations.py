@@ -288,7 +288,7 @@ CORRELATED_READINGS = (
             Field(
                 f"row_{number}",
                 "number",
-                f"{which}: its row there; the heading is row 1",
+                f"{which}: its row there, as the sheet numbers it; in a CSV file the heading is 1",
                 required=True,
                 low=2,
                 high=1e7,
@@ -340,10 +340,10 @@ READINGS = (
 SURVEYS = {
     "photos": (
         *("photos", "image_points", "targets", "control", "check", "distances"),
-        *("height_differences", "plumb_lines"),
+        *("height_differences", "plumb_lines", "vectors", "correlated_readings"),
     ),
     "total-station": (
         *("setups", "directions", "zenith_angles", "slope_distances", "targets", "control"),
-        *("check", "distances", "height_differences"),
+        *("check", "distances", "height_differences", "vectors", "correlated_readings"),
     ),
 }

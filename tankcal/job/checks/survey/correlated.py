@@ -1,5 +1,7 @@
 """correlated_readings.csv: pairs of values that exist, each pair once, and none with itself."""
 
+import math
+
 from tankcal.job.checks.common import has_rows
 from tankcal.messages import message
 
@@ -62,6 +64,8 @@ def _doubt_of_end(named, name, at, axis):
             at=at,
             table=name,
         )
+    if name == "control" and axis is not None:
+        return _doubt_of_control(named, place, axis)
     if (name in OF_AXES) == (axis is not None):
         return None, None
     if axis is None:
@@ -76,3 +80,25 @@ def _doubt_of_end(named, name, at, axis):
         axis=axis,
         table=name,
     )
+
+
+def _doubt_of_control(named, place, axis):
+    """The same of a control coordinate: it must be an observation in the survey's own system."""
+    if "system" in named.columns and named.of("system")[place] is not None:
+        return "row", message(
+            "correlated_other_system",
+            "row {at:g} of control is in the system {system}; expected one in the system of the"
+            " survey: coordinates of further systems have no correlations",
+            at=named.rows[place],
+            system=named.of("system")[place],
+        )
+    sd = named.numbers(f"s{axis}_mm")[place] if f"s{axis}_mm" in named.columns else math.nan
+    if not sd > 0:
+        return "value", message(
+            "correlated_no_observation",
+            "{axis} in row {at:g} of control has no standard deviation above 0; expected one: what"
+            " is held, or only approximate, is correlated with nothing",
+            axis=axis,
+            at=named.rows[place],
+        )
+    return None, None
