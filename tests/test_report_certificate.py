@@ -12,6 +12,7 @@ from tankcal.job.contract import KEYS
 from tankcal.report import blocks, certificate, field_table, sketch
 from tankcal.report.dip_point import dip_point, dip_point_text
 from tankcal.report.letterhead import Letterhead
+from tankcal.report.numbers import degrees_of_freedom
 from tankcal.report.paper import Column, Paper
 from tankcal.report.pdf import pdf
 from tankcal.words import load_words
@@ -225,6 +226,31 @@ def test_the_dip_point_is_stated_and_drawn_where_it_was_declared(paper):
     ]
     (x,) = {float(line.get_xdata()[0]) for line in gauges}
     assert x == pytest.approx(3.0 + 2.5 / radius)  # the axis at 3.0 inches, the wall at 4.0
+
+
+@pytest.mark.parametrize("depth_m", [0.35, 2.0, -0.5])
+def test_a_shaped_bottom_is_drawn_and_its_labels_keep_clear(paper, depth_m):
+    """The centre of the bottom hangs as deep as its course is scaled; the measure stands below."""
+    drawn = paper()
+    drawn.record["bottom"] = [{"code": "bottom_depth", "value": depth_m, "unit": "m"}]
+    drawn.record["job"]["datum"] |= {
+        "dip_x_m": drawn.record["shell"]["x_m"],
+        "dip_y_m": drawn.record["shell"]["y_m"],
+    }
+    (axes,) = sketch.sketch(drawn).axes
+    wall = next(line for line in axes.lines if len(line.get_xdata()) == 5)
+    top, edge, centre = (float(wall.get_ydata()[i]) for i in (0, 1, 2))
+    height = drawn.record["courses"][-1]["top_m"]
+    assert (edge - centre) / (top - edge) == pytest.approx(depth_m / height)
+    nominal = next(one for one in axes.texts if one.get_text().startswith("nominal"))
+    assert axes.get_ylim()[0] < nominal.get_position()[1] < min(centre, edge) - 0.2
+    named = next(one for one in axes.texts if one.get_text().startswith("top of"))
+    assert named.get_bbox_patch() is not None  # the gauge in the middle does not strike it
+
+
+def test_degrees_of_freedom_without_number_are_infinite():
+    found = [degrees_of_freedom(value) for value in (None, 5.05e16, 10_001, 2321.4, 7.04)]
+    assert found == ["∞", "∞", "∞", "2321", "7.04"]
 
 
 def test_an_uncertainty_has_two_digits_in_litres_too(paper):

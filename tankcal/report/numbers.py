@@ -1,13 +1,14 @@
 """Units as they are printed, and values with powers of ten beside their standard deviations."""
 
 from dataclasses import dataclass
-from math import pi
+from math import inf, pi
 
-from tankcal.digits import ENGLISH, WITHOUT_U, superscript, with_digits, written
+from tankcal.digits import ENGLISH, WITHOUT_U, shortest, superscript, with_digits, written
 from tankcal.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
 from tankcal.errors import TankcalError
 
 _SHORT = range(-2, 6)  # powers of ten written out in a narrow column
+_MOST_DEGREES = 10_000  # of freedom: from there k is that of the normal distribution, to 0.03 %
 
 
 @dataclass(frozen=True)
@@ -92,3 +93,13 @@ def concise(value, sd, marks=ENGLISH):
 def powers(unit):
     """A unit with powers as it is printed: "mm-2" is "mm⁻²"."""
     return superscript(unit)
+
+
+def degrees_of_freedom(value, marks=ENGLISH):
+    """Effective degrees of freedom; so many that nobody can tell, or None, are written as ∞.
+
+    >>> degrees_of_freedom(2321.4), degrees_of_freedom(5.05e16)
+    ('2321', '∞')
+    """
+    many = inf if value is None else value
+    return "∞" if many > _MOST_DEGREES else shortest(many, marks, digits=3)

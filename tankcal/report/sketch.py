@@ -33,10 +33,11 @@ def sketch(paper):
     return _DRAWINGS[paper.record["job"]["tank"]["kind"]](paper)
 
 
-def _page(height):
-    figure = Figure(figsize=(WIDTH, _BOTTOM + height + _ABOVE))
+def _page(height, below=0.0):
+    """An empty page for a tank so high, a part of which hangs `below` its bottom line."""
+    figure = Figure(figsize=(WIDTH, below + _BOTTOM + height + _ABOVE))
     ax = figure.add_axes((0, 0, 1, 1))
-    ax.set(xlim=(0, WIDTH), ylim=(0, _BOTTOM + height + _ABOVE), aspect="equal")
+    ax.set(xlim=(0, WIDTH), ylim=(-below, _BOTTOM + height + _ABOVE), aspect="equal")
     ax.axis("off")
     return figure, ax
 
@@ -49,21 +50,29 @@ def _upright(paper):
     height = max(_LEAST_HEIGHT, min(_MOST_HEIGHT, shape), _OF_COURSE * len(courses))
     per_m = height / courses[-1]["top_m"]
     with matplotlib.rc_context(STYLE):
-        figure, ax = _page(height)
-        _ground(ax)
-        top = _BOTTOM + height
-        x, y = [_LEFT] * 2 + [_RIGHT] * 2, [top, _BOTTOM, _BOTTOM, top]
-        ax.plot(x, y, color=INK, linewidth=1.4)
+        rise = per_m * _rise_m(record)
+        below = max(-rise, 0.0)
+        figure, ax = _page(height, below)
+        _ground(ax, open_below=below > 0)
+        top, middle = _BOTTOM + height, (_LEFT + _RIGHT) / 2
+        x = [_LEFT, _LEFT, middle, _RIGHT, _RIGHT]
+        ax.plot(x, [top, _BOTTOM, _BOTTOM + rise, _BOTTOM, top], color=INK, linewidth=1.4)
         _open_top(ax, top)
         for course in courses:
             _course(ax, paper, course, per_m)
         _level_of(ax, paper, per_m)
         _critical_zone(ax, paper, per_m)
-        _gauge(ax, paper, _dip_x(record), top, _zero_y(record, per_m))
+        _gauge(ax, paper, _dip_x(record), top, _zero_y(record, per_m), below)
         _measure(ax, _LEFT - 0.35, _BOTTOM, top, _of(paper, "shell", courses[-1]["top_m"]))
         nominal = _of(paper, "diameter", tank["nominal_diameter_m"])
-        _across(ax, nominal)
+        _across(ax, nominal, below=below)
     return figure
+
+
+def _rise_m(record):
+    """How far the centre of a shaped bottom lies above its edge; the courses begin at the edge."""
+    found = {one["code"]: one["value"] for one in record["bottom"] or ()}
+    return -found.get("bottom_depth", 0.0)
 
 
 def _dip_x(record):
@@ -83,8 +92,11 @@ def _zero_y(record, per_m):
     return _BOTTOM + per_m * (datum["dip_plate_z_m"] - datum["bottom_z_m"])
 
 
-def _ground(ax):
-    ax.plot([_LEFT - 0.35, _RIGHT + 0.35], [_BOTTOM - 0.03] * 2, color=_GREY, linewidth=0.6)
+def _ground(ax, open_below=False):
+    ends = [_LEFT - 0.35, _RIGHT + 0.35]
+    parts = [(ends[0], _LEFT), (_RIGHT, ends[1])] if open_below else [ends]
+    for part in parts:
+        ax.plot(part, [_BOTTOM - 0.03] * 2, color=_GREY, linewidth=0.6)
 
 
 def _open_top(ax, y):
@@ -113,7 +125,7 @@ def _level_of(ax, paper, per_m):
     y = _zero_y(record, per_m) + per_m * top_m
     ax.plot([_LEFT, _RIGHT], [y, y], color=RED, linewidth=0.8, linestyle=(0, (4, 2)))
     label = paper.word("sketch.top", value=paper.height(top_m))
-    _text(ax, _LEFT + 0.12, y - 0.1, label, "left", RED)
+    _text(ax, _LEFT + 0.12, y - 0.1, label, "left", RED, over_lines=True)
 
 
 def _critical_zone(ax, paper, per_m):
@@ -127,10 +139,10 @@ def _critical_zone(ax, paper, per_m):
     style = {"facecolor": "none", "edgecolor": _GREY, "hatch": "////", "linewidth": 0.4}
     ax.add_patch(Rectangle((_LEFT, zero + per_m * low), *size, **style))
     label = paper.word("sketch.critical", low=paper.height(low), high=paper.height(high))
-    _text(ax, _LEFT + 0.06, zero + per_m * high + 0.07, label, "left")
+    _text(ax, _LEFT + 0.06, zero + per_m * high + 0.07, label, "left", over_lines=True)
 
 
-def _gauge(ax, paper, x, top, zero):
+def _gauge(ax, paper, x, top, zero, below=0.0):
     """The gauge: its zero below, and the reference height above the tank."""
     upper = top + 0.22
     record = paper.record
@@ -144,9 +156,8 @@ def _gauge(ax, paper, x, top, zero):
         paper, "reference_height", height_m)  # fmt: skip
     _text(ax, x + 0.12, upper, label, "left")
     named = paper.word(f"zeros.{record['capacity']['zero']}")
-    _text(
-        ax, x + 0.16, max(zero, _BOTTOM) - 0.12, paper.word("sketch.zero", zero=named), "left", RED
-    )
+    y = zero if zero > _BOTTOM else _BOTTOM - below
+    _text(ax, x + 0.16, y - 0.12, paper.word("sketch.zero", zero=named), "left", RED)
 
 
 def _lying(paper):
@@ -194,15 +205,19 @@ def _measure(ax, x, low, high, label):
     _text(ax, x - 0.08, (low + high) / 2, label, "right")
 
 
-def _across(ax, label, left=_LEFT, right=_RIGHT):
+def _across(ax, label, left=_LEFT, right=_RIGHT, below=0.0):
     """A measure below the tank, from one of its sides to the other."""
-    ax.annotate("", (right, _BOTTOM - 0.24), (left, _BOTTOM - 0.24), arrowprops=_ARROW)
-    _text(ax, (left + right) / 2, _BOTTOM - 0.37, label, "center")
+    y = _BOTTOM - below - 0.24
+    ax.annotate("", (right, y), (left, y), arrowprops=_ARROW)
+    _text(ax, (left + right) / 2, y - 0.13, label, "center")
 
 
 def _of(paper, name, value_m):
     return paper.word(f"sketch.{name}", value=paper.number(value_m, "m", decimals=3))
 
 
-def _text(ax, x, y, text, side, colour="black"):
-    ax.text(x, y, text, ha=side, va="center", fontsize=_SMALL, color=colour, parse_math=False)
+def _text(ax, x, y, text, side, colour="black", over_lines=False):
+    """A label; one `over_lines` hides what would run through it: the gauge may stand anywhere."""
+    hiding = {"facecolor": "white", "edgecolor": "none", "pad": 0.8} if over_lines else None
+    style = {"fontsize": _SMALL, "color": colour, "bbox": hiding}
+    ax.text(x, y, text, ha=side, va="center", parse_math=False, **style)

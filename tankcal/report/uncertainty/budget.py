@@ -3,7 +3,7 @@
 from tankcal.digits import NOTHING, decimals_of, fixed, shortest
 from tankcal.plots import even_groups
 from tankcal.report import blocks
-from tankcal.report.numbers import like_its_sd, symbol
+from tankcal.report.numbers import degrees_of_freedom, like_its_sd, symbol
 from tankcal.report.paper import Column
 from tankcal.words import name_of_input
 
@@ -56,7 +56,7 @@ def _table(paper, name, lines, values, /, **places):
         Column("contribution_m3", "m3", decimals=decimals),
         Column("share", "share", decimals=1),
     ]
-    k, nu = paper.number(values["k"], decimals=2), _dof(paper, values["dof"])
+    k, nu = paper.number(values["k"], decimals=2), degrees_of_freedom(values["dof"], paper.marks)
     rows = [_line(paper, line) for line in lines]
     return paper.table(name, rows, columns, u=u, U=U, k=k, nu=nu, **places)
 
@@ -70,12 +70,8 @@ def _line(paper, line):
         "estimate": None if estimate is None else like_its_sd(estimate, line["u"], paper.marks),
         "unit": symbol(line["unit"]),
         "how": f"{line['type']}, {distribution}",
-        "dof": _dof(paper, line["dof"]),
+        "dof": degrees_of_freedom(line["dof"], paper.marks),
     }
-
-
-def _dof(paper, value):
-    return "∞" if value is None else shortest(value, paper.marks, digits=3)
 
 
 def _notes(paper, lines):

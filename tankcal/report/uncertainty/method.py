@@ -2,7 +2,6 @@
 
 from math import inf
 
-from tankcal.digits import shortest
 from tankcal.report import blocks, numbers
 from tankcal.report.paper import Column
 from tankcal.report.uncertainty.stated import MARK, by_monte_carlo, k_of_rows, stated_rows
@@ -47,19 +46,16 @@ def on_k(paper):
         return []
     ks, dofs = zip(*known, strict=True)
     k = _between(paper, [paper.number(of(ks), decimals=2) for of in (min, max)])
-    if min(dofs) == inf:
+    ends = [numbers.degrees_of_freedom(of(dofs), paper.marks) for of in (min, max)]
+    if ends[0] == numbers.degrees_of_freedom(inf):
         return [paper.word("texts.k_normal", k=k, coverage=paper.coverage())]
-    dof = _between(paper, [_dof(paper, of(dofs)) for of in (min, max)])
+    dof = _between(paper, ends)
     return [paper.word("texts.k_t", k=k, dof=dof, coverage=paper.coverage())]
 
 
 def _between(paper, ends):
     low, high = ends
     return low if low == high else paper.word("texts.between_values", low=low, high=high)
-
-
-def _dof(paper, value):
-    return "∞" if value == inf else shortest(value, paper.marks, digits=3)
 
 
 def _simulated(paper, mark):
@@ -157,7 +153,7 @@ def stated_blocks(paper):
         Column("volume_m3", unit, u="U_m3", least=numbers.unit(unit).least),
         Column("U_m3", unit, u="U_m3"),
         Column("k", decimals=2, nothing=""),
-        Column("dof", digits=2, nothing="∞", align="right"),
+        Column("dof", align="right"),
         Column("relative", "share", digits=2, align="right"),
         Column("remark", nothing=""),
     ]
@@ -170,6 +166,7 @@ def stated_blocks(paper):
 def _row(paper, row):
     return row | {
         "by_monte_carlo": MARK if row["simulated"] else None,
+        "dof": numbers.degrees_of_freedom(row["dof"], paper.marks),
         "remark": "; ".join(remarks(paper, row)) or None,
     }
 
