@@ -26,7 +26,7 @@ def volume_text(volume_m3: float, U_m3: float, k: float | None = None) -> str:
     if not U_m3 > 0:
         return f"{fixed(volume_m3, 3)} m3, no uncertainty declared"
     shown = written(volume_m3, U_m3, ENGLISH, least=0)
-    return f"{shown.value} m3, U = {shown.uncertainty} m3 ({how})"
+    return f"{shown.value}{shown.power} m3, U = {shown.uncertainty}{shown.power} m3 ({how})"
 
 
 def table_html(caption: str, headings, rows) -> str:

@@ -24,6 +24,7 @@ from tankcal.messages import message
 from tankcal.plausibility import doubts_of_mesh, doubts_of_scan, doubts_of_wall
 from tankcal.scan import Scan
 from tankcal.tanks import body_of, critical_zone, zero_height
+from tankcal.uncertainty import ROUNDING, combined
 from tankcal.wall import Wall, warnings_of
 
 CLOSED = 1e-3  # of its largest free surface: one that is smaller at the top counts as none
@@ -79,7 +80,7 @@ def tabled(job, survey, tell=lambda text: None):
     exact = _exact(body, zero)
     heights = _rows(spec, exact, top, kinks)
     levels = heights + zero
-    volumes, areas, sources = body.rows(levels)
+    volumes, areas, sources = _without_rounding(*body.rows(levels))
     table = Capacity(
         height_m=heights,
         volume_m3=volumes,
@@ -109,6 +110,21 @@ def _doubts_of_survey(job, survey, top_m):
     if isinstance(survey, Scan):
         return doubts_of_scan(job, survey, top_m)
     return () if survey is None else doubts_of_mesh(job, top_m)
+
+
+def _without_rounding(volumes, areas, sources):
+    """The rows with exact zeros where nothing but rounding stands.
+
+    Below a raised bottom the volume is a difference of volumes: it came out as -9e-16 m3 with u of
+    3e-20 m3, and was written with twenty decimals. A row whose volume is 0 but unsure stays so.
+    """
+    u = combined(sources, len(volumes)).u
+    least = ROUNDING * np.max(np.abs(volumes), initial=0.0)
+    empty = (np.abs(volumes) <= least) & (u <= least)
+    flat = np.abs(areas) <= ROUNDING * np.max(np.abs(areas), initial=0.0)
+    rows = empty[:, None]
+    sources = tuple(one.mapped(lambda columns: np.where(rows, 0.0, columns)) for one in sources)
+    return np.where(empty, 0.0, volumes), np.where(flat, 0.0, areas), sources
 
 
 def _exact(body, zero_m):

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev
 from scipy.special import ndtri, stdtrit
 
+ROUNDING = 1e-12  # of the largest volume of a table: less than that is lost in its digits
 _SMOOTH_DOF, _DEGREE = 3.0, 20  # from where on, and of what degree, k is a polynomial in 1/dof
 
 

@@ -11,6 +11,7 @@ from job_builder import write_job
 
 import tankcal
 from tankcal import workbook
+from tankcal.display import volume_text
 from tankcal.errors import ProgramError
 from tankcal.job import StatedVolume
 from tankcal.monte_carlo import Verdict
@@ -61,6 +62,89 @@ def test_every_interval_holds_its_volume(kind, tmp_path):
     assert np.all(holds(delivered.low_m3, one.volume_m3, delivered.high_m3, one.u_m3))
     for stated in budgets_of(result):
         assert holds(*(stated[key] for key in ("low_m3", "volume_m3", "high_m3", "u_m3")))
+
+
+def random_job(rng):
+    """Parts of a job of any kind, with inputs of any size, distribution and dof."""
+    kind = rng.choice([*KINDS])
+    parts = dict(KINDS[kind])
+    settings = dict(parts["settings"])
+    settings["table.step_m"] = float(rng.choice([0.05, 0.1]))
+    declared = [("datum", rng.choice([0.5, 2.0, 5.0]), "mm"), ("scale", rng.choice([5, 50]), "ppm")]
+    if kind == "lying":
+        length = float(rng.uniform(4, 20))
+        settings |= {
+            "horizontal.length_m": length,
+            "horizontal.diameter_m": float(rng.uniform(1.5, 3)),
+            "horizontal.tilt_mm_per_m": float(rng.uniform(-8, 8)),
+            "horizontal.dip_from_a_m": float(rng.uniform(0.1, 0.9)) * length,
+        }
+        declared += [("tilt", rng.choice([0.2, 1, 4]), "mm/m"), ("diameter", 3.0, "mm")]
+    elif kind.startswith("cone"):
+        settings["bottom.centre_z_m"] = float(rng.choice([-1, 1]) * rng.uniform(0.02, 0.4))
+    some = [one for one in declared if rng.random() < 0.8] or declared[:1]
+    laws = ("normal", "rectangular", "triangular")
+    parts["settings"] = settings
+    parts["uncertainty"] = [(name, float(u), unit, rng.choice(laws)) for name, u, unit in some]
+    return parts
+
+
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(n, marks=pytest.mark.study) for n in range(2, 40))]
+)
+def test_intervals_of_random_jobs_in_everything_that_is_written(seed, tmp_path):
+    """Property: what is written of a volume holds it, and has a width where anything is unsure."""
+    rng = np.random.default_rng(seed)
+    parts = random_job(rng)
+    parts["uncertainty"] = [(*one[:3], "B", one[3]) for one in parts["uncertainty"]]
+    result = tankcal.run(tankcal.load(write_job(tmp_path / "job", **parts)), simulated=True)
+    table = result.capacity
+    heights = table.height_m.to_numpy()
+    for dip in rng.uniform(heights[0], heights[-1], 20):
+        found = result.at(dip)
+        assert holds(found.low_m3, found.value_m3, found.high_m3, found.u_m3), dip
+    for low, high in np.sort(rng.uniform(heights[0], heights[-1], (10, 2))):
+        found = result.delivery(low, high)
+        assert holds(found.low_m3, found.value_m3, found.high_m3, found.u_m3), (low, high)
+    save(record_of(result), tmp_path / "record.json")
+    record = json.loads((tmp_path / "record.json").read_text(encoding="utf-8"))
+    write_tables(record, tmp_path)
+    capacity, written = record["capacity"], pd.read_csv(tmp_path / "capacity.csv")
+    workbook.write(record, tmp_path / "capacity.xlsx")
+    book = openpyxl.load_workbook(tmp_path / "capacity.xlsx")
+    keys = ("low_m3", "volume_m3", "high_m3", "u_m3")
+    for ends in (capacity, written):
+        assert np.all(holds(*(np.asarray(ends[key], dtype=float) for key in keys)))
+    names = ("capacity_low", "capacity_volume", "capacity_high", "capacity_standard_u")
+    assert np.all(holds(*(np.array(cells_of(book, name), dtype=float) for name in names)))
+    for one in record["budgets"]:
+        assert holds(*(one[key] for key in keys))
+
+
+def cells_of(book, name):
+    """The values of a named range, from the top down."""
+    ((sheet, cells),) = book.defined_names[name].destinations
+    return [cell.value for (cell,) in book[sheet][cells]]
+
+
+def test_nothing_below_a_raised_bottom_is_nothing(tmp_path):
+    """A difference of volumes: -9e-16 m3 with u = 3e-20 m3, and Monte Carlo's interval beside it.
+
+    Then the run ended with an error of the program, or wrote twenty decimals.
+    """
+    settings = CONE | {"bottom.centre_z_m": 0.1623087709233953, "table.step_m": 0.1}
+    job = write_job(tmp_path / "job", settings=settings, uncertainty=[("scale", 5.0, "ppm")])
+    result = tankcal.run(tankcal.load(job), simulated=True)
+    write_tables(record_of(result), tmp_path)
+    first = (tmp_path / "capacity.csv").read_text().splitlines()[1].split(",")
+    assert [float(one) for one in first[:3]] == [0.0, 0.0, 0.0]
+    assert first[1] == "0.000000"
+    assert result.table.u_m3[0] == result.table.volume_m3[0] == 0.0
+
+
+def test_a_power_of_ten_is_not_lost_in_words():
+    """-8.9e-16 m3 was shown as -8.88178 m3."""
+    assert "10⁻¹⁶" in volume_text(-8.88178e-16, 7.6e-20)
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.errors import ProgramError
-
-ROUNDING = 1e-12  # of a volume: a u smaller than this is lost in its digits
+from tankcal.uncertainty import ROUNDING
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,8 @@ def checked(intervals, volume_m3, u_m3):
 
 
 def _refuse_without_width(intervals, volume_m3, u_m3):
-    varies = u_m3 > ROUNDING * np.abs(volume_m3)
+    # of the largest volume: the empty tank's is a difference of volumes, and has their rounding
+    varies = u_m3 > ROUNDING * np.max(np.abs(volume_m3), initial=0.0)
     _refuse(varies & ~(intervals.low_m3 < intervals.high_m3), intervals, volume_m3, u_m3)
 
 
