@@ -1,35 +1,20 @@
 """Codes of the record as sentences, in the reader's language (report_templates/words/)."""
 
-import tomllib
 from numbers import Integral, Number
 
 from tankcal.digits import NOTHING, Marks, fixed, shortest
-from tankcal.errors import SHEET, TankcalError
+from tankcal.errors import SHEET
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
 from tankcal.job.form_words import word_of
 from tankcal.languages import DEFAULT
 from tankcal.messages import as_plain, filled
-from tankcal.shipped import shipped
+from tankcal.word_files import load_words as load_words  # the door to words of every kind
 
 
 def language_of(record):
     """The language that the job of a record asks for."""
     table = record["job"]["table"] or {}  # a survey alone has none
     return table.get("language") or DEFAULT
-
-
-def load_words(language=DEFAULT):
-    """The words of one language: {group: {code: template, or {value: template}}}.
-
-    Raises TankcalError when no words are shipped in that language.
-    """
-    folder = shipped("report_templates") / "words"
-    known = {path.stem: path for path in sorted(folder.glob("*.toml"))}
-    if language not in known:
-        raise TankcalError(
-            f"there are no words in language {language!r}; shipped: {', '.join(known) or 'none'}"
-        )
-    return tomllib.loads(known[language].read_text(encoding="utf-8"))
 
 
 def marks_of(words):

@@ -14,7 +14,7 @@ OTHERS = [one for one in LANGUAGES if one != DEFAULT]
 GLOSSARY = {
     "pt-BR": {
         "serviço": (r"\btrabalhos?\b(?<!pasta de trabalho)(?<!pastas de trabalho)", r"\bo job\b"),
-        "posição do ponto": (r"lugar d[oe] ponto", r"novo lugar"),
+        "posição do ponto": (r"lugar do ponto", r"novo lugar"),
         "interpolação linear": (r"reta entre", r"linha reta entre"),
         "arredondamento": (r"último algarismo",),
         "balanço de incerteza": (r"orçamento",),
@@ -39,7 +39,7 @@ GLOSSARY = {
     },
     "es": {
         "servicio": (r"\btrabajos?\b", r"\bel job\b"),
-        "posición del punto": (r"lugar del? punto", r"nuevo lugar"),
+        "posición del punto": (r"lugar del punto", r"nuevo lugar"),
         "interpolación lineal": (r"recta entre",),
         "redondeo": (r"última cifra impresa",),
         "balance de incertidumbre": (r"presupuesto",),

@@ -6,8 +6,9 @@ import sys
 
 import tankcal
 from tankcal.cli import camera, linting, planning, reporting, running, starting
+from tankcal.cli.help_words import argparse_in, put_in_words
 from tankcal.cli.machine import failure, print_json
-from tankcal.cli.showing import complain, speak
+from tankcal.cli.showing import complain, speak, spoken
 from tankcal.errors import TankcalError
 from tankcal.messages import message
 
@@ -39,10 +40,11 @@ the job format: docs/job-format.md; axes, signs and units: docs/conventions.md""
 def main(arguments=None):
     """Run the command line; returns the exit status."""
     speak()
-    options = _options(arguments)
-    if options.command is None:
-        options.shown.print_help()
-        return 0
+    with argparse_in(spoken()):
+        options = _options(arguments)
+        if options.command is None:
+            options.shown.print_help()
+            return 0
     try:
         return options.command(options) or 0
     except TankcalError as error:
@@ -77,7 +79,7 @@ def _options(arguments):
     parser = _parser()
     options, rest = parser.parse_known_args(arguments)
     if rest and (not hasattr(options, "names") or any(one.startswith("-") for one in rest)):
-        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+        parser.error(argparse._("unrecognized arguments: %s") % " ".join(rest))
     if rest:
         options.names = [*options.names, *rest]
     return options
@@ -96,4 +98,6 @@ def _parser():
 
     for room in (running, reporting, starting, planning, linting, camera):
         room.add(commands)
+    if spoken():
+        put_in_words(parser, spoken())
     return parser

@@ -2,7 +2,9 @@
 
 import argparse
 
+from tankcal.cli.showing import said
 from tankcal.languages import LANGUAGES
+from tankcal.messages import message
 from tankcal.numerals import NUMBER, WHOLE_NUMBER
 
 
@@ -20,30 +22,43 @@ def add_language(parser):
 def positive(text):
     value = _number(text)
     if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"found {text!r}; expected a number above 0")
+        raise refused(
+            message("option_above_0", "found {text!r}; expected a number above 0", text=text)
+        )
     return value
 
 
 def share(text):
     value = _number(text)
     if not 0 < value < 1:
-        raise argparse.ArgumentTypeError(f"found {text!r}; expected a number between 0 and 1")
+        raise refused(
+            message("option_share", "found {text!r}; expected a number between 0 and 1", text=text)
+        )
     return value
 
 
 def several(text):
     value = _number(text)
     if not (2 <= value <= 1e6 and value == int(value)):
-        raise argparse.ArgumentTypeError(
-            f"found {text!r}; expected a whole number from 2 to 1000000"
+        raise refused(
+            message(
+                "option_several",
+                "found {text!r}; expected a whole number from 2 to 1000000",
+                text=text,
+            )
         )
     return int(value)
 
 
 def whole(text):
     if not WHOLE_NUMBER.fullmatch(text):
-        raise argparse.ArgumentTypeError(f"found {text!r}; expected a whole number")
+        raise refused(message("option_whole", "found {text!r}; expected a whole number", text=text))
     return int(text)
+
+
+def refused(text):
+    """The error of an argument, in the language that is spoken."""
+    return argparse.ArgumentTypeError(said(text))
 
 
 def _number(text):

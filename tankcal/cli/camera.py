@@ -1,10 +1,9 @@
 """`tankcal camera`: which parameters belong, comparison and influence of calibrations, and more."""
 
-import argparse
-
 from tankcal.cli import camera_runs as runs
-from tankcal.cli.arguments import positive, share, whole
+from tankcal.cli.arguments import positive, refused, share, whole
 from tankcal.languages import DEFAULT, LANGUAGES
+from tankcal.messages import message
 
 
 def add(commands):
@@ -245,5 +244,9 @@ def _add_outputs(parser):
 def _states(text):
     states = tuple(part.strip() for part in text.split(","))
     if not set(states) <= {"fixed", "weighted", "free"}:
-        raise argparse.ArgumentTypeError(f"found {text!r}; expected some of fixed,weighted,free")
+        raise refused(
+            message(
+                "option_states", "found {text!r}; expected some of fixed,weighted,free", text=text
+            )
+        )
     return states

@@ -17,9 +17,14 @@ def speak(language=None):
         setting = next((os.environ[name] for name in _LOCALE if os.environ.get(name)), "")
         language = nearest_language(setting) or DEFAULT
     if language != DEFAULT:
-        from tankcal.words import load_words
+        from tankcal.word_files import load_words
 
         _spoken.update(load_words(language))
+
+
+def spoken():
+    """The words of the language that is spoken; {}: English."""
+    return _spoken
 
 
 def said(text):
