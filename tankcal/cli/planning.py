@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language, several, share, whole
-from tankcal.cli.asked_language import asked_of_plan
 from tankcal.cli.showing import (
     Progress,
     listed,
@@ -68,6 +67,7 @@ def add(commands):
 def _plan(options):
     prepare_for_small_work()
     from tankcal import planning_papers
+    from tankcal.cli.asked_language import asked_of_plan
     from tankcal.errors import TankcalError
     from tankcal.planning import load_plan, predict
 
