@@ -15,6 +15,7 @@ from tankcal.report.letterhead import Letterhead
 from tankcal.report.numbers import degrees_of_freedom
 from tankcal.report.paper import Column, Paper
 from tankcal.report.pdf import pdf
+from tankcal.report.uncertainty.stated import stated_rows
 from tankcal.words import load_words
 
 HARD = '#2 [west] *A* _b_ $x$ \\input{y} =1+1 <b>&amp; "q" {value}'
@@ -246,6 +247,17 @@ def test_a_shaped_bottom_is_drawn_and_its_labels_keep_clear(paper, depth_m):
     assert axes.get_ylim()[0] < nominal.get_position()[1] < min(centre, edge) - 0.2
     named = next(one for one in axes.texts if one.get_text().startswith("top of"))
     assert named.get_bbox_patch() is not None  # the gauge in the middle does not strike it
+
+
+def test_no_volume_has_the_uncertainty_of_its_reading_alone(paper):
+    """Where nothing of the tank was declared uncertain, the certificate states no U anywhere."""
+    shown = paper()
+    assert stated_rows(shown.record)
+    capacity = shown.record["capacity"]
+    nothing = [0.0] * len(capacity["U_m3"])
+    capacity |= {key: nothing for key in capacity if key.endswith("U_m3")}
+    capacity |= {"low_m3": capacity["volume_m3"], "high_m3": capacity["volume_m3"]}
+    assert stated_rows(shown.record) == []
 
 
 def test_degrees_of_freedom_without_number_are_infinite():

@@ -47,8 +47,15 @@ def stated_rows(record):
     (None: no volume), low_m3, high_m3 (None where even about the volume), simulated, for_use,
     minimum_m, the minimum height of which it is the worst delivery (None: of none), and stated_m3
     and note, as stated.csv has them.
+
+    There are none where no input of the table was uncertain and nobody asked for a volume: what
+    a reading adds is all that their U would hold, and be read as that of the tank.
     """
-    return [_stated(record, one) for one in record.get("budgets", [])]
+    budgets = record.get("budgets", [])
+    asked = any(one.get("stated_m3") is not None or one.get("note") for one in budgets)
+    if not asked and not any(stated_U_m3(record["capacity"])):
+        return []
+    return [_stated(record, one) for one in budgets]
 
 
 def _stated(record, one):
