@@ -24,7 +24,7 @@ RELEASED_M = 0.001  # sd of fixed control while it is doubted
 SCALED = 6.0  # sds that a scale must differ from one
 SOUND = 2.0  # sigma0 of a survey that fits, where there is none to compare with
 LIKELY = 0.5  # share of the largest reaction, from which a held coordinate is released for once
-TRIED = 8  # held coordinates that are
+TRIED = 12  # held coordinates that are
 MOST = 25  # iterations of such a trial
 ALIKE = 1.5  # times the smallest sigma0, within which suppositions explain as much
 
@@ -151,8 +151,9 @@ class _Release:
         table = next(t for t in found.residuals if t.exact and t.source == self.number)
         size = np.zeros(len(self.control))
         size[table.rows] = table.whole
+        most = size.max(initial=0.0)
         order = np.argsort(-size, kind="stable")
-        return order[size[order] > max(LIKELY * size.max(initial=0.0), CRITICAL)][:TRIED]
+        return order[(size[order] > LIKELY * most) & (most > CRITICAL)][:TRIED]
 
     def _tried(self, trials):
         """[(rows, Adjusted without them)] of trials that could be adjusted, the best first."""
@@ -200,9 +201,13 @@ def strained(readings, known):
     """
     held = [one for one in readings if _tested(one)]
     limit = -float(ndtri(0.5 * LEVEL / max(len(held), 1)))
+    most = max((abs(one.w) for one in held), default=0.0)
     used = [abs(one.w) for one in readings if not (one.removed or one.check) and one.w == one.w]
-    least = max(used, default=0.0) ** 2 - CRITICAL**2
-    found = [one for one in held if abs(one.w) > limit and one.w**2 > least]
+    if most <= limit:
+        return []
+    # what explains as much as the best of all is named though it alone would not be tested
+    least = max(most, *used) ** 2 - CRITICAL**2
+    found = [one for one in held if one.w**2 > least]
     return [_strained(one) for one in sorted(found, key=lambda one: -abs(one.w))[: 2 * LISTED]]
 
 
