@@ -13,6 +13,10 @@ from tankcal.job.plausibility import (
     MISFIT,
     MISFIT_M,
     MISFIT_SDS,
+    NEAR_WALL,
+    OFF_SHELL,
+    OFF_SHELL_M,
+    OFF_SHELL_POINTS,
     PLATE_ON_BOTTOM,
     PLATE_ON_BOTTOM_M,
     reference_doubt,
@@ -90,6 +94,7 @@ def doubts_of_wall(job, wall):
         *_against_drawing(job, 2 * radius),
         *_against_plates(job, wall),
         *_against_tape(job, wall),
+        *_beyond_ends(job, wall, radius),
         *_plate_on_bottom(job, wall, radius),
     ]
 
@@ -135,6 +140,41 @@ def _against_tape(job, wall):
         miss_mm=1000 * measured * miss,
     )
     return [Problem("job.toml", text, column="checks.circumference_m")]
+
+
+def _beyond_ends(job, wall, radius_m):
+    """Points of the wall that lie where the courses and the bottom leave no wall."""
+    xyz, (low, high) = job.points.xyz_m, _ends(job)
+    axis = _axis_at(wall.shell, xyz[:, 2])
+    away = np.abs(np.hypot(*(xyz[:, :2] - axis).T) - radius_m)
+    is_near = away < NEAR_WALL * radius_m
+    for end, beyond in (("bottom", low - xyz[:, 2]), ("top", xyz[:, 2] - high)):
+        off = is_near & (beyond > OFF_SHELL_M)
+        if off.sum() < max(OFF_SHELL_POINTS, OFF_SHELL * is_near.sum()):
+            continue
+        text = message(
+            "points_off_shell",
+            "{count} points of the wall lie up to {most_m:.3g} m beyond the {end} of the shell,"
+            " which goes from z = {low_m:.6g} to {high_m:.6g} m: is datum.bottom_z_m right, and are"
+            " the courses all there?",
+            count=int(off.sum()),
+            most_m=float(beyond[off].max()),
+            end=message("end_bottom", "bottom") if end == "bottom" else message("end_top", "top"),
+            low_m=low,
+            high_m=high,
+        )
+        return [Problem("job.toml", text, column="datum.bottom_z_m")]
+    return []
+
+
+def _ends(job):
+    bottom = job.datum.bottom_z_m
+    return bottom, bottom + sum(course.height_m for course in job.courses)
+
+
+def _axis_at(shell, z_m):
+    """(n, 2) places of the axis of a vertical wall."""
+    return np.array(shell.axis_m) + np.outer(z_m - shell.z_m, shell.slope)
 
 
 def _plate_on_bottom(job, wall, radius_m):
@@ -183,8 +223,7 @@ def refuse_other_side(job, is_within, adjustment):
 
 def is_within_wall(wall, places_m):
     """(n,) whether places lie within the mean radius of a vertical wall, at any height."""
-    shell = wall.shell
-    axis = np.array(shell.axis_m) + np.outer(places_m[:, 2] - shell.z_m, shell.slope)
+    axis = _axis_at(wall.shell, places_m[:, 2])
     radius = float(np.mean([section.circle.radius_m for section in wall.sections]))
     return np.hypot(*(places_m[:, :2] - axis).T) < radius
 

@@ -342,6 +342,15 @@ def test_a_slip_of_a_kind(tmp_path, kind, slip, code, key):
     assert_told(tmp_path, sound(kind, **slip), code, key)
 
 
+@pytest.mark.parametrize("miss_m", [-0.6, 0.8])
+def test_a_bottom_that_leaves_a_ring_beyond_the_shell(tmp_path, miss_m):
+    """The rings lie 0.55 m above the bottom and 0.4 m below the top; nothing else tells."""
+    parts = sound("vertical", settings={"datum.dip_plate_z_m": None, "checks.top_z_m": None})
+    for row in parts.tables["points"][1:]:
+        row[3] -= miss_m
+    assert_told(tmp_path, parts, "points_off_shell", "datum.bottom_z_m")
+
+
 def assert_told(tmp_path, parts, code, key):
     found = told(tmp_path / "job", parts)
     assert code in found

@@ -59,6 +59,8 @@ RISING_PLATES = 1.1  # thickness of the top course over that of the bottom cours
 NEAR_JOINT_M = 0.025  # rings are surveyed on plates, not on welds
 LEVEL_M, RING_GAP_M, MOST_RINGS = 0.03, 0.08, 60
 TOP_MISS_M = 0.05
+OFF_SHELL_M, OFF_SHELL, OFF_SHELL_POINTS = 0.05, 0.03, 5  # beyond an end; part of the points; least
+NEAR_WALL = 0.005  # of the radius: such points are of the wall, not clutter
 RIM, RIM_MISS_M = 0.8, 0.25  # bottom points beyond this part of the radius lie near bottom_z_m
 DIP_PLATE_M, DIP_PLATE = 0.3, 0.05  # and of the diameter of a lying tank or a sphere
 PLATE_ON_BOTTOM, PLATE_ON_BOTTOM_M = 0.5, 0.05  # of the rise at the dip point, and
@@ -314,10 +316,11 @@ TABLE = (
     Plausible(
         "datum.bottom_z_m",
         f"with the courses {1000 * TOP_MISS_M:g} mm from checks.top_z_m; bottom points near the"
-        f" wall within {RIM_MISS_M:g} m",
+        f" wall within {RIM_MISS_M:g} m; at most {100 * OFF_SHELL:g} % of the points of the wall"
+        f" over {1000 * OFF_SHELL_M:g} mm below the bottom or above the top course",
         "half a metre off",
-        "checks.top_z_m, bottom.csv",
-        ("top_not_met", "rim_off"),
+        "checks.top_z_m, bottom.csv, the points of the wall",
+        ("top_not_met", "rim_off", "points_off_shell"),
     ),
     Plausible(
         "datum.dip_plate_z_m",
