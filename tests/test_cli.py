@@ -42,6 +42,16 @@ def test_help_loads_nothing_heavy():
     assert subprocess.run([sys.executable, "-c", code], stdout=subprocess.DEVNULL).returncode == 0
 
 
+def test_adjusting_without_papers_loads_nothing_that_only_papers_or_simulations_need():
+    code = (
+        "import sys, tankcal.cli.running, tankcal.chain, tankcal.outputs\n"
+        "heavy = {'scipy.stats', 'matplotlib', 'openpyxl', 'xlsxwriter', 'nbformat', 'trimesh'}\n"
+        "print(*heavy & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
 @pytest.mark.parametrize("job", ["nowhere", "nowhere.xlsx", "\0", "x" * 5000])
 def test_a_job_that_is_not_there(job, capsys):
     assert main(["run", job]) == 2

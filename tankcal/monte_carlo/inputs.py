@@ -10,7 +10,6 @@ from typing import Protocol
 
 import numpy as np
 from scipy.special import ndtr, ndtri
-from scipy.stats import qmc
 
 PROBES = np.array([1e-9, 1e-5, 0.003, 0.1, 0.31, 0.5, 0.77, 0.98, 0.9999, 1 - 1e-9])
 
@@ -36,6 +35,8 @@ def is_normal(distribution):
 
 def uniforms(count, inputs, seed):
     """(count, inputs) scrambled Sobol points: each uniform, together evenly spread (Owen 1998)."""
+    from scipy.stats import qmc  # half a second to import, which is for those who simulate
+
     points = qmc.Sobol(inputs, scramble=True, rng=np.random.default_rng(seed))
     return points.random(count)
 
