@@ -1,10 +1,13 @@
 """Commands without a job speak the language that is asked for: plans and findings of lint."""
 
+import ast
 import re
+from pathlib import Path
 
 import pytest
 from conftest import EXAMPLE
 
+import tankcal
 from tankcal.cli import main
 from tankcal.cli.showing import speak
 
@@ -13,6 +16,8 @@ ENGLISH = re.compile(
     r"\b(the|expected|found|missing|blank|row|sheet|with|is|of|are|stands|rows|and|or|points"
     r"|targets|observations|change|drop|add)\b"
 )
+# names of the files that are read, and what stands in them
+OF_FILES = r"'[^']*'|tankcal|sensor width|#Focal Length mm assuming a sensor width of"
 
 
 @pytest.fixture(autouse=True)
@@ -29,7 +34,7 @@ def told(capsys):
 
 
 def english(lines):
-    return [line for line in lines if ENGLISH.search(re.sub(r"'[^']*'|tankcal", "", line))]
+    return [line for line in lines if ENGLISH.search(re.sub(OF_FILES, "", line))]
 
 
 TABLE = """height_m,volume_m3
@@ -91,3 +96,66 @@ def test_a_plan_is_told_in_its_language(tmp_path, capsys, language):
     lines = told(capsys)
     assert lines
     assert english(lines) == []
+
+
+@pytest.mark.parametrize("language", OTHERS)
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.txt", "nothing\n"),
+        ("cameras.txt", "1 OPENCV 4000 3000 1 2\n1 THING 10 10 3\n"),
+        ("a.xml", "<calibration><projection>fisheye</projection></calibration>"),
+        ("a.yml", "%YAML:1.0\ncamera_matrix: 3\n"),
+        ("a.ior", "Ck 100\nXh x\nXh 1\nZZ 3\n"),
+        ("a.cam", "Pix4D camera calibration file 0\nF 5\nF 5\nQ 1\n"),
+    ],
+)
+def test_a_camera_that_cannot_be_read_is_told_in_the_language(
+    tmp_path, capsys, language, name, text
+):
+    path = tmp_path / name
+    path.write_text(text)
+    asked = ["camera", "convert", str(path), "--to", "opencv", "--language", language]
+    assert main(asked) == 2
+    lines = told(capsys)
+    assert lines
+    assert english(lines) == []
+
+
+ROOMS = ("planning", "planning_papers", "linter", "conversions", "camera_analysis",
+         "camera_papers", "targets", "cli")  # fmt: skip
+TOLD_BY = {"Problem", "InputError", "SolutionError", "problem", "warning", "warn", "print", "say",
+           "complain", "step", "part", "tell"}  # fmt: skip
+
+
+def test_no_plain_text_is_told_in_these_rooms():
+    """A text of several words that is handed to a teller of the user's is a `message`."""
+    plain = []
+    for room in ROOMS:
+        for path in (Path(tankcal.__file__).parent / room).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if not isinstance(node, ast.Call):
+                    continue
+                name = getattr(node.func, "id", getattr(node.func, "attr", ""))
+                if name in TOLD_BY:
+                    plain += [
+                        f"{path.name}:{one.lineno}: {text_of(one)}"
+                        for one in node.args
+                        if WORDS.search(re.sub(NO_SENTENCES, "", text_of(one)))
+                    ]
+    assert plain == []
+
+
+NO_SENTENCES = r"sensor width|tankcal run"  # a key of a file, a command
+WORDS = re.compile(r"[a-z]{2,}[ ;,:]+[a-z]{2,}")
+
+
+def text_of(node):
+    """The words of a text that stands in the source as it is; "" for anything else."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return node.value
+    if isinstance(node, ast.JoinedStr):
+        return "".join(
+            text_of(one) if isinstance(one, ast.Constant) else "{}" for one in node.values
+        )
+    return ""

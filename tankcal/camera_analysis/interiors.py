@@ -11,6 +11,7 @@ from tankcal.camera import AFFINITIES, CONVENTIONS, PARAMETERS, Form
 from tankcal.camera_analysis.edges import Frame
 from tankcal.conversions.frame import framed, on_film
 from tankcal.errors import InputError, Problem
+from tankcal.messages import Message, listed, message
 
 MOST_NAMES = 20  # in a message
 
@@ -119,7 +120,9 @@ def photos_in(record):
     try:
         return {one["photo"]: one["camera"] for one in record["adjustment"]["photos"]}
     except (KeyError, TypeError) as error:
-        raise InputError(_problem("no sound list", "adjustment.photos")) from error
+        raise InputError(
+            _problem(message("camera_no_list", "no sound list"), "adjustment.photos")
+        ) from error
 
 
 def refuse_unknown(photos, camera=None, photo=None):
@@ -136,8 +139,12 @@ def refuse_unknown(photos, camera=None, photo=None):
 
 
 def _unknown(name, known):
-    more = f" and {len(known) - MOST_NAMES} more" if len(known) > MOST_NAMES else ""
-    return f"found {name!r}; expected one of {', '.join(known[:MOST_NAMES])}{more}"
+    return message(
+        "camera_unknown_name",
+        "found {found!r}; expected one of {names}",
+        found=name,
+        names=listed(known, MOST_NAMES),
+    )
 
 
 def chosen(interiors, photos, camera=None, photo=None):
@@ -166,7 +173,15 @@ def framed_in(record, pixel_mm=None):
     cameras, covariances, problems = [], [], []
     for one in interiors_in(record):
         if one.format_mm is None:
-            problems.append(_problem(f"camera {one.camera}: expected its format"))
+            problems.append(
+                _problem(
+                    message(
+                        "camera_format_missing",
+                        "camera {camera}: expected its format",
+                        camera=one.camera,
+                    )
+                )
+            )
             continue
         cameras.append((one.camera, _framed(one, pixel_mm)))
         covariances.append(_among_all(one.free, one.covariance))
@@ -197,10 +212,19 @@ def interiors_in(record):
     """A tuple of Interior of a record (dict); InputError where it is no sound record of cameras."""
     adjustment = record.get("adjustment") if isinstance(record, dict) else None
     if not isinstance(adjustment, dict):
-        raise InputError(_problem("no adjustment in this record: it says nothing of cameras"))
+        raise InputError(
+            _problem(
+                message(
+                    "camera_no_adjustment",
+                    "no adjustment in this record: it says nothing of cameras",
+                )
+            )
+        )
     cameras = adjustment.get("cameras")
     if not isinstance(cameras, list) or not cameras:
-        raise InputError(_problem("no camera in the adjustment of this record"))
+        raise InputError(
+            _problem(message("camera_none_adjusted", "no camera in the adjustment of this record"))
+        )
     found, problems = [], []
     for number, one in enumerate(cameras):
         try:
@@ -215,10 +239,24 @@ def interiors_in(record):
 def _read(one, cameras):
     convention, affinity = one["convention"], one["affinity"]
     if convention not in CONVENTIONS or affinity not in AFFINITIES:
-        raise ValueError(f"found {convention!r} and {affinity!r}, expected a form of distortion")
+        raise ValueError(
+            message(
+                "camera_no_form",
+                "found {convention!r} and {affinity!r}, expected a form of distortion",
+                convention=convention,
+                affinity=affinity,
+            )
+        )
     names, free = one["parameters"], tuple(one["free"])
     if not set(names) <= set(PARAMETERS) or not set(free) <= set(names):
-        raise ValueError(f"found parameters {names} and free {list(free)}")
+        raise ValueError(
+            message(
+                "camera_parameters_free",
+                "found parameters {names} and free {free}",
+                names=names,
+                free=list(free),
+            )
+        )
     given = dict(zip(names, one["values"], strict=True))
     scope = dict(zip(names, one["scopes"], strict=True))
     state = dict(zip(names, one["states"], strict=True))
@@ -226,11 +264,19 @@ def _read(one, cameras):
     values = np.array([given.get(name, 0.0) for name in PARAMETERS], dtype=float)
     half = np.array(one["edge_mm"], dtype=float).reshape(2)
     if not (np.isfinite(covariance).all() and np.isfinite(values).all() and (half > 0).all()):
-        raise ValueError("found a number that is not finite, or no frame")
+        raise ValueError(
+            message("camera_number_not_finite", "found a number that is not finite, or no frame")
+        )
     if (np.diag(covariance) < 0).any():
-        raise ValueError("found a negative variance")
+        raise ValueError(message("camera_negative_variance", "found a negative variance"))
     if not values[0] > 0:
-        raise ValueError(f"found c = {values[0]:g}, expected a principal distance above 0")
+        raise ValueError(
+            message(
+                "camera_no_principal_distance",
+                "found c = {c:g}, expected a principal distance above 0",
+                c=values[0],
+            )
+        )
     common = len(cameras) > 1 and "block" in scope.values()
     return Interior(
         camera=str(one["camera"]),
@@ -254,7 +300,11 @@ def _two(values):
         return None
     pair = np.array(values, dtype=float).reshape(2)
     if not (np.isfinite(pair).all() and (pair > 0).all()):
-        raise ValueError(f"found {values}, expected two numbers above 0")
+        raise ValueError(
+            message(
+                "camera_two_numbers", "found {found}, expected two numbers above 0", found=values
+            )
+        )
     return pair
 
 
@@ -262,12 +312,20 @@ def _reach(value):
     """Distance of the farthest image point; inf where a record does not say it."""
     reach = np.inf if value is None else float(value)
     if not reach > 0:
-        raise ValueError(f"found reach_mm {value}, expected a distance above 0")
+        raise ValueError(
+            message(
+                "camera_reach", "found reach_mm {found}, expected a distance above 0", found=value
+            )
+        )
     return reach
 
 
 def _why(error):
-    return f"no {error.args[0]!r} there" if isinstance(error, KeyError) else str(error)
+    if isinstance(error, KeyError):
+        return message("camera_key_missing", "no {key!r} there", key=str(error.args[0]))
+    if error.args and isinstance(error.args[0], Message):
+        return error.args[0]
+    return message("camera_unreadable", "cannot be read: {error}", error=str(error))
 
 
 def _problem(expected, column=None):

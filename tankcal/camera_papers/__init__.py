@@ -14,6 +14,7 @@ from tankcal.camera_papers.paper import CameraPaper
 from tankcal.camera_papers.provenance import made_from
 from tankcal.camera_papers.tables import write_csv
 from tankcal.camera_papers.terminal import lines_of
+from tankcal.messages import message
 
 __all__ = ["CameraPaper", "lines", "made_from", "refuse_foreign", "write"]
 
@@ -70,7 +71,9 @@ def write(result, directory, progress=None, language=None):
             notebook,
             temporary,
             (("report.pdf", ""),),
-            lambda done, total: tell("writing the report", done, total),
+            lambda done, total: tell(
+                message("camera_writing_report", "writing the report"), done, total
+            ),
         )
     return [Path(directory) / name for name in FILES if (Path(directory) / name).exists()]
 

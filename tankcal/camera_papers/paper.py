@@ -7,6 +7,7 @@ from tankcal.camera_analysis.versions import CAMERA
 from tankcal.digits import NOTHING
 from tankcal.errors import InputError, Problem
 from tankcal.languages import DEFAULT
+from tankcal.messages import message
 from tankcal.report import blocks
 from tankcal.report.plain import Column, PlainPaper
 from tankcal.words import load_words
@@ -21,7 +22,10 @@ def load(path):
     try:
         result = json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise InputError(Problem(name, f"cannot be read as a result: {error}")) from error
+        expected = message(
+            "camera_result_unreadable", "cannot be read as a result: {error}", error=str(error)
+        )
+        raise InputError(Problem(name, expected)) from error
     return CAMERA.migrated(result, name)
 
 

@@ -1,8 +1,7 @@
 """`tankcal camera`: which parameters belong, comparison and influence of calibrations, and more."""
 
 from tankcal.cli import camera_runs as runs
-from tankcal.cli.arguments import positive, refused, share, whole
-from tankcal.languages import DEFAULT, LANGUAGES
+from tankcal.cli.arguments import add_language, positive, refused, share, whole
 from tankcal.messages import message
 
 
@@ -181,6 +180,7 @@ def _convert(kinds):
         help="first into the convention and affinity of a publication",
     )
     one.add_argument("--out", metavar="FILE", help="where to write (default: the terminal)")
+    add_language(one)
     one.set_defaults(command=runs.convert)
 
 
@@ -225,19 +225,14 @@ def _read(kinds):
     )
     one.add_argument("--replace", action="store_true", help="overwrite an earlier list")
     one.add_argument("--quiet", action="store_true", help="no progress, only problems")
+    add_language(one)
     one.set_defaults(command=runs.read)
 
 
 def _add_outputs(parser):
     parser.add_argument("--json", action="store_true", help="print JSON, not tables")
     parser.add_argument("--out", metavar="DIR", help="also write tables, figures and a report")
-    parser.add_argument(
-        "--language",
-        metavar="CODE",
-        choices=LANGUAGES,
-        help=f"of tables and report: {', '.join(LANGUAGES)} (default: that of the job, "
-        f"else {DEFAULT})",
-    )
+    add_language(parser)
     parser.add_argument("--quiet", action="store_true", help="no progress, only problems")
 
 

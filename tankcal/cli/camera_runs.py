@@ -5,8 +5,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import tankcal
-from tankcal.cli.showing import Progress, counted, listed, prepare_for_small_work, warn
+from tankcal.cli.showing import (
+    Progress,
+    listed,
+    prepare_for_small_work,
+    say,
+    speak,
+    spoken_language,
+    warn,
+)
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 
 FIRST_WORDS = 200  # bytes
 
@@ -28,7 +37,7 @@ def parameters(options):
     if record is not None:
         found = analyse_record(record, choices, **of)
     else:
-        job = _load(options.source, show)
+        job = _load(options.source, show, options.language)
         if job.measurements is not None:
             _refuse_several(options, sets_to_be(job.measurements, **of))
         found = analyse_job(job, choices, **of, dropping=not options.no_trials, tell=show.part)
@@ -74,7 +83,7 @@ def influence(options):
     show = _start(options)
     warnings = []
     calibrations = read_cameras(options.cameras, warnings.append, in_pixels=False)
-    job = _load(options.job, show)
+    job = _load(options.job, show, options.language)
     found = influence_of(
         job,
         calibrations,
@@ -105,7 +114,7 @@ def check(options):
     elif Path(options.source).suffix.lower() == ".csv":
         differences = read_differences(options.source, options.separator, options.decimal)
     else:
-        job = _load(options.source, show)
+        job = _load(options.source, show, options.language)
         differences = differences_of(tankcal.adjust_job(job, show.step))
     axes, values = differences.of_known_axes()
     found = check_product(values, axes, names=differences.names, limits=table, alpha=options.alpha)
@@ -120,21 +129,26 @@ def convert(options):
 
     from tankcal.conversions.writing import write_camera
 
+    speak(options.language)
     cameras, covariances = _cameras_of(options)
     if options.name is not None:
         cameras, covariances = _only(options, cameras, covariances)
     for name, camera in cameras:
-        _tell_error(f"{name}, as read", camera)
+        _tell_error(message("convert_as_read", "{name}, as read", name=name), camera)
     if options.form is not None:
         cameras, covariances = _in_form(options.form, cameras, covariances)
         for name, camera in cameras:
-            _tell_error(f"{name}, in the form of {options.form}", camera)
+            what = message(
+                "convert_in_form", "{name}, in the form of {form}", name=name, form=options.form
+            )
+            _tell_error(what, camera)
     sds = [None if one is None else np.sqrt(np.maximum(np.diag(one), 0.0)) for one in covariances]
     file = Path(options.file).name
     written = write_camera(options.to, cameras, sds, options.radius_mm, file)
     if options.to != "cameras.toml":
         for (name, camera), error_px in zip(cameras, written.error_px, strict=True):
-            _tell_error(f"{name}, as {options.to}", replace(camera, error_px=error_px))
+            what = message("convert_as", "{name}, as {form}", name=name, form=options.to)
+            _tell_error(what, replace(camera, error_px=error_px))
     if options.out is None:
         print(written.text, end="")
         return
@@ -195,7 +209,12 @@ def _only(options, cameras, covariances):
     """The camera of that name alone."""
     names = [name for name, _ in cameras]
     if options.name not in names:
-        expected = f"found --name {options.name!r}; expected one of {', '.join(names[:20])}"
+        expected = message(
+            "camera_no_such_name",
+            "found --name {found!r}; expected one of {known}",
+            found=options.name,
+            known=", ".join(names[:20]),
+        )
         raise InputError(Problem(Path(options.file).name, expected))
     place = names.index(options.name)
     return [cameras[place]], [covariances[place]]
@@ -203,9 +222,16 @@ def _only(options, cameras, covariances):
 
 def _tell_error(what, camera):
     if camera.error_px > 1e-9:
-        is_film = camera.film_mm is not None
-        away = f"{camera.error_um:.2g} um" if is_film else f"{camera.error_px:.2g} px"
-        warn([f"{what}: fitted, up to {away} away within the frame"])
+        away = message("convert_px", "{error:.2g} px", error=camera.error_px)
+        if camera.film_mm is not None:
+            away = message("convert_um", "{error:.2g} um", error=camera.error_um)
+        text = message(
+            "convert_fitted",
+            "{what}: fitted, up to {away} away within the frame",
+            what=what,
+            away=away,
+        )
+        warn([text])
 
 
 def _write_new(target, text):
@@ -213,8 +239,13 @@ def _write_new(target, text):
         with target.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        raise InputError(Problem(target.name, "exists; expected the name of a new file")) from error
-    print(f"wrote {target}")
+        raise InputError(
+            Problem(
+                target.name,
+                message("camera_file_exists", "exists; expected the name of a new file"),
+            )
+        ) from error
+    say(message("convert_wrote", "wrote {file}", file=str(target)))
 
 
 def read(options):
@@ -222,6 +253,7 @@ def read(options):
     prepare_for_small_work()
     from tankcal.targets import Wanted, read_photographs
 
+    speak(options.language)
     show = Progress(options.quiet)
     wanted = Wanted(
         what=options.what,
@@ -239,12 +271,40 @@ def read(options):
     warn(found.warnings)
     refused = sum(found.refused.values())
     reasons = ", ".join(f"{code} {count}" for code, count in sorted(found.refused.items()))
-    print(
-        f"{counted(found.targets, 'target')}, {counted(found.points, 'image point')} in "
-        f"{counted(len(found.photos), 'photo')}; refused: {refused}"
-        + (f" ({reasons})" if refused else "")
+    say(
+        message(
+            "targets_read",
+            "{targets}, {points} in {photos}; refused: {refused}{reasons}",
+            targets=_targets(found.targets),
+            points=_image_points(found.points),
+            photos=_photos(len(found.photos)),
+            refused=refused,
+            reasons=f" ({reasons})" if refused else "",
+        )
     )
     print(f"  {found.path}\n  {found.refused_path}")
+
+
+def _targets(count):
+    if count == 1:
+        return message("one_target", "1 target")
+    if count == 0:
+        return message("no_targets", "no targets")
+    return message("some_targets", "{count} targets", count=count)
+
+
+def _image_points(count):
+    if count == 1:
+        return message("one_image_point", "1 image point")
+    if count == 0:
+        return message("no_image_points", "no image points")
+    return message("some_image_points", "{count} image points", count=count)
+
+
+def _photos(count):
+    if count == 1:
+        return message("one_photo_read", "1 photo")
+    return message("some_photos_read", "{count} photos", count=count)
 
 
 def _start(options):
@@ -253,12 +313,18 @@ def _start(options):
 
     if options.out is not None:
         camera_papers.refuse_foreign(options.out)
+    speak(options.language)
     return Progress(options.quiet)
 
 
-def _load(source, show):
+def _load(source, show, language):
     """The job, with its tank where it has one."""
-    show.step(f"reading {source}")
+    from tankcal.cli.asked_language import asked_language
+
+    language = language or asked_language(source)
+    if language is not None:
+        speak(language)
+    show.step(message("camera_reading", "reading {source}", source=str(source)))
     job = tankcal.load(source, only="adjustment")
     return job if job.tank is None else tankcal.load(source)
 
@@ -284,7 +350,8 @@ def _finish(results, options, show, paths, job=None, record=None, printed=None):
     """Print tables or JSON; write the papers where they are asked for."""
     from tankcal import camera_papers
 
-    language = options.language or _language_of(job, record)
+    language = options.language or _language_of(job, record) or spoken_language()
+    speak(language)
     _refuse_several(options, len(results))
     made_from = camera_papers.made_from(paths, job)
     results = [result | {"made_from": made_from} for result in results]
@@ -314,5 +381,9 @@ def _language_of(job, record):
 
 def _refuse_several(options, count):
     if options.out is not None and count > 1:
-        several = f"there are {count} sets of parameters; expected --camera or --photo"
-        raise InputError(Problem("--out", f"{several}, to write one"))
+        several = message(
+            "camera_several_sets",
+            "there are {count} sets of parameters; expected --camera or --photo, to write one",
+            count=count,
+        )
+        raise InputError(Problem("--out", several))

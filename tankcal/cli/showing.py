@@ -27,6 +27,11 @@ def spoken():
     return _spoken
 
 
+def spoken_language():
+    """The code of the language that is spoken."""
+    return _spoken["language"]["code"] if _spoken else DEFAULT
+
+
 def said(text):
     """A text in the language that is spoken; one without a code is as it is."""
     if not (_spoken and isinstance(text, Message)):
@@ -96,11 +101,6 @@ def listed(out, paths):
     say(message("results_in", "results in {folder}:", folder=str(out)))
     for path in paths:
         print(f"  {path}")
-
-
-def counted(count, thing):
-    """ "no points", "1 point", "2 points"."""
-    return f"{count or 'no'} {thing}{'' if count == 1 else 's'}"
 
 
 class Progress:

@@ -21,7 +21,8 @@ from tankcal.camera import Form
 from tankcal.conversions.fitting import USUAL
 from tankcal.conversions.frame import framed, on_film
 from tankcal.conversions.published import converted
-from tankcal.conversions.texts import exactly, shown
+from tankcal.conversions.texts import exactly, given_twice, shown
+from tankcal.messages import message
 
 KEYS = ("Ck", "Xh", "Yh", "A1", "A2", "R0", "A3", "B1", "B2", "C1", "C2")
 FILM_KEYS = ("format_width", "format_height")
@@ -99,20 +100,38 @@ def parse(text, notes):
             continue
         key = words[0]
         if len(words) != 2:
-            notes.tell("expected a key and one number", row, shown(key))
+            notes.tell(
+                message("convert_key_and_number", "expected a key and one number"), row, shown(key)
+            )
         elif key in values:
-            notes.tell("given twice; expected once", row, key)
+            notes.tell(given_twice(), row, key)
         elif key == "convention":
             convention = words[1]
             if convention not in CONVENTIONS_OF:
-                notes.tell(f"expected one of {', '.join(CONVENTIONS_OF)}", row, key)
+                notes.tell(
+                    message(
+                        "convert_conventions",
+                        "expected one of {names}",
+                        names=", ".join(CONVENTIONS_OF),
+                    ),
+                    row,
+                    key,
+                )
         elif key in ("columns", "lines"):
             values[key] = notes.count(words[1], row, key)
         elif key in KEYS or key in FRAME_KEYS:
             low = 0 if key in FRAME_KEYS else None
             values[key] = notes.number(words[1], row, key, above=low)
         else:
-            notes.tell(f"unknown; expected {', '.join((*KEYS, *FRAME_KEYS))}", row, shown(key))
+            notes.tell(
+                message(
+                    "convert_balanced_unknown",
+                    "unknown; expected {known}",
+                    known=", ".join((*KEYS, *FRAME_KEYS)),
+                ),
+                row,
+                shown(key),
+            )
     _check(values, notes)
     camera = Balanced({key: values.get(key, 0.0) for key in KEYS}, convention)
     return camera, {key: values[key] for key in FRAME_KEYS if key in values}
@@ -121,14 +140,35 @@ def parse(text, notes):
 def _check(values, notes):
     for key in ("Ck", "R0"):
         if key not in values:
-            notes.tell("missing; expected a number (R0 is 0 when not balanced)", key=key)
+            notes.tell(
+                message(
+                    "convert_balanced_missing",
+                    "missing; expected a number (R0 is 0 when not balanced)",
+                ),
+                key=key,
+            )
     if values.get("Ck", -1) >= 0:
-        notes.tell(f"found {values['Ck']:g}; expected a number of mm below 0", key="Ck")
+        notes.tell(
+            message(
+                "convert_balanced_ck",
+                "found {found:g}; expected a number of mm below 0",
+                found=values["Ck"],
+            ),
+            key="Ck",
+        )
     for key in FILM_KEYS:
         if values.get(key, 0) > LARGEST_FILM_MM:
-            notes.tell(f"found {values[key]:g}; expected mm, at most {LARGEST_FILM_MM}", key=key)
+            notes.tell(
+                message(
+                    "convert_balanced_film",
+                    "found {found:g}; expected mm, at most {most}",
+                    found=values[key],
+                    most=LARGEST_FILM_MM,
+                ),
+                key=key,
+            )
     if values.get("R0", 0) < 0:
-        notes.tell("below 0; expected a radius in mm", key="R0")
+        notes.tell(message("convert_balanced_radius", "below 0; expected a radius in mm"), key="R0")
 
 
 def _written(value):

@@ -13,6 +13,7 @@ import numpy as np
 from tankcal.conversions.brown import Has, to_brown
 from tankcal.conversions.opencv import OpenCV, from_opencv
 from tankcal.conversions.texts import exactly, shown
+from tankcal.messages import message
 
 MODELS = {
     "SIMPLE_PINHOLE": ("f", "cx", "cy"),
@@ -102,25 +103,53 @@ def parse(text, notes):
             continue
         name = notes.name(words[0], row, "CAMERA_ID")
         if name in [other for other, _ in found]:
-            notes.tell(f"camera {shown(name)} a second time; expected each once", row, "CAMERA_ID")
+            notes.tell(
+                message(
+                    "convert_colmap_twice",
+                    "camera {name} a second time; expected each once",
+                    name=shown(name),
+                ),
+                row,
+                "CAMERA_ID",
+            )
         found.append((name, camera))
     if not found and not notes.problems:
-        notes.tell("no camera; expected lines such as 1 OPENCV 4000 3000 and its parameters")
+        notes.tell(
+            message(
+                "convert_colmap_none",
+                "no camera; expected lines such as 1 OPENCV 4000 3000 and its parameters",
+            )
+        )
     return found
 
 
 def _parsed(words, row, notes):
     if len(words) < 4:
-        notes.tell("cut off; expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS", row)
+        notes.tell(
+            message("convert_colmap_cut", "cut off; expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS"),
+            row,
+        )
         return None
     model = words[1]
     if model not in MODELS:
-        expected = f"camera model {shown(model)}; those read are {', '.join(MODELS)}"
+        expected = message(
+            "convert_colmap_model",
+            "camera model {model}; those read are {models}",
+            model=shown(model),
+            models=", ".join(MODELS),
+        )
         notes.tell(expected, row, "MODEL")
         return None
     names, texts = MODELS[model], words[4:]
     if len(texts) != len(names):
-        expected = f"{len(texts)} parameters of {model}; expected {len(names)}: {' '.join(names)}"
+        expected = message(
+            "convert_colmap_parameters",
+            "{count} parameters of {model}; expected {expected}: {names}",
+            count=len(texts),
+            model=model,
+            expected=len(names),
+            names=" ".join(names),
+        )
         notes.tell(expected, row, "PARAMS")
         return None
     size = (notes.count(words[2], row, "WIDTH"), notes.count(words[3], row, "HEIGHT"))

@@ -10,7 +10,8 @@ import re
 import numpy as np
 
 from tankcal.conversions.opencv import COUNTS, OpenCV
-from tankcal.conversions.texts import exactly, shown
+from tankcal.conversions.texts import exactly, given_twice, shown
+from tankcal.messages import message
 
 MATRIX = ("camera_matrix", "cameramatrix", "intrinsic_matrix", "k", "mtx", "camera_mtx")
 COEFFICIENTS = ("distortion_coefficients", "distcoeffs", "dist_coeffs", "dist", "d")
@@ -27,7 +28,11 @@ def parse(text, notes):
     if nodes is None:
         return None
     if _is_fisheye(nodes):
-        notes.tell("a fisheye camera; only the perspective model of OpenCV is read")
+        notes.tell(
+            message(
+                "convert_fisheye", "a fisheye camera; only the perspective model of OpenCV is read"
+            )
+        )
         return None
     matrix = _array(nodes, MATRIX, notes)
     coefficients = _array(nodes, COEFFICIENTS, notes)
@@ -35,7 +40,11 @@ def parse(text, notes):
     if matrix is not None:
         _check_matrix(matrix, notes)
     if coefficients is not None and coefficients.size not in COUNTS:
-        expected = f"{coefficients.size} numbers; expected 4, 5, 8, 12 or 14"
+        expected = message(
+            "convert_coefficients",
+            "{count} numbers; expected 4, 5, 8, 12 or 14",
+            count=coefficients.size,
+        )
         notes.tell(expected, key="distortion_coefficients")
     if notes.problems:
         return None
@@ -44,15 +53,30 @@ def parse(text, notes):
 
 def _check_matrix(matrix, notes):
     if matrix.size != 9:
-        notes.tell(f"{matrix.size} numbers; expected 3 x 3", key="camera_matrix")
+        notes.tell(
+            message("convert_matrix", "{count} numbers; expected 3 x 3", count=matrix.size),
+            key="camera_matrix",
+        )
         return
     (fx, skew, _), (low, fy, _), last = matrix.reshape(3, 3)
     if fx <= 0 or fy <= 0:
-        notes.tell(f"fx = {fx:g}, fy = {fy:g}; expected both above 0", key="camera_matrix")
+        notes.tell(
+            message(
+                "convert_focal", "fx = {fx:g}, fy = {fy:g}; expected both above 0", fx=fx, fy=fy
+            ),
+            key="camera_matrix",
+        )
     if low != 0 or tuple(last) != (0, 0, 1):
-        notes.tell("expected the rows fx 0 cx, 0 fy cy, 0 0 1", key="camera_matrix")
+        notes.tell(
+            message("convert_matrix_rows", "expected the rows fx 0 cx, 0 fy cy, 0 0 1"),
+            key="camera_matrix",
+        )
     if skew != 0:
-        expected = f"a skew of {skew:g} px, which OpenCV itself leaves out; expected 0"
+        expected = message(
+            "convert_skew",
+            "a skew of {skew:g} px, which OpenCV itself leaves out; expected 0",
+            skew=skew,
+        )
         notes.tell(expected, key="camera_matrix")
 
 
@@ -67,7 +91,10 @@ def _size(nodes, notes):
         return None
     for (key, _), name in zip(found, ("image_width", "image_height"), strict=True):
         if key is None:
-            notes.tell("missing; expected both sides of the image or none", key=name)
+            notes.tell(
+                message("convert_one_side", "missing; expected both sides of the image or none"),
+                key=name,
+            )
     return tuple(notes.count(value, key=key) if key else 2 for key, value in found)
 
 
@@ -79,7 +106,14 @@ def _first(nodes, names):
 def _array(nodes, names, notes):
     key, node = _first(nodes, names)
     if key is None:
-        notes.tell(f"missing; expected it under a name such as {names[0]}", key=names[0])
+        notes.tell(
+            message(
+                "convert_under_name",
+                "missing; expected it under a name such as {name}",
+                name=names[0],
+            ),
+            key=names[0],
+        )
         return None
     shape = None
     if isinstance(node, dict):
@@ -87,7 +121,7 @@ def _array(nodes, names, notes):
         node = node.get("data")
     flat = _flat(node)
     if flat is None or (not flat and key in MATRIX):
-        notes.tell("no numbers; expected a matrix", key=key)
+        notes.tell(message("convert_no_matrix", "no numbers; expected a matrix"), key=key)
         return None
     before = len(notes.problems)
     values = np.array([notes.number(one, key=key) for one in flat], dtype=float)
@@ -96,7 +130,16 @@ def _array(nodes, names, notes):
     if shape is not None and None not in shape:
         rows, columns = (notes.number(one, key=key) for one in shape)
         if rows * columns != values.size:
-            notes.tell(f"{values.size} numbers; expected {rows:g} x {columns:g}", key=key)
+            notes.tell(
+                message(
+                    "convert_matrix_size",
+                    "{count} numbers; expected {rows:g} x {columns:g}",
+                    count=values.size,
+                    rows=rows,
+                    columns=columns,
+                ),
+                key=key,
+            )
             return None
     return values
 
@@ -122,11 +165,14 @@ def _json(text, notes):
         found = json.loads(text, object_pairs_hook=unique)
     except (ValueError, RecursionError) as error:
         notes.tell(
-            f"no readable JSON ({error}); is the file complete?", getattr(error, "lineno", None)
+            message(
+                "convert_no_json", "no readable JSON ({error}); is the file complete?", error=error
+            ),
+            getattr(error, "lineno", None),
         )
         return None
     for key in twice:
-        notes.tell("given twice; expected once", key=shown(key))
+        notes.tell(given_twice(), key=shown(key))
     return found
 
 
@@ -147,13 +193,17 @@ def _yaml(text, notes):
             value += " " + lines[row].strip()
             row += 1
         if value.startswith("[") and not LIST.fullmatch(value):
-            notes.tell("a list without end; is the file complete?", number, shown(key))
+            notes.tell(
+                message("convert_endless_list", "a list without end; is the file complete?"),
+                number,
+                shown(key),
+            )
             return None
         if value.startswith("["):
             value = [one.strip() for one in value[1:-1].split(",") if one.strip()]
         home = nodes if indent == 0 or inside is None else inside
         if key in home:
-            notes.tell("given twice; expected once", number, shown(key))
+            notes.tell(given_twice(), number, shown(key))
         is_node = isinstance(value, str) and (value == "" or value.startswith("!!opencv-matrix"))
         home[key] = {} if is_node and indent == 0 else value
         if indent == 0:

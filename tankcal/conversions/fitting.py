@@ -17,6 +17,7 @@ import numpy as np
 from tankcal.camera import PARAMETERS
 from tankcal.errors import SolutionError
 from tankcal.imaging import one_image_point
+from tankcal.messages import message
 
 ROUNDS = 60
 SMALL_PX = 1e-12  # root mean square effect of the last step on the image
@@ -61,7 +62,12 @@ def fit(rays, image_mm, pixel_mm, form, start, used, extras=()):
         felt = size > 0  # P3 beside P1 = P2 = 0 has no effect
         step, _, rank, _ = np.linalg.lstsq(columns[:, felt] / size[felt], -off, rcond=None)
         if rank < np.count_nonzero(felt):
-            raise SolutionError("the parameters of the camera cannot be told apart over the frame")
+            raise SolutionError(
+                message(
+                    "convert_not_told_apart",
+                    "the parameters of the camera cannot be told apart over the frame",
+                )
+            )
         moved = np.zeros_like(values)
         moved[np.array(unknown)[felt]] = step / size[felt]
         values, off, jacobian, shrunk = _shortened(
@@ -71,7 +77,13 @@ def fit(rays, image_mm, pixel_mm, form, start, used, extras=()):
         if effect_px < SMALL_PX or not shrunk:
             break
     if shrunk and effect_px > SERVES_PX:
-        raise SolutionError(f"the conversion did not converge in {ROUNDS} rounds")
+        raise SolutionError(
+            message(
+                "convert_no_convergence",
+                "the conversion did not converge in {rounds} rounds",
+                rounds=ROUNDS,
+            )
+        )
     return Fit(values[: len(PARAMETERS)], *(float(v) for v in values[len(PARAMETERS) :]))
 
 

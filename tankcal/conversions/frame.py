@@ -14,6 +14,7 @@ import numpy as np
 
 from tankcal.camera import Form, corrected, measured
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 
 COUNTED_ON_FILM = 4608  # stand-ins for pixels along the longest side of a film
 GRID = (46, 35)  # points of the frame, edges included, over which errors are stated
@@ -116,8 +117,15 @@ def refuse_folds(points_px, off_px):
     if np.any(bad):
         column, line = np.asarray(points_px)[np.flatnonzero(bad)[0]]
         raise SolutionError(
-            f"the distortion folds the image at column {column:.0f}, line {line:.0f}: no one ray"
-            f" belongs to {np.count_nonzero(bad)} of {len(bad)} points of the frame"
+            message(
+                "convert_folds",
+                "the distortion folds the image at column {column:.0f}, line {line:.0f}: "
+                "no one ray belongs to {bad} of {all} points of the frame",
+                column=column,
+                line=line,
+                bad=np.count_nonzero(bad),
+                all=len(bad),
+            )
         )
 
 

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 from tankcal.conversions.brown import Brown, from_brown, to_brown
-from tankcal.conversions.texts import exactly, shown
+from tankcal.conversions.texts import exactly, given_twice, shown
+from tankcal.messages import message
 
 TERMS = ("cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
 OTHERS = ("projection", "date", "width", "height", "f")
@@ -93,16 +94,29 @@ def parse(text, notes):
     found = {}
     for child in root:
         if child.tag in found:
-            notes.tell("given twice; expected once", key=shown(child.tag))
+            notes.tell(given_twice(), key=shown(child.tag))
         elif child.tag not in (*TERMS, *OTHERS, *OLD):
-            notes.tell("unknown; expected the keys of a frame camera", key=shown(child.tag))
+            notes.tell(
+                message(
+                    "convert_metashape_unknown", "unknown; expected the keys of a frame camera"
+                ),
+                key=shown(child.tag),
+            )
         found[child.tag] = (child.text or "").strip()
     kind = found.get("projection", "frame")
     if kind != "frame":
-        notes.tell(f"{shown(kind)}; only frame cameras are read", key="projection")
+        notes.tell(
+            message(
+                "convert_metashape_kind", "{kind}; only frame cameras are read", kind=shown(kind)
+            ),
+            key="projection",
+        )
         return None
     if any(key in found for key in OLD):
-        expected = "a form of PhotoScan before 1.2; open it in Metashape and save it again"
+        expected = message(
+            "convert_metashape_old",
+            "a form of PhotoScan before 1.2; open it in Metashape and save it again",
+        )
         notes.tell(expected, key=next(key for key in OLD if key in found))
         return None
     size = tuple(_needed(found, key, notes.count, notes) for key in ("width", "height"))
@@ -110,31 +124,59 @@ def parse(text, notes):
     terms = [notes.number(found[key], key=key) if key in found else 0.0 for key in TERMS]
     camera = Metashape(size, f, *terms[:4], tuple(terms[4:8]), tuple(terms[8:]))
     if f + terms[2] <= 0:
-        notes.tell(f"{terms[2]:g} beside f = {f:g}; expected less in magnitude", key="b1")
+        notes.tell(
+            message(
+                "convert_metashape_shear",
+                "{found:g} beside f = {f:g}; expected less in magnitude",
+                found=terms[2],
+                f=f,
+            ),
+            key="b1",
+        )
     return camera
 
 
 def _root(text, notes):
     lower = text.lower()
     if "<!doctype" in lower or "<!entity" in lower:
-        notes.tell("a document type or entities; expected a calibration as Metashape saves it")
+        notes.tell(
+            message(
+                "convert_metashape_doctype",
+                "a document type or entities; expected a calibration as Metashape saves it",
+            )
+        )
         return None
     try:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
         row = getattr(error, "position", (None,))[0]
-        notes.tell(f"no readable XML ({error}); is the file complete?", row)
+        notes.tell(
+            message(
+                "convert_no_xml", "no readable XML ({error}); is the file complete?", error=error
+            ),
+            row,
+        )
         return None
     if root.tag != "calibration":
-        expected = "expected calibration: save it in Tools, Camera Calibration, as Agisoft XML"
-        notes.tell(f"{shown(root.tag)} as the outermost element; {expected}")
+        expected = message(
+            "convert_metashape_root",
+            "expected calibration: save it in Tools, Camera Calibration, as Agisoft XML",
+        )
+        notes.tell(
+            message(
+                "convert_outermost",
+                "{found} as the outermost element; {expected}",
+                found=shown(root.tag),
+                expected=expected,
+            )
+        )
         return None
     return root
 
 
 def _needed(found, key, read, notes):
     if found.get(key, "") == "":
-        notes.tell("missing; expected a number", key=key)
+        notes.tell(message("convert_metashape_missing", "missing; expected a number"), key=key)
         return 2
     return read(found[key], key=key)
 

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 
 from tankcal.conversions.brown import Brown, Has, from_brown, to_brown
 from tankcal.conversions.texts import exactly, shown
+from tankcal.messages import message
 
 KEYS = ("F", "Px", "Py", "K1", "K2", "K3", "T1", "T2")
 HEAD = re.compile(r"pix4d camera calibration file\s*(.*)", re.IGNORECASE)
@@ -88,8 +89,12 @@ def parse(text, notes):
     for row, line in enumerate(text.splitlines(), 1):
         head = HEAD.match(line.strip())
         if INPHO.match(line):
-            expected = "the form for Inpho; expected PROJECT_pix4d_calibrated_internal_camera"
-            notes.tell(f"{expected}_parameters.cam, beside it", row)
+            expected = message(
+                "convert_inpho",
+                "the form for Inpho; expected "
+                "PROJECT_pix4d_calibrated_internal_camera_parameters.cam, beside it",
+            )
+            notes.tell(expected, row)
             return []
         if head:
             name = notes.name(head[1], row) if head[1] else str(len(parts))
@@ -97,10 +102,21 @@ def parse(text, notes):
         elif parts:
             parts[-1][2].append((row, line.strip()))
         elif line.strip():
-            notes.tell(f"{shown(line.strip())}; expected Pix4D camera calibration file 0", row)
+            notes.tell(
+                message(
+                    "convert_pix4d_first",
+                    "{found}; expected Pix4D camera calibration file 0",
+                    found=shown(line.strip()),
+                ),
+                row,
+            )
             return []
     if not parts:
-        notes.tell("no camera; expected a line Pix4D camera calibration file 0")
+        notes.tell(
+            message(
+                "convert_pix4d_none", "no camera; expected a line Pix4D camera calibration file 0"
+            )
+        )
     return [(name, _parsed(row, lines, notes)) for name, row, lines in parts]
 
 
@@ -117,18 +133,34 @@ def _parsed(head_row, lines, notes):
         if not line:
             continue
         if key not in KEYS:
-            notes.tell(f"unknown; expected {', '.join(KEYS)}", row, shown(key))
+            notes.tell(
+                message(
+                    "convert_pix4d_unknown", "unknown; expected {known}", known=", ".join(KEYS)
+                ),
+                row,
+                shown(key),
+            )
         elif key in values:
-            notes.tell("given twice; expected once for each camera", row, key)
+            notes.tell(
+                message("convert_pix4d_twice", "given twice; expected once for each camera"),
+                row,
+                key,
+            )
         else:
             values[key] = notes.number(value.strip(), row, key, above=0 if key == "F" else None)
     for key in KEYS:
         if key not in values:
-            notes.tell("missing; is the file complete?", head_row, key)
+            notes.tell(
+                message("convert_pix4d_missing", "missing; is the file complete?"), head_row, key
+            )
             values[key] = 0.0
     if sensor is None:
-        expected = "missing; expected a remark such as #Focal Length mm assuming a sensor width of"
-        notes.tell(f"{expected} 6.17x4.63mm", head_row, "sensor width")
+        expected = message(
+            "convert_sensor_width",
+            "missing; expected a remark such as #Focal Length mm assuming a sensor width of "
+            "6.17x4.63mm",
+        )
+        notes.tell(expected, head_row, "sensor width")
         sensor = (1.0, 1.0)
     f, px, py, *k, t1, t2 = (values[key] for key in KEYS)
     return Pix4D(sensor, f, px, py, tuple(k), (t1, t2))

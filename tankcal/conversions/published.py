@@ -28,6 +28,7 @@ from tankcal.conversions.frame import (
     rays_of,
 )
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 
 PUBLISHED = {
     "silva": Form("correction_added", "both_y"),
@@ -162,9 +163,21 @@ def propagated(function, values, covariance):
 
 def _standard_deviations(covariance, count):
     if covariance.shape != (count, count) or not np.all(np.isfinite(covariance)):
-        raise SolutionError(f"covariance: expected {count} x {count} finite numbers")
+        raise SolutionError(
+            message(
+                "convert_covariance",
+                "covariance: expected {count} x {same} finite numbers",
+                count=count,
+                same=count,
+            )
+        )
     if np.any(np.diag(covariance) < 0) or not np.allclose(covariance, covariance.T, rtol=1e-9):
-        raise SolutionError("covariance: expected a symmetric matrix without negative variances")
+        raise SolutionError(
+            message(
+                "convert_covariance_form",
+                "covariance: expected a symmetric matrix without negative variances",
+            )
+        )
     return np.sqrt(np.diag(covariance))
 
 

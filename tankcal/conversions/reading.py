@@ -16,6 +16,7 @@ from tankcal.conversions import balanced, colmap, filestorage, metashape, pix4d
 from tankcal.conversions.opencv import from_opencv
 from tankcal.conversions.texts import LONGEST, Notes, only_letters, shown
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 
 SAME_PIXEL = 0.01  # pixels of a file and as given may differ by as much, for rounding
 PIXELS_UM = (0.1, 100.0)  # of cameras and scanners
@@ -47,7 +48,11 @@ def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
     found = _PARSERS[kind](text, notes, file, size_px)
     needs_pixel = kind not in ("pix4d", "aicon")
     if needs_pixel and pixel_um is None:
-        expected = f"missing; a file of kind {kind} does not say it. Give it in micrometres"
+        expected = message(
+            "convert_pixel_missing",
+            "missing; a file of kind {form} does not say it. Give it in micrometres",
+            form=kind,
+        )
         notes.tell(expected, key="pixel_um")
     notes.stop()
     pixel_mm = None if pixel_um is None else pixel_um * 1e-3
@@ -56,19 +61,39 @@ def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
         try:
             cameras.append((name, convert(pixel_mm)))
         except SolutionError as error:
-            notes.tell(f"camera {shown(name)} cannot be converted: {error}")
+            text = message(
+                "convert_cannot",
+                "camera {camera} cannot be converted: {error}",
+                camera=shown(name),
+                error=error.texts[0],
+            )
+            notes.tell(text)
     notes.stop()
     return cameras
 
 
 def _check_arguments(kind, pixel_um, size_px, notes):
     if kind is not None and kind not in KINDS:
-        notes.tell(f"{shown(kind)} as the kind of file; expected one of {', '.join(KINDS)}")
+        notes.tell(
+            message(
+                "convert_kind",
+                "{found} as the kind of file; expected one of {known}",
+                found=shown(kind),
+                known=", ".join(KINDS),
+            )
+        )
     if (
         pixel_um is not None
         and not PIXELS_UM[0] <= notes.number(pixel_um, key="pixel_um") <= PIXELS_UM[1]
     ):
-        notes.tell(f"{shown(pixel_um)}; expected micrometres, 0.1 to 100", key="pixel_um")
+        notes.tell(
+            message(
+                "convert_pixel_range",
+                "{found}; expected micrometres, 0.1 to 100",
+                found=shown(pixel_um),
+            ),
+            key="pixel_um",
+        )
     if size_px is not None:
         for number, key in zip(size_px, ("columns", "lines"), strict=True):
             notes.count(number, key=key)
@@ -78,23 +103,38 @@ def _text(path, notes):
     """The text of a file, or None after telling what is wrong."""
     try:
         if not path.is_file():
-            notes.tell("not found; expected a file of cameras")
+            notes.tell(message("convert_not_found", "not found; expected a file of cameras"))
             return None
         with path.open("rb") as stream:
             data = stream.read(LONGEST + 1)
     except (OSError, ValueError) as error:
-        notes.tell(f"cannot be read ({getattr(error, 'strerror', None) or error})")
+        notes.tell(
+            message(
+                "convert_not_readable",
+                "cannot be read ({reason})",
+                reason=getattr(error, "strerror", None) or error,
+            )
+        )
         return None
     if len(data) > LONGEST:
-        notes.tell(f"more than {LONGEST} bytes; expected a file of cameras")
+        notes.tell(
+            message(
+                "convert_too_long",
+                "more than {most} bytes; expected a file of cameras",
+                most=LONGEST,
+            )
+        )
         return None
     if b"\0" in data:
-        notes.tell("no text; expected a text file (UTF-8)")
+        notes.tell(message("convert_no_text", "no text; expected a text file (UTF-8)"))
         return None
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        notes.tell("a letter that is not UTF-8", data[: error.start].count(b"\n") + 1)
+        notes.tell(
+            message("convert_no_utf8", "a letter that is not UTF-8"),
+            data[: error.start].count(b"\n") + 1,
+        )
         return None
 
 
@@ -115,7 +155,13 @@ def _recognised(text, notes):
         "CAMERA_ID" in start
     ):
         return "colmap"
-    notes.tell(f"no camera file that is known; expected one of {', '.join(KINDS)}")
+    notes.tell(
+        message(
+            "convert_not_known",
+            "no camera file that is known; expected one of {known}",
+            known=", ".join(KINDS),
+        )
+    )
     return None
 
 
@@ -156,10 +202,17 @@ def _pix4d(text, notes, _file, size_px):
     for name, camera in found:
         if size_px is not None and not notes.problems and not pix4d.suits(camera, size_px):
             width, height = camera.sensor_mm
-            expected = (
-                f"{size_px[0]} x {size_px[1]} px beside a sensor of {width:g} x {height:g} mm"
+            expected = message(
+                "convert_proportions",
+                "{columns} x {lines} px beside a sensor of {width:g} x {height:g} mm (camera "
+                "{camera}); expected the same proportions",
+                columns=size_px[0],
+                lines=size_px[1],
+                width=width,
+                height=height,
+                camera=name,
             )
-            notes.tell(f"{expected} (camera {name}); expected the same proportions", key="columns")
+            notes.tell(expected, key="columns")
     return [(name, later(camera)) for name, camera in found]
 
 
@@ -168,21 +221,38 @@ def _aicon(text, notes, file, size_px):
     film_mm = [frame[key] for key in balanced.FILM_KEYS if key in frame]
     if len(film_mm) == 1:
         notes.tell(
-            "one side of a film; expected format_width and format_height", key="format_width"
+            message(
+                "convert_one_side_of_film",
+                "one side of a film; expected format_width and format_height",
+            ),
+            key="format_width",
         )
     if len(film_mm) == 2 and len(frame) > 2:
-        notes.tell("given beside pixels; expected a format, or pixels", key="format_width")
+        notes.tell(
+            message("convert_film_and_pixels", "given beside pixels; expected a format, or pixels"),
+            key="format_width",
+        )
     if film_mm:
         return [(_stem(file), _film_of(camera, film_mm))]
     given = (frame["columns"], frame["lines"]) if {"columns", "lines"} <= set(frame) else None
     size = _one_size(given, size_px, notes)
     sides = [frame[key] for key in ("pixel_width", "pixel_height") if key in frame]
     if len(sides) == 1:
-        notes.tell("one side of a pixel; expected pixel_width and pixel_height", key="pixel_width")
+        notes.tell(
+            message(
+                "convert_one_side_of_pixel",
+                "one side of a pixel; expected pixel_width and pixel_height",
+            ),
+            key="pixel_width",
+        )
 
     def convert(pixel_mm):
         if pixel_mm is None and not sides:
-            raise SolutionError("the size of a pixel is missing; give it in micrometres")
+            raise SolutionError(
+                message(
+                    "convert_no_pixel", "the size of a pixel is missing; give it in micrometres"
+                )
+            )
         if sides:
             _refuse_other_pixel(sides[-1], pixel_mm)
         return balanced.from_balanced(camera, sides or pixel_mm, size)
@@ -205,9 +275,19 @@ def _film_of(camera, film_mm):
 def _one_size(of_file, given, notes):
     """(columns, lines) of the file or as given; told when there is none, or when they differ."""
     if of_file is None and given is None:
-        notes.tell("missing; the file does not say it. Give columns and lines", key="format_px")
+        notes.tell(
+            message("convert_no_size", "missing; the file does not say it. Give columns and lines"),
+            key="format_px",
+        )
     elif of_file is not None and given is not None and tuple(of_file) != tuple(given):
-        expected = f"{of_file[0]} x {of_file[1]} px; expected {given[0]} x {given[1]}, as given"
+        expected = message(
+            "convert_other_size",
+            "{columns} x {lines} px; expected {given_columns} x {given_lines}, as given",
+            columns=of_file[0],
+            lines=of_file[1],
+            given_columns=given[0],
+            given_lines=given[1],
+        )
         notes.tell(expected, key="format_px")
     return of_file or given
 
@@ -215,7 +295,12 @@ def _one_size(of_file, given, notes):
 def _refuse_other_pixel(of_file_mm, given_mm):
     if given_mm is not None and abs(of_file_mm / given_mm - 1) > SAME_PIXEL:
         raise SolutionError(
-            f"a pixel of {of_file_mm * 1e3:.5g} um in the file, {given_mm * 1e3:.5g} um was given"
+            message(
+                "convert_other_pixel",
+                "a pixel of {found:.5g} um in the file, {given:.5g} um was given",
+                found=of_file_mm * 1e3,
+                given=given_mm * 1e3,
+            )
         )
 
 

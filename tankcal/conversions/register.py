@@ -10,6 +10,7 @@ import numpy as np
 from tankcal.camera import PARAMETERS, UNITS
 from tankcal.conversions.texts import NAME_IS, exactly, shown
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 from tankcal.naming import is_name
 
 NEIGHBOURS = 4
@@ -78,5 +79,15 @@ def _micrometres(pixel_mm):
 
 def _quoted(name):
     if not is_name(name) or name != name.strip():
-        raise InputError(Problem("cameras.toml", f"{shown(name)}; expected {NAME_IS}"))
+        raise InputError(
+            Problem(
+                "cameras.toml",
+                message(
+                    "convert_register_name",
+                    "{found}; expected {expected}",
+                    found=shown(name),
+                    expected=NAME_IS,
+                ),
+            )
+        )
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else f'"{name}"'

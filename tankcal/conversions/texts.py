@@ -7,11 +7,16 @@ import math
 import re
 
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 from tankcal.naming import MAX_NAME, is_name
 
 LONGEST = 4_000_000  # bytes of a file, letters of a text
 MOST_PIXELS = 1_000_000
-NAME_IS = f"a name of at most {MAX_NAME} letters, digits, spaces or _ - . ( ) / #"
+NAME_IS = message(
+    "convert_name_is",
+    "a name of at most {most} letters, digits, spaces or _ - . ( ) / #",
+    most=MAX_NAME,
+)
 
 
 class Notes:
@@ -41,10 +46,23 @@ class Notes:
         except (TypeError, ValueError, OverflowError):
             value = math.nan
         if not math.isfinite(value) or (isinstance(text, str) and "_" in text):
-            self.tell(f"{shown(text)}; expected a finite number", row, key)
+            self.tell(
+                message("convert_finite", "{found}; expected a finite number", found=shown(text)),
+                row,
+                key,
+            )
             return math.nan
         if above is not None and value <= above:
-            self.tell(f"{shown(text)}; expected a number above {above:g}", row, key)
+            self.tell(
+                message(
+                    "convert_above",
+                    "{found}; expected a number above {least:g}",
+                    found=shown(text),
+                    least=above,
+                ),
+                row,
+                key,
+            )
             return math.nan
         return value
 
@@ -55,7 +73,16 @@ class Notes:
         if len(self.problems) > before:
             return 2
         if value != round(value) or not 2 <= value <= MOST_PIXELS:
-            self.tell(f"{shown(text)}; expected whole pixels, 2 to {MOST_PIXELS}", row, key)
+            self.tell(
+                message(
+                    "convert_pixels",
+                    "{found}; expected whole pixels, 2 to {most}",
+                    found=shown(text),
+                    most=MOST_PIXELS,
+                ),
+                row,
+                key,
+            )
             return 2
         return int(value)
 
@@ -64,8 +91,19 @@ class Notes:
         text = text.strip()
         if is_name(text):
             return text
-        self.tell(f"{shown(text)}; expected {NAME_IS}", row, key)
+        self.tell(
+            message(
+                "convert_name", "{found}; expected {expected}", found=shown(text), expected=NAME_IS
+            ),
+            row,
+            key,
+        )
         return "camera"
+
+
+def given_twice():
+    """What is wrong with a key that stands there twice."""
+    return message("convert_given_twice", "given twice; expected once")
 
 
 def shown(value):

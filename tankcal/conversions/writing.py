@@ -10,6 +10,7 @@ from tankcal.conversions.opencv import to_opencv
 from tankcal.conversions.register import as_cameras_toml
 from tankcal.conversions.texts import shown
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 
 
 @dataclass(frozen=True)
@@ -37,11 +38,28 @@ def write_camera(kind, cameras, sds=None, radius_mm=0.0, file="cameras"):
     SolutionError where the distortion folds the image within the frame.
     """
     if kind not in KINDS:
-        expected = f"{shown(kind)} as the kind of file; expected one of {', '.join(KINDS)}"
+        expected = message(
+            "convert_to_kind",
+            "{found} as the kind of file; expected one of {known}",
+            found=shown(kind),
+            known=", ".join(KINDS),
+        )
         raise InputError(Problem("cameras", expected))
     if not cameras or (kind in SINGLE and len(cameras) > 1):
-        expected = f"{len(cameras)} cameras; expected one" + ("" if kind in SINGLE else " or more")
-        raise InputError(Problem("cameras", f"{expected} in a file of kind {kind}"))
+        expected = message(
+            "convert_none_to_write",
+            "{count} cameras; expected one or more in a file of kind {form}",
+            count=len(cameras),
+            form=kind,
+        )
+        if kind in SINGLE:
+            expected = message(
+                "convert_one_to_write",
+                "{count} cameras; expected one in a file of kind {form}",
+                count=len(cameras),
+                form=kind,
+            )
+        raise InputError(Problem("cameras", expected))
     if kind not in IN_MM:
         _refuse_film(kind, cameras, file)
     if kind == "cameras.toml":
@@ -53,7 +71,11 @@ def write_camera(kind, cameras, sds=None, radius_mm=0.0, file="cameras"):
 
 def _refuse_film(kind, cameras, file):
     """Raise InputError for cameras whose pixels are not known."""
-    expected = f"missing; {kind} counts in pixels: expected their size, micrometres (--pixel-um)"
+    expected = message(
+        "convert_to_pixels",
+        "missing; {form} counts in pixels: expected their size, micrometres (--pixel-um)",
+        form=kind,
+    )
     problems = [
         Problem(file, expected, None, f"{name}.pixel_um")
         for name, one in cameras

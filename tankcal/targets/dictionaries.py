@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 from tankcal.targets.opencv import opencv
 
 BORDER_CELLS = 1
@@ -40,7 +41,12 @@ def _name(name):
     wanted = str(name).upper()
     wanted = wanted if wanted.startswith("DICT_") else f"DICT_{wanted}"
     if wanted not in known:
-        expected = f"found {str(name)[:60]!r}; expected one of {', '.join(known)}"
+        expected = message(
+            "targets_dictionary",
+            "found {found!r}; expected one of {known}",
+            found=str(name)[:60],
+            known=", ".join(known),
+        )
         raise InputError(Problem("dictionary", expected))
     return wanted
 

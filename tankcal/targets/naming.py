@@ -7,15 +7,37 @@ import numpy as np
 from tankcal.job.fields import Field, Refused, is_blank, read_value
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import MAX_FILE_BYTES, nearest, read_bytes, shown
+from tankcal.messages import message
 
-ID = Field("id", "number", "number of the code", required=True, low=0, high=1e6)
-POINT = Field("point", "name", "name of the point", required=True)
+ID = Field(
+    "id", "number", message("targets_note_id", "number of the code"), required=True, low=0, high=1e6
+)
+POINT = Field("point", "name", message("targets_note_point", "name of the point"), required=True)
 NAMES = (ID, POINT)
 PLACES = (
-    Field("photo", "name", "the photo, its file without the ending", required=True),
+    Field(
+        "photo",
+        "name",
+        message("targets_note_photo", "the photo, its file without the ending"),
+        required=True,
+    ),
     POINT,
-    Field("column_px", "number", "about there, pixels", required=True, low=-1e6, high=1e6),
-    Field("line_px", "number", "about there, pixels", required=True, low=-1e6, high=1e6),
+    Field(
+        "column_px",
+        "number",
+        message("targets_note_column", "about there, pixels"),
+        required=True,
+        low=-1e6,
+        high=1e6,
+    ),
+    Field(
+        "line_px",
+        "number",
+        message("targets_note_line", "about there, pixels"),
+        required=True,
+        low=-1e6,
+        high=1e6,
+    ),
 )
 CORNERS = ("-1", "-2", "-3", "-4")  # top left of the marker as printed, then clockwise
 
@@ -28,18 +50,35 @@ def read_names(path, log, suffixes=()):
     names, first = {}, {}
     for file, row, (number, point) in _rows(path, NAMES, log):
         if number != int(number):
-            log.problem(file, f"found {number:g}; expected a whole number", row, "id")
+            log.problem(
+                file,
+                message(
+                    "targets_not_whole", "found {found:g}; expected a whole number", found=number
+                ),
+                row,
+                "id",
+            )
             continue
         for value, column in ((int(number), "id"), (point, "point")):
             if (column, value) in first:
-                expected = f"{value!r} stands in row {first[column, value]} already; expected once"
+                expected = message(
+                    "targets_twice",
+                    "{found!r} stands in row {row} already; expected once",
+                    found=value,
+                    row=first[column, value],
+                )
                 log.problem(file, expected, row, column)
             first.setdefault((column, value), row)
         try:
             for suffix in suffixes:
                 read_value(POINT, point + suffix)
         except Refused as refusal:
-            log.problem(file, f"with its corner {refusal}", row, "point")
+            log.problem(
+                file,
+                message("targets_with_corner", "with its corner {refusal}", refusal=refusal.text),
+                row,
+                "point",
+            )
         names[int(number)] = point
     return names
 
@@ -58,8 +97,14 @@ def read_places(path, log):
     places, first = {}, {}
     for file, row, (photo, point, column, line) in _rows(path, PLACES, log):
         if (photo, point) in first:
-            expected = f"{point!r} stands in row {first[photo, point]} already; expected once"
-            log.problem(file, f"{expected} in photo {photo!r}", row, "point")
+            expected = message(
+                "targets_place_twice",
+                "{point!r} stands in row {first_row} already; expected once in photo {photo!r}",
+                point=point,
+                first_row=first[photo, point],
+                photo=photo,
+            )
+            log.problem(file, expected, row, "point")
         first.setdefault((photo, point), row)
         places.setdefault(photo, []).append(Place(point, np.array([column, line]), row))
     return places
@@ -73,7 +118,12 @@ def warn_of_unused(places, photos, file, log):
     for photo in places:
         if photo not in photos:
             hint = nearest(photo, photos)
-            expected = f"found {shown(photo)}; expected one of the photos given{hint}: not used"
+            expected = message(
+                "targets_unused_photo",
+                "found {found}; expected one of the photos given{hint}: not used",
+                found=shown(photo),
+                hint=hint,
+            )
             log.warning(file, expected, places[photo][0].row, "photo")
 
 
@@ -85,7 +135,9 @@ def _rows(path, fields, log):
         return
     lacking = [field for field in fields if field.name not in table.headings]
     for field in lacking:
-        expected = f"missing column; expected {field.wanted()}"
+        expected = message(
+            "targets_missing_column", "missing column; expected {wanted}", wanted=field.wanted()
+        )
         log.problem(table.file, expected, table.heading_row, field.name)
     if lacking:
         return
@@ -95,7 +147,13 @@ def _rows(path, fields, log):
         for field, place in zip(fields, places, strict=True):
             try:
                 if is_blank(cells[place]):
-                    raise Refused(f"blank; expected {field.expectation()}")
+                    raise Refused(
+                        message(
+                            "targets_blank",
+                            "blank; expected {expected}",
+                            expected=field.expectation(),
+                        )
+                    )
                 values.append(read_value(field, cells[place], table.decimal))
             except Refused as refusal:
                 log.problem(table.file, refusal.text, row, field.name)

@@ -3,6 +3,7 @@
 import importlib
 
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 
 OLDEST = (4, 7)  # the first one with ArucoDetector
 
@@ -14,9 +15,18 @@ def opencv():
         is_usable = tuple(int(part) for part in found.__version__.split(".")[:2]) >= OLDEST
     except ImportError:
         raise InputError(
-            Problem("OpenCV", "not installed; expected: pip install 'tankcal[images]'")
+            Problem(
+                "OpenCV",
+                message(
+                    "targets_no_opencv", "not installed; expected: pip install 'tankcal[images]'"
+                ),
+            )
         ) from None
     if not (is_usable and hasattr(found, "aruco")):
-        expected = "expected 4.7 or later: pip install 'tankcal[images]'"
-        raise InputError(Problem("OpenCV", f"found version {found.__version__}; {expected}"))
+        expected = message(
+            "targets_old_opencv",
+            "found version {version}; expected 4.7 or later: pip install 'tankcal[images]'",
+            version=found.__version__,
+        )
+        raise InputError(Problem("OpenCV", expected))
     return found

@@ -7,13 +7,14 @@ import numpy as np
 
 from tankcal.job.fields import Field, read_value
 from tankcal.job.tables import read_bytes
+from tankcal.messages import message
 from tankcal.targets.headers import header_of
 from tankcal.targets.opencv import opencv
 
 MOST_PIXELS = 250_000_000
 LEAST_SIDE_PX = 32
 MOST_BYTES = 1_000_000_000
-KINDS = "a JPEG, PNG, TIFF or BMP picture"
+KINDS = message("targets_kinds", "a JPEG, PNG, TIFF or BMP picture")
 PHOTO = Field("photo", "name", "the photo")
 ENCODINGS = ("by_file", "linear", "srgb")
 JPEG_START = b"\xff\xd8"
@@ -50,17 +51,37 @@ def read_picture(path, log, encoding="by_file"):
         return None
     header = header_of(data)
     if header is None:
-        return log.problem(path.name, f"no picture that can be read; expected {KINDS}")
+        return log.problem(
+            path.name,
+            message(
+                "targets_no_picture", "no picture that can be read; expected {kinds}", kinds=KINDS
+            ),
+        )
     columns, lines = header.size_px
     if columns * lines > MOST_PIXELS:
-        expected = f"{columns} x {lines} pixels; expected at most {MOST_PIXELS:,} in all"
-        return log.problem(path.name, expected.replace(",", " "))
+        expected = message(
+            "targets_large_picture",
+            "{columns} x {lines} pixels; expected at most {most} in all",
+            columns=columns,
+            lines=lines,
+            most=MOST_PIXELS,
+        )
+        return log.problem(path.name, expected)
     if min(columns, lines) < LEAST_SIDE_PX:
-        expected = f"{columns} x {lines} pixels; expected {LEAST_SIDE_PX} each way at least"
+        expected = message(
+            "targets_small_picture",
+            "{columns} x {lines} pixels; expected {least} each way at least",
+            columns=columns,
+            lines=lines,
+            least=LEAST_SIDE_PX,
+        )
         return log.problem(path.name, expected)
     image = _decoded(data)
     if image is None or image.shape != (lines, columns):
-        return log.problem(path.name, "damaged: it cannot be decoded as its header says")
+        return log.problem(
+            path.name,
+            message("targets_damaged", "damaged: it cannot be decoded as its header says"),
+        )
     if encoding == "by_file":
         encoding = "srgb" if data.startswith(JPEG_START) else "linear"
     return Picture(_light(image, encoding), encoding, header.orientation)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from tankcal.job.fields import Refused as BadName
 from tankcal.job.tables import Log, shown
+from tankcal.messages import either, message
 from tankcal.targets.circles import read_circles
 from tankcal.targets.coded import read_coded
 from tankcal.targets.dictionaries import dictionary_of
@@ -96,11 +97,16 @@ def read_photographs(paths, out_csv, wanted=None, replace=False, tell=None):
     log.stop_if_problems()
     _warn(photos, wanted, names, log)
     if encodings["srgb"] and wanted.encoding == "by_file":
-        expected = f"{encodings['srgb']} of JPEG: grey values are taken as sRGB"
-        log.warning("photographs", f"{expected}; where that is wrong, edges are half a pixel off")
+        expected = message(
+            "targets_srgb",
+            "{count} of JPEG: grey values are taken as sRGB; where that is wrong, edges are half a "
+            "pixel off",
+            count=encodings["srgb"],
+        )
+        log.warning("photographs", expected)
     written = write_image_points(photos, out_csv, replace)
     if tell:
-        tell("done", len(titles), len(titles))
+        tell(message("targets_done", "done"), len(titles), len(titles))
     return Reading(
         tuple(photos),
         *written,
@@ -118,20 +124,45 @@ def _lists(wanted, log):
         (wanted.encoding, ENCODINGS, "encoding"),
     ):
         if value not in known:
-            log.problem(name, f"found {shown(value)}; expected {' or '.join(known)}")
+            expected = message(
+                "targets_choice",
+                "found {found}; expected {known}",
+                found=shown(value),
+                known=either([*known]),
+            )
+            log.problem(name, expected)
     for name in ("reach_px", "smallest_px", "largest_px", "bit_errors"):
         value = getattr(wanted, name)
         if value is not None and not 0 <= value < 1e5:
-            log.problem(name, f"found {value:g}; expected a number of 0 or more")
+            log.problem(
+                name,
+                message(
+                    "targets_number", "found {found:g}; expected a number of 0 or more", found=value
+                ),
+            )
     if wanted.what == "circles":
         if wanted.names is not None:
-            log.problem("names", "only for coded targets; circles have `places`")
+            log.problem(
+                "names",
+                message(
+                    "targets_names_of_circles", "only for coded targets; circles have `places`"
+                ),
+            )
         if wanted.places is None:
-            log.problem("places", "missing; circles get their names from approximate places")
+            log.problem(
+                "places",
+                message(
+                    "targets_places_missing",
+                    "missing; circles get their names from approximate places",
+                ),
+            )
             return None, {}
         return None, read_places(Path(wanted.places), log)
     if wanted.places is not None:
-        log.problem("places", "only for circles; coded targets have `names`")
+        log.problem(
+            "places",
+            message("targets_places_of_codes", "only for circles; coded targets have `names`"),
+        )
     known = dictionary_of(wanted.dictionary)
     if wanted.names is None:
         return None, {}
@@ -139,7 +170,13 @@ def _lists(wanted, log):
     beyond = [number for number in names if number >= len(known.cells)]
     if beyond:
         listed = ", ".join(str(number) for number in beyond[:5])
-        expected = f"found {listed}; expected 0 to {len(known.cells) - 1} of {known.name}"
+        expected = message(
+            "targets_beyond",
+            "found {numbers}; expected 0 to {last} of {dictionary}",
+            numbers=listed,
+            last=len(known.cells) - 1,
+            dictionary=known.name,
+        )
         log.problem(Path(wanted.names).name, expected, column="id")
     return names, {}
 
@@ -151,15 +188,23 @@ def _titles(paths, log):
         try:
             title = photo_name(path)
         except BadName as refusal:
-            log.problem(path.name, f"as the name of a photo: {refusal}")
+            log.problem(
+                path.name,
+                message("targets_photo_name", "as the name of a photo: {refusal}", refusal=refusal),
+            )
             continue
         if title in seen:
-            expected = f"the photo {title!r} is {seen[title]} already; expected another file name"
+            expected = message(
+                "targets_photo_twice",
+                "the photo {photo!r} is {file} already; expected another file name",
+                photo=title,
+                file=seen[title],
+            )
             log.problem(path.name, expected)
         seen.setdefault(title, path.name)
         found.append((path, title))
     if not seen and not log.problems:
-        log.problem("photographs", "none given")
+        log.problem("photographs", message("targets_none_given", "none given"))
     return found
 
 
@@ -182,7 +227,11 @@ def _photo(title, picture, wanted, names, places, log):
     targets = tuple(name for _, name in named)
     if found.doubtful:
         listed = ", ".join(str(number) for number in found.doubtful[:10])
-        expected = f"ids that would read the same in a mirror, corners exchanged: {listed}"
+        expected = message(
+            "targets_mirror",
+            "ids that would read the same in a mirror, corners exchanged: {numbers}",
+            numbers=listed,
+        )
         log.warning(title, expected)
     return PhotoReading(
         title, found.size_px, picture.orientation, targets, tuple(points), found.refused
@@ -194,7 +243,13 @@ def _photo_of_circles(title, picture, wanted, places, log):
     named, refused, lacking = by_places(found.targets, places, wanted.reach_px)
     if lacking:
         listed = ", ".join(repr(name) for name in lacking[:5])
-        expected = f"no circle within {wanted.reach_px:g} px of {len(lacking)} places: {listed}"
+        expected = message(
+            "targets_no_circle",
+            "no circle within {reach:g} px of {count} places: {names}",
+            reach=wanted.reach_px,
+            count=len(lacking),
+            names=listed,
+        )
         log.warning(title, expected)
     points = tuple(ImagePoint(name, one.centre_px, one.sd_px) for name, one in named)
     refused = [
@@ -215,25 +270,58 @@ def _warn(photos, wanted, names, log):
     """Tell what deserves a look."""
     for photo in photos:
         if not photo.targets:
-            log.warning(photo.photo, "no targets found")
+            log.warning(photo.photo, message("targets_none_found", "no targets found"))
         if photo.orientation != 1:
-            expected = f"its file asks to be turned (orientation {photo.orientation}); not done"
-            log.warning(photo.photo, f"{expected}: columns and lines are those of the sensor")
+            expected = message(
+                "targets_turned",
+                "its file asks to be turned (orientation {orientation}); not done: columns and "
+                "lines are those of the sensor",
+                orientation=photo.orientation,
+            )
+            log.warning(photo.photo, expected)
     sizes = Counter(photo.size_px for photo in photos)
     if len(sizes) > 1:
         listed = ", ".join(f"{a} x {b} ({count})" for (a, b), count in sizes.most_common(5))
-        log.warning("photographs", f"of several sizes: {listed}; photos of one camera have one")
+        log.warning(
+            "photographs",
+            message(
+                "targets_sizes",
+                "of several sizes: {sizes}; photos of one camera have one",
+                sizes=listed,
+            ),
+        )
     times = Counter(name for photo in photos for name in photo.targets)
     once = [name for name, count in times.items() if count == 1]
     if once and len(photos) > 1:
         listed = ", ".join(repr(name) for name in once[:10])
-        log.warning("photographs", f"targets that are in one photo only: {len(once)}: {listed}")
+        log.warning(
+            "photographs",
+            message(
+                "targets_once",
+                "targets that are in one photo only: {count}: {names}",
+                count=len(once),
+                names=listed,
+            ),
+        )
     unseen = [name for name in (names or {}).values() if name not in times]
     if unseen:
         listed = ", ".join(repr(name) for name in unseen[:10])
-        log.warning(Path(wanted.names).name, f"listed but never read: {len(unseen)}: {listed}")
+        log.warning(
+            Path(wanted.names).name,
+            message(
+                "targets_unseen",
+                "listed but never read: {count}: {names}",
+                count=len(unseen),
+                names=listed,
+            ),
+        )
     if wanted.what != "circles" and names is None:
         chance = dictionary_of(wanted.dictionary).chance
         if chance > CHANCE_TOLD:
-            expected = f"one of {1 / chance:.0f} black frames with anything inside is a code of it"
-            log.warning("dictionary", f"{expected}; give the list of ids that there are")
+            expected = message(
+                "targets_chance",
+                "one of {frames:.0f} black frames with anything inside is a code of it; give the "
+                "list of ids that there are",
+                frames=1 / chance,
+            )
+            log.warning("dictionary", expected)

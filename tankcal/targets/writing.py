@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 from tankcal.targets.found import REASONS
 
 HEADINGS = ("photo", "point", "column_px", "line_px", "s_px")
@@ -50,14 +51,20 @@ def refused_path(path):
     return path.with_name(f"{path.stem}_refused.csv")
 
 
+def _there_already():
+    return message(
+        "targets_there_already", "is there already; expected another name, or to replace it"
+    )
+
+
 def check_free(path, replace, log):
     """Tell `log` of what stands in the way of writing."""
     for one in (Path(path), refused_path(path)):
         if not one.parent.is_dir():
-            log.problem(one.name, "its folder is not there")
+            log.problem(one.name, message("targets_no_folder", "its folder is not there"))
             return
         if one.exists() and not replace:
-            log.problem(one.name, "is there already; expected another name, or to replace it")
+            log.problem(one.name, _there_already())
 
 
 def write_image_points(photos, path, replace=False):
@@ -70,7 +77,7 @@ def write_image_points(photos, path, replace=False):
     """
     taken = [one.name for one in (Path(path), refused_path(path)) if one.exists()]
     if taken and not replace:
-        expected = "is there already; expected another name, or to replace it"
+        expected = _there_already()
         raise InputError([Problem(name, expected) for name in taken])
     rows = [
         (photo.photo, one.point, *(f"{x:.4f}" for x in one.place_px), f"{one.sd_px:.4f}")
@@ -92,7 +99,12 @@ def write_image_points(photos, path, replace=False):
         for draft in drafts.values():
             draft.unlink(missing_ok=True)
         raise InputError(
-            Problem(Path(path).name, f"cannot be written ({error.strerror})")
+            Problem(
+                Path(path).name,
+                message(
+                    "targets_not_written", "cannot be written ({reason})", reason=error.strerror
+                ),
+            )
         ) from None
     return Path(path), refused_path(path)
 

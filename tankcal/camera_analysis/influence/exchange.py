@@ -6,6 +6,7 @@ import numpy as np
 
 from tankcal.camera import PARAMETERS
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 from tankcal.surveys.pictures import ELEMENTS, TURNS
 
 STATES = ("fixed", "weighted", "free")
@@ -23,14 +24,30 @@ def chosen_camera(job, camera=None):
     photographed = set() if measurements is None else {one.camera for one in measurements.photos}
     known = {one.camera.name: one for one in setups if one.camera.name in photographed}
     if measurements is None or measurements.image_points is None or not known:
-        raise InputError(Problem("job.toml", "no photographs: no camera can be replaced"))
+        raise InputError(
+            Problem(
+                "job.toml",
+                message("camera_no_photographs", "no photographs: no camera can be replaced"),
+            )
+        )
     if camera is None and len(known) == 1:
         return next(iter(known.values()))
     if camera in known:
         return known[camera]
-    listed = ", ".join(known)
-    found = "several cameras" if camera is None else f"no photos of a camera {camera}"
-    raise InputError(Problem(FILE, f"{found}; expected the name of one of them: {listed}"))
+    if camera is None:
+        expected = message(
+            "camera_several",
+            "several cameras; expected the name of one of them: {names}",
+            names=[*known],
+        )
+    else:
+        expected = message(
+            "camera_without_photos",
+            "no photos of a camera {camera}; expected the name of one of them: {names}",
+            camera=camera,
+            names=[*known],
+        )
+    raise InputError(Problem(FILE, expected))
 
 
 def refuse_others(setup, calibrations, file=FILE):
@@ -41,25 +58,37 @@ def refuse_others(setup, calibrations, file=FILE):
     """
     problems, seen = [], set()
     if not calibrations:
-        problems.append(Problem(file, "no calibrations; expected one or more"))
+        problems.append(
+            Problem(
+                file, message("camera_no_calibrations", "no calibrations; expected one or more")
+            )
+        )
     for one in calibrations:
         name = one.camera.name
         if name in seen:
-            text = "this name stands there twice; expected once"
+            text = message("camera_name_twice", "this name stands there twice; expected once")
             problems.append(Problem(file, text, None, name))
         seen.add(name)
         for what, unit, theirs, ours in (
-            ("format", "mm", one.format_mm, setup.format_mm),
-            ("pixel", "mm", one.pixel_mm, setup.pixel_mm),
+            (message("camera_the_format", "the format"), "mm", one.format_mm, setup.format_mm),
+            (message("camera_the_pixel", "the pixel"), "mm", one.pixel_mm, setup.pixel_mm),
         ):
             if _differ(theirs, ours):
-                text = (
-                    f"the {what} is {_pair(theirs)} {unit}; expected that of the job's camera "
-                    f"{setup.camera.name}, {_pair(ours)} {unit}"
+                text = message(
+                    "camera_differs",
+                    "{what} is {theirs} {unit}; expected that of the job's camera "
+                    "{name}, {ours} {unit}",
+                    what=what,
+                    theirs=_pair(theirs),
+                    unit=unit,
+                    name=setup.camera.name,
+                    ours=_pair(ours),
                 )
                 problems.append(Problem(file, text, None, name))
         if not (np.isfinite(one.camera.values).all() and one.camera.values[0] > 0):
-            text = "expected finite parameters and a principal distance above 0"
+            text = message(
+                "camera_not_finite", "expected finite parameters and a principal distance above 0"
+            )
             problems.append(Problem(file, text, None, name))
     if problems:
         raise InputError(problems)

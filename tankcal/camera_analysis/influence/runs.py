@@ -35,6 +35,7 @@ from tankcal.camera_analysis.influence.exchange import (
 from tankcal.camera_analysis.product.checking import ALPHA
 from tankcal.chain import adjust_job
 from tankcal.errors import TankcalError
+from tankcal.messages import message
 
 REFERENCE = "reference"
 TOLD = 3  # lines of why there is no volume
@@ -131,16 +132,20 @@ def influence(
     free = free_parameters(setup, calibrations)
     tell = tell or (lambda text, done, total: None)
     total = 1 + len(calibrations) * len(states)
-    tell(REFERENCE, 0, total)
+    tell(message("camera_reference_run", "reference"), 0, total)
     top = TopOfTank(job) if volume and _is_whole(job) else None
     reference, removed = _reference(job, counted_in(setup, calibrations), alpha, top)
     common = without(job.measurements, removed)
     runs = [reference]
     for one in calibrations:
         for state in states:
-            tell(f"{one.camera.name}, {state}", len(runs), total)
+            tell(
+                message("camera_run", "{name}, {state}", name=one.camera.name, state=state),
+                len(runs),
+                total,
+            )
             runs.append(_run(job, common, setup, one, state, free, alpha, top))
-    tell("done", total, total)
+    tell(message("camera_runs_done", "done"), total, total)
     return Influence(
         camera=setup.camera.name,
         states=states,

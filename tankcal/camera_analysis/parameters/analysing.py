@@ -28,6 +28,7 @@ from tankcal.camera_analysis.parameters.judging import (
 )
 from tankcal.chain import adjust_job
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 
 
 def analyse_record(record, choices=None, *, camera=None, photo=None):
@@ -59,10 +60,18 @@ def _statistics_in(record):
             ],
         )
     except (KeyError, TypeError, ValueError) as error:
-        text = f"the statistics of the adjustment cannot be read: {error}"
+        text = message(
+            "camera_statistics_unreadable",
+            "the statistics of the adjustment cannot be read: {error}",
+            error=error,
+        )
         raise InputError(Problem("record.json", text, None, "adjustment")) from error
     if not statistics.cov_scale > 0:
-        text = f"found cov_scale {statistics.cov_scale:g}, expected a factor above 0"
+        text = message(
+            "camera_cov_scale",
+            "found cov_scale {found:g}, expected a factor above 0",
+            found=statistics.cov_scale,
+        )
         raise InputError(Problem("record.json", text, None, "adjustment.cov_scale"))
     return statistics
 
@@ -82,11 +91,16 @@ def analyse_job(
     """
     tell = tell or (lambda text, done, total: None)
     if job.measurements is None or not job.measurements.photos:
-        raise InputError(Problem("job.toml", "no photographs: there is no camera to be judged"))
+        raise InputError(
+            Problem(
+                "job.toml",
+                message("camera_none_to_judge", "no photographs: there is no camera to be judged"),
+            )
+        )
     photos = {one.name: one.camera for one in job.measurements.photos}
     refuse_unknown(photos, camera, photo)
     if adjustment is None:
-        tell("adjusting the survey with all parameters", 0, 1)
+        tell(message("camera_adjusting_all", "adjusting the survey with all parameters"), 0, 1)
         adjustment = adjust_job(job)
     groups = [(g.kind, g.name, g.count, g.redundancy, g.rms) for g in adjustment.groups]
     statistics = Statistics(adjustment.sigma0, adjustment.redundancy, adjustment.cov_scale, groups)
@@ -99,18 +113,21 @@ def analyse_job(
 def _of_all(interiors, statistics, choices, file, source="record"):
     judged = [one for one in interiors if len(adjusted_rows(one))]
     if not judged:
-        text = "no parameter of any camera is adjusted: there is nothing to be judged"
+        text = message(
+            "camera_nothing_adjusted",
+            "no parameter of any camera is adjusted: there is nothing to be judged",
+        )
         raise InputError(Problem(file, text))
     try:
         return tuple(analysed(one, statistics, choices, source) for one in judged)
     except ValueError as error:
-        raise InputError(Problem(file, str(error))) from error
+        raise InputError(Problem(file, error.args[0])) from error
 
 
 def _with_outcomes(found, job, adjustment, tell):
     """All CameraParameters with each of their trials adjusted again, then what they advise."""
     outcomes, total = {}, 1 + sum(len(without_advised(one).trials) for one in found)
-    tell("computing the volume with all parameters", 0, total)
+    tell(message("camera_volume_all", "computing the volume with all parameters"), 0, total)
     again = Dropping(job, adjustment)
 
     def tried(stage):
@@ -120,7 +137,12 @@ def _with_outcomes(found, job, adjustment, tell):
                 key = one.interior.camera, trial.names
                 if key not in outcomes:
                     done = len(outcomes) + 1
-                    told = f"adjusting without {' '.join(trial.names)} of {key[0]}"
+                    told = message(
+                        "camera_adjusting_without",
+                        "adjusting without {parameters} of {camera}",
+                        parameters=" ".join(trial.names),
+                        camera=key[0],
+                    )
                     tell(told, done, max(done, total))
                     outcomes[key] = again.without(*key)
         return tuple(advised(_tried(one, outcomes, adjustment, again)) for one in staged)

@@ -16,6 +16,7 @@ import numpy as np
 from tankcal.camera import PARAMETERS
 from tankcal.camera_analysis.capacity_at_top import TopOfTank, TopVolume
 from tankcal.errors import SolutionError, TankcalError
+from tankcal.messages import message
 from tankcal.network import adjust
 from tankcal.network.cleaning import started
 from tankcal.surveys import Adjustment
@@ -141,7 +142,7 @@ def movement(before, after):
     places = {name: i for i, name in enumerate(after.names)}
     both = [(i, places[name]) for i, name in enumerate(before.names) if name in places]
     if not both:
-        raise SolutionError("no point is left to be compared")
+        raise SolutionError(message("camera_no_point_left", "no point is left to be compared"))
     here, there = np.array(both).T
     change = after.xyz_m[there] - before.xyz_m[here]
     sd = np.sqrt(np.maximum(np.einsum("nii->ni", before.covariance_m2[here]), 0.0))

@@ -19,6 +19,7 @@ from tankcal.camera_analysis.parameters.recommending import (
 )
 from tankcal.camera_analysis.parameters.rules import LIMIT_PX, pessoa_rule, silva_rule
 from tankcal.camera_analysis.parameters.significance import group_tests, groups_among, single_tests
+from tankcal.messages import message
 
 IMAGE = "image coordinate"
 
@@ -83,7 +84,13 @@ def _limit(interior, statistics, choices):
         return Limit(choices.limit_um, choices.limit_um / pixel_um, "given")
     if choices.limit_px is not None:
         if pixel_mm is None:
-            raise ValueError(f"{interior.camera} has no pixels: expected its limit in micrometres")
+            raise ValueError(
+                message(
+                    "camera_no_pixels",
+                    "{camera} has no pixels: expected its limit in micrometres",
+                    camera=interior.camera,
+                )
+            )
         return Limit(choices.limit_px * pixel_um, choices.limit_px, "given")
     images = [one for one in statistics.groups if one[0] == IMAGE and one[4] is not None]
     images = [one for one in images if one[1] == interior.camera] or images

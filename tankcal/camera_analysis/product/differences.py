@@ -10,10 +10,13 @@ from tankcal.errors import InputError, Problem
 from tankcal.job.fields import Field, Refused, is_blank, read_value
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log, nearest, read_bytes
+from tankcal.messages import message
 
 AXES = "xyz"
 FARTHEST_M = 1e8  # keeps nonsense out
-_POINT = Field("point", "name", "name of the check point", required=True)
+_POINT = Field(
+    "point", "name", message("check_note_point", "name of the check point"), required=True
+)
 _DIFFERENCES = tuple(f"d{axis}_m" for axis in AXES)
 _PAIRS = tuple((f"{axis}_m", f"{axis}_ref_m") for axis in AXES)
 _NUMBERS = tuple(
@@ -48,14 +51,26 @@ def differences_of(adjustment):
         found = part.get("check_points") if isinstance(part, Mapping) else None
         rows = found.get("points") if isinstance(found, Mapping) else None
         if not rows:
-            raise InputError(Problem("record.json", "no check points; expected some to judge by"))
+            raise InputError(
+                Problem(
+                    "record.json",
+                    message(
+                        "check_no_points_in_record", "no check points; expected some to judge by"
+                    ),
+                )
+            )
         values = [[row.get(name) for name in _DIFFERENCES] for row in rows]
         return Differences(
             tuple(str(row["point"]) for row in rows), np.array(values, dtype=float).reshape(-1, 3)
         )
     found = adjustment.check_points
     if found is None:
-        raise InputError(Problem("check.csv", "no check points; expected some to judge by"))
+        raise InputError(
+            Problem(
+                "check.csv",
+                message("check_no_points", "no check points; expected some to judge by"),
+            )
+        )
     return Differences(tuple(found.names), np.array(found.difference_m, dtype=float))
 
 
@@ -76,7 +91,11 @@ def read_differences(path, separator=",", decimal="."):
     rows = [_row(table, i, columns, fields, log) for i in range(len(table.rows))]
     _tell_repeated(table, rows, log)
     if not (table.rows or table.skipped):
-        log.problem(table.file, "no rows; expected check points", table.heading_row)
+        log.problem(
+            table.file,
+            message("check_no_rows", "no rows; expected check points"),
+            table.heading_row,
+        )
     log.stop_if_problems()
     values = np.array([[row.get(name, np.nan) for name in _DIFFERENCES] for row in rows])
     return Differences(tuple(row["point"] for row in rows), values)
@@ -89,19 +108,42 @@ def _columns(table, fields, log):
         if heading in fields:
             columns[heading] = place
         else:
-            text = f"unknown column; expected {FORMS}{nearest(heading, fields)}"
+            text = message(
+                "check_unknown_column",
+                "unknown column; expected {forms}{hint}",
+                forms=FORMS,
+                hint=nearest(heading, fields),
+            )
             log.problem(table.file, text, table.heading_row, heading)
     if "point" not in columns:
-        log.problem(table.file, "missing column; expected the names of points", 1, "point")
+        log.problem(
+            table.file,
+            message("check_point_column", "missing column; expected the names of points"),
+            1,
+            "point",
+        )
     direct = [name for name in _DIFFERENCES if name in columns]
     paired = [pair for pair in _PAIRS if any(name in columns for name in pair)]
     if direct and paired:
-        text = f"differences beside coordinates; expected one of them: {FORMS}"
+        text = message(
+            "check_both_forms",
+            "differences beside coordinates; expected one of them: {forms}",
+            forms=FORMS,
+        )
         log.problem(table.file, text, table.heading_row, direct[0])
     for name in (name for pair in paired for name in pair if name not in columns):
-        log.problem(table.file, "missing column beside its pair", table.heading_row, name)
+        log.problem(
+            table.file,
+            message("check_column_of_pair", "missing column beside its pair"),
+            table.heading_row,
+            name,
+        )
     if not (direct or paired):
-        log.problem(table.file, f"no differences; expected {FORMS}", table.heading_row)
+        log.problem(
+            table.file,
+            message("check_no_differences", "no differences; expected {forms}", forms=FORMS),
+            table.heading_row,
+        )
     return columns
 
 
@@ -112,7 +154,12 @@ def _row(table, number, columns, fields, log):
         raw = table.rows[number][place]
         if is_blank(raw):
             if name == "point":
-                log.problem(table.file, "missing; expected the name of the point", row, name)
+                log.problem(
+                    table.file,
+                    message("check_point_name", "missing; expected the name of the point"),
+                    row,
+                    name,
+                )
             continue
         try:
             given[name] = read_value(fields[name], raw, table.decimal)
@@ -126,11 +173,20 @@ def _row(table, number, columns, fields, log):
         elif any(both):
             lacking = pair[both.index(False)]
             if lacking in columns:
-                log.problem(table.file, "missing; expected it beside its pair", row, lacking)
+                log.problem(
+                    table.file,
+                    message("check_value_of_pair", "missing; expected it beside its pair"),
+                    row,
+                    lacking,
+                )
     if not any(name in given for name in _DIFFERENCES) and not any(
         name in given for pair in _PAIRS for name in pair
     ):
-        log.problem(table.file, "no difference in this row; expected one at least", row)
+        log.problem(
+            table.file,
+            message("check_row_without", "no difference in this row; expected one at least"),
+            row,
+        )
     return given
 
 
@@ -139,6 +195,11 @@ def _tell_repeated(table, rows, log):
     for row, number in zip(rows, table.row_numbers, strict=True):
         name = row.get("point")
         if name in seen and name is not None:
-            text = f"point {name} stands in row {seen[name]} already; expected once"
+            text = message(
+                "check_point_twice",
+                "point {point} stands in row {row} already; expected once",
+                point=name,
+                row=seen[name],
+            )
             log.problem(table.file, text, number, "point")
         seen.setdefault(name, number)

@@ -28,6 +28,7 @@ from tankcal.job.entries import read_setting
 from tankcal.job.fields import Field
 from tankcal.job.folder import read_toml
 from tankcal.job.tables import Log, nearest, read_bytes
+from tankcal.messages import message
 from tankcal.shipped import shipped
 
 PARTS = ("plan", "height")
@@ -36,8 +37,13 @@ MAX_BYTES = 1_000_000
 _TABLE = {
     field.name: field
     for field in (
-        Field("name", "text", "name of the table", required=True),
-        Field("source", "text", "where its numbers were read", required=True),
+        Field("name", "text", message("limits_note_name", "name of the table"), required=True),
+        Field(
+            "source",
+            "text",
+            message("limits_note_source", "where its numbers were read"),
+            required=True,
+        ),
         Field("verified", "flag", "whether they were read in the legal or technical text itself"),
         Field("remark", "text", "anything that is to stand beside it"),
         Field("share", "number", "share of the points within the tolerance", low=0, high=1),
@@ -93,7 +99,17 @@ def of_scale(table, scale):
     chosen = tuple(one for one in table.limits if one.scale == name)
     if not chosen:
         known = ", ".join(dict.fromkeys(one.scale for one in table.limits))
-        raise InputError(Problem(table.name, f"found no scale {name}; expected one of {known}"))
+        raise InputError(
+            Problem(
+                table.name,
+                message(
+                    "limits_no_scale",
+                    "found no scale {scale}; expected one of {known}",
+                    scale=name,
+                    known=known,
+                ),
+            )
+        )
     return replace(table, limits=chosen)
 
 
@@ -129,7 +145,12 @@ def _values(file, section, fields, given, row, log):
     """{key: value or None} of a section; what is wrong goes to the log."""
     for key in given.keys() - fields.keys():
         known = ", ".join(fields)
-        expected = f"unknown key; expected {known}{nearest(key, fields)}"
+        expected = message(
+            "limits_unknown_key",
+            "unknown key; expected {known}{hint}",
+            known=known,
+            hint=nearest(key, fields),
+        )
         log.problem(file, expected, given[key].row or row, f"{section}.{key}")
     values = {
         name: read_setting(
@@ -138,7 +159,12 @@ def _values(file, section, fields, given, row, log):
         for name, field in fields.items()
     }
     if values.get("share") == 0:
-        log.problem(file, "found 0; expected a share above 0, at most 1", row, "table.share")
+        log.problem(
+            file,
+            message("limits_no_share", "found 0; expected a share above 0, at most 1"),
+            row,
+            "table.share",
+        )
     return values
 
 
@@ -151,17 +177,26 @@ def _limits(file, settings, sections, log):
         row = sections.get(section)
         if part not in PARTS:
             hint = nearest(part, PARTS)
-            expected = f"unknown section; expected [table], [plan.SCALE] or [height.SCALE]{hint}"
+            expected = message(
+                "limits_unknown_section",
+                "unknown section; expected [table], [plan.SCALE] or [height.SCALE]{hint}",
+                hint=hint,
+            )
             log.problem(file, expected, row, f"[{section}]")
         elif grade and "." not in grade:
             values = _values(file, section, _LIMIT, given, row, log)
             if None not in values.values():
                 found.append(Limit(part, scale, grade, **values))
         elif given:
-            expected = "expected classes such as A = {tolerance_m = 0.28, sd_m = 0.17}"
+            expected = message(
+                "limits_no_classes",
+                "expected classes such as A = {{tolerance_m = 0.28, sd_m = 0.17}}",
+            )
             log.problem(file, expected, row, f"[{section}]")
     if not (found or log.problems):
-        log.problem(file, "no limits; expected sections such as [plan.1000]")
+        log.problem(
+            file, message("limits_none", "no limits; expected sections such as [plan.1000]")
+        )
     _tell_disorder(file, found, sections, log)
     return tuple(found)
 
@@ -175,6 +210,8 @@ def _tell_disorder(file, limits, sections, log):
         now = one.tolerance_m, one.sd_m
         if now[0] < last[0] or now[1] < last[1]:
             section = f"{one.part}.{one.scale}.{one.grade}"
-            expected = "smaller than the class before it; expected the best class first"
+            expected = message(
+                "limits_disorder", "smaller than the class before it; expected the best class first"
+            )
             log.problem(file, expected, sections.get(section), section)
         before[place] = now

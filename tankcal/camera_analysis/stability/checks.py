@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 
 SAME_PIXEL = 2e-3  # programs with two focal lengths give calibrations pixels that differ a little
 MOST_DIFFERENCES = 20_000_000  # pairs times grid points
@@ -12,13 +13,29 @@ def check_options(method, methods, threshold_px, seed):
     """Raises InputError for a method, a threshold or a seed that is none."""
     problems = []
     if method not in methods:
-        expected = f"found {str(method)[:60]!r}; expected {', '.join(methods)}"
+        expected = message(
+            "compare_method",
+            "found {found!r}; expected {methods}",
+            found=str(method)[:60],
+            methods=", ".join(methods),
+        )
         problems.append(Problem("--method", expected))
     if not (np.isfinite(threshold_px) and threshold_px > 0):
-        expected = f"found {threshold_px}; expected pixels above 0, such as 0.5 or 0.33"
+        expected = message(
+            "compare_threshold",
+            "found {found}; expected pixels above 0, such as 0.5 or 0.33",
+            found=threshold_px,
+        )
         problems.append(Problem("--threshold", expected))
     if seed < 0:
-        problems.append(Problem("--seed", f"found {seed}; expected a whole number, 0 or more"))
+        problems.append(
+            Problem(
+                "--seed",
+                message(
+                    "compare_seed", "found {seed}; expected a whole number, 0 or more", seed=seed
+                ),
+            )
+        )
     if problems:
         raise InputError(problems)
 
@@ -26,22 +43,38 @@ def check_options(method, methods, threshold_px, seed):
 def check_size(cameras, grid, unknowns, file):
     """Neither too few points for the unknowns nor more differences than memory holds."""
     if 2 * grid.size <= unknowns:
-        expected = f"{grid.size} points; expected more than {unknowns // 2} for this method"
+        expected = message(
+            "compare_few_points",
+            "{count} points; expected more than {least} for this method",
+            count=grid.size,
+            least=unknowns // 2,
+        )
         raise InputError(Problem("--grid", expected))
     count = cameras * (cameras - 1) // 2
     if count * grid.size > MOST_DIFFERENCES:
-        expected = f"{count} pairs of {grid.size} points; expected fewer calibrations or points"
+        expected = message(
+            "compare_too_many",
+            "{count} pairs of {points} points; expected fewer calibrations or points",
+            count=count,
+            points=grid.size,
+        )
         raise InputError(Problem(file, expected))
 
 
 def common_frame(setups, file):
     """(columns, lines) of all the setups; raises InputError where they are not of one frame."""
     if len(setups) < 2:
-        expected = f"{len(setups) or 'no'} calibration; expected two or more to compare"
+        expected = message(
+            "compare_too_few",
+            "{count} calibration; expected two or more to compare",
+            count=len(setups) or message("compare_none", "no"),
+        )
         raise InputError(Problem(file, expected))
     lacking = [setup.camera.name for setup in setups if setup.pixel_mm is None]
     if lacking:
-        expected = "the size of a pixel is not known; expected format_px with pixel_um"
+        expected = message(
+            "compare_no_pixel", "the size of a pixel is not known; expected format_px with pixel_um"
+        )
         raise InputError([Problem(file, expected, None, name) for name in lacking])
     first, frame = setups[0], setups[0].format_px
     problems = []
@@ -58,12 +91,22 @@ def _complaint(one, first, frame):
     """What keeps a setup from being compared with the first, in words; None: nothing."""
     of_first = first.camera.name
     if np.any(one.format_px != frame):
-        return f"a frame of {_sides(one.format_px)} px; expected {_sides(frame)} as of {of_first}"
+        return message(
+            "compare_frame",
+            "a frame of {found} px; expected {frame} as of {first}",
+            found=_sides(one.format_px),
+            frame=_sides(frame),
+            first=of_first,
+        )
     if np.all(np.abs(one.pixel_mm / first.pixel_mm - 1) <= SAME_PIXEL):
         return None
-    return (
-        f"a pixel of {_sides(1000 * one.pixel_mm)} micrometres; expected that of {of_first},"
-        f" {_sides(1000 * first.pixel_mm)}, within {100 * SAME_PIXEL:g} %"
+    return message(
+        "compare_pixel",
+        "a pixel of {found} micrometres; expected that of {first}, {pixel}, within {percent:g} %",
+        found=_sides(1000 * one.pixel_mm),
+        first=of_first,
+        pixel=_sides(1000 * first.pixel_mm),
+        percent=100 * SAME_PIXEL,
     )
 
 

@@ -38,6 +38,7 @@ from tankcal.camera_analysis.stability.grids import Grid, default_grid
 from tankcal.camera_analysis.stability.terrains import SEED, TERRAINS, Terrain
 from tankcal.errors import SolutionError
 from tankcal.job.measurements import CameraSetup
+from tankcal.messages import message
 from tankcal.rotations import angles_of
 
 METHODS = ("mis", "zrot", "rot", "spr")
@@ -217,8 +218,12 @@ def _corrected(setup, grid, format_px):
             is_undone = np.abs(again - points_mm).max() < UNDONE_MM
     if not is_undone:
         raise SolutionError(
-            f"{camera.name}: its distortion cannot be taken out of all points of the grid;"
-            " the polynomial turns back within the frame"
+            message(
+                "compare_folds",
+                "{name}: its distortion cannot be taken out of all points of the grid; "
+                "the polynomial turns back within the frame",
+                name=camera.name,
+            )
         )
     return _Set(setup, ideal)
 
@@ -246,7 +251,14 @@ def _compared(pair, method, as_published, terrain, depths_m):
         if method == "spr":
             return _by_resections(*pair, terrain, depths_m)
     except SolutionError as error:
-        raise SolutionError(f"{pair[0].name} and {pair[1].name}: {error}") from error
+        text = message(
+            "compare_of_pair",
+            "{one} and {other}: {error}",
+            one=pair[0].name,
+            other=pair[1].name,
+            error=error.texts[0],
+        )
+        raise SolutionError(text) from error
     return _by_coordinates(*pair, method, as_published)
 
 

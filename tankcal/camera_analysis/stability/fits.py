@@ -19,6 +19,7 @@ import numpy as np
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
 from tankcal.imaging import ideal_point
+from tankcal.messages import message
 from tankcal.rotations import turned, vector_derivatives
 
 
@@ -90,7 +91,12 @@ def orientation_model(place, c_mm, start, pixel_mm):
         position = x[3:] if len(x) > 3 else np.zeros(3)
         seen = rotation @ (place - position).T
         if np.any(seen[2] >= 0):
-            raise SolutionError("points behind the camera: these are not bundles of one camera")
+            raise SolutionError(
+                message(
+                    "compare_behind",
+                    "points behind the camera: these are not bundles of one camera",
+                )
+            )
         xi, eta, by_x, by_y = ideal_point(*seen, rotation.ravel(), c_mm)
         by = np.stack([np.column_stack(by_x[:6]), np.column_stack(by_y[:6])], axis=1)
         by /= np.asarray(pixel_mm)[:, None]
@@ -107,7 +113,14 @@ def _fit(place, image_mm, c_mm, pixel_mm, start, position):
     unknowns = np.zeros(3) if position is None else np.append(np.zeros(3), position)
     image = (image_mm / pixel_mm).ravel()
     if len(image) <= len(unknowns):
-        raise SolutionError(f"{len(place)} points for {len(unknowns)} unknowns: too few")
+        raise SolutionError(
+            message(
+                "compare_fit_few",
+                "{points} points for {unknowns} unknowns: too few",
+                points=len(place),
+                unknowns=len(unknowns),
+            )
+        )
     adjusted = adjust(model, unknowns, image, np.ones(len(image)))
     found = adjusted.unknowns
     misclosure, design, _ = model(found, image)

@@ -14,12 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 
 STEPS_ON_LONGEST_SIDE = 46.08  # Pessoa: 4608 px in steps of 100
 MOST_POINTS = 250_000
 _NUMBER = r"([0-9]{1,6}(?:\.[0-9]{1,6})?)"
 _FORM = re.compile(rf"([0-9]{{1,6}})[xX]([0-9]{{1,6}}),{_NUMBER},{_NUMBER},{_NUMBER}")
-EXPECTED = "expected COLUMNSxROWS,FIRST_COLUMN,FIRST_LINE,STEP in pixels, such as 46x35,50,50,100"
+EXPECTED = message(
+    "compare_grid_form",
+    "expected COLUMNSxROWS,FIRST_COLUMN,FIRST_LINE,STEP in pixels, such as 46x35,50,50,100",
+)
 
 
 @dataclass(frozen=True)
@@ -61,8 +65,18 @@ class Grid:
             raise InputError(
                 Problem(
                     "--grid",
-                    f"columns {first[0]:g} to {last[0]:g}, lines {first[1]:g} to {last[1]:g};"
-                    f" expected all of it on the frame of {size[0]:g} x {size[1]:g} px",
+                    message(
+                        "compare_grid_off",
+                        "columns {first_column:g} to {last_column:g}, lines {first_line:g} to "
+                        "{last_line:g}; expected all of it on the frame of {columns:g} x "
+                        "{lines:g} px",
+                        first_column=first[0],
+                        last_column=last[0],
+                        first_line=first[1],
+                        last_line=last[1],
+                        columns=size[0],
+                        lines=size[1],
+                    ),
                 )
             )
         return (self.places_px - (size - 1) / 2) * pixel_mm * [1, -1]
@@ -89,10 +103,18 @@ def parse(text):
     """The Grid of a text such as 46x35,50,50,100; raises InputError for any other text."""
     match = _FORM.fullmatch(text.replace(" ", "")) if len(text) <= 80 else None
     if match is None:
-        raise InputError(Problem("--grid", f"found {text[:60]!r}; {EXPECTED}"))
+        expected = message(
+            "compare_no_grid", "found {found!r}; {expected}", found=text[:60], expected=EXPECTED
+        )
+        raise InputError(Problem("--grid", expected))
     columns, rows = int(match[1]), int(match[2])
     x, y, step = (float(part) for part in match.groups()[2:])
     if columns * rows == 0 or columns * rows > MOST_POINTS or step == 0:
-        expected = f"found {text[:60]!r}; expected 1 to {MOST_POINTS} points and a step above 0"
+        expected = message(
+            "compare_grid_size",
+            "found {found!r}; expected 1 to {most} points and a step above 0",
+            found=text[:60],
+            most=MOST_POINTS,
+        )
         raise InputError(Problem("--grid", expected))
     return Grid(columns, rows, (x, y), step)

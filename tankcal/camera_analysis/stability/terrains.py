@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 
 SEED = 1
 DRAWN = 10  # terrains that a figure is pooled over
@@ -66,7 +67,13 @@ def parse_terrain(text):
     raise InputError(
         Problem(
             "--terrain",
-            f"found {text[:60]!r}; expected I, II, or LOW,RANGE in metres with a range of 0 or more"
-            f" and all of it below the camera at {camera_m:g} m, such as 200,100",
+            message(
+                "compare_terrain",
+                "found {found!r}; expected I, II, or LOW,RANGE in metres with a range of "
+                "0 or more and all of it below the camera at {height:g} m, such as "
+                "200,100",
+                found=text[:60],
+                height=camera_m,
+            ),
         )
     )
