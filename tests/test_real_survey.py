@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tankcal
+from tankcal.job.plausibility import CODES
 from tankcal.record import record_of
 
 # an independent robust fit: radii 7.582 to 7.589 m, 2152.1 m3, 11.906 m (the data's NOTE)
@@ -119,3 +120,7 @@ def test_every_course_is_a_barrel(result, figure):
     )
     assert np.all(barrels > 0.002)
     assert barrels.mean() == pytest.approx(np.mean(lifts), abs=0.003)  # 1.1 mm of noise
+
+
+def test_nothing_in_it_is_doubted(result):
+    assert {one.expected.code for one in result.warnings} & CODES == set()
