@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tankcal.job.checks.bottom import STEEP_FACTOR
 from tankcal.job.checks.common import has_rows, tell
 from tankcal.job.checks.geometry import places_of
 from tankcal.job.checks.settings import bottoms_z
@@ -101,8 +102,8 @@ def _check_slope(values, raw, log):
         )
         tell(log.warning, raw, "bottom", "centre_z_m", text)
 
-    elif drawn is None:
-        text = message(
+    elif drawn is None and (diameter is None or abs(centre - edge) <= STEEP_FACTOR * diameter):
+        text = message(  # a steeper one is asked about already
             "bottom_slopes_unsaid",
             "blank; the bottom goes {found} to its centre by {rise_m:.3g} m, and nothing else says"
             " that it does: expected up or down as the drawing has it",
