@@ -22,7 +22,7 @@ test: $(VENV)/full ## the tests, studies at a twentieth of their size
 	$(BIN)/pytest
 
 study: $(VENV)/full ## the studies at full size (minutes)
-	$(BIN)/pytest -m study --dist load
+	$(BIN)/pytest -m study --dist load --durations 25
 
 check: $(VENV)/full ## style, floors of the house, notebooks without outputs
 	$(BIN)/ruff check .

@@ -106,7 +106,7 @@ def test_resistance_and_reactance():
 
 
 def test_simultaneous_readings_keep_their_degrees_of_freedom():
-    """Willink 2007 section 4.1: exactly those of the five sets of readings, in all outputs."""
+    """c' S c is a chi-square: exactly those of the five sets of readings, in all outputs."""
     result = propagate(resistance_reactance_impedance, impedance())
     assert result.dof == pytest.approx([4, 4, 4], rel=1e-12)
 
