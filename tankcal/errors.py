@@ -92,6 +92,10 @@ class HeightError(TankcalError, ValueError):
     exit_status = 2
 
 
+class VocabularyError(TankcalError):
+    """A code or a unit that no language has words for; in a record that was read, damage."""
+
+
 class ProgramError(TankcalError):
     """A result that contradicts itself, such as an interval that leaves its volume out.
 

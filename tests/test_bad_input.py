@@ -91,6 +91,18 @@ def test_a_setting_that_is_no_finite_number(tmp_path, value):
     assert "not NaN or infinite" in problem.expected
 
 
+@pytest.mark.parametrize("rows", [10, 900])
+def test_a_number_next_to_zero(tmp_path, rows):
+    """Its square is nothing to a computer, and its weight endless; long columns are read apart."""
+    parts = job_parts()
+    points = parts.tables["points"]
+    points += [[f"more{i}", *points[1 + i % 9][1:]] for i in range(rows)]
+    points[5][1] = "1e-308"
+    (problem,) = problems_of(write(tmp_path, parts, "folder"))
+    assert (problem.file, problem.row, problem.column) == ("points.csv", 6, "x_m")
+    assert "0 or farther from 0" in problem.expected
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_missing_key_and_unknown_section(tmp_path, form):
     parts = job_parts(settings={"survey.side": None, "tnak.id": "x"})

@@ -95,6 +95,16 @@ def test_what_cannot_be_used_is_one_line(again, tmp_path, capsys, change, option
     assert names_of(tmp_path) == ["record.json"]
 
 
+def test_a_code_that_has_no_words_is_one_line(again, tmp_path, capsys):
+    record = json.loads((again / "record.json").read_text(encoding="utf-8"))
+    record["capacity"]["zero"] = "elsewhere"
+    (tmp_path / "record.json").write_text(json.dumps(record), encoding="utf-8")
+    assert main(["report", str(tmp_path), "--out", str(tmp_path / "out"), "--quiet"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("tankcal: record.json: does not hold what a record does (")
+    assert names_of(tmp_path) == ["record.json"]
+
+
 def test_a_folder_of_somebody_else_is_refused(again, tmp_path, capsys):
     shutil.copyfile(again / "record.json", tmp_path / "record.json")
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")

@@ -7,7 +7,7 @@ import numpy as np
 
 from tankcal.job.contract import COLUMNS, KEYS, KINDS, OPEN_SECTIONS, REGISTER_KEYS
 from tankcal.job.contract.registers import FAMILIES, SHORT_KEYS
-from tankcal.job.fields import IN_TOML, MAX_NAME, Field, Refused, is_blank, read_value
+from tankcal.job.fields import IN_TOML, MAX_NAME, NEXT_TO_ZERO, Field, Refused, is_blank, read_value
 from tankcal.job.form_words import NO, YES, meant
 from tankcal.job.tables import nearest, shown
 from tankcal.messages import message
@@ -355,6 +355,7 @@ def _plain_numbers(field, raws, decimal):
         ]
     )
     sound = (values >= field.low) & (values <= field.high) & np.isfinite(values)
+    sound &= (values == 0) | (np.abs(values) >= NEXT_TO_ZERO)
     if field.above_low:
         sound &= values > field.low
     return [value if good else None for value, good in zip(values.tolist(), sound, strict=True)]

@@ -1,6 +1,7 @@
 """Meshes from files and to files, through trimesh."""
 
 import io
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -38,9 +39,11 @@ def parse_mesh(name, data, unit_m=1.0):
             message("mesh_ending", "expected one of {names}", names=["." + k for k in FILE_KINDS]),
         )
     try:
-        found = trimesh.load_mesh(
-            io.BytesIO(cleaned(kind, data)), file_type=kind, process=False, skip_materials=True
-        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what is wrong, our own problems say
+            found = trimesh.load_mesh(
+                io.BytesIO(cleaned(kind, data)), file_type=kind, process=False, skip_materials=True
+            )
         vertices, faces = np.array(found.vertices), np.array(found.faces)
     except Exception as error:  # whatever a parser stumbles over
         raise problem(

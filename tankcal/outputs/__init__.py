@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tankcal import folders, report
 from tankcal import record as records
-from tankcal.errors import InputError, Problem, TankcalError
+from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
 from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.languages import LANGUAGES
 from tankcal.messages import message
@@ -91,6 +91,10 @@ def rebuild(record_path, directory, progress=None, language=None, letterhead=Non
 
     try:
         return _write(prepare, directory, progress, language, letterhead)
+    except VocabularyError as error:
+        found = message("record_speaks_otherwise", "does not hold what a record does ({what})",
+                        what=str(error))  # fmt: skip
+        raise InputError(Problem(source.name, found)) from error
     except TankcalError:
         raise
     except (LookupError, TypeError, ValueError, AttributeError) as error:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import nbformat
 
-from tankcal.errors import TankcalError
+from tankcal.errors import TankcalError, VocabularyError
 from tankcal.shipped import shipped
 
 TEMPLATES = ("certificate.ipynb", "working_papers.ipynb", "field_table.ipynb")
@@ -91,6 +91,8 @@ def execute(notebook, folder, on_cell=None):
         try:
             client.execute(env=_environment(scratch), cleanup_kc=True)
         except CellExecutionError as error:
+            if error.ename == VocabularyError.__name__:
+                raise VocabularyError(error.evalue) from error
             raise TankcalError(
                 f"the report stopped in {_failed_cell(notebook)}: {error.ename}: {error.evalue}"
             ) from error

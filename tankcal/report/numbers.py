@@ -5,7 +5,7 @@ from math import inf, pi
 
 from tankcal.digits import ENGLISH, WITHOUT_U, shortest, superscript, with_digits, written
 from tankcal.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
-from tankcal.errors import TankcalError
+from tankcal.errors import VocabularyError
 
 _SHORT = range(-2, 6)  # powers of ten written out in a narrow column
 _MOST_DEGREES = 10_000  # of freedom: from there k is that of the normal distribution, to 0.03 %
@@ -56,9 +56,9 @@ UNITS = {
 
 
 def unit(name):
-    """The unit called `name`; raises TankcalError when it is not one of UNITS."""
+    """The unit called `name`; raises VocabularyError when it is not one of UNITS."""
     if name not in UNITS:
-        raise TankcalError(
+        raise VocabularyError(
             f"unit {name!r} is not known; there are: {', '.join(filter(None, UNITS))}"
         )
     return UNITS[name]

@@ -15,7 +15,7 @@ from tankcal.digits import (
     shortest,
     with_digits,
 )
-from tankcal.errors import TankcalError
+from tankcal.errors import VocabularyError
 from tankcal.report import blocks, numbers
 from tankcal.words import marks_of, percent
 
@@ -69,12 +69,12 @@ class PlainPaper:
     def word(self, name, /, **values):
         """The word or sentence called "group.key", with whole numbers in the marks of its language.
 
-        Raises TankcalError when it is missing.
+        Raises VocabularyError when it is missing.
         """
         group, key = name.split(".", 1)
         template = self.words.get(group, {}).get(key)
         if not isinstance(template, str):
-            raise TankcalError(f"the words of this language lack {name}")
+            raise VocabularyError(f"the words of this language lack {name}")
         shown = {
             name: fixed(value, 0, self.marks) if isinstance(value, int) else value
             for name, value in values.items()
