@@ -18,6 +18,7 @@ import scipy.linalg
 import scipy.sparse
 
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 
 SMALLEST_PIVOT = 1e-12  # of normal equations with ones in the diagonal: below it is rounding
 
@@ -76,7 +77,14 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
     for iteration in range(1, max_iterations + 1):
         w, a, b = model(x, l + v)
         if len(w) < len(x):
-            raise SolutionError(f"{len(w)} conditions for {len(x)} unknowns: too few observations")
+            raise SolutionError(
+                message(
+                    "too_few_conditions",
+                    "{conditions} conditions for {unknowns} unknowns: too few observations",
+                    conditions=len(w),
+                    unknowns=len(x),
+                )
+            )
         if b is None:  # B = -I
             minus_qb, whiten, w_there = q, by_weights(), w + v
         else:
@@ -103,7 +111,13 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
                 dof=len(w) - len(x),
                 iterations=iteration,
             )
-    raise SolutionError(f"the adjustment did not converge in {max_iterations} iterations")
+    raise SolutionError(
+        message(
+            "adjustment_unconverged",
+            "the adjustment did not converge in {iterations} iterations",
+            iterations=max_iterations,
+        )
+    )
 
 
 def determined(pivots, rows, of_normals=False):
@@ -135,7 +149,12 @@ def _whitener(m):
     try:
         factor = scipy.linalg.cholesky(m, lower=True)
     except scipy.linalg.LinAlgError as error:
-        raise SolutionError("the observations' covariance is not positive definite") from error
+        raise SolutionError(
+            message(
+                "covariance_indefinite",
+                "the observations' covariance is not positive definite",
+            )
+        ) from error
 
     def whiten(array, transposed=False):
         return scipy.linalg.solve_triangular(
@@ -147,7 +166,12 @@ def _whitener(m):
 
 def _diagonal_whitener(diagonal):
     if not np.all(diagonal > 0):
-        raise SolutionError("an observation has no variance: its sd must be above zero")
+        raise SolutionError(
+            message(
+                "observation_without_variance",
+                "an observation has no variance: its sd must be above zero",
+            )
+        )
     root = np.sqrt(diagonal)
 
     def whiten(array, transposed=False):
@@ -160,7 +184,12 @@ def _solve(a, w):
     """Step, cofactor matrix and an orthonormal basis of the columns, by QR with scaled columns."""
     scale = np.linalg.norm(a, axis=0)
     if not np.all(np.isfinite(scale)):
-        raise SolutionError("the adjustment left the numbers: a derivative is not finite")
+        raise SolutionError(
+            message(
+                "derivative_not_finite",
+                "the adjustment left the numbers: a derivative is not finite",
+            )
+        )
     scale[scale == 0] = 1.0
     basis, r, order = scipy.linalg.qr(a / scale, mode="economic", pivoting=True, check_finite=False)
     rank = int(np.sum(determined(np.diag(r), len(a))))

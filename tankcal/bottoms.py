@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 from tankcal.soundings import surveyed_surface
 from tankcal.terrain import Surface, surface
 from tankcal.uncertainty import Source
@@ -117,11 +118,30 @@ def shaped_bottom(form, plan_m2, centre_m=0.0):
     if form not in FORMS:
         raise SolutionError(f'bottom "{form}"; expected one of {", ".join(FORMS)}')
     if not (np.isfinite(plan_m2) and plan_m2 > 0 and np.isfinite(centre_m)):
-        raise SolutionError(f"bottom of {plan_m2:g} m2 with its centre at {centre_m:g} m")
+        raise SolutionError(
+            message(
+                "bottom_impossible",
+                "bottom of {plan_m2:g} m2 with its centre at {centre_m:g} m",
+                plan_m2=plan_m2,
+                centre_m=centre_m,
+            )
+        )
     if form == "flat" and centre_m != 0:
-        raise SolutionError(f"a flat bottom with its centre at {centre_m:g} m; expected 0")
+        raise SolutionError(
+            message(
+                "flat_bottom_centre",
+                "a flat bottom with its centre at {centre_m:g} m; expected 0",
+                centre_m=centre_m,
+            )
+        )
     if form == "dish" and abs(centre_m) > np.sqrt(plan_m2 / np.pi):
-        raise SolutionError(f"a dish {abs(centre_m):g} m deep is more than half a sphere")
+        raise SolutionError(
+            message(
+                "dish_too_deep",
+                "a dish {depth_m:g} m deep is more than half a sphere",
+                depth_m=abs(centre_m),
+            )
+        )
     return ShapedBottom("flat" if centre_m == 0 else form, float(centre_m), float(plan_m2))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from tankcal.display import volume_text
 from tankcal.errors import HeightError
+from tankcal.messages import message
 from tankcal.uncertainty import Source, combined
 
 SAME_ROW = 1e-9  # of a weight: a dip this near to a row is that row
@@ -147,8 +148,13 @@ class Capacity:
         outside = ~((dips >= first - SAME_M) & (dips <= max(round(last, 3), last + SAME_M)))
         if np.any(outside):
             raise HeightError(
-                f"dip {dips[outside][0]:g} m is outside the capacity table "
-                f"({first:g} to {last:g} m)"
+                message(
+                    "dip_outside_table",
+                    "dip {dip_m:g} m is outside the capacity table ({first_m:g} to {last_m:g} m)",
+                    dip_m=dips[outside][0],
+                    first_m=first,
+                    last_m=last,
+                )
             )
         return np.clip(dips, first, last)
 

@@ -7,6 +7,7 @@ import scipy.sparse
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,11 @@ def fit_circle(xy_m, covariance_m2):
     xy_m = np.asarray(xy_m, dtype=float)
     n = len(xy_m)
     if n < 3:
-        raise SolutionError(f"a circle needs 3 points, {n} were given")
+        raise SolutionError(
+            message(
+                "circle_short_of_points", "a circle needs 3 points, {count} were given", count=n
+            )
+        )
     centre = xy_m.mean(axis=0)
     local = xy_m - centre
     adjusted = adjust(circle_conditions, taubin_circle(local), local.ravel(), covariance_m2)
@@ -78,11 +83,13 @@ def taubin_circle(local):
     z = np.sum(local**2, axis=1)
     mean = z.mean()
     if not mean > 0:
-        raise SolutionError("all points of the section lie on one place")
+        raise SolutionError(
+            message("section_in_one_place", "all points of the section lie on one place")
+        )
     design = np.column_stack([(z - mean) / (2 * np.sqrt(mean)), local])
     values, vectors = np.linalg.svd(design, full_matrices=False)[1:]
     if values[1] < 1e-9 * values[0] or abs(vectors[-1, 0]) < 1e-12:
-        raise SolutionError("the points of the section lie on a line")
+        raise SolutionError(message("section_on_a_line", "the points of the section lie on a line"))
     a = vectors[-1]
     scaled = a[0] / (2 * np.sqrt(mean))
     x, y = -a[1:] / (2 * scaled)

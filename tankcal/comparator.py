@@ -20,6 +20,7 @@ import numpy as np
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 
 KINDS = {"affine": 3, "similarity": 2}  # and the fewest marks that determine each
 GROSS = 0.002  # residual of a mark over the extent of the marks: more than film ever shrinks
@@ -189,11 +190,22 @@ def _linear(readings, marks, kind):
     """Parameters (6,) or (4,) that fit best in the photo system; SolutionError where none do."""
     away = readings - readings.mean(axis=0)
     if len(readings) < KINDS[kind]:
-        raise SolutionError(f"{len(readings)} marks: at least {KINDS[kind]} are needed")
+        raise SolutionError(
+            message(
+                "fiducials_too_few",
+                "{count} marks: at least {needed} are needed",
+                count=len(readings),
+                needed=KINDS[kind],
+            )
+        )
     rows = _rows(away) @ _SIX[kind]
     sizes = np.linalg.svd(away, compute_uv=False)
     if sizes[0] == 0 or (kind == "affine" and sizes[1] < ONE_LINE * sizes[0]):
-        raise SolutionError("the marks lie on one line: they determine no transformation")
+        raise SolutionError(
+            message(
+                "marks_on_a_line", "the marks lie on one line: they determine no transformation"
+            )
+        )
     return np.linalg.lstsq(rows, marks.ravel(), rcond=None)[0]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 from tankcal.primitives import centred, conditions_of, refuse_flat, spread_of, units, walk
 
 DIRECTION_SD_LIMIT = 0.1  # rad: beyond, the direction of a cylinder is not determined
@@ -132,14 +133,23 @@ def lying_cylinder(xyz_m, covariance_m2, azimuth_rad):
     level = np.hypot(east, north)
     if abs(up) > level:
         raise SolutionError(
-            f"the cylinder stands: its axis leans {np.degrees(np.arctan2(level, abs(up))):.1f} deg"
+            message(
+                "cylinder_stands",
+                "the cylinder stands: its axis leans {lean_deg:.1f} deg",
+                lean_deg=np.degrees(np.arctan2(level, abs(up))),
+            )
         )
     towards = (east * np.sin(azimuth_rad) + north * np.cos(azimuth_rad)) / level
     sign = 1.0 if towards > 0 else -1.0
     found = np.arctan2(sign * east, sign * north) % (2 * np.pi)
     if abs(towards) < np.cos(np.pi / 4):
         raise SolutionError(
-            f"the axis runs towards {np.degrees(found):.1f} deg, not {np.degrees(azimuth_rad):.1f}"
+            message(
+                "axis_elsewhere",
+                "the axis runs towards {found_deg:.1f} deg, not {expected_deg:.1f}",
+                found_deg=np.degrees(found),
+                expected_deg=np.degrees(azimuth_rad),
+            )
         )
     outwards = cylinder.tangents @ np.array([east, north, 0.0]) / level
     by_direction = sign * (cylinder.tangents[:, 2] * level - up * outwards) / level**2
@@ -161,12 +171,24 @@ def _refuse_undetermined(adjusted, local, residuals):
     scatter = np.sqrt(np.mean(residuals**2))
     if thick < LEAST_THICKNESS * scatter:
         raise SolutionError(
-            f"the points lie in a plane: {thick:.3g} m thick, where they scatter by {scatter:.3g} m"
+            message(
+                "points_in_a_plane",
+                "the points lie in a plane: {thick_m:.3g} m thick, where they scatter by "
+                "{scatter_m:.3g} m",
+                thick_m=thick,
+                scatter_m=scatter,
+            )
         )
     factor = adjusted.variance_factor if adjusted.dof else 1.0
     sd = np.sqrt(factor * np.diag(adjusted.cofactor)[2:4].sum())
     if not sd < DIRECTION_SD_LIMIT:
-        raise SolutionError(f"the direction of the cylinder is not determined: sd {sd:.3g} rad")
+        raise SolutionError(
+            message(
+                "cylinder_direction_undetermined",
+                "the direction of the cylinder is not determined: sd {sd_rad:.3g} rad",
+                sd_rad=sd,
+            )
+        )
 
 
 def _start_of_cylinder(local):
@@ -191,7 +213,13 @@ def _start_of_cylinder(local):
         if len(tried) == CANDIDATES:
             break
     if best is None:
-        raise SolutionError(f"none of {len(tried)} directions leads to a cylinder")
+        raise SolutionError(
+            message(
+                "cylinder_not_found",
+                "none of {count} directions leads to a cylinder",
+                count=len(tried),
+            )
+        )
     _, frame, found = best
     return _turned(frame, walk(cylinder_distances(frame), found, some))
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 from tankcal.uncertainty import Source
 
 AIR_KG_M3, WEIGHTS_KG_M3 = 1.2, 8000.0  # of conventional weighing (OIML D 28)
@@ -96,13 +97,30 @@ def deadwood(names, bottoms_m, tops_m, volumes_m3, u_m3=None):
     columns = [np.array(c, dtype=float) for c in (bottoms_m, tops_m, volumes_m3, u)]
     for name, bottom, top, volume, sd in zip(names, *columns, strict=True):
         if not np.all(np.isfinite([bottom, top, volume])) or np.isinf(sd):
-            raise SolutionError(f"deadwood {name}: expected finite numbers")
+            raise SolutionError(
+                message(
+                    "deadwood_not_finite", "deadwood {name}: expected finite numbers", name=name
+                )
+            )
         if top < bottom:
             raise SolutionError(
-                f"deadwood {name}: its top {top:g} m is below its bottom {bottom:g} m"
+                message(
+                    "deadwood_top_below_bottom",
+                    "deadwood {name}: its top {top_m:g} m is below its bottom {bottom_m:g} m",
+                    name=name,
+                    top_m=top,
+                    bottom_m=bottom,
+                )
             )
         if sd < 0:
-            raise SolutionError(f"deadwood {name}: its uncertainty {sd:g} m3 is negative")
+            raise SolutionError(
+                message(
+                    "deadwood_uncertainty_negative",
+                    "deadwood {name}: its uncertainty {u_m3:g} m3 is negative",
+                    name=name,
+                    u_m3=sd,
+                )
+            )
     return Deadwood(names, *columns)
 
 
@@ -189,11 +207,21 @@ class FloatingRoof:
 def floating_roof(mass_kg, critical_bottom_m, critical_top_m, reference_density_kg_m3, weighing):
     """`FloatingRoof`; raises SolutionError for a mass, zone, density or weighing that cannot be."""
     if not (np.isfinite(mass_kg) and mass_kg > 0):
-        raise SolutionError(f"floating roof of {mass_kg:g} kg; expected a mass above 0")
+        raise SolutionError(
+            message(
+                "roof_without_mass",
+                "floating roof of {mass_kg:g} kg; expected a mass above 0",
+                mass_kg=mass_kg,
+            )
+        )
     if not critical_bottom_m < critical_top_m:
         raise SolutionError(
-            f"critical zone from {critical_bottom_m:g} to {critical_top_m:g} m; "
-            "expected its top above its bottom"
+            message(
+                "critical_zone_upside_down",
+                "critical zone from {low_m:g} to {high_m:g} m; expected its top above its bottom",
+                low_m=critical_bottom_m,
+                high_m=critical_top_m,
+            )
         )
     if weighing not in ("air", "vacuum"):
         raise SolutionError(f'weighing "{weighing}"; expected "air" or "vacuum"')

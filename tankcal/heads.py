@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 from tankcal.quadrature import panels
 
 NODES = 24  # of each panel
@@ -136,7 +137,13 @@ def meridian(end, radius_m):
         return _torispherical(end, radius_m)
     if end.kind == "flat":
         if end.depth_m:
-            raise SolutionError(f"a flat end has no depth, {end.depth_m:g} m was given")
+            raise SolutionError(
+                message(
+                    "flat_end_depth",
+                    "a flat end has no depth, {depth_m:g} m was given",
+                    depth_m=end.depth_m,
+                )
+            )
         return ()
     h = end.depth_m
     if not 0 < h < np.inf:
@@ -162,8 +169,13 @@ def _inputs(by_radius, by_depth):
 def _spherical(h, radius_m):
     if h > radius_m * (1 + 1e-12):
         raise SolutionError(
-            f"a spherical end {h:g} m deep on a radius of {radius_m:g} m: expected at most the"
-            " radius (a hemisphere)"
+            message(
+                "spherical_end_too_deep",
+                "a spherical end {depth_m:g} m deep on a radius of {radius_m:g} m: "
+                "expected at most the radius (a hemisphere)",
+                depth_m=h,
+                radius_m=radius_m,
+            )
         )
     ball = (radius_m**2 + h**2) / (2 * h)
     by_radius = radius_m / h * np.array([-1.0, 0, 1, 1])
@@ -175,12 +187,24 @@ def _spherical(h, radius_m):
 def _torispherical(end, radius_m):
     dish, knuckle = end.dish_radius_m, end.knuckle_radius_m
     if dish is None or knuckle is None:
-        raise SolutionError("a torispherical end needs the radii of its dish and its knuckle")
+        raise SolutionError(
+            message(
+                "torispherical_radii_missing",
+                "a torispherical end needs the radii of its dish and its knuckle",
+            )
+        )
     if not 0 < knuckle <= radius_m < dish < np.inf:
         raise SolutionError(
-            f"a torispherical end with a knuckle of {knuckle:g} m and a dish of {dish:g} m on a"
-            f" radius of {radius_m:g} m: expected 0 < knuckle <= radius < dish (an end without"
-            " knuckle, or a hemisphere, is a spherical one)"
+            message(
+                "torispherical_radii_impossible",
+                "a torispherical end with a knuckle of {knuckle_m:g} m and a dish of "
+                "{dish_m:g} m on a radius of {radius_m:g} m: expected 0 < knuckle <= "
+                "radius < dish (an end without knuckle, or a hemisphere, is a spherical "
+                "one)",
+                knuckle_m=knuckle,
+                dish_m=dish,
+                radius_m=radius_m,
+            )
         )
     inner = radius_m - knuckle
     reach = np.sqrt((dish - radius_m) * (dish + radius_m - 2 * knuckle))

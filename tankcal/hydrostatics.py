@@ -24,6 +24,7 @@ import numpy as np
 
 from tankcal.courses import CourseShape
 from tankcal.errors import HeightError, SolutionError
+from tankcal.messages import message
 from tankcal.volumes import ShellVolume
 
 STANDARD_GRAVITY = 9.80665  # m/s2
@@ -121,7 +122,14 @@ class LiquidHead:
         top = self.volume.height_m
         inside = levels <= top * (1 + 1e-12)
         if not np.all(inside):
-            raise HeightError(f"level {levels[~inside][0]:g} m is above the shell ({top:g} m)")
+            raise HeightError(
+                message(
+                    "liquid_level_above_shell",
+                    "level {level_m:g} m is above the shell ({top_m:g} m)",
+                    level_m=levels[~inside][0],
+                    top_m=top,
+                )
+            )
         place = np.searchsorted([hoop.course.bottom_m for hoop in self.hoops], levels, "right") - 1
         sums = np.zeros((1 + len(INPUTS), len(levels)))
         for index, (hoop, below) in enumerate(zip(self.hoops, self._below, strict=True)):
@@ -167,22 +175,36 @@ def liquid_head(
     thicknesses = np.asarray(thicknesses_m, dtype=float)
     if thicknesses.shape != (len(volume.courses),):
         raise SolutionError(
-            f"{thicknesses.size} plate thicknesses for {len(volume.courses)} courses"
+            message(
+                "thicknesses_for_courses",
+                "{count} plate thicknesses for {courses} courses",
+                count=thicknesses.size,
+                courses=len(volume.courses),
+            )
         )
     _refuse_numbers(
         youngs_modulus_pa, gravity_m_s2, density_kg_m3, survey_density_kg_m3, survey_level_m
     )
     if survey_level_m > volume.height_m:
         raise SolutionError(
-            f"liquid up to {survey_level_m:g} m during the survey; "
-            f"the shell ends at {volume.height_m:g} m"
+            message(
+                "survey_liquid_above_shell",
+                "liquid up to {level_m:g} m during the survey; the shell ends at {top_m:g} m",
+                level_m=survey_level_m,
+                top_m=volume.height_m,
+            )
         )
     surveyed = survey_level_m if survey_density_kg_m3 > 0 else 0.0
     for number, (course, plate) in enumerate(zip(volume.courses, thicknesses, strict=True), 1):
         if (density_kg_m3 > 0 or course.bottom_m < surveyed) and not plate > 0:
             raise SolutionError(
-                f"course {number} from the bottom has a plate of {plate:g} m; "
-                "for the liquid head it needs its thickness"
+                message(
+                    "course_without_plate",
+                    "course {number} from the bottom has a plate of {plate_m:g} m; for the "
+                    "liquid head it needs its thickness",
+                    number=number,
+                    plate_m=plate,
+                )
             )
     survey = (float(survey_density_kg_m3), float(survey_level_m))
     hoops = [
@@ -195,10 +217,22 @@ def liquid_head(
 def _refuse_numbers(modulus, gravity, *others):
     for value in (modulus, gravity):
         if not (np.isfinite(value) and value > 0):
-            raise SolutionError(f"Young's modulus or gravity {value:g}; expected it above 0")
+            raise SolutionError(
+                message(
+                    "modulus_or_gravity",
+                    "Young's modulus or gravity {value:g}; expected it above 0",
+                    value=value,
+                )
+            )
     for value in others:
         if not (np.isfinite(value) and value >= 0):
-            raise SolutionError(f"density or level of a liquid {value:g}; expected 0 or more")
+            raise SolutionError(
+                message(
+                    "density_or_level",
+                    "density or level of a liquid {value:g}; expected 0 or more",
+                    value=value,
+                )
+            )
 
 
 def _hoop(course, plate, modulus, gravity, scale, density, level):

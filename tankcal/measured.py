@@ -6,6 +6,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from tankcal.errors import HeightError, SolutionError
+from tankcal.messages import message
 from tankcal.uncertainty import Source
 
 
@@ -75,8 +76,14 @@ class MeasuredBottom:
         levels, lowest = _rows(levels_m), self.levels_m[0]
         if self.volumes_m3[0] > 0 and not np.all(levels >= lowest):
             raise HeightError(
-                f"level {levels.min():g} m is below the lowest one measured by liquid "
-                f"({lowest:g} m, {self.volumes_m3[0]:g} m3)"
+                message(
+                    "level_below_measured",
+                    "level {level_m:g} m is below the lowest one measured by liquid "
+                    "({lowest_m:g} m, {volume_m3:g} m3)",
+                    level_m=levels.min(),
+                    lowest_m=lowest,
+                    volume_m3=self.volumes_m3[0],
+                )
             )
         return np.clip(levels, lowest, self.highest_m)
 
@@ -92,15 +99,29 @@ def measured_bottom(levels_m, volumes_m3, u_m3=None):
     levels, volumes = np.asarray(levels_m, dtype=float), np.asarray(volumes_m3, dtype=float)
     u = np.zeros(len(levels)) if u_m3 is None else np.asarray(u_m3, dtype=float)
     if len(levels) < 2:
-        raise SolutionError(f"{len(levels)} volumes measured by liquid; expected two or more")
+        raise SolutionError(
+            message(
+                "too_few_measured_volumes",
+                "{count} volumes measured by liquid; expected two or more",
+                count=len(levels),
+            )
+        )
     finite = np.isfinite(levels) & np.isfinite(volumes) & np.isfinite(u)
     follows = np.append(True, (np.diff(levels) > 0) & (np.diff(volumes) >= 0))
     wrong = np.flatnonzero(~(finite & follows & (volumes >= 0) & (u >= 0)))
     if len(wrong):
         row = wrong[0]
         raise SolutionError(
-            f"volume {row + 1} measured by liquid: level {levels[row]:g} m, {volumes[row]:g} m3, "
-            f"u {u[row]:g} m3; expected rising levels, volumes that do not fall, none negative"
+            message(
+                "measured_volume_wrong",
+                "volume {number} measured by liquid: level {level_m:g} m, {volume_m3:g} "
+                "m3, u {u_m3:g} m3; expected rising levels, volumes that do not fall, "
+                "none negative",
+                number=row + 1,
+                level_m=levels[row],
+                volume_m3=volumes[row],
+                u_m3=u[row],
+            )
         )
     errors = np.zeros((len(u), len(u)))
     for row in range(len(u)):

@@ -21,6 +21,7 @@ from tankcal.form import (
     unit_form,
     whitened,
 )
+from tankcal.messages import message
 from tankcal.quadrature import panels, polar_products
 
 FULL_TURN = 2 * np.pi
@@ -138,9 +139,20 @@ def interpolate_outline(xy_m, x_m, y_m, form, zeta=0.0):
     knots = azimuth[order]
     n = len(knots)
     if n < 5:
-        raise SolutionError(f"an irregular section needs 5 points, {n} were given")
+        raise SolutionError(
+            message(
+                "outline_short_of_points",
+                "an irregular section needs 5 points, {count} were given",
+                count=n,
+            )
+        )
     if np.min(np.diff(knots, append=knots[0] + FULL_TURN)) < 1e-9:
-        raise SolutionError("two points of a section share an azimuth: it cannot be interpolated")
+        raise SolutionError(
+            message(
+                "azimuth_shared",
+                "two points of a section share an azimuth: it cannot be interpolated",
+            )
+        )
     return Outline(
         x_m=x_m,
         y_m=y_m,
@@ -214,7 +226,12 @@ def _shrunk(design, free, noise_m2):
     bound = np.arange(free, len(normal))
     normal[bound, bound] += 1.0
     if np.linalg.matrix_rank(normal[:free, :free]) < free:
-        raise SolutionError("the points of a section do not determine its centre and radius")
+        raise SolutionError(
+            message(
+                "section_undetermined",
+                "the points of a section do not determine its centre and radius",
+            )
+        )
     return np.linalg.solve(normal, whitened(white, noise_m2, transposed=True).T)
 
 

@@ -19,6 +19,7 @@ import scipy.sparse
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 
 FLAT_BEYOND = 100.0  # spreads of the points: a larger radius is that of a plane or a line
 
@@ -178,7 +179,12 @@ def units(d):
     """Lengths (n,) of vectors (n, k), and the vectors of length one."""
     distance = np.linalg.norm(d, axis=1)
     if not np.all(distance > 0):
-        raise SolutionError("a point lies in the very centre of the shape that is fitted to it")
+        raise SolutionError(
+            message(
+                "point_in_the_centre",
+                "a point lies in the very centre of the shape that is fitted to it",
+            )
+        )
     return distance, d / distance[:, None]
 
 
@@ -229,7 +235,7 @@ def _direct_ellipse(local):
     a, b, c = vectors[:, np.argmax(4 * vectors[0] * vectors[2] - vectors[1] ** 2)]
     matrix = np.array([[a, b / 2], [b / 2, c]])
     if not np.linalg.det(matrix) > 0:
-        raise SolutionError("the points lie on no ellipse")
+        raise SolutionError(message("no_ellipse", "the points lie on no ellipse"))
     d, e, f = back @ (a, b, c)
     centre = -np.linalg.solve(matrix, [d, e]) / 2
     size = centre @ matrix @ centre - f
@@ -244,7 +250,13 @@ def _axes(sxx, syy, sxy):
     middle, lean = (sxx + syy) / 2, (sxx - syy) / 2
     half = np.hypot(lean, sxy)
     if not middle > half:
-        raise SolutionError(f"the points lie on no ellipse: half axes {middle + half:.3g} m and 0")
+        raise SolutionError(
+            message(
+                "ellipse_degenerate",
+                "the points lie on no ellipse: half axes {half_axis_m:.3g} m and 0",
+                half_axis_m=middle + half,
+            )
+        )
     sine, cosine = (sxy / half, lean / half) if half > 1e-12 * middle else (0.0, 0.0)
     by_half = np.array([cosine / 2, -cosine / 2, sine])
     by_middle = np.array([0.5, 0.5, 0.0])

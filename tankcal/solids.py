@@ -11,6 +11,7 @@ import numpy as np
 
 from tankcal.errors import HeightError, SolutionError
 from tankcal.heads import Bow, Cut, End, Line, depth_of, integrate, meridian
+from tankcal.messages import message
 
 ROUNDING = 1e-9  # of the highest dip: a dip so little outside is the top or the bottom itself
 FLAT = End("flat")
@@ -64,7 +65,12 @@ class LyingTank:
         inward = sum(depth for depth, end in depths if end.inward)
         if inward > self.length_m:
             raise SolutionError(
-                f"ends that bulge {inward:g} m inwards meet in a cylinder of {self.length_m:g} m"
+                message(
+                    "ends_meet",
+                    "ends that bulge {inward_m:g} m inwards meet in a cylinder of {length_m:g} m",
+                    inward_m=inward,
+                    length_m=self.length_m,
+                )
             )
         self._check_dip()
 
@@ -75,8 +81,15 @@ class LyingTank:
         slack = ROUNDING * self.length_m
         if min(low, high) < -slack or max(low, high) > self.length_m + slack:
             raise SolutionError(
-                f"the dip touches the bottom {low:g} m and leaves the top {high:g} m from the"
-                f" start of the cylinder: expected both between 0 and {self.length_m:g} m"
+                message(
+                    "dip_off_cylinder",
+                    "the dip touches the bottom {low_m:g} m and leaves the top {high_m:g} m "
+                    "from the start of the cylinder: expected both between 0 and "
+                    "{length_m:g} m",
+                    low_m=low,
+                    high_m=high,
+                    length_m=self.length_m,
+                )
             )
 
     @property
@@ -284,7 +297,14 @@ def _inside(levels_m, top_m):
     slack = ROUNDING * top_m
     outside = ~((levels >= -slack) & (levels <= top_m + slack))
     if np.any(outside):
-        raise HeightError(f"dip {levels[outside][0]:g} m is outside the tank (0 to {top_m:g} m)")
+        raise HeightError(
+            message(
+                "dip_outside_tank",
+                "dip {dip_m:g} m is outside the tank (0 to {top_m:g} m)",
+                dip_m=levels[outside][0],
+                top_m=top_m,
+            )
+        )
     return levels
 
 

@@ -16,6 +16,7 @@ from scipy.spatial.distance import cdist
 from scipy.special import ndtr
 
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 from tankcal.terrain import Surface, surface
 from tankcal.uncertainty import factor_of
 
@@ -66,10 +67,18 @@ def surveyed_surface(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0)):
     n = len(xyz)
     if not FEWEST_POINTS <= n <= MOST_POINTS:
         raise SolutionError(
-            f"{n} surveyed points of the bottom; expected {FEWEST_POINTS} to {MOST_POINTS}"
+            message(
+                "bottom_points_count",
+                "{count} surveyed points of the bottom; expected {fewest} to {most}",
+                count=n,
+                fewest=FEWEST_POINTS,
+                most=MOST_POINTS,
+            )
         )
     if not np.all(np.isfinite(xyz)):
-        raise SolutionError("a surveyed point of the bottom is not finite")
+        raise SolutionError(
+            message("bottom_point_not_finite", "a surveyed point of the bottom is not finite")
+        )
     size = np.sqrt(footprint.area_m2 / np.pi)
     plan = xyz[:, :2] - (footprint.x_m, footprint.y_m) - np.outer(xyz[:, 2], slope)
     _refuse_outside(footprint, plan)
@@ -132,8 +141,14 @@ def _refuse_outside(footprint, plan):
     worst = int(np.argmax(beyond))
     if not beyond[worst] <= BEYOND_WALL:
         raise SolutionError(
-            f"point {worst + 1} of the bottom is {distance[worst]:.3f} m from the axis, "
-            f"outside the wall ({footprint.radius_at(azimuth[worst]):.3f} m)"
+            message(
+                "bottom_point_off_wall",
+                "point {point} of the bottom is {distance_m:.3f} m from the axis, "
+                "outside the wall ({wall_m:.3f} m)",
+                point=worst + 1,
+                distance_m=distance[worst],
+                wall_m=footprint.radius_at(azimuth[worst]),
+            )
         )
 
 
@@ -179,8 +194,11 @@ def _kriging(points, heights, noise):
     trend = _trend(points)
     if np.linalg.cond(trend) > WORST_CONDITION:
         raise SolutionError(
-            "the points of the bottom do not spread over its plan: expected some in the middle, "
-            "some at the wall, some between, all around"
+            message(
+                "bottom_points_unspread",
+                "the points of the bottom do not spread over its plan: expected some in "
+                "the middle, some at the wall, some between, all around",
+            )
         )
     contrasts = np.linalg.qr(trend, mode="complete")[0][:, TREND:]
     form = -contrasts.T @ cdist(points, points) @ contrasts

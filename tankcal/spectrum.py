@@ -11,6 +11,7 @@ import scipy.optimize
 
 from tankcal.errors import SolutionError
 from tankcal.form import Form, free_columns, unit_form, whitened
+from tankcal.messages import message
 
 LEAST_FORM_M2, MOST_FORM_M2 = 1e-12, 1.0
 LEAST_NOISE_M = 1e-6  # what is given as perfect is not quite
@@ -125,7 +126,12 @@ def _whitened_course(samples, noise):
 def _determined(sample):
     columns = free_columns(sample.azimuth_rad, sample.zeta, sample.degree)
     if np.linalg.matrix_rank(columns) < columns.shape[1]:
-        raise SolutionError("the points of a section do not determine its centre and radius")
+        raise SolutionError(
+            message(
+                "spectrum_undetermined",
+                "the points of a section do not determine its centre and radius",
+            )
+        )
     return columns
 
 

@@ -19,6 +19,7 @@ import scipy.linalg
 
 from tankcal.courses import CourseShape, gauss_levels
 from tankcal.errors import HeightError
+from tankcal.messages import message
 from tankcal.quadrature import height_polynomials, height_products
 from tankcal.uncertainty import factor_of
 
@@ -206,7 +207,12 @@ class ShellVolume:
         outside = ~((heights >= 0) & (heights <= self.height_m * (1 + 1e-12)))
         if np.any(outside):
             raise HeightError(
-                f"height {heights[outside][0]:g} m is outside the shell (0 to {self.height_m:g} m)"
+                message(
+                    "height_outside_shell",
+                    "height {height_m:g} m is outside the shell (0 to {top_m:g} m)",
+                    height_m=heights[outside][0],
+                    top_m=self.height_m,
+                )
             )
         return heights
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.errors import HeightError
+from tankcal.messages import message
 
 
 @dataclass(frozen=True)
@@ -25,8 +26,12 @@ def ullage_m(reference_height_m, dip_m):
     outside = ~((dips >= 0) & (dips <= reference_height_m))
     if np.any(outside):
         raise HeightError(
-            f"dip {np.atleast_1d(dips)[np.atleast_1d(outside)][0]:g} m is outside 0 to the "
-            f"reference height, {reference_height_m:g} m"
+            message(
+                "dip_beyond_reference",
+                "dip {dip_m:g} m is outside 0 to the reference height, {reference_m:g} m",
+                dip_m=np.atleast_1d(dips)[np.atleast_1d(outside)][0],
+                reference_m=reference_height_m,
+            )
         )
     return reference_height_m - dips
 
@@ -67,8 +72,14 @@ def _row_above(heights, volumes, wanted):
     outside = ~((wanted >= lasting[0]) & (wanted <= rising[-1]))
     if np.any(outside):
         raise HeightError(
-            f"volume {wanted[outside][0]:g} m3 is outside the capacity table "
-            f"({lasting[0]:g} to {rising[-1]:g} m3)"
+            message(
+                "volume_outside_table",
+                "volume {volume_m3:g} m3 is outside the capacity table ({first_m3:g} to "
+                "{last_m3:g} m3)",
+                volume_m3=wanted[outside][0],
+                first_m3=lasting[0],
+                last_m3=rising[-1],
+            )
         )
     reached = np.searchsorted(rising, wanted, side="left")  # first row not below the volume
     left = np.searchsorted(lasting, wanted, side="right") - 1  # last row not above it
@@ -76,7 +87,13 @@ def _row_above(heights, volumes, wanted):
     if np.any(unclear):
         low, high = heights[reached[unclear][0]], heights[left[unclear][0]]
         raise HeightError(
-            f"volume {wanted[unclear][0]:g} m3 has no single dip: the table has it from "
-            f"{low:g} to {high:g} m"
+            message(
+                "volume_without_dip",
+                "volume {volume_m3:g} m3 has no single dip: the table has it from "
+                "{low_m:g} to {high_m:g} m",
+                volume_m3=wanted[unclear][0],
+                low_m=low,
+                high_m=high,
+            )
         )
     return np.clip(reached, 1, len(heights) - 1)

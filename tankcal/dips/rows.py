@@ -8,6 +8,7 @@ import numpy as np
 
 from tankcal.dips.units import HEIGHT_STEPS_M
 from tankcal.errors import HeightError, InputError, Problem
+from tankcal.messages import message
 
 MOST_ROWS = 25_000
 _PER_METRE = 1_000_000_000  # steps and rows are whole nanometres, so that rows are exact decimals
@@ -71,7 +72,17 @@ def multiples_of(step_m, first, last):
 def _check_steps(step_m, top_m, fine_step_m, fine_zones):
     if not step_m > 0 or not top_m > 0:
         raise InputError(
-            Problem("table", f"step {step_m:g} m, top {top_m:g} m; expected above 0", None, "step")
+            Problem(
+                "table",
+                message(
+                    "steps_above_zero",
+                    "step {step_m:g} m, top {top_m:g} m; expected above 0",
+                    step_m=step_m,
+                    top_m=top_m,
+                ),
+                None,
+                "step",
+            )
         )
     count = top_m / step_m
     if fine_zones:
@@ -89,12 +100,29 @@ def _check_steps(step_m, top_m, fine_step_m, fine_zones):
         for low_m, high_m in fine_zones:
             if not 0 <= low_m < high_m or low_m >= top_m:
                 raise HeightError(
-                    f"fine zone {low_m:g} to {high_m:g} m is outside the table (0 to {top_m:g} m)"
+                    message(
+                        "fine_zone_outside",
+                        "fine zone {low_m:g} to {high_m:g} m is outside the table (0 to "
+                        "{top_m:g} m)",
+                        low_m=low_m,
+                        high_m=high_m,
+                        top_m=top_m,
+                    )
                 )
             count += (min(high_m, top_m) - low_m) / fine_step_m
     if count > MOST_ROWS:
         raise InputError(
-            Problem("table", f"{count:.0f} rows, expected at most {MOST_ROWS}", None, "step_m")
+            Problem(
+                "table",
+                message(
+                    "table_rows_too_many",
+                    "{rows:.0f} rows, expected at most {most}",
+                    rows=count,
+                    most=MOST_ROWS,
+                ),
+                None,
+                "step_m",
+            )
         )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from tankcal.digits import LITRE_DECIMALS, PROGRAM, decimals_of_height, fixed
 from tankcal.errors import HeightError
+from tankcal.messages import message
 
 METRES_PER_INCH = Fraction(254, 10_000)
 INCHES_PER_FOOT = 12
@@ -62,7 +63,13 @@ def dip_label(height_m, height_unit="m"):
     if height_unit == "m":
         return fixed(height_m, decimals_of_height(height_m), PROGRAM)
     if height_m < 0:
-        raise HeightError(f"height {height_m:g} m: feet and inches count from zero upwards")
+        raise HeightError(
+            message(
+                "negative_in_feet",
+                "height {height_m:g} m: feet and inches count from zero upwards",
+                height_m=height_m,
+            )
+        )
     step = HEIGHT_STEPS_M[height_unit]
     marks = round(height_m / float(step))
     if abs(height_m - float(marks * step)) <= _ON_THE_MARK_M:
@@ -85,11 +92,23 @@ def parse_dip(text, height_unit="m"):
     if height_unit == "m":
         if re.fullmatch(r"\d+(\.\d*)?|\.\d+", text, re.ASCII):
             return float(text)
-        raise HeightError(f"{text[:40]!r} is no dip; expected metres, such as 1.035")
+        raise HeightError(
+            message(
+                "no_dip_in_metres",
+                "{text!r} is no dip; expected metres, such as 1.035",
+                text=text[:40],
+            )
+        )
     found = _FEET_AND_INCHES.fullmatch(text.translate(_TYPED_MARKS))
     inches = _inches(found) if found else None
     if inches is None:
-        raise HeightError(f"{text[:40]!r} is no dip; expected feet and inches, such as 3' 4 5/8\"")
+        raise HeightError(
+            message(
+                "no_dip_in_feet",
+                "{text!r} is no dip; expected feet and inches, such as 3' 4 5/8\"",
+                text=text[:40],
+            )
+        )
     return float(inches * METRES_PER_INCH)
 
 

@@ -14,6 +14,7 @@ from tankcal.film import Surface, flattened, heights_at
 from tankcal.job.cameras import image_coordinates, image_frames
 from tankcal.job.contract.registers import MARKS
 from tankcal.job.measurements import FiducialFit, RejectedReadings
+from tankcal.messages import message
 
 FEWEST_HEIGHTS = 3
 FLAT = 1e-6  # of the extent of the places of a film: nearer to one line they are no surface
@@ -189,7 +190,7 @@ class MarkReadings:
         """The FiducialFit; raises SolutionError where the marks do not determine it."""
         same = self.repeats
         if not len(self.rows):
-            raise SolutionError("no marks")
+            raise SolutionError(message("no_marks", "no marks"))
         found = transformation(self.xy_mm, self.marks_mm, self.sd_mm[:, None], self.kind)
         calibrated = self.marks_mm[same.first]
         return FiducialFit(

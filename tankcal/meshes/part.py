@@ -15,6 +15,7 @@ from math import comb
 import numpy as np
 
 from tankcal.errors import HeightError
+from tankcal.messages import message
 
 BLOCK = 1 << 16  # faces worked on at a time
 
@@ -108,8 +109,12 @@ class MeshPart:
         outside = ~(np.isfinite(heights) & (heights <= self.height_m * (1 + 1e-12)))
         if outside.any():
             raise HeightError(
-                f"level {heights[outside][0] - self.zero_m:g} m is outside the mesh, which ends at "
-                f"{self.height_m - self.zero_m:g} m"
+                message(
+                    "level_outside_mesh",
+                    "level {level_m:g} m is outside the mesh, which ends at {top_m:g} m",
+                    level_m=heights[outside][0] - self.zero_m,
+                    top_m=self.height_m - self.zero_m,
+                )
             )
         return np.minimum(heights, self.height_m)
 

@@ -139,8 +139,12 @@ def _refuse_coincident(survey, groups, state):
             bad = np.flatnonzero(one.without_length(state))
             if len(bad):
                 raise SolutionError(
-                    f"the approximate places of the ends of {told(survey, one, bad[0])} are one"
-                    " and the same: the points hang on too little, or one has two names"
+                    message(
+                        "ends_coincide",
+                        "the approximate places of the ends of {observation} are one and the "
+                        "same: the points hang on too little, or one has two names",
+                        observation=told(survey, one, bad[0]),
+                    )
                 )
 
 
@@ -189,7 +193,13 @@ def _refuse_poor_photos(survey):
     poor = np.flatnonzero(count < 6)
     if len(poor):
         told = ", ".join(f"{photos.names[i]} ({rays[i]})" for i in poor)
-        raise SolutionError(f"a photo needs at least 3 image points: {told}")
+        raise SolutionError(
+            message(
+                "photo_short_of_points",
+                "a photo needs at least 3 image points: {photos}",
+                photos=told,
+            )
+        )
 
 
 def _others(survey, used, centre):
@@ -235,7 +245,13 @@ def _centre(survey):
     known = np.isfinite(survey.xyz_m).all(axis=1)
     if not known.all():
         missing = [survey.points[i] for i in np.flatnonzero(~known)[:5]]
-        raise SolutionError(f"no approximate coordinates for {', '.join(missing)}")
+        raise SolutionError(
+            message(
+                "no_approximate_coordinates",
+                "no approximate coordinates for {points}",
+                points=missing,
+            )
+        )
     return survey.xyz_m.mean(axis=0)
 
 
@@ -251,7 +267,13 @@ def _interior(survey):
     values, free, known, shared = [], [], [], {}
     for camera, settings in enumerate(survey.cameras):
         if settings.scope[0] == "off" or not settings.values[0] > 0:
-            raise SolutionError(f"{settings.name} has no principal distance c")
+            raise SolutionError(
+                message(
+                    "no_principal_distance",
+                    "{camera} has no principal distance c",
+                    camera=settings.name,
+                )
+            )
         mine = np.flatnonzero(photos.camera == camera)
         wanted = [[k for k in range(13) if settings.scope[k] == scope] for scope in SCOPES]
         each = [(shared, mine, wanted[1]), ({}, mine, wanted[2])]
@@ -294,7 +316,12 @@ def _image_groups(survey, used, layout, reduced, table):
     for number, camera in enumerate(survey.cameras):
         forms.setdefault(camera.form, []).append(number)
     if not (images.sd_mm > 0).all():
-        raise SolutionError("an image coordinate cannot hold exactly: its sd must be above zero")
+        raise SolutionError(
+            message(
+                "image_coordinate_exact",
+                "an image coordinate cannot hold exactly: its sd must be above zero",
+            )
+        )
     key = layout.points[images.point, 0]
     key = np.where(key < reduced, np.iinfo(np.int64).max, key)
     for form, cameras in forms.items():

@@ -18,6 +18,7 @@ from scipy.special import chdtri, ndtri
 
 from tankcal.errors import SolutionError
 from tankcal.gauss_markov.effects import responses
+from tankcal.messages import message
 from tankcal.observations import ControlCoordinates, Correlated, Layout, PhotoOrientation
 
 CORRELATED = "correlated"  # source of their groups; their residuals stand under their own tables
@@ -104,7 +105,12 @@ def _made(survey, centre, all_of, source, row, component, covariance):
     try:
         return Correlated(zero, zero + 1, tuple(parts), covariance, all_of)
     except np.linalg.LinAlgError:
-        raise SolutionError("the covariance of correlated observations is not possible") from None
+        raise SolutionError(
+            message(
+                "correlated_covariance_impossible",
+                "the covariance of correlated observations is not possible",
+            )
+        ) from None
 
 
 def _every_unknown(state):

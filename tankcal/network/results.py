@@ -10,6 +10,7 @@ from scipy.special import chdtri, gammaincinv
 from tankcal.camera import PARAMETERS
 from tankcal.errors import SolutionError
 from tankcal.gauss_markov.effects import responses
+from tankcal.messages import message
 from tankcal.network.reliability import residuals_of
 from tankcal.observations import KnownUnknowns
 from tankcal.rotations import angle_derivatives, angles_of
@@ -115,7 +116,12 @@ class Adjusted:
         if choice != "a_posteriori":
             raise ValueError(f"scale {choice!r}: a_priori or a_posteriori")
         if self.dof < 1:
-            raise SolutionError("no a-posteriori variance factor: no observation is redundant")
+            raise SolutionError(
+                message(
+                    "no_variance_factor",
+                    "no a-posteriori variance factor: no observation is redundant",
+                )
+            )
         return float(self.variance_factor)
 
     @property

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.errors import SolutionError
-from tankcal.messages import listed, message
+from tankcal.messages import either, listed, message
 from tankcal.network.positioning import SHOWN
 from tankcal.network.survey import FEWEST
 from tankcal.observations import Distances, HeightDifferences, VerticalAngles
@@ -82,25 +82,47 @@ def not_fixed(survey, found, point, centre_m):
         return None
     if found.rows < found.unknowns:
         return SolutionError(
-            f"point {name} has {found.rows} reading{'s' * (found.rows != 1)} to known points, and "
-            f"{found.unknowns} are needed"
+            message(
+                "point_short_of_readings",
+                "point {name} has {rows} reading to known points, and {unknowns} are needed"
+                if found.rows == 1
+                else "point {name} has {rows} readings to known points, and {unknowns} are needed",
+                name=name,
+                rows=found.rows,
+                unknowns=found.unknowns,
+            )
         )
     if len(found.rivals_m) > SHOWN or len(found.rivals_m) == 1:
         return SolutionError(
-            f"the readings between point {name} and known points leave it free to move (lines or "
-            "circles that coincide, or hardly cross): another reading is needed"
+            message(
+                "point_moves_freely",
+                "the readings between point {name} and known points leave it free to "
+                "move (lines or circles that coincide, or hardly cross): another reading "
+                "is needed",
+                name=name,
+            )
         )
     if not len(found.rivals_m):
         return SolutionError(
-            f"no place of point {name} agrees with the readings between it and known points"
+            message(
+                "point_fits_nowhere",
+                "no place of point {name} agrees with the readings between it and known points",
+                name=name,
+            )
         )
     places = [
         "(" + ", ".join(f"{value:.2f}" for value in place[np.isfinite(place)]) + ")"
         for place in found.rivals_m + centre_m
     ]
     return SeveralPlacesError(
-        f"point {name} may stand at {' or '.join(places)}, which fit as well: another reading is "
-        "needed, or approximate coordinates (in control.csv, standard deviations blank)"
+        message(
+            "point_at_several_places",
+            "point {name} may stand at {places}, which fit as well: another reading "
+            "is needed, or approximate coordinates (in control.csv, standard "
+            "deviations blank)",
+            name=name,
+            places=either(places),
+        )
     )
 
 

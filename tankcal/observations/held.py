@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import SolutionError
+from tankcal.messages import message
 from tankcal.observations.base import Observations
 from tankcal.observations.photographs import PhotoOrientation, PhotoRotation
 from tankcal.rotations import (
@@ -104,7 +105,11 @@ def exact_rows(one):
     if not zero.any():
         return np.zeros(len(one), dtype=bool)
     if (zero.any(axis=1) & ~zero.all(axis=1)).any():
-        raise SolutionError(f"{one.kind}: all its values hold exactly (sd 0) or none")
+        raise SolutionError(
+            message(
+                "exact_in_part", "{kind}: all its values hold exactly (sd 0) or none", kind=one.kind
+            )
+        )
     return zero.all(axis=1)
 
 

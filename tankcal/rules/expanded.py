@@ -20,6 +20,7 @@ from tankcal.deliveries import (
     worst_deliveries,
 )
 from tankcal.errors import HeightError
+from tankcal.messages import message
 from tankcal.rules.model import UncertaintyLimit
 from tankcal.rules.printed import of_table
 
@@ -67,7 +68,14 @@ def judge_uncertainty(limit, table, lowest_m=None, printed=None):
     Raises HeightError for a lowest_m above the table's last row.
     """
     if lowest_m is not None and lowest_m > table.height_m[-1]:
-        raise HeightError(f"lowest level {lowest_m:g} m: the table ends at {table.height_m[-1]:g}")
+        raise HeightError(
+            message(
+                "lowest_above_table",
+                "lowest level {lowest_m:g} m: the table ends at {end_m:g}",
+                lowest_m=lowest_m,
+                end_m=table.height_m[-1],
+            )
+        )
     judged = table.for_use(table.height_m)
     if not np.any(judged):
         return UncertaintyVerdict(limit, "nothing_to_judge", None)

@@ -5,6 +5,7 @@ from pathlib import Path
 from tankcal.errors import InputError, Problem
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.languages import DEFAULT
+from tankcal.messages import message
 from tankcal.starter.book import write_book
 from tankcal.starter.form import Form
 from tankcal.starter.text_files import csv_text, register_text, settings_text
@@ -54,7 +55,12 @@ def write_input_workbook(path, kind="vertical", survey=None, language=DEFAULT):
             _make_empty(path)
             path = path / WORKBOOK_FILE
         elif path.exists():
-            raise InputError(Problem(path.name, "exists; expected the name of a new workbook"))
+            raise InputError(
+                Problem(
+                    path.name,
+                    message("workbook_exists", "exists; expected the name of a new workbook"),
+                )
+            )
         path.parent.mkdir(parents=True, exist_ok=True)
         write_book(path, form)
     except OSError as error:
@@ -70,4 +76,9 @@ def _make_empty(directory):
 
 
 def _unwritten(path, error):
-    return InputError(Problem(path.name, f"cannot be written ({error.strerror})"))
+    return InputError(
+        Problem(
+            path.name,
+            message("file_unwritten", "cannot be written ({reason})", reason=error.strerror),
+        )
+    )

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 from tankcal.network import Adjusted, predict
 from tankcal.surveys.frames import Frame, framed
 from tankcal.surveys.gathering import Gathered, gather
@@ -46,7 +47,11 @@ def predict_survey(measurements, nominal):
     """
     gathered = gather(measurements)
     if not gathered.survey.points:
-        raise InputError(Problem("plan.toml", "the survey has no observations"))
+        raise InputError(
+            Problem(
+                "plan.toml", message("no_observations_planned", "the survey has no observations")
+            )
+        )
     survey = finished(placed(gathered.survey, nominal), gathered, measurements)
     frame = framed(survey, gathered, measurements.settings)
     return Predicted(predict(frame.survey, **frame.options), gathered, frame)
