@@ -91,16 +91,17 @@ def test_a_setting_that_is_no_finite_number(tmp_path, value):
     assert "not NaN or infinite" in problem.expected
 
 
-@pytest.mark.parametrize("rows", [10, 900])
-def test_a_number_next_to_zero(tmp_path, rows):
+@pytest.mark.parametrize("rows", [3, 900])
+def test_a_size_next_to_zero(tmp_path, rows):
     """Its square is nothing to a computer, and its weight endless; long columns are read apart."""
     parts = job_parts()
-    points = parts.tables["points"]
-    points += [[f"more{i}", *points[1 + i % 9][1:]] for i in range(rows)]
-    points[5][1] = "1e-308"
-    (problem,) = problems_of(write(tmp_path, parts, "folder"))
-    assert (problem.file, problem.row, problem.column) == ("points.csv", 6, "x_m")
-    assert "0 or farther from 0" in problem.expected
+    courses = parts.tables["courses"]
+    place = courses[0].index("thickness_mm")
+    courses += [list(courses[-1]) for _ in range(rows)]
+    courses[2][place] = "1e-308"
+    problems = problems_of(write(tmp_path, parts, "folder"))
+    (problem,) = [one for one in problems if "0 or farther from 0" in str(one.expected)]
+    assert (problem.file, problem.row, problem.column) == ("courses.csv", 3, "thickness_mm")
 
 
 @pytest.mark.parametrize("form", FORMS)

@@ -355,7 +355,8 @@ def _plain_numbers(field, raws, decimal):
         ]
     )
     sound = (values >= field.low) & (values <= field.high) & np.isfinite(values)
-    sound &= (values == 0) | (np.abs(values) >= NEXT_TO_ZERO)
+    if field.low == 0:
+        sound &= (values == 0) | (values >= NEXT_TO_ZERO)
     if field.above_low:
         sound &= values > field.low
     return [value if good else None for value, good in zip(values.tolist(), sound, strict=True)]

@@ -21,7 +21,7 @@ MAX_TEXT = 300
 MAX_LIST = 50  # numbers or pairs
 IN_TOML = "toml"  # in place of a decimal mark: a number is a number, and never a cell
 MAX_NAMES = 5000
-NEXT_TO_ZERO = 1e-30  # nothing that is measured is so small, and its square would be nothing
+NEXT_TO_ZERO = 1e-30  # no size, no standard deviation is so small: its square would be nothing
 
 _TANK_ID = re.compile(r"(?!.*\.\.)[\w(][\w .()-]*")
 _RULE_NAME = re.compile(r"(?!.*\.\.)\w[\w .()-]*")
@@ -237,7 +237,7 @@ def _read_number(field, raw, decimal):
         raise _refused(field, _kind_of(raw), hint_of_number(raw))
     if not math.isfinite(value):
         raise _refused(field, shown(raw), message("not_infinite", ", not NaN or infinite"))
-    if 0 < abs(value) < NEXT_TO_ZERO:
+    if field.low == 0 < value < NEXT_TO_ZERO:
         raise _refused(field, shown(raw), message("next_to_zero", ", 0 or farther from 0"))
     if value > field.high or value < field.low or (field.above_low and value == field.low):
         hint = _other_unit(field, value)
