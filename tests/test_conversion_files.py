@@ -174,7 +174,7 @@ POWERS = np.array([-1, -1, 2, 4, 6, 8, 1, 1, 2, 4, 0, 0])  # of 1/mm, of all but
     st.floats(0.06, 190),
     st.sampled_from(["both_y", "both_x", "b1_b2", "before_distortion"]),
     st.sampled_from(["distortion_of_ideal", "correction_added", "correction_subtracted"]),
-    st.floats(0, 20),
+    st.just(0.0) | st.floats(1e-9, 20),
     st.tuples(st.integers(1000, 9000), st.integers(1000, 9000)),
     st.tuples(st.floats(2e-3, 2e-2), st.floats(2e-3, 2e-2)),
     st.lists(st.sampled_from([np.nan, 0.0, 1e-5, 3e-4]), min_size=13, max_size=13),
