@@ -317,3 +317,31 @@ def test_numbers_of_options_are_those_of_tables(command, option, capsys):
         told = capsys.readouterr().err
         assert option.split()[0] in told
         assert "number" in told
+
+
+BARE_TANK = """\
+[tank]
+id = "L1"
+kind = "horizontal"
+[survey]
+side = "inside"
+date = 2024-05-31
+[horizontal]
+diameter_m = 2.4
+length_m = 10
+end_a = "flat"
+end_b = "flat"
+[table]
+step_m = 0.1
+reference_temperature_c = 20
+[corrections]
+temperature = false
+"""
+
+
+def test_a_tank_without_any_uncertainty_says_so(tmp_path, capsys):
+    (tmp_path / "job.toml").write_text(BARE_TANK, encoding="utf-8")
+    assert main(["run", str(tmp_path), "--no-papers", "--quiet"]) == 0
+    said = capsys.readouterr().out
+    assert "45.239 m3 at 2.400 m, no uncertainty stated" in said
+    assert "U = 0" not in said

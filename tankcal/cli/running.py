@@ -19,6 +19,8 @@ from tankcal.digits import decimals_of_height, fixed, with_digits, written
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
+DECIMALS_WITHOUT_U = 3  # of a volume in m3: litres
+
 
 def add(commands):
     """The parsers of `tankcal run` and `tankcal demo`."""
@@ -181,6 +183,15 @@ def _capacity(result):
             ", {accepted} points of the wall, {rejected} rejected",
             accepted=accepted,
             rejected=len(result.job.points.names) - accepted,
+        )
+    if not stated.U_m3[-1] > 0:
+        return message(
+            "holds_without_u",
+            "{tank}: {volume} m3 at {height} m, no uncertainty stated: none was declared{points}",
+            tank=result.job.tank.id,
+            volume=fixed(top.value_m3, DECIMALS_WITHOUT_U, marks()),
+            height=fixed(top_m, decimals_of_height(top_m), marks()),
+            points=points,
         )
     return message(
         "holds",
