@@ -6,9 +6,9 @@ and the calculator, which work on sums kept for speed, by the same `sum_of_fourt
 Inputs that are correlated are one component: its variance has their covariances in it, and its
 degrees of freedom are the least of theirs (`together_dof`). Of inputs whose covariance was
 estimated together these are equal, and c' S c is a chi-square of just as many (S is of Wishart's
-distribution). Of unequal ones no rule was found that neither falls
-short nor is long; of five that were simulated the least fell short the least often, however the
-variances and the correlation had been estimated (docs/uncertainty.md).
+distribution). Of unequal ones no rule was found that neither falls short nor is long; of five that
+were simulated the least fell short the least often, however the variances and the correlation had
+been estimated (docs/uncertainty.md).
 
 Sources: JCGM 100:2008 (GUM) 5.1, 5.2, G.4.
 """
