@@ -22,10 +22,10 @@ import numpy as np
 from scipy.stats import norm
 
 import tankcal
-from tankcal.distributions import Normal, standard
-from tankcal.monte_carlo import Goal, QuadraticRows, simulate
-from tankcal.shipped import shipped
-from tankcal.simulation import simulate_table
+from tankcal.gum.distributions import Normal, standard
+from tankcal.gum.monte_carlo import Goal, QuadraticRows, simulate
+from tankcal.pipeline.simulation import simulate_table
+from tankcal.text.shipped import shipped
 
 COURSES, RADIUS_M, HEIGHT_M, EXPANSION = 8, 7.1, 9.5, 1.1e-5
 ORDINARY = ("normal",) * 20

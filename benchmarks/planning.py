@@ -18,8 +18,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from tankcal.planning import load_plan, predict
 from tankcal.planning.changes import changes_of
-from tankcal.planning.helping import greedy
-from tankcal.planning.plain import plain_of
+from tankcal.planning.improvements import greedy
+from tankcal.record.plan import plain_of
 
 PLAN = Path(__file__).resolve().parents[1] / "examples" / "plan-silva"
 LARGER = {

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tankcal.rings import Axis, ring_sections
+from tankcal.geometry.rings import Axis, ring_sections
 
 ROUNDS, SAMPLED_RINGS = 5, 5
 HEIGHT_M, RADIUS_M, NOISE_M = 9.5, 6.5, 0.003

@@ -18,11 +18,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 import tankcal
-from tankcal.capacity import Capacity
-from tankcal.deliveries import worst_deliveries
-from tankcal.heads import End
 from tankcal.job import Bottom, Deadwood, DeclaredInput, Roof
-from tankcal.solids import LyingTank
+from tankcal.tank.capacity import Capacity
+from tankcal.tank.deliveries import worst_deliveries
+from tankcal.tank.heads import End
+from tankcal.tank.solids import LyingTank
 
 ROOT = Path(__file__).resolve().parent.parent
 ROUNDS, STEP_M = 20, 0.001

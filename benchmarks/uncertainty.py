@@ -29,14 +29,14 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import block_diag
 
-from tankcal.body import Body, ShellPart, survey_factors
-from tankcal.capacity import Capacity
-from tankcal.courses import course_shape
-from tankcal.fittings import deadwood
-from tankcal.form import Form
+from tankcal.geometry.form import Form
+from tankcal.geometry.outlines import interpolate_outline
 from tankcal.job import DeclaredInput
-from tankcal.outlines import interpolate_outline
-from tankcal.volumes import ShellVolume
+from tankcal.tank.body import Body, ShellPart, survey_factors
+from tankcal.tank.capacity import Capacity
+from tankcal.tank.courses import course_shape
+from tankcal.tank.fittings import deadwood
+from tankcal.tank.volumes import ShellVolume
 
 ROUNDS, PEER_S, TABLES = 5, 4.0, 20  # of ours, in a round
 HEIGHT_M, COURSES, POINTS, RADIUS_M = 9.5004, 8, 14, 6.5

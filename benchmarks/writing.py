@@ -134,7 +134,7 @@ def _sizes(folder):
 def phases(job, out, no_papers):
     """Print the seconds of reading and adjusting, and of writing, in this process."""
     import tankcal
-    from tankcal import outputs
+    from tankcal.report import outputs
 
     begin = _now()
     job = tankcal.load(job, only="adjustment")

@@ -17,25 +17,25 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # what a type checker reads; nothing of it runs
-    from tankcal.chain import Result, adjust_job, run
     from tankcal.errors import HeightError, InputError, SolutionError, TankcalError
     from tankcal.job import Job, load
     from tankcal.linter import lint
-    from tankcal.outputs import write
-    from tankcal.surveys import Adjustment
-    from tankcal.views import plot
+    from tankcal.pipeline.chain import Result, adjust_job, run
+    from tankcal.pipeline.views import plot
+    from tankcal.report.outputs import write
+    from tankcal.survey import Adjustment
 
 __version__ = "0.1.0"
 
 _ROOM_OF = {
     "load": "job",
     "Job": "job",
-    "run": "chain",
-    "adjust_job": "chain",
-    "Result": "chain",
-    "Adjustment": "surveys",
-    "plot": "views",
-    "write": "outputs",
+    "run": "pipeline.chain",
+    "adjust_job": "pipeline.chain",
+    "Result": "pipeline.chain",
+    "Adjustment": "survey",
+    "plot": "pipeline.views",
+    "write": "report.outputs",
     "lint": "linter",
     "TankcalError": "errors",
     "InputError": "errors",

@@ -123,7 +123,7 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
 def determined(pivots, rows, of_normals=False):
     """Which unknowns are determined: (k,) True for pivots of a factor that are more than rounding.
 
-    The one rule about rank, here and in tankcal.gauss_markov: columns are scaled to length one
+    The one rule about rank, here and in tankcal.solver: columns are scaled to length one
     first; then a pivot of the rows themselves (QR) must be above max(rows, k) eps of the largest,
     a squared pivot of normal equations (Cholesky), which have lost half the digits, above 1e-12.
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse
 
-from tankcal.circles import Circle, fit_circle, radial_covariance, taubin_circle
-from tankcal.form import Form, Sample, free_columns, harmonics
-from tankcal.outlines import (
+from tankcal.geometry.circles import Circle, fit_circle, radial_covariance, taubin_circle
+from tankcal.geometry.form import Form, Sample, free_columns, harmonics
+from tankcal.geometry.outlines import (
     Outline,
     evenly_spread,
     interpolate_outline,

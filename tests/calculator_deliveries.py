@@ -1,14 +1,14 @@
-"""Deliveries of a recalculated calculator against `tankcal.deliveries`, the second method."""
+"""Deliveries of a recalculated calculator against `tankcal.tank.deliveries`, the second method."""
 
 import numpy as np
 
-from tankcal.deliveries import deliveries
+from tankcal.tank.deliveries import deliveries
 
 K_RELATIVE = 1e-10  # of k: beta distribution, or the expansion in 1/dof
 
 
 def held_against_deliveries(typed, table, cases, figure):
-    """Second method: tankcal.deliveries on the table itself."""
+    """Second method: tankcal.tank.deliveries on the table itself."""
     low, high = ([case[f"delivery_{end}_dip"] for case in cases] for end in ("low", "high"))
     expected = deliveries(table, low, high)
     for line, values, relative in (

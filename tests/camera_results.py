@@ -8,16 +8,16 @@ from camera_sets import HOSTILE, SMALL, sets
 from networks import CONTROL_SD_M, photographed, tank_points
 from photographed_jobs import by_tape, control_of, measurements, tank_job
 
-from tankcal.camera_analysis.influence import plain as influence_json
-from tankcal.camera_analysis.influence.runs import influence
-from tankcal.camera_analysis.parameters import plain as parameters_json
-from tankcal.camera_analysis.parameters.analysing import analyse_job
-from tankcal.camera_analysis.product import plain as product_json
-from tankcal.camera_analysis.product.checking import check_product
-from tankcal.camera_analysis.product.limits import shipped_limits
-from tankcal.camera_analysis.stability import plain as stability_json
-from tankcal.camera_analysis.stability.comparing import compare
-from tankcal.job.measurements import AdjustmentSettings, Instrument
+from tankcal.calibration.influence.runs import influence
+from tankcal.calibration.parameters.analysis import analyse_job
+from tankcal.calibration.product.check import check_product
+from tankcal.calibration.product.limits import shipped_limits
+from tankcal.calibration.stability.comparison import compare
+from tankcal.record import camera_influence as influence_json
+from tankcal.record import camera_parameters as parameters_json
+from tankcal.record import camera_product as product_json
+from tankcal.record import camera_stability as stability_json
+from tankcal.survey.measurements import AdjustmentSettings, Instrument
 
 CONTROL = tuple(f"P{i}" for i in range(1, 48, 6))
 

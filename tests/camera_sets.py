@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from tankcal.camera import Form
-from tankcal.camera_analysis.stability.grids import Grid
-from tankcal.job.measurements import CameraSetup
-from tankcal.network.survey import Camera
+from tankcal.calibration.stability.grids import Grid
+from tankcal.camera.model import Form
+from tankcal.survey.measurements import CameraSetup
+from tankcal.survey.network.survey import Camera
 
 HOSTILE = ("=1+1", "<b>bold</b>", "#typst [x] *a*", "$x$ _y_", "n" * 60, "@cmd|' /C calc'!A0")
 Q = np.array([4.4, 0.03, -0.02, -2e-3, 3e-5, 1e-6, 0, 8e-4, -6e-4, 0, 0, 8e-5, -5e-5])

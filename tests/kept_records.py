@@ -16,8 +16,8 @@ from test_jobs_of_film import film_job
 from workbook_records import records_of_every_kind
 
 import tankcal
-from tankcal.layouts import keys_in
 from tankcal.record import VERSION, record_of, record_of_adjustment
+from tankcal.record.layout import keys_in
 from tankcal.record.versions import RECORD
 
 KEPT = Path(__file__).with_name("records")

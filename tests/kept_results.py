@@ -8,9 +8,9 @@ import json
 import sys
 from pathlib import Path
 
-from tankcal.camera_analysis.versions import CAMERA
-from tankcal.layouts import keys_in
-from tankcal.planning.versions import PLAN
+from tankcal.record.camera_versions import CAMERA
+from tankcal.record.layout import keys_in
+from tankcal.record.plan_versions import PLAN
 
 KEPT = Path(__file__).with_name("kept")
 FREE = (

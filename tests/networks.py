@@ -4,15 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera import Form, measured
-from tankcal.network import Camera, ImagePoints, Photos, Survey
-from tankcal.observations import (
-    ControlCoordinates,
-    Directions,
-    Distances,
-    VerticalAngles,
-)
-from tankcal.rotations import looking, turned
+from tankcal.camera.model import Form, measured
+from tankcal.geometry.rotations import looking, turned
+from tankcal.survey.network import Camera, ImagePoints, Photos, Survey
+from tankcal.survey.observations import ControlCoordinates, Directions, Distances, VerticalAngles
 
 INTERIOR = np.array([100.02, 0.03, -0.04, 2e-8, -1e-12, 0, 0, 3e-7, -2e-7, 0, 0, 1e-4, -8e-5])
 SCOPE = tuple("block" if i in (0, 1, 2, 3, 4, 7, 8, 11, 12) else "off" for i in range(13))

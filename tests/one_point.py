@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 from surveyed import known, table
 
-from tankcal.job.measurements import AdjustmentSettings, Measurements, Setup
+from tankcal.survey.measurements import AdjustmentSettings, Measurements, Setup
 
 KNOWN = {
     "A": np.array([0.0, 0.0, 1.0]),

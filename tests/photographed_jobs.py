@@ -8,7 +8,8 @@ from networks import TAPE_SD_M
 from surveyed import known
 
 import tankcal
-from tankcal.job.measurements import (
+from tankcal.geometry.rotations import angles_of
+from tankcal.survey.measurements import (
     AdjustmentSettings,
     CameraSetup,
     ImageReadings,
@@ -17,7 +18,6 @@ from tankcal.job.measurements import (
     Photo,
     Readings,
 )
-from tankcal.rotations import angles_of
 
 FORMAT_MM = np.array([180.0, 180.0])
 HEIGHT_M, COURSES, COLUMNS = 9.3, 4, 12

@@ -8,11 +8,11 @@ import openpyxl
 import pytest
 from openpyxl.utils import get_column_letter
 
-from tankcal.words import in_language
-from tankcal.workbook.book import Book
-from tankcal.workbook.calculator import calculator_sheets, factor_sheet
-from tankcal.workbook.capacity import capacity_sheet
-from tankcal.workbook.parts import densities_sheet
+from tankcal.report.workbook.book import Book
+from tankcal.report.workbook.calculator import calculator_sheets, factor_sheet
+from tankcal.report.workbook.capacity import capacity_sheet
+from tankcal.report.workbook.parts import densities_sheet
+from tankcal.text.words import in_language
 
 FIRST_COLUMN = 6  # of the copies of the calculator: F and on, its own is B
 _CELL = re.compile(r"\bB(\d+)\b")

@@ -15,14 +15,14 @@ from job_builder import write_job
 from shapes import azimuths, ring
 
 import tankcal
-from tankcal.capacity import Capacity
-from tankcal.form import harmonics
+from tankcal.geometry.form import harmonics
+from tankcal.geometry.spectrum import estimate_form
 from tankcal.job.model import DeclaredInput
+from tankcal.pipeline.tanks import body_of, zero_height
+from tankcal.pipeline.wall import find_wall
 from tankcal.sections import fit_section, sample_of
-from tankcal.spectrum import estimate_form
-from tankcal.tanks import body_of, zero_height
+from tankcal.tank.capacity import Capacity
 from tankcal.uncertainty import Source
-from tankcal.wall import find_wall
 
 GRAVITY, MODES = 9.80665, 150
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # areas are of degree 4 in height

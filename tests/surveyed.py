@@ -7,7 +7,8 @@ from messages_told import lines
 from networks import by_total_station, photographed
 
 from tankcal.errors import SolutionError
-from tankcal.job.measurements import (
+from tankcal.survey import adjust_survey
+from tankcal.survey.measurements import (
     AdjustmentSettings,
     CameraSetup,
     ImageReadings,
@@ -20,7 +21,6 @@ from tankcal.job.measurements import (
     Setup,
     Targets,
 )
-from tankcal.surveys import adjust_survey
 
 
 def known(names, xyz_m, sd_m, check=None, file="control.csv", system=None):

@@ -7,7 +7,7 @@ from test_adjustment_outputs import write_photos
 from uncertain_job import write_uncertain_record
 
 import tankcal
-from tankcal.chain import adjust_job
+from tankcal.pipeline.chain import adjust_job
 from tankcal.record import record_of, record_of_adjustment, save
 
 KINDS = ("furnished", "lying", "uncertain", "photographed", "survey")

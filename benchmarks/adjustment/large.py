@@ -14,7 +14,7 @@ import time
 import numpy as np
 import problems
 
-from tankcal.network import adjust
+from tankcal.survey.network import adjust
 
 
 def main():

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tankcal.camera import Form
-from tankcal.network import Camera, ImagePoints, Photos, Survey
-from tankcal.observations import ControlCoordinates, Distances
-from tankcal.rotations import looking, turned
+from tankcal.camera.model import Form
+from tankcal.geometry.rotations import looking, turned
+from tankcal.survey.network import Camera, ImagePoints, Photos, Survey
+from tankcal.survey.observations import ControlCoordinates, Distances
 
 TANK_PARAMETERS = [0, 1, 2, 3, 4, 5, 7, 8, 11, 12]
 

@@ -24,7 +24,7 @@ from statistics import median
 import numpy as np
 import problems
 
-from tankcal.network import adjust
+from tankcal.survey.network import adjust
 
 HERE = Path(__file__).resolve().parent
 SHARED = Path(os.environ.get("TANKCAL_DATA", HERE.parents[2] / "shared"))

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tankcal.camera import PARAMETERS, Form, measured
-from tankcal.rotations import angles_of, looking
+from tankcal.camera.model import PARAMETERS, Form, measured
+from tankcal.geometry.rotations import angles_of, looking
 
 HERE = Path(__file__).parent
 SEED = 137

@@ -1,4 +1,4 @@
-// Numbers and sentences in the language of the page; the rules are those of tankcal/digits.py.
+// Numbers and sentences in the language of the page; the rules are those of tankcal/text/digits.py.
 
 const spoken = JSON.parse(document.getElementById("words").textContent);
 const words = spoken.words;

@@ -3,9 +3,9 @@
 import argparse
 
 from tankcal.cli.showing import said
-from tankcal.languages import LANGUAGES
 from tankcal.messages import message
-from tankcal.numerals import NUMBER, WHOLE_NUMBER
+from tankcal.text.languages import LANGUAGES
+from tankcal.text.numerals import NUMBER, WHOLE_NUMBER
 
 
 def add_language(parser):

@@ -7,8 +7,8 @@ from tankcal.job.folder import MAX_SETTINGS_BYTES, parsed_toml
 from tankcal.job.grids import table_rows
 from tankcal.job.sheets import KEY, SECTION, SETTINGS_SHEET, VALUE
 from tankcal.job.tables import SETTINGS_FILE, Log, read_bytes
-from tankcal.languages import DEFAULT, LANGUAGES, nearest_language
-from tankcal.words import load_words
+from tankcal.text.languages import DEFAULT, LANGUAGES, nearest_language
+from tankcal.text.words import load_words
 
 
 def asked_language(path):

@@ -23,10 +23,10 @@ FIRST_WORDS = 200  # bytes
 def parameters(options):
     """Which additional parameters belong in the model."""
     prepare_for_small_work()
-    from tankcal.camera_analysis.interiors import sets_to_be
-    from tankcal.camera_analysis.parameters.analysing import analyse_job, analyse_record
-    from tankcal.camera_analysis.parameters.findings import Choices
-    from tankcal.camera_analysis.parameters.plain import as_json
+    from tankcal.calibration.interiors import sets_to_be
+    from tankcal.calibration.parameters.analysis import analyse_job, analyse_record
+    from tankcal.calibration.parameters.findings import Choices
+    from tankcal.record.camera_parameters import as_json
 
     show = _start(options)
     choices = Choices(
@@ -48,11 +48,11 @@ def parameters(options):
 def compare(options):
     """All pairs of calibrations."""
     prepare_for_small_work()
-    from tankcal.camera_analysis.stability.comparing import compare as compared
-    from tankcal.camera_analysis.stability.grids import parse
-    from tankcal.camera_analysis.stability.plain import as_json, summary
-    from tankcal.camera_analysis.stability.terrains import parse_terrain
+    from tankcal.calibration.stability.comparison import compare as compared
+    from tankcal.calibration.stability.grids import parse
+    from tankcal.calibration.stability.terrains import parse_terrain
     from tankcal.job.calibrations import choose, read_cameras, with_pixels
+    from tankcal.record.camera_stability import as_json, summary
 
     show = _start(options)
     warnings = []
@@ -76,9 +76,9 @@ def compare(options):
 def influence(options):
     """The same survey with each of several calibrations."""
     prepare_for_small_work()
-    from tankcal.camera_analysis.influence.plain import as_json
-    from tankcal.camera_analysis.influence.runs import influence as influence_of
+    from tankcal.calibration.influence.runs import influence as influence_of
     from tankcal.job.calibrations import read_cameras
+    from tankcal.record.camera_influence import as_json
 
     show = _start(options)
     warnings = []
@@ -99,10 +99,10 @@ def influence(options):
 def check(options):
     """Differences at check points against a table of limits."""
     prepare_for_small_work()
-    from tankcal.camera_analysis.product import limits
-    from tankcal.camera_analysis.product.checking import check_product
-    from tankcal.camera_analysis.product.differences import differences_of, read_differences
-    from tankcal.camera_analysis.product.plain import as_json
+    from tankcal.calibration.product import limits
+    from tankcal.calibration.product.check import check_product
+    from tankcal.calibration.product.differences import differences_of, read_differences
+    from tankcal.record.camera_product import as_json
 
     show = _start(options)
     table = limits.read_limits(options.limits) if options.limits else limits.shipped_limits()
@@ -127,7 +127,7 @@ def convert(options):
     """A camera of one program, or of a publication, as another has it."""
     import numpy as np
 
-    from tankcal.conversions.writing import write_camera
+    from tankcal.camera.formats.writing import write_camera
 
     speak(options.language)
     cameras, covariances = _cameras_of(options)
@@ -157,7 +157,7 @@ def convert(options):
 
 def _in_form(form, cameras, covariances):
     """[(name, FramedCamera)] in the form of a publication, and their covariances or None."""
-    from tankcal.conversions.published import in_form
+    from tankcal.camera.formats.published import in_form
 
     found = [
         (name, *in_form(camera, form, covariance))
@@ -170,8 +170,8 @@ def _cameras_of(options):
     """[(name, FramedCamera)] of a cameras.toml, a record or a file of another program, and the
     covariance (13, 13) of each, or None.
     """
-    from tankcal.camera_analysis.interiors import framed_in
-    from tankcal.conversions.reading import read_camera
+    from tankcal.calibration.interiors import framed_in
+    from tankcal.camera.formats.reading import read_camera
 
     if options.kind is None and _is_record(options.file):
         pixel_mm = options.pixel_um and options.pixel_um / 1000
@@ -197,7 +197,7 @@ def _registered(path, pixel_um):
 
 def _framed(setup):
     """FramedCamera of a CameraSetup."""
-    from tankcal.conversions.frame import framed, on_film
+    from tankcal.camera.formats.frame import framed, on_film
 
     values, form = setup.camera.values, setup.camera.form
     if setup.pixel_mm is None:
@@ -251,7 +251,7 @@ def _write_new(target, text):
 def read(options):
     """Targets from photographs into image_points.csv."""
     prepare_for_small_work()
-    from tankcal.targets import Wanted, read_photographs
+    from tankcal.calibration.targets import Wanted, read_photographs
 
     speak(options.language)
     show = Progress(options.quiet)
@@ -309,7 +309,7 @@ def _photos(count):
 
 def _start(options):
     """Progress; a folder for the results that is not ours is refused before any work."""
-    from tankcal import camera_papers
+    from tankcal.report import camera as camera_papers
 
     if options.out is not None:
         camera_papers.refuse_foreign(options.out)
@@ -348,7 +348,7 @@ def _is_record(source):
 
 def _finish(results, options, show, paths, job=None, record=None, printed=None):
     """Print tables or JSON; write the papers where they are asked for."""
-    from tankcal import camera_papers
+    from tankcal.report import camera as camera_papers
 
     language = options.language or _language_of(job, record) or spoken_language()
     speak(language)
@@ -372,7 +372,7 @@ def _finish(results, options, show, paths, job=None, record=None, printed=None):
 
 def _language_of(job, record):
     """The language that a job, or a record, asks for; None where there is neither."""
-    from tankcal.words import language_of
+    from tankcal.text.words import language_of
 
     if record is not None:
         return language_of(record)

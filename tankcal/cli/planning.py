@@ -3,17 +3,9 @@
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language, several, share, whole
-from tankcal.cli.showing import (
-    Progress,
-    listed,
-    marks,
-    prepare_for_small_work,
-    say,
-    speak,
-    warn,
-)
-from tankcal.digits import fixed, with_digits, written
+from tankcal.cli.showing import Progress, listed, marks, prepare_for_small_work, say, speak, warn
 from tankcal.messages import message
+from tankcal.text.digits import fixed, with_digits, written
 
 SHOWN = 12  # changes in the terminal
 
@@ -66,10 +58,10 @@ def add(commands):
 
 def _plan(options):
     prepare_for_small_work()
-    from tankcal import planning_papers
     from tankcal.cli.asked_language import asked_of_plan
     from tankcal.errors import TankcalError
     from tankcal.planning import load_plan, predict
+    from tankcal.report import planning as planning_papers
 
     speak(options.language or asked_of_plan(options.plan))
     _refuse_idle(options)
@@ -129,7 +121,7 @@ def _refuse_unlimited(plan):
 
 def _studied(plan, prediction, options, show):
     """Effects of all changes, and the path to the smallest design; () and None: not asked for."""
-    from tankcal.planning.helping import smallest, what_helps
+    from tankcal.planning.improvements import smallest, what_helps
 
     effects = what_helps(plan, tell=show.part, before=prediction) if options.changes else ()
     return effects, smallest(plan, tell=show.part) if options.smallest else None

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from tankcal.cli.showing import Progress, listed, speak
-from tankcal.languages import LANGUAGES
+from tankcal.text.languages import LANGUAGES
 
 
 def add(commands):
@@ -51,7 +51,7 @@ def letterhead_of(options):
 
 
 def _report(options):
-    from tankcal import outputs
+    from tankcal.report import outputs
 
     show = Progress(options.quiet)
     letterhead = letterhead_of(options)

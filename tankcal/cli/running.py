@@ -15,9 +15,9 @@ from tankcal.cli.showing import (
     say,
     warn,
 )
-from tankcal.digits import decimals_of_height, fixed, with_digits, written
 from tankcal.errors import SolutionError
 from tankcal.messages import message
+from tankcal.text.digits import decimals_of_height, fixed, with_digits, written
 
 DECIMALS_WITHOUT_U = 3  # of a volume in m3: litres
 
@@ -95,7 +95,7 @@ def _default_out(source):
 
 
 def _demo(options):
-    from tankcal.shipped import shipped
+    from tankcal.text.shipped import shipped
 
     _compute(shipped("examples") / "silva-1995", Path(options.out), options.quiet)
 
@@ -153,7 +153,7 @@ def _fit(adjustment):
 
 def _compute(source, out, quiet, strict=False, papers=(), tell=_tell):
     prepare_for_small_work()
-    from tankcal import outputs
+    from tankcal.report import outputs
 
     show = Progress(quiet)
     job = read_job(source, show)
@@ -207,7 +207,7 @@ def _capacity(result):
 
 def _adjust(source, out, quiet, strict, papers, tell=_tell):
     prepare_for_small_work()
-    from tankcal import outputs
+    from tankcal.report import outputs
 
     show = Progress(quiet)
     job = read_job(source, show, only="adjustment")
@@ -246,7 +246,7 @@ def _refuse_failed(adjustment):
 
 def _summary(adjustment):
     """One line: how well the survey fits, and how good its points are."""
-    from tankcal.network.quality import precision
+    from tankcal.survey.network.quality import precision
 
     removed = len({(one.kind, one.ids, one.row) for one in adjustment.removed})
     free = ~adjustment.fixed.all(axis=1)

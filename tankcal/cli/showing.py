@@ -3,8 +3,8 @@
 import os
 import sys
 
-from tankcal.languages import DEFAULT, nearest_language
 from tankcal.messages import Message, message
+from tankcal.text.languages import DEFAULT, nearest_language
 
 _LOCALE = ("LC_ALL", "LC_MESSAGES", "LANG")  # the first that is set counts
 _spoken = {}  # the words of the language that is spoken; nothing: English as it was made
@@ -17,7 +17,7 @@ def speak(language=None):
         setting = next((os.environ[name] for name in _LOCALE if os.environ.get(name)), "")
         language = nearest_language(setting) or DEFAULT
     if language != DEFAULT:
-        from tankcal.word_files import load_words
+        from tankcal.text.word_files import load_words
 
         _spoken.update(load_words(language))
 
@@ -36,14 +36,14 @@ def said(text):
     """A text in the language that is spoken; one without a code is as it is."""
     if not (_spoken and isinstance(text, Message)):
         return str(text)
-    from tankcal.words import said as said_in
+    from tankcal.text.words import said as said_in
 
     return said_in(_spoken, text)
 
 
 def marks():
     """What stands between the digits of numbers in that language (digits.Marks)."""
-    from tankcal.digits import PROGRAM, Marks
+    from tankcal.text.digits import PROGRAM, Marks
 
     return Marks(**_spoken["language"]["marks"]) if _spoken else PROGRAM
 

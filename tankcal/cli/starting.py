@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from tankcal.cli.showing import say, speak
-from tankcal.languages import DEFAULT, LANGUAGES
 from tankcal.messages import message
+from tankcal.text.languages import DEFAULT, LANGUAGES
 
 
 def add(commands):
@@ -40,7 +40,7 @@ def add(commands):
 
 
 def _new(options):
-    from tankcal.starter import write_input_workbook, write_starter
+    from tankcal.job.starter import write_input_workbook, write_starter
 
     if options.language != DEFAULT:
         speak(options.language)

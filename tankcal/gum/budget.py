@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.distributions import name_of
+from tankcal.gum.distributions import name_of
 
 
 @dataclass(frozen=True)

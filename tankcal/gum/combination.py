@@ -25,7 +25,7 @@ _SMALL = 1e-12  # of a term of the series, below it the rest is left out
 class Combination:
     """sum of coefficient times distribution, all independent.
 
-    distributions  of tankcal.distributions; coefficients  (n,) or None for ones
+    distributions  of tankcal.gum.distributions; coefficients  (n,) or None for ones
     """
 
     def __init__(self, distributions, coefficients=None):

@@ -6,7 +6,7 @@ import numpy as np
 
 from tankcal.job.tables import fingerprint, read_bytes
 from tankcal.messages import message
-from tankcal.rules.model import Rule
+from tankcal.tank.rules.model import Rule
 
 MAX_MESH_BYTES = 200_000_000
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera import PARAMETERS, Form
-from tankcal.focus import RADIAL, Lens
+from tankcal.camera.focus import RADIAL, Lens
+from tankcal.camera.model import PARAMETERS, Form
 from tankcal.job.contract.registers import (
     AFFINITIES_BY_AUTHOR,
     FOCUS_CALIBRATIONS,
@@ -19,8 +19,8 @@ from tankcal.job.contract.registers import (
     SECOND_NAMES,
     sd_key,
 )
-from tankcal.job.measurements import CameraSetup
-from tankcal.network.survey import DEFAULT_SCOPE, Camera
+from tankcal.survey.measurements import CameraSetup
+from tankcal.survey.network.survey import DEFAULT_SCOPE, Camera
 
 ASSUMED_CONVENTION = "distortion_of_ideal"
 

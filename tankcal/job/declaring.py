@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.distributions import name_of, within
+from tankcal.gum.distributions import name_of, within
 from tankcal.job.checks import spreads, standard_u, useless_inputs
 from tankcal.job.contract import INPUTS
 from tankcal.job.model import DeclaredInput, StatedVolume

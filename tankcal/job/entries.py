@@ -11,7 +11,7 @@ from tankcal.job.fields import IN_TOML, MAX_NAME, NEXT_TO_ZERO, Field, Refused, 
 from tankcal.job.form_words import NO, YES, meant
 from tankcal.job.tables import nearest, shown
 from tankcal.messages import message
-from tankcal.numerals import NUMBER
+from tankcal.text.numerals import NUMBER
 
 
 @dataclass(frozen=True)

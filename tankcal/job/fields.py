@@ -14,8 +14,8 @@ from tankcal.job.form_words import NO, YES, meant
 from tankcal.job.misread import hint_of_date, hint_of_number, hint_of_text
 from tankcal.job.tables import BadCell, Percent, nearest, shown
 from tankcal.messages import message
-from tankcal.naming import MAX_NAME, is_name
-from tankcal.numerals import NUMBER
+from tankcal.text.naming import MAX_NAME, is_name
+from tankcal.text.numerals import NUMBER
 
 MAX_TEXT = 300
 MAX_LIST = 50  # numbers or pairs

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tankcal.comparator import repeats, transformation
+from tankcal.camera.comparator import repeats, transformation
+from tankcal.camera.film import Surface, flattened, heights_at
 from tankcal.errors import SolutionError
-from tankcal.film import Surface, flattened, heights_at
 from tankcal.job.cameras import image_coordinates, image_frames
 from tankcal.job.contract.registers import MARKS
-from tankcal.job.measurements import FiducialFit, RejectedReadings
 from tankcal.messages import message
+from tankcal.survey.measurements import FiducialFit, RejectedReadings
 
 FEWEST_HEIGHTS = 3
 FLAT = 1e-6  # of the extent of the places of a film: nearer to one line they are no surface

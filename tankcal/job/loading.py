@@ -3,6 +3,7 @@
 from os import PathLike
 from pathlib import Path
 
+from tankcal.job.assembly import make_frame, make_job
 from tankcal.job.attached import Attached, read_mesh_file
 from tankcal.job.checks import check_all
 from tankcal.job.checks.common import has_survey
@@ -10,7 +11,6 @@ from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.covariance import read_covariance
 from tankcal.job.entries import kind_of, read_columns, read_register, read_settings
 from tankcal.job.folder import read_folder
-from tankcal.job.making import make_frame, make_job
 from tankcal.job.measuring import make_measurements
 from tankcal.job.model import Job
 from tankcal.job.rule_files import find_rule

@@ -7,7 +7,7 @@ from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.contract.registers import FREE, INSTRUMENT_KINDS
 from tankcal.job.datum import AXES, datum_point
 from tankcal.job.imagery import imagery_of
-from tankcal.job.measurements import (
+from tankcal.survey.measurements import (
     AdjustmentSettings,
     CorrelatedReadings,
     ImageReadings,

@@ -10,8 +10,8 @@ from tankcal.job.fields import is_blank
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
 from tankcal.job.tables import Log, fingerprint, nearest, read_bytes
 from tankcal.messages import message
-from tankcal.rules.model import TANKS, DeviationLimit, Rule, UncertaintyLimit
-from tankcal.shipped import shipped
+from tankcal.tank.rules.model import TANKS, DeviationLimit, Rule, UncertaintyLimit
+from tankcal.text.shipped import shipped
 
 _FOLDER, _ENDING = "job/rule_tables", ".toml"
 

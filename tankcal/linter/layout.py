@@ -7,7 +7,6 @@ pairs are read column by column or row by row, whichever lets the heights rise.
 from dataclasses import dataclass, replace
 from itertools import pairwise, zip_longest
 
-from tankcal.dips import parse_dip
 from tankcal.errors import HeightError, InputError, Problem
 from tankcal.linter.headings import announces_parts, heading_of, is_unit
 from tankcal.linter.numbers import (
@@ -20,6 +19,7 @@ from tankcal.linter.numbers import (
     style_of,
 )
 from tankcal.messages import message
+from tankcal.tank.dips import parse_dip
 
 _FEW_SPLIT_ROWS = 5
 _FEET_DECIMALS = 4  # of a metre, in a label with decimals of an inch

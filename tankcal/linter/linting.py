@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
-from tankcal.display import table_html
 from tankcal.errors import InputError, Problem
 from tankcal.job.tables import Log, nearest
 from tankcal.linter.grids import read_grids
@@ -14,6 +13,7 @@ from tankcal.linter.parts import MOST_PARTS, check_parts
 from tankcal.linter.totals import NOTHING_NOMINAL, Nominal, check_totals, units_of
 from tankcal.linter.volumes import volumes_of
 from tankcal.messages import message
+from tankcal.text.display import table_html
 
 _PART_OF_LARGEST = 0.5  # of its rows: smaller tables beside it are not capacity tables
 _ROWS_OF_SLOPE = 10

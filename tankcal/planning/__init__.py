@@ -7,12 +7,12 @@ from importlib import import_module
 
 _ROOM_OF = {
     "Plan": "model",
-    "Prediction": "predicting",
-    "greedy": "helping",
+    "Prediction": "prediction",
+    "greedy": "improvements",
     "load_plan": "reading",
-    "predict": "predicting",
-    "smallest": "helping",
-    "what_helps": "helping",
+    "predict": "prediction",
+    "smallest": "improvements",
+    "what_helps": "improvements",
 }
 
 __all__ = [*_ROOM_OF]

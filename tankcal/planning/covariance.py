@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse
 
-from tankcal.gauss_markov.effects import covariances
-from tankcal.wall import common_motions, taken_along
+from tankcal.pipeline.wall import common_motions, taken_along
+from tankcal.solver.effects import covariances
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,16 @@ volume of the full tank by up to
 
 All numbers are of one reading: of those that are repeated see `repeated`.
 
-Source: Baarda 1968, as in tankcal.network.reliability.
+Source: Baarda 1968, as in tankcal.survey.network.reliability.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.gauss_markov.effects import covariances
-from tankcal.network.reliability import UNCONTROLLED, noncentrality
 from tankcal.planning.repeated import single_readings
+from tankcal.solver.effects import covariances
+from tankcal.survey.network.reliability import UNCONTROLLED, noncentrality
 
 
 @dataclass(frozen=True)

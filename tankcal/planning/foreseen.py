@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.doubts import SHOWN, of_adjustment
 from tankcal.errors import Problem
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import listed, message
+from tankcal.pipeline.plausibility import SHOWN, of_adjustment
+from tankcal.pipeline.table import doubts_of_table
 from tankcal.planning.covariance import PredictedCovariance
 from tankcal.planning.given import PLAN_FILE
-from tankcal.tabling import doubts_of_table
 
 
 def foreseen(prediction):

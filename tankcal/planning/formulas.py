@@ -82,7 +82,7 @@ def classes_reached(sd_m, limits):
 
     sd_m    of the product; in plan sqrt(s_X^2 + s_Y^2)
     limits  limits of one part, the best class of a scale first: things with `scale` and `sd_m`
-            (`tankcal.camera_analysis.product.limits.Limit`)
+            (`tankcal.calibration.product.limits.Limit`)
     """
     found = {}
     for limit in limits:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tankcal.form import Form
+from tankcal.geometry.form import Form
 from tankcal.job.model import Job
 from tankcal.job.tables import RawJob
 

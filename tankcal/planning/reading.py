@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+from tankcal.job.assembly import make_job
 from tankcal.job.attached import Attached
 from tankcal.job.checks import check_tank
 from tankcal.job.checks.survey.cameras import check_cameras
@@ -27,28 +28,17 @@ from tankcal.job.folder import (
     read_csv,
 )
 from tankcal.job.folder import read_register as read_register_file
-from tankcal.job.making import make_job
 from tankcal.job.measuring import make_measurements
 from tankcal.job.rule_files import find_rule
-from tankcal.job.tables import (
-    REGISTERS,
-    Log,
-    RawJob,
-    Value,
-    fingerprint,
-    nearest,
-    read_bytes,
-)
-from tankcal.job.tables import (
-    TABLES as JOB_FILES,
-)
+from tankcal.job.tables import REGISTERS, Log, RawJob, Value, fingerprint, nearest, read_bytes
+from tankcal.job.tables import TABLES as JOB_FILES
 from tankcal.messages import message
-from tankcal.numerals import NUMBER
-from tankcal.planning.assembling import assembled
+from tankcal.planning.assembly import assembled
 from tankcal.planning.checks.given import check_given
 from tankcal.planning.checks.placed import check_plan
 from tankcal.planning.contract import JOB_TABLES, REPEATED, SINGLE, TABLES, Count
 from tankcal.planning.given import PLAN_FILE, Entry, Given
+from tankcal.text.numerals import NUMBER
 
 
 def load_plan(path):

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.observations import ImageCoordinates
 from tankcal.planning.model import TAPED
+from tankcal.survey.observations import ImageCoordinates
 
 SIGHTED = ("directions", "zenith_angles", "slope_distances")
 

@@ -4,9 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from tankcal.geometry.rotations import looking
 from tankcal.planning.model import Instrumented, Photograph, Shell, Targets, Tie
 from tankcal.quadrature import panels
-from tankcal.rotations import looking
 
 ARCSEC = np.pi / 180 / 3600
 LEVELS, CLEARANCE_M = 2, 0.3

@@ -11,11 +11,11 @@ import numpy as np
 
 from tankcal.errors import SolutionError, TankcalError
 from tankcal.messages import message
-from tankcal.planning.predicting import Prediction
-from tankcal.planning.simulating import measured
-from tankcal.surveys import adjust_survey, wall_points
-from tankcal.tabling import tabled
-from tankcal.wall import among_themselves, find_wall
+from tankcal.pipeline.table import tabled
+from tankcal.pipeline.wall import among_themselves, find_wall
+from tankcal.planning.measurements import measured
+from tankcal.planning.prediction import Prediction
+from tankcal.survey import adjust_survey, wall_points
 
 OF_SURVEY = ("points", "instrument_scale", "instrument_offset")
 BLUNDER_SDS = 20.0  # size of a blunder, in standard deviations of its reading

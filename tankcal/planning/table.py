@@ -5,17 +5,17 @@ from functools import cached_property
 
 import numpy as np
 
-from tankcal.doubts import refuse_undetermined
 from tankcal.errors import SolutionError
 from tankcal.job.model import Job, Points
 from tankcal.messages import message
+from tankcal.pipeline.plausibility import refuse_undetermined
+from tankcal.pipeline.statements import statements
+from tankcal.pipeline.table import Tabled, tabled
+from tankcal.pipeline.tanks.vertical import volume_by_points
+from tankcal.pipeline.wall import Wall, find_wall
 from tankcal.planning.covariance import PredictedCovariance
-from tankcal.statements import statements
-from tankcal.surveys.causes import causes_of
-from tankcal.surveys.walls import off_the_wall
-from tankcal.tabling import Tabled, tabled
-from tankcal.tanks.vertical import volume_by_points
-from tankcal.wall import Wall, find_wall
+from tankcal.survey.causes import causes_of
+from tankcal.survey.wall_points import off_the_wall
 
 MANY = 400  # points of a wall whose covariance is written out for its outlines
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera import measured
+from tankcal.camera.model import measured
 from tankcal.planning.model import Box, Pillar
 
 FEWEST_READINGS = 3

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.plain_data import without_collection
+from tankcal.record.plain_data import without_collection
 from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
 
 __all__ = [

@@ -3,13 +3,13 @@
 import numpy as np
 from scipy.special import fdtri, gammaincinv
 
-from tankcal.camera import PARAMETERS, UNITS
-from tankcal.camera_analysis.edges import Frame, own_shift
-from tankcal.camera_analysis.interiors import interiors_of
-from tankcal.network import correlations
-from tankcal.network.quality import ellipsoid_factor, ellipsoids, precision
-from tankcal.plain_data import plain, rows_of
-from tankcal.rotations import angle_derivatives, angles_of
+from tankcal.calibration.edges import Frame, own_shift
+from tankcal.calibration.interiors import interiors_of
+from tankcal.camera.model import PARAMETERS, UNITS
+from tankcal.geometry.rotations import angle_derivatives, angles_of
+from tankcal.record.plain_data import plain, rows_of
+from tankcal.survey.network import correlations
+from tankcal.survey.network.quality import ellipsoid_factor, ellipsoids, precision
 
 ELLIPSE = 0.95  # probability of the ellipses and ellipsoids that are drawn and listed
 PROBABILITIES = (0.20, 0.90, 0.95, 0.99)

@@ -6,8 +6,6 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from tankcal.messages import as_plain
-from tankcal.network.cleaning import CRITICAL
-from tankcal.network.reliability import UNCONTROLLED, noncentrality, tau_limit
 from tankcal.record.adjusted import (
     adjusted_points_of,
     cameras_of,
@@ -17,7 +15,9 @@ from tankcal.record.adjusted import (
     systems_of,
 )
 from tankcal.record.images import depth_of, fiducials_of, image_readings_of
-from tankcal.surveys.results import Reading
+from tankcal.survey.network.reliability import UNCONTROLLED, noncentrality, tau_limit
+from tankcal.survey.network.snooping import CRITICAL
+from tankcal.survey.results import Reading
 
 CONFIDENCE = 0.95  # of the global test and of the intervals of variance factors
 ALPHA, POWER = 0.001, 0.80  # of the tests of single readings

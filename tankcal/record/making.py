@@ -8,17 +8,11 @@ import scipy
 
 import tankcal
 from tankcal.messages import as_plain
-from tankcal.plain_data import plain, plain_problems
 from tankcal.record import FORMAT
 from tankcal.record.adjustment import adjustment_of
 from tankcal.record.parts import bottom_of, deadwood_of, roof_of, solid_of
-from tankcal.record.statements import (
-    budget_of,
-    budgets_of,
-    deliveries_of,
-    monte_carlo_of,
-    rule_of,
-)
+from tankcal.record.plain_data import plain, plain_problems
+from tankcal.record.statements import budget_of, budgets_of, deliveries_of, monte_carlo_of, rule_of
 from tankcal.record.survey import (
     adjustment_in,
     courses_of,

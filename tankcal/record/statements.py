@@ -4,8 +4,8 @@ from dataclasses import asdict, fields
 
 import numpy as np
 
-from tankcal.budgets import budget
-from tankcal.rules import as_json
+from tankcal.gum.volume_budgets import budget
+from tankcal.record.rules import as_json
 
 
 def budget_of(result):

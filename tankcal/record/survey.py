@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.courses import FORM_GRID
-from tankcal.outlines import FULL_TURN
+from tankcal.geometry.outlines import FULL_TURN
+from tankcal.tank.courses import FORM_GRID
 
 
 def shell_of(result):

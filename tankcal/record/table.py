@@ -4,12 +4,12 @@ from dataclasses import asdict
 
 import numpy as np
 
-from tankcal.chain import PARTS
-from tankcal.dips import dip_label
-from tankcal.network.cleaning import CRITICAL
+from tankcal.geometry.snooping import CRITICAL_W
+from tankcal.pipeline.chain import PARTS
 from tankcal.record.statements import intervals_of
 from tankcal.record.survey import adjustment_in
-from tankcal.snooping import CRITICAL_W
+from tankcal.survey.network.snooping import CRITICAL
+from tankcal.tank.dips import dip_label
 
 LEAST_PART_M3 = 1e-4  # last place of a printed part: an error below it is not told apart
 

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from tankcal.layouts import layout_of
-from tankcal.plain_data import columns_of
-from tankcal.saved_formats import SavedFormat
+from tankcal.record.layout import layout_of
+from tankcal.record.plain_data import columns_of
+from tankcal.record.saved_formats import SavedFormat
 
 VERSION = 2
-LAYOUTS = Path(__file__).with_name("layouts")
+LAYOUTS = Path(__file__).with_name("layouts") / "record"
 
 
 def _completed_draft(record, version):

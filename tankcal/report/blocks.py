@@ -11,8 +11,8 @@ A block is plain data. Jupyter shows its HTML; the exporters take the data itsel
 import io
 from dataclasses import dataclass
 
-from tankcal.digits import NOTHING
 from tankcal.errors import TankcalError
+from tankcal.text.digits import NOTHING
 
 MIME = "application/vnd.tankcal.block+json"
 ALIGNMENTS = ("left", "center", "right", "decimal")

@@ -1,4 +1,4 @@
-"""The figures of the working papers: the record's numbers, drawn by `tankcal.plots`.
+"""The figures of the working papers: the record's numbers, drawn by `tankcal.pipeline.plots`.
 
 Each function takes a Paper and gives a matplotlib Figure, or a list of them when there are many
 sections; the words at the axes are those of the paper's language.
@@ -7,7 +7,7 @@ sections; the words at the axes are those of the paper's language.
 import numpy as np
 from matplotlib.ticker import Formatter, ScalarFormatter
 
-from tankcal import plots
+from tankcal.pipeline import plots
 from tankcal.report.uncertainty.stated import stated_U_m3
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import nbformat
 
 from tankcal.errors import TankcalError, VocabularyError
-from tankcal.shipped import shipped
+from tankcal.text.shipped import shipped
 
 TEMPLATES = ("certificate.ipynb", "working_papers.ipynb", "field_table.ipynb")
 CELL_TIMEOUT_S = 600

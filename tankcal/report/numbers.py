@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from math import inf, pi
 
-from tankcal.digits import ENGLISH, WITHOUT_U, shortest, superscript, with_digits, written
-from tankcal.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
 from tankcal.errors import VocabularyError
+from tankcal.tank.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
+from tankcal.text.digits import ENGLISH, WITHOUT_U, shortest, superscript, with_digits, written
 
 _SHORT = range(-2, 6)  # powers of ten written out in a narrow column
 _MOST_DEGREES = 10_000  # of freedom: from there k is that of the normal distribution, to 0.03 %

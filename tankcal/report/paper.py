@@ -9,12 +9,12 @@ The cells of the templates use it; nothing here computes a number.
 from functools import cached_property
 from pathlib import Path
 
-from tankcal.plain_data import rows_of, without_collection
 from tankcal.record import load
+from tankcal.record.plain_data import rows_of, without_collection
 from tankcal.report import attachments, blocks
 from tankcal.report.letterhead import read_saved
 from tankcal.report.plain import Column, PlainPaper
-from tankcal.words import choice_sentence, in_language, input_name, language_of, load_words
+from tankcal.text.words import choice_sentence, in_language, input_name, language_of, load_words
 
 __all__ = ["Column", "Paper"]
 _BLANK = "_" * 20  # to be filled in by hand

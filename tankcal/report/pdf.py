@@ -14,7 +14,7 @@ from tankcal.errors import TankcalError
 from tankcal.report import attachments
 from tankcal.report.blocks import WEB_ONLY
 from tankcal.report.plain_formulas import formula_nodes
-from tankcal.shipped import shipped
+from tankcal.text.shipped import shipped
 
 STANDARDS = ["a-3a", "ua-1"]  # archival, and readable by a screen reader
 PLACES = ("asked", "tables", "no")  # who asks for its place on the page (page.typ)

@@ -6,7 +6,9 @@ What every paper shares, whatever it is about; nothing here computes a number.
 from dataclasses import dataclass
 from datetime import date
 
-from tankcal.digits import (
+from tankcal.errors import VocabularyError
+from tankcal.report import blocks, numbers
+from tankcal.text.digits import (
     NOTHING,
     decimals_of,
     decimals_of_height,
@@ -15,9 +17,7 @@ from tankcal.digits import (
     shortest,
     with_digits,
 )
-from tankcal.errors import VocabularyError
-from tankcal.report import blocks, numbers
-from tankcal.words import marks_of, percent
+from tankcal.text.words import marks_of, percent
 
 _SPACE = "\N{NO-BREAK SPACE}"
 

@@ -7,7 +7,7 @@ import matplotlib
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Rectangle
 
-from tankcal.plots import INK, PALE, RED, STYLE, WIDTH
+from tankcal.pipeline.plots import INK, PALE, RED, STYLE, WIDTH
 from tankcal.report.dip_point import dip_point
 
 _GREY = "#445566"

@@ -1,7 +1,7 @@
 """correlations.csv: pairs of declared inputs, each once, and all of them possible together."""
 
-from tankcal.distributions import Normal
 from tankcal.gum import Input, Inputs
+from tankcal.gum.distributions import Normal
 from tankcal.messages import message
 
 

@@ -1,6 +1,6 @@
 """uncertainty.csv: each input once, in its own unit, of a credible size, and of use here."""
 
-from tankcal.distributions import FAMILIES, expanded, within
+from tankcal.gum.distributions import FAMILIES, expanded, within
 from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.common import refuse_repeated
 from tankcal.job.contract import INPUTS

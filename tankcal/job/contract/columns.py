@@ -1,6 +1,6 @@
 """The columns of every table."""
 
-from tankcal.distributions import FAMILIES
+from tankcal.gum.distributions import FAMILIES
 from tankcal.job.contract.inputs import AS_READ, INPUTS, UNITS
 from tankcal.job.fields import Field
 

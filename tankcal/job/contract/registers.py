@@ -1,13 +1,13 @@
 """The keys of cameras.toml, instruments.toml and [adjustment.camera]."""
 
-from tankcal.camera import AFFINITIES, CONVENTIONS
-from tankcal.comparator import KINDS as TRANSFORMATIONS
+from tankcal.camera.comparator import KINDS as TRANSFORMATIONS
+from tankcal.camera.model import AFFINITIES, CONVENTIONS
 from tankcal.job.fields import Field
-from tankcal.network.survey import STATES
+from tankcal.survey.network.survey import STATES
 
 FREE = "free"
 INSTRUMENT_KINDS = ("tape", "edm", "total_station", "theodolite", "level")
-# name in cameras.toml and largest magnitude of each parameter, by its name in tankcal.camera
+# name in cameras.toml and largest magnitude of each parameter, by its name in tankcal.camera.model
 PARAMETER_KEYS = {
     "c": ("c_mm", 1e5),
     "x0": ("x0_mm", 1e4),

@@ -1,7 +1,7 @@
 """The keys of a decision rule's file: [rule], [uncertainty.NAME] and [deviation.NAME]."""
 
 from tankcal.job.fields import Field
-from tankcal.rules.model import DEVIATION_OF, GUARDS, RELATIVE_TO, SIDES, UNCERTAINTY_OF
+from tankcal.tank.rules.model import DEVIATION_OF, GUARDS, RELATIVE_TO, SIDES, UNCERTAINTY_OF
 
 RULE = (
     Field("name", "text", "name of the rule", required=True),

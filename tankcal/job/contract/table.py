@@ -2,7 +2,7 @@
 
 from tankcal.job.contract.kinds import VERTICAL
 from tankcal.job.fields import Field
-from tankcal.languages import LANGUAGES
+from tankcal.text.languages import LANGUAGES
 
 TABLE = (
     Field(

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 
-from tankcal.job.measurements import Measurements
 from tankcal.job.model.declared import DeclaredInput, StatedVolume
 from tankcal.job.model.parts import (
     Bottom,
@@ -16,7 +15,8 @@ from tankcal.job.model.parts import (
     Sphere,
 )
 from tankcal.job.model.settings import Datum, Material, Survey, Switches, TableSpec, Tank
-from tankcal.rules.model import Rule
+from tankcal.survey.measurements import Measurements
+from tankcal.tank.rules.model import Rule
 
 __all__ = [
     "Bottom",

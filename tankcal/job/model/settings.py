@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tankcal.languages import DEFAULT
+from tankcal.text.languages import DEFAULT
 
 
 @dataclass(frozen=True)

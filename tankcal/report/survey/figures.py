@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
-from tankcal.labels import MARK, Label, write_labels
-from tankcal.plots import INK, MANY, RED, STYLE, WIDTH, round_factor, set_margins
+from tankcal.pipeline.plots import INK, MANY, RED, STYLE, WIDTH, round_factor, set_margins
+from tankcal.text.labels import MARK, Label, write_labels
 
 MOST_PHOTOS = 12
 MOST_NAMES = 60  # places whose names are written in the plan

@@ -1,10 +1,10 @@
 """Single readings: those set aside, those that fit worst, those that nothing controls."""
 
-from tankcal.digits import fixed, with_digits
 from tankcal.report import numbers
 from tankcal.report.paper import Column
 from tankcal.report.survey.common import LARGE_UNITS, MOST_ROWS, SMALL_UNITS, with_note
-from tankcal.words import observation_name
+from tankcal.text.digits import fixed, with_digits
+from tankcal.text.words import observation_name
 
 WORST = 16  # rows of a table of the worst readings
 WEAK = 0.1  # redundancy number below which a blunder has to be 13 sds to be found

@@ -1,11 +1,11 @@
 """What was found: points, check points, cameras, photographs, instruments, systems."""
 
-from tankcal.digits import NOTHING, fixed
 from tankcal.report import blocks, numbers
 from tankcal.report.paper import Column
 from tankcal.report.survey.common import MOST_CAMERAS, MOST_ROWS, with_note
 from tankcal.report.survey.images import images
-from tankcal.words import listed
+from tankcal.text.digits import NOTHING, fixed
+from tankcal.text.words import listed
 
 STEEP_DEG = 80.0  # of phi: beyond, omega and kappa are hardly told apart
 _ANGLES = ("omega", "phi", "kappa")

@@ -1,10 +1,10 @@
 """How well everything fits: statistics, datum, groups of observations."""
 
-from tankcal import words
-from tankcal.digits import NOTHING
 from tankcal.report import blocks, numbers
 from tankcal.report.paper import Column
 from tankcal.report.survey.common import MOST_ROWS, SMALL_UNITS
+from tankcal.text import words
+from tankcal.text.digits import NOTHING
 
 
 def facts(paper):

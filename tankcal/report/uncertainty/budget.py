@@ -1,11 +1,11 @@
 """Budgets: line by line for the top row and a delivery, contributions for the others."""
 
-from tankcal.digits import NOTHING, decimals_of, fixed, shortest
-from tankcal.plots import even_groups
+from tankcal.pipeline.plots import even_groups
 from tankcal.report import blocks
 from tankcal.report.numbers import degrees_of_freedom, like_its_sd, symbol
 from tankcal.report.paper import Column
-from tankcal.words import name_of_input
+from tankcal.text.digits import NOTHING, decimals_of, fixed, shortest
+from tankcal.text.words import name_of_input
 
 ACROSS = 7  # volumes and deliveries beside each other
 USEFUL = 0.995  # of U: an input that would change it less is not worth measuring better

@@ -5,7 +5,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 
-from tankcal.plots import INK, RED, STYLE, WIDTH, set_margins
+from tankcal.pipeline.plots import INK, RED, STYLE, WIDTH, set_margins
 
 _GREY = "#9aa5b1"
 _SHORT_AXIS = 20  # from its lowest number to its highest: beyond, powers of ten are enough

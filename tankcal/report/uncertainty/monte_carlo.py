@@ -5,7 +5,7 @@ from itertools import groupby
 from tankcal.report import blocks, numbers
 from tankcal.report.paper import Column
 from tankcal.report.uncertainty import method
-from tankcal.words import name_of_input
+from tankcal.text.words import name_of_input
 
 MOST_RANGES = 40
 

@@ -4,7 +4,7 @@ Where Monte Carlo does not validate the GUM interval its own interval counts, an
 distance of its ends from the volume (docs/uncertainty.md).
 """
 
-from tankcal.digits import decimals_of
+from tankcal.text.digits import decimals_of
 
 MONTE_CARLO = "monte_carlo"
 MARK = "*"

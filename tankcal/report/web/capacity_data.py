@@ -6,16 +6,12 @@ of a long table is nearly straight between few of its rows: only those are kept.
 
 import numpy as np
 
-from tankcal.digits import decimals_of_rows
 from tankcal.report.blocks import Block
 from tankcal.report.numbers import unit
 from tankcal.report.uncertainty.sources import critical_zone, groups_of
-from tankcal.report.uncertainty.stated import (
-    by_monte_carlo,
-    stated_rows,
-    stated_U_m3,
-)
+from tankcal.report.uncertainty.stated import by_monte_carlo, stated_rows, stated_U_m3
 from tankcal.report.web.packing import packed
+from tankcal.text.digits import decimals_of_rows
 from tankcal.uncertainty import coverage_factor
 
 BEND = 1e-6  # of the largest u: how far the factor may be from the straight line between kept rows

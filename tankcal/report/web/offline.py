@@ -9,14 +9,14 @@ import hashlib
 import re
 from html import escape
 
-from tankcal.languages import DEFAULT, LANGUAGES
 from tankcal.report.web.contents import contents_html, with_ids
 from tankcal.report.web.elements import block_html
 from tankcal.report.web.packing import script_data
 from tankcal.report.web.tables import PIECE, framed_table, searchable_table
 from tankcal.report.web.widgets import calculator_html, view_html
-from tankcal.shipped import shipped
-from tankcal.words import load_words
+from tankcal.text.languages import DEFAULT, LANGUAGES
+from tankcal.text.shipped import shipped
+from tankcal.text.words import load_words
 
 _SCRIPTS = {
     "": ("numbers.js", "look.js"),

@@ -8,7 +8,7 @@ from math import sqrt
 
 import numpy as np
 
-from tankcal.plots import round_factor
+from tankcal.pipeline.plots import round_factor
 from tankcal.report.blocks import Block
 from tankcal.report.web.packing import packed
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.special import chdtri
 
-from tankcal.comparator import GROSS, KINDS, suspicion
+from tankcal.camera.comparator import GROSS, KINDS, suspicion
 from tankcal.errors import SolutionError
 from tankcal.job.checks.common import has_rows, is_not_given, tell
 from tankcal.job.checks.survey.files import refuse_undefined, tell_rows

@@ -1,6 +1,6 @@
 """Distance-dependent distortion: the keys of a camera's focus, and [adjustment] depth_of_field."""
 
-from tankcal.focus import RADIAL
+from tankcal.camera.focus import RADIAL
 from tankcal.job.cameras import focus_keys, lens_of
 from tankcal.job.checks.common import tell
 from tankcal.job.contract.registers import PARAMETER_KEYS

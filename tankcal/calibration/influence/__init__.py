@@ -1,0 +1,9 @@
+"""What does a wrong calibration do to a survey?"""
+
+
+def __getattr__(name):
+    if name != "influence":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from tankcal.calibration.influence.runs import influence
+
+    return influence

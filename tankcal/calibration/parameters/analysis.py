@@ -1,0 +1,169 @@
+"""Which parameters belong to a camera: all that a job, or a record of it, says about that.
+
+Tests, components, predictions and rules need only the covariance of the camera, which a record
+keeps. What dropping a parameter does to points and volume needs the job.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tankcal.calibration.interiors import (
+    chosen,
+    interiors_in,
+    interiors_of,
+    photos_in,
+    refuse_unknown,
+)
+from tankcal.calibration.parameters.dropping import Dropping, interior_after
+from tankcal.calibration.parameters.findings import Choices, Statistics
+from tankcal.calibration.parameters.judgement import (
+    adjusted_rows,
+    advised,
+    analysed,
+    told_together,
+    with_advised,
+    with_fewer,
+    without_advised,
+)
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+from tankcal.pipeline.chain import adjust_job
+
+
+def analyse_record(record, choices=None, *, camera=None, photo=None):
+    """A tuple of CameraParameters of a record (dict as read), one for each set; without dropping.
+
+    camera, photo  names, to have the sets of these only
+
+    Raises InputError where it is no record of an adjustment with cameras, holds no parameter that
+    was adjusted, or no such camera or photo.
+    """
+    interiors = interiors_in(record)
+    if camera is not None or photo is not None:
+        interiors = chosen(interiors, photos_in(record), camera, photo)
+    return _of_all(interiors, _statistics_in(record), choices or Choices(), "record.json")
+
+
+def _statistics_in(record):
+    """The Statistics of a record; InputError where they are missing or no numbers."""
+    found = record["adjustment"]
+    try:
+        sigma0 = found["sigma0"]
+        statistics = Statistics(
+            sigma0=np.nan if sigma0 is None else float(sigma0),
+            dof=int(found["redundancy"]),
+            cov_scale=float(found["cov_scale"]),
+            groups=[
+                tuple(one[key] for key in ("kind", "name", "count", "redundancy", "rms"))
+                for one in found["groups"]
+            ],
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        text = message(
+            "camera_statistics_unreadable",
+            "the statistics of the adjustment cannot be read: {error}",
+            error=error,
+        )
+        raise InputError(Problem("record.json", text, None, "adjustment")) from error
+    if not statistics.cov_scale > 0:
+        text = message(
+            "camera_cov_scale",
+            "found cov_scale {found:g}, expected a factor above 0",
+            found=statistics.cov_scale,
+        )
+        raise InputError(Problem("record.json", text, None, "adjustment.cov_scale"))
+    return statistics
+
+
+def analyse_job(
+    job, choices=None, *, camera=None, photo=None, adjustment=None, dropping=True, tell=None
+):
+    """A tuple of CameraParameters of a job, one for each set of interior parameters.
+
+    camera, photo  names, to have the sets of these only
+    adjustment  surveys.Adjustment of job.measurements, where it is at hand
+    dropping    whether the survey is adjusted again without each candidate
+    tell        tell(text, done, total) is called as the work goes on
+
+    Raises InputError for a job without photographs, without adjusted parameters or without such a
+    camera or photo, SolutionError when the survey cannot be adjusted.
+    """
+    tell = tell or (lambda text, done, total: None)
+    if job.measurements is None or not job.measurements.photos:
+        raise InputError(
+            Problem(
+                "job.toml",
+                message("camera_none_to_judge", "no photographs: there is no camera to be judged"),
+            )
+        )
+    photos = {one.name: one.camera for one in job.measurements.photos}
+    refuse_unknown(photos, camera, photo)
+    if adjustment is None:
+        tell(message("camera_adjusting_all", "adjusting the survey with all parameters"), 0, 1)
+        adjustment = adjust_job(job)
+    groups = [(g.kind, g.name, g.count, g.redundancy, g.rms) for g in adjustment.groups]
+    statistics = Statistics(adjustment.sigma0, adjustment.redundancy, adjustment.cov_scale, groups)
+    interiors = interiors_of(adjustment, job.measurements)
+    interiors = chosen(interiors, photos, camera, photo)
+    found = _of_all(interiors, statistics, choices or Choices(), "cameras.toml", source="job")
+    return _with_outcomes(found, job, adjustment, tell) if dropping else found
+
+
+def _of_all(interiors, statistics, choices, file, source="record"):
+    judged = [one for one in interiors if len(adjusted_rows(one))]
+    if not judged:
+        text = message(
+            "camera_nothing_adjusted",
+            "no parameter of any camera is adjusted: there is nothing to be judged",
+        )
+        raise InputError(Problem(file, text))
+    try:
+        return tuple(analysed(one, statistics, choices, source) for one in judged)
+    except ValueError as error:
+        raise InputError(Problem(file, error.args[0])) from error
+
+
+def _with_outcomes(found, job, adjustment, tell):
+    """All CameraParameters with each of their trials adjusted again, then what they advise."""
+    outcomes, total = {}, 1 + sum(len(without_advised(one).trials) for one in found)
+    tell(message("camera_volume_all", "computing the volume with all parameters"), 0, total)
+    again = Dropping(job, adjustment)
+
+    def tried(stage):
+        staged = tuple(stage(one) for one in found)
+        for one in staged:
+            for trial in one.trials:
+                key = one.interior.camera, trial.names
+                if key not in outcomes:
+                    done = len(outcomes) + 1
+                    told = message(
+                        "camera_adjusting_without",
+                        "adjusting without {parameters} of {camera}",
+                        parameters=" ".join(trial.names),
+                        camera=key[0],
+                    )
+                    tell(told, done, max(done, total))
+                    outcomes[key] = again.without(*key)
+        return tuple(advised(_tried(one, outcomes, adjustment, again)) for one in staged)
+
+    found = tried(without_advised)
+    found = tried(with_advised)
+    while any(fewer is not one for fewer, one in zip(map(with_fewer, found), found, strict=True)):
+        found = tuple(advised(with_fewer(one)) for one in found)
+        found = tried(with_advised)
+    tell("done", total, total)
+    return tuple(told_together(one) for one in found)
+
+
+def _tried(found, outcomes, adjustment, again):
+    """The CameraParameters with what came out of its trials."""
+    trials = []
+    for trial in found.trials:
+        outcome, after = outcomes[found.interior.camera, trial.names], None
+        if outcome.adjustment is not None:
+            values, names, cofactors = interior_after(outcome, found.interior)
+            factor = adjustment.sigma0**2 if found.scale == "a_posteriori" else 1.0
+            after = names, values, factor * cofactors
+        trials.append(replace(trial, outcome=outcome, after=after))
+    return replace(found, trials=tuple(trials), base=(again.volume, again.no_volume))

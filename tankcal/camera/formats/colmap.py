@@ -1,0 +1,174 @@
+"""Cameras of COLMAP: models SIMPLE_PINHOLE to FULL_OPENCV, and cameras.txt.
+
+    CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]
+
+The models are those of OpenCV, but the corner of the first pixel is 0, 0, its centre 0.5, 0.5.
+Source: COLMAP's documentation, camera models and output format.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.camera.formats.brown import Has, to_brown
+from tankcal.camera.formats.opencv import OpenCV, from_opencv
+from tankcal.camera.formats.texts import exactly, shown
+from tankcal.messages import message
+
+MODELS = {
+    "SIMPLE_PINHOLE": ("f", "cx", "cy"),
+    "PINHOLE": ("fx", "fy", "cx", "cy"),
+    "SIMPLE_RADIAL": ("f", "cx", "cy", "k1"),
+    "RADIAL": ("f", "cx", "cy", "k1", "k2"),
+    "OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"),
+    "FULL_OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+}
+ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+HALF = 0.5
+EXACT_PX = 1e-9
+
+
+@dataclass(frozen=True)
+class Colmap:
+    """A camera as COLMAP has it.
+
+    model     one of MODELS         size_px  (2,) columns, lines
+    params    as MODELS names them, px and units of the focal length
+    error_px  largest distance of an image point over the frame from the camera that was converted
+    """
+
+    model: str
+    size_px: tuple[int, int]
+    params: tuple
+    error_px: float = 0.0
+
+
+def from_colmap(camera, pixel_mm):
+    """FramedCamera, of the plain Form().
+
+    pixel_mm  height of a pixel; the width follows from fx and fy
+
+    Raises SolutionError where the distortion folds the image within the frame.
+    """
+    values = dict(zip(MODELS[camera.model], camera.params, strict=True))
+    fx, fy = values.get("fx", values.get("f")), values.get("fy", values.get("f"))
+    matrix = [[fx, 0, values["cx"] - HALF], [0, fy, values["cy"] - HALF], [0, 0, 1]]
+    coefficients = np.array([values.get(name, 0.0) for name in ORDER])
+    return from_opencv(OpenCV(np.array(matrix), coefficients), pixel_mm, camera.size_px)
+
+
+def to_colmap(camera, model=None):
+    """Colmap of a FramedCamera: exact where the model has all the terms, else fitted.
+
+    model  one of MODELS; None: the simplest that is exact, else FULL_OPENCV
+    """
+    if model is not None:
+        return _as_model(camera, model)
+    for name in MODELS:
+        found = _as_model(camera, name)
+        if found.error_px < EXACT_PX:
+            break
+    return found
+
+
+def _as_model(camera, model):
+    names = MODELS[model]
+    has = Has(
+        radial=sum(name in names for name in ("k1", "k2", "k3")),
+        decentring=2 if "p1" in names else 0,
+        two_focals="fx" in names,
+        skew=False,
+    )
+    brown, error = to_brown(camera, has)
+    values = {
+        "f": brown.fy,
+        "fx": brown.fx,
+        "fy": brown.fy,
+        "cx": brown.cx + HALF,
+        "cy": brown.cy + HALF,
+    }
+    values |= dict(zip(ORDER, (*brown.k[:2], *brown.p[:2], brown.k[2], 0.0, 0.0, 0.0), strict=True))
+    return Colmap(model, camera.size_px, tuple(values[name] for name in names), error)
+
+
+def parse(text, notes):
+    """[(name, Colmap)] of a cameras.txt; problems go to notes."""
+    found = []
+    for row, line in enumerate(text.splitlines(), 1):
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            continue
+        camera = _parsed(words, row, notes)
+        if camera is None:
+            continue
+        name = notes.name(words[0], row, "CAMERA_ID")
+        if name in [other for other, _ in found]:
+            notes.tell(
+                message(
+                    "convert_colmap_twice",
+                    "camera {name} a second time; expected each once",
+                    name=shown(name),
+                ),
+                row,
+                "CAMERA_ID",
+            )
+        found.append((name, camera))
+    if not found and not notes.problems:
+        notes.tell(
+            message(
+                "convert_colmap_none",
+                "no camera; expected lines such as 1 OPENCV 4000 3000 and its parameters",
+            )
+        )
+    return found
+
+
+def _parsed(words, row, notes):
+    if len(words) < 4:
+        notes.tell(
+            message("convert_colmap_cut", "cut off; expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS"),
+            row,
+        )
+        return None
+    model = words[1]
+    if model not in MODELS:
+        expected = message(
+            "convert_colmap_model",
+            "camera model {model}; those read are {models}",
+            model=shown(model),
+            models=", ".join(MODELS),
+        )
+        notes.tell(expected, row, "MODEL")
+        return None
+    names, texts = MODELS[model], words[4:]
+    if len(texts) != len(names):
+        expected = message(
+            "convert_colmap_parameters",
+            "{count} parameters of {model}; expected {expected}: {names}",
+            count=len(texts),
+            model=model,
+            expected=len(names),
+            names=" ".join(names),
+        )
+        notes.tell(expected, row, "PARAMS")
+        return None
+    size = (notes.count(words[2], row, "WIDTH"), notes.count(words[3], row, "HEIGHT"))
+    params = tuple(
+        notes.number(one, row, name, above=0 if name[0] == "f" else None)
+        for name, one in zip(names, texts, strict=True)
+    )
+    return Colmap(model, size, params)
+
+
+def text_of(cameras):
+    """cameras.txt of [(name, Colmap)]; cameras are numbered when a name is no number."""
+    are_numbers = all(name.isdecimal() and name.isascii() for name, _ in cameras)
+    lines = ["# Camera list with one line of data per camera:"]
+    lines += [
+        "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]",
+        f"# Number of cameras: {len(cameras)}",
+    ]
+    for number, (name, camera) in enumerate(cameras, 1):
+        head = (name if are_numbers else str(number), camera.model, *map(str, camera.size_px))
+        lines.append(" ".join((*head, *map(exactly, camera.params))))
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,195 @@
+"""Cameras of Agisoft Metashape: the frame camera, and its calibration as XML.
+
+With x, y the ray to the right and down, r2 = x2 + y2,
+
+    x' = x (1 + K1 r2 + K2 r4 + K3 r6 + K4 r8) + (P1 (r2 + 2 x2) + 2 P2 x y) (1 + P3 r2 + P4 r4)
+    y' = y (1 + K1 r2 + K2 r4 + K3 r6 + K4 r8) + (P2 (r2 + 2 y2) + 2 P1 x y) (1 + P3 r2 + P4 r4)
+    u = width/2 + cx + x' f + x' B1 + y' B2        v = height/2 + cy + y' f
+
+P1 and P2 have changed places against OpenCV. u, v count from the corner of the first pixel, cx and
+cy from the middle of the image. All but B2 is exact; the pixels are f/(f + B1) times as wide as
+high.
+
+Source: Metashape user manual, appendix "Camera models"; (1 + P3 r2 + P4 r4) stands in those of
+PhotoScan 1.2 to 1.4.
+"""
+
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+from tankcal.camera.formats.brown import Brown, from_brown, to_brown
+from tankcal.camera.formats.texts import exactly, given_twice, shown
+from tankcal.messages import message
+
+TERMS = ("cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
+OTHERS = ("projection", "date", "width", "height", "f")
+OLD = ("fx", "fy", "skew")
+
+
+@dataclass(frozen=True)
+class Metashape:
+    """A frame camera as Metashape has it, see above.
+
+    size_px           (2,) columns, lines
+    f, cx, cy, b1, b2 px                k  (4,) k1..k4          p  (4,) p1..p4
+    error_px          largest distance of an image point over the frame from the camera that was
+                      converted
+    """
+
+    size_px: tuple[int, int]
+    f: float
+    cx: float = 0.0
+    cy: float = 0.0
+    b1: float = 0.0
+    b2: float = 0.0
+    k: tuple = (0.0, 0.0, 0.0, 0.0)
+    p: tuple = (0.0, 0.0, 0.0, 0.0)
+    error_px: float = 0.0
+
+
+def from_metashape(camera, pixel_mm):
+    """FramedCamera, of the plain Form(): exact but for B2, which A and B are fitted to.
+
+    pixel_mm  height of a pixel; the width follows from f and B1
+
+    Raises SolutionError where the distortion folds the image within the frame.
+    """
+    columns, lines = camera.size_px
+    p1, p2, p3, p4 = camera.p
+    brown = Brown(
+        camera.f + camera.b1,
+        camera.f,
+        (columns - 1) / 2 + camera.cx,
+        (lines - 1) / 2 + camera.cy,
+        camera.b2,
+        tuple(camera.k),
+        (p2, p1, p3, p4),
+    )
+    return from_brown(brown, pixel_mm, camera.size_px)
+
+
+def to_metashape(camera):
+    """Metashape of a FramedCamera: exact for its plain form without affinity, else fitted."""
+    brown, error = to_brown(camera)
+    columns, lines = camera.size_px
+    p1, p2, p3, p4 = brown.p
+    return Metashape(
+        camera.size_px,
+        brown.fy,
+        brown.cx - (columns - 1) / 2,
+        brown.cy - (lines - 1) / 2,
+        brown.fx - brown.fy,
+        brown.skew,
+        brown.k,
+        (p2, p1, p3, p4),
+        error,
+    )
+
+
+def parse(text, notes):
+    """Metashape of the text of a calibration, or None; problems go to notes."""
+    root = _root(text, notes)
+    if root is None:
+        return None
+    found = {}
+    for child in root:
+        if child.tag in found:
+            notes.tell(given_twice(), key=shown(child.tag))
+        elif child.tag not in (*TERMS, *OTHERS, *OLD):
+            notes.tell(
+                message(
+                    "convert_metashape_unknown", "unknown; expected the keys of a frame camera"
+                ),
+                key=shown(child.tag),
+            )
+        found[child.tag] = (child.text or "").strip()
+    kind = found.get("projection", "frame")
+    if kind != "frame":
+        notes.tell(
+            message(
+                "convert_metashape_kind", "{kind}; only frame cameras are read", kind=shown(kind)
+            ),
+            key="projection",
+        )
+        return None
+    if any(key in found for key in OLD):
+        expected = message(
+            "convert_metashape_old",
+            "a form of PhotoScan before 1.2; open it in Metashape and save it again",
+        )
+        notes.tell(expected, key=next(key for key in OLD if key in found))
+        return None
+    size = tuple(_needed(found, key, notes.count, notes) for key in ("width", "height"))
+    f = _needed(found, "f", lambda one, key: notes.number(one, key=key, above=0), notes)
+    terms = [notes.number(found[key], key=key) if key in found else 0.0 for key in TERMS]
+    camera = Metashape(size, f, *terms[:4], tuple(terms[4:8]), tuple(terms[8:]))
+    if f + terms[2] <= 0:
+        notes.tell(
+            message(
+                "convert_metashape_shear",
+                "{found:g} beside f = {f:g}; expected less in magnitude",
+                found=terms[2],
+                f=f,
+            ),
+            key="b1",
+        )
+    return camera
+
+
+def _root(text, notes):
+    lower = text.lower()
+    if "<!doctype" in lower or "<!entity" in lower:
+        notes.tell(
+            message(
+                "convert_metashape_doctype",
+                "a document type or entities; expected a calibration as Metashape saves it",
+            )
+        )
+        return None
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError, RecursionError) as error:
+        row = getattr(error, "position", (None,))[0]
+        notes.tell(
+            message(
+                "convert_no_xml", "no readable XML ({error}); is the file complete?", error=error
+            ),
+            row,
+        )
+        return None
+    if root.tag != "calibration":
+        expected = message(
+            "convert_metashape_root",
+            "expected calibration: save it in Tools, Camera Calibration, as Agisoft XML",
+        )
+        notes.tell(
+            message(
+                "convert_outermost",
+                "{found} as the outermost element; {expected}",
+                found=shown(root.tag),
+                expected=expected,
+            )
+        )
+        return None
+    return root
+
+
+def _needed(found, key, read, notes):
+    if found.get(key, "") == "":
+        notes.tell(message("convert_metashape_missing", "missing; expected a number"), key=key)
+        return 2
+    return read(found[key], key=key)
+
+
+def text_of(camera):
+    """XML of a Metashape camera; what is 0 beyond K3 and P2 is left out."""
+    values = dict(zip(TERMS, (camera.cx, camera.cy, camera.b1, camera.b2), strict=False))
+    values |= dict(zip(TERMS[4:], (*camera.k, *camera.p), strict=True))
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<calibration>"]
+    lines += ["  <projection>frame</projection>"]
+    lines += [f"  <width>{camera.size_px[0]}</width>", f"  <height>{camera.size_px[1]}</height>"]
+    lines += [f"  <f>{exactly(camera.f)}</f>"]
+    for key, value in values.items():
+        if value or key not in ("k4", "p3", "p4"):
+            lines.append(f"  <{key}>{exactly(value)}</{key}>")
+    return "\n".join([*lines, "</calibration>"]) + "\n"

@@ -1,0 +1,117 @@
+"""Cameras of OpenCV: camera matrix and distortion coefficients.
+
+With x, y the ray to the right and down, r2 = x2 + y2,
+
+    x'' = x (1 + k1 r2 + k2 r4 + k3 r6)/(1 + k4 r2 + k5 r4 + k6 r6)
+          + 2 p1 x y + p2 (r2 + 2 x2) + s1 r2 + s2 r4
+    y'' = y (...) + p1 (r2 + 2 y2) + 2 p2 x y + s3 r2 + s4 r4
+
+and, where tauX or tauY is not 0, the image plane tilted by these angles. The centre of the first
+pixel is column 0, line 0. Coefficients stand as k1, k2, p1, p2[, k3[, k4, k5, k6[, s1..s4[, tauX,
+tauY]]]]: 4, 5, 8, 12 or 14 of them.
+
+Five are written; of more than five the plain form is fitted over the frame.
+Source: OpenCV's documentation, module calib3d.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.camera.formats.brown import Brown, Has, from_brown, to_brown
+from tankcal.camera.formats.fitting import fit
+from tankcal.camera.formats.frame import differences_px, frame_points, framed, in_mm, refuse_folds
+from tankcal.camera.model import Form
+
+COUNTS = (0, 4, 5, 8, 12, 14)
+NEWTON_ROUNDS = 30
+FITTED = ("c", "x0", "y0", "K1", "K2", "K3", "K4", "P1", "P2")
+
+
+@dataclass(frozen=True)
+class OpenCV:
+    """A camera as OpenCV has it.
+
+    matrix        (3, 3) camera matrix, px, without skew
+    coefficients  (n,) n of COUNTS, see above
+    error_px      largest distance of an image point over the frame from the camera that was
+                  converted; 0 but for rounding where OpenCV has all the terms
+    """
+
+    matrix: np.ndarray
+    coefficients: np.ndarray
+    error_px: float = 0.0
+
+
+def from_opencv(camera, pixel_mm, size_px):
+    """FramedCamera, of the plain Form(), of an OpenCV camera.
+
+    pixel_mm  height of a pixel; the width follows from fx and fy, which differ after the
+              distortion, as pixels that are not square: exactly so here
+    size_px   (columns, lines)
+
+    Raises SolutionError where the distortion folds the image within the frame.
+    """
+    k = np.zeros(14)
+    k[: len(camera.coefficients)] = np.ravel(camera.coefficients)
+    (fx, _, cx), (_, fy, cy) = np.asarray(camera.matrix, dtype=float)[:2]
+    if not np.any(k[5:]):
+        brown = Brown(fx, fy, cx, cy, 0.0, (k[0], k[1], k[4], 0.0), (k[2], k[3], 0.0, 0.0))
+        return from_brown(brown, pixel_mm, size_px)
+    points = frame_points(size_px)
+    rays = _rays(k, (points - [cx, cy]) / [fx, fy], points, [fx, fy]) * [1, -1]
+    pixel = np.array([pixel_mm * (fy / fx), pixel_mm])
+    c = fy * pixel_mm
+    start = np.zeros(13)
+    start[:3] = c, *in_mm([[cx, cy]], pixel, size_px)[0]
+    start[[3, 7, 8]] = (k[0] - k[5]) / c**2, k[3] / c, -k[2] / c
+    used = FITTED + (("A", "B") if np.any(k[8:]) else ())
+    seen = in_mm(points, pixel, size_px)
+    interior = fit(rays, seen, pixel, Form(), start, used).interior
+    found = framed(interior, Form(), pixel, size_px)
+    error = differences_px(found, rays, points).max()
+    return framed(interior, Form(), pixel, size_px, error)
+
+
+def to_opencv(camera):
+    """OpenCV of a FramedCamera: exact for its plain form, else fitted over the frame."""
+    brown, error = to_brown(camera, Has(radial=3, decentring=2, skew=False))
+    matrix = np.array([[brown.fx, 0, brown.cx], [0, brown.fy, brown.cy], [0, 0, 1]])
+    k1, k2, k3, _ = brown.k
+    return OpenCV(matrix, np.array([k1, k2, *brown.p[:2], k3]), error)
+
+
+def distorted(x, y, k):
+    """x'', y'' (n,) of rays (n,), counted to the right and down; k  (14,) coefficients."""
+    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y = k
+    r2 = x * x + y * y
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    radial = radial / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    along = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x) + r2 * (s1 + r2 * s2)
+    down = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y + r2 * (s3 + r2 * s4)
+    if tau_x == 0 and tau_y == 0:
+        return along, down
+    cx, sx, cy, sy = np.cos(tau_x), np.sin(tau_x), np.cos(tau_y), np.sin(tau_y)
+    turned = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]])
+    turned = turned @ np.array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
+    onto = np.array([[turned[2, 2], 0, -turned[0, 2]], [0, turned[2, 2], -turned[1, 2]], [0, 0, 1]])
+    u, v, w = (onto @ turned) @ np.stack([along, down, np.ones_like(along)])
+    return u / w, v / w
+
+
+def _rays(k, plane, points_px, focal_px):
+    """(n, 2) rays, to the right and down, whose distorted points are plane (n, 2): Newton."""
+    x, y = plane.T
+    tiny = 1e-30j
+    with np.errstate(all="ignore"):
+        for _ in range(NEWTON_ROUNDS):
+            u, v = distorted(x, y, k)
+            by_x, by_y = distorted(x + tiny, y + 0j, k), distorted(x + 0j, y + tiny, k)
+            (a, c), (b, d) = (np.imag(by_x) / 1e-30, np.imag(by_y) / 1e-30)
+            off_x, off_y = u - plane[:, 0], v - plane[:, 1]
+            determinant = a * d - b * c
+            x = x - (d * off_x - b * off_y) / determinant
+            y = y - (a * off_y - c * off_x) / determinant
+        off = (np.column_stack(distorted(x, y, k)) - plane) * focal_px
+    refuse_folds(points_px, np.hypot(*off.T))
+    return np.column_stack([x, y])

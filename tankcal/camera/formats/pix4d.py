@@ -1,0 +1,188 @@
+"""Cameras of Pix4D: perspective lenses, and the file of them that a project has.
+
+That is PROJECT_pix4d_calibrated_internal_camera_parameters.cam.
+
+With x, y the ray to the right and down, r2 = x2 + y2,
+
+    x' = x (1 + R1 r2 + R2 r4 + R3 r6) + 2 T1 x y + T2 (r2 + 2 x2)
+    y' = y (1 + R1 r2 + R2 r4 + R3 r6) + 2 T2 x y + T1 (r2 + 2 y2)
+    x mm = Px + F x'        y mm = Py + F y'
+
+from the upper left corner of the sensor: T1 and T2 are p1 and p2 of OpenCV. The file calls R1, R2,
+R3 K1, K2, K3, and gives the sensor's size in a remark.
+
+Source: Pix4D support, "How are the internal and external camera parameters defined?". A caption
+there puts the origin at the lower left corner; the calibration of this form that Pessoa 2017 prints
+(quadro 1) agrees with tables 6 to 9 as written here only, and with y upwards by no signs of T1
+and T2.
+"""
+
+import re
+from dataclasses import dataclass
+
+from tankcal.camera.formats.brown import Brown, Has, from_brown, to_brown
+from tankcal.camera.formats.texts import exactly, shown
+from tankcal.messages import message
+
+KEYS = ("F", "Px", "Py", "K1", "K2", "K3", "T1", "T2")
+HEAD = re.compile(r"pix4d camera calibration file\s*(.*)", re.IGNORECASE)
+INPHO = re.compile(r"\s*camera_calibration_file", re.IGNORECASE)
+SENSOR = re.compile(r"sensor width of\s+([\d.eE+-]+)\s*x\s*([\d.eE+-]+)", re.IGNORECASE)
+SAME_SHAPE = 0.01  # the remark gives the sensor's size to few digits
+
+
+@dataclass(frozen=True)
+class Pix4D:
+    """A perspective camera as Pix4D has it, see above.
+
+    sensor_mm     (2,) width, height            f_mm, px_mm, py_mm  mm
+    r             (3,) R1, R2, R3               t                   (2,) T1, T2
+    error_px      largest distance of an image point over the frame from the camera that was
+                  converted
+    """
+
+    sensor_mm: tuple[float, float]
+    f_mm: float
+    px_mm: float
+    py_mm: float
+    r: tuple = (0.0, 0.0, 0.0)
+    t: tuple = (0.0, 0.0)
+    error_px: float = 0.0
+
+
+def from_pix4d(camera, size_px):
+    """FramedCamera, of the plain Form(): exact.
+
+    size_px  (columns, lines); the pixels are the sensor's height over the lines, and square
+
+    Raises SolutionError where the distortion folds the image within the frame.
+    """
+    pixel = camera.sensor_mm[1] / size_px[1]
+    f = camera.f_mm / pixel
+    k1, k2, k3 = camera.r
+    middle = (camera.px_mm / pixel - 0.5, camera.py_mm / pixel - 0.5)
+    # a sensor whose printed size is not quite that of its pixels keeps its middle
+    shift = (size_px[0] - camera.sensor_mm[0] / pixel) / 2
+    brown = Brown(f, f, middle[0] + shift, middle[1], 0.0, (k1, k2, k3, 0.0), (*camera.t, 0.0, 0.0))
+    return from_brown(brown, pixel, size_px)
+
+
+def to_pix4d(camera):
+    """Pix4D of a FramedCamera: exact for its plain form with square pixels, else fitted."""
+    brown, error = to_brown(camera, Has(radial=3, decentring=2, two_focals=False, skew=False))
+    pixel = float(camera.pixel_mm[1])
+    sensor = (camera.size_px[0] * pixel, camera.size_px[1] * pixel)
+    return Pix4D(
+        sensor,
+        brown.fy * pixel,
+        (brown.cx + 0.5) * pixel,
+        (brown.cy + 0.5) * pixel,
+        brown.k[:3],
+        brown.p[:2],
+        error,
+    )
+
+
+def parse(text, notes):
+    """[(name, Pix4D)] of a .cam file; problems go to notes."""
+    parts = []
+    for row, line in enumerate(text.splitlines(), 1):
+        head = HEAD.match(line.strip())
+        if INPHO.match(line):
+            expected = message(
+                "convert_inpho",
+                "the form for Inpho; expected "
+                "PROJECT_pix4d_calibrated_internal_camera_parameters.cam, beside it",
+            )
+            notes.tell(expected, row)
+            return []
+        if head:
+            name = notes.name(head[1], row) if head[1] else str(len(parts))
+            parts.append((name, row, []))
+        elif parts:
+            parts[-1][2].append((row, line.strip()))
+        elif line.strip():
+            notes.tell(
+                message(
+                    "convert_pix4d_first",
+                    "{found}; expected Pix4D camera calibration file 0",
+                    found=shown(line.strip()),
+                ),
+                row,
+            )
+            return []
+    if not parts:
+        notes.tell(
+            message(
+                "convert_pix4d_none", "no camera; expected a line Pix4D camera calibration file 0"
+            )
+        )
+    return [(name, _parsed(row, lines, notes)) for name, row, lines in parts]
+
+
+def _parsed(head_row, lines, notes):
+    values, sensor = {}, None
+    for row, line in lines:
+        size = SENSOR.search(line)
+        if line.startswith("#"):
+            if size:
+                sides = size.groups()
+                sensor = tuple(notes.number(one, row, "sensor width", above=0) for one in sides)
+            continue
+        key, _, value = line.partition(" ")
+        if not line:
+            continue
+        if key not in KEYS:
+            notes.tell(
+                message(
+                    "convert_pix4d_unknown", "unknown; expected {known}", known=", ".join(KEYS)
+                ),
+                row,
+                shown(key),
+            )
+        elif key in values:
+            notes.tell(
+                message("convert_pix4d_twice", "given twice; expected once for each camera"),
+                row,
+                key,
+            )
+        else:
+            values[key] = notes.number(value.strip(), row, key, above=0 if key == "F" else None)
+    for key in KEYS:
+        if key not in values:
+            notes.tell(
+                message("convert_pix4d_missing", "missing; is the file complete?"), head_row, key
+            )
+            values[key] = 0.0
+    if sensor is None:
+        expected = message(
+            "convert_sensor_width",
+            "missing; expected a remark such as #Focal Length mm assuming a sensor width of "
+            "6.17x4.63mm",
+        )
+        notes.tell(expected, head_row, "sensor width")
+        sensor = (1.0, 1.0)
+    f, px, py, *k, t1, t2 = (values[key] for key in KEYS)
+    return Pix4D(sensor, f, px, py, tuple(k), (t1, t2))
+
+
+def suits(camera, size_px):
+    """Has a frame of size_px (columns, lines) the proportions of the sensor?"""
+    width, height = camera.sensor_mm
+    return abs(width * size_px[1] / (height * size_px[0]) - 1) <= SAME_SHAPE
+
+
+def text_of(cameras):
+    """.cam text of [(name, Pix4D)]."""
+    lines = []
+    for name, camera in cameras:
+        width, height = map(exactly, camera.sensor_mm)
+        f, px, py = map(exactly, (camera.f_mm, camera.px_mm, camera.py_mm))
+        lines += [f"Pix4D camera calibration file {name}"]
+        lines += [f"#Focal Length mm assuming a sensor width of {width}x{height}mm", f"F {f}"]
+        lines += ["#Principal Point mm", f"Px {px}", f"Py {py}"]
+        lines += ["#Symmetrical Lens Distortion Coeffs"]
+        lines += [f"K{i} {exactly(k)}" for i, k in enumerate(camera.r, 1)]
+        lines += ["#Tangential Lens Distortion Coeffs"]
+        lines += [f"T{i} {exactly(t)}" for i, t in enumerate(camera.t, 1)] + [""]
+    return "\n".join(lines)

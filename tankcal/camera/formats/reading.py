@@ -1,0 +1,318 @@
+"""One door for cameras of other programs: the file tells which of them it is from.
+
+kind       file
+opencv     YAML of FileStorage, JSON with K and dist; opencv-json means the same
+colmap     cameras.txt
+metashape  XML of a calibration
+pix4d      PROJECT_pix4d_calibrated_internal_camera_parameters.cam
+aicon      lines of the balanced form, such as Ck -24.1
+
+The files of OpenCV, COLMAP and Metashape do not say how large a pixel is.
+"""
+
+from pathlib import Path
+
+from tankcal.camera.formats import balanced, colmap, filestorage, metashape, pix4d
+from tankcal.camera.formats.opencv import from_opencv
+from tankcal.camera.formats.texts import LONGEST, Notes, only_letters, shown
+from tankcal.errors import SolutionError
+from tankcal.messages import message
+
+SAME_PIXEL = 0.01  # pixels of a file and as given may differ by as much, for rounding
+PIXELS_UM = (0.1, 100.0)  # of cameras and scanners
+KINDS = ("opencv", "opencv-json", "colmap", "metashape", "pix4d", "aicon")
+
+
+def read_camera(path, kind=None, pixel_um=None, size_px=None):
+    """[(name, FramedCamera)] of a file of another program.
+
+    kind      one of KINDS; None: it is recognised
+    pixel_um  height of a pixel, um; needed for OpenCV, COLMAP and Metashape, elsewhere compared
+    size_px   (columns, lines), where the file does not say it: OpenCV, Pix4D, AICON
+
+    Raises InputError with every problem of the file.
+    """
+    path = Path(path)
+    notes = Notes(path.name or str(path))
+    text = _text(path, notes)
+    notes.stop()
+    return cameras_of(text, notes.file, kind, pixel_um, size_px)
+
+
+def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
+    """[(name, FramedCamera)] of the text of a file; see read_camera. file: its name."""
+    notes = Notes(file)
+    _check_arguments(kind, pixel_um, size_px, notes)
+    kind = kind or _recognised(text, notes)
+    notes.stop()
+    found = _PARSERS[kind](text, notes, file, size_px)
+    needs_pixel = kind not in ("pix4d", "aicon")
+    if needs_pixel and pixel_um is None:
+        expected = message(
+            "convert_pixel_missing",
+            "missing; a file of kind {form} does not say it. Give it in micrometres",
+            form=kind,
+        )
+        notes.tell(expected, key="pixel_um")
+    notes.stop()
+    pixel_mm = None if pixel_um is None else pixel_um * 1e-3
+    cameras = []
+    for name, convert in found:
+        try:
+            cameras.append((name, convert(pixel_mm)))
+        except SolutionError as error:
+            text = message(
+                "convert_cannot",
+                "camera {camera} cannot be converted: {error}",
+                camera=shown(name),
+                error=error.texts[0],
+            )
+            notes.tell(text)
+    notes.stop()
+    return cameras
+
+
+def _check_arguments(kind, pixel_um, size_px, notes):
+    if kind is not None and kind not in KINDS:
+        notes.tell(
+            message(
+                "convert_kind",
+                "{found} as the kind of file; expected one of {known}",
+                found=shown(kind),
+                known=", ".join(KINDS),
+            )
+        )
+    if (
+        pixel_um is not None
+        and not PIXELS_UM[0] <= notes.number(pixel_um, key="pixel_um") <= PIXELS_UM[1]
+    ):
+        notes.tell(
+            message(
+                "convert_pixel_range",
+                "{found}; expected micrometres, 0.1 to 100",
+                found=shown(pixel_um),
+            ),
+            key="pixel_um",
+        )
+    if size_px is not None:
+        for number, key in zip(size_px, ("columns", "lines"), strict=True):
+            notes.count(number, key=key)
+
+
+def _text(path, notes):
+    """The text of a file, or None after telling what is wrong."""
+    try:
+        if not path.is_file():
+            notes.tell(message("convert_not_found", "not found; expected a file of cameras"))
+            return None
+        with path.open("rb") as stream:
+            data = stream.read(LONGEST + 1)
+    except (OSError, ValueError) as error:
+        notes.tell(
+            message(
+                "convert_not_readable",
+                "cannot be read ({reason})",
+                reason=getattr(error, "strerror", None) or error,
+            )
+        )
+        return None
+    if len(data) > LONGEST:
+        notes.tell(
+            message(
+                "convert_too_long",
+                "more than {most} bytes; expected a file of cameras",
+                most=LONGEST,
+            )
+        )
+        return None
+    if b"\0" in data:
+        notes.tell(message("convert_no_text", "no text; expected a text file (UTF-8)"))
+        return None
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        notes.tell(
+            message("convert_no_utf8", "a letter that is not UTF-8"),
+            data[: error.start].count(b"\n") + 1,
+        )
+        return None
+
+
+def _recognised(text, notes):
+    """Kind of a text, or None after telling that it is none that is known."""
+    start = text.lstrip()[:2000]
+    lines = [line.split() for line in text.splitlines()[:200]]
+    words = [line[0] for line in lines if line and not line[0].startswith("#")]
+    if start.startswith("<"):
+        return "metashape"
+    if start.startswith(("%YAML", "{")) or "opencv-matrix" in text or "camera_matrix:" in text:
+        return "opencv"
+    if "camera calibration file" in start.lower() or "camera_calibration_file" in start.lower():
+        return "pix4d"
+    if "Ck" in words:
+        return "aicon"
+    if any(len(line) > 3 and line[1].isupper() and line[2].isdecimal() for line in lines) or (
+        "CAMERA_ID" in start
+    ):
+        return "colmap"
+    notes.tell(
+        message(
+            "convert_not_known",
+            "no camera file that is known; expected one of {known}",
+            known=", ".join(KINDS),
+        )
+    )
+    return None
+
+
+def _opencv(text, notes, file, size_px):
+    parsed = filestorage.parse(text, notes)
+    if parsed is None:
+        return []
+    camera, size = parsed
+    size = _one_size(size, size_px, notes)
+    return [(_stem(file), lambda pixel: from_opencv(camera, pixel, size))]
+
+
+def _colmap(text, notes, _file, _size):
+    def later(camera):
+        return lambda pixel: colmap.from_colmap(camera, pixel)
+
+    return [(name, later(camera)) for name, camera in colmap.parse(text, notes)]
+
+
+def _metashape(text, notes, file, _size):
+    camera = metashape.parse(text, notes)
+    if camera is None:
+        return []
+    return [(_stem(file), lambda pixel: metashape.from_metashape(camera, pixel))]
+
+
+def _pix4d(text, notes, _file, size_px):
+    def later(camera):
+        def convert(pixel_mm):
+            _refuse_other_pixel(camera.sensor_mm[1] / size_px[1], pixel_mm)
+            return pix4d.from_pix4d(camera, size_px)
+
+        return convert
+
+    found = pix4d.parse(text, notes)
+    if size_px is None:
+        _one_size(None, None, notes)
+    for name, camera in found:
+        if size_px is not None and not notes.problems and not pix4d.suits(camera, size_px):
+            width, height = camera.sensor_mm
+            expected = message(
+                "convert_proportions",
+                "{columns} x {lines} px beside a sensor of {width:g} x {height:g} mm (camera "
+                "{camera}); expected the same proportions",
+                columns=size_px[0],
+                lines=size_px[1],
+                width=width,
+                height=height,
+                camera=name,
+            )
+            notes.tell(expected, key="columns")
+    return [(name, later(camera)) for name, camera in found]
+
+
+def _aicon(text, notes, file, size_px):
+    camera, frame = balanced.parse(text, notes)
+    film_mm = [frame[key] for key in balanced.FILM_KEYS if key in frame]
+    if len(film_mm) == 1:
+        notes.tell(
+            message(
+                "convert_one_side_of_film",
+                "one side of a film; expected format_width and format_height",
+            ),
+            key="format_width",
+        )
+    if len(film_mm) == 2 and len(frame) > 2:
+        notes.tell(
+            message("convert_film_and_pixels", "given beside pixels; expected a format, or pixels"),
+            key="format_width",
+        )
+    if film_mm:
+        return [(_stem(file), _film_of(camera, film_mm))]
+    given = (frame["columns"], frame["lines"]) if {"columns", "lines"} <= set(frame) else None
+    size = _one_size(given, size_px, notes)
+    sides = [frame[key] for key in ("pixel_width", "pixel_height") if key in frame]
+    if len(sides) == 1:
+        notes.tell(
+            message(
+                "convert_one_side_of_pixel",
+                "one side of a pixel; expected pixel_width and pixel_height",
+            ),
+            key="pixel_width",
+        )
+
+    def convert(pixel_mm):
+        if pixel_mm is None and not sides:
+            raise SolutionError(
+                message(
+                    "convert_no_pixel", "the size of a pixel is missing; give it in micrometres"
+                )
+            )
+        if sides:
+            _refuse_other_pixel(sides[-1], pixel_mm)
+        return balanced.from_balanced(camera, sides or pixel_mm, size)
+
+    return [(_stem(file), convert)]
+
+
+def _film_of(camera, film_mm):
+    """From a size of pixels, mm, or None, to the FramedCamera of a Balanced camera on film."""
+
+    def convert(pixel_mm):
+        if pixel_mm is None:
+            return balanced.film_from_balanced(camera, film_mm)
+        size_px = [max(2, round(side / pixel_mm)) for side in film_mm]
+        return balanced.from_balanced(camera, pixel_mm, size_px)
+
+    return convert
+
+
+def _one_size(of_file, given, notes):
+    """(columns, lines) of the file or as given; told when there is none, or when they differ."""
+    if of_file is None and given is None:
+        notes.tell(
+            message("convert_no_size", "missing; the file does not say it. Give columns and lines"),
+            key="format_px",
+        )
+    elif of_file is not None and given is not None and tuple(of_file) != tuple(given):
+        expected = message(
+            "convert_other_size",
+            "{columns} x {lines} px; expected {given_columns} x {given_lines}, as given",
+            columns=of_file[0],
+            lines=of_file[1],
+            given_columns=given[0],
+            given_lines=given[1],
+        )
+        notes.tell(expected, key="format_px")
+    return of_file or given
+
+
+def _refuse_other_pixel(of_file_mm, given_mm):
+    if given_mm is not None and abs(of_file_mm / given_mm - 1) > SAME_PIXEL:
+        raise SolutionError(
+            message(
+                "convert_other_pixel",
+                "a pixel of {found:.5g} um in the file, {given:.5g} um was given",
+                found=of_file_mm * 1e3,
+                given=given_mm * 1e3,
+            )
+        )
+
+
+def _stem(file):
+    return only_letters(Path(file).stem)
+
+
+_PARSERS = {
+    "opencv": _opencv,
+    "opencv-json": _opencv,
+    "colmap": _colmap,
+    "metashape": _metashape,
+    "pix4d": _pix4d,
+    "aicon": _aicon,
+}

@@ -1,0 +1,139 @@
+"""Cameras as the text of a file of another program, or of cameras.toml.
+
+What a form cannot express is fitted over the frame and stated with the text.
+"""
+
+from dataclasses import dataclass
+
+from tankcal.camera.formats import balanced, colmap, filestorage, metashape, pix4d
+from tankcal.camera.formats.opencv import to_opencv
+from tankcal.camera.formats.register import as_cameras_toml
+from tankcal.camera.formats.texts import shown
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+
+
+@dataclass(frozen=True)
+class Written:
+    """The text of a camera file.
+
+    text      its content
+    error_px  of each camera, the largest distance of an image point over the frame
+    """
+
+    text: str
+    error_px: tuple[float, ...]
+
+
+def write_camera(kind, cameras, sds=None, radius_mm=0.0, file="cameras"):
+    """Written: the text of a file of cameras.
+
+    kind       one of KINDS; files of SINGLE hold one camera
+    cameras    [(name, FramedCamera)]
+    sds        [(13,) or None] of each camera, which only cameras.toml has a place for; or None
+    radius_mm  R0 of "aicon"
+    file       what messages call the place where the cameras are from
+
+    Raises InputError for another kind or number of cameras and for a film in a form of pixels,
+    SolutionError where the distortion folds the image within the frame.
+    """
+    if kind not in KINDS:
+        expected = message(
+            "convert_to_kind",
+            "{found} as the kind of file; expected one of {known}",
+            found=shown(kind),
+            known=", ".join(KINDS),
+        )
+        raise InputError(Problem("cameras", expected))
+    if not cameras or (kind in SINGLE and len(cameras) > 1):
+        expected = message(
+            "convert_none_to_write",
+            "{count} cameras; expected one or more in a file of kind {form}",
+            count=len(cameras),
+            form=kind,
+        )
+        if kind in SINGLE:
+            expected = message(
+                "convert_one_to_write",
+                "{count} cameras; expected one in a file of kind {form}",
+                count=len(cameras),
+                form=kind,
+            )
+        raise InputError(Problem("cameras", expected))
+    if kind not in IN_MM:
+        _refuse_film(kind, cameras, file)
+    if kind == "cameras.toml":
+        return _register(cameras, sds)
+    if kind == "aicon":
+        return _aicon(cameras, radius_mm)
+    return _WRITERS[kind](cameras)
+
+
+def _refuse_film(kind, cameras, file):
+    """Raise InputError for cameras whose pixels are not known."""
+    expected = message(
+        "convert_to_pixels",
+        "missing; {form} counts in pixels: expected their size, micrometres (--pixel-um)",
+        form=kind,
+    )
+    problems = [
+        Problem(file, expected, None, f"{name}.pixel_um")
+        for name, one in cameras
+        if one.film_mm is not None
+    ]
+    if problems:
+        raise InputError(problems)
+
+
+def _register(cameras, sds):
+    sds = [None] * len(cameras) if sds is None else sds
+    entries = [
+        as_cameras_toml(name, one.interior, one.form, one.size_px, one.pixel_mm, sd, one.film_mm)
+        for (name, one), sd in zip(cameras, sds, strict=True)
+    ]
+    return Written("\n".join(entries), tuple(one.error_px for _, one in cameras))
+
+
+def _aicon(cameras, radius_mm):
+    camera = cameras[0][1]
+    found = balanced.to_balanced(camera, radius_mm)
+    return Written(balanced.text_of(found, camera), (found.error_px,))
+
+
+def _opencv(cameras):
+    camera = cameras[0][1]
+    found = to_opencv(camera)
+    return Written(filestorage.text_of(found, camera.size_px), (found.error_px,))
+
+
+def _opencv_json(cameras):
+    camera = cameras[0][1]
+    found = to_opencv(camera)
+    return Written(filestorage.json_of(found, camera.size_px), (found.error_px,))
+
+
+def _metashape(cameras):
+    found = metashape.to_metashape(cameras[0][1])
+    return Written(metashape.text_of(found), (found.error_px,))
+
+
+def _colmap(cameras):
+    found = [(name, colmap.to_colmap(camera)) for name, camera in cameras]
+    return Written(colmap.text_of(found), tuple(camera.error_px for _, camera in found))
+
+
+def _pix4d(cameras):
+    found = [(name, pix4d.to_pix4d(camera)) for name, camera in cameras]
+    return Written(pix4d.text_of(found), tuple(camera.error_px for _, camera in found))
+
+
+_WRITERS = {
+    "opencv": _opencv,
+    "opencv-json": _opencv_json,
+    "colmap": _colmap,
+    "metashape": _metashape,
+    "pix4d": _pix4d,
+}
+SINGLE = ("opencv", "opencv-json", "metashape", "aicon")  # one camera a file
+IN_MM = ("cameras.toml", "aicon")  # forms that need no pixels
+KINDS = ("cameras.toml", *_WRITERS, "aicon")

@@ -1,0 +1,332 @@
+"""The image of a point and its derivatives: one set of formulas, run over arrays or compiled.
+
+The functions take numbers or arrays alike. `image_rows` evaluates them for many image points, over
+whole arrays, or one image point at a time when loops can be compiled. Symbols, forms of distortion
+and conventions are those of tankcal.camera.model.
+"""
+
+import sys
+
+import numpy as np
+
+from tankcal.solver.compiled import compiled, worthwhile
+
+NEWTON_STEPS = 6  # quadratic: a distortion of 30 % of the radius is solved to the last digit
+
+
+def led(x, y, q, form):
+    """The measured point (x, y), from the principal point, after the affinity before distortion."""
+    return (1.0 + form[6] * q[11]) * x + form[6] * q[12] * y, y
+
+
+def distort(x, y, q, form):
+    """Distortion of points (x, y) from the principal point, and its derivatives by x and y.
+
+    x, y  numbers or (n,) mm
+    q     13 interior parameters in the order of PARAMETERS, numbers or (n,)
+    form  8 numbers, see Form.numbers
+
+    Returns dx, dy, d dx/dx, d dx/dy, d dy/dx, d dy/dy.
+    """
+    k1, k2, k3, k4, p1, p2, p3, p4, a, b = q[3:13]
+    _, ax, ay, bxy, byx, by, _, e = form
+    r2 = x * x + y * y
+    radial = r2 * (k1 + r2 * (k2 + r2 * (k3 + r2 * k4))) - e * (k1 + e * (k2 + e * (k3 + e * k4)))
+    slope = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * (3.0 * k3 + r2 * 4.0 * k4)))
+    tx = p1 * (r2 + 2.0 * x * x) + 2.0 * p2 * x * y
+    ty = p2 * (r2 + 2.0 * y * y) + 2.0 * p1 * x * y
+    m, dm = 1.0 + r2 * (p3 + r2 * p4), 2.0 * (p3 + 2.0 * r2 * p4)
+    cross = x * y * slope + 2.0 * (p1 * y + p2 * x) * m
+    return (
+        x * radial + tx * m + a * (ax * x + ay * y) + b * bxy * y,
+        y * radial + ty * m + b * (byx * x + by * y),
+        radial + x * x * slope + (6.0 * p1 * x + 2.0 * p2 * y) * m + tx * x * dm + a * ax,
+        cross + tx * y * dm + a * ay + b * bxy,
+        cross + ty * x * dm + b * byx,
+        radial + y * y * slope + (6.0 * p2 * y + 2.0 * p1 * x) * m + ty * y * dm + b * by,
+    )
+
+
+def distortion_derivatives(x, y, q, form):
+    """Derivatives of the distortion by K1..K4, P1..P4, A, B: ten for dx and ten for dy."""
+    p1, p2, p3, p4 = q[7:11]
+    _, ax, ay, bxy, byx, by, _, e = form
+    r2 = x * x + y * y
+    k1, k2, k3, k4 = r2 - e, r2 * r2 - e * e, r2**3 - e**3, r2**4 - e**4
+    m = 1.0 + r2 * (p3 + r2 * p4)
+    xx, xy, yy = r2 + 2.0 * x * x, 2.0 * x * y, r2 + 2.0 * y * y
+    tx, ty = (p1 * xx + p2 * xy) * r2, (p2 * yy + p1 * xy) * r2
+    zero = 0.0 * r2
+    return (
+        (x * k1, x * k2, x * k3, x * k4, xx * m, xy * m, tx, tx * r2, ax * x + ay * y, bxy * y),
+        (y * k1, y * k2, y * k3, y * k4, xy * m, yy * m, ty, ty * r2, zero, byx * x + by * y),
+    )
+
+
+def undistorted_by(x, y, q, form):
+    """The point whose correction gives the ideal point (x, y), by Newton's method (mm)."""
+    side = form[0]
+    px, py = x, y
+    for _ in range(NEWTON_STEPS):
+        dx, dy, dxx, dxy, dyx, dyy = distort(px, py, q, form)
+        a, b, c, d = 1.0 + side * dxx, side * dxy, side * dyx, 1.0 + side * dyy
+        ex, ey = px + side * dx - x, py + side * dy - y
+        determinant = a * d - b * c
+        px = px - (d * ex - b * ey) / determinant
+        py = py - (a * ey - c * ex) / determinant
+    return px, py
+
+
+def image_point(x, y, q, form, of_ideal):
+    """The measured coordinate of an ideal point, and its derivatives.
+
+    x, y      numbers or (n,) mm, ideal, from the principal point
+    of_ideal  True for "distortion_of_ideal"
+
+    Returns the measured x and y (frame of the image), the point at which the distortion holds, the
+    derivatives d x/d xi, d x/d eta, d y/d xi, d y/d eta, and those by the distortion there, d x/d
+    dx, d x/d dy, d y/d dx, d y/d dy.
+    """
+    if of_ideal:
+        dx, dy, dxx, dxy, dyx, dyy = distort(x, y, q, form)
+        px, py, mx, my = x, y, q[1] + x + dx, q[2] + y + dy
+        a, b, c, d = 1.0 + dxx, dxy, dyx, 1.0 + dyy
+        e, f, g, h = 1.0, 0.0, 0.0, 1.0
+    else:
+        side = form[0]
+        px, py = undistorted_by(x, y, q, form)
+        _, _, dxx, dxy, dyx, dyy = distort(px, py, q, form)
+        a, b, c, d = 1.0 + side * dxx, side * dxy, side * dyx, 1.0 + side * dyy
+        t = 1.0 / (a * d - b * c)
+        mx, my = q[1] + px, q[2] + py
+        a, b, c, d = d * t, -b * t, -c * t, a * t
+        e, f, g, h = -side * a, -side * b, -side * c, -side * d
+    if form[6] == 0.0:
+        return mx, my, px, py, a, b, c, d, e, f, g, h
+    s, k = 1.0 / (1.0 + q[11]), q[12]  # what led does, undone
+    mx = q[1] + s * (mx - q[1] - k * (my - q[2]))
+    a, b, e, f = s * (a - k * c), s * (b - k * d), s * (e - k * g), s * (f - k * h)
+    return mx, my, px, py, a, b, c, d, e, f, g, h
+
+
+def ideal_point(u, v, w, r, c):
+    """Ideal point of (u, v, w) = R (X - S), and its derivatives.
+
+    r  the nine elements of R, row by row, numbers or (n,)
+
+    Returns xi, eta and, for each of them, the derivatives by X (3), rotation (3) and c; those by S
+    are those by X with the other sign.
+    """
+    x, y, f = -u / w, -v / w, c / w
+    xy = c * x * y
+    return (
+        c * x,
+        c * y,
+        (
+            -f * (r[0] + x * r[6]),
+            -f * (r[1] + x * r[7]),
+            -f * (r[2] + x * r[8]),
+            xy,
+            -c * (1.0 + x * x),
+            -c * y,
+            x,
+        ),
+        (
+            -f * (r[3] + y * r[6]),
+            -f * (r[4] + y * r[7]),
+            -f * (r[5] + y * r[8]),
+            c * (1.0 + y * y),
+            -xy,
+            c * x,
+            y,
+        ),
+    )
+
+
+def one_image_point(p, r, q, form, of_ideal):
+    """Measured coordinate of a point and all its derivatives.
+
+    p         X - S, three numbers or (n,) (m)
+    r         nine elements of R, row by row
+    q         13 interior parameters
+
+    Returns x, y (mm) and for each 3 + 3 + 13 derivatives: by X, rotation, interior parameters.
+    """
+    u = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
+    v = r[3] * p[0] + r[4] * p[1] + r[5] * p[2]
+    w = r[6] * p[0] + r[7] * p[1] + r[8] * p[2]
+    xi, eta, dxi, deta = ideal_point(u, v, w, r, q[0])
+    x, y, px, py, a, b, c, d, e, f, g, h = image_point(xi, eta, q, form, of_ideal)
+    kx, ky = distortion_derivatives(px, py, q, form)
+    by_kx = ten(e, f, kx, ky)
+    led_by = form[6] / (1.0 + form[6] * q[11])
+    by_a, by_b = by_kx[8] - led_by * (x - q[1]), by_kx[9] - led_by * (y - q[2])
+    one, zero = 1.0 + 0.0 * x, 0.0 * x
+    return (
+        x,
+        y,
+        seven(a, b, dxi, deta) + (one, zero) + by_kx[:8] + (by_a, by_b),
+        seven(c, d, dxi, deta) + (zero, one) + ten(g, h, kx, ky),
+    )
+
+
+def one_ideal_point(p, r, q, measured, form, of_ideal):
+    """Misclosure of the ideal image: the ideal point of the ground less that of the measured
+    coordinate, which depends on the interior parameters, too, and all its derivatives.
+
+    p, r, q   as for one_image_point
+    measured  x and y, two numbers or (n,) mm
+
+    With y the measured coordinate from the principal point, after an affinity before the
+    distortion where there is one, a correction gives p = y + side d(y),
+    so that dp = -(1 + side d') d(x0, y0) + side d_K; a distortion of the ideal point p + d(p) = y,
+    so that dp = (1 + d')^-1 (-d(x0, y0) - d_K).
+    """
+    u = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
+    v = r[3] * p[0] + r[4] * p[1] + r[5] * p[2]
+    w = r[6] * p[0] + r[7] * p[1] + r[8] * p[2]
+    xi, eta, dxi, deta = ideal_point(u, v, w, r, q[0])
+    from_x, from_y = measured[0] - q[1], measured[1] - q[2]
+    x, y = led(from_x, from_y, q, form)
+    zero = 0.0 * x
+    if of_ideal:
+        x, y = undistorted_by(
+            x, y, q, (1.0, form[1], form[2], form[3], form[4], form[5], form[6], form[7])
+        )
+        _, _, dxx, dxy, dyx, dyy = distort(x, y, q, form)
+        a, b, c, d = 1.0 + dxx, dxy, dyx, 1.0 + dyy
+        t = 1.0 / (a * d - b * c)
+        a, b, c, d = d * t, -b * t, -c * t, a * t  # of dp by dy
+        corrected_x, corrected_y = x, y
+        e, f, g, h = a, b, c, d
+    else:
+        side = form[0]
+        dx, dy, dxx, dxy, dyx, dyy = distort(x, y, q, form)
+        a, b, c, d = 1.0 + side * dxx, side * dxy, side * dyx, 1.0 + side * dyy
+        corrected_x, corrected_y = x + side * dx, y + side * dy
+        e, f, g, h = zero - side, zero, zero, zero - side
+    kx, ky = distortion_derivatives(x, y, q, form)
+    by_kx, by_ky = ten(e, f, kx, ky), ten(g, h, kx, ky)
+    scale, skew = 1.0 + form[6] * q[11], form[6] * q[12]
+    by_a, by_b = form[6] * from_x, form[6] * from_y
+    return (
+        xi - corrected_x,
+        eta - corrected_y,
+        dxi + (a * scale, a * skew + b) + by_kx[:8] + (by_kx[8] - a * by_a, by_kx[9] - a * by_b),
+        deta + (c * scale, c * skew + d) + by_ky[:8] + (by_ky[8] - c * by_a, by_ky[9] - c * by_b),
+    )
+
+
+def seven(a, b, p, q):
+    """a p + b q, element by element: seven numbers or arrays."""
+    return (
+        a * p[0] + b * q[0],
+        a * p[1] + b * q[1],
+        a * p[2] + b * q[2],
+        a * p[3] + b * q[3],
+        a * p[4] + b * q[4],
+        a * p[5] + b * q[5],
+        a * p[6] + b * q[6],
+    )
+
+
+def ten(a, b, p, q):
+    """a p + b q, element by element: ten numbers or arrays."""
+    return seven(a, b, p[:7], q[:7]) + (
+        a * p[7] + b * q[7],
+        a * p[8] + b * q[8],
+        a * p[9] + b * q[9],
+    )
+
+
+def _loop(
+    xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac,
+    in_ideal,
+):  # fmt: skip
+    """image_rows, one image point after the other."""
+    for i in range(len(point)):
+        p, s, r, q = xyz[point[i]], photo_xyz[photo[i]], rotation[photo[i]], interior[photo[i]]
+        ground = (p[0] - s[0], p[1] - s[1], p[2] - s[2])
+        turn = (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2])
+        own = (q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8], q[9], q[10], q[11], q[12])
+        if in_ideal:
+            mx, my = xy[i, 0], xy[i, 1]
+            x, y, dx, dy = one_ideal_point(ground, turn, own, (mx, my), form, of_ideal)
+        else:
+            x, y, dx, dy = one_image_point(ground, turn, own, form, of_ideal)
+            x, y = x - xy[i, 0], y - xy[i, 1]
+        wx, wy = weight[i, 0], weight[i, 1]
+        w[i, 0] = x * wx
+        w[i, 1] = y * wy
+        if len(jac) == 0:
+            continue
+        gx, gy = jac[i, 0], jac[i, 1]
+        for k in range(3):
+            gx[k] = dx[k] * wx
+            gy[k] = dy[k] * wy
+            gx[3 + k] = -gx[k]
+            gy[3 + k] = -gy[k]
+            gx[6 + k] = dx[3 + k] * wx
+            gy[6 + k] = dy[3 + k] * wy
+        for k in range(len(active)):
+            gx[9 + k] = dx[6 + active[k]] * wx
+            gy[9 + k] = dy[6 + active[k]] * wy
+
+
+_COMPILED = (
+    "led",
+    "distort",
+    "distortion_derivatives",
+    "undistorted_by",
+    "image_point",
+    "ideal_point",
+    "seven",
+    "ten",
+    "one_image_point",
+    "one_ideal_point",
+    "_loop",
+)
+
+
+def _arrays(
+    xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac,
+    in_ideal,
+):  # fmt: skip
+    """image_rows, over whole arrays."""
+    p = (xyz[point] - photo_xyz[photo]).T
+    r = rotation.reshape(-1, 9)[photo].T
+    p, r, q = tuple(p), tuple(r), tuple(interior[photo].T)
+    if in_ideal:
+        x, y, dx, dy = one_ideal_point(p, r, q, tuple(xy.T), form, of_ideal)
+        w[:] = np.column_stack([x, y]) * weight
+    else:
+        x, y, dx, dy = one_image_point(p, r, q, form, of_ideal)
+        w[:] = (np.column_stack([x, y]) - xy) * weight
+    if len(jac) == 0:
+        return
+    for row, derivatives in ((0, dx), (1, dy)):
+        d = np.stack(derivatives, axis=1) * weight[:, row, None]
+        jac[:, row, :3] = d[:, :3]
+        jac[:, row, 3:6] = -d[:, :3]
+        jac[:, row, 6:9] = d[:, 3:6]
+        jac[:, row, 9:] = d[:, 6 + active]
+
+
+def image_rows(*arguments, in_ideal=False):
+    """Whitened misclosures of image coordinates, computed minus measured, and their derivatives.
+
+    xyz        (points, 3) m            photo_xyz  (photos, 3) m
+    rotation   (photos, 3, 3)           interior   (photos, 13) mm
+    form       tuple of 8, see Form     of_ideal   True for "distortion_of_ideal"
+    point      (n,)                     photo      (n,)
+    xy         (n, 2) measured, mm
+    weight     (n, 2) 1/sd, 1/mm        active     (k,) places of the parameters asked for
+    w          (n, 2) filled            jac        (n, 2, 9 + k) filled, or of length 0: left out
+    in_ideal   misclosures of the ideal image (one_ideal_point) instead of the measured one
+
+    The derivatives are by point (3), photo (position 3, rotation 3), interior parameters (k).
+    """
+    if worthwhile(len(arguments[6])):
+        compiled(sys.modules[__name__], _COMPILED)._loop(*arguments, in_ideal)
+    else:
+        _arrays(*arguments, in_ideal)

@@ -1,0 +1,140 @@
+"""Cameras: interior orientation, distortion in all published forms, the image of a point.
+
+With (u, v, w) = R (X - S) the ideal image point, counted from the principal point, is
+
+    xi = -c u / w,   eta = -c v / w
+
+and the distortion of a point (x, y), with r2 = x2 + y2, is the sum of
+
+    radial      x (K1 r2 + K2 r4 + K3 r6 + K4 r8)      balanced about R0: K1 (r2 - R0^2) + ...
+    decentring  (P1 (r2 + 2 x2) + 2 P2 x y) (1 + P3 r2 + P4 r4), y alike with P1 and P2 swapped
+    affinity    A y, B y ("both_y", Silva 40-44);  A x, B x ("both_x", Pessoa 6);
+                A x + B y, 0 ("b1_b2")              written as (dx, dy)
+
+With the affinity "before_distortion" (DBAT) it is no part of the sum: in every convention the
+measured coordinate, from the principal point, is first replaced by (1 + A) x + B y, y.
+
+Three conventions say which point that is, and on which side it stands:
+
+    distortion_of_ideal    x = x0 + xi + d(xi)               OpenCV, AICON
+    correction_added       (x - x0) + d(x - x0) = xi         Silva 39, DBAT
+    correction_subtracted  (x - x0) - d(x - x0) = xi         Pessoa 10
+
+The last two are solved for the measured coordinate x, so every convention is a function of the
+unknowns and the misclosure is "computed minus measured", in the image as it was measured. With
+weights "ideal" it is counted in the ideal image: xi less the corrected measured coordinate.
+
+Image coordinates and c, x0, y0, R0 in mm; K1 mm^-2, K2 mm^-4 ...; P1, P2 mm^-1, P3 mm^-2, P4 mm^-4.
+Source: Silva 1995 (39-47, 58); Pessoa 2017 (3-6, 9, 10); Brown 1971; DBAT, res_euler_brown_1.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tankcal.camera.imaging import distort, image_point, led, undistorted_by
+
+NEWTON_ROUNDS = 50
+PARAMETERS = ("c", "x0", "y0", "K1", "K2", "K3", "K4", "P1", "P2", "P3", "P4", "A", "B")
+_UNITS = ("mm", "mm", "mm", "mm-2", "mm-4", "mm-6", "mm-8", "mm-1", "mm-1", "mm-2", "mm-4", "", "")
+UNITS = dict(zip(PARAMETERS, _UNITS, strict=True))
+CONVENTIONS = {"distortion_of_ideal": 0.0, "correction_added": 1.0, "correction_subtracted": -1.0}
+WEIGHTS = ("measured", "ideal")
+# (dx by A x, dx by A y, dx by B y, dy by B x, dy by B y, A x + B y before the distortion)
+AFFINITIES = {
+    "both_y": (0.0, 1.0, 0.0, 0.0, 1.0, 0.0),
+    "both_x": (1.0, 0.0, 0.0, 1.0, 0.0, 0.0),
+    "b1_b2": (1.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+    "before_distortion": (0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+}
+
+
+@dataclass(frozen=True)
+class Form:
+    """How the distortion of a camera is written.
+
+    convention         one of CONVENTIONS
+    affinity           one of AFFINITIES
+    radial_balance_mm  R0, the radius without radial distortion; 0 where none is named
+    weights            one of WEIGHTS: the image in which residuals are counted and weighed
+    """
+
+    convention: str = "distortion_of_ideal"
+    affinity: str = "b1_b2"
+    radial_balance_mm: float = 0.0
+    weights: str = "measured"
+
+    @property
+    def numbers(self):
+        """(8,) side (0, +1, -1), the six affinity switches, R0^2: what the formulas take."""
+        side = CONVENTIONS[self.convention]
+        return np.array([side, *AFFINITIES[self.affinity], self.radial_balance_mm**2])
+
+
+def corrected(xy_mm, interior, form):
+    """Ideal image points (n, 2), from the principal point, of measured ones.
+
+    xy_mm     (n, 2) as measured
+    interior  (13,) or (n, 13) in the order of PARAMETERS
+    form      a Form
+    """
+    numbers = form.numbers
+    q = tuple(np.asarray(interior, dtype=float).T)
+    x, y = led(xy_mm[:, 0] - q[1], xy_mm[:, 1] - q[2], q, numbers)
+    if form.convention != "distortion_of_ideal":
+        dx, dy = distort(x, y, q, numbers)[:2]
+        return np.column_stack([x + numbers[0] * dx, y + numbers[0] * dy])
+    numbers[0] = 1.0
+    return np.column_stack(undistorted_by(x, y, q, numbers))
+
+
+def measured(ideal_mm, interior, form):
+    """Measured image points (n, 2) of ideal ones, counted from the principal point (mm)."""
+    q = tuple(np.asarray(interior, dtype=float).T)
+    of_ideal = form.convention == "distortion_of_ideal"
+    return np.column_stack(image_point(*ideal_mm.T, q, form.numbers, of_ideal)[:2])
+
+
+def balanced_about(interior, form, radius_mm):
+    """The same camera with its radial distortion balanced about another radius R0: (13,) and Form.
+
+    What R0 takes out of the radial terms, s = 1 - (K1 R0^2 + ...), is a change of scale, which c
+    takes: exact, whatever the convention (in the one that subtracts K counts with the other sign).
+    radius_mm 0 gives the plain form.
+    """
+    side = CONVENTIONS[form.convention]
+    plain = rescaled(
+        interior, form, 1 - (side or 1) * _at_balance(interior, form.radial_balance_mm)
+    )
+    target = replace(form, radial_balance_mm=float(radius_mm))
+    s = 1.0
+    for _ in range(NEWTON_ROUNDS):
+        found = rescaled(plain, form, 1 / s)
+        wanted = 1 - (side or 1) * _at_balance(found, radius_mm)
+        if abs(wanted - s) < 1e-15:
+            break
+        s = wanted
+    return found, target
+
+
+def _at_balance(interior, radius_mm):
+    """K1 R0^2 + K2 R0^4 + ..."""
+    e = radius_mm**2
+    return float(np.polyval(np.append(np.asarray(interior)[6:2:-1], 0.0), e))
+
+
+def rescaled(interior, form, s):
+    """Interior parameters (13,) of the same camera when a scale s goes over to c.
+
+    distortion_of_ideal: s xi is the ideal point of the same image in place of xi; else the equation
+    of the correction is divided by s. An affinity before the distortion stays what it is.
+    """
+    q = np.array(interior, dtype=float)
+    if CONVENTIONS[form.convention]:
+        q[0] /= s
+        q[[3, 4, 5, 6, 7, 8, 11, 12]] /= s
+    else:
+        q *= s ** np.array([1, 0, 0, -3, -5, -7, -9, -2, -2, -2, -4, -1, -1], dtype=float)
+    if form.affinity == "before_distortion":
+        q[11:] = interior[11:]
+    return q

@@ -1,0 +1,1 @@
+"""Shapes and their fits: circle, cylinder, sphere, outline, the form of a wall, its outliers."""

@@ -1,0 +1,231 @@
+"""The shell as one body: its wall told apart from clutter, its axis and its tilt.
+
+A survey hits stairs, pipes and the roof too. A consensus of circles finds the wall, a leaning
+cylinder with one radius a course refines it, and data snooping about the shell's smooth form (dents
+that run up the wall are form, not blunders) rejects what remains, the worst points first.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.adjust import adjust
+from tankcal.errors import SolutionError
+from tankcal.geometry.snooping import LEAST_NOISE_M, from_axis, shell_problem, snoop
+from tankcal.messages import message
+
+WIDE_BAND, WALL_BAND = 0.03, 0.01  # of the nominal radius: start, and largest believed deviation
+END_TOLERANCE_M = 0.020  # a point this far above or below the shell still belongs to its edge
+SAMPLES = 1000  # three-point circles tried; with half the points clutter one in eight is sound
+LEAST_PART = 0.5  # of the points between bottom and top that the wall must hold
+WIDEST_SLOPE = 0.05  # sd of the slope before anything is measured: tanks hardly lean by more
+VAGUE_TILT = 2e-3  # sd above which the tilt counts as not determined by the points
+
+
+@dataclass(frozen=True)
+class Shell:
+    """Axis, form and accepted points of a shell; n points in the order given.
+
+    axis_m        (x, y) of the axis at height z_m
+    slope         (dx/dz, dy/dz) of the axis; slope_cofactor (2, 2) its covariance
+    reason        (n,) "" for points of the wall, else why the point was rejected
+    residual_m    (n,) distance outwards to the smooth form of the shell; of points far from the
+                  wall to the leaning cylinder of their course
+    w             (n,) normalised residual of the snooping test, nan where none was made
+    noise_m       standard deviation of a point about the smooth form common to all courses;
+                  of a point of median standard deviation where those are given
+    noise_dof     its degrees of freedom
+    tilt_known    False: the points do not determine a tilt, and the shell is taken as upright
+    """
+
+    axis_m: tuple[float, float]
+    z_m: float
+    slope: tuple[float, float]
+    slope_cofactor: np.ndarray
+    reason: np.ndarray
+    residual_m: np.ndarray
+    w: np.ndarray
+    noise_m: float
+    noise_dof: float
+    tilt_known: bool
+
+    @property
+    def tilt(self):
+        """Length of the slope, m/m: the tangent of the angle to the vertical."""
+        return float(np.hypot(*self.slope))
+
+    @property
+    def tilt_sd(self):
+        """Standard deviation of the tilt, m/m."""
+        direction = np.array(self.slope) / self.tilt if self.tilt > 0 else np.array([1.0, 0.0])
+        return float(np.sqrt(direction @ self.slope_cofactor @ direction))
+
+    @property
+    def tilt_azimuth_rad(self):
+        """Direction towards which the top leans, clockwise from +y, 0 to 2 pi."""
+        return float(np.arctan2(self.slope[0], self.slope[1]) % (2 * np.pi))
+
+
+def course_of(z_m, joints_m):
+    """Index of the course of each height; the ends belong to the first and the last course."""
+    return np.searchsorted(np.asarray(joints_m)[1:-1], z_m, side="right")
+
+
+def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
+    """Tell the wall from the clutter and find the axis of the shell.
+
+    xyz_m (n, 3); joints_m (courses + 1,) heights of the course joints in the same frame; sd_m (n,)
+    standard deviations of the radii, which are believed in relation to each other.
+    Raises SolutionError when no cylinder near the nominal radius holds half of the points between
+    the bottom and the top.
+    """
+    xyz_m = np.asarray(xyz_m, dtype=float)
+    reason = _reasons(xyz_m, joints_m)
+    candidates = reason == ""
+    course = course_of(xyz_m[:, 2], joints_m)
+    origin = np.array([*np.median(xyz_m[:, :2], axis=0), (joints_m[0] + joints_m[-1]) / 2])
+    local = xyz_m - origin
+
+    start = _consensus_circle(local[candidates, :2], nominal_radius_m)
+    wall, axis = _leaning_cylinder(local, course, candidates, start, nominal_radius_m)
+    reason[candidates & ~wall] = "consensus"
+    believed = np.ones(len(xyz_m)) if sd_m is None else np.maximum(sd_m, LEAST_NOISE_M)
+    relative = believed / np.median(believed)
+    zeta = _within_course(xyz_m[:, 2], course, np.asarray(joints_m, dtype=float))
+    found = snoop(local, course, zeta, wall, axis, relative, WIDEST_SLOPE, snooping)
+    tilt_known = np.sqrt(np.diag(found.slope_cofactor).max()) < VAGUE_TILT
+    if not tilt_known:
+        upright = np.array([*axis[:2], 0.0, 0.0])
+        found = snoop(local, course, zeta, wall, upright, relative, 1e-9, snooping)
+    in_band, wall, axis = wall, found.wall, found.axis
+    reason[(reason == "") & ~wall] = "snooping"
+    if wall.sum() < LEAST_PART * candidates.sum():
+        raise SolutionError(
+            message(
+                "no_shell",
+                "only {found} of {all} points between bottom and top lie on one wall: no shell "
+                "can be told from its surroundings; check nominal_diameter_m and points",
+                found=wall.sum(),
+                all=candidates.sum(),
+            )
+        )
+
+    distance = from_axis(local, axis)[1]
+    radii = _mean_radii(distance[wall], course[wall], len(joints_m) - 1, nominal_radius_m)
+    return Shell(
+        axis_m=(float(axis[0] + origin[0]), float(axis[1] + origin[1])),
+        z_m=float(origin[2]),
+        slope=(float(axis[2]), float(axis[3])),
+        slope_cofactor=found.slope_cofactor,
+        reason=reason,
+        residual_m=np.where(in_band, found.residual, distance - radii[course]),
+        w=found.w,
+        noise_m=found.noise,
+        noise_dof=found.noise_dof,
+        tilt_known=bool(tilt_known),
+    )
+
+
+def _within_course(z_m, course, joints_m):
+    """(n,) height within the course, -1 at its bottom to +1 at its top."""
+    low, high = joints_m[course], joints_m[course + 1]
+    return 2 * (z_m - low) / (high - low) - 1
+
+
+def _reasons(xyz_m, joints_m):
+    """(n,) why a point cannot be of the wall, by its place alone; else ""."""
+    reason = np.full(len(xyz_m), "", dtype=object)
+    reason[_repeated(xyz_m)] = "same_place"
+    reason[xyz_m[:, 2] > joints_m[-1] + END_TOLERANCE_M] = "above_shell"
+    reason[xyz_m[:, 2] < joints_m[0] - END_TOLERANCE_M] = "below_shell"
+    return reason
+
+
+def _mean_radii(distance, course, courses, otherwise):
+    """(courses,) mean distance from the axis in each course; `otherwise` where it has no point."""
+    return np.array(
+        [distance[course == c].mean() if np.any(course == c) else otherwise for c in range(courses)]
+    )
+
+
+def _repeated(xyz_m):
+    """Mask of points on the very place of an earlier one."""
+    first = np.unique(xyz_m, axis=0, return_index=True)[1]
+    repeated = np.ones(len(xyz_m), dtype=bool)
+    repeated[first] = False
+    return repeated
+
+
+def _consensus_circle(xy, nominal_radius):
+    """(x, y, radius) of the three-point circle near the nominal radius that most points support."""
+    if len(xy) < 5:
+        raise SolutionError(
+            message(
+                "too_few_for_shell",
+                "{count} points between bottom and top of the shell: too few",
+                count=len(xy),
+            )
+        )
+    rng = np.random.default_rng(20_11)
+    triples = xy[rng.integers(len(xy), size=(SAMPLES, 3))]
+    circles = _circles_through(triples)
+    near = np.abs(circles[:, 2] / nominal_radius - 1) < WIDE_BAND
+    judges = xy if len(xy) <= 2000 else xy[rng.choice(len(xy), 2000, replace=False)]
+    band = WIDE_BAND * nominal_radius
+    support = [
+        np.mean(np.abs(np.hypot(judges[:, 0] - x, judges[:, 1] - y) - r) < band)
+        for x, y, r in circles[near]
+    ]
+    best = max(support, default=0.0)
+    if best < LEAST_PART:
+        band, share = 100 * WIDE_BAND, 100 * best
+        raise SolutionError(
+            message(
+                "no_circle",
+                "no circle within {band:.0f} % of the nominal radius {nominal_m:.3f} m holds "
+                "half of the points (best {share:.0f} %): check nominal_diameter_m, units and "
+                "axes",
+                band=band,
+                nominal_m=nominal_radius,
+                share=share,
+            )
+        )
+    return circles[near][int(np.argmax(support))]
+
+
+def _circles_through(triples):
+    """(k, 3) centre and radius of the circle through each of k triples of points (k, 3, 2)."""
+    a, b, c = (triples[:, i] for i in range(3))
+    ab, ac = b - a, c - a
+    cross = 2 * (ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0])
+    cross = np.where(np.abs(cross) < 1e-12, np.nan, cross)
+    sab, sac = np.sum(ab**2, axis=1), np.sum(ac**2, axis=1)
+    x = (ac[:, 1] * sab - ab[:, 1] * sac) / cross
+    y = (ab[:, 0] * sac - ac[:, 0] * sab) / cross
+    return np.column_stack([a[:, 0] + x, a[:, 1] + y, np.hypot(x, y)])
+
+
+def _leaning_cylinder(local, course, candidates, circle, nominal_radius):
+    """Mask of the wall and axis (x, y, dx/dz, dy/dz), the band narrowing from 3 % to 1 % of R."""
+    axis = np.array([circle[0], circle[1], 0.0, 0.0])
+    distance = from_axis(local, axis)[1]
+    wall = candidates & (np.abs(distance - circle[2]) < WIDE_BAND * nominal_radius)
+    for band in np.repeat(np.geomspace(WIDE_BAND, WALL_BAND, 5), 3) * nominal_radius:
+        rough = np.full(wall.sum(), 0.01)
+        fit = adjust(*shell_problem(local[wall], course[wall], axis, rough, None, WIDEST_SLOPE))
+        axis = fit.unknowns[:4]
+        distance = from_axis(local, axis)[1]
+        names, first = np.unique(course[wall], return_inverse=True)
+        radii = np.array([np.median(distance[wall][first == i]) for i in range(len(names))])
+        # a course without a point so far is judged by its nearest neighbour
+        nearest = np.abs(names[None, :] - course[:, None]).argmin(axis=1)
+        wall = candidates & (np.abs(distance - radii[nearest]) < band)
+        if wall.sum() < 5 + len(names):
+            raise SolutionError(
+                message(
+                    "no_cylinder",
+                    "only {count} points lie on a cylinder: no wall was found",
+                    count=wall.sum(),
+                )
+            )
+    return wall, axis

@@ -1,0 +1,238 @@
+"""Data snooping about the smooth form of a shell: what is clutter, and what is a dent.
+
+The radii of the wall are fitted by one radius a course, a taper within it, one radius more for each
+of three rings or more, an axis, and a form of azimuth and height that has the spectrum of
+real shells as its prior. Points that deny that form are rejected, the
+worst first, and those that agree with it after all come back.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.adjust import Adjustment, adjust
+from tankcal.geometry.form import harmonics, mode_variances
+
+CRITICAL_W = 3.29  # two-sided, 0.1 % of sound points are rejected (Baarda 1968)
+MODES = 24  # highest mode of the form that the snooping allows for
+TAPER_M, RING_M = 0.010, 0.005  # prior sd of a radius: at the ends of a course; of a ring beside it
+FEWEST_OF_RING, WIDEST_GAP = 8, np.pi / 2  # points, and rad between two: they go round
+RING_SPAN, MIDDLE = 0.2, 0.15  # of half a course: between two rings; what is neither end
+REJECTED = 1e3  # factor on the sd of a rejected point: it is predicted, not fitted
+LEAST_NOISE_M = 1e-4  # a sound point is never rejected for less than a third of a millimetre
+
+
+@dataclass(frozen=True)
+class Wall:
+    """What the snooping left: mask, axis (x, y, dx/dz, dy/dz), residuals, tests, point noise."""
+
+    wall: np.ndarray
+    axis: np.ndarray
+    slope_cofactor: np.ndarray
+    w: np.ndarray
+    residual: np.ndarray
+    noise: float
+    noise_dof: float
+
+
+def snoop(local, course, zeta, candidates, axis, relative, slope_sd, snooping):
+    """Reject the worst points about the smooth form until all are sound; re-admit whom it spares.
+
+    A pass rejects the points within a tenth of the worst and fits anew. When none is left to
+    reject, rejected points that agree with the fit after all come back, each once.
+    """
+    index = np.flatnonzero(candidates)
+    xyz, of, relative = local[index], course[index], relative[index]
+    uneven = unevenness(xyz, of, zeta[index], axis)
+    accepted, returned = np.ones(len(index), dtype=bool), np.zeros(len(index), dtype=bool)
+    state = None
+    while True:
+        state = _fit_form(xyz, of, uneven, axis, relative, slope_sd, accepted, state)
+        size = np.abs(state.w)
+        worst = accepted & (size > CRITICAL_W)
+        sound = ~accepted & ~returned & (size <= CRITICAL_W)
+        if snooping and worst.any():
+            accepted &= ~(worst & (size >= 0.9 * size[worst].max()))
+        elif snooping and sound.any():
+            accepted, returned = accepted | sound, returned | sound
+        else:
+            return _wall_of(state, index, accepted, len(local))
+
+
+def _wall_of(state, index, accepted, count):
+    """The `Wall` of all `count` points from the fit of the candidates `index`."""
+    wall, w, residual = np.zeros(count, dtype=bool), np.full(count, np.nan), np.full(count, np.nan)
+    wall[index], w[index], residual[index] = accepted, state.w, state.residual
+    fit = state.fit
+    dof = float(np.sum(fit.redundancy[: len(index)][accepted]))
+    return Wall(wall, fit.unknowns[:4], fit.cofactor[2:4, 2:4], w, residual, state.noise, dof)
+
+
+@dataclass(frozen=True)
+class _FormFit:
+    """A fit of the form: its components, and residual and test quantity of every candidate."""
+
+    fit: Adjustment
+    noise: float
+    form: float
+    residual: np.ndarray
+    w: np.ndarray
+
+
+def _fit_form(xyz, course, uneven, axis, relative, slope_sd, accepted, before):
+    """Shell with form, its point noise and form amplitude as two variance components.
+
+    Helmert's simple iteration: each standard deviation is scaled by the root of its group's sum of
+    squared normalised residuals over its redundancy (Foerstner 1979). The point noise is kept
+    robust: never above 1.4826 times the median residual. Accepted points beyond two standard
+    deviations weigh less (Huber 1964), so that clutter does not bend the form.
+    """
+    noise, form = (before.noise, before.form) if before else (0.005, 0.010)
+    residual = before.residual if before else np.zeros(len(xyz))
+    axis = before.fit.unknowns[:4] if before else axis
+    n = len(xyz)
+    for _ in range(3 if before else 10):
+        was = noise, form
+        doubt = np.maximum(1.0, np.abs(residual) / (2 * noise * relative))
+        sd = noise * relative * np.where(accepted, doubt, REJECTED)
+        fit = adjust(*shell_problem(xyz, course, axis, sd, form, slope_sd, uneven))
+        axis, residual = fit.unknowns[:4], fit.residuals[:n]
+        noise = _noise(residual[accepted] / relative[accepted], fit.redundancy[:n][accepted])
+        form = max(form * _component(fit, slice(n, n + 4 * (MODES - 1))), 0.1 * noise)
+        if np.allclose(was, (noise, form), rtol=0.05):
+            break
+    return _FormFit(fit, noise, form, residual, _left_out(fit, residual, sd, noise * relative))
+
+
+def _left_out(fit, residual, sd, noise):
+    """(n,) residual of each point from the fit without it, over its standard deviation.
+
+    For a point of full weight this is Baarda's w = v / (s sqrt(r)); for a rejected one it tests
+    whether the point agrees with all the others.
+    """
+    r = np.maximum(fit.redundancy[: len(residual)], 1e-9)
+    return (residual / r) / np.sqrt(noise**2 + sd**2 * (1 - r) / r)
+
+
+def _noise(residual, redundancy):
+    """Point noise: root of the squares over the redundancy, at most the normal median's."""
+    whole = np.sqrt(np.sum(residual**2) / np.sum(redundancy))
+    robust = 1.4826 * np.median(np.abs(residual) / np.sqrt(np.maximum(redundancy, 1e-9)))
+    return max(min(whole, robust), LEAST_NOISE_M)
+
+
+def _component(fit, group):
+    redundancy = np.sum(fit.redundancy[group])
+    return np.sqrt(np.sum(fit.normalised[group] ** 2) / max(redundancy, 1e-9))
+
+
+@dataclass(frozen=True)
+class Uneven:
+    """How the mean radius departs from that of its course.
+
+    columns  (n, c) derivative of the radii by each departure; sd_m (c,) of it, before any point
+    """
+
+    columns: np.ndarray
+    sd_m: np.ndarray
+
+
+def unevenness(xyz, course, zeta, axis):
+    """`Uneven`: a taper for each course that shows one, a radius for each of three rings or more.
+
+    zeta  (n,) height within the course, -1 at its bottom to +1 at its top
+
+    Only points that go round tell it, in the lower and the upper part of a course: with fewer, what
+    stands before the wall (treads of a stair, the rim of a nozzle) would bear itself out.
+    """
+    offset, _ = from_axis(xyz, axis)
+    azimuth = np.arctan2(offset[:, 0], offset[:, 1])
+    columns, sds = [np.zeros((len(xyz), 0))], []
+    for one in np.unique(course):
+        own = np.flatnonzero(course == one)
+        ends = own[zeta[own] < -MIDDLE], own[zeta[own] > MIDDLE]
+        if not all(_goes_round(azimuth[end]) for end in ends):
+            continue
+        columns.append(_column(len(xyz), own, zeta[own]))
+        sds.append(TAPER_M)
+        rings = _rings(own, zeta, azimuth)
+        if len(rings) > 2:
+            columns += [_column(len(xyz), ring, 1.0) for ring in rings]
+            sds += len(rings) * [RING_M]
+    return Uneven(np.hstack(columns), np.array(sds))
+
+
+def _column(count, members, value):
+    column = np.zeros((count, 1))
+    column[members, 0] = value
+    return column
+
+
+def _rings(members, zeta, azimuth):
+    """Lists of the points of a course that stand at one height, all round it."""
+    order = members[np.argsort(zeta[members], kind="stable")]
+    rings = np.split(order, np.flatnonzero(np.diff(zeta[order]) > RING_SPAN) + 1)
+    level = [ring for ring in rings if np.ptp(zeta[ring]) <= 2 * RING_SPAN]
+    return [ring for ring in level if _goes_round(azimuth[ring])]
+
+
+def _goes_round(azimuth):
+    if len(azimuth) < FEWEST_OF_RING:
+        return False
+    around = np.sort(azimuth)
+    return np.diff(around, append=around[0] + 2 * np.pi).max() < WIDEST_GAP
+
+
+def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
+    """Arguments of `adjust` for radii = R of the course + uneven + form(azimuth, height).
+
+    The form is the same at all heights but for a part that grows linearly with height; its modes,
+    the slope and what is `Uneven` are unknowns with a prior (an observation of zero). Without
+    `form` the shell is round. sd (n,) of the radii.
+    """
+    courses, row_of = np.unique(course, return_inverse=True)
+    n, modes = len(xyz), 0 if form is None else 2 * (MODES - 1)
+    first_mode = 4 + len(courses)
+    height = xyz[:, 2] / max(np.abs(xyz[:, 2]).max(), 1e-9)
+    by_radius = np.zeros((n, len(courses)))
+    by_radius[np.arange(n), row_of] = -1.0
+    by_uneven = np.zeros((n, 0)) if uneven is None else uneven.columns
+    more, last_mode = by_uneven.shape[1], first_mode + 2 * modes
+    priors = np.zeros((2 * modes + 2 + more, last_mode + more))
+    priors[: 2 * modes, first_mode:last_mode] = np.eye(2 * modes)
+    priors[2 * modes : 2 * modes + 2, 2:4] = np.eye(2)
+    priors[2 * modes + 2 :, last_mode:] = np.eye(more)
+
+    def model(x, observations):
+        offset, distance = from_axis(xyz, x[:4])
+        azimuth = np.arctan2(offset[:, 0], offset[:, 1])
+        sin, cos = offset[:, 0] / distance, offset[:, 1] / distance
+        form_now, turn = np.zeros(n), np.zeros(n)
+        by_form = np.zeros((n, 2 * modes))
+        if modes:
+            waves = harmonics(azimuth, MODES)[:, 3:]
+            by_form = np.hstack([waves, waves * height[:, None]])
+            slopes = harmonics(azimuth, MODES, derivative=1)[:, 3:]
+            form_now = by_form @ x[first_mode:last_mode]
+            by_azimuth = np.hstack([slopes, slopes * height[:, None]])
+            turn = by_azimuth @ x[first_mode:last_mode] / distance
+        by_xy = -np.column_stack([sin - turn * cos, cos + turn * sin])
+        by_axis = np.hstack([by_xy, by_xy * xyz[:, 2:]])
+        top = np.hstack([by_axis, by_radius, -by_form, -by_uneven])
+        misclosure = distance - x[4:first_mode][row_of] - form_now - by_uneven @ x[last_mode:]
+        modelled = np.concatenate([misclosure, x[first_mode:last_mode], x[2:4], x[last_mode:]])
+        return modelled - observations, np.vstack([top, priors]), None
+
+    distance = from_axis(xyz, axis)[1]
+    radii = [np.median(distance[row_of == i]) for i in range(len(courses))]
+    start = np.concatenate([axis, radii, np.zeros(2 * modes + more)])
+    uneven_variances = np.zeros(0) if uneven is None else uneven.sd_m**2
+    prior = form**2 * mode_variances(MODES) if modes else np.zeros(0)
+    variances = np.concatenate([sd**2, prior, prior, np.full(2, slope_sd**2), uneven_variances])
+    return model, start, np.zeros(len(variances)), variances
+
+
+def from_axis(local, axis):
+    """Horizontal offsets (n, 2) and distances (n,) from the axis at each point's own height."""
+    offset = local[:, :2] - axis[:2] - local[:, 2:] * axis[2:4]
+    return offset, np.hypot(offset[:, 0], offset[:, 1])

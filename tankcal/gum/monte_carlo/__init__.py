@@ -1,0 +1,21 @@
+"""Monte Carlo of models with many rows: JCGM 101:2008 and JCGM 102:2011.
+
+`simulate` draws, `verdict` says whether the GUM intervals may stand; tables are `QuadraticRows`.
+"""
+
+from tankcal.gum.monte_carlo.goal import NAMES as ESTIMATES
+from tankcal.gum.monte_carlo.goal import Goal, Simulation, numerical_tolerance
+from tankcal.gum.monte_carlo.quadratic import QuadraticRows
+from tankcal.gum.monte_carlo.simulation import simulate
+from tankcal.gum.monte_carlo.validation import Verdict, verdict
+
+__all__ = [
+    "ESTIMATES",
+    "Goal",
+    "QuadraticRows",
+    "Simulation",
+    "Verdict",
+    "numerical_tolerance",
+    "simulate",
+    "verdict",
+]

@@ -1,0 +1,182 @@
+"""The estimates of rows that are quadratic in a few inputs: means over independent point sets.
+
+u from the covariance of (d, forms), whose first block is exact; the ends by inverting the
+distribution function, known at three levels about each end, that quadratic.Lines estimates.
+Sources: JCGM 101:2008 7.6, 7.7; randomised point sets: Owen 1998.
+"""
+
+import numpy as np
+from scipy.special import ndtri
+
+from tankcal.gum.monte_carlo.goal import enough, no_worse
+from tankcal.gum.monte_carlo.inputs import uniforms
+from tankcal.gum.monte_carlo.linear import linear_law, shapes_of
+from tankcal.gum.monte_carlo.quadratic import RARE, Lines
+
+SETS = 10  # independent point sets
+POINTS = 2048  # of a set; intervals take FIRST to MOST of them
+FIRST, MOST = 16, 1024
+PILOT = 64  # points of the first set that place the ends before they are estimated
+SIDES = np.array([0.6, 1.0, 1.4])  # levels about an end, by that end's own
+
+
+def table_estimates(model, ready, goal, tell):
+    """Estimates and errors (6, rows), draws, control (rows,), and which rows are sound.
+
+    A row is not sound where its quadratic part is too large for one parabola to be followed, its
+    shortest interval lies far from the symmetric one, or plain draws would be as good. The ends of
+    such a row are nan: another method has to find them.
+    """
+    rows = model.in_coordinates(ready.transform)
+    sets = _point_sets(ready, goal)
+    forms = np.stack([rows.forms(e) for e in sets])
+    shapes = shapes_of(ready)
+    lines = Lines(rows, ready.normal, shapes, ready.coordinate_scale)
+    levels = np.concatenate([SIDES * goal.tail, 1 - SIDES[::-1] * goal.tail])
+    scaled = rows.jacobian * ready.coordinate_scale
+    law = linear_law(scaled, ready.normal, shapes, levels)
+    moments = np.stack([_moments(rows, ready, e, q) for e, q in zip(sets, forms, strict=True)])
+    found = _Ends(lines, law, levels, sets, forms)
+    estimates, errors = np.full((2, 6, len(rows.value)), np.nan)  # what nobody fills shows
+    estimates[:2], errors[:2] = _mean_and_error(moments)
+    draws = np.full(len(rows.value), SETS * POINTS)
+    pending, count = np.flatnonzero(law.known), FIRST
+    sound = ~np.any(scaled != 0, axis=1) & ~np.any(rows.weights != 0, axis=1)
+    estimates[2:, sound], errors[2:, sound] = rows.value[sound], 0.0
+    plain = _plain(goal, rows, ready, shapes, law)
+    while len(pending) and count <= MOST:
+        ends, steady = found.of(pending, count)
+        estimates[2:, pending], errors[2:, pending] = _mean_and_error(ends)
+        part = estimates[:, pending], errors[:, pending], plain[:, pending]
+        # more points may show what fewer hid: a row that was sound with 16 need not stay so
+        sound[pending] = steady & no_worse(goal, *part)
+        part[1][:2] = 0.0  # mean and u come from all points already
+        done = enough(goal, *part)
+        pending, count = pending[~done & steady], 4 * count
+        tell("Monte Carlo", len(law.known) - len(pending), len(law.known))
+    return estimates, errors, draws, law.known.copy(), sound
+
+
+def _point_sets(ready, goal):
+    seeds = np.random.SeedSequence(goal.seed).spawn(SETS)
+    return np.stack([ready.draws(uniforms(POINTS, len(ready.mean), seed))[1] for seed in seeds])
+
+
+def _plain(goal, rows, ready, shapes, law):
+    """(3, rows) standard errors of u and both ends from one plain draw of the linear part.
+
+    sqrt(u^4 (2 + excess)/4)/u for u, the excess from the fourth moments of the inputs.
+    """
+    excess = [0.0 if s is None else s.fourth - 3 * s.second**2 for s in shapes]
+    parts = (rows.jacobian * ready.coordinate_scale) ** 2
+    second = [1.0 if s is None else s.second for s in shapes]
+    variance, fourth = parts @ second, parts**2 @ excess
+    variance = np.where(variance > 0, variance, 1.0)
+    of_u = np.sqrt(np.maximum(2 * variance**2 + fourth, 0.0) / (4 * variance))
+    ends = np.sqrt(goal.tail * (1 - goal.tail)) / law.density[:, [1, 4]].T
+    return np.concatenate([of_u[None, :], ends])
+
+
+def _mean_and_error(sets):
+    with np.errstate(invalid="ignore"):
+        error = np.std(sets, axis=0, ddof=1) / np.sqrt(len(sets))
+    return np.mean(sets, axis=0), error
+
+
+def _moments(rows, ready, e, forms):
+    """(2, rows) mean and u: exact for the linear part, from the draws for what is added."""
+    sd = ready.coordinate_sd
+    finite = np.isfinite(sd)
+    exact = np.einsum("kaa,a->k", rows.hessians[:, finite][:, :, finite], sd[finite] ** 2)
+    middle = np.where(
+        np.any(rows.hessians[:, ~finite] != 0, axis=(1, 2)), forms.mean(axis=0), exact
+    )
+    about = forms - middle
+    mixed, own = e.T @ about / len(e), about.T @ about / len(e)
+    with np.errstate(invalid="ignore"):
+        linear = np.where(rows.jacobian == 0, 0.0, rows.jacobian * sd)
+    variance = np.sum(linear**2, axis=1)
+    variance = variance + 2 * np.sum((rows.jacobian @ mixed) * rows.weights, axis=1)
+    variance = variance + np.sum((rows.weights @ own) * rows.weights, axis=1)
+    return np.stack([rows.value + rows.weights @ middle, np.sqrt(np.maximum(variance, 0.0))])
+
+
+class _Ends:
+    """Both intervals of chosen rows from the first points of every set."""
+
+    def __init__(self, lines, law, levels, sets, forms):
+        self.lines, self.law, self.levels = lines, law, levels
+        self.sets, self.forms = sets, forms
+        self.score = ndtri(levels)
+
+    def of(self, rows, count):
+        """(sets, 4, rows) ends from `count` points of every set, nan where a row is not steady."""
+        ends = np.full((len(self.sets), 4, len(rows)), np.nan)
+        steady = np.zeros(len(rows), dtype=bool)
+        place = np.full(len(self.law.known), -1)
+        place[rows] = np.arange(len(rows))
+        for along, block in self.lines.groups(len(self.sets) * count):
+            block = block[place[block] >= 0]
+            if not len(block):
+                continue
+            at = place[block]
+            target, unbent = self._targets(along, block)
+            scores, near = self._scores(along, block, target, count)
+            rising = np.all(np.diff(scores, axis=2) > 0, axis=(0, 2))
+            sound = np.flatnonzero(unbent & rising & (near <= RARE))
+            base = self.lines.rows.value[block[sound]]
+            inner = np.ones(len(sound), dtype=bool)
+            own = np.empty((len(ends), 4, len(sound)))
+            for i, score in enumerate(scores[:, sound]):
+                found, within = self._invert(score, target[sound])
+                own[i] = base + found
+                inner &= within
+            ends[:, :, at[sound[inner]]] = own[:, :, inner]
+            steady[at[sound]] = inner
+        return ends, steady
+
+    def _targets(self, along, block):
+        """(block, levels) values near the levels, from the pilot draws, and which are found."""
+        linear, slope = self.law.quantile[block], self.law.density[block]
+        pilot = self.sets[:1, :PILOT], self.forms[:1, :PILOT]
+        shift = np.mean(pilot[1][0] @ self.lines.rows.weights[block].T, axis=0)
+        target = linear + shift[:, None]
+        for _ in range(2):
+            found, _ = self.lines.differences(along, block, pilot, target, self.levels, linear)
+            moved = (self.levels - found[0]) / slope
+            target = target + moved
+        return target, np.all(np.abs(moved) * slope < 0.1 * self.levels[0], axis=1)
+
+    def _scores(self, along, block, target, count):
+        """(sets, block, levels) normal scores of the probability below the targets."""
+        draws = self.sets[:, :count], self.forms[:, :count]
+        linear = self.law.quantile[block]
+        found, near = self.lines.differences(along, block, draws, target, self.levels, linear)
+        return ndtri(np.clip(found, 1e-9, 1 - 1e-9)), near
+
+    def _invert(self, score, target):
+        """(4, block) ends of both intervals, and whether the shortest lies inside the levels."""
+        lower = [_through(score[:, :3], target[:, :3], s) for s in self.score[:3]]
+        upper = [_through(score[:, 3:], target[:, 3:], s) for s in self.score[3:]]
+        first, second, third = (high - low for low, high in zip(lower, upper, strict=True))
+        curve = first - 2 * second + third
+        offset = np.divide(first - third, 2 * curve, out=np.full_like(curve, 2.0), where=curve > 0)
+        within = np.abs(offset) <= 1
+        tail = self.levels[1] * (1 + (SIDES[2] - 1) * np.clip(offset, -1, 1))
+        high = 1 - 2 * self.levels[1] + tail
+        shortest = (
+            _through(score[:, :3], target[:, :3], ndtri(tail)),
+            _through(score[:, 3:], target[:, 3:], ndtri(high)),
+        )
+        return np.stack([lower[1], upper[1], *shortest]), within
+
+
+def _through(x, y, at):
+    """Parabolas through three points (rows, 3) each, at one place for each row."""
+    a, b, c = x.T
+    first, second, third = (at - a), (at - b), (at - c)
+    return (
+        y[:, 0] * second * third / ((a - b) * (a - c))
+        + y[:, 1] * first * third / ((b - a) * (b - c))
+        + y[:, 2] * first * second / ((c - a) * (c - b))
+    )

@@ -1,0 +1,189 @@
+"""The budget of a volume that is read from the table: at a dip, or between two dips.
+
+One line for each input, correlated ones each by itself, then what the reading adds: the rows are
+written to litres and joined by straight lines. These errors are of each reading by itself, so they
+are no part of the covariance of the rows; of a delivery they count twice.
+Source: JCGM 100:2008 5.1.3, 5.2.2, 7.2.7.
+"""
+
+from dataclasses import dataclass, replace
+from math import isnan
+
+import numpy as np
+
+from tankcal.gum import BudgetRow
+from tankcal.gum.distributions import within
+from tankcal.text.display import table_html, volume_text
+from tankcal.uncertainty import Combined, Source, combined, declared_source
+
+HALF_A_LITRE_M3 = 5e-4
+
+
+@dataclass(frozen=True, repr=False)
+class Budget:
+    """A volume read from the table and what its uncertainty is made of.
+
+    low_m, high_m  dips; low_m None: the volume below high_m
+    table_u_m3     of the table alone; u_m3, dof, k, U_m3 with what the reading adds, alone
+                   `reading_U_m3`
+    for_use        False where a dip stands in a zone in which the table must not be used
+    lines          in the order of the table's sources, then the reading's; shares add up to 1
+    """
+
+    low_m: float | None
+    high_m: float
+    volume_m3: float
+    table_u_m3: float
+    u_m3: float
+    dof: float
+    k: float
+    U_m3: float
+    for_use: bool
+    lines: tuple[BudgetRow, ...]
+
+    @property
+    def reading_U_m3(self):
+        """k times what reading adds: the standard uncertainties of its lines, by squares."""
+        return self.k * max(self.u_m3**2 - self.table_u_m3**2, 0.0) ** 0.5
+
+    def __str__(self) -> str:
+        dips = (
+            f"{self.high_m:g} m" if self.low_m is None else f"{self.low_m:g} to {self.high_m:g} m"
+        )
+        return f"{dips}: {volume_text(self.volume_m3, self.U_m3, self.k)}"
+
+    def __repr__(self) -> str:
+        return f"<Budget of {self}>"
+
+    def _repr_html_(self) -> str:
+        ordered = sorted(self.lines, key=lambda one: -abs(one.share))
+        rows = [
+            [
+                one.name + (" (default)" if one.is_default else ""),
+                None if isnan(one.u) else one.u,
+                one.unit,
+                one.contribution,
+                100 * one.share,
+            ]
+            for one in ordered
+        ]
+        return table_html(str(self), ["input", "u", "unit", "contribution, m3", "share, %"], rows)
+
+
+def reading_sources(declared, largest_interpolation_m3):
+    """The two causes that reading adds, m3 of one dip: `Source`s of one row.
+
+    declared  of the job: inputs "interpolation" and "rounding" there count instead of the defaults,
+              rectangular: half a litre, and the largest error of a straight line between two rows
+    """
+    given = {one.name: one for one in declared}
+    defaults = {"interpolation": largest_interpolation_m3, "rounding": HALF_A_LITRE_M3}
+    return tuple(
+        declared_source(given[name], np.ones(1)) if name in given else _default(name, half_width)
+        for name, half_width in defaults.items()
+    )
+
+
+def _default(name, half_width):
+    u = within(half_width).u
+    return Source(
+        name,
+        np.array([[u]]),
+        u=u,
+        unit="m3",
+        type="B",
+        distribution="rectangular",
+        is_default=True,
+    )
+
+
+def budget(table, high_m, low_m=None, reading=()):
+    """`Budget` of the volume below a dip, or between two; HeightError outside the table.
+
+    reading  of `reading_sources`; () for the table alone
+    """
+    found = table.at(high_m) if low_m is None else table.delivery(low_m, high_m)
+    dips = [high_m] if low_m is None else [low_m, high_m]
+    weights = table.weights(dips[-1:]) - (0 if low_m is None else table.weights(dips[:1]))
+    sources = [source.weighted(weights) for source in table.sources]
+    sources += [_read(source, table, dips) for source in reading]
+    total = _Total(sources, table.probability)
+    return Budget(
+        low_m=low_m,
+        high_m=high_m,
+        volume_m3=found.value_m3,
+        table_u_m3=found.u_m3,
+        u_m3=total.u,
+        dof=total.dof,
+        k=total.k,
+        U_m3=total.expanded,
+        for_use=found.for_use,
+        lines=tuple(line for index in range(len(sources)) for line in total.lines(index)),
+    )
+
+
+def _read(source, table, dips):
+    """What reading adds for these dips: rounding at each, interpolation where it is no row."""
+    between = sum(len(table.rows_of(dip)) > 1 for dip in dips)
+    times = between if source.kind == "interpolation" else len(dips)
+    return source.mapped(lambda columns: columns * np.sqrt(times))
+
+
+class _Total:
+    """The variances of the sources of one value, and the lines that they make."""
+
+    def __init__(self, sources, probability):
+        self.sources, self.probability = sources, probability
+        self.found = combined(sources, 1)
+        self.variances = self.found.variances[0]
+        self.variance = float(self.variances.sum())
+        self.u, self.dof = float(self.found.u[0]), float(self.found.effective_dof[0])
+        self.k = float(self.found.k(probability)[0])
+        self.expanded = self.k * self.u
+
+    def lines(self, index):
+        """The `BudgetRow`s of a source: one, or one for each of its correlated parts."""
+        source = self.sources[index]
+        if not source.parts:
+            variance = self.variances[index]
+            return [self._line(source, variance**0.5, variance, index, variance / 4)]
+        own = np.array([part.columns_m3[0, 0] for part in source.parts])
+        together = own * (source.correlation @ own)
+        found = []
+        for i, part in enumerate(source.parts):
+            half = np.where(np.arange(len(own)) == i, own / 2, own)
+            halved = half @ source.correlation @ half
+            line = self._line(part, abs(own[i]), together[i], index, halved)
+            others = zip(source.parts, source.correlation[i], strict=True)
+            pairs = tuple((one.kind, float(r)) for one, r in others if one is not part and r)
+            found.append(replace(line, correlations=pairs))
+        return found
+
+    def _line(self, source, contribution, variance, index, halved):
+        known = source.u is not None
+        column = float(source.columns_m3[0, 0]) if source.columns_m3.shape[1] == 1 else None
+        is_slope = known and source.u > 0 and column is not None
+        return BudgetRow(
+            name=source.kind,
+            unit=source.unit or "",
+            type=source.type,
+            distribution=source.distribution,
+            dof=source.u_dof,
+            note=source.note,
+            is_default=source.is_default,
+            estimate=np.nan if source.estimate is None else source.estimate,
+            u=source.u if known else np.nan,
+            sensitivity=column / source.u if is_slope else np.nan,
+            contribution=float(contribution),
+            share=float(variance / self.variance) if self.variance > 0 else 0.0,
+            halved=self._if(index, halved),
+        )
+
+    def _if(self, index, variance):
+        """Expanded uncertainty with another variance of one source, over what it is."""
+        if not self.expanded > 0:
+            return 1.0
+        changed = self.variances.copy()
+        changed[index] = variance
+        halved = Combined(changed[None, :], self.found.dof)
+        return float(halved.expanded(self.probability)[0] / self.expanded)

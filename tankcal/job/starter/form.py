@@ -1,0 +1,111 @@
+"""What a starter job has: its tables, lists and keys by the kind of tank and of survey."""
+
+from dataclasses import dataclass
+
+from tankcal.job.contract import (
+    INPUTS,
+    KEYS,
+    OF_PHOTOS,
+    REGISTER_KEYS,
+    REGISTERS_OF_SURVEY,
+    SURVEYS,
+    TABLES_OF_KIND,
+)
+from tankcal.job.contract.inputs import UNITS
+from tankcal.job.fields import Field
+from tankcal.text.languages import DEFAULT, LANGUAGES
+
+PLACEHOLDER = "NAME"  # of a camera or an instrument
+
+
+@dataclass(frozen=True)
+class Form:
+    """Kind of tank, kind of survey (None: surveyed points), language of the papers.
+
+    Raises ValueError for what there is not.
+    """
+
+    kind: str
+    survey: str | None = None
+    language: str = DEFAULT
+
+    def __post_init__(self):
+        _refuse_others(self.kind, TABLES_OF_KIND)
+        _refuse_others(self.language, LANGUAGES)
+        if self.survey is not None:
+            _refuse_others(self.survey, SURVEYS)
+            if "points" not in TABLES_OF_KIND[self.kind]:
+                raise ValueError(f"a tank of kind {self.kind} has no survey; expected another kind")
+
+    @property
+    def tables(self):
+        """Names of its tables; those of a survey stand in place of the points."""
+        of_tank = TABLES_OF_KIND[self.kind]
+        if self.survey is None:
+            return of_tank
+        return (*SURVEYS[self.survey], *(table for table in of_tank if table != "points"))
+
+    @property
+    def registers(self):
+        """Names of its lists of cameras and instruments."""
+        return REGISTERS_OF_SURVEY.get(self.survey, ())
+
+    @property
+    def keys(self):
+        """{section: its fields}; sections without any are left out."""
+        suiting = {
+            section: [field for field in fields if self._has(section, field)]
+            for section, fields in KEYS.items()
+        }
+        return {section: fields for section, fields in suiting.items() if fields}
+
+    @property
+    def inputs(self):
+        """{name: Declarable} of the inputs of uncertainty that bear on this kind of tank."""
+        return {name: one for name, one in INPUTS.items() if self.kind in one.kinds}
+
+    def start(self, section, field):
+        """What the form has in the place of a key; "" for nothing."""
+        if (section, field.name) == ("tank", "kind"):
+            return self.kind
+        if (section, field.name) == ("table", "language") and self.language != DEFAULT:
+            return self.language
+        return field.start
+
+    def is_to_fill_in(self, section, field):
+        """Is it a key that must be given, and has nothing yet?"""
+        return field.is_required(self.kind) and not self.start(section, field)
+
+    def entries(self, register):
+        """{name: {key: text}} of what a list of cameras or instruments has beforehand."""
+        return {PLACEHOLDER: {}}
+
+    def fields(self, register, given):
+        """The fields of an entry: the usual ones, and those that it has under names of its own."""
+        usual = REGISTER_KEYS[register]
+        others = given.keys() - {field.name for field in usual}
+        return (*usual, *(Field(name, "numbers", "") for name in given if name in others))
+
+    def rows(self, table):
+        """What a table has beforehand: a {column: text} for each row."""
+        return ()
+
+    def choices(self, table, field):
+        """What may be chosen in a column; of the inputs of uncertainty those of this tank."""
+        suiting = self.inputs
+        if table in ("uncertainty", "correlations") and set(field.choices) <= set(INPUTS):
+            return tuple(name for name in field.choices if name in suiting)
+        if field.choices == UNITS:
+            return tuple(dict.fromkeys(one.unit for one in suiting.values()))
+        return field.choices
+
+    def _has(self, section, field):
+        if field.of_survey and self.survey is None:
+            return False
+        of_photos = section == "adjustment.camera" or field.name in OF_PHOTOS
+        return field.suits(self.kind) and (self.survey == "photos" or not of_photos)
+
+
+def _refuse_others(value, known):
+    if value not in known:
+        raise ValueError(f"found {value!r}; expected one of {', '.join(known)}")

@@ -1,0 +1,1 @@
+"""The main job: from a checked job to the capacity table, step by step."""

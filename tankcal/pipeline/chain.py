@@ -1,0 +1,410 @@
+"""The main job on one screen: a checked job in; wall, parts and the capacity table out."""
+
+from collections.abc import Callable
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from tankcal.errors import HeightError, InputError, Problem, SolutionError
+from tankcal.gum.volume_budgets import Budget, budget, reading_sources
+from tankcal.job import Job
+from tankcal.job.tables import in_book
+from tankcal.messages import message
+from tankcal.pipeline.corrections import Correction, corrections_of
+from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
+from tankcal.pipeline.plausibility import incomplete_certificate, of_adjustment, refuse_undetermined
+from tankcal.pipeline.scan import Scan, scanned
+from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
+from tankcal.pipeline.simulation.table import SIMULATING
+from tankcal.pipeline.statements import (
+    Statements,
+    pairs_to_simulate,
+    stated_delivery,
+    stated_volume,
+    statements,
+    verdict_of,
+)
+from tankcal.pipeline.table import doubts_of_table, tabled
+from tankcal.pipeline.tanks import body_of, shell_volume
+from tankcal.pipeline.views import plot
+from tankcal.pipeline.wall import Wall, among_themselves, find_wall
+from tankcal.survey import Adjustment, adjust_survey, wall_points
+from tankcal.tank import dips
+from tankcal.tank.body import Body
+from tankcal.tank.capacity import Capacity, Quantity
+from tankcal.tank.dips import Dips, ProportionalParts, Straightness, proportional_parts
+from tankcal.tank.falling_capacity import refuse_falling
+from tankcal.tank.meshes import parse_mesh
+from tankcal.tank.rules import RuleVerdict
+from tankcal.tank.service import shell_factor, shell_temperature_c
+from tankcal.tank.volumes import ShellVolume
+from tankcal.text.digits import decimals_of_height, fixed
+from tankcal.text.display import table_html, volume_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MILLIMETRE, PARTS = 0.001, 10  # of a step of the tables that proportional parts are for
+PARTS_OF_U, PARTS_M3 = 0.05, 0.0005  # error of proportional parts: a share of U, or half a litre
+VAST_M3 = 1e12  # stands for a U without end
+TOLD = 10  # warnings of the adjustment that are told when there is no wall
+
+
+@dataclass(frozen=True, repr=False)
+class Result:
+    """Everything that a job gave; `capacity` is the table as a DataFrame.
+
+    job          as it was computed: the points are in it, too, where they came from an adjustment
+    wall         the surveyed wall of a vertical tank (`wall.Wall`); None for other kinds
+    scan         what points say of a lying cylinder or a sphere (`scan.Scan`), else None
+    body         the tank as the sum of its parts, with all corrections that are on (`body.Body`)
+    zero_m       level of the table's zero: dip 0 in the frame of the parts
+    straightness how far linear interpolation between the rows is from the exact volume
+    proportional_parts  what millimetres add to a row, zone by zone; () for no centimetre table
+    corrections  each with its size at the top row
+    by_density   {density kg/m3: (rows,) volumes}: the same table for other densities
+    stated       budgets, worst deliveries (`statements.Statements`)
+    simulation   the table by Monte Carlo (`simulation.TableSimulation`); None where it is off
+    intervals    of the rows, as they are printed (`simulation.Intervals`)
+    rule         verdict of the job's decision rule on them (`rules.RuleVerdict`); None without one
+    adjustment   the adjusted survey (`surveys.Adjustment`); None where points were handed in
+    """
+
+    job: Job
+    wall: Wall | None
+    scan: Scan | None
+    body: Body
+    zero_m: float
+    table: Capacity
+    straightness: Straightness
+    proportional_parts: tuple[ProportionalParts, ...]
+    corrections: tuple[Correction, ...]
+    by_density: dict[float, np.ndarray]
+    stated: Statements
+    simulation: TableSimulation | None
+    intervals: Intervals
+    rule: RuleVerdict | None
+    warnings: tuple[Problem, ...]
+    adjustment: Adjustment | None = None
+
+    def __str__(self) -> str:
+        top_m = self.table.height_m[-1]
+        k = self.table.k[-1] if self.intervals.by_gum[-1] else None
+        top = volume_text(self.table.volume_m3[-1], self.intervals.U_m3[-1], k)
+        points = ""
+        if self.accepted is not None:
+            points = f"; {len(self.accepted)} of {len(self.job.points.names)} points of the wall"
+        return f"{self.job.tank.id}: {top} at {fixed(top_m, decimals_of_height(top_m))} m{points}"
+
+    def __repr__(self) -> str:
+        return f"<tankcal.Result of {self}>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [one.code, "yes" if one.applied else "no", one.size_m3, one.size_percent]
+            for one in self.corrections
+        ]
+        warnings = "".join(f"<li>{escape(str(one))}</li>" for one in self.warnings)
+        return (
+            f"<p><b>{escape(str(self))}</b></p>"
+            + table_html("Corrections at the top", ["correction", "made", "m3", "%"], rows)
+            + (f"<p>Warnings:</p><ul>{warnings}</ul>" if warnings else "")
+        )
+
+    def plot(self, what: str | None = None) -> "Figure":
+        """A drawing of the result, by the names that `tankcal.plot` takes."""
+        return plot(self, what)
+
+    def budget(
+        self, high_m: float | None = None, low_m: float | None = None, *, reading: bool = False
+    ) -> Budget:
+        """What the uncertainty of a volume, or of a delivery, consists of.
+
+        Parameters
+        ----------
+        high_m, low_m : float, optional
+            Dips, m; without `high_m` the top row, without `low_m` the volume below `high_m`.
+        reading : bool
+            Whether what reading the table adds (interpolation, rounding) is in it.
+
+        Raises
+        ------
+        HeightError
+            For a dip outside the table.
+        """
+        high_m = float(self.table.height_m[-1]) if high_m is None else high_m
+        largest_m3 = self.straightness.largest_m3
+        added = reading_sources(self.job.inputs, largest_m3) if reading else ()
+        return budget(self.table, high_m, low_m, added)
+
+    @property
+    def accepted(self) -> np.ndarray | None:
+        """(m,) indices of the points that are of the wall; None where none were surveyed."""
+        found = self.wall or self.scan
+        return None if found is None else found.accepted
+
+    @property
+    def gross(self) -> ShellVolume | None:
+        """The shell as surveyed, without any correction (`volumes.ShellVolume`); else None."""
+        if self.wall is None:
+            return None
+        return shell_volume(self.job.courses, self.wall.joints_m, self.wall.sections)
+
+    @property
+    def capacity(self) -> pd.DataFrame:
+        """The capacity table, with the U that every paper states: the columns of capacity.csv.
+
+        height_m, volume_m3 and u_m3, the standard uncertainty; k, not a number where U is not k u
+        but Monte Carlo's; U_m3, low_m3 and high_m3; interval, "gum" or "monte_carlo": whose these
+        are; with a floating roof for_use.
+        """
+        table, stated = self.table, self.intervals
+        columns = {
+            "height_m": table.height_m,
+            "volume_m3": table.volume_m3,
+            "u_m3": table.u_m3,
+            "k": np.where(stated.by_gum, table.k, np.nan),
+            "U_m3": stated.U_m3,
+            "low_m3": stated.low_m3,
+            "high_m3": stated.high_m3,
+            "interval": np.where(stated.by_gum, "gum", "monte_carlo"),
+        }
+        if table.critical_m is not None:
+            columns["for_use"] = table.for_use(table.height_m)
+        return pd.DataFrame(columns)
+
+    def at(self, height_m: float) -> Quantity:
+        """Volume at a dip, with the U that is stated (`capacity.Quantity`); HeightError outside."""
+        return stated_volume(self.table, self.intervals, height_m)
+
+    def in_service_m3(
+        self,
+        height_m: float,
+        liquid_c: float,
+        ambient_c: float | None = None,
+        *,
+        insulated: bool = False,
+    ) -> float:
+        """Volume at a dip of a shell that the liquid keeps at another temperature: V times CTSh.
+
+        ambient_c  needed for a shell that is not insulated (`service.shell_temperature_c`)
+        """
+        shell_c = shell_temperature_c(liquid_c, ambient_c, insulated=insulated)
+        reference, expansion = self.job.table.reference_temperature_c, self.job.material
+        factor = shell_factor(shell_c, reference, expansion.expansion_per_k)
+        return self.at(height_m).value_m3 * factor
+
+    def dip_of(self, volume_m3: float | np.ndarray) -> Dips:
+        """(n,) dips of volumes, with their standard uncertainties (`dips.Dips`); HeightError."""
+        table = self.table
+        return dips.dips_of(table.height_m, table.volume_m3, table.factor_m3, volume_m3)
+
+    def at_ullage(self, ullage_m: float) -> Quantity:
+        """Volume at an ullage, measured down from the reference point of the gauge.
+
+        Raises HeightError outside the table, and without a reference height in the job.
+        """
+        reference = self.job.datum.reference_height_m
+        if reference is None:
+            raise HeightError(
+                message("no_ullage", "no ullage without datum.reference_height_m in the job")
+            )
+        return self.at(float(dips.ullage_m(reference, ullage_m)))
+
+    def delivery(self, low_m: float, high_m: float) -> Quantity:
+        """Volume between two dips, with its own uncertainty; HeightError outside."""
+        return stated_delivery(self.table, self.simulation, low_m, high_m)
+
+
+def run(
+    job: Job,
+    progress: Callable[[str], None] | None = None,
+    *,
+    counting: Callable[[str, int, int], None] | None = None,
+    simulated: bool | None = None,
+) -> Result:
+    """Compute a job: adjusted points, wall and axis, parts of the tank, table with covariance.
+
+    progress  called with a line of text as each step begins
+    counting  called as counting(text, done, total) while a long step goes on
+    simulated whether the table is simulated, too; None: as the job says. One without any
+              uncertainty never is
+    Raises InputError when a course is left with too few points, SolutionError when the survey does
+    not determine the points, the vertical or the scale or when there is no wall, TypeError for
+    anything but a `Job`.
+    """
+    _refuse_other(job, "run")
+    with _telling(job):
+        return _run(job, progress or (lambda text: None), counting, simulated)
+
+
+def _run(job, tell, counting, simulated):
+    if job.tank is None:
+        raise InputError(
+            Problem("job.toml", message("no_tank", "no tank: only its survey can be adjusted"))
+        )
+    adjustment = None
+    if job.measurements is not None:
+        job, adjustment = _adjusted(job, tell)
+    try:
+        survey = _survey(job, tell, np.inf if adjustment is None else adjustment.dof)
+    except SolutionError as error:
+        if adjustment is None or not adjustment.warnings:
+            raise
+        told = (one.text for one in _placed(job, adjustment.warnings[:TOLD]))
+        raise SolutionError(*error.args, *told) from error
+    wall = survey if isinstance(survey, Wall) else None
+    if adjustment is not None and wall is not None:
+        refuse_other_side(job, partial(is_within_wall, wall), adjustment)
+    elif adjustment is not None and isinstance(survey, Scan):
+        refuse_other_side(job, survey.is_within, adjustment)
+    made = tabled(job, survey, tell)
+    body, zero, table = made.body, made.zero_m, made.table
+    tell(message("stating", "stating volumes and deliveries"))
+    stated = statements(job, table, made.straightness.largest_m3)
+    simulation = None
+    intervals = gum_intervals(table.volume_m3, table.u_m3, table.U_m3)
+    wanted = job.table.monte_carlo if simulated is None else simulated
+    if wanted and table.sources:
+        tell(SIMULATING)
+        pairs = pairs_to_simulate(stated, job, body, table)
+        simulation = simulate_table(job, survey, body, zero, table, pairs, tell=counting)
+        intervals = simulation.intervals(table)
+    return Result(
+        job=job,
+        wall=wall,
+        scan=survey if isinstance(survey, Scan) else None,
+        body=body,
+        zero_m=zero,
+        table=table,
+        straightness=made.straightness,
+        proportional_parts=() if wall is None else _parts(job.table, made, intervals.U_m3),
+        corrections=corrections_of(job, survey, made.over_m),
+        by_density=_by_density(job, survey, made.levels_m, zero),
+        stated=stated,
+        simulation=simulation,
+        intervals=intervals,
+        rule=verdict_of(job, body, table, intervals, simulation),
+        warnings=_warnings(job, adjustment, survey, made),
+        adjustment=adjustment,
+    )
+
+
+def _warnings(job, adjustment, survey, made):
+    of_survey = ()
+    if adjustment is not None:
+        left_open = of_adjustment(job, adjustment.datum, adjustment.causes)
+        of_survey = (*adjustment.warnings, *left_open)
+    warnings = (
+        *job.warnings,
+        *of_survey,
+        *doubts_of_table(job, survey, made),
+        *incomplete_certificate(job),
+    )
+    return _placed(job, warnings)
+
+
+def _placed(job, problems):
+    """Problems by workbook and sheet where the job stands in one."""
+    if not job.source.endswith(".xlsx"):
+        return tuple(problems)
+    return tuple(in_book(one, job.source) for one in problems)
+
+
+@contextmanager
+def _telling(job):
+    try:
+        yield
+    except InputError as error:
+        raise InputError(_placed(job, error.problems)) from error
+
+
+def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjustment:
+    """Adjust the survey of a job, whether it has a tank or not: a `surveys.Adjustment`.
+
+    progress  called with a line of text as each step begins
+    Raises InputError when nothing was measured, SolutionError when the measurements do not
+    determine the points, TypeError for anything but a `Job`.
+    """
+    _refuse_other(job, "adjust_job")
+    if job.measurements is None:
+        raise InputError(
+            Problem(
+                "job.toml",
+                message("no_measurements", "no measurements: there is nothing to adjust"),
+            )
+        )
+    with _telling(job):
+        adjustment = adjust_survey(job.measurements, progress or (lambda text: None))
+    return replace(adjustment, warnings=_placed(job, adjustment.warnings))
+
+
+def _refuse_other(job, name):
+    if not isinstance(job, Job):
+        raise TypeError(f"found {type(job).__name__}; expected a Job: {name}(tankcal.load(path))")
+
+
+def _adjusted(job, tell):
+    """The job with the points of its adjusted survey, and the adjustment."""
+    if job.points is not None and not job.points.from_adjustment:
+        expected = message(
+            "points_beside_survey",
+            "given beside a survey; expected one of them: the points are adjusted from it",
+        )
+        raise InputError(Problem("points.csv", expected))
+    adjustment = adjust_survey(job.measurements, tell)
+    refuse_undetermined(adjustment.datum)
+    points = wall_points(adjustment, job.measurements, job.survey.side)
+    return replace(job, points=among_themselves(points)), adjustment
+
+
+def _survey(job, tell, dof):
+    """What was surveyed: a wall of courses, a mesh, the scan of another wall; None: sizes alone."""
+    if job.tank.kind == "vertical":
+        return find_wall(job, tell, dof)
+    if job.mesh is not None:
+        tell(message("checking_mesh", "checking the mesh {file}", file=job.mesh.file))
+        return parse_mesh(job.mesh.file, job.mesh.data, job.mesh.unit_m)
+    if job.points is not None:
+        tell(
+            message(
+                "fitting_wall", "fitting the wall to {count} points", count=len(job.points.names)
+            )
+        )
+        return scanned(job, dof)
+    return None
+
+
+def _parts(spec, made, U_m3):
+    """Proportional parts of a centimetre table where their error is a small part of U."""
+    if spec.step_m is None or abs(spec.step_m - PARTS * MILLIMETRE) > 1e-9:
+        return ()
+    edges = np.unique(np.round([0.0, *made.kinks_m, made.top_m], 3))
+    allowed = np.maximum(PARTS_OF_U * np.minimum(U_m3, VAST_M3), PARTS_M3)
+
+    def bound_m3(dips_m):
+        return np.interp(dips_m, made.table.height_m, allowed)
+
+    return proportional_parts(made.volume_m3, edges, spec.step_m, PARTS, bound_m3)
+
+
+def _by_density(job, survey, levels, zero_m):
+    """The same rows for each further density of the liquid: another head, another draught."""
+    found = {}
+    for density in job.table.other_densities_kg_m3:
+        filled = _filled_with(job, density)
+        body = body_of(filled, survey, uncertain=False)
+        found[density] = body.volume_m3(levels)
+        refuse_falling(filled, body, zero_m, levels - zero_m, found[density])
+    return found
+
+
+def _filled_with(job, density):
+    """The job of a tank that holds another liquid, in which its floating roof floats."""
+    roof = job.roof and replace(job.roof, reference_density_kg_m3=density)
+    return replace(job, table=replace(job.table, liquid_density_kg_m3=density), roof=roof)

@@ -1,0 +1,120 @@
+"""Second derivatives of the volumes by the declared inputs, from the tank itself.
+
+    H_ab u_a u_b = [J_b(x_a + u_a) - J_b(x_a - u_a)] u_b / 2
+
+The slopes J_b are taken of the tank with the input a moved by its standard uncertainty, or at dips
+moved by that of the datum. A scale s of surveyed lengths gives V = s^2 times a tank whose plates
+are 1/s as thick: second derivatives are those by the other inputs, twice for temperature and level,
+once for lengths that do not grow with it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.errors import SolutionError
+from tankcal.pipeline.simulation.variation import VARIED, varied
+from tankcal.pipeline.tanks import body_of
+from tankcal.tank.body import summed
+
+PICKED, FROM_EMPTY = 400, 40  # rows that curvatures are computed at; of them next to the empty tank
+STEPS = (1.0, 1 / 4, 1 / 16)  # in u, by which an input is moved, until there is such a tank
+SMALLEST = 1e-4  # of u of a row: a smaller second derivative is left out everywhere
+BY_SCALE = {
+    **dict.fromkeys(("scale", "offset", "barrel", "plate_thickness", "paint"), 1.0),
+    **dict.fromkeys(("datum", "shell_temperature", "expansion"), 2.0),
+}
+
+
+@dataclass(frozen=True)
+class Curvature:
+    """pairs (k,) of input names; values (rows, k) m3: second derivative times both u."""
+
+    pairs: tuple[tuple[str, str], ...]
+    values: np.ndarray
+
+
+def curvature(job, survey, body, levels_m, declared, least_m3):
+    """`Curvature` of the rows by pairs of declared inputs.
+
+    declared  {name: u in SI} of inputs with one column each
+    least_m3  (rows,) u of each row: second derivatives below 1e-4 of it everywhere are left out
+    """
+    picked = _picked(len(levels_m))
+    found = {}
+    for name in declared:
+        columns = _of_input(job, survey, body, levels_m, picked, name, declared)
+        for other, column in columns.items():
+            found.setdefault(tuple(sorted((name, other))), []).append(column)
+    size = np.where(least_m3 > 0, least_m3, np.inf)
+    means = {pair: sum(columns) / len(columns) for pair, columns in found.items()}
+    kept = [pair for pair, one in means.items() if np.max(np.abs(one) / size) > SMALLEST]
+    values = np.stack([means[pair] for pair in kept], axis=1) if kept else None
+    empty = np.empty((len(levels_m), 0))
+    return Curvature(tuple(kept), empty if values is None else values)
+
+
+def _of_input(job, survey, body, levels_m, picked, name, declared):
+    """{other: (rows,)} second derivatives by one input and each other, times both u."""
+    if name == "datum":
+        return _of_level(body, levels_m, declared)
+    if name == "scale":
+        return _of_scale(body, levels_m, declared) if body.shell is not None else {}
+    if name == "tilt" and body.shell is not None:
+        return {"tilt": body.shell.volume_m3(levels_m) * declared["tilt"] ** 2}
+    if name not in VARIED:
+        return {}
+    for share in STEPS:
+        try:
+            ends = _slopes_of_moved(job, survey, levels_m[picked], name, share * declared[name])
+        except SolutionError:  # no such tank: an error that large cannot have been made
+            continue
+        break
+    else:
+        return {}
+    if ends is None:
+        return {}
+    place = np.arange(len(levels_m))
+    return {
+        other: np.interp(place, picked, (ends[0][other] - ends[1][other]) / (2 * share) * u)
+        for other, u in declared.items()
+        if other in ends[0] and other != "datum" and other != "scale"
+    }
+
+
+def _slopes_of_moved(job, survey, levels_m, name, step):
+    """Derivatives of the tank with the input a step up, and a step down; None: it has no such."""
+    jobs = [varied(job, name, sign * step) for sign in (1, -1)]
+    if None in jobs:
+        return None
+    tanks = [body_of(moved, survey, uncertain=False) for moved in jobs]
+    return [tank.derivatives(np.minimum(levels_m, tank.highest_m)) for tank in tanks]
+
+
+def _of_level(body, levels_m, declared):
+    """What moves with the dips, such as deadwood, has no second derivative by the datum."""
+    u = declared["datum"]
+    up = np.minimum(levels_m + u, body.highest_m)
+    down = np.maximum(levels_m - u, body.lowest_m)
+    moving = [part for part in body.parts if "datum" in part.derivatives(levels_m[:1])]
+    ends = [summed(part.derivatives(levels) for part in moving) for levels in (up, down)]
+    span = np.where(up > down, (up - down) / u, 1.0)
+    return {
+        other: (ends[0][other] - ends[1][other]) / span * u_other
+        for other, u_other in declared.items()
+        if other in ends[0]
+    }
+
+
+def _of_scale(body, levels_m, declared):
+    slopes = body.derivatives(levels_m)
+    return {
+        other: times * slopes[other] * declared[other] * declared["scale"]
+        for other, times in BY_SCALE.items()
+        if other in declared and other in slopes
+    }
+
+
+def _picked(rows):
+    spread = np.linspace(0, rows - 1, min(rows, PICKED)).round().astype(int)
+    return np.unique([*range(min(rows, FROM_EMPTY)), *spread])

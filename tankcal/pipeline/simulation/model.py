@@ -1,0 +1,147 @@
+"""The volumes of a table and of deliveries from it, as functions of few coordinates."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tankcal.gum.monte_carlo import ESTIMATES, QuadraticRows, numerical_tolerance, simulate
+from tankcal.pipeline.simulation.bent import bent_rows, datum_law, simulate_bent
+from tankcal.pipeline.simulation.coordinates import coordinates
+from tankcal.pipeline.simulation.curvature import curvature
+
+UNFELT = 1e-4  # of u of a volume: an input that adds less is not drawn for it
+COUNTED = ("reached", "controlled", "draws", "tolerance")  # of a row that was drawn for
+MOST_ROWS, MOST_BENT = 800, 60  # that are drawn for; of longer tables others follow neighbours
+
+
+class Model:
+    """The rows first, then what weights (deliveries, rows) make of them.
+
+    A coordinate is in units of its input's u, so a slope is a contribution in m3.
+    """
+
+    def __init__(self, job, survey, body, zero_m, table, weights):
+        self.body, self.table, self.weights = body, table, weights
+        self.rows = len(table.height_m)
+        self.parts = slice(0, self.rows), slice(self.rows, None)
+        self.levels = np.minimum(table.height_m + zero_m, body.highest_m)
+        self.inputs = coordinates([one.mapped(self._both) for one in table.sources])
+        u = {one.name: one.u for one in body.declared if one.name in self.inputs.place and one.u}
+        self.datum_m = u.get("datum", 0.0)
+        self.curved = curvature(job, survey, body, self.levels, u, table.u_m3)
+        self.quadratic = self._quadratic()
+        self.bent = self._bent()
+        self.some_even = self._thinned(np.flatnonzero(~self.bent), MOST_ROWS)
+        self.some_bent = self._thinned(np.flatnonzero(self.bent), MOST_BENT)
+
+    @property
+    def drawn(self):
+        """How many rows are drawn for."""
+        places = (self.some_even, self.some_bent)
+        return sum(int(np.count_nonzero(one < self.rows)) for one in places)
+
+    def simulated(self, goal, tell):
+        """`monte_carlo.Simulation` of all volumes."""
+        even, bent = self.some_even, self.some_bent
+        found = simulate(
+            self.quadratic.subset(even), self.inputs.distributions, goal=goal, tell=tell
+        )
+        if len(bent):
+            found = _merged(found, even, self._of_bent(bent, goal), bent)
+        places = np.sort(np.concatenate([even, bent]))
+        u = np.linalg.norm(self.inputs.slopes, axis=1)
+        full = spread(found, places, self.quadratic.value, u, goal.digits)
+        endless = [not np.isfinite(one.sd) for one in self.inputs.distributions]
+        without_u = np.any(self.inputs.slopes[:, endless] != 0, axis=1)
+        return replace(full, u=np.where(without_u, np.inf, full.u))
+
+    def _both(self, of_rows):
+        """Values of the rows, then those of the deliveries."""
+        return np.concatenate([of_rows, self.weights @ of_rows])
+
+    def _thinned(self, volumes, most):
+        """At most so many of the rows among these volumes, evenly, and all deliveries."""
+        rows = volumes[volumes < self.rows]
+        some = np.linspace(0, len(rows) - 1, min(most, len(rows))).round().astype(int)
+        return np.concatenate([rows[some], volumes[len(rows) :]])
+
+    def _quadratic(self):
+        count, pairs = len(self.inputs.distributions), self.curved.pairs
+        hessians = np.zeros((max(len(pairs), 1), count, count))
+        for hessian, (one, other) in zip(hessians, pairs, strict=False):
+            i, j = self.inputs.place[one], self.inputs.place[other]
+            hessian[i, j] += 0.25
+            hessian[j, i] += 0.25
+        second = self.curved.values if pairs else np.zeros((self.rows, 1))
+        return QuadraticRows(
+            self._both(self.table.volume_m3),
+            self.inputs.slopes,
+            hessians,
+            self._both(second),
+            np.zeros(count),
+        )
+
+    def _bent(self):
+        """(volumes,) which are not quadratic; a delivery is when a row that it reads is."""
+        rows = np.zeros(self.rows, dtype=bool)
+        if self.datum_m:
+            pair = ("datum", "datum")
+            kept = pair in self.curved.pairs
+            second = self.curved.values[:, self.curved.pairs.index(pair)] if kept else 0.0 * rows
+            slope = self.inputs.slopes[self.parts[0], self.inputs.place["datum"]]
+            rows = bent_rows(self.body, self.levels, self.datum_m, slope, second, self.table.u_m3)
+        return np.concatenate([rows, (self.weights != 0) @ rows > 0])
+
+    def _of_bent(self, bent, goal):
+        """`Simulation` of the volumes that are not quadratic, by the inputs that they feel."""
+        datum, slopes = self.inputs.place["datum"], np.abs(self.inputs.slopes[bent])
+        felt = np.any(slopes > UNFELT * np.linalg.norm(slopes, axis=1, keepdims=True), axis=0)
+        felt[datum] = False
+        others = np.flatnonzero(felt)
+        part = self.quadratic.subset(bent)
+        rest = replace(
+            part,
+            jacobian=part.jacobian[:, others],
+            hessians=part.hessians[:, others][:, :, others],
+            mean=np.zeros(len(others)),
+        )
+        weights = self._weights_of(bent)
+        needed = np.flatnonzero(np.any(weights != 0, axis=0))
+        unit = self.inputs.distributions[datum]
+        law = datum_law(self.body, self.levels[needed], self.datum_m, unit)
+        some = [self.inputs.distributions[place] for place in others]
+        return simulate_bent(rest, some, weights[:, needed] @ law.added_m3, law.below, goal)
+
+    def _weights_of(self, volumes):
+        """(volumes, rows) by which the rows make these volumes."""
+        own = volumes[volumes < self.rows]
+        weights = np.zeros((len(volumes), self.rows))
+        weights[np.arange(len(own)), own] = 1.0
+        weights[len(own) :] = self.weights[volumes[len(own) :] - self.rows]
+        return weights
+
+
+def _merged(found, even, others, bent):
+    """One Simulation from two, each of its own volumes."""
+    order = np.argsort(np.concatenate([even, bent]))
+    both = zip(found.by_volume.items(), others.by_volume.values(), strict=True)
+    return replace(found, **{name: np.concatenate([a, b])[order] for (name, a), b in both})
+
+
+def spread(found, places, value_m3, u_m3, digits):
+    """A Simulation of all volumes from one of some, at `places` among them.
+
+    In between, everything is linear in parts of the u of the law of propagation: the volumes of
+    neighbouring rows have nearly the same distribution. digits  of u that its tolerance is for
+    """
+    every, near = np.arange(len(value_m3)), np.searchsorted(places, np.arange(len(value_m3)))
+    size, full = np.where(u_m3 > 0, u_m3, 1.0), {}
+    for name, known in found.by_volume.items():
+        if name in COUNTED:
+            full[name] = known[np.minimum(near, len(places) - 1)]
+            continue
+        own = value_m3 if name in ESTIMATES and name != "u" else np.zeros(len(value_m3))
+        parts = (known - own[places]) / size[places]
+        full[name] = own + size * np.interp(every, places, parts)
+    tolerance = numerical_tolerance(np.where(np.isfinite(full["u"]), full["u"], u_m3), digits)
+    return replace(found, **full | {"tolerance": tolerance})

@@ -1,0 +1,156 @@
+"""From what was surveyed to the capacity table: rows, their volumes and what makes them uncertain.
+
+The wall may be that of an adjusted survey or that of a survey that is only planned.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.messages import message
+from tankcal.pipeline.cross_checks import doubts_of_mesh, doubts_of_scan, doubts_of_wall
+from tankcal.pipeline.plausibility import against_nominal, not_in_u
+from tankcal.pipeline.scan import Scan
+from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
+from tankcal.pipeline.wall import Wall, warnings_of
+from tankcal.tank.body import Body
+from tankcal.tank.capacity import Capacity
+from tankcal.tank.dips import (
+    HEIGHT_STEPS_M,
+    LADDERS_M,
+    Straightness,
+    choose_rows,
+    interpolation_errors,
+    table_heights,
+    whole_top,
+)
+from tankcal.tank.falling_capacity import refuse_falling
+from tankcal.uncertainty import ROUNDING, combined
+
+CLOSED = 1e-3  # of its largest free surface: one that is smaller at the top counts as none
+
+
+@dataclass(frozen=True)
+class Tabled:
+    """A tank with its capacity table.
+
+    body          the tank as the sum of its parts (`body.Body`)
+    zero_m        level of the table's zero: dip 0 in the frame of the parts
+    levels_m      (rows,) levels of the rows there
+    kinks_m       dips between empty and full at which the area jumps
+    table         `capacity.Capacity`
+    straightness  how far linear interpolation between the rows is from the exact volume
+    """
+
+    body: Body
+    zero_m: float
+    levels_m: np.ndarray
+    kinks_m: np.ndarray
+    table: Capacity
+    straightness: Straightness
+
+    @property
+    def top_m(self):
+        """Dip of the last row: that of the full tank as a whole millimetre."""
+        return float(self.table.height_m[-1])
+
+    @property
+    def over_m(self):
+        """How far the last row stands above the top of the tank; below 0: below it."""
+        return float(self.levels_m[-1] - self.body.highest_m)
+
+    def volume_m3(self, dips_m):
+        """(n,) exact volumes at dips."""
+        return _exact(self.body, self.zero_m)(dips_m)
+
+
+def tabled(job, survey, tell=lambda text: None):
+    """The `Tabled` of a job.
+
+    survey  its `wall.Wall`, `scan.Scan` or mesh, None where sizes alone tell of the tank
+    tell    called with a line of text as each step begins
+    """
+    tell(message("integrating", "integrating volumes"))
+    body = body_of(job, survey)
+    zero = zero_height(job, survey)
+    tell(message("propagating", "propagating the covariance to every row of the table"))
+    spec = job.table
+    top = whole_top(body.highest_m - zero, spec.height_unit, closed=_is_closed(body))
+    kinks = np.unique([kink - zero for kink in body.kinks_m if 0 < kink - zero < top])
+    exact = _exact(body, zero)
+    heights = _rows(spec, exact, top, kinks)
+    levels = heights + zero
+    volumes, areas, sources = _without_rounding(*body.rows(levels))
+    table = Capacity(
+        height_m=heights,
+        volume_m3=volumes,
+        area_m2=areas,
+        sources=sources,
+        probability=spec.coverage_probability,
+        critical_m=critical_zone(job),
+    )
+    dips = np.union1d(heights, kinks)
+    refuse_falling(job, body, zero, dips, exact(dips))
+    straightness = interpolation_errors(exact, heights, kinks)
+    return Tabled(body, zero, levels, kinks, table, straightness)
+
+
+def doubts_of_table(job, survey, made):
+    """Warnings of what was surveyed, as for `tabled`, and of the `Tabled` that was made of it."""
+    return (
+        *_doubts_of_survey(job, survey, made.top_m),
+        *not_in_u(made.body.undeclared()),
+        *against_nominal(job.tank, made.table.volume_m3[-1]),
+    )
+
+
+def _doubts_of_survey(job, survey, top_m):
+    if isinstance(survey, Wall):
+        return (*warnings_of(job, survey), *doubts_of_wall(job, survey))
+    if isinstance(survey, Scan):
+        return doubts_of_scan(job, survey, top_m)
+    return () if survey is None else doubts_of_mesh(job, top_m)
+
+
+def _without_rounding(volumes, areas, sources):
+    """The rows with exact zeros where nothing but rounding stands.
+
+    Below a raised bottom the volume is a difference of volumes: it came out as -9e-16 m3 with u of
+    3e-20 m3, and was written with twenty decimals. A row whose volume is 0 but unsure stays so.
+    """
+    u = combined(sources, len(volumes)).u
+    least = ROUNDING * np.max(np.abs(volumes), initial=0.0)
+    empty = (np.abs(volumes) <= least) & (u <= least)
+    flat = np.abs(areas) <= ROUNDING * np.max(np.abs(areas), initial=0.0)
+    rows = empty[:, None]
+    sources = tuple(one.mapped(lambda columns: np.where(rows, 0.0, columns)) for one in sources)
+    return np.where(empty, 0.0, volumes), np.where(flat, 0.0, areas), sources
+
+
+def _exact(body, zero_m):
+    """Function from dips to exact volumes."""
+    return lambda dips_m: body.volume_m3(dips_m + zero_m)
+
+
+def _is_closed(body):
+    """Whether a tank narrows to nothing at its top, as a sphere or a lying cylinder does."""
+    span = np.linspace(body.lowest_m, body.highest_m, 9)
+    areas = body.area_m2(span)
+    return bool(areas[-1] < CLOSED * areas.max())
+
+
+def _rows(spec, exact, top_m, kinks_m):
+    """Dips of the rows: by the step asked for, or by the bound on linear interpolation."""
+    step = spec.step_m
+    if step is None and spec.height_unit != "m":
+        step = float(HEIGHT_STEPS_M[spec.height_unit])
+    if spec.max_interpolation_error_m3 is not None:
+        return choose_rows(
+            exact,
+            top_m,
+            spec.max_interpolation_error_m3,
+            kinks_m,
+            step_m=step,
+            ladder_m=LADDERS_M[spec.height_unit],
+        ).height_m
+    return table_heights(step, top_m, spec.fine_step_m, spec.fine_zones)

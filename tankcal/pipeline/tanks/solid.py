@@ -1,0 +1,129 @@
+"""A tank of one solid: lying cylinder, sphere or mesh, from its sizes or its points."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+from tankcal.pipeline.tanks.estimates import estimates_of
+from tankcal.pipeline.tanks.furniture import deadwood_part
+from tankcal.pipeline.tanks.thermal import is_warmed, thermal_scale
+from tankcal.tank.body import Body, SolidPart
+from tankcal.tank.heads import End
+from tankcal.tank.meshes import mesh_part
+from tankcal.tank.solids import LyingTank, Sphere
+
+
+def solid_body(job, survey, switches):
+    scale = thermal_scale(job, switches)
+    job = _with_scan(job, survey)
+    given = job.horizontal or job.sphere
+    plate = 0.0
+    if given and job.survey.side == "outside" and switches.plate:
+        plate = given.thickness_m
+    if job.sphere is not None:
+        solid = Sphere((job.sphere.diameter_m - 2 * plate) * scale)
+    elif job.horizontal is not None:
+        solid = _lying(job.horizontal, plate, scale)
+    else:
+        solid = _of_mesh(job, survey, scale)
+    part = SolidPart(
+        solid,
+        scale,
+        job.material.expansion_per_k,
+        warmed=is_warmed(job, switches),
+        **(_of_scan(survey, scale) if job.points is not None else {}),
+        unused=() if plate else ("plate_thickness",),
+    )
+    parts = [part]
+    zero = solid_zero(job)
+    if switches.deadwood and job.deadwood:
+        parts.append(deadwood_part(job.deadwood, zero))
+    edges = {zero + edge for item in job.deadwood for edge in (item.bottom_m, item.top_m)}
+    return Body(
+        tuple(parts),
+        job.inputs,
+        0.0,
+        solid.top_m,
+        tuple(sorted(edges)),
+        job.correlations,
+        estimates_of(job),
+    )
+
+
+def solid_zero(job):
+    """Level of the table's zero: of the dip plate where it is given, above the solid's own zero.
+
+    The levels of a mesh count from its dip plate already.
+    """
+    datum = job.datum
+    if job.mesh is not None or datum.dip_plate_z_m is None:
+        return 0.0
+    if datum.bottom_z_m is None:
+        expected = message(
+            "plate_beside_scan",
+            "not available beside a scan: dips count from the inside bottom; expected blank",
+        )
+        raise InputError(Problem("job.toml", expected, column="datum.dip_plate_z_m"))
+    zero = datum.dip_plate_z_m - datum.bottom_z_m
+    if zero < 0:
+        expected = message(
+            "plate_below_solid",
+            "found {plate_m:g}; expected a plate inside the tank, 0 or above",
+            plate_m=datum.dip_plate_z_m,
+        )
+        raise InputError(Problem("job.toml", expected, column="datum.dip_plate_z_m"))
+    return zero
+
+
+def _with_scan(job, scan):
+    """The job with the sizes that its points gave."""
+    if job.points is None:
+        return job
+    found = dict(zip(scan.names, map(float, scan.values), strict=True))
+    if job.sphere is not None:
+        return replace(job, sphere=replace(job.sphere, diameter_m=found["diameter"]))
+    width = found["diameter"]
+    lying = replace(job.horizontal, width_m=width, height_m=width, tilt=found["tilt"])
+    return replace(job, horizontal=lying)
+
+
+def _of_scan(scan, scale):
+    """What the survey leaves uncertain, as arguments of `SolidPart`; lengths are to scale."""
+    lengths = np.array([scale if name == "diameter" else 1.0 for name in scan.names])
+    return {
+        "surveyed": scan.names,
+        "factors": tuple(
+            replace(one, columns=lengths[:, None] * one.columns) for one in scan.factors
+        ),
+    }
+
+
+def _of_mesh(job, mesh, scale):
+    """The part that a mesh encloses; levels count from the dip plate or from its lowest point."""
+    warmed = replace(mesh, vertices_m=scale * mesh.vertices_m)
+    zero = job.datum.dip_plate_z_m
+    if zero is None:
+        zero = job.datum.bottom_z_m
+    return mesh_part(warmed, zero if zero is None else scale * zero)
+
+
+def _lying(tank, plate_m, scale):
+    return LyingTank(
+        width_m=scale * (tank.width_m - 2 * plate_m),
+        height_m=scale * (tank.height_m - 2 * plate_m),
+        length_m=scale * tank.length_m,
+        end_a=_end(tank.end_a, plate_m, scale),
+        end_b=_end(tank.end_b, plate_m, scale),
+        tilt=tank.tilt,
+        roll_rad=tank.roll_rad,
+        dip_from_a_m=scale * tank.dip_from_a_m,
+        dip_direction=tank.dip_direction,
+    )
+
+
+def _end(end, plate_m, scale):
+    """The inside of an end; the depth of a torispherical one follows from its radii."""
+    lengths = (end.depth_m, end.dish_radius_m, end.knuckle_radius_m)
+    return End(end.kind, *(scale * (length - plate_m) if length else length for length in lengths))

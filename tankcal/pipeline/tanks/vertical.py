@@ -1,0 +1,263 @@
+"""A vertical tank: the shell of courses, its head, and what is under and in it."""
+
+import numpy as np
+
+from tankcal.geometry.outlines import FULL_TURN
+from tankcal.pipeline.tanks.estimates import estimates_of
+from tankcal.pipeline.tanks.furniture import deadwood_part
+from tankcal.pipeline.tanks.thermal import is_warmed, thermal_scale
+from tankcal.pipeline.tanks.widening import widened
+from tankcal.sections import coordinates_of
+from tankcal.tank.body import Body, Factor, ShellPart, survey_factors
+from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
+from tankcal.tank.courses import course_shape
+from tankcal.tank.fittings import floating_roof
+from tankcal.tank.hydrostatics import liquid_head
+from tankcal.tank.liquid_zone import Above, measured_bottom
+from tankcal.tank.terrain import Footprint
+from tankcal.tank.volumes import ShellVolume
+from tankcal.uncertainty import factor_of
+
+FOOTPRINT = 360  # azimuths of the outline that a bottom is computed over
+
+
+def insets_of(job, switches):
+    """(courses,) what is taken off the surveyed radii, m: plate and paint of an outside survey."""
+    outside = job.survey.side == "outside"
+    return [
+        outside * (switches.plate * course.thickness_m + switches.paint * course.paint_m)
+        for course in job.courses
+    ]
+
+
+def shell_volume(courses, joints_m, sections, insets_m=None, scale=1.0, stretch=1.0):
+    """The shell of courses from its sections; every course has one section at least.
+
+    insets_m (courses,) off the radii; scale of horizontal lengths, stretch of heights
+    """
+    shapes = []
+    for index in range(len(courses)):
+        own = [s.levels for s in sections if s.group.course == index]
+        levels = [level for of_section in own for level in of_section]
+        shapes.append(
+            course_shape(
+                stretch * joints_m[index],
+                stretch * joints_m[index + 1],
+                [stretch * level.height_m for level in levels],
+                [level.outline for level in levels],
+                inset_m=insets_m[index] if insets_m else 0.0,
+                scale=scale,
+            )
+        )
+    return ShellVolume(tuple(shapes))
+
+
+def shell_zero(job, wall):
+    """Level of the table's zero, in the frame of the parts.
+
+    Of a shell: of the dip plate, else of the bottom, above the bottom of the first course; a bottom
+    that leans with the shell lies higher or lower where the dip point is.
+    """
+    datum = job.datum
+    if datum.dip_plate_z_m is not None:
+        return datum.dip_plate_z_m - datum.bottom_z_m
+    if job.bottom.form == "leaning" and job.switches.bottom and datum.dip_x_m is not None:
+        offset = np.array([datum.dip_x_m, datum.dip_y_m]) - _axis_at_bottom(job, wall)
+        return -float(offset @ wall.shell.slope)
+    return 0.0
+
+
+def _axis_at_bottom(job, wall):
+    shell = wall.shell
+    return np.array(shell.axis_m) + (job.datum.bottom_z_m - shell.z_m) * np.array(shell.slope)
+
+
+def critical_zone(job):
+    """(low, high) dips between which a floating roof is partly afloat; None without a roof."""
+    if job.roof is None or not job.switches.roof:
+        return None
+    return job.roof.critical_bottom_m, job.roof.critical_top_m
+
+
+def vertical_body(job, wall, switches, uncertain):
+    shell = _shell(job, wall, switches, uncertain)
+    zero = shell_zero(job, wall)
+    parts = [shell]
+    if switches.head and (job.table.liquid_density_kg_m3 or job.survey.liquid_density_kg_m3):
+        parts.append(_head(job, shell, zero))
+    if switches.deadwood and job.deadwood:
+        parts.append(deadwood_part(job.deadwood, zero))
+    if switches.roof and job.roof is not None:
+        parts.append(_roof(job, zero))
+    if switches.bottom and job.bottom.form != "flat":
+        parts = _on_its_bottom(job, wall, shell, zero, parts)
+    return Body(
+        tuple(parts),
+        job.inputs,
+        lowest_m=min(getattr(part, "lowest_m", 0.0) for part in parts),
+        highest_m=shell.volume.height_m,
+        kinks_m=_kinks(shell, parts, job, zero),
+        correlations=job.correlations,
+        estimates=estimates_of(job),
+    )
+
+
+def _kinks(shell, parts, job, zero):
+    """Levels at which the area jumps: bottom and joints, edges of bottom, deadwood and roof."""
+    kinks = {course.bottom_m for course in shell.volume.courses}
+    kinks |= {zero + edge for item in job.deadwood for edge in (item.bottom_m, item.top_m)}
+    kinks |= {zero + edge for edge in critical_zone(job) or ()}
+    for part in parts:
+        kinks |= {getattr(part, name) for name in ("lowest_m", "highest_m") if hasattr(part, name)}
+    return tuple(sorted(kink for kink in kinks if np.isfinite(kink)))
+
+
+def _on_its_bottom(job, wall, shell, zero, parts):
+    """The parts with the bottom: beside them, or below them where it was measured by liquid."""
+    bottom = job.bottom
+    if bottom.form == "liquid":
+        measured = measured_bottom(bottom.level_m + zero, bottom.volume_m3, bottom.u_m3)
+        return [*(Above(part, measured.highest_m) for part in parts), measured]
+    return [*parts, widened(_bottom(job, wall, shell), shell)]
+
+
+def _bottom(job, wall, shell):
+    bottom, low = job.bottom, job.datum.bottom_z_m
+    footprint = _footprint(wall, shell)
+    if bottom.form == "leaning":
+        return leaning_bottom(footprint, wall.shell.slope)
+    if bottom.form == "points":
+        xyz = bottom.xyz_m - (0.0, 0.0, low)
+        return surveyed_bottom(footprint, xyz, bottom.sd_m, wall.shell.slope)
+    return shaped_bottom(bottom.form, footprint.area_m2, bottom.centre_z_m - low)
+
+
+def _footprint(wall, shell):
+    """The inside outline of the first course at its bottom: that of its lowest section, to scale.
+
+    As large as the shell is there.
+    """
+    level = min((level for section in wall.sections for level in section.levels), key=_height)
+    outline = level.outline
+    radius = outline.radius_m(np.arange(FOOTPRINT) * FULL_TURN / FOOTPRINT)
+    larger = shell.volume.area_m2([0.0])[0] / (np.pi * np.mean(radius**2))
+    x, y = np.array([outline.x_m, outline.y_m]) - level.height_m * np.array(wall.shell.slope)
+    return Footprint(float(x), float(y), radius * np.sqrt(larger))
+
+
+def _height(level):
+    return level.height_m
+
+
+def _head(job, shell, zero):
+    survey = job.survey
+    return liquid_head(
+        shell.volume,
+        [course.thickness_m for course in job.courses],
+        job.material.e_pa,
+        job.table.liquid_density_kg_m3,
+        survey_density_kg_m3=survey.liquid_density_kg_m3 or 0.0,
+        survey_level_m=_survey_level_m(survey, zero),
+        scale=shell.scale,
+    )
+
+
+def _survey_level_m(survey, zero):
+    """Level of the liquid on the survey day; 0 for the empty tank."""
+    if not survey.liquid_density_kg_m3:
+        return 0.0
+    return max((survey.liquid_level_m or 0.0) + zero, 0.0)
+
+
+def _roof(job, zero):
+    roof = job.roof
+    return floating_roof(
+        roof.mass_kg,
+        roof.critical_bottom_m + zero,
+        roof.critical_top_m + zero,
+        roof.reference_density_kg_m3,
+        roof.weighing,
+    )
+
+
+def _shell(job, wall, switches, uncertain):
+    scale = thermal_scale(job, switches)
+    stretch = scale if job.table.height_expansion else 1.0
+    leaning = np.hypot(1.0, wall.shell.tilt)  # horizontal cut over cut square to the axis
+    volume = shell_volume(
+        job.courses,
+        wall.joints_m,
+        wall.sections,
+        insets_of(job, switches),
+        scale if switches.tilt else scale / np.sqrt(leaning),
+        stretch if switches.tilt else stretch * leaning,
+    )
+    return ShellPart(
+        volume,
+        _factors(job, wall, volume) if uncertain else (),
+        scale,
+        job.material.expansion_per_k,
+        stretch,
+        _bearing(job, switches),
+        wall.shell.tilt if switches.tilt else 0.0,
+    )
+
+
+def _factors(job, wall, volume):
+    """What the survey leaves uncertain about the features of the shell: points, and form."""
+    jacobian = _features_by_points(volume, wall.sections, wall.covariance_m2.shape[0])
+    covariance = jacobian @ (wall.covariance_m2 @ jacobian.T)
+    causes, index = job.points.causes, coordinates_of(wall.accepted)
+    effects = [jacobian @ cause.column_m[index] for cause in causes]
+    common, form = volume.form_m2, wall.form
+    of_form = (
+        Factor(
+            "form",
+            factor_of(common @ common.T),
+            form.common_dof,
+            contrasts=form.common_contrasts,
+        ),
+        Factor("own_form", volume.own_form_m2, form.own_dof, contrasts=form.own_contrasts),
+    )
+    return (
+        *survey_factors(covariance, wall.noise_dof, causes, effects),
+        *(one for one in of_form if one.columns.shape[1]),
+    )
+
+
+def volume_by_points(job, wall, levels_m):
+    """(rows, 3m) derivative of the shell's volume below levels by the accepted points, m2."""
+    volume = _shell(job, wall, job.switches, False).volume
+    jacobian = _features_by_points(volume, wall.sections, wall.covariance_m2.shape[0])
+    return volume.weights_m(np.maximum(levels_m, 0.0)) @ jacobian
+
+
+def _bearing(job, switches):
+    """Declared inputs that the corrections of the shell use."""
+    outside = job.survey.side == "outside"
+    bears = {
+        "plate_thickness": outside and switches.plate and any(c.thickness_m for c in job.courses),
+        "paint": outside and switches.paint and any(c.paint_m for c in job.courses),
+        "shell_temperature": is_warmed(job, switches),
+        "expansion": is_warmed(job, switches),
+    }
+    return tuple(name for name, does in bears.items() if does)
+
+
+def _features_by_points(volume, sections, coordinates):
+    """(f, coordinates) derivative of the features of the shell by the points' coordinates."""
+    jacobians = []
+    for index, course in enumerate(volume.courses):
+        by_parameters = course.upper("by_parameters")
+        jacobian = np.zeros((len(by_parameters), coordinates))
+        start = 0
+        for section in sections:
+            if section.group.course != index:
+                continue
+            columns = coordinates_of(section.group.members)
+            for level in section.levels:
+                part = by_parameters[:, start : start + len(level.by_points)]
+                start += part.shape[1]
+                jacobian[:, columns] += part @ level.by_points
+        jacobians.append(jacobian)
+    return np.vstack(jacobians)

@@ -1,0 +1,103 @@
+"""The drawings of results, by name, for notebooks."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tankcal.survey import Adjustment
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def plot(result, what: str | None = None) -> "Figure":
+    """A drawing of a result, or of an adjusted survey, as a matplotlib Figure.
+
+    Parameters
+    ----------
+    result : Result or Adjustment
+        Of an Adjustment its points from above are drawn, with their error ellipses.
+    what : {"capacity", "budget", "sections", "residuals", "wall"}, optional
+        Of a Result: litres per centimetre and U against the dip (this one without a name); what U
+        at the top consists of; of a surveyed wall the sections about their circles, the residuals
+        of their points, the wall unrolled.
+
+    Raises
+    ------
+    ValueError
+        For another name, or a drawing of the wall where none was surveyed.
+    """
+    if isinstance(result, Adjustment):
+        if what is not None:
+            raise ValueError(f"found {what!r}; an adjusted survey has one drawing: name none")
+        return _drawn(_network, result)
+    what = what or "capacity"
+    if what not in _DRAWINGS:
+        raise ValueError(f"found {what!r}; expected one of {', '.join(_DRAWINGS)}")
+    if what in _OF_THE_WALL and result.wall is None:
+        raise ValueError(f"no wall was surveyed: there is no drawing of its {what}")
+    return _drawn(_DRAWINGS[what], result)
+
+
+def _drawn(draw, result):
+    from tankcal.pipeline import plots  # matplotlib is loaded when something is drawn
+
+    return draw(plots, result)
+
+
+def _network(plots, adjustment):
+    covariance = adjustment.covariance_m2[:, :2, :2]
+    return plots.network(adjustment.names, adjustment.xyz_m[:, :2], covariance)
+
+
+def _capacity(plots, result):
+    table = result.table
+    return plots.capacity_curves(table.height_m, table.area_m2, result.intervals.U_m3)
+
+
+def _budget(plots, result):
+    lines = result.budget().lines
+    return plots.budget_bars([(one.name, one.share, one.is_default) for one in lines])
+
+
+def _sections(plots, result):
+    return plots.polar(_rings(plots, result), most=len(result.wall.sections))[0]
+
+
+def _residuals(plots, result):
+    return plots.residual_panels(_rings(plots, result), most=len(result.wall.sections))[0]
+
+
+def _wall(plots, result):
+    wall, rings = result.wall, _rings(plots, result)
+    members = np.concatenate([section.group.members for section in wall.sections])
+    height_m = result.job.points.xyz_m[wall.accepted[members], 2] - result.job.datum.bottom_z_m
+    azimuth = np.concatenate([ring.azimuth_deg for ring in rings])
+    residual = np.concatenate([ring.residual_m for ring in rings])
+    return plots.deviation_map(azimuth, height_m, residual, wall.joints_m)
+
+
+def _rings(plots, result):
+    every_degree = np.arange(360.0)
+    return [
+        plots.Ring(
+            section.group.name,
+            f"{section.group.height_m:.3f} m",
+            section.circle.radius_m,
+            np.degrees(section.outline.azimuth_rad) % 360,
+            section.circle.residuals_m,
+            every_degree,
+            section.outline.radius_m(np.radians(every_degree)),
+        )
+        for section in result.wall.sections
+    ]
+
+
+_DRAWINGS = {
+    "capacity": _capacity,
+    "budget": _budget,
+    "sections": _sections,
+    "residuals": _residuals,
+    "wall": _wall,
+}
+_OF_THE_WALL = ("sections", "residuals", "wall")

@@ -1,0 +1,270 @@
+"""From surveyed points to the sections of the shell: wall and axis, covariance, form, outlines."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse
+
+from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.geometry.form import Form
+from tankcal.geometry.outlines import polar
+from tankcal.geometry.shell import Shell, course_of, find_shell
+from tankcal.geometry.spectrum import estimate_form
+from tankcal.messages import message
+from tankcal.pipeline.plausibility import (
+    ADVISED_POINTS,
+    FEWEST_POINTS,
+    doubts,
+    noise_is_estimated,
+    origin_of,
+    vague_points,
+    vague_vertical,
+    weak_sections,
+)
+from tankcal.sections import (
+    Section,
+    coordinates_of,
+    covariance_of,
+    fit_section,
+    group_by_height,
+    group_by_name,
+    sample_of,
+)
+
+
+@dataclass(frozen=True)
+class Wall:
+    """The wall of a tank as surveyed.
+
+    shell          axis, tilt, and what became of every point
+    joints_m       (courses + 1,) heights of the joints above the bottom, along the vertical
+    accepted       (m,) indices of the accepted points in job.points
+    covariance_m2  (3m, 3m) of the accepted points, sparse or dense
+    noise_dof      degrees of freedom of that covariance's scale
+    form           what the points tell of the form between them (`spectrum.Form`)
+    sections       from the bottom up
+    """
+
+    shell: Shell
+    joints_m: np.ndarray
+    accepted: np.ndarray
+    covariance_m2: object
+    noise_dof: float
+    form: Form
+    sections: tuple[Section, ...]
+
+
+def find_wall(job, tell, dof=np.inf, form=None):
+    """The wall, its axis and its sections, from the points of a job.
+
+    tell  called with a line of text as each step begins
+    dof   degrees of freedom of the points' covariance, where it was given
+    form  `Form` of the shell where it is known beforehand; None: the points tell it
+    Raises InputError when a course is left with too few points, SolutionError when there is no
+    wall.
+    """
+    tell(
+        message(
+            "separating",
+            "separating the wall from clutter in {count} points",
+            count=len(job.points.names),
+        )
+    )
+    heights = np.cumsum([0.0] + [course.height_m for course in job.courses])
+    sds, estimated = radial_sds(job.points), noise_is_estimated(job)
+    shell = _shell(job, heights, sds)
+    accepted = np.flatnonzero(shell.reason == "")
+    joints = heights / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
+    tell(
+        message(
+            "fitting_sections",
+            "fitting sections through {count} points of the wall",
+            count=len(accepted),
+        )
+    )
+    groups = _groups(job, shell, accepted, joints)
+    given = _given_covariance(job.points, accepted)
+    factor = (shell.noise_m / _median_sd(sds)) ** 2 if estimated else 1.0
+    if form is None:
+        samples = [sample_of(*one) for one in _to_fit(job, shell, accepted, groups, given)]
+        form = estimate_form(samples, factor)
+    covariance = given if factor == 1.0 else given * factor  # it may be half a gigabyte
+    to_fit = _to_fit(job, shell, accepted, groups, covariance)
+    sections = tuple(fit_section(*one, form) for one in to_fit)
+    noise_dof = shell.noise_dof if estimated else dof
+    return Wall(shell, joints, accepted, covariance, noise_dof, form, sections)
+
+
+def _shell(job, heights, sds):
+    try:
+        return find_shell(
+            job.points.xyz_m,
+            job.datum.bottom_z_m + heights,
+            job.tank.nominal_diameter_m / 2,
+            sd_m=sds,
+            snooping=job.snooping,
+        )
+    except SolutionError as error:
+        if job.points.from_adjustment:
+            hint = message(
+                "told_by_targets",
+                "{error}, and bottom_z_m; targets.csv tells points of the wall from others",
+                error=error.args[0],
+            )
+            raise SolutionError(hint) from error
+        raise
+
+
+def warnings_of(job, wall):
+    """What a sound survey of a sound wall hardly has."""
+    groups = [section.group for section in wall.sections]
+    sds = radial_sds(job.points)
+    return (
+        *weak_sections(job, groups, _azimuths(job, wall.shell, wall.accepted)),
+        *doubts(job, wall.shell, wall.sections, sds),
+        *vague_points(job.points, wall.accepted, sds, wall.shell.noise_m),
+        *vague_vertical(job.points),
+    )
+
+
+def _groups(job, shell, wall, joints):
+    """Groups of indices into `wall`; raises InputError for courses and sections with too few."""
+    points = job.points
+    height = points.xyz_m[wall, 2] - job.datum.bottom_z_m
+    azimuth = _azimuths(job, shell, wall)
+    names = [points.section[i] for i in wall]
+    if all(names):
+        groups = group_by_name(names, height, lambda z: course_of(z, joints), azimuth, joints)
+    else:
+        groups = group_by_height(height, azimuth, course_of(height, joints), joints)
+    _refuse_weak(groups, job.courses, height, points)
+    return groups
+
+
+def _refuse_weak(groups, courses, height, points):
+    """Raise InputError for sections of too few points or too tall, and courses without any."""
+    problems = []
+    for group in groups:
+        count, tall = len(group.members), np.ptp(height[group.members])
+        if count < FEWEST_POINTS:
+            problems.append(
+                message(
+                    "section_of_few",
+                    "section {name} has {count} points on the wall, expected at least {fewest} "
+                    "({advised} or more are advised)",
+                    name=group.name,
+                    count=count,
+                    fewest=FEWEST_POINTS,
+                    advised=ADVISED_POINTS,
+                )
+            )
+        if tall > 1.2 * courses[group.course].height_m:
+            height_m = courses[group.course].height_m
+            problems.append(
+                message(
+                    "section_too_tall",
+                    "section {name} is {tall:.3f} m tall, expected points within one course "
+                    "({height_m:.3f} m)",
+                    name=group.name,
+                    tall=tall,
+                    height_m=height_m,
+                )
+            )
+    seen = {group.course for group in groups}
+    problems += [
+        message(
+            "course_without_section",
+            "course {name} has no section: expected {fewest} points or more on its wall",
+            name=course.name,
+            fewest=FEWEST_POINTS,
+        )
+        for index, course in enumerate(courses)
+        if index not in seen
+    ]
+    if problems:
+        raise InputError([Problem(origin_of(points), text) for text in problems])
+
+
+def _azimuths(job, shell, wall):
+    """Azimuths of the wall points about the axis at their own height."""
+    xyz = job.points.xyz_m[wall]
+    axis = np.array(shell.axis_m) + np.outer(xyz[:, 2] - shell.z_m, shell.slope)
+    return polar(xyz[:, :2] - axis, 0.0, 0.0)[0]
+
+
+def among_themselves(points):
+    """Adjusted points with the covariance that they have among themselves.
+
+    C' = S C S + s2 D D',  S = I - D D',  D an orthonormal basis of their common shift and their
+    turn about the vertical, s2 the mean variance that is left. No volume depends on these, and a
+    datum that holds one photo or one point gives them whatever variance it has: sections fitted
+    with it would depend on that choice. Columns of causes go along.
+    """
+    basis, given = common_motions(points.xyz_m), points.covariance_m2
+    across = taken_along(basis, given @ basis, np.trace(given))
+    change = np.hstack([basis, across]) @ np.hstack([across, basis]).T
+    causes = tuple(
+        replace(cause, column_m=cause.column_m - basis @ (basis.T @ cause.column_m))
+        for cause in points.causes
+    )
+    return replace(points, covariance_m2=np.subtract(given, change, out=change), causes=causes)
+
+
+def common_motions(xyz_m):
+    """(3n, 4) orthonormal basis of the shifts and the turn about the vertical of points (n, 3)."""
+    x, y, _ = (xyz_m - xyz_m.mean(axis=0)).T
+    motions = np.zeros((len(x), 3, 4))
+    motions[:, :, :3] = np.eye(3)
+    motions[:, 0, 3], motions[:, 1, 3] = -y, x
+    return np.linalg.qr(motions.reshape(-1, 4))[0]
+
+
+def taken_along(basis, spread, trace):
+    """A (3n, 4) of C' = C - D A' - A D', which is S C S + s2 D D' of `among_themselves`.
+
+    A = C D - D (D'C D + s2 I) / 2; basis D, spread C D, trace of C
+    """
+    across = spread - 0.5 * basis @ (basis.T @ spread)
+    left = trace - 2 * np.sum(basis * across)
+    return across - 0.5 * max(left, 0.0) / (len(basis) - 4) * basis
+
+
+def radial_sds(points):
+    """(n,) standard deviations of the points in plan, or None when the file gives none."""
+    if points.covariance_m2 is not None:
+        variances = points.covariance_m2.diagonal().reshape(-1, 3)
+    elif points.sd_m is not None:
+        variances = points.sd_m**2
+    else:
+        return None
+    return np.sqrt(variances[:, :2].mean(axis=1))
+
+
+def _median_sd(sds):
+    """Median standard deviation of the points in plan; one metre when the file gives none."""
+    return 1.0 if sds is None else float(np.median(sds))
+
+
+def _given_covariance(points, wall):
+    """(3m, 3m) as in the file; one metre for every coordinate when the file gives none."""
+    if points.covariance_m2 is not None:
+        index = coordinates_of(wall)
+        return points.covariance_m2[np.ix_(index, index)]
+    if points.sd_m is not None:
+        return scipy.sparse.diags_array(points.sd_m[wall].ravel() ** 2).tocsr()
+    return scipy.sparse.eye_array(3 * len(wall), format="csr")
+
+
+def _to_fit(job, shell, accepted, groups, covariance):
+    """Arguments of `fit_section`, but for the form, of each group."""
+    xyz = job.points.xyz_m[accepted]
+    return [
+        (
+            group,
+            xyz[group.members],
+            covariance_of(group.members, covariance),
+            shell.slope,
+            job.datum.bottom_z_m + group.height_m,
+        )
+        for group in groups
+    ]

@@ -1,0 +1,120 @@
+"""From checked values to a Plan: rings become stations, patterns targets, tapes two points each."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tankcal.geometry.form import Form, mode_variances
+from tankcal.planning.given import PLAN_FILE
+from tankcal.planning.model import Box, Known, Limits, Pillar, Plan, Tie
+from tankcal.planning.rings import photographs_of, setups_of, shell_of, tape_of, targets_of
+
+INCIDENCE_DEG, RAYS = 70.0, 3
+HIGHEST_MODE = 1000  # of the sum that turns an rms departure into an amplitude
+
+
+def assembled(job, given, folder):
+    """The Plan of a Job and what its plan gives beside it (`given.Given`), both sound."""
+    pattern = given.single["pattern"]
+    shell = shell_of(job, pattern)
+    targets = targets_of(pattern, shell, job.courses)
+    settings = job.measurements.settings
+    photos, setups, ties, extra, facing = [], [], [], {}, {}
+    for number, ring in enumerate(given.repeated["photo_rings"], 1):
+        photos += photographs_of(ring, number, shell, settings.image_sd_mm, ring.place)
+    for number, ring in enumerate(given.repeated["setup_rings"], 1):
+        setups += setups_of(ring, number, shell, ring.place)
+    for tape in given.repeated["tapes"]:
+        tie, ends, out = tape_of(tape, shell)
+        ties.append(tie)
+        extra |= ends
+        facing |= dict.fromkeys(ends, out)
+    ties += _listed(given.tables)
+    places = dict(zip(targets.names, targets.xyz_m, strict=True)) | extra
+    places |= {one.name: one.xyz_m for one in setups}
+    known = _known(job.measurements.control, places)
+    extra |= {
+        one.name: one.xyz_m
+        for one in known
+        if one.name not in places and np.isfinite(one.xyz_m).all()
+    }
+    return Plan(
+        job=replace(job, measurements=replace(job.measurements, control=None)),
+        shell=shell,
+        targets=targets,
+        photos=tuple(photos),
+        setups=tuple(setups),
+        ties=tuple(ties),
+        known=tuple(one for one in known if np.isfinite(one.sd_m).any()),
+        extra=extra,
+        facing=facing,
+        obstacles=tuple(_obstacle(one) for one in given.repeated["obstacles"]),
+        limits=_limits(given.single["limits"]),
+        form=_form(pattern),
+        costs={key: value or 0.0 for key, value in given.single["costs"].values.items()},
+        folder=folder,
+    )
+
+
+def _listed(tables):
+    """Ties of the plan's tables."""
+    found = []
+    for name, table in tables.items():
+        if table is None:
+            continue
+        kinds = table.of("kind") if "kind" in table.columns else [None] * len(table.rows)
+        tools = table.of("instrument") if "instrument" in table.columns else kinds
+        rows = zip(
+            table.of("from"), table.of("to"), table.of("s_mm"), table.of("readings"),
+            kinds, tools if name == "distances" else [None] * len(kinds), strict=True,
+        )  # fmt: skip
+        for start, end, sd, readings, kind, tool in rows:
+            named = (f"{start}-{end}", name, start, end)
+            found.append(Tie(*named, sd / 1000, kind or "spatial", tool, int(readings or 1)))
+    return found
+
+
+def _known(control, places):
+    """Known points; a coordinate left blank is the nominal one, where the plan has the point.
+
+    What is only compared (use = "check") is a place and no control.
+    """
+    if control is None:
+        return []
+    found = []
+    sds = np.where(control.check[:, None], np.nan, control.sd_m)
+    for name, xyz, sd in zip(control.point, control.xyz_m, sds, strict=True):
+        nominal = places.get(name, np.full(3, np.nan))
+        found.append(Known(name, np.where(np.isnan(xyz), nominal, xyz), sd))
+    return found
+
+
+def _obstacle(given):
+    if given["kind"] == "box":
+        corners = np.array([given["from_m"], given["to_m"]])
+        return Box(corners.min(axis=0), corners.max(axis=0), given["name"])
+    return Pillar(
+        np.array(given["axis_m"]), given["radius_m"], given["low_m"], given["high_m"],
+        given["name"],
+    )  # fmt: skip
+
+
+def _limits(given):
+    incidence = INCIDENCE_DEG if given["incidence_deg"] is None else given["incidence_deg"]
+    return Limits(
+        incidence_rad=float(np.radians(incidence)),
+        relative_u=given["relative_u"],
+        of=given["of"] or "top",
+        rays=int(given["rays"] or RAYS),
+        place=(PLAN_FILE, given.rows.get("of", given.row), "limits.of"),
+    )
+
+
+def _form(pattern):
+    """The expected Form: an rms departure s is the amplitude s^2 / sum of k^-3 over k >= 2.
+
+    The variance of a form of amplitude A at one azimuth is A sum k^-3, for cos^2 + sin^2 = 1.
+    """
+    whole, common = ((pattern[key] or 0.0) / 1000 for key in ("form_mm", "common_form_mm"))
+    unit = mode_variances(HIGHEST_MODE)[::2].sum()
+    return Form(common_m2=common**2 / unit, own_m2=max(whole**2 - common**2, 0.0) / unit)

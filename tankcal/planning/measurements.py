@@ -1,0 +1,205 @@
+"""A plan as measurements: those that will be made, with the values that they would have.
+
+Values are what the observations compute from the nominal places, without errors or with errors
+drawn from their standard deviations.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tankcal.geometry.rotations import angles_of
+from tankcal.planning.model import TAPED
+from tankcal.planning.visibility import measurable
+from tankcal.survey import Nominal
+from tankcal.survey.measurements import ImageReadings, KnownPoints, Photo, Readings, Setup, Targets
+from tankcal.survey.readings import true_distance_m
+
+DISTANCES = ("distances", "slope_distances")
+
+
+def nominal_of(plan):
+    """surveys.Nominal of a Plan."""
+    return Nominal(plan.points, {one.name: (one.xyz_m, one.rotation) for one in plan.photos})
+
+
+def measurements_of(plan, seen):
+    """job.Measurements of a Plan: what is measured and how well; values of readings are 0.
+
+    seen  visibility.Visibility
+
+    Readings that are repeated stand there once, with the standard deviation of their mean.
+    """
+    given, counts = plan.job.measurements, measurable(plan, seen)
+    seen = replace(seen, on_photo=seen.on_photo & counts, on_setup=seen.on_setup & counts)
+    there = {name for name, is_there in zip(seen.points, counts, strict=True) if is_there}
+    return replace(
+        given,
+        photos=tuple(_photo(one) for one in plan.photos),
+        image_points=_image_points(plan, seen),
+        control=_control(plan),
+        targets=targets_of(plan),
+        setups=tuple(Setup(one.name, one.name, one.instrument) for one in plan.setups),
+        readings=(*_sights(plan, seen), *_ties(plan, there)),
+    )
+
+
+def _photo(one):
+    values = np.concatenate([one.xyz_m, angles_of(one.rotation)])
+    return Photo(one.name, one.camera, values, np.full(6, np.nan))
+
+
+def _image_points(plan, seen):
+    photo, point = np.nonzero(seen.on_photo)
+    if not len(photo):
+        return None
+    sd = np.array([one.sd_mm / np.sqrt(one.readings) for one in plan.photos])
+    return ImageReadings(
+        photo=tuple(plan.photos[k].name for k in photo.tolist()),
+        point=tuple(seen.points[k] for k in point.tolist()),
+        xy_mm=seen.image_mm[photo, point],
+        sd_mm=np.repeat(sd[photo, None], 2, axis=1),
+        check=np.zeros(len(photo), dtype=bool),
+    )
+
+
+def _control(plan):
+    if not plan.known:
+        return None
+    return KnownPoints(
+        point=tuple(one.name for one in plan.known),
+        xyz_m=np.array([one.xyz_m for one in plan.known]),
+        sd_m=np.array([one.sd_m for one in plan.known]),
+        system=(None,) * len(plan.known),
+        check=np.zeros(len(plan.known), dtype=bool),
+    )
+
+
+def targets_of(plan):
+    """job.Targets of a Plan: its targets.csv."""
+    one = plan.targets
+    return Targets(
+        one.names,
+        one.section,
+        one.generatrix,
+        one.xyz_m[:, 2],
+        np.full(len(one.names), one.offset_m),
+    )
+
+
+def _sights(plan, seen):
+    """Readings of directions, zenith angles and slope distances of all set-ups."""
+    for table, key in (
+        ("directions", "direction_sd_rad"),
+        ("zenith_angles", "zenith_sd_rad"),
+        ("slope_distances", "distance_sd_m"),
+    ):
+        setup, end, sd = [], [], []
+        for k, one in enumerate(plan.setups):
+            if getattr(one, key) is None:
+                continue
+            names = [seen.points[i] for i in np.flatnonzero(seen.on_setup[k])]
+            setup += [one.name] * len(names)
+            end += names
+            sd += [getattr(one, key) / np.sqrt(one.sets)] * len(names)
+        if end:
+            yield _readings(table, [None] * len(end), end, sd, setup=tuple(setup))
+
+
+def _ties(plan, there):
+    """Readings of tapes, levels and plumb lines between points that are there, by name."""
+    for table in TAPED:
+        ties = [one for one in plan.ties if one.table == table and {one.start, one.end} <= there]
+        if not ties:
+            continue
+        more = {}
+        if table == "distances":
+            more = {
+                "instrument": tuple(one.instrument for one in ties),
+                "horizontal": np.array([one.kind == "horizontal" for one in ties]),
+            }
+        sd = [one.sd_m / np.sqrt(one.readings) for one in ties]
+        yield _readings(table, [one.start for one in ties], [one.end for one in ties], sd, **more)
+
+
+def _readings(table, start, end, sd, **more):
+    n = len(end)
+    return Readings(
+        table=table, value=np.zeros(n), sd=np.array(sd), start=tuple(start), end=tuple(end),
+        check=np.zeros(n, dtype=bool), **more,
+    )  # fmt: skip
+
+
+def measured(plan, measurements, predicted, rng=None):
+    """The Measurements with the values that they would have at the nominal places.
+
+    predicted  surveys.Predicted of the same        rng  None: without errors; else every reading is
+               off by its own, and those of an instrument by its scale and offset together
+    """
+    values, draw = _computed(predicted), _drawn(rng)
+    off = {one.name: _off(one, draw) for one in measurements.instruments}
+    tools = {one.name: one for one in measurements.instruments}
+    setups = {one.name: one for one in measurements.setups}
+    images, control = measurements.image_points, measurements.control
+    if images is not None:
+        images = replace(images, xy_mm=draw(images.xy_mm, images.sd_mm))
+    if control is not None:
+        control = replace(control, xyz_m=draw(control.xyz_m, np.nan_to_num(control.sd_m)))
+    readings = tuple(
+        _filled(one, values, draw, (tools, off), setups) for one in measurements.readings
+    )
+    return replace(measurements, image_points=images, control=control, readings=readings)
+
+
+def _drawn(rng):
+    """Function (value, sd) -> value with an error."""
+    if rng is None:
+        return lambda value, sd: np.array(value, dtype=float)
+    return lambda value, sd: value + rng.standard_normal(np.shape(value)) * sd
+
+
+def _computed(predicted):
+    """{(table, horizontal, names): value} of all readings, computed from the nominal places."""
+    found, problem = {}, predicted.adjusted.problem
+    parts = [*zip(problem.observations, problem.sources, problem.rows_of, strict=True)]
+    parts += [(held.observations, held.source, held.rows) for held in problem.exact]
+    for one, source, rows in parts:
+        trace = predicted.gathered.traces.get(source)
+        if trace is None or not trace.table:
+            continue
+        computed = one.computed(problem.state, False)[0]
+        for row, value in zip(rows.tolist(), computed[:, 0].tolist(), strict=True):
+            key = trace.table, bool(getattr(one, "horizontal", False))
+            found[*key, *trace.ids[row]] = value
+            if trace.table == "distances":  # a tape is read either way
+                found[*key, *reversed(trace.ids[row])] = value
+    return found
+
+
+def _filled(readings, values, draw, tools, setups):
+    """Readings with their values; those of points that are left out stay 0."""
+    starts = readings.setup or readings.start
+    horizontal = readings.horizontal
+    flat = np.zeros(len(starts), dtype=bool) if horizontal is None else horizontal
+    keys = zip(flat.tolist(), starts, readings.end, strict=True)
+    value = np.array([values.get((readings.table, *key), 0.0) for key in keys])
+    if readings.table in DISTANCES:
+        names = [setups[one].instrument for one in readings.setup] or readings.instrument
+        value = np.array([_read(one, name, *tools) for one, name in zip(value, names, strict=True)])
+    elif readings.table == "plumb_lines":
+        return readings
+    return replace(readings, value=draw(value, readings.sd))
+
+
+def _off(tool, draw):
+    """(scale, offset m) by which an instrument is off; 0 where it is not known beforehand."""
+    return tuple(float(draw(0.0, np.nan_to_num(u))) for u in (tool.u_scale, tool.u_offset_m))
+
+
+def _read(true_m, name, tools, off):
+    """What an instrument reads of a true distance, at the temperature of its certificate."""
+    if name is None:
+        return true_m
+    zero, one = true_distance_m([0.0, 1.0], tools[name], [np.nan, np.nan])
+    scale, offset = off[name]
+    return (true_m * (1.0 + scale) + offset - zero) / (one - zero)

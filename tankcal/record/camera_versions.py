@@ -1,0 +1,31 @@
+"""The versions of camera.json, and what is added to an older one so that it is of the last."""
+
+from pathlib import Path
+
+from tankcal.record.saved_formats import SavedFormat
+
+VERSION = 2
+KINDS = ("stability", "parameters", "influence", "product")
+
+
+def _from_1(result):
+    """Version 2 from version 1, whose comparisons drew one terrain and knew no scatter."""
+    result = result | {"format": "tankcal-camera/2"}
+    if result["kind"] != "stability":
+        return result
+    terrain = result["terrain"] and {"terrains": 1} | result["terrain"]
+    pairs = [{"scatter_px": None} | pair for pair in result["pairs"]]
+    random = {"terrain_random": {"terrains": 1}}
+    conventions = [random.get(one["code"], {}) | one for one in result["conventions"]]
+    return result | {"terrain": terrain, "pairs": pairs, "conventions": conventions}
+
+
+CAMERA = SavedFormat(
+    "tankcal-camera",
+    VERSION,
+    "camera.json",
+    Path(__file__).with_name("layouts") / "camera",
+    {1: _from_1},
+    KINDS,
+)  # fmt: skip
+FORMAT = CAMERA.format  # of the plain data that every analysis gives

@@ -1,0 +1,270 @@
+"""Influence of the calibration on a survey: sentences, tables and rows for CSV files."""
+
+from tankcal.report import blocks
+from tankcal.report.camera import influence_tables
+from tankcal.report.camera.naming import short
+from tankcal.report.camera.product import decimals_of_axes, unit_of
+from tankcal.report.plain import Column
+from tankcal.text.words import listed, observation_name
+
+MOST_PAIRS, MOST_PAIRS_ON_TERMINAL = 40, 15
+tables = influence_tables.tables
+
+
+def summary(paper):
+    """What the terminal shows: each run, what it changes, check points, volumes, pairs."""
+    return [
+        *facts(paper),
+        *runs(paper),
+        *troubles(paper),
+        *shifts(paper),
+        *checks(paper),
+        *volumes(paper),
+        *pairs(paper, MOST_PAIRS_ON_TERMINAL),
+    ]
+
+
+def facts(paper):
+    """What was replaced, how large the survey is, and what its search for blunders set aside."""
+    found = paper.result
+    states = ", ".join(paper.words["states"].get(state, state) for state in found["states"])
+    search = paper.text("not_searched")
+    if found["search"]["searched"]:
+        search = paper.text("searched", count=len(found["search"]["removed"]))
+    return [
+        paper.facts(
+            [
+                ("camera", found["camera"]),
+                ("calibrations", listed(paper.words, map(short, found["calibrations"]))),
+                ("states", states),
+                ("free", paper.parameters(found["free"])),
+                ("photos", paper.number(found["photos"], decimals=0)),
+                ("adjusted_points", paper.number(found["points"], decimals=0)),
+                ("search", search),
+            ]
+        )
+    ]
+
+
+def label(paper, run):
+    """A run's name: the reference, or a calibration with what is held of it."""
+    if run["calibration"] is None:
+        return paper.text("reference")
+    state = paper.words["states"].get(run["state"], run["state"])
+    return paper.text("run", name=short(run["calibration"]), state=state)
+
+
+def adjusted(paper):
+    """The runs that could be adjusted."""
+    return [run for run in paper.result["runs"] if run["outcome"] == "adjusted"]
+
+
+def runs(paper):
+    """How well each adjustment fits, and the residuals of its images."""
+    rows = [_run(paper, run) for run in paper.result["runs"]]
+    seen = [row for row in rows if row["largest_um"] is not None]
+    in_pixels = bool(seen) and all(row["rms_x_px"] is not None for row in seen)
+    unit, column = ("px", "px") if in_pixels else ("um", "um")
+    columns = [
+        Column("run"),
+        Column("outcome", words="outcomes"),
+        Column("sigma0", decimals=3),
+        Column("passed", words="passed"),
+        Column("redundancy", decimals=0),
+        *(Column(f"rms_{axis}_{unit}", column, decimals=2) for axis in "xy"),
+        Column(f"largest_{unit}", column, decimals=2, heading="largest_residual"),
+        Column("largest_at"),
+    ]
+    return [paper.table("runs", rows, columns)]
+
+
+def _run(paper, run):
+    quality, images = run["quality"] or {}, run["images"] or {}
+    row = {
+        "run": label(paper, run),
+        "outcome": run["outcome"],
+        "sigma0": quality.get("sigma0"),
+        "passed": quality.get("passed"),
+        "redundancy": quality.get("redundancy"),
+        "largest_um": images.get("largest_um"),
+        "largest_px": images.get("largest_px"),
+        "largest_at": None,
+    }
+    if images:
+        row["largest_at"] = f"{images['largest_photo']}, {images['largest_point']}"
+    for unit in ("um", "px"):
+        values = images.get(f"rms_{unit}") or [None, None]
+        row |= {f"rms_{axis}_{unit}": value for axis, value in zip("xy", values, strict=True)}
+    return row
+
+
+def troubles(paper):
+    """A sentence for each run that failed, was left out, or has no volume; for what was held."""
+    sentences = []
+    for run in paper.result["runs"]:
+        name = label(paper, run)
+        if run["message"]:
+            sentences.append(paper.text("run_failed", run=name, text=run["message"]))
+        if run["skipped"]:
+            code = run["skipped"]["code"]
+            sentences.append(paper.words["skipped"].get(code, "{run}: " + code).format(run=name))
+        if run["held"]:
+            held = paper.parameters(run["held"])
+            sentences.append(paper.text("run_held", run=name, names=held))
+        if run["volume_failed"]:
+            sentences.append(paper.text("run_no_volume", run=name, text=run["volume_failed"]))
+    return [blocks.listing(sentences)] if sentences else []
+
+
+def shifts(paper):
+    """How far points and photographs move against the reference."""
+    rows = [_shift(label(paper, run), run["shifts"]) for run in adjusted(paper) if run["shifts"]]
+    if not rows:
+        return [paper.paragraph("no_shifts")]
+    found = [paper.table("shifts", rows, [Column("run"), *_columns_of_shifts()])]
+    if any(run["shifts"] and run["shifts"]["aligned"] for run in adjusted(paper)):
+        found.append(paper.paragraph("aligned"))
+    return found
+
+
+def _columns_of_shifts():
+    return [
+        *(Column(f"points_{axis}_mm", "image mm", decimals=3) for axis in "xyz"),
+        Column("points_largest_mm", "image mm", decimals=3),
+        Column("largest_point"),
+        Column("photos_mm", "image mm", decimals=2),
+        Column("photos_arcsec", "arcsec", decimals=1),
+    ]
+
+
+def _shift(name, shift):
+    points, photos = shift["points"], shift["photos"]
+    row = {f"points_{axis}_mm": v for axis, v in zip("xyz", points["rms_mm"], strict=True)}
+    return row | {
+        "run": name,
+        "points_largest_mm": points["largest_xyz_mm"],
+        "largest_point": points["largest_point"],
+        "photos_mm": photos["rms_xyz_mm"],
+        "photos_arcsec": photos["rms_turn_arcsec"],
+    }
+
+
+def checks(paper):
+    """Check points of each run: RMSE and bias of each axis, before and after the bias."""
+    done = [run for run in adjusted(paper) if run["product"]]
+    if not done:
+        return [paper.paragraph("no_check_points")]
+    unit = "m" if "m" in {unit_of(run["product"]) for run in done} else "mm"
+    decimals = max(decimals_of_axes(run["product"], unit) for run in done)
+    rows = [
+        row
+        | {
+            "run": label(paper, run) if number == 0 else "",
+            "axis": paper.word(f"axis_names.{row['axis']}"),
+            "biased": {True: "yes", False: "no", None: None}[row["biased"]],
+        }
+        for run in done
+        for number, row in enumerate(run["product"]["axes"])
+    ]
+    columns = [
+        Column("run"),
+        Column("axis"),
+        Column("n", decimals=0),
+        Column("mean_m", unit, decimals=decimals),
+        Column("t", decimals=2),
+        Column("t_limit", decimals=2),
+        Column("biased", words="yes_no"),
+        Column("rmse_m", unit, decimals=decimals),
+        Column("rmse_unbiased_m", unit, decimals=decimals),
+    ]
+    level = paper.percent(done[0]["product"]["alpha"])
+    return [paper.table("checks_of_runs", rows, columns, level=level)]
+
+
+def volumes(paper):
+    """Volume of each run, and its difference from the reference."""
+    done = [run for run in adjusted(paper) if run["volume"]]
+    if not done:
+        return []
+    rows = []
+    for run in done:
+        change = (run["shifts"] or {}).get("volume") or {}
+        rows.append(
+            run["volume"]
+            | {
+                "run": label(paper, run),
+                "change_m3": change.get("difference_m3"),
+                "change_percent": change.get("percent"),
+            }
+        )
+    columns = [
+        Column("run"),
+        Column("height_m", "m", height=True),
+        Column("volume_m3", "m3", u="U_m3"),
+        Column("U_m3", "m3", u="U_m3"),
+        Column("change_m3", "m3", decimals=4, heading="volume_change_m3"),
+        Column("change_percent", "percent", decimals=4, heading="relative"),
+    ]
+    return [paper.table("volumes_of_runs", rows, columns)]
+
+
+def pairs(paper, most=MOST_PAIRS):
+    """Pairs of runs, those with the largest movement of points first, and how many there are."""
+    every = paper.result["runs"]
+    rows = [
+        _shift("", pair)
+        | {
+            "one": label(paper, every[pair["one"]]),
+            "other": label(paper, every[pair["other"]]),
+            "change_m3": (pair["volume"] or {}).get("difference_m3"),
+        }
+        for pair in paper.result["pairs"]
+        if pair["one"] != 0 and not _are_free(every[pair["one"]], every[pair["other"]])
+    ]
+    if not rows:
+        return []
+    rows.sort(key=lambda row: -(row["points_largest_mm"] or 0.0))
+    shown = rows[:most]
+    columns = [
+        Column("one"),
+        Column("other"),
+        Column("points_largest_mm", "image mm", decimals=3),
+        Column("largest_point"),
+        Column("photos_mm", "image mm", decimals=2),
+        Column("photos_arcsec", "arcsec", decimals=1),
+    ]
+    if any(row["change_m3"] is not None for row in rows):
+        columns.append(Column("change_m3", "m3", decimals=4, heading="volume_change_m3"))
+    found = [paper.table("pairs_of_runs", shown, columns)]
+    if len(rows) > len(shown):
+        found.append(paper.paragraph("only_largest", shown=len(shown), all=len(rows)))
+    return found
+
+
+def _are_free(one, other):
+    """Whether both start values only: the same adjustment."""
+    return one["state"] == other["state"] == "free"
+
+
+def removed(paper):
+    """The readings that the reference set aside, and that all runs do without."""
+    rows = [
+        {
+            "observation": observation_name(paper.words, row),
+            "between": row["ids"],
+            "w": row["w"],
+            "file": row["file"],
+            "row": row["row"],
+        }
+        for row in paper.result["search"]["removed"]
+    ]
+    if not rows:
+        return []
+    columns = [
+        Column("observation"),
+        Column("between"),
+        Column("w", decimals=1),
+        Column("file"),
+        Column("row", decimals=0),
+    ]
+    return [paper.table("removed_of_reference", rows[:MOST_PAIRS], columns)]

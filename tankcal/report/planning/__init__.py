@@ -1,0 +1,71 @@
+"""What a plan becomes on paper: prediction, field sheets, an empty job, files for programs.
+
+Nothing here computes a number.
+"""
+
+from pathlib import Path
+
+from tankcal.messages import message
+from tankcal.report import folders
+from tankcal.report.planning.paper import PlanPaper
+
+__all__ = ["DESIGN", "FILES", "JOB", "PlanPaper", "refuse_foreign", "write"]
+
+JOB = "job"  # folder of the empty job
+DESIGN = "design"  # folder of the plan that a search ends with
+FILES = (
+    *("plan.json", "points.csv", "sections.csv", "capacity.csv", "changes.csv", "design.csv"),
+    *("changes.png", "prediction.pdf", "field-sheets.pdf", "field-sheets.xlsx"),
+)
+
+
+def write(
+    prediction, directory, progress=None, *, effects=(), design=None, simulated=None, language=None
+):
+    """Write everything that a `planning.predicting.Prediction` gives, all or nothing; the paths.
+
+    directory  made when missing; earlier results of a plan there are replaced
+    progress   called with a line of text as each step begins
+    effects    `planning.helping.Effect` of changes that were tried
+    design     `planning.helping.Path`, whose last plan has the same papers in a folder of its own;
+               None: none was looked for
+    simulated  `planning.simulations.Simulated` of the prediction, or None
+    language   of papers and workbook, one of languages.LANGUAGES; None: that of the plan
+
+    Raises InputError for a folder that holds other things, or an empty job that was filled in.
+    """
+    refuse_foreign(directory)
+    tell = progress or (lambda text: None)
+    with folders.replaced(directory) as temporary:
+        paper = PlanPaper(prediction, language, effects, design, simulated)
+        _write(paper, temporary, tell)
+        if design is not None and design.steps:
+            (temporary / DESIGN).mkdir()
+            _write(PlanPaper(design.prediction, language), temporary / DESIGN, tell)
+    names = (*FILES, JOB, DESIGN)
+    return [path for path in (Path(directory) / name for name in names) if path.exists()]
+
+
+def _write(paper, folder, tell):
+    """The files of a PlanPaper."""
+    from tankcal.report.planning import empty_job, files, papers, workbook
+
+    tell(message("plan_writing_job", "writing the empty job"))
+    empty_job.write(paper.prediction, folder / JOB)
+    tell(message("plan_writing_tables", "writing the tables"))
+    files.write(paper, folder, empty_job.fingerprints(folder / JOB))
+    workbook.write(paper, folder / "field-sheets.xlsx")
+    tell(message("plan_setting_papers", "setting prediction and field sheets"))
+    papers.write(paper, folder)
+
+
+def refuse_foreign(directory):
+    """Raise InputError when `directory` holds anything but results of write(), as it left them."""
+    from tankcal.report.planning import empty_job
+
+    directory = Path(directory)
+    folders.refuse_foreign(directory, (*FILES, JOB, DESIGN))
+    empty_job.refuse_filled(directory / JOB, directory / "plan.json")
+    if (directory / DESIGN).exists():
+        folders.refuse_foreign(directory / DESIGN, (*FILES, JOB))
+        empty_job.refuse_filled(directory / DESIGN / JOB, directory / DESIGN / "plan.json")

@@ -1,0 +1,118 @@
+"""The figures of a prediction: U against dip, weak areas, rays of the points, what helps most."""
+
+from functools import wraps
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from tankcal.pipeline.plots import INK, PALE, RED, STYLE, WIDTH, set_margins
+from tankcal.report.planning.sketches import unrolled
+
+MOST = 32  # bars
+COLOURS = {"add": INK, "repeat": PALE, "drop": RED}
+GREY = "#445566"
+
+
+def _styled(draw):
+    @wraps(draw)
+    def drawing(*arguments):
+        with matplotlib.rc_context(STYLE):
+            return draw(*arguments)
+
+    return drawing
+
+
+@_styled
+def uncertainty(paper):
+    """U of every row, in m3 and over the volume, against the dip; the limit where there is one."""
+    table, limits = paper.prediction.table, paper.plan.limits
+    some = table.volume_m3 > 0.02 * table.volume_m3[-1]
+    figure = Figure(figsize=(WIDTH, 2.4))
+    left, right = figure.subplots(1, 2)
+    left.plot(table.height_m, table.U_m3, color=INK)
+    left.set_ylabel(paper.word("axes.U_m3"))
+    share = 100 * table.U_m3[some] / table.volume_m3[some]
+    right.plot(table.height_m[some], share, color=INK)
+    right.set_ylabel(paper.word("axes.relative_u"))
+    if limits.relative_u is not None and limits.of == "top":
+        right.axhline(100 * limits.relative_u, color=RED, linewidth=0.9)
+    for ax in (left, right):
+        ax.set_xlabel(paper.word("axes.dip"))
+        ax.set_xlim(0, table.height_m[-1])
+        ax.set_ylim(bottom=0)
+        ax.grid(True)
+    set_margins(figure, left=0.6, right=0.12, bottom=0.42, top=0.08, wspace=0.3)
+    return figure
+
+
+@_styled
+def weak_areas(paper):
+    """The wall unrolled: every target coloured by its largest sd; weak and lost ones are marked."""
+    targets, points = paper.plan.targets, _of_targets(paper)
+    sd_mm = np.array([1000 * one.sd_m.max() for one in points])
+    known = np.isfinite(sd_mm)
+    figure, ax = unrolled(paper, 2.9)
+    shown = ax.scatter(
+        targets.arc_m[known], targets.height_m[known], c=sd_mm[known], s=18, cmap="viridis_r",
+        zorder=3,
+    )  # fmt: skip
+    for name, mark in (("weak", "o"), ("undetermined", "x")):
+        mine = np.array([bool(getattr(one, name)) for one in points])
+        if mine.any():
+            fill = {"markerfacecolor": "none"} if mark == "o" else {}
+            ax.plot(
+                targets.arc_m[mine], targets.height_m[mine], mark, color=RED, markersize=7,
+                label=paper.word(f"legend.{name}"), **fill, zorder=4,
+            )  # fmt: skip
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2, frameon=False)
+    bar = figure.colorbar(shown, ax=ax, pad=0.02, aspect=30)
+    bar.set_label(paper.word("axes.largest_sd"))
+    figure.subplots_adjust(left=0.075, right=1.04, bottom=0.26, top=0.97)
+    return figure
+
+
+@_styled
+def rays(paper):
+    """How many targets are seen from how many stations; those too few to be sound in red."""
+    counts = np.bincount([one.rays for one in _of_targets(paper)])
+    few = np.arange(len(counts)) < max(paper.fewest_rays, 1)
+    figure = Figure(figsize=(WIDTH, 1.9))
+    ax = figure.subplots()
+    ax.bar(range(len(counts)), counts, color=np.where(few, RED, INK), width=0.7)
+    ax.set_xticks(range(len(counts)))
+    ax.set_xlabel(paper.word("axes.rays"))
+    ax.set_ylabel(paper.word("axes.targets"))
+    ax.grid(True, axis="y")
+    ax.set_axisbelow(True)
+    set_margins(figure, left=0.6, right=0.12, bottom=0.42, top=0.08)
+    return figure
+
+
+def _of_targets(paper):
+    return paper.prediction.points[: len(paper.plan.targets.names)]
+
+
+@_styled
+def changes(paper):
+    """Bars of the change of U over volume, in ppm, by each `helping.Effect` that still works.
+
+    Of many, those that change most, on either side.
+    """
+    works = [one for one in paper.effects if not one.why]
+    shown = sorted(works, key=lambda one: -abs(one.difference))[:MOST]
+    shown = sorted(shown, key=lambda one: one.difference)
+    figure = Figure(figsize=(WIDTH, 0.9 + 0.17 * len(shown)))
+    ax = figure.subplots()
+    places = range(len(shown))
+    values = [1e6 * one.difference for one in shown]
+    ax.barh(places, values, color=[COLOURS[one.change.action] for one in shown])
+    ax.set_yticks(places, [paper.change(one.change) for one in shown], parse_math=False)
+    ax.invert_yaxis()
+    ax.axvline(0.0, color=GREY, linewidth=0.5)
+    ax.set_xlabel(paper.word("axes.change_of_u"))
+    ax.grid(True, axis="x")
+    ax.set_axisbelow(True)
+    set_margins(figure, left=2.4, right=0.12, bottom=0.45, top=0.08)
+    return figure

@@ -1,0 +1,105 @@
+"""The field sheets as a workbook: the tables of the paper, to sort, filter and print."""
+
+import io
+
+from xlsxwriter.utility import xl_range_abs
+
+from tankcal import __version__
+from tankcal.report import numbers
+from tankcal.report.plain import Column
+from tankcal.report.planning import sketches
+from tankcal.report.planning.stands import stands
+from tankcal.report.planning.tables import field_tables
+from tankcal.report.workbook.book import Book
+from tankcal.report.workbook.look import Column as Cells
+from tankcal.report.workbook.tables import set_widths
+
+ONE_A_SHEET = ("targets", "others", "stations", "photographs", "setups", "ties", "control")
+EQUIPMENT = ("cameras", "instruments")
+SKETCHES = {"wall": sketches.wall, "stands": stands}
+FIRST = {"targets": ("point", "line", "row")}  # columns of a sheet before those of the paper
+COUNTED = ("line", "row", "course")  # names that sort as numbers where they are
+HEAD_ROW = 3
+LONGEST = 30  # letters of a column that wraps no text
+DPI, PT, ROOM_PT = 110, 72.0, 8.0
+
+
+def write(paper, path):
+    """Write the workbook of a PlanPaper; the same plan gives the same bytes."""
+    tables = field_tables(paper.prediction)
+    with Book(path, _as_record(paper), paper.words, about="plan") as book:
+        _draw(book, paper)
+        for name in ONE_A_SHEET:
+            if name in tables:
+                _sheet(book, paper, name, {name: tables[name]})
+        found = {name: tables[name] for name in EQUIPMENT if name in tables}
+        if found:
+            _sheet(book, paper, "equipment", found)
+
+
+def _as_record(paper):
+    """What a Book asks of a record: whose the workbook is, and the day."""
+    job = paper.plan.job
+    return {
+        "tankcal": __version__,
+        "capacity": None,
+        "job": {
+            "certificate": {},
+            "tank": {"id": job.tank.id},
+            "survey": {"date": job.survey.date},
+        },
+    }
+
+
+def _sheet(book, paper, code, tables):
+    """Tables one below the other; a single one can be sorted, and its headings print again."""
+    sheet = book.sheet(code, landscape=code in ("ties", "setups"), tab="input")
+    columns = {
+        name: [_column(paper, found, one) for one in _columns_of(name, of_paper)]
+        for name, (found, of_paper) in tables.items()
+    }
+    widths, row, single = set_widths(book, sheet, *columns.values()), HEAD_ROW, len(columns) == 1
+    if single:
+        book.freeze(sheet, HEAD_ROW, 1)
+    for name, of_sheet in columns.items():
+        if not single:
+            book.heading(sheet, row, paper.word(f"captions.{name}"), len(of_sheet))
+            row += 1
+        last = book.table(sheet, row, name, of_sheet, autofilter=single, widths=widths)
+        sheet.unprotect_range(xl_range_abs(row, 0, last, len(of_sheet) - 1), name)
+        row = last + 2
+
+
+def _columns_of(name, of_paper):
+    """Columns of a sheet: those of the paper, after what its rows can be sorted by."""
+    first = FIRST.get(name, ())
+    return [*map(Column, first), *(one for one in of_paper if one.key not in first)]
+
+
+def _draw(book, paper):
+    """The sketches, each in one high row."""
+    sheet, row = book.sheet("sketches", tab="input"), HEAD_ROW
+    for name, draw in SKETCHES.items():
+        figure, picture = draw(paper), io.BytesIO()
+        figure.savefig(picture, format="png", dpi=DPI, metadata={"Software": None})
+        book.set_height(sheet, row, PT * figure.get_figheight() + ROOM_PT)
+        described = {"image_data": picture, "description": paper.word(f"captions.{name}_alt")}
+        sheet.insert_image(row, 0, f"{name}.png", described)
+        row += 1
+
+
+def _column(paper, rows, column):
+    """A column of the paper as one of the workbook: numbers as numbers, in the same unit."""
+    unit = numbers.unit(column.unit)
+    heading = paper.word(f"table_headings.{column.heading or column.key}")
+    heading = f"{heading}, {unit.symbol}" if unit.symbol else heading
+    is_number = column.decimals is not None or column.digits is not None
+    values = [row.get(column.key) for row in rows]
+    if not is_number:
+        texts = zip(values, paper.column_texts(rows, column), strict=True)
+        cells = ["" if value is None else text for value, text in texts]
+        if column.key in COUNTED and all(text.isdecimal() for text in cells):
+            return Cells(heading, list(map(int, cells)), 0)
+        return Cells(heading, cells, width=min(LONGEST, max(12, *map(len, cells)) + 1))
+    cells = [None if value is None else value * unit.factor for value in values]
+    return Cells(heading, cells, "General" if column.decimals is None else column.decimals)

@@ -1,0 +1,89 @@
+"""The output workbook: the record as capacity.xlsx, by XlsxWriter (docs/workbook.md).
+
+No number is computed here. What stands in a cell is the record's value, at most in another unit
+(mm for m, litres per centimetre for m2), and a formula carries the record's value as its result.
+"""
+
+from tankcal.report.workbook.book import Book
+from tankcal.report.workbook.calculator import calculator_sheets, factor_sheet
+from tankcal.report.workbook.cameras import cameras_sheet
+from tankcal.report.workbook.capacity import capacity_sheet
+from tankcal.report.workbook.certificate import certificate_sheet
+from tankcal.report.workbook.charts import charts_sheets
+from tankcal.report.workbook.millimetres import millimetres_sheet
+from tankcal.report.workbook.observations import observations_sheet
+from tankcal.report.workbook.papers import corrections_sheet, courses_sheet, provenance_sheet
+from tankcal.report.workbook.parts import densities_sheet, inside_sheet, proportional_parts_sheet
+from tankcal.report.workbook.points import points_sheet
+from tankcal.report.workbook.rule import rule_sheet
+from tankcal.report.workbook.survey import adjustment_sheet
+from tankcal.report.workbook.uncertainty import budget_sheet, deliveries_sheet, monte_carlo_sheet
+from tankcal.text.words import in_language, language_of, load_words
+
+# What a gauger uses and an owner prints. The others are for reviewers and programs, and hidden:
+# printed with the whole workbook they are hundreds of pages.
+_SHOWN_OF_TANK = (
+    "certificate",
+    "capacity",
+    "proportional_parts",
+    "other_densities",
+    "dip_calculator",
+)
+_SHOWN_OF_SURVEY = ("adjustment", "points", "provenance")
+
+
+def write(record, path, language=None):
+    """Write the workbook of `record` (record.json as parsed) to `path`; same record, same bytes.
+
+    language  of the words; None: that of the job
+
+    Raises TankcalError when no words are shipped in the language of the job, OSError when the file
+    cannot be written.
+    """
+    words = load_words(language or language_of(record))
+    record = in_language(words, record)
+    shown = _SHOWN_OF_TANK if record["capacity"] else _SHOWN_OF_SURVEY
+    with Book(path, record, words, shown=shown) as book:
+        if record["capacity"]:
+            _sheets_of_tank(book, record)
+        else:
+            _sheets_of_survey(book, record)
+
+
+def _sheets_of_tank(book, record):
+    certificate_sheet(book, record)
+    rows = capacity_sheet(book, record)
+    proportional_parts_sheet(book, record)
+    densities_sheet(book, record)
+    millimetres_sheet(book, record)
+    calculator_sheets(book, record)
+    factor_sheet(book, record)
+    if record["courses"]:
+        courses_sheet(book, record)
+    corrections_sheet(book, record)
+    inside_sheet(book, record)
+    budget_sheet(book, record)
+    if record.get("budgets"):
+        deliveries_sheet(book, record)
+    if record.get("monte_carlo"):
+        monte_carlo_sheet(book, record)
+    if record.get("rule"):
+        rule_sheet(book, record)
+    if record["adjustment"]:
+        adjustment_sheet(book, record)
+    if record["points"]:
+        points_sheet(book, record)
+    if record["adjustment"]:
+        observations_sheet(book, record)
+        cameras_sheet(book, record)
+    provenance_sheet(book, record)
+    charts_sheets(book, record, rows)
+
+
+def _sheets_of_survey(book, record):
+    """A survey that was only adjusted: no table, nothing that follows from one."""
+    adjustment_sheet(book, record)
+    points_sheet(book, record)
+    observations_sheet(book, record)
+    cameras_sheet(book, record)
+    provenance_sheet(book, record)

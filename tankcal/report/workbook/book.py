@@ -1,0 +1,182 @@
+"""The workbook as a file: its properties, its sheets and their page set-up and protection."""
+
+from datetime import datetime
+from itertools import pairwise
+
+import xlsxwriter
+from xlsxwriter.exceptions import FileCreateError
+from xlsxwriter.utility import quote_sheetname, xl_range_abs
+
+from tankcal.report.workbook.look import (
+    ACCENT,
+    FONT,
+    LINE_PT,
+    MUTED,
+    ROW_PT,
+    day,
+    lines_of,
+    number_format,
+)
+from tankcal.report.workbook.writer import Writer
+
+_A4 = 9
+_PAGE_PT = (750.0, 480.0)  # of A4 in landscape, within the margins
+_COLUMN_PT, _BESIDE_PT = 5.25, 3.75  # of a unit of width; beside it
+_TAB = {"result": ACCENT, "input": "#C98A00", "paper": "#8FA3B8", "origin": "#5F7A61"}
+_OPENINGS = {"sort": True, "autofilter": True, "format_columns": True, "format_rows": True}
+
+
+def header_text(text):
+    """User text as it may stand in a page header: & doubled, one line, of bearable length."""
+    return " ".join(str(text).split())[:50].replace("&", "&&")
+
+
+class Book(Writer):
+    """A workbook being written; as a context manager it is closed, that is saved, at the end.
+
+    subject  what the workbook is about: the tank, or the survey alone
+    notice   of the certificate, on every sheet; "" for none
+    about    "capacity", "adjustment" or "plan", by which the file is called; None: by the record
+    shown    codes of the sheets that show, and are printed with the whole workbook; None: all
+    """
+
+    def __init__(self, path, record, words, about=None, shown=None):
+        self._path = path
+        self._shown = shown
+        options = {
+            "strings_to_formulas": False,
+            "strings_to_urls": False,
+            "strings_to_numbers": False,
+            "in_memory": True,
+            "default_format_properties": dict(FONT),
+        }
+        super().__init__(xlsxwriter.Workbook(str(path), options), words)
+        job = record["job"]
+        certificate, tank = job["certificate"], job["tank"]
+        name = tank["id"] if tank else job["source"]
+        self.subject = f"{words['page']['tank' if tank else 'survey']} {name}"
+        self.notice = str(certificate.get("notice") or "")
+        self._made_by = f"tankcal {record['tankcal']}"
+        self._number = certificate.get("number") or ""
+        self._set_properties(certificate, name, record, about)
+
+    def _set_properties(self, certificate, name, record, about):
+        """What the file says of itself: title, author, company, language, date."""
+        kind = about or ("capacity" if record["capacity"] else "adjustment")
+        laboratory = str(certificate.get("laboratory") or "")
+        self._file.set_properties(
+            {
+                "title": self.word(f"document.{kind}", name=name),
+                "subject": self.notice or self.subject,
+                "author": str(certificate.get("operator") or laboratory),
+                "company": laboratory,
+                "comments": self.word("document.comments", program=self._made_by),
+                "created": _created(certificate.get("date_of_issue"), record["job"]["survey"]),
+            }
+        )
+        self._file.set_custom_property("Language", self.words["language"]["code"], "text")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, error, trace):
+        if kind is None:
+            try:
+                self._file.close()
+            except FileCreateError as failure:
+                raise OSError(f"{self._path}: the workbook cannot be written: {failure}") from None
+
+    # ---- sheets
+
+    def sheet(self, code, subtitle="", landscape=False, tab="paper"):
+        """A new protected sheet with its title, page set-up, header and footer.
+
+        code  of its name in [workbook.sheets] and of its title in [workbook.titles]
+        tab   kind of the sheet, by which its tab is coloured: result, input, paper or origin
+        """
+        sheet = self._page(code, landscape, tab)
+        self.set_height(sheet, 0, 24)
+        look = self.format(bold=True, font_size=15, font_color=ACCENT)
+        sheet.write_string(0, 0, self.word(f"titles.{code}"), look)
+        line = " · ".join(part for part in (self.subject, self.notice, subtitle) if part)
+        sheet.write_string(1, 0, line, self.format(font_color=MUTED))
+        return sheet
+
+    def plain_sheet(self, code, columns, landscape=False, tab="origin"):
+        """A protected sheet of nothing but columns, headings in row 1: for other programs to read.
+
+        A cell that is None stays blank.
+        """
+        sheet = self._page(code, landscape, tab)
+        self.widths(sheet, *(column.width for column in columns))
+        lines = max(lines_of(column.heading, 0.85 * column.width) for column in columns)
+        sheet.set_row(0, LINE_PT * lines + 3)
+        self.freeze(sheet, 0)
+        for place, column in enumerate(columns):
+            sheet.write_string(0, place, column.heading, self._head(column))
+            digits, count = column.digits, len(column.cells)
+            each = digits if isinstance(digits, list) else [digits] * count
+            looks = {one: self.format(num_format=number_format(one)) for one in set(each)}
+            for row, (value, one) in enumerate(zip(column.cells, each, strict=True), start=1):
+                if value is not None:
+                    sheet.write_number(row, place, value, looks[one])
+        return sheet
+
+    def _page(self, code, landscape, tab):
+        """A new protected sheet with page set-up, header and footer."""
+        name = self.sheet_name(code)
+        sheet = self._file.add_worksheet(name)
+        if self._shown is not None and code not in self._shown:
+            sheet.hide()
+        sheet.hide_gridlines(2)
+        sheet.set_default_row(ROW_PT)
+        sheet.set_tab_color(_TAB[tab])
+        sheet.set_paper(_A4)
+        if landscape:
+            sheet.set_landscape()
+        sheet.fit_to_pages(1, 0)
+        sheet.center_horizontally()
+        sheet.set_margins(left=0.6, right=0.6, top=0.8, bottom=0.75)
+        sheet.set_header(
+            f"&L&9 {header_text(self.subject)}&C&9&B {header_text(self.notice)}"
+            f"&R&9 {header_text(name)}"
+        )
+        page = self.words["page"]
+        number = f"{page['number']} {header_text(self._number)}" if self._number else ""
+        pages = page["footer"].format(page="&P", pages="&N")
+        sheet.set_footer(f"&L&9 {self._made_by}&C&9 {number}&R&9 {pages}")
+        sheet.protect("", _OPENINGS)
+        return sheet
+
+    def keep_together(self, sheet, starts, last, widths):
+        """Break pages in landscape before blocks of rows that would not fit below the others.
+
+        starts  first row of each block, from the top down; last is the last row of all
+        widths  of the columns, which decide how small the sheet is printed
+        """
+        wide_pt = sum(_COLUMN_PT * width + _BESIDE_PT for width in widths)
+        page_pt = _PAGE_PT[1] * max(wide_pt / _PAGE_PT[0], 1.0)
+        name, used, breaks = sheet.get_name(), 0.0, []
+        for start, end in pairwise([0, *starts, last + 1]):
+            high = sum(self._heights.get((name, row), LINE_PT) for row in range(start, end))
+            if used and used + high > page_pt:
+                breaks.append(start)
+                used = 0.0
+            used += high
+        sheet.set_h_pagebreaks(breaks)
+
+    def name(self, name, sheet, first_row, last_row, column, last_column=None):
+        """Give a name to the cells of one column, or of several; the same in every language."""
+        cells = xl_range_abs(first_row, column, last_row, last_column or column)
+        self._file.define_name(name, f"={quote_sheetname(sheet.get_name())}!{cells}")
+
+    def chart(self, subtype="straight"):
+        """A new chart with numbers on both axes, their points joined by straight lines or bare."""
+        options = {"type": "scatter"} | ({"subtype": subtype} if subtype else {})
+        return self._file.add_chart(options)
+
+
+def _created(issued, survey):
+    """Date of issue, else of the survey, else a fixed one: the same record, the same bytes."""
+    found = day(issued) or day(survey and survey["date"]) or datetime(2000, 1, 1)
+    return datetime(found.year, found.month, found.day)

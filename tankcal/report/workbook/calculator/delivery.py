@@ -1,0 +1,149 @@
+"""A delivery between two dips, with its own U: what both dips have in common cancels.
+
+u^2 is the sum of squares of f(high) - f(low), f a row of the covariance factor, linear between
+rows; k by Welch-Satterthwaite over the inputs that were found together (tankcal.tank.deliveries).
+"""
+
+import math
+
+import numpy as np
+
+from tankcal.report.workbook.calculator.cells import Line, if_number
+from tankcal.report.workbook.calculator.coverage import normal, student
+from tankcal.text.digits import LITRE_DECIMALS, NOTHING
+from tankcal.uncertainty import dof_of, least_of, sum_of_fourths
+
+_INFINITE = "1E+99"  # degrees of freedom, in the workings
+_SHOWN_INFINITE = "1E+15"
+
+
+def state(table, number):
+    """The line that says whether there is a delivery between the two dips."""
+    both = "AND([low_dip_state]=#within,[high_dip_state]=#within)"
+    formula = f"IF({both},IF([high_dip]-[low_dip]>1E-9,#delivery,#swapped),#no_delivery)"
+    found = number("delivery" if table.low < table.at else "swapped")
+    return Line("delivery_state", formula, found, 0)
+
+
+def differences(table, names):
+    """One line for each column of the factor: what of it does not cancel, m³.
+
+    names  of the columns, as the sheet of the factor has them
+    """
+    lines = []
+    for column, (name, value) in enumerate(zip(names, table.differences(), strict=True), start=1):
+        low, high = (_at(dip, column) for dip in ("low_dip", "high_dip"))
+        formula = f"IF([delivery_state]=#delivery,{high}-{low},{_NONE})"
+        lines.append(Line(f"column_{column}", formula, _if(table, value), 6, "m³", label=name))
+    return lines
+
+
+_NONE = f'"{NOTHING}"'
+
+
+def _if(table, value):
+    """The result where the workbook opens with a delivery."""
+    return value if table.low < table.at else NOTHING
+
+
+def _at(dip, column):
+    """The factor at a dip, linear between two rows."""
+    low = f"INDEX(covariance_factor,[{dip}_row],{column})"
+    high = f"INDEX(covariance_factor,[{dip}_next],{column})"
+    return f"({low}*(1-[{dip}_part])+{high}*[{dip}_part])"
+
+
+def combining(table, label):
+    """Lines that make u, degrees of freedom and k of these differences.
+
+    label  function of a `Group` that names the line of its variance
+    """
+    groups = [group for group in table.groups() if math.isfinite(group.dof)]
+    squares = [value**2 for value in table.differences()]
+    variances = [sum(squares[group.first : group.last + 1]) for group in groups]
+    lines, shares = [], []
+    for place, (group, variance) in enumerate(zip(groups, variances, strict=True), start=1):
+        cells = f"[column_{group.first + 1}]:[column_{group.last + 1}]"
+        formula = f"IF([delivery_state]=#delivery,SUMSQ({cells}),{_NONE})"
+        name = label(group)
+        lines.append(
+            Line(f"variance_{place}", formula, _if(table, variance), "0.00E+00", "m⁶", label=name)
+        )
+        shares.append(f"[variance_{place}]^2/{group.dof!r}")
+    dofs = [group.dof for group in groups]
+    least = least_of(dofs)
+    fourth = float(sum_of_fourths(np.array(variances), dofs))
+    u = math.sqrt(sum(squares))
+    dof = float(dof_of(sum(squares), fourth, least))
+    z, k = table.coverage(dof)
+    probability = table.job["table"]["coverage_probability"]
+    every = f"[column_1]:[column_{len(squares)}]"
+    found = "[delivery_state]=#delivery"
+    shown_dof = dof if math.isfinite(dof) else float(_INFINITE)
+    student_k = student(probability, "[delivery_dof]", "[normal]")
+    return [
+        *lines,
+        Line("delivery_u", f"IF({found},SQRT(SUMSQ({every})),{_NONE})", _if(table, u), 6, "m³"),
+        Line(
+            "fourth",
+            f"IF({found},{'+'.join(shares) or '0'},{_NONE})",
+            _if(table, fourth),
+            "0.00E+00",
+        ),
+        Line(
+            "delivery_dof",
+            if_number(
+                "[fourth]",
+                f"IF([fourth]>0,MAX([delivery_u]^4/[fourth],{least!r}),{_INFINITE})",
+            ),
+            _if(table, shown_dof),
+            "0.0E+00",
+        ),
+        Line("normal", normal(probability), z, 6),
+        Line("delivery_k", if_number("[delivery_dof]", student_k), _if(table, k), 6),
+    ]
+
+
+def results(table):
+    """Lines of the result of a delivery."""
+    volume = table.volume_m3[table.at] - table.volume_m3[table.low]
+    values = {line.key: line.result for line in combining(table, lambda group: "")}
+    u, k, dof = values["delivery_u"], values["delivery_k"], values["delivery_dof"]
+    U = NOTHING if u == NOTHING else k * u
+    delivered = "[high_dip_volume]-[low_dip_volume]"
+    looks = {"unit": "m³", "by": "delivered_U"}
+    relative = NOTHING if U == NOTHING or not volume > 0 else U / volume
+    endless = dof != NOTHING and dof > float(_SHOWN_INFINITE)
+    return [
+        Line(
+            "delivered",
+            f"IF([delivery_state]=#delivery,{delivered},{_NONE})",
+            _if(table, volume),
+            LITRE_DECIMALS,
+            strong=True,
+            remark="delivery_state",
+            **looks,
+        ),
+        Line(
+            "delivered_U",
+            if_number("[delivery_k]", "[delivery_k]*[delivery_u]"),
+            U,
+            0,
+            strong=True,
+            **looks,
+        ),
+        Line("delivered_k", "[delivery_k]", k, 2),
+        Line("delivered_u", "[delivery_u]", u, 0, "m³", by="delivered_u"),
+        Line(
+            "delivered_dof",
+            if_number("[delivery_dof]", f'IF([delivery_dof]>{_SHOWN_INFINITE},"∞",[delivery_dof])'),
+            "∞" if endless else dof,
+            "[>=100]0;0.0",
+        ),
+        Line(
+            "delivered_relative",
+            if_number("[delivered]", f"IF([delivered]>0,[delivered_U]/[delivered],{_NONE})"),
+            relative,
+            "0.000 %",
+        ),
+    ]

@@ -1,0 +1,205 @@
+"""The sheet Certificate: what was calibrated, the main result, and what was assumed."""
+
+from tankcal.report.certificate import doubts_of
+from tankcal.report.paper import Paper
+from tankcal.report.uncertainty import method, rule
+from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
+from tankcal.report.workbook.look import ACCENT, DATE, LINE_PT, MUTED, lines_of, number_format
+from tankcal.text.digits import decimals_of, decimals_of_height
+from tankcal.text.words import choice_sentence, method_line, sentence
+
+_WIDTHS = (36, 20, 24, 14, 14)
+_LONG = 60  # letters that fit beside a label
+_DATES = ("date", "date_of_issue")  # keys of the job whose values are dates
+
+
+def certificate_sheet(book, record):
+    """Write the sheet, the first of the workbook."""
+    words = book.words
+    sheet = book.sheet("certificate", tab="result")
+    book.widths(sheet, *_WIDTHS)
+    row = 3
+    if book.notice:
+        look = {"bold": True, "font_size": 14, "align": "center", "valign": "vcenter", "border": 2}
+        book.paragraph(sheet, row, book.notice, _WIDTHS, border_color=ACCENT, **look)
+        sheet.set_row(row, 26)
+        row += 2
+    row = _result(book, sheet, row, record)
+    row = _doubts(book, sheet, row, record)
+    row = _entries(book, sheet, row, sentence(words, "headings", "tank"), _tank(record, words))
+    row = _entries(book, sheet, row, book.word("headings.certificate"), _certificate(record, words))
+    row = _entries(book, sheet, row, book.word("headings.survey"), _survey(record, words))
+    row = _uncertainty(book, sheet, row, Paper(record, words))
+    row = _corrections(book, sheet, row, record)
+    row = _choices(book, sheet, row, record)
+    _authorisation(book, sheet, row)
+
+
+def _label(words, key):
+    """The label of a key of the job; one without words is written out: vessel_no as Vessel no."""
+    return words["labels"].get(key, key.replace("_", " ").capitalize())
+
+
+def _tank(record, words):
+    """(label, value, number format or None) of the tank."""
+    tank = record["job"]["tank"]
+    return [
+        (_label(words, "tank_id"), tank["id"], None),
+        (_label(words, "kind"), sentence(words, "kinds", tank["kind"]), None),
+        *((_label(words, key), value, None) for key, value in tank["details"].items()),
+        *(
+            (_label(words, key), tank[f"{key}_{unit}"], shown)
+            for key, unit, shown in (
+                ("nominal_diameter", "m", '0.000 "m"'),
+                ("nominal_height", "m", '0.000 "m"'),
+                ("nominal_volume", "m3", '0.000 "m³"'),
+            )
+            if tank[f"{key}_{unit}"] is not None
+        ),
+    ]
+
+
+def _certificate(record, words):
+    """(label, value, DATE or None) of what the job says about its certificate, nothing else."""
+    labels = {"number": sentence(words, "page", "number")}
+    return [
+        (labels.get(key) or _label(words, key), value, DATE if key in _DATES else None)
+        for key, value in record["job"]["certificate"].items()
+        if key != "notice"  # that one stands at the top
+    ]
+
+
+def _survey(record, words):
+    """(label, value, number format or None) of the survey and of what the table refers to."""
+    job = record["job"]
+    survey, table, adjustment = job["survey"], job["table"], record["adjustment"]
+    lines = (
+        ("survey_date", survey["date"], DATE),
+        ("survey_method", adjustment and method_line(words, adjustment), None),
+        ("survey_side", sentence(words, "sides", survey["side"]), None),
+        ("shell_temperature", survey["shell_temperature_c"], '0.0 "°C"'),
+        ("reference_temperature", table["reference_temperature_c"], '0.0 "°C"'),
+        ("zero", sentence(words, "zeros", record["capacity"]["zero"]), None),
+        ("reference_height", job["datum"]["reference_height_m"], '0.000 "m"'),
+    )
+    return [(_label(words, key), value, shown) for key, value, shown in lines if value is not None]
+
+
+def _entries(book, sheet, row, title, lines):
+    """A heading and a line for each (label, value, number format); returns the next row."""
+    if not lines:
+        return row
+    book.heading(sheet, row, title, len(_WIDTHS))
+    for label, value, shown in lines:
+        row += 1
+        if shown == DATE:
+            book.put_date(sheet, row, 1, value, align="left")
+        elif len(str(value)) > _LONG:
+            book.paragraph_in(sheet, row, 1, str(value), _WIDTHS[1:])
+        else:
+            look = {"num_format": shown} if shown else {}
+            book.put(sheet, row, 1, value, align="left", valign="top", **look)
+        book.label(sheet, row, label, _WIDTHS[0])
+    return row + 2
+
+
+def _uncertainty(book, sheet, row, paper):
+    """How U was found and from what, and the verdict of a decision rule; returns the next row."""
+    book.heading(sheet, row, paper.word("headings.uncertainty"), len(_WIDTHS))
+    for text in method.sentences(paper, f'"{paper.word("intervals.monte_carlo")}"'):
+        row += 1
+        book.paragraph(sheet, row, text, _WIDTHS)
+    row = _entries(
+        book, sheet, row + 2, paper.word("headings.inputs"), _facts(paper, method.inputs)
+    )
+    if not paper.record.get("rule"):
+        return row
+    row = _entries(book, sheet, row, paper.word("headings.rule"), _facts(paper, rule.facts)) - 1
+    for text in rule.sentences(paper):
+        book.paragraph(sheet, row, text, _WIDTHS)
+        row += 1
+    return row + 1
+
+
+def _facts(paper, of):
+    """(label, text, None) of what a paper says, without what it has nothing of."""
+    return [(paper.label(key), text, None) for key, text in of(paper) if text]
+
+
+def _result(book, sheet, row, record):
+    """The capacity at the top of the table with U and k on its line; returns the next row."""
+    capacity, words = record["capacity"], book.words
+    U, k = stated_U_m3(capacity)[-1], k_of_rows(capacity)[-1]
+    cubic = number_format(decimals_of(U), unit="m³")
+    top = number_format(decimals_of_height(capacity["height_m"][-1]), unit="m")
+    book.heading(sheet, row, sentence(words, "headings", "result"), len(_WIDTHS))
+    lines = []
+    for column, code in enumerate(("volume", "U", "k", "dip_height"), 1):
+        text = book.word(f"labels.{code}")
+        look = {"align": "right", "text_wrap": True, "font_color": MUTED}
+        book.put(sheet, row + 1, column, text, **look)
+        lines.append(lines_of(text, _WIDTHS[column]))
+    book.set_height(sheet, row + 1, LINE_PT * max(lines))
+    line = {"bold": True, "font_size": 12}
+    sheet.set_row(row + 2, 20)
+    book.put(sheet, row + 2, 0, book.word("labels.top_of_table"), **line)
+    k = words["intervals"]["monte_carlo"] if k is None else k
+    for column, value, shown in (
+        (1, capacity["volume_m3"][-1], cubic),
+        (2, U, f'"± "{cubic}'),
+        (3, k, '"k = "0.00'),
+        (4, capacity["height_m"][-1], top),
+    ):
+        book.put(sheet, row + 2, column, value, num_format=shown, align="right", **line)
+    return row + 4
+
+
+def _doubts(book, sheet, row, record):
+    """What is implausible of the numbers handed in; returns the next row."""
+    lines = doubts_of(record["warnings"])
+    if not lines:
+        return row
+    book.heading(sheet, row, book.words["certificate"]["doubtful"], len(_WIDTHS))
+    for text in lines:
+        row += 1
+        book.paragraph(sheet, row, text, _WIDTHS, bold=True, font_color=ACCENT)
+    return row + 2
+
+
+def _corrections(book, sheet, row, record):
+    """The corrections that were applied, with their sizes; returns the next row."""
+    words = book.words
+    book.heading(sheet, row, sentence(words, "headings", "corrections"), len(_WIDTHS))
+    applied = [correction for correction in record["corrections"] if correction["applied"]]
+    cubic = number_format(decimals_of(stated_U_m3(record["capacity"])[-1]) + 1, unit="m³")
+    for correction in applied:
+        row += 1
+        book.put(sheet, row, 0, sentence(words, "corrections", correction["code"]))
+        book.put(sheet, row, 1, correction["size_m3"], num_format=cubic)
+        book.put(sheet, row, 2, correction["size_percent"], num_format='0.0000 "%"')
+    if not applied:
+        row += 1
+        book.put(sheet, row, 0, sentence(words, "texts", "no_corrections"))
+    return row + 2
+
+
+def _choices(book, sheet, row, record):
+    """What was assumed, a sentence each; returns the next row."""
+    words = book.words
+    book.heading(sheet, row, sentence(words, "headings", "choices"), len(_WIDTHS))
+    for choice in record["choices"]:
+        row += 1
+        text = choice_sentence(words, choice)
+        book.paragraph(sheet, row, text, _WIDTHS)
+    return row + 2
+
+
+def _authorisation(book, sheet, row):
+    """Lines that are left empty, for a person to fill in and sign."""
+    words = book.words
+    book.heading(sheet, row, sentence(words, "headings", "authorisation"), len(_WIDTHS))
+    line = book.format(bottom=1)
+    for below, key in ((2, "authorised_by"), (4, "signature"), (6, "place_and_date")):
+        book.put(sheet, row + below, 0, _label(words, key))
+        for column in (1, 2):
+            sheet.write_blank(row + below, column, None, line)

@@ -1,0 +1,176 @@
+"""The sheets Charts, native charts of the table and of the wall, and Deviations, their points."""
+
+from itertools import groupby
+from math import floor, log10
+
+from tankcal.report.workbook.look import ACCENT, in_mm, values_of
+from tankcal.report.workbook.tables import set_widths
+
+_HEAD_ROW = 3
+_MOST_POINTS = 20_000  # of the sheet Deviations
+_WIDE, _HIGH, _LOW = 640, 415, 300  # pixels of a chart: two to a page, or three
+_PT = 0.75  # of a pixel
+_COLOURS = (ACCENT, "#B03A2E", "#2E7D5B", "#8E6C00", "#6A4C93", "#445566")
+_GRID = {"visible": True, "line": {"color": "#E3E8ED", "width": 0.75}}
+
+
+def charts_sheets(book, record, rows):
+    """Charts of the capacity table, whose `rows` they draw, and of the deviations of the wall."""
+    sheet = book.sheet("charts", tab="paper")
+    row = _HEAD_ROW
+    for name, axis in (("litres_per_cm", "litres_per_cm"), ("U", "U_m3")):
+        row = _insert(book, sheet, row, _curve(book, rows, name, axis), _HIGH)
+    points = _of_sections(record) or _of_solid(record)
+    if not points:
+        return
+    for title, x_axis, series in _deviations_sheet(book, points):
+        chart = _scatter(book, title, x_axis, series, _limit_mm(points))
+        row = _insert(book, sheet, row, (chart, title, x_axis, "residual"), _LOW)
+
+
+def _insert(book, sheet, row, drawn, high):
+    """A chart in one high row, which no page break can part; returns the next row."""
+    chart, title, *axes = drawn
+    x, y = (book.words["axes"][axis] for axis in axes)
+    sheet.set_row(row, _PT * (high + 5))
+    chart.set_size({"width": _WIDE, "height": high})
+    described = book.word("charts.alt", title=title, x=x, y=y)
+    sheet.insert_chart(row, 0, chart, {"description": described})
+    return row + 1
+
+
+def _curve(book, rows, name, axis):
+    """One column of the capacity table against the height: chart, title and axes."""
+    title, capacity = book.word(f"charts.{name}"), book.sheet_name("capacity")
+    height, column = rows.columns["height"], rows.columns[name]
+    chart = book.chart()
+    chart.add_series(
+        {
+            "name": title,
+            "categories": [capacity, rows.first, height, rows.last, height],
+            "values": [capacity, rows.first, column, rows.last, column],
+            "line": {"color": ACCENT, "width": 1.5},
+        }
+    )
+    _dress(book, chart, title, "height", axis)
+    chart.set_legend({"none": True})
+    return chart, title, "height", axis
+
+
+def _dress(book, chart, title, x_axis, y_axis, x=None, y=None):
+    """Title and axes of a chart; x and y are further options of the axes."""
+    names = book.words["axes"]
+    plain = {"major_gridlines": _GRID, "name_font": {"bold": False}, "label_position": "low"}
+    chart.set_title({"name": title, "name_font": {"size": 12, "color": ACCENT}})
+    chart.set_x_axis({"name": names[x_axis], "num_format": "0", **plain, **(x or {})})
+    chart.set_y_axis({"name": names[y_axis], "num_format": "General", **plain, **(y or {})})
+
+
+# ---- deviations of the points from the wall
+
+
+def _deviations_sheet(book, rows):
+    """The points with their deviations; returns (title, x axis, series) of each chart of them."""
+    every = -(-len(rows) // _MOST_POINTS)
+    shown = rows[::every]
+    subtitle = book.word("texts.deviations_subtitle", shown=len(shown), all=len(rows))
+    sheet = book.sheet("deviations", subtitle, tab="paper")
+    columns = _columns(book, shown)
+    set_widths(book, sheet, columns)
+    book.table(sheet, _HEAD_ROW, "radial_deviations", columns)
+    book.freeze(sheet, _HEAD_ROW, 1)
+    name, last = sheet.get_name(), len(columns) - 1
+    if "section" not in shown[0]:
+        title = book.word("charts.deviations_solid")
+        end = _HEAD_ROW + len(shown)
+        places = [[name, _HEAD_ROW + 1, column, end, column] for column in (last - 1, last)]
+        return [(title, "height", [(title, *places)])]
+    return [
+        (book.word("charts.deviations", course=course), "azimuth", series)
+        for course, series in _series_of_courses(book, name, shown, last)
+    ]
+
+
+def _of_sections(record):
+    """One row a used point of a section, section by section, by azimuth."""
+    return [
+        {
+            "point": point,
+            "course": section["course"],
+            "section": section["section"],
+            "azimuth_deg": azimuth,
+            "residual_mm": in_mm(residual),
+        }
+        for section in record["sections"]
+        for azimuth, point, residual in sorted(
+            zip(section["azimuth_deg"], section["points"], section["residual_m"], strict=True)
+        )
+    ]
+
+
+def _of_solid(record):
+    """One row a used point of a wall without sections, by its height."""
+    used = [row for row in record["points"] or [] if row["used"]]
+    return [
+        {"point": row["point"], "z_m": row["z_m"], "residual_mm": in_mm(row["residual_m"])}
+        for row in sorted(used, key=lambda row: row["z_m"])
+    ]
+
+
+def _columns(book, rows):
+    residual = book.column("residual_mm", values_of(rows, "residual_mm"), 1, 16)
+    if "section" not in rows[0]:
+        height = book.column("of_m", values_of(rows, "z_m"), 3, 14, axis="z")
+        return [book.column("point", values_of(rows, "point"), None, 20), height, residual]
+    return [
+        book.column("point", values_of(rows, "point"), None, 20),
+        book.column("course", values_of(rows, "course"), None, 14),
+        book.column("section", values_of(rows, "section"), None, 14),
+        book.column("azimuth_deg", values_of(rows, "azimuth_deg"), 2, 16),
+        residual,
+    ]
+
+
+def _series_of_courses(book, name, rows, last):
+    """(course, [(name, x cells, y cells) of each of its sections]) from the bottom up."""
+    row, courses = _HEAD_ROW, {}
+    for (course, section), group in groupby(rows, key=lambda one: (one["course"], one["section"])):
+        first, row = row + 1, row + len(list(group))
+        cells = [[name, first, column, row, column] for column in (last - 1, last)]
+        title = book.words["axes"]["section"].format(section=section)
+        courses.setdefault(course, []).append((title, *cells))
+    return courses.items()
+
+
+def _limit_mm(rows):
+    """The end of the axis of deviations, the same in every chart: 1, 2 or 5 times 10^n mm."""
+    largest = max(abs(row["residual_mm"]) for row in rows) or 1.0
+    power = 10.0 ** floor(log10(largest))
+    return next(step * power for step in (1, 2, 5, 10) if step * power >= largest)
+
+
+def _scatter(book, title, x_axis, series, limit_mm):
+    """Deviations against the azimuth, joined within each section, or bare points by height."""
+    joined = x_axis == "azimuth"
+    chart = book.chart("straight_with_markers" if joined else None)
+    for place, (name, x, y) in enumerate(series):
+        colour = _COLOURS[place % len(_COLOURS)]
+        chart.add_series(
+            {
+                "name": name,
+                "categories": x,
+                "values": y,
+                "line": {"color": colour, "width": 0.75} if joined else {"none": True},
+                "marker": {
+                    "type": "circle",
+                    "size": 4,
+                    "fill": {"color": colour},
+                    "border": {"none": True},
+                },
+            }
+        )
+    turn = {"min": 0, "max": 360, "major_unit": 45} if joined else {}
+    ends = {"min": -limit_mm, "max": limit_mm}
+    _dress(book, chart, title, x_axis, "residual", turn, ends)
+    chart.set_legend({"position": "bottom"} if len(series) > 1 else {"none": True})
+    return chart

@@ -1,0 +1,129 @@
+"""Sheets beside the capacity table: proportional parts, other densities, what is in the tank."""
+
+from tankcal.report.numbers import unit
+from tankcal.report.paper import DECIMALS_OF_PARTS, Paper
+from tankcal.report.uncertainty.stated import stated_U_m3
+from tankcal.report.workbook.look import Column, height_digits, number_format, values_of
+from tankcal.report.workbook.tables import set_widths
+from tankcal.text.digits import LITRE_DECIMALS, decimals_of_rows, shortest, with_digits
+from tankcal.text.words import marks_of
+
+_HEAD_ROW = 3
+_WIDTHS = (50, 16, 16, 16, 16)
+
+
+def proportional_parts_sheet(book, record):
+    """What 1 to 9 mm add to the row below a dip, course by course; no sheet for other tables."""
+    parts = record["proportional_parts"]
+    zones = parts["zones"]
+    if not zones:
+        return
+    largest = with_digits(1000 * parts["largest_m3"], 2, marks_of(book.words))
+    subtitle = book.word("texts.parts_subtitle", largest=largest)
+    sheet = book.sheet("proportional_parts", subtitle, landscape=True, tab="result")
+    columns = [
+        book.column(code, values_of(zones, key), height_digits(values_of(zones, key)), 10)
+        for code, key in (("from_m", "bottom_m"), ("to_m", "top_m"))
+    ]
+    for place in range(parts["parts"] - 1):
+        litres = [1000 * zone["part_m3"][place] for zone in zones]
+        columns.append(book.column("part_l", litres, 1, 11, millimetres=place + 1))
+    set_widths(book, sheet, columns)
+    book.table(sheet, _HEAD_ROW, "proportional_parts", columns)
+    book.freeze(sheet, _HEAD_ROW)
+
+
+def densities_sheet(book, record):
+    """The table for each further density of the liquid; no sheet where none was asked for."""
+    others = record["densities"]
+    if not others:
+        return
+    capacity = record["capacity"]
+    own = record["job"]["table"]["liquid_density_kg_m3"]
+    name = book.sheet_name("capacity")
+    subtitle = book.word("texts.densities_subtitle", capacity=name)
+    sheet = book.sheet("other_densities", subtitle, tab="result")
+    digits = decimals_of_rows(stated_U_m3(capacity), least=LITRE_DECIMALS)
+    heights = capacity["height_m"]
+    tables = [(own, capacity["volume_m3"])]
+    tables += [(other["density_kg_m3"], other["volume_m3"]) for other in others]
+    columns = [book.column("dip_height_m", heights, height_digits(heights), 13)]
+    for density, volumes in tables:
+        heading = f"{shortest(density, marks_of(book.words))} kg/m³"
+        columns.append(Column(heading, volumes, digits, 16))
+    named = range(2, len(columns))
+    muted = [row for row, good in enumerate(capacity["for_use"]) if not good]
+    if muted:
+        columns.append(use_column(book, capacity))
+    set_widths(book, sheet, columns)
+    last = book.table(sheet, _HEAD_ROW, "other_densities", columns, muted=muted)
+    book.freeze(sheet, _HEAD_ROW)
+    for place in named:
+        book.name(name_of_density(place), sheet, _HEAD_ROW + 1, last, place)
+
+
+def use_column(book, capacity):
+    """The column that says which rows are not for use."""
+    refused = book.words["texts"]["not_for_use"]
+    return book.column("use", ["" if good else refused for good in capacity["for_use"]], None, 14)
+
+
+def name_of_density(place):
+    """The named range of the volumes of a density of the sheet, from 2 on: 1 is the table's own."""
+    return f"volume_of_density_{place}"
+
+
+def inside_sheet(book, record):
+    """Dimensions of a solid; bottom, deadwood and roof, or that none was declared."""
+    paper, corrections = Paper(record, book.words), book.words["corrections"]
+    sheet = book.sheet("inside")
+    book.widths(sheet, *_WIDTHS)
+    row = _HEAD_ROW
+    if record["solid"]:
+        row = _described(book, sheet, row, book.words["headings"]["dimensions"], record["solid"])
+    for code in ("deadwood", "bottom", "roof"):
+        said, declared = paper.choices(code), record[code]
+        if not (said or declared):
+            continue
+        title = corrections[code]
+        if declared and code != "deadwood":
+            row = _described(book, sheet, row, title, declared) - 1
+        else:
+            book.heading(sheet, row, title, len(_WIDTHS))
+            row += 1
+        for text in said:
+            book.paragraph(sheet, row, text, _WIDTHS)
+            row += 1
+        if declared and code == "deadwood":
+            row = book.table(sheet, row + 1, "deadwood", _deadwood(book, declared)) + 1
+        row += 1
+
+
+def _described(book, sheet, row, title, lines):
+    """A heading, and a line for each {code, value, unit} of the record; returns the next row."""
+    words = book.words
+    book.heading(sheet, row, title, len(_WIDTHS))
+    for line in lines:
+        row += 1
+        value = line["value"]
+        book.put(sheet, row, 0, words["labels"].get(line["code"], line["code"]))
+        if line["unit"] is None:
+            book.put(sheet, row, 1, words["parts"].get(value, value))
+            continue
+        shown, decimals = unit(line["unit"]), DECIMALS_OF_PARTS.get(line["unit"], 0)
+        look = {"num_format": number_format(decimals)}
+        book.put(sheet, row, 1, shown.factor * value, **look)
+        book.put(sheet, row, 2, shown.symbol, indent=1)
+    return row + 2
+
+
+def _deadwood(book, items):
+    u = values_of(items, "u_m3")
+    digits = decimals_of_rows(u, unknown=LITRE_DECIMALS + 1)
+    return [
+        book.column("item", values_of(items, "name"), None, _WIDTHS[0]),
+        book.column("bottom_m", values_of(items, "bottom_m"), 3),
+        book.column("top_m", values_of(items, "top_m"), 3),
+        book.column("volume_m3", values_of(items, "volume_m3"), digits, 14),
+        book.column("u_m3", u, digits),
+    ]

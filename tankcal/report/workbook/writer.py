@@ -1,0 +1,192 @@
+"""Writing values, texts and tables into the cells of a sheet, in the words of a language."""
+
+from tankcal.report.workbook.look import (
+    ACCENT,
+    DATE,
+    LINE_PT,
+    MUTED,
+    RULE,
+    Column,
+    day,
+    lines_in,
+    lines_of,
+    number_format,
+    width_of,
+)
+from tankcal.text.digits import NOTHING
+
+_LONGEST_CELL = 32767  # characters, Excel's limit
+
+
+class Writer:
+    """Writes into the sheets of an XlsxWriter workbook.
+
+    words  of the language of every text that is not the record's
+    """
+
+    def __init__(self, file, words):
+        self._file = file
+        self.words = words
+        self._formats = {}
+        self._heights = {}  # {(name of a sheet, row): points}
+
+    # ---- words and looks
+
+    def word(self, name, /, of="workbook", **values):
+        """The text "group.key" of [workbook.*], or of another part of the words, filled in.
+
+        Raises KeyError when the words lack it.
+        """
+        group, key = name.split(".", 1)
+        return self.words[of][group][key].format(**values)
+
+    def sheet_name(self, code):
+        """The name of the sheet with this code, as formulas of the language must call it."""
+        return self.word(f"sheets.{code}")
+
+    def format(self, **properties):
+        """The format with these XlsxWriter properties, made once."""
+        key = tuple(sorted(properties.items()))
+        if key not in self._formats:
+            self._formats[key] = self._file.add_format({"valign": "vcenter", **properties})
+        return self._formats[key]
+
+    # ---- cells
+
+    def heading(self, sheet, row, text, columns):
+        """A heading with a rule under it across so many columns."""
+        rule = {"bottom": 1, "bottom_color": ACCENT}
+        look = self.format(bold=True, font_size=12, font_color=ACCENT, **rule)
+        self.set_height(sheet, row, 21)
+        self.set_height(sheet, row + 1, 18)  # the rule would touch what stands under it
+        for column in range(columns):
+            sheet.write_blank(row, column, None, look)
+        sheet.write_string(row, 0, text, look)
+
+    def put(self, sheet, row, column, value, **look):
+        """Write one value of the record: a number as number, all else as text, never a formula."""
+        if isinstance(value, bool):
+            value = self.words["yes_no"]["yes" if value else "no"]
+        if isinstance(value, list | tuple):
+            value = ", ".join(str(item) for item in value)
+        if isinstance(value, int | float):
+            look = {"align": "right", **look}
+            sheet.write_number(row, column, value, self.format(**look))
+            return
+        if value is None:
+            value, look = NOTHING, {**look, "font_color": MUTED}
+        look.pop("num_format", None)
+        sheet.write_string(row, column, str(value)[:_LONGEST_CELL], self.format(**look))
+
+    def put_date(self, sheet, row, column, text, **look):
+        """A date of the record as a date of the spreadsheet; what is no date stays text."""
+        found = day(text)
+        if found is None or len(str(text)) > len(found.isoformat()):
+            self.put(sheet, row, column, text, **look)
+        else:
+            sheet.write_datetime(row, column, found, self.format(num_format=DATE, **look))
+
+    def paragraph(self, sheet, row, text, widths, **look):
+        """A wrapped text across the columns of these widths, in a row as high as it needs."""
+        self.paragraph_in(sheet, row, 0, text, widths, **look)
+
+    def paragraph_in(self, sheet, row, column, text, widths, **look):
+        """A wrapped text from one column over those of these widths, at its left."""
+        look = self.format(**{"text_wrap": True, "align": "left", "valign": "top", **look})
+        self.set_height(sheet, row, LINE_PT * lines_of(text, sum(widths)))
+        if len(widths) > 1:
+            sheet.merge_range(row, column, row, column + len(widths) - 1, "", look)
+        sheet.write_string(row, column, text[:_LONGEST_CELL], look)
+
+    def label(self, sheet, row, text, width):
+        """A wrapped label in the first column, of this width, in a row as high as it needs."""
+        needed = LINE_PT * lines_of(text, width)
+        if needed > self._heights.get((sheet.get_name(), row), LINE_PT):
+            self.set_height(sheet, row, needed)
+        self.put(sheet, row, 0, text, valign="top", text_wrap=True)
+
+    def set_height(self, sheet, row, points):
+        """Set the height of a row, which `keep_together` counts with."""
+        sheet.set_row(row, points)
+        self._heights[sheet.get_name(), row] = points
+
+    def widths(self, sheet, *widths):
+        """Set the widths of the first columns, in letters."""
+        for column, width in enumerate(widths):
+            sheet.set_column(column, column, width)
+
+    @staticmethod
+    def freeze(sheet, head_row, columns=0):
+        """Keep the headings in sight, with so many columns at the left, and print them again."""
+        sheet.freeze_panes(head_row + 1, columns)
+        sheet.repeat_rows(head_row)
+
+    # ---- tables
+
+    def column(self, code, cells, digits=None, width=12, percent=False, **values):
+        """A Column with its heading from [workbook.columns]."""
+        return Column(self.word(f"columns.{code}", **values), cells, digits, width, percent)
+
+    def table(self, sheet, row, name, columns, muted=(), autofilter=False, widths=None):
+        """An Excel table with its headings in `row`; returns the number of its last row.
+
+        name    of the table, the same in every language
+        muted   numbers of the data rows that stand back in grey italics
+        widths  of its columns where tables share them; None: of the columns themselves
+        """
+        count = len(columns[0].cells)
+        muted = frozenset(muted)
+        widths = widths or [width_of(column) for column in columns]
+        for place, column in enumerate(columns):
+            self._cells(sheet, row + 1, place, column, muted)
+        heads = [{"header": one.heading, "header_format": self._head(one)} for one in columns]
+        options = {"name": name, "style": None, "autofilter": autofilter, "columns": heads}
+        sheet.add_table(row, 0, row + count, len(columns) - 1, options)
+        lines = max(
+            lines_of(column.heading, width, bold=True)
+            for column, width in zip(columns, widths, strict=False)
+        )
+        self.set_height(sheet, row, LINE_PT * lines + 3)
+        self._row_heights(sheet, row + 1, columns, widths)
+        return row + count
+
+    def _cells(self, sheet, first, place, column, muted):
+        """The cells of a column; a table may have a million: each look is made once."""
+        each = isinstance(column.digits, list)
+        looks = {}
+        for index, value in enumerate(column.cells):
+            digits = column.digits[index] if each else column.digits
+            key = digits, index in muted
+            if key not in looks:
+                look = self._cell_look(*key, column.percent)
+                looks[key] = look, self.format(**look)
+            look, made = looks[key]
+            if isinstance(value, float):
+                sheet.write_number(first + index, place, value, made)
+            else:
+                self.put(sheet, first + index, place, value, **look)
+
+    @staticmethod
+    def _cell_look(digits, muted, percent):
+        look = {"bottom": 4, "bottom_color": RULE}
+        if digits is None:
+            look |= {"text_wrap": True, "align": "left", "indent": 1}
+        else:
+            look |= {"align": "right", "num_format": number_format(digits, percent)}
+        return look | ({"italic": True, "font_color": MUTED} if muted else {})
+
+    def _row_heights(self, sheet, first, columns, widths):
+        """Make the rows of a table high enough for their longest text."""
+        of_columns = [
+            lines_in(column, width)
+            for column, width in zip(columns, widths, strict=False)
+            if column.digits is None
+        ]
+        for index, lines in enumerate(map(max, zip(*of_columns, strict=True))):
+            if lines > 1:
+                self.set_height(sheet, first + index, LINE_PT * lines)
+
+    def _head(self, column):
+        side = {"align": "left", "indent": 1} if column.digits is None else {"align": "right"}
+        colours = {"font_color": "white", "bg_color": ACCENT}
+        return self.format(bold=True, text_wrap=True, **side, **colours)

@@ -1,0 +1,138 @@
+"""The normal equations of a plan: compiled loops where they can be had, else whole arrays.
+
+Both forms give the same numbers but for rounding; see tankcal.solver.loops for the equations.
+"""
+
+import numpy as np
+import scipy.sparse
+
+from tankcal.solver import loops
+from tankcal.solver.compiled import compiled, worthwhile
+
+
+def add_rows(batch, w, jac, normals):
+    """Add a batch's rows (w, jac already the batch's own) to the Normals."""
+    if worthwhile():
+        run = compiled(loops, loops.COMPILED)
+        if batch.block is None:
+            run._add_plain_rows(w, jac, batch.columns, normals.t, normals.g)
+        else:
+            run._add_rows(
+                w, jac, batch.block, batch.columns, batch.places, batch.cuts,
+                normals.v, normals.wide, normals.b, normals.t, normals.g,
+            )  # fmt: skip
+        return
+    f = jac
+    if batch.block is not None:
+        e, f = jac[:, :, :3], jac[:, :, 3:]
+        square = np.einsum("nma,nmb->nab", e, e)
+        np.add.at(normals.v, batch.block, square[:, *np.tril_indices(3)])
+        np.add.at(normals.b, batch.block, np.einsum("nma,nm->na", e, w))
+        np.add.at(normals.wide, batch.places, np.einsum("nmk,nma->nka", f, e))
+    np.add.at(normals.g, batch.columns, np.einsum("nmk,nm->nk", f, w))
+    once = np.triu(np.ones((f.shape[2],) * 2)) * np.einsum("nma,nmb->nab", f, f)
+    np.add.at(normals.t, (batch.columns[:, :, None], batch.columns[:, None, :]), once)
+
+
+def eliminate(plan, normals, damping, smallest):
+    """Eliminate the blocks in place; the first block that is not determined, or -1."""
+    if worthwhile():
+        return compiled(loops, loops.COMPILED)._eliminate(
+            normals.v, normals.wide, normals.b, plan.starts, plan.columns, plan.runs, plan.ends,
+            plan.alike, normals.t, normals.g, damping, smallest,
+        )  # fmt: skip
+    v = np.zeros((plan.blocks, 3, 3))
+    v[:, *np.tril_indices(3)] = normals.v
+    v += np.tril(v, -1).transpose(0, 2, 1)
+    diagonal = np.einsum("nii->ni", v)
+    before = diagonal.copy()
+    diagonal *= 1 + damping
+    scale = np.sqrt(np.where(before > 0, before, 1.0))
+    values = np.linalg.eigvalsh(v / (scale[:, :, None] * scale[:, None, :]))
+    bad = np.flatnonzero(~(values[:, 0] > smallest))
+    if len(bad):
+        return int(bad[0])
+    root = np.linalg.cholesky(v)
+    normals.v[:] = root[:, *np.tril_indices(3)]
+    normals.b[:] = np.linalg.solve(root, normals.b[:, :, None])[:, :, 0]
+    owner = np.repeat(np.arange(plan.blocks), np.diff(plan.starts))
+    normals.wide[:-1] = np.linalg.solve(root[owner], normals.wide[:-1, :, None])[:, :, 0]
+    y = block_rows(plan, normals.wide)
+    normals.t[:-1, :-1] -= np.triu((y.T @ y).toarray())
+    normals.g[:-1] -= y.T @ normals.b.ravel()
+    return -1
+
+
+def block_rows(plan, wide):
+    """The wide part as a sparse matrix (3 nb, nr)."""
+    owner = np.repeat(np.arange(plan.blocks), np.diff(plan.starts))
+    rows = 3 * owner[:, None] + np.arange(3)
+    columns = np.repeat(plan.columns[:, None], 3, axis=1)
+    return scipy.sparse.csr_array(
+        (wide[:-1].ravel(), (rows.ravel(), columns.ravel())), shape=(3 * plan.blocks, plan.reduced)
+    )
+
+
+def back_substitute(plan, normals, reduced):
+    """L^-T (y + Y' reduced) of each block (nb, 3); the blocks' step is this with the other sign."""
+    if worthwhile():
+        out = np.empty((plan.blocks, 3))
+        compiled(loops, loops.COMPILED)._back(
+            normals.v, normals.wide, normals.b, plan.starts, plan.columns, reduced, out
+        )
+        return out
+    right = normals.b + (block_rows(plan, normals.wide) @ reduced).reshape(-1, 3)
+    return np.linalg.solve(roots(normals).transpose(0, 2, 1), right[:, :, None])[:, :, 0]
+
+
+def roots(normals):
+    """The Cholesky factors L (nb, 3, 3) of eliminated blocks."""
+    v = np.zeros((len(normals.v), 3, 3))
+    v[:, *np.tril_indices(3)] = normals.v
+    return v
+
+
+def block_cofactors(plan, normals, inverse):
+    """Cofactors (nb, 3, 3) of all blocks, and (t, 3) of each block with its reduced columns.
+
+    inverse  (nr, nr) cofactor matrix of the reduced unknowns
+    """
+    cross, out = np.empty((len(plan.columns) + 1, 3)), np.empty((plan.blocks, 3, 3))
+    cross[-1] = 0.0
+    if worthwhile():
+        compiled(loops, loops.COMPILED)._cofactors(
+            normals.v, normals.wide, plan.starts, plan.columns, plan.runs, plan.ends,
+            inverse, cross, out,
+        )  # fmt: skip
+        return out, cross
+    root = np.linalg.inv(roots(normals))
+    for o in range(plan.blocks):
+        here = slice(plan.starts[o], plan.starts[o + 1])
+        z = normals.wide[here] @ root[o]
+        columns = plan.columns[here]
+        cross[here] = -inverse[np.ix_(columns, columns)] @ z
+        out[o] = root[o].T @ root[o] - z.T @ cross[here]
+    return out, cross
+
+
+def leverage(plan, batch, jac, inverse, cross, cofactors):
+    """J Q J' of each row (n, m): one minus the redundancy number.
+
+    inverse, cross, cofactors  of the reduced unknowns, and as block_cofactors gives them
+    """
+    spare = plan.reduced
+    if batch.block is not None and worthwhile():
+        out = np.empty(jac.shape[:2])
+        compiled(loops, loops.COMPILED)._leverage(
+            jac, batch.block, batch.columns, batch.places, inverse, cross, cofactors, spare, out
+        )
+        return out
+    padded = np.pad(inverse, (0, 1))
+    f = jac if batch.block is None else jac[:, :, 3:]
+    q = padded[batch.columns[:, :, None], batch.columns[:, None, :]]
+    out = np.einsum("nma,nab,nmb->nm", f, q, f)
+    if batch.block is not None:
+        e, mixed = jac[:, :, :3], cross[batch.places]
+        out += np.einsum("nma,nab,nmb->nm", e, cofactors[batch.block], e)
+        out += 2 * np.einsum("nma,nka,nmk->nm", e, mixed, f)
+    return out

@@ -1,0 +1,255 @@
+"""Gauss-Newton on the reduced normal equations; damped only when the cost rises."""
+
+import numpy as np
+import scipy.linalg
+
+from tankcal.adjust import SMALLEST_PIVOT, determined
+from tankcal.errors import SolutionError
+from tankcal.messages import message
+from tankcal.solver.elimination import add_rows, back_substitute, eliminate
+from tankcal.solver.exact import Conditions
+from tankcal.solver.model import Normals
+from tankcal.solver.plan import plan
+from tankcal.solver.rank import diagnosis, weakness
+from tankcal.solver.solution import Factor, Solution
+from tankcal.solver.threads import threads_for
+
+SMALL = 2e7  # rows times unknowns squared: below it a system without blocks is solved by QR
+FIRST_DAMPING = 1e-4
+STRONGEST_DAMPING = 1e12
+NEARLY_THERE = 1e-2  # of the cost, still to be gained: from here on undamped
+SHARP = 1e-13  # of the rows, gained by the last step: below it derivatives need no renewal
+
+
+class UndeterminedError(SolutionError):
+    """Some unknowns are not determined by the observations."""
+
+
+def solve(model, state, *, max_iterations=100, tolerance=1e-4):
+    """Minimise the sum of squared rows of a Model, starting from `state`.
+
+    tolerance  of the last step: root of the sum of squares of what it changes in the rows, per root
+               of the number of rows; the step itself is taken, so the error left is far smaller
+
+    Returns a Solution. Raises SolutionError when the observations do not determine the unknowns
+    (the message names them) or when the iteration does not converge.
+    """
+    with threads_for(model.reduced):
+        return _solved(_Work(model), state, max_iterations, tolerance)
+
+
+def linearise(model, state):
+    """The Solution of a Model with its derivatives at `state`: no step is made.
+
+    Its cofactors are those of a survey whose observations are what `state` computes, so it tells
+    how well the unknowns will be known before anything is measured. Raises SolutionError when the
+    observations do not determine the unknowns (the message names them).
+    """
+    with threads_for(model.reduced):
+        work = _Work(model)
+        cost, factor = work.evaluate(state), work.factor(state, 0.0)
+        if factor is None:
+            raise SolutionError(
+                message(
+                    "no_factor",
+                    "the normal equations have no factor{weakness}",
+                    weakness=weakness(work, state),
+                )
+            )
+        _refuse_untouched(model, factor)
+        return Solution(work, state, cost, 0, factor, factor)
+
+
+def _solved(work, state, max_iterations, tolerance):
+    """The iteration of `solve`."""
+    model, state = work.model, work.closed_start(state)
+    cost = work.evaluate(state)
+    damping, resting = 0.0, FIRST_DAMPING
+    limit = tolerance**2 * max(work.rows, 1)
+    for iteration in range(1, max_iterations + 1):
+        factor = work.factor(state, damping)
+        if factor is None:
+            damping = _stronger(damping, resting)
+            continue
+        step, decrement = work.step(factor)
+        candidate = work.closed(model.moved(state, step), factor)
+        if candidate is None:
+            damping = _stronger(damping, resting)
+            continue
+        if not damping and decrement < limit:
+            _refuse_untouched(model, factor)
+            cost = work.evaluate(candidate, derivatives=False)
+            sharp = decrement < SHARP * max(work.rows, 1)
+            return Solution(work, candidate, cost, iteration, factor if sharp else None, factor)
+        before, cost = cost, work.evaluate(candidate)
+        if cost <= before * (1 + 1e-12):
+            gain = 2 * (before - cost) / decrement
+            damping *= max(1 / 3, 1 - (2 * gain - 1) ** 3)
+            if damping and decrement < NEARLY_THERE * cost:
+                damping, resting = 0.0, damping
+            state = candidate
+        else:
+            cost, damping = work.evaluate(state), _stronger(damping, resting)
+    raise SolutionError(
+        message(
+            "not_converged",
+            "the adjustment did not converge in {most} iterations{weakness}",
+            most=max_iterations,
+            weakness=weakness(work, state),
+        )
+    )
+
+
+def _refuse_untouched(model, factor):
+    if len(factor.untouched):
+        names = ", ".join(model.name_of(int(column)) for column in factor.untouched)
+        raise UndeterminedError(
+            message("says_nothing", "no observation says anything about: {names}", names=names)
+        )
+
+
+def _stronger(damping, resting):
+    damping = 10 * damping or resting
+    if damping > STRONGEST_DAMPING:
+        raise SolutionError(
+            message("no_minimum", "the adjustment cannot be improved, and is not at a minimum")
+        )
+    return damping
+
+
+class _Work:
+    """Plan and buffers of one solve."""
+
+    def __init__(self, model):
+        self.model = model
+        self.plan = plan(model.reduced, model.blocks, model.groups)
+        self.w = [np.zeros((len(group.columns), group.rows)) for group in model.groups]
+        self.jac = [
+            np.zeros((len(group.columns), group.rows, group.columns.shape[1]))
+            for group in model.groups
+        ]
+        self.normals = Normals.zero(self.plan)
+        self.rows = sum(w.size for w in self.w)
+        self.conditions = Conditions(model)
+
+    def closed_start(self, state):
+        """The start state, brought to where the exact conditions hold."""
+        if not self.conditions:
+            return state
+        self.evaluate(state)
+        lengths = np.zeros(self.model.unknowns + 1)
+        for group, jac in zip(self.model.groups, self.jac, strict=True):
+            np.add.at(lengths, group.columns, np.einsum("nmk,nmk->nk", jac, jac))
+        lengths = lengths[: self.plan.reduced]
+        scale = 1.0 / np.sqrt(np.where(lengths > 0, lengths, 1.0))
+        return self.conditions.closed(state, scale, strict=True)
+
+    def closed(self, state, factor):
+        """The state after a step, brought back to the exact conditions; None: damp more."""
+        return self.conditions.closed(state, factor.scale) if self.conditions else state
+
+    def evaluate(self, state, derivatives=True):
+        """Fill misclosures (and derivatives) at a state; half the sum of squares."""
+        cost = 0.0
+        for group, w, jac in zip(self.model.groups, self.w, self.jac, strict=True):
+            group.fill(state, w, jac if derivatives else jac[:0])
+            cost += 0.5 * float(np.vdot(w, w))
+        return cost if np.isfinite(cost) else np.inf
+
+    def factor(self, state, damping):
+        """Normal equations at the evaluated state, eliminated and factored; None: damp more."""
+        normals, nr = self.normals, self.plan.reduced
+        normals.clear()
+        for batch in self.plan.batches:
+            add_rows(batch, batch.of(self.w[batch.group]), batch.of(self.jac[batch.group]), normals)
+        diagonal = normals.t.diagonal()[:nr].copy()
+        if not np.isfinite(diagonal).all():
+            return None  # no derivative exists at this state
+        untouched = diagonal == 0.0
+        if untouched.any():
+            diagonal[untouched] = 1.0
+        tangent = None
+        if self.conditions:
+            tangent = self.conditions.tangent(state, 1.0 / np.sqrt(diagonal))
+            untouched &= ~tangent.touched
+        bad = eliminate(self.plan, normals, damping, SMALLEST_PIVOT)
+        if bad >= 0:
+            return self._look(state, damping, bad)
+        scale = 1.0 / np.sqrt(diagonal)
+        free = ties = held = None
+        if self.model.free is not None and not damping:
+            free = self.model.free(state)
+            ties = free * self.model.inner[:, None]
+            if np.linalg.matrix_rank(ties.T @ free) < free.shape[1]:
+                raise SolutionError(
+                    message("datum_not_fixed", "what is to hold the datum does not fix it")
+                )
+            held = np.linalg.qr(free[:nr] / scale[:, None])[0]
+        if self.plan.blocks == 0 and self.rows * nr * nr < SMALL:
+            lower, sound, pull = self._dense_root(scale, untouched, damping, held, tangent)
+        else:
+            lower, sound, pull = self._root(scale, untouched, damping, held, tangent)
+        if not sound:
+            return self._look(state, damping, None)
+        untouched = np.flatnonzero(untouched)
+        return Factor(normals, scale, lower, untouched, free, ties, tangent, pull)
+
+    def _root(self, scale, untouched, damping, held, tangent):
+        """Cholesky factor of the scaled reduced system, and whether its pivots are sound.
+
+        And what the conditions hold against: see Tangent.square.
+        """
+        nr = self.plan.reduced
+        s = self.normals.t[:nr, :nr] + self.normals.t[:nr, :nr].T
+        corner = np.einsum("ii->i", s)
+        corner *= 0.5
+        corner[untouched] = 1.0
+        s *= scale
+        s *= scale[:, None]
+        corner += damping
+        if held is not None:
+            s += held @ held.T
+        pull = None
+        if tangent is not None:
+            s, pull = tangent.square(s)
+        lower, info = scipy.linalg.lapack.dpotrf(s.T, lower=1, clean=0, overwrite_a=1)
+        sound = not info and determined(lower.diagonal(), self.rows, of_normals=True).all()
+        return lower, sound, pull
+
+    def _dense_root(self, scale, untouched, damping, held, tangent):
+        """The same factor by QR of the rows themselves: nothing is squared."""
+        nr = self.plan.reduced
+        rows = [np.diag(untouched.astype(float)), np.sqrt(damping) * np.eye(nr)]
+        if held is not None:
+            rows.append(held.T)
+        for batch in self.plan.batches:
+            jac = batch.of(self.jac[batch.group])
+            n, m, _ = jac.shape
+            dense = np.zeros((n, m, nr + 1))
+            columns = np.broadcast_to(batch.columns[:, None, :], jac.shape)
+            dense[np.arange(n)[:, None, None], np.arange(m)[:, None], columns] = jac
+            rows.append(dense.reshape(n * m, dense.shape[-1])[:, :nr] * scale)
+        rows, pull = np.vstack(rows), None
+        if tangent is not None:
+            outer, rows = tangent.split(rows.T)
+            pull, rows = outer @ np.vstack([outer, rows]).T, rows.T
+        r = np.linalg.qr(rows, mode="r")
+        lower = np.asfortranarray((r * np.sign(r.diagonal())[:, None]).T)
+        return lower, determined(lower.diagonal(), self.rows).all(), pull
+
+    def _look(self, state, damping, bad_block):
+        """A factor that could not be had: raise when it is the survey's fault."""
+        found = None if damping else diagnosis(self, state, bad_block)
+        if found:
+            raise UndeterminedError(found)
+
+    def step(self, factor):
+        """Gauss-Newton step (unknowns,) and the squared size of what it changes in the rows."""
+        n = factor.normals
+        reduced = -factor.solved(n.g[:-1])
+        blocks = -back_substitute(self.plan, n, reduced)
+        step = np.concatenate([reduced, blocks.ravel()])
+        if factor.free is not None:
+            step -= factor.free @ np.linalg.solve(factor.ties.T @ factor.free, factor.ties.T @ step)
+        decrement = -float(n.g[:-1] @ reduced) + float(np.vdot(n.b, n.b))
+        return step, decrement

@@ -1,9 +1,0 @@
-"""The starter job of `tankcal new`: an empty form, as a folder of text files and as a workbook.
-
-Both are written from the lists of `tankcal.job.contract`, so that they name every key and column.
-"""
-
-from tankcal.starter.filled import FilledForm
-from tankcal.starter.writing import write_form, write_input_workbook, write_starter
-
-__all__ = ["FilledForm", "write_form", "write_input_workbook", "write_starter"]

@@ -1,0 +1,263 @@
+"""A survey adjusted: from the measurements as they were read to points with their covariance."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.messages import message
+from tankcal.survey.causes import causes_of
+from tankcal.survey.datum import framed
+from tankcal.survey.depth import in_depth
+from tankcal.survey.diagnosis.blunders import searched
+from tankcal.survey.diagnosis.checks import check_points, check_readings, disagreeing
+from tankcal.survey.diagnosis.diagnoses import MIRROR, diagnosed
+from tankcal.survey.diagnosis.double_names import names_alike, same_place
+from tankcal.survey.diagnosis.gross_errors import gross_readings, swapped_at_start
+from tankcal.survey.diagnosis.held_control import strained, wrong_control, wrongly_held
+from tankcal.survey.diagnosis.misread_files import likely_mistake, photos_that_do_not_fit
+from tankcal.survey.diagnosis.outlier_attribution import SOME, one_sided, set_aside, undecided
+from tankcal.survey.diagnosis.scales import check_readings_off, scale_of_control
+from tankcal.survey.network.reactions import HELD, reactions
+from tankcal.survey.network.snooping import CRITICAL
+from tankcal.survey.network.soundness import hardly_determined
+from tankcal.survey.network_of_survey import gather, held_trace, named_in
+from tankcal.survey.results import Adjustment
+from tankcal.survey.rows import gone_with_their_points, readings_of
+from tankcal.survey.start.unstarted import SeveralPlacesError
+from tankcal.survey.start_values import mirrored_targets, started, started_like
+
+SUSPICIOUS = 4.0  # sigma0 above which whole files are doubted
+SEVERAL = 0.05  # share of the values set aside, above which they are as well
+SPARED = 2  # values fewer set aside, from which a held coordinate is doubted and not they
+NOISELESS = 1e-6  # sigma0 of rounding alone: what was measured scatters more
+TRIED = 25  # iterations of a survey that is only supposed
+FILES = ("image_points.csv", "photos.csv", "control.csv")  # first in the list of readings
+
+
+def adjust_survey(measurements, tell=None):
+    """Adjust everything that was measured on site: the Adjustment of job.Measurements.
+
+    tell  tell(text) is called with what is being done
+
+    Raises InputError for what cannot be meant, SolutionError (in words, with a likely cause where
+    one is found) when the survey does not determine what is asked for.
+    """
+    tell = tell or (lambda text: None)
+
+    def adjusted(measured, like):
+        return _adjusted(measured, tell, like=like)
+
+    try:
+        found, measurements, depth = in_depth(measurements, adjusted, tell)
+    except SolutionError as error:
+        if not measurements.settings.explain or isinstance(error, SeveralPlacesError):
+            raise
+        tell(message("looking_for_faults", "looking for what is wrong"))
+        told = _why_not(measurements, str(error))
+        if not told:
+            raise
+        raise SolutionError(*error.args, *(one.text for one in told)) from error
+    tell(message("judging_residuals", "working out what the residuals say"))
+    return replace(_complete(*found, measurements), depth=depth)
+
+
+def _adjusted(measurements, tell, snooping=None, most=100, like=None):
+    """Searched, Gathered and Frame of measurements; like: network.Adjusted that is close to it."""
+    gathered = gather(measurements)
+    if not gathered.survey.points:
+        nothing = message("nothing_observed", "the survey has no observations to be adjusted")
+        raise InputError([Problem("job.toml", nothing), *gathered.warnings])
+    tell(
+        message(
+            "finding_starts",
+            "finding approximate values of {count} points",
+            count=len(gathered.survey.points),
+        )
+    )
+    survey = None if like is None else started_like(like, gathered, measurements)
+    survey = survey or started(gathered, measurements)
+    swapped = swapped_at_start(survey, gathered.known)
+    if swapped:
+        raise SolutionError("\n".join(map(str, swapped)))
+    frame = framed(survey, gathered, measurements.settings)
+    tell(message("adjusting", "adjusting {count} observations", count=_count(frame.survey)))
+    wanted = measurements.settings.snooping if snooping is None else snooping
+    gross = gross_readings(frame.survey) if wanted else None
+    options = {**frame.options, "max_iterations": most}
+    return searched(frame.survey, options, gross), gathered, frame
+
+
+def _tried(measurements, snooping=False, like=None):
+    """network.Adjusted and Gathered of measurements that are only supposed."""
+    search, gathered, _ = _adjusted(measurements, lambda text: None, snooping, TRIED, like)
+    return search.adjusted, gathered
+
+
+def _why_not(measurements, message):
+    """Problem rows that may explain why a survey could not be adjusted."""
+    if "datum defect" in message or MIRROR in message:
+        return []
+    lost = photos_that_do_not_fit(measurements, message, _tried)
+    return (
+        lost
+        or likely_mistake(measurements, np.inf, _tried)
+        or wrong_control(measurements, np.inf, _tried)[0]
+    )
+
+
+def _count(survey):
+    images = 0 if survey.image_points is None else 2 * len(survey.image_points.point)
+    return images + sum(len(one) * one.rows for one in survey.observations)
+
+
+def _complete(search, gathered, frame, measurements):
+    """The Adjustment of what was adjusted."""
+    adjusted = search.adjusted
+    scale, warnings = _cov_scale(adjusted, measurements.settings)
+    warnings = [*gathered.warnings, *frame.warnings, *search.warnings, *warnings]
+    held = reactions(adjusted.problem, adjusted.solution, frame.tested & ~gathered.idle)
+    traces = gathered.traces | {HELD: held_trace(gathered.known, adjusted.survey.points)}
+    readings, groups = readings_of(adjusted, traces, held.residuals(adjusted.problem))
+    readings += gone_with_their_points(adjusted, search.removed, gathered.traces)
+    removed = sorted((one for one in readings if one.removed), key=lambda one: -abs(one.w))
+    readings += check_readings(adjusted, gathered.checks, scale)
+    readings = _in_order(readings)
+    there = np.flatnonzero(np.isfinite(adjusted.xyz_m).all(axis=1))
+    names = tuple(adjusted.survey.points[i] for i in there)
+    late = {i: why for i, why in enumerate(adjusted.problem.set_aside) if why}
+    warnings += [_lost(measurements, adjusted.survey.points[i], why) for i, why in late.items()]
+    warnings += [_kept(one, gathered.traces) for one in search.needed if one.w > CRITICAL]
+    diagnoses = _diagnoses(adjusted, readings, groups, gathered, measurements)
+    doubts = _causes(adjusted, readings, gathered, measurements, diagnoses)
+    rays, others = [], [one for one in search.removed if one.source != "image points"]
+    if doubts:
+        others = [one for one in others if one.kind.startswith("control coordinate")]
+    else:
+        of_images = [one for one in search.removed if one.source == "image points"]
+        rays = undecided(adjusted, of_images, traces, held)  # one more or less: a warning
+    doubts += undecided(adjusted, others, traces, held)
+    warnings = [*doubts, *warnings, *diagnoses, *rays]
+    known = gathered.known
+    acting = frame.held
+    if measurements.settings.datum == "control":
+        acting = np.isfinite(known.xyz_m) & np.isfinite(known.sd_m)
+    checked = check_points(adjusted, measurements, known, acting, scale)
+    warnings += disagreeing(checked, measurements.check)
+    warnings += check_readings_off(readings)
+    warnings += scale_of_control(adjusted, readings, measurements, scale)
+    return Adjustment(
+        names=names,
+        xyz_m=adjusted.xyz_m[there],
+        covariance_m2=scale * adjusted.point_covariances_m2[there],
+        fixed=adjusted.problem.layout.points[there] < 0,
+        aside=(*gathered.aside, *late.values()),
+        adjusted=adjusted,
+        readings=tuple(readings),
+        removed=tuple(removed),
+        groups=groups,
+        datum=frame.report,
+        check_points=checked,
+        causes=causes_of(adjusted, there, scale),
+        cov_scale=scale,
+        sigma0=adjusted.sigma0,
+        observations=adjusted.solution.rows + adjusted.within[1],
+        unknowns=adjusted.solution.unknowns,
+        redundancy=adjusted.dof,
+        iterations=adjusted.solution.iterations,
+        rounds=search.rounds,
+        warnings=tuple(dict.fromkeys(warnings)),
+        doubts=tuple(doubts),
+        repeats=gathered.repeats,
+    )
+
+
+def _kept(one, traces):
+    """Problem of a reading that disagrees, but cannot be spared."""
+    trace = traces[one.source]
+    text = message(
+        "disagreeing_but_kept",
+        "reading {reading} disagrees with the others (w = {w:.1f}), and was kept: without it"
+        " something would not be determined",
+        reading="-".join(trace.ids[one.row]),
+        w=one.w,
+    )
+    return Problem(trace.file, text, trace.rows[one.row])
+
+
+def _lost(measurements, name, why):
+    """Problem of a point that the search for blunders left with too few readings."""
+    file, row = named_in(measurements, name)
+    text = message("left_after_search", "{why} left after the search for blunders", why=why)
+    return Problem(file, text, row)
+
+
+def _diagnoses(adjusted, readings, groups, gathered, measurements):
+    """Problem rows: what the result says about mistakes in the input."""
+    found = diagnosed(adjusted, readings, groups, gathered.known)
+    found += names_alike(gathered.lost, adjusted.survey.points) + same_place(adjusted)
+    found += [Problem("job.toml", text, None, "adjustment") for text in hardly_determined(adjusted)]
+    found += mirrored_targets(adjusted.xyz_m, adjusted.survey.points, measurements)
+    return found
+
+
+def _causes(adjusted, readings, gathered, measurements, diagnoses):
+    """Problem rows: what is wrong with the whole rather than with single readings."""
+    if not measurements.settings.explain:
+        return []
+    gone = set_aside(adjusted.survey)
+    told = one_sided(readings, gathered.known)
+    if not (told or adjusted.sigma0 > SUSPICIOUS or gone > SOME * len(readings)):
+        return strained(readings, gathered.known)
+    close, sigma0 = partial(_tried, like=adjusted), adjusted.sigma0
+    if gone:
+        try:
+            sigma0 = close(measurements)[0].sigma0
+        except SolutionError:
+            sigma0 = np.inf
+    bad = told or adjusted.sigma0 > SUSPICIOUS or gone > SEVERAL * len(readings)
+    bad = bad and sigma0 > SUSPICIOUS and not any(MIRROR in one.expected for one in diagnoses)
+    misread = likely_mistake(measurements, sigma0, _tried) if bad else []
+    if misread:
+        raise SolutionError("\n".join(["the readings do not fit together", *map(str, misread)]))
+    control, left = wrong_control(measurements, gone, close)
+    found = wrongly_held(measurements, sigma0, gone, close) + control + told
+    if gone - left >= SPARED:
+        text = message(
+            "held_or_readings",
+            "the search for blunders would set {gone} values aside, and no more than {left} were a"
+            " held coordinate wrong instead: correct that coordinate or leave its standard"
+            " deviation blank, or mark the readings use = check if they are the wrong ones",
+            gone=gone,
+            left=left,
+        )
+        raise SolutionError("\n".join(map(str, [text, *found])))
+    return found + (strained(readings, gathered.known) if not control else [])
+
+
+def _in_order(readings):
+    """Readings by file, then row, in the order in which they stand there."""
+    files = {one.file for one in readings}
+    files = [one for one in FILES if one in files] + sorted(files - set(FILES))
+    rank = {name: i for i, name in enumerate(files)}
+    of = np.array([rank[one.file] for one in readings])
+    row = np.array([-1 if one.row is None else one.row for one in readings])
+    return [readings[i] for i in np.lexsort((row, of)).tolist()]
+
+
+def _cov_scale(adjusted, settings):
+    """Variance factor of the covariances that go on, and what is to be said about it."""
+    if settings.scale != "a_posteriori":
+        return 1.0, []
+    if adjusted.dof > 0 and adjusted.sigma0 > NOISELESS:
+        return adjusted.sigma0**2, []
+    text = message("nothing_redundant", "nothing is redundant: covariances keep the a-priori scale")
+    if adjusted.dof > 0:
+        text = message(
+            "nothing_scatters",
+            "all residuals are zero (sigma0 = {sigma0:.1g}): that is no measure of the readings,"
+            " and covariances keep the a-priori scale",
+            sigma0=adjusted.sigma0,
+        )
+    return 1.0, [Problem("job.toml", text, None, "adjustment.scale")]

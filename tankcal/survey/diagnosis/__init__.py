@@ -1,0 +1,1 @@
+"""What does not fit, and why: gross errors, held control, misread files."""

@@ -1,0 +1,186 @@
+"""Are the readings that were set aside blunders, or victims of something wrong that was kept?
+
+A search for blunders believes the majority and what is held fixed. Of single blunders it leaves
+their traces everywhere; where it took far more readings of one thing (a point with known
+coordinates, a photo, an instrument) than of all others, that thing is told:
+
+    P(k or more of n | p) < 0.001 / number of things,   p = (K + 1) / (N + 2)
+
+with k of its n values set aside and K of the N values of everything else.
+"""
+
+from collections import defaultdict
+
+import numpy as np
+from scipy.special import betainc
+
+from tankcal.errors import Problem
+from tankcal.messages import either, listed, message
+from tankcal.survey.diagnosis.double_names import in_photo
+from tankcal.survey.network.reactions import HELD
+from tankcal.survey.network.separability import alternatives
+
+LEVEL = 0.001
+MANY = 0.12  # share of all values set aside, above which these are hardly single blunders
+SOME = 0.02  # share above which what is held fixed is doubted for once
+LISTED = 4
+TESTED = 60  # readings set aside of which it is asked whether others might have been
+
+
+def one_sided(readings, known):
+    """Problem rows on things that lost many more of their values than everything else.
+
+    readings  Reading rows              known  Known control
+    """
+    used = [one for one in readings if not one.check and one.file != "cameras.toml"]
+    things = defaultdict(list)
+    for one in used:
+        for thing in _things(one, known):
+            things[thing].append(one)
+    total, gone = len(used), sum(one.removed for one in used)
+    if not gone:
+        return []
+    found = []
+    for (file, name), mine in things.items():
+        n, k = len(mine), sum(one.removed for one in mine)
+        p = (gone - k + 1) / (total - n + 2)
+        if k > 2 and n < total and betainc(k, n - k + 1, p) < LEVEL / len(things):
+            told = _far_more(name, k, n) if file == "control.csv" else _much_of_photo(name, k, n)
+            row = known.row.get(name) if file == "control.csv" else None
+            found.append((k / n, Problem(file, told, row)))
+    found.sort(key=lambda pair: -pair[0])
+    return [*_lost_control(used), *(one for _, one in found[:LISTED]), *_many(gone, total)]
+
+
+def _things(one, known):
+    """(file, name) of what a value hangs on."""
+    if one.kind == "image coordinate":
+        yield one.file, one.ids[0]
+    for name in dict.fromkeys(one.ids):
+        if name in known.row and not one.kind.startswith("control coordinate"):
+            yield "control.csv", name
+
+
+def _far_more(name, k, n):
+    return message(
+        "point_lost_much",
+        "{gone} of the {count} values measured to point {point} were set aside, far more than of"
+        " other points: its coordinates may be wrong, not the readings",
+        gone=k,
+        count=n,
+        point=name,
+    )
+
+
+def _much_of_photo(name, k, n):
+    return message(
+        "photo_lost_much",
+        "{gone} of the {count} values of photo {photo} were set aside, far more than of others:"
+        " look at the whole of it",
+        gone=k,
+        count=n,
+        photo=name,
+    )
+
+
+def _lost_control(readings):
+    """Known coordinates that were set aside."""
+    gone = [
+        one
+        for one in readings
+        if one.removed and one.kind.startswith("control coordinate") and np.isfinite(one.residual)
+    ]
+    return [
+        Problem(one.file, _lost(one), one.row, f"{one.element}_m") for one in gone[: 2 * LISTED]
+    ]
+
+
+def _lost(one):
+    return message(
+        "control_set_aside",
+        "{axis} of {point} was set aside: given as {value_m:.4f} (sd {sd_m:.4f}), and the readings"
+        " put it at {here_m:.4f}",
+        axis=one.element,
+        point=one.ids[0],
+        value_m=one.value,
+        sd_m=one.sd,
+        here_m=one.value + one.residual,
+    )
+
+
+def _many(gone, total):
+    if gone < 3 or gone <= MANY * total:
+        return []
+    text = message(
+        "many_set_aside",
+        "{gone} of {total} values ({percent:.0f} %) were set aside: more than single blunders"
+        " explain; doubt what is held fixed, a scale, or the standard deviations first",
+        gone=gone,
+        total=total,
+        percent=100 * gone / total,
+    )
+    return [Problem("job.toml", text, None, "adjustment.snooping")]
+
+
+def undecided(adjusted, removed, traces, held):
+    """Problem rows of readings set aside in whose place others might have been.
+
+    removed  tuple of network.cleaning.Removed, the worst first        traces  {source: Trace}
+    held     network.reactions.Reactions of held coordinates
+    """
+    found = []
+    for one in removed[:TESTED]:
+        others = alternatives(adjusted, one.source, one.row, held)
+        if others:
+            names = [_named(adjusted, traces, *other) for other in others]
+            text = message(
+                "undecided",
+                "{reading} was set aside, but it may as well be {others} that is wrong: the"
+                " readings cannot tell",
+                reading=_named(adjusted, traces, one.source, one.row),
+                others=_either(names),
+            )
+            trace = traces[one.source]
+            found.append(Problem(trace.file, text, trace.rows[one.row]))
+    if len(found) > LISTED:
+        text = message(
+            "more_undecided",
+            "of {more} more readings set aside the same is true",
+            more=len(found) - LISTED,
+        )
+        found[LISTED:] = [Problem("job.toml", text, None, "adjustment.snooping")]
+    return found
+
+
+def _either(names):
+    """Readings of which each may be the wrong one."""
+    if len(names) > LISTED:
+        return message("one_of", "one of {names}", names=listed(names, LISTED))
+    return either(names)
+
+
+def _named(adjusted, traces, source, row):
+    """A reading in words."""
+    trace = traces[source]
+    ids = trace.ids[row]
+    if source == "image points":
+        return in_photo(*ids)
+    kind = "control coordinate" if source == HELD else adjusted.survey.observations[source].kind
+    of = trace.table.replace("_", " ") or kind.removesuffix(" of a further system")
+    name, kind = (
+        " ".join(filter(None, ["-".join(ids), trace.element[row][0]])),
+        of.removesuffix("s"),
+    )
+    if trace.rows[row] is None:
+        return message("reading", "{kind} {name}", kind=kind, name=name)
+    row = trace.rows[row]
+    return message("reading_in_row", "{kind} {name} (row {row})", kind=kind, name=name, row=row)
+
+
+def set_aside(survey):
+    """Number of values that the survey of an adjustment leaves out."""
+    images = survey.image_points
+    count = 0 if images is None or images.use is None else 2 * int(np.sum(images.use == 0))
+    return count + sum(
+        one.rows * int(np.sum(one.use == 0)) for one in survey.observations if one.use is not None
+    )

@@ -1,0 +1,117 @@
+"""Points that cannot be adjusted, and coordinates that no observation touches."""
+
+import numpy as np
+
+from tankcal.errors import Problem
+from tankcal.messages import joined, listed, message
+from tankcal.survey.network.assembly import one_ray
+from tankcal.survey.observations import (
+    Azimuths,
+    ControlCoordinates,
+    Directions,
+    Distances,
+    HeightDifferences,
+    HorizontalAngles,
+    PlumbLines,
+    SystemCoordinates,
+)
+
+SHOWN = 5  # points in a sentence
+IN_PLAN = (Azimuths, Directions, HorizontalAngles, PlumbLines)
+
+
+def left_out(survey):
+    """{point: why} of the points that have too few observations."""
+    plan, height, rows, rays, measured = _counts(survey)
+    held = np.zeros((len(survey.points), 3), dtype=bool) if survey.fixed is None else survey.fixed
+    plan_held, height_held = held[:, :2].sum(axis=1), held[:, 2]
+    in_plan, in_height = plan > 0, height > 0
+    needed = 2 * in_plan + in_height
+    have = rows + plan_held * in_plan + height_held * in_height
+    poor = (have < needed) | (in_plan & (plan + plan_held < 2)) | ~measured
+    return {
+        survey.points[i]: _why(survey.points[i], rays[i], rows[i], needed[i], measured[i])
+        for i in np.flatnonzero(poor)
+    }
+
+
+def _why(name, rays, rows, needed, measured):
+    if not measured:
+        return not_measured(name)
+    if rays == 1 and rows == 2:
+        return one_ray(name)
+    return message(
+        "too_few_observations",
+        "point {point} has too few observations: {count} for {needed} coordinates",
+        point=name,
+        count=rows,
+        needed=needed,
+    )
+
+
+def not_measured(name):
+    """What is said of a point that nothing measured."""
+    return message("not_measured", "point {point} is not measured", point=name)
+
+
+def sorted_out(survey):
+    """(points, 3) True where nothing touches a coordinate, and warnings that say so."""
+    plan, height, _, _, _ = _counts(survey)
+    idle = np.column_stack([plan == 0, plan == 0, height == 0])
+    warnings = []
+    for columns, what in ((slice(0, 2), joined(["x", "y"])), (slice(2, 3), "z")):
+        names = [survey.points[i] for i in np.flatnonzero(idle[:, columns].all(axis=1))]
+        if names:
+            text = message(
+                "untouched",
+                "no observation says anything about {axes} of {points}: what was given is kept, or"
+                " 0",
+                axes=what,
+                points=listed(names, SHOWN),
+            )
+            warnings.append(Problem("job.toml", text, None, "adjustment"))
+    return idle, warnings
+
+
+def _counts(survey):
+    """Rows that speak about plan, height and all of each point; its rays; whether measured."""
+    n = len(survey.points)
+    plan, height, rows = np.zeros((3, n), dtype=int)
+    rays, measured = np.zeros(n, dtype=int), np.zeros(n, dtype=bool)
+    images = survey.image_points
+    if images is not None:
+        rays = np.bincount(images.point, minlength=n)
+        measured |= rays > 0
+        for counter in (plan, height, rows):
+            counter += 2 * rays
+    for one in survey.observations:
+        if isinstance(one, ControlCoordinates):
+            _add_control(one, plan, height, rows)
+            continue
+        if not one.ties:
+            continue
+        in_plan, in_height = _speaks(one)
+        _, lines = np.unique([getattr(one, name) for name in one.ties], axis=1, return_index=True)
+        for name in one.ties:
+            count = one.rows * np.bincount(getattr(one, name)[lines], minlength=n)
+            plan += count * in_plan
+            height += count * in_height
+            rows += count
+            measured |= (count > 0) & (not isinstance(one, SystemCoordinates))
+    return plan, height, rows, rays, measured
+
+
+def _speaks(one):
+    """Whether observations say something about the plan, about heights."""
+    if isinstance(one, HeightDifferences):
+        return False, True
+    if isinstance(one, IN_PLAN) or (isinstance(one, Distances) and one.horizontal):
+        return True, False
+    return True, True
+
+
+def _add_control(one, plan, height, rows):
+    flat = one.axis < 2
+    np.add.at(plan, one.point[flat], 1)
+    np.add.at(height, one.point[~flat], 1)
+    np.add.at(rows, one.point, 1)

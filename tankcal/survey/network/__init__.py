@@ -1,0 +1,30 @@
+"""The network: everything that was observed on site, in one adjustment.
+
+Names are resolved when they are first used: reading a job needs a Camera, not the solver.
+"""
+
+from importlib import import_module
+
+_ROOM_OF = {
+    "Adjusted": "results",
+    "Camera": "survey",
+    "Cleaned": "snooping",
+    "ImagePoints": "survey",
+    "Instrument": "survey",
+    "Photos": "survey",
+    "Residuals": "reliability",
+    "Survey": "survey",
+    "System": "survey",
+    "adjust": "adjustment",
+    "correlations": "results",
+    "predict": "adjustment",
+    "snoop": "snooping",
+}
+
+__all__ = [*_ROOM_OF]
+
+
+def __getattr__(name):
+    if name not in _ROOM_OF:
+        raise AttributeError(f"module 'tankcal.survey.network' has no attribute {name!r}")
+    return getattr(import_module(f"tankcal.survey.network.{_ROOM_OF[name]}"), name)

@@ -1,0 +1,83 @@
+"""Adjust a survey: one call from observations to adjusted points with their covariance."""
+
+from tankcal.errors import SolutionError
+from tankcal.messages import message
+from tankcal.solver import UndeterminedError, linearise, solve
+from tankcal.survey.network.assembly import assemble
+from tankcal.survey.network.datum import held, in_words, unobserved
+from tankcal.survey.network.results import Adjusted
+from tankcal.survey.network.soundness import hanging_datum, refuse_worthless_cameras
+from tankcal.survey.observations import PlumbLines
+
+
+def adjust(survey, *, datum="control", over=None, photo=None, tolerance=1e-4, max_iterations=100):
+    """Least squares of all observations of a Survey.
+
+    datum      "control": whatever is known of points and photos must fix it; "inner": what is not
+               fixed is chosen so that the points keep their places on the whole (free network)
+    over       (k,) points that take part in the inner constraints, None: all
+    photo      number of the photo that takes part in their place; None: points do
+    tolerance  of the last step, see tankcal.solver.solve
+
+    Returns an Adjusted. Raises SolutionError when something is not determined: a datum defect in
+    words, points and parameters by name; or when the iteration does not converge.
+    """
+    problem = _in_datum(survey, datum, over, photo)
+    return _adjusted(
+        survey,
+        problem,
+        datum,
+        lambda: solve(
+            problem.model, problem.state, tolerance=tolerance, max_iterations=max_iterations
+        ),
+    )
+
+
+def predict(survey, *, datum="control", over=None, photo=None):
+    """What `adjust` would give, before anything is measured: an Adjusted at the start values.
+
+    The derivatives are taken at the start values of the Survey and no step is made, so the values
+    of its observations do not matter; arguments and errors are those of `adjust`. Residuals and
+    sigma0 mean nothing, covariances, redundancy numbers and minimal detectable biases do.
+    """
+    problem = _in_datum(survey, datum, over, photo)
+    return _adjusted(survey, problem, datum, lambda: linearise(problem.model, problem.state))
+
+
+def _in_datum(survey, datum, over, photo):
+    """The Problem of a survey, with inner constraints where they are asked for and needed."""
+    problem = assemble(survey)
+    if datum == "inner":
+        free = unobserved(problem)
+        return held(problem, over, free, photo) if free.shape[1] else problem
+    if any(isinstance(one, PlumbLines) for one in survey.observations):
+        _refuse_defect(problem)  # a plumb line that is not quite plumb would hide one
+    return problem
+
+
+def _adjusted(survey, problem, datum, solved):
+    """The Adjusted of a problem that `solved` solves; what cannot be solved is told in words."""
+    try:
+        solution = solved()
+    except UndeterminedError:
+        if datum != "inner":
+            _refuse_defect(problem)
+        raise
+    except SolutionError as error:
+        text = message(
+            "and_hanging",
+            "{error}{datum}",
+            error=error.args[0],
+            datum=hanging_datum(problem),
+        )
+        raise SolutionError(text) from error
+    if survey.photos is not None:
+        refuse_worthless_cameras(survey, problem, solution)
+    return Adjusted(survey, problem, solution)
+
+
+def _refuse_defect(problem):
+    """Raise when the datum is missing, in words."""
+    free = unobserved(problem)
+    if free.shape[1]:
+        raise SolutionError(in_words(free, problem))

@@ -1,0 +1,288 @@
+"""The seven ways in which a whole survey can move, and which of them nothing observes.
+
+Translations, rotations about the axes through the centre, and scale move points, projection
+centres, directions of circles and further systems together, so that no image, angle or ratio of
+distances changes. Source: Koch 1999, Parameter Estimation and Hypothesis Testing, section 3.3;
+Meissl 1969.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tankcal.messages import joined, message
+
+SHIFTS, TURNS = ("x", "y", "z"), ("X", "Y", "Z")
+THREE_TURNS = message("rotations", "three rotations")
+SCALE = message("scale", "the scale")
+UNFELT = 1e-8  # change of the whitened rows, with all columns scaled to length one
+DEPENDS, TINY = 1e-6, 1e-12  # change of a quantity over the sum of its parts' changes; m or rad
+NAMED = 4  # points and photos in a sentence
+AS_IF_FIXED = 1e4  # weight of a fixed unknown among the rows, as if it were known to 0.1 mm
+
+
+def directions(layout, state):
+    """The seven directions (unknowns, 7) at a state; fixed unknowns are left out."""
+    whole = np.zeros((unknowns(layout) + 1, 7))
+    for columns, derivative in _parts(layout, state):
+        whole[columns.ravel()] = derivative.reshape(-1, 7)
+    return whole[:-1]
+
+
+def unknowns(layout):
+    """Number of unknowns of a layout."""
+    return 1 + max((columns.max(initial=-1) for columns in vars(layout).values()), default=-1)
+
+
+def _parts(layout, state):
+    """Columns (...) of each kind of unknown with their derivatives (..., 7)."""
+    yield from zip((getattr(layout, name) for name in _NAMES), _derivatives(state), strict=True)
+
+
+_NAMES = ("points", "photos", "orientation", "scale", "system")
+
+
+def _derivatives(state):
+    """Derivatives (..., 7) of the unknowns of _NAMES by the seven ways."""
+    n = len(state.photo_xyz_m)
+    photos = np.zeros((n, 6, 7))
+    if n:
+        photos[:, :3] = _of_places(state.photo_xyz_m)
+        photos[:, 3:, 3:6] = -state.rotation
+    turn = np.zeros((len(state.orientation_rad), 7))
+    turn[:, 5] = -1.0
+    stretch = np.zeros((len(state.scale), 7))
+    stretch[:, 6] = -(1.0 + state.scale)
+    systems = np.zeros((len(state.system), 7, 7))
+    if len(systems):
+        m = 1.0 + state.system_scale
+        systems[:, :3, 3:6] = -state.system
+        systems[:, 3:6, :3] = -m[:, None, None] * state.system
+        systems[:, 6, 6] = -m
+    return _of_places(state.xyz_m), photos, turn, stretch, systems
+
+
+def _of_places(xyz):
+    """Derivatives (n, 3, 7) of places by the seven ways."""
+    x, y, z = xyz.T
+    out = np.zeros((len(xyz), 3, 7))
+    out[:, :, :3] = np.eye(3)
+    out[:, 0, 4], out[:, 0, 5] = z, -y
+    out[:, 1, 3], out[:, 1, 5] = -z, x
+    out[:, 2, 3], out[:, 2, 4] = y, -x
+    out[:, :, 6] = xyz
+    return out
+
+
+def unobserved(problem, unfelt=UNFELT, fixed=True, state=None, count=None):
+    """Combinations (7, d) of the seven ways that neither observations nor fixed unknowns feel.
+
+    unfelt  see UNFELT      fixed  False: as if only observations held anything
+    state   where they are asked for, None: the start      count  d, None: all below `unfelt`
+    """
+    layout, state = problem.layout, problem.state if state is None else state
+    idle = _idle(problem)
+    whole = np.vstack([directions(layout, state), np.zeros(7)])
+    felt, lengths = [np.zeros((1, 7))], np.zeros(len(whole))
+    for one, weight in _feeling(problem):
+        columns = one.columns(layout)
+        w = np.empty((len(one), one.rows))
+        jac = np.empty((len(one), one.rows, columns.shape[1]))
+        undisturbed = one.undisturbed(state)
+        one.fill(undisturbed, w, jac)
+        jac *= weight
+        ways = whole
+        if undisturbed is not state:
+            ways = np.vstack([directions(layout, undisturbed), np.zeros(7)])
+        moved = np.einsum("nmk,nkd->nmd", jac, ways[columns]).reshape(-1, 7)
+        felt.append(np.linalg.qr(moved, mode="r"))
+        np.add.at(lengths, columns, np.einsum("nmk,nmk->nk", jac, jac))
+    square = (whole[:-1] ** 2).T @ lengths[:-1]
+    for columns, derivative in _parts(layout, state):
+        holds = (columns < 0) & np.logical_not(idle.get(id(columns), False))
+        sharp = AS_IF_FIXED * derivative[holds].reshape(-1, 7)
+        if fixed and len(sharp):
+            felt.append(np.linalg.qr(sharp, mode="r"))
+            square += np.sum(sharp**2, axis=0)
+    moving = (square > 0) | whole.any(axis=0)  # heights at one place know no turn about Z
+    size = np.sqrt(np.where(square > 0, square, 1.0))[moving]
+    _, singular, vectors = np.linalg.svd(np.vstack(felt)[:, moving] / size)
+    rank = len(size) - count if count is not None else int(np.sum(singular > unfelt))
+    free = np.zeros((7, len(size) - rank))
+    free[moving] = (vectors[rank:] / size).T
+    return free
+
+
+def _feeling(problem):
+    """Observations that may feel the datum, each with what its rows are multiplied by."""
+    yield from ((one, 1.0) for one in problem.observations if one.feels_datum)
+    yield from ((held.conditions, AS_IF_FIXED) for held in problem.exact)
+
+
+def _idle(problem):
+    """{id of columns: mask} of the unknowns that have no column because nobody observed them."""
+    layout = problem.layout
+    aside = np.array([bool(why) for why in problem.set_aside], dtype=bool)
+    unused = np.ones(len(layout.scale), dtype=bool)
+    for one, _ in _feeling(problem):
+        instrument = getattr(one, "instrument", np.zeros(0, dtype=int))
+        unused[instrument[instrument >= 0]] = False
+    return {id(layout.points): aside[:, None], id(layout.scale): unused}
+
+
+def dependent(adjusted, quantities, fixed=False):
+    """Which quantities depend on the choice of the datum: (n,) True for those that do.
+
+    A quantity depends on it when a motion or scaling of the whole survey that no observation feels
+    would change it. Distances do when nothing gives the scale, heights and coordinates nearly
+    always, shapes never.
+
+    quantities  observations of tankcal.survey.observations between points of the survey; values
+                and sds do not matter
+    fixed       True: coordinates and photos held fixed count as known, not as a choice
+    """
+    problem, state = adjusted.problem, adjusted.solution.state
+    free = unobserved(problem, fixed=fixed)
+    if not free.shape[1]:
+        return np.zeros(len(quantities), dtype=bool)
+    first, parts, whole = 0, {}, []
+    for name, derivative in zip(_NAMES, _derivatives(state), strict=True):
+        count = int(np.prod(derivative.shape[:-1]))
+        parts[name] = first + np.arange(count).reshape(derivative.shape[:-1])
+        whole.append(derivative.reshape(count, 7))
+        first += count
+    one = problem.relative(quantities)
+    interior, offset = problem.layout.interior, problem.layout.offset
+    layout = replace(
+        problem.layout,
+        **parts,
+        interior=np.full_like(interior, -1),
+        offset=np.full_like(offset, -1),
+    )
+    ways = np.vstack([*whole, np.zeros((1, 7))]) @ free
+    _, derivatives = one.computed(state, True)
+    columns = one.columns(layout)
+    change = np.einsum("nmk,nkd->nmd", derivatives, ways[columns])
+    size = np.einsum("nmk,nkd->nmd", np.abs(derivatives), np.abs(ways[columns]))
+    return (np.abs(change) > DEPENDS * np.maximum(size, TINY)).any(axis=(1, 2))
+
+
+def in_words(combinations, problem=None):
+    """The datum defect in words, and what helps; see `defect_in_words`."""
+    defect = defect_in_words(combinations, problem)
+    return message(
+        "defect_and_help", "{defect}; add control or choose datum = inner", defect=defect
+    )
+
+
+def defect_in_words(combinations, problem=None):
+    """The datum defect in words, from combinations (7, d) of the seven ways: a Message.
+
+    problem  to name the points that a single rotation leaves in place, or None
+    """
+    d = combinations.shape[1]
+    basis = np.linalg.qr(combinations)[0]
+    share = np.sum(basis**2, axis=1)
+    pure = [i for i in range(7) if share[i] > 1 - 1e-6]
+    parts = _ways(pure)
+    if len(pure) < d:
+        mixed = [i for i in range(7) if 1e-6 < share[i] <= 1 - 1e-6]
+        about = None if problem is None else _about_what_stays(combinations, problem)
+        parts.append(about or _mixture(d - len(pure), _ways(mixed)))
+    if d == 1:
+        one = "datum defect 1: {what} is not determined by any observation"
+        return message("datum_defect_one", one, what=joined(parts))
+    several = "datum defect {defect}: {what} are not determined by any observation"
+    return message("datum_defect", several, defect=d, what=joined(parts))
+
+
+def _ways(numbers):
+    """What each of some of the seven ways is called; three of a kind are one."""
+    shifts = [SHIFTS[i] for i in numbers if i < 3]
+    turns = [TURNS[i - 3] for i in numbers if 3 <= i < 6]
+    found = [message("translation", "the translation in {axis}", axis=one) for one in shifts]
+    if len(shifts) == 3:
+        found = [message("translations", "three translations")]
+    if len(turns) == 3:
+        found.append(THREE_TURNS)
+    else:
+        found += [message("rotation", "the rotation about {axis}", axis=one) for one in turns]
+    return found + [SCALE] * (6 in numbers)
+
+
+def _mixture(count, ways):
+    if count == 1:
+        return message("combination", "a combination of {ways}", ways=ways)
+    return message("combinations", "{count} combinations of {ways}", count=count, ways=ways)
+
+
+def _about_what_stays(combinations, problem):
+    """What turns and stretches about what keeps its place, None when nothing does."""
+    turns, stretches = (
+        np.linalg.matrix_rank(combinations[rows], tol=1e-6 * np.abs(combinations[rows]).max())
+        if np.abs(combinations[rows]).max() > 1e-9 * np.abs(combinations).max()
+        else 0
+        for rows in (slice(3, 6), slice(6, 7))
+    )
+    if turns + stretches != combinations.shape[1]:
+        return None
+    still, count = _staying(combinations, problem)
+    if not count:
+        return None
+    if turns == 1 and not stretches and count > 1:
+        return message("about_line", "the rotation about the line through {still}", still=still)
+    what = {
+        1: [message("one_rotation", "the rotation")],
+        2: [message("two_rotations", "two rotations")],
+        3: [THREE_TURNS],
+    }.get(turns, [])
+    what += [SCALE] * stretches
+    return message("about_place", "{what} about {still}", what=joined(what), still=still)
+
+
+def _staying(combinations, problem):
+    """The points and photos that no combination (7, d) moves, in words, and how many."""
+    used = ~_idle(problem)[id(problem.layout.points)][:, 0]
+    xyz = np.vstack([problem.state.xyz_m[used], problem.state.photo_xyz_m])
+    size = np.linalg.norm(_of_places(xyz) @ combinations, axis=(1, 2))
+    points = np.flatnonzero(used)
+    still = np.flatnonzero(size < 1e-3 * size.max())
+    names = [problem.name_of_point(int(points[i])) for i in still if i < len(points)]
+    photos = [problem.photos[i - len(points)] for i in still if i >= len(points)]
+    found = []
+    if names:
+        found.append(_points(names[:NAMED]))
+    if photos:
+        found.append(message("photos", "photos {photos}", photos=photos[:NAMED]))
+    return joined(found) if found else None, len(still)
+
+
+def _points(names):
+    if len(names) == 1:
+        return message("point", "point {point}", point=names[0])
+    return message("points", "points {points}", points=names)
+
+
+def held(problem, over, combinations, photo=None):
+    """The Problem with a datum by inner constraints over chosen points, or over one photo.
+
+    over          (k,) points that take part, or None: all
+    combinations  (7, d) from `unobserved`
+    photo         number of the photo that is moved and turned as little as can be, in place of the
+                  points; None: the points take part
+    """
+    layout, mask = problem.layout, np.zeros(problem.model.unknowns + 1)
+    if photo is None:
+        members = slice(None) if over is None else np.asarray(over)
+        mask[layout.points[members].ravel()] = 1.0
+    else:
+        mask[layout.photos[photo]] = 1.0
+
+    d = combinations.shape[1]
+
+    def free(state):
+        # what turns about held coordinates turns about where they are now, not at the start
+        ways = unobserved(problem, state=state, count=d) if state is not problem.state else None
+        return directions(layout, state) @ (combinations if ways is None else ways)
+
+    return replace(problem, model=replace(problem.model, free=free, inner=mask[:-1]))

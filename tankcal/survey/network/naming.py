@@ -1,0 +1,88 @@
+"""What the user calls the unknowns and observations of an adjustment."""
+
+import numpy as np
+
+from tankcal.camera.model import PARAMETERS
+from tankcal.messages import filled, listed
+
+ELEMENTS = ("x", "y", "z", "omega", "phi", "kappa")
+
+
+def name_of_exact(survey, exact, row):
+    """What the user calls a row of the exact conditions, all of them counted through."""
+    for held in exact:
+        count = len(held.conditions) * held.conditions.rows
+        if row < count:
+            return told(survey, held.observations, held.row_of[row // held.conditions.rows])
+        row -= count
+    raise IndexError(row)
+
+
+def told(survey, one, row):
+    """What the user calls an observation: its kind and what it ties together."""
+    ends = [name for name in ("origin", "start", "end", "point") if name in one.ties]
+    names = [survey.points[getattr(one, name)[row]] for name in ends]
+    if hasattr(one, "photo"):
+        names.insert(0, survey.photos.names[one.photo[row]])
+    text = f"{one.kind} {' - '.join(names)}".rstrip()
+    if hasattr(one, "element"):
+        return f"{text} {ELEMENTS[one.element[row]]}"
+    return f"{text} {'xyz'[one.axis[row]]}" if hasattr(one, "axis") else text
+
+
+def name_of(survey, layout, table, column):
+    """What the user calls the unknown in a column."""
+    for row, axis in np.argwhere(layout.points == column):
+        return f"{'xyz'[axis]} of point {survey.points[row]}"
+    for row, element in np.argwhere(layout.photos == column):
+        what = ("x", "y", "z", "rotation 1", "rotation 2", "rotation 3")[element]
+        return f"{what} of photo {survey.photos.names[row]}"
+    for place in np.flatnonzero(layout.interior == column):
+        photo, number = np.argwhere(table == place)[0]
+        camera = survey.cameras[survey.photos.camera[photo]].name
+        return f"{PARAMETERS[number]} of {camera}"
+    for place in np.flatnonzero(layout.orientation == column):
+        return f"orientation of direction set {place + 1}"
+    for what, columns in (("scale", layout.scale), ("offset", layout.offset)):
+        for place in np.flatnonzero(columns == column):
+            return f"{what} of {survey.instruments[place].name}"
+    system = np.argwhere(layout.system == column)[0, 0]
+    return f"transformation of system {survey.systems[system].name}"
+
+
+SHARE = 0.1  # of the largest part of a direction: below it an unknown does not take part
+LISTED = 3  # parts in a sentence; more of a kind are one, with their number
+NAMED = 5  # names in it
+
+
+def in_words(survey, layout, table, directions):
+    """The unknowns that take part in directions (unknowns, d) that nothing determines, in words."""
+    size = np.append(np.sqrt(np.sum(directions**2, axis=1)), 0.0)
+    size[size < SHARE * size.max()] = 0.0
+    parts, told_already = [], np.zeros(len(size), dtype=bool)
+    photos = () if survey.photos is None else survey.photos.names
+    for what, one, names, columns in (
+        ("position", "photo", photos, layout.photos[:, :3]),
+        ("rotation", "photo", photos, layout.photos[:, 3:]),
+        ("place", "point", survey.points, layout.points),
+    ):
+        who = np.flatnonzero(size[columns].max(axis=1, initial=0.0) > 0) if len(names) else []
+        told_already[columns.ravel()] = True
+        if len(who) > LISTED:
+            parts.append(f"the {what}s of {_many(names, who, one)}")
+        else:
+            parts += [f"the {what} of {one} {names[i]}" for i in who]
+    others = np.flatnonzero((size[:-1] > 0) & ~told_already[:-1])
+    parts = list(dict.fromkeys(name_of(survey, layout, table, column) for column in others)) + parts
+    if len(parts) == 1:
+        return parts[0]
+    told_of = f"{', '.join(parts[:-1])} and {parts[-1]} cannot be told apart"
+    return told_of + (f"; fix {parts[0]} or give it a standard deviation" if len(others) else "")
+
+
+def _many(names, who, one):
+    """Some of the photos or points, `who` their numbers: all of them, or how many and which."""
+    if len(who) == len(names):
+        return f"all {one}s"
+    which = listed([names[i] for i in who], NAMED)
+    return filled("{count} {what}s ({which})", {"count": len(who), "what": one, "which": which})

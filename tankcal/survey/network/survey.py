@@ -1,0 +1,185 @@
+"""A survey as it goes into the adjustment: names, start values and observations, all in arrays."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tankcal.camera.model import PARAMETERS, Form
+
+SCOPES = ("off", "block", "camera", "photo")
+FEWEST = 3  # values that speak of a point that can be determined
+STATES = ("free", "weighted", "fixed")
+DEFAULT_SCOPE = tuple("off" if name in ("K4", "P3", "P4") else "camera" for name in PARAMETERS)
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera and what the adjustment may do with each of its parameters (PARAMETERS).
+
+    values  (13,) mm
+    form    how its distortion is written
+    sd      (13,) standard deviations known beforehand, for the weighted ones
+    scope   13 of SCOPES: left out; one value for all photos, for each camera, for each photo
+    state   13 of STATES
+    name    as the user knows it
+    """
+
+    values: np.ndarray
+    form: Form = field(default_factory=Form)
+    sd: np.ndarray = field(default_factory=lambda: np.full(13, np.nan))
+    scope: tuple = DEFAULT_SCOPE
+    state: tuple = ("free",) * 13
+    name: str = "camera"
+
+
+@dataclass(frozen=True)
+class Photos:
+    """Photographs. Values that are nan are not known and have to be found.
+
+    names     tuple
+    camera    (n,) number of the camera
+    xyz_m     (n, 3) projection centres
+    rotation  (n, 3, 3) R3(kappa) R2(phi) R1(omega)
+    fixed     (n, 4) True: x, y, z, the rotation is not adjusted
+    """
+
+    names: tuple
+    camera: np.ndarray
+    xyz_m: np.ndarray
+    rotation: np.ndarray
+    fixed: np.ndarray = None
+
+
+@dataclass(frozen=True)
+class ImagePoints:
+    """Measured image coordinates.
+
+    point, photo  (n,)
+    xy_mm, sd_mm  (n, 2)
+    use           (n,) 1, or 0 when set aside; None: all are used
+    """
+
+    point: np.ndarray
+    photo: np.ndarray
+    xy_mm: np.ndarray
+    sd_mm: np.ndarray
+    use: np.ndarray = None
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """An instrument whose readings are (1 + scale) true + offset.
+
+    scale_sd, offset_sd_m  0: fixed at the value; nan: free; else a weighted unknown
+    """
+
+    name: str
+    scale: float = 0.0
+    offset_m: float = 0.0
+    scale_sd: float = 0.0
+    offset_sd_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class System:
+    """A further coordinate system of control points: X_system = (1 + scale) R X + shift.
+
+    scale_free  whether its scale is an unknown
+    """
+
+    name: str
+    rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
+    shift_m: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    scale: float = 0.0
+    scale_free: bool = False
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Everything that goes into one adjustment. Coordinates are in the survey's frame.
+
+    points        names
+    xyz_m         (points, 3) start values
+    fixed         (points, 3) True: not adjusted; None: nothing is
+    image_points  ImagePoints or None
+    photos        Photos or None
+    cameras       tuple of Camera
+    observations  tuple of tankcal.survey.observations (with coordinates in the survey's frame)
+    sets          (s,) start azimuths of the zeros of the direction sets, rad
+    instruments   tuple of Instrument
+    systems       tuple of System
+    correlated    tuple of tankcal.survey.observations.Block: values of the observations (none of
+                  them held exactly) that are correlated; no value stands in two
+    repeated      {source: (chi-square (n,), degrees of freedom (n,))}: scatter of the readings that
+                  were averaged into each observation; it counts in sigma0 and in the redundancy as
+                  if they had been adjusted one by one. Sources as Residuals name them
+    """
+
+    points: tuple
+    xyz_m: np.ndarray
+    fixed: np.ndarray = None
+    image_points: ImagePoints = None
+    photos: Photos = None
+    cameras: tuple = ()
+    observations: tuple = ()
+    sets: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    instruments: tuple = ()
+    systems: tuple = ()
+    correlated: tuple = ()
+    repeated: dict = field(default_factory=dict)
+
+    def values_of_points(self):
+        """(points,) how many values, fixed coordinates among them, speak of each point."""
+        count, images = np.zeros(len(self.points), dtype=int), self.image_points
+        if images is not None:
+            seen = images.point if images.use is None else images.point[images.use > 0]
+            count += 2 * np.bincount(seen, minlength=len(count))
+        for one in self.observations:
+            for name in one.ties:
+                point = getattr(one, name)
+                point = point if one.use is None else point[one.use > 0]
+                count += one.rows * np.bincount(point, minlength=len(count))
+        return count if self.fixed is None else count + self.fixed.sum(axis=1)
+
+    def without(self, sources):
+        """The survey without some of its tables of observations (numbers), correlations with them.
+
+        The others are counted anew, in `correlated` as well.
+        """
+        kept = [i for i in range(len(self.observations)) if i not in set(sources)]
+        number = np.full(len(self.observations), -1)
+        number[kept] = np.arange(len(kept))
+        blocks = []
+        for block in self.correlated:
+            stays = number[block.source] >= 0
+            if stays.any():
+                blocks.append(
+                    replace(
+                        block,
+                        source=number[block.source[stays]],
+                        row=block.row[stays],
+                        component=block.component[stays],
+                        covariance=block.covariance[np.ix_(stays, stays)],
+                    )
+                )
+        return replace(
+            self,
+            observations=tuple(self.observations[i] for i in kept),
+            correlated=tuple(blocks),
+        )
+
+    def with_sds(self, factors):
+        """The survey with the sds of groups multiplied; factors {source: factor}, see Residuals."""
+        observations = tuple(
+            replace(one, sd=one.sd * factors.get(number, 1.0))
+            for number, one in enumerate(self.observations)
+        )
+        images = self.image_points
+        if images is not None:
+            images = replace(images, sd_mm=images.sd_mm * factors.get("image points", 1.0))
+        blocks = tuple(
+            replace(one, covariance=one.covariance * np.outer(size, size))
+            for one in self.correlated
+            for size in [np.array([factors.get(i, 1.0) for i in one.source.tolist()])]
+        )
+        return replace(self, observations=observations, image_points=images, correlated=blocks)

@@ -1,0 +1,53 @@
+"""The kinds of observation: what each one computes, and its derivatives."""
+
+from tankcal.survey.observations.base import Layout, Observations, State
+from tankcal.survey.observations.coordinates import (
+    ControlCoordinates,
+    HeightDifferences,
+    KnownUnknowns,
+    PlumbLines,
+    SystemCoordinates,
+    Vectors,
+)
+from tankcal.survey.observations.correlated import Block, Correlated
+from tankcal.survey.observations.held import HeldOrientation, as_conditions, exact_rows, lever
+from tankcal.survey.observations.photographs import (
+    ImageCoordinates,
+    PhotoOrientation,
+    PhotoRotation,
+)
+from tankcal.survey.observations.sights import (
+    Azimuths,
+    Directions,
+    Distances,
+    HorizontalAngles,
+    Sights,
+    VerticalAngles,
+)
+
+__all__ = [
+    "Azimuths",
+    "Block",
+    "ControlCoordinates",
+    "Correlated",
+    "Directions",
+    "Distances",
+    "HeightDifferences",
+    "HeldOrientation",
+    "HorizontalAngles",
+    "ImageCoordinates",
+    "KnownUnknowns",
+    "Layout",
+    "Observations",
+    "PhotoOrientation",
+    "PhotoRotation",
+    "PlumbLines",
+    "Sights",
+    "State",
+    "SystemCoordinates",
+    "Vectors",
+    "VerticalAngles",
+    "as_conditions",
+    "exact_rows",
+    "lever",
+]

@@ -1,0 +1,148 @@
+"""What every kind of observation has, and the unknowns that it may speak about.
+
+A kind is a frozen table of n observations with m values each. It knows how to compute them from a
+State and their derivatives; it knows no solver. `fill` writes (computed - observed) / sd and the
+derivatives over the sd, `columns` says to which unknowns these belong.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from tankcal.geometry.rotations import turned
+
+
+@dataclass(frozen=True)
+class State:
+    """Values of all unknowns; coordinates are relative to the survey's centre.
+
+    xyz_m            (points, 3)
+    photo_xyz_m      (photos, 3) projection centres
+    rotation         (photos, 3, 3) R3(kappa) R2(phi) R1(omega)
+    interior         (q + 1,) interior parameters, mm; the last is 0, for those left out
+    orientation_rad  (sets,) of direction sets: azimuth of the circle's zero
+    scale            (instruments,) reading = true (1 + scale) + offset
+    offset_m         (instruments,)
+    system           (systems, 3, 3) rotations of further control systems
+    system_shift_m   (systems, 3)
+    system_scale     (systems,) scale minus one
+    """
+
+    xyz_m: np.ndarray
+    photo_xyz_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    rotation: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    interior: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    orientation_rad: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    scale: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    offset_m: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    system: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    system_shift_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    system_scale: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Column of each unknown in the adjustment, -1 where it is fixed or left out.
+
+    points (points, 3), photos (photos, 6), interior (q + 1,), orientation (sets,),
+    scale (instruments,), offset (instruments,), system (systems, 7: rotation, shift, scale)
+    """
+
+    points: np.ndarray
+    photos: np.ndarray
+    interior: np.ndarray
+    orientation: np.ndarray
+    scale: np.ndarray
+    offset: np.ndarray
+    system: np.ndarray
+
+    def moved(self, state, step):
+        """The state after a step (unknowns,); rotations are turned, everything else is added."""
+        step = np.append(step, 0.0)  # column -1, the fixed ones, does not move
+        photos, system = step[self.photos], step[self.system]
+        changes = {"xyz_m": state.xyz_m + step[self.points]}
+        if len(photos):
+            changes["photo_xyz_m"] = state.photo_xyz_m + photos[:, :3]
+            changes["rotation"] = turned(state.rotation, photos[:, 3:])
+            changes["interior"] = state.interior + step[self.interior]
+        if len(state.orientation_rad):
+            changes["orientation_rad"] = state.orientation_rad + step[self.orientation]
+        if len(state.scale):
+            changes["scale"] = state.scale + step[self.scale]
+            changes["offset_m"] = state.offset_m + step[self.offset]
+        if len(system):
+            changes["system"] = turned(state.system, system[:, :3])
+            changes["system_shift_m"] = state.system_shift_m + system[:, 3:6]
+            changes["system_scale"] = state.system_scale + system[:, 6]
+        return replace(state, **changes)
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Observations of one kind; subclasses add what they tie together.
+
+    value  (n,) or (n, m) observed
+    sd     like value, standard deviations
+    use    (n,) share with which each takes part: 1, 0 when set aside, between for robust starts
+    """
+
+    value: np.ndarray
+    sd: np.ndarray
+    use: np.ndarray = field(default=None, kw_only=True)
+
+    kind = "observation"
+    unit = "m"
+    rows = 1
+    feels_datum = True  # False: no motion or scale of the whole survey changes it
+    ties = ()  # names of the fields that hold points
+
+    def __len__(self):
+        return len(self.value)
+
+    @cached_property
+    def weight(self):
+        """(n, m) what misclosures are multiplied by: root of `use`, over the sd."""
+        weight = 1.0 / np.asarray(self.sd, dtype=float).reshape(len(self), self.rows)
+        return weight if self.use is None else weight * np.sqrt(self.use)[:, None]
+
+    def taken(self, keep):
+        """The observations `keep` (indices or a mask)."""
+        parts = {
+            name: value[keep]
+            for name, value in vars(self).items()
+            if isinstance(value, np.ndarray) and name in self._per_row
+        }
+        return replace(self, **parts)
+
+    @property
+    def _per_row(self):
+        return {"value", "sd", "use", *self.ties}
+
+    def using(self, use):
+        """The same observations, each with its share (n,)."""
+        return replace(self, use=np.asarray(use, dtype=float))
+
+    def columns(self, layout):
+        """(n, K) column of the unknown of each derivative, -1 where it is fixed."""
+        raise NotImplementedError
+
+    def computed(self, state, derivatives):
+        """Computed values (n, m) and, if asked for, derivatives (n, m, K)."""
+        raise NotImplementedError
+
+    def undisturbed(self, state):
+        """The state in which misclosures that would feel a motion falsely are zero."""
+        return state
+
+    def difference(self, computed):
+        """Computed minus observed (n, m)."""
+        return computed - np.reshape(self.value, computed.shape)
+
+    def fill(self, state, w, jac):
+        """Whitened misclosures into w (n, m), derivatives into jac (n, m, K) unless it is empty."""
+        wanted = len(jac) > 0
+        computed, derivatives = self.computed(state, wanted)
+        np.multiply(self.difference(computed), self.weight, out=w)
+        if wanted:
+            np.multiply(derivatives, self.weight[:, :, None], out=jac)

@@ -1,0 +1,173 @@
+"""Control coordinates, height differences, plumb lines, and unknowns known beforehand."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tankcal.survey.observations.base import Observations
+
+
+@dataclass(frozen=True)
+class ControlCoordinates(Observations):
+    """Single control coordinates (n,), m, relative to the centre.
+
+    point  (n,)
+    axis   (n,) 0 x, 1 y, 2 z
+    """
+
+    point: np.ndarray
+    axis: np.ndarray
+
+    kind, ties = "control coordinate", ("point",)
+
+    @property
+    def _per_row(self):
+        return {"value", "sd", "use", "point", "axis"}
+
+    def columns(self, layout):
+        """Point (3)."""
+        return layout.points[self.point]
+
+    def computed(self, state, derivatives):
+        """The coordinates (n, 1)."""
+        computed = state.xyz_m[self.point, self.axis, None]
+        return computed, np.eye(3)[self.axis][:, None, :] if derivatives else None
+
+
+@dataclass(frozen=True)
+class SystemCoordinates(Observations):
+    """Control coordinates (n,), m, in a further system with its own transformation
+
+        X_system = (1 + scale) R_system X + shift
+
+    point, axis  (n,) as for ControlCoordinates
+    system       (n,)
+    """
+
+    point: np.ndarray
+    axis: np.ndarray
+    system: np.ndarray
+
+    kind, ties = "control coordinate of a further system", ("point",)
+
+    @property
+    def _per_row(self):
+        return {"value", "sd", "use", "point", "axis", "system"}
+
+    def columns(self, layout):
+        """Point (3), system (rotation 3, shift 3, scale)."""
+        return np.hstack([layout.points[self.point], layout.system[self.system]])
+
+    def computed(self, state, derivatives):
+        """The coordinates (n, 1)."""
+        rotation, m = state.system[self.system], 1.0 + state.system_scale[self.system]
+        turned = np.einsum("nij,nj->ni", rotation, state.xyz_m[self.point])
+        rows = np.arange(len(self))
+        all_three = m[:, None] * turned + state.system_shift_m[self.system]
+        if not derivatives:
+            return all_three[rows, self.axis, None], None
+        jac = np.zeros((len(self), 3, 10))
+        jac[:, :, :3] = m[:, None, None] * rotation
+        x, y, z = (m[:, None] * turned).T
+        jac[:, 0, 4], jac[:, 0, 5] = z, -y
+        jac[:, 1, 3], jac[:, 1, 5] = -z, x
+        jac[:, 2, 3], jac[:, 2, 4] = y, -x
+        jac[:, :, 6:9] = np.eye(3)
+        jac[:, :, 9] = turned
+        return all_three[rows, self.axis, None], jac[rows, self.axis][:, None, :]
+
+
+@dataclass(frozen=True)
+class HeightDifferences(Observations):
+    """Height differences (n,), m: z of `end` minus z of `start`, points (n,)."""
+
+    start: np.ndarray
+    end: np.ndarray
+
+    kind, ties = "height difference", ("start", "end")
+
+    def columns(self, layout):
+        """z of end, z of start."""
+        return np.hstack([layout.points[self.end], layout.points[self.start]])
+
+    def computed(self, state, derivatives):
+        """The differences (n, 1)."""
+        computed = state.xyz_m[self.end, 2:] - state.xyz_m[self.start, 2:]
+        row = np.array([0.0, 0, 1, 0, 0, -1])
+        return computed, np.tile(row, (len(self), 1, 1)) if derivatives else None
+
+
+@dataclass(frozen=True)
+class PlumbLines(Observations):
+    """Pairs of points (n,) on one vertical; value (n, 2) is zero, in x and in y, m."""
+
+    start: np.ndarray
+    end: np.ndarray
+
+    kind, rows, ties = "plumb line", 2, ("start", "end")
+
+    def columns(self, layout):
+        """Point end (3), point start (3)."""
+        return np.hstack([layout.points[self.end], layout.points[self.start]])
+
+    def computed(self, state, derivatives):
+        """Differences in x and y (n, 2)."""
+        computed = state.xyz_m[self.end, :2] - state.xyz_m[self.start, :2]
+        rows = np.hstack([np.eye(2, 3), -np.eye(2, 3)])
+        return computed, np.tile(rows, (len(self), 1, 1)) if derivatives else None
+
+    def undisturbed(self, state):
+        """Plumb: an oblique pair would pretend to know the rotation about the vertical."""
+        xyz = state.xyz_m.copy()
+        xyz[self.end, :2] = xyz[self.start, :2]
+        return replace(state, xyz_m=xyz)
+
+
+@dataclass(frozen=True)
+class Vectors(Observations):
+    """Vectors (n, 3), m, from `start` to `end` in the axes of the survey: GNSS baselines."""
+
+    start: np.ndarray
+    end: np.ndarray
+
+    kind, rows, ties = "vector", 3, ("start", "end")
+
+    def columns(self, layout):
+        """Point end (3), point start (3)."""
+        return np.hstack([layout.points[self.end], layout.points[self.start]])
+
+    def computed(self, state, derivatives):
+        """Differences in x, y and z (n, 3)."""
+        computed = state.xyz_m[self.end] - state.xyz_m[self.start]
+        rows = np.hstack([np.eye(3), -np.eye(3)])
+        return computed, np.tile(rows, (len(self), 1, 1)) if derivatives else None
+
+
+@dataclass(frozen=True)
+class KnownUnknowns(Observations):
+    """Unknowns with a value and an sd known beforehand: interior parameters, scales, offsets.
+
+    of      "interior", "scale", "offset_m", "orientation_rad" or "system_scale": field of State
+    index   (n,) place in that field
+    """
+
+    of: str
+    index: np.ndarray
+
+    kind, unit = "weighted unknown", "its own"
+
+    @property
+    def _per_row(self):
+        return {"value", "sd", "use", "index"}
+
+    def columns(self, layout):
+        """The unknown itself."""
+        if self.of == "system_scale":
+            return layout.system[self.index, 6:]
+        place = {"offset_m": "offset", "orientation_rad": "orientation"}.get(self.of, self.of)
+        return getattr(layout, place)[self.index, None]
+
+    def computed(self, state, derivatives):
+        """The values (n, 1)."""
+        computed = getattr(state, self.of)[self.index, None]
+        return computed, np.ones((len(self), 1, 1)) if derivatives else None

@@ -1,0 +1,214 @@
+"""Distances, angles and directions between points: tapes, levels, theodolites, total stations.
+
+From `start` (plus the instrument's height) to `end` (plus the target's height), with (x, y, z) the
+difference, p2 = x2 + y2 and s2 = p2 + z2:
+
+    azimuth atan2(x, y)     height angle atan2(z, p)     zenith angle pi/2 - that     distance s
+
+Azimuths count clockwise from +y. A reading of a distance is (1 + scale) s + offset.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tankcal.survey.observations.base import Observations
+
+
+@dataclass(frozen=True)
+class Sights(Observations):
+    """Observations from one point to another.
+
+    start, end  (n,) points
+    rise_m      (n,) height of the instrument minus height of the target; None: zero
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    rise_m: np.ndarray = field(default=None, kw_only=True)
+
+    ties = ("end", "start")
+
+    @property
+    def _per_row(self):
+        return {"value", "sd", "use", "start", "end", "rise_m", "instrument", "set"}
+
+    def columns(self, layout):
+        """Point end (3), point start (3)."""
+        return np.hstack([layout.points[self.end], layout.points[self.start]])
+
+    def line(self, state):
+        """Differences x, y, z (3, n)."""
+        d = (state.xyz_m[self.end] - state.xyz_m[self.start]).T
+        if self.rise_m is not None:
+            d[2] -= self.rise_m
+        return d
+
+    def without_length(self, state):
+        """(n,) True where both ends are at one place, so that no derivative exists."""
+        raise NotImplementedError
+
+    @staticmethod
+    def of_ends(derivative):
+        """Derivatives (n, 1, 6) by end and start from those by the difference (3, n)."""
+        d = np.stack(derivative, axis=-1)
+        return np.concatenate([d, -d], axis=1)[:, None, :]
+
+
+@dataclass(frozen=True)
+class Distances(Sights):
+    """Distances (n,), m, spatial or horizontal, by tape, EDM or total station.
+
+    instrument  (n,) whose scale and offset hold, -1 for none
+    horizontal  True when heights do not enter
+    """
+
+    instrument: np.ndarray
+    horizontal: bool = field(default=False, kw_only=True)
+
+    kind = "distance"
+
+    def columns(self, layout):
+        """Point end (3), point start (3), scale, offset."""
+        scale, offset = (np.append(c, -1)[self.instrument] for c in (layout.scale, layout.offset))
+        return np.hstack([super().columns(layout), scale[:, None], offset[:, None]])
+
+    def without_length(self, state):
+        """(n,) True where both ends are at one place; in plan, if the distance is horizontal."""
+        x, y, z = self.line(state)
+        return (x == 0) & (y == 0) & (self.horizontal | (z == 0))
+
+    def computed(self, state, derivatives):
+        """The readings (n, 1)."""
+        d = self.line(state)
+        if self.horizontal:
+            d[2] = 0.0
+        s = np.sqrt(np.sum(d * d, axis=0))
+        m = 1.0 + np.append(state.scale, 0.0)[self.instrument]
+        computed = (m * s + np.append(state.offset_m, 0.0)[self.instrument])[:, None]
+        if not derivatives:
+            return computed, None
+        of_tools = np.stack([s, np.ones_like(s)], axis=1)[:, None, :]
+        return computed, np.concatenate([self.of_ends(m * d / s), of_tools], axis=2)
+
+
+@dataclass(frozen=True)
+class _Angles(Sights):
+    unit = "rad"
+
+    def without_length(self, state):
+        """(n,) True where both ends are at one place in plan: no angle has derivatives there."""
+        x, y, _ = self.line(state)
+        return (x == 0) & (y == 0)
+
+    def difference(self, computed):
+        """Computed minus observed, by the shorter way round."""
+        found = super().difference(computed)
+        return found - 2 * np.pi * np.round(found / (2 * np.pi))
+
+
+def azimuth(x, y):
+    """Azimuth (n,), rad clockwise from +y, and its derivatives by x, y, z (3, n)."""
+    p2 = x * x + y * y
+    return np.arctan2(x, y), np.stack([y / p2, -x / p2, np.zeros_like(p2)])
+
+
+@dataclass(frozen=True)
+class Azimuths(_Angles):
+    """Azimuths (n,), rad."""
+
+    kind = "azimuth"
+
+    def computed(self, state, derivatives):
+        """The azimuths (n, 1)."""
+        x, y, _ = self.line(state)
+        value, derivative = azimuth(x, y)
+        return value[:, None], self.of_ends(derivative) if derivatives else None
+
+
+@dataclass(frozen=True)
+class Directions(_Angles):
+    """Directions (n,), rad, read on a circle whose zero has an unknown azimuth.
+
+    set  (n,) the set of directions; each has its own orientation unknown
+    """
+
+    set: np.ndarray
+
+    kind = "direction"
+
+    def columns(self, layout):
+        """Point end (3), point start (3), orientation."""
+        return np.hstack([super().columns(layout), layout.orientation[self.set, None]])
+
+    def computed(self, state, derivatives):
+        """The directions (n, 1)."""
+        x, y, _ = self.line(state)
+        value, derivative = azimuth(x, y)
+        computed = (value - state.orientation_rad[self.set])[:, None]
+        if not derivatives:
+            return computed, None
+        turn = np.full((len(self), 1, 1), -1.0)
+        return computed, np.concatenate([self.of_ends(derivative), turn], axis=2)
+
+
+@dataclass(frozen=True)
+class HorizontalAngles(_Angles):
+    """Horizontal angles (n,), rad, at `start`, clockwise from `origin` to `end`."""
+
+    origin: np.ndarray
+
+    kind, ties = "horizontal angle", ("end", "start", "origin")
+
+    @property
+    def _per_row(self):
+        return super()._per_row | {"origin"}
+
+    def without_length(self, state):
+        """(n,) True where the station is, in plan, where one of its targets is."""
+        back = state.xyz_m[self.origin, :2] == state.xyz_m[self.start, :2]
+        return super().without_length(state) | back.all(axis=1)
+
+    def columns(self, layout):
+        """Point end (3), point start (3), point origin (3)."""
+        return np.hstack([super().columns(layout), layout.points[self.origin]])
+
+    def computed(self, state, derivatives):
+        """The angles (n, 1)."""
+        x, y, _ = self.line(state)
+        back = state.xyz_m[self.origin] - state.xyz_m[self.start]
+        first, of_first = azimuth(x, y)
+        second, of_second = azimuth(back[:, 0], back[:, 1])
+        if not derivatives:
+            return (first - second)[:, None], None
+        jac = np.concatenate([of_first, of_second - of_first, -of_second]).T[:, None, :]
+        return (first - second)[:, None], jac
+
+
+@dataclass(frozen=True)
+class VerticalAngles(_Angles):
+    """Vertical angles (n,), rad: above the horizon, or from the zenith.
+
+    zenith        True when they count from the zenith
+    bend_per_m    (1 - k) / (2 R), for curvature of the earth and refraction; 0 leaves both out.
+                  The target then stands lower by bend times the horizontal distance squared
+    """
+
+    zenith: bool = field(default=False, kw_only=True)
+    bend_per_m: float = field(default=0.0, kw_only=True)
+
+    kind = "vertical angle"
+
+    def computed(self, state, derivatives):
+        """The angles (n, 1)."""
+        x, y, z = self.line(state)
+        p2 = x * x + y * y
+        p, z = np.sqrt(p2), z - self.bend_per_m * p2
+        s2 = p2 + z * z
+        value = np.arctan2(z, p)
+        of_z, of_p = p / s2, -z / s2 - 2 * self.bend_per_m * p2 / s2
+        sign = -1.0 if self.zenith else 1.0
+        computed = (np.pi / 2 - value if self.zenith else value)[:, None]
+        if not derivatives:
+            return computed, None
+        return computed, sign * self.of_ends(np.stack([of_p * x / p, of_p * y / p, of_z]))

@@ -1,0 +1,284 @@
+"""Tables of distances, angles and levels as observations between numbered points."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tankcal.survey.means import averaged, scatter_warnings, torn_apart
+from tankcal.survey.observations import (
+    Azimuths,
+    Directions,
+    Distances,
+    HeightDifferences,
+    HorizontalAngles,
+    PlumbLines,
+    Vectors,
+    VerticalAngles,
+)
+
+EARTH_RADIUS_M = 6_371_000.0
+ANGLES = ("directions", "zenith_angles", "azimuths", "horizontal_angles", "vertical_angles")
+PLAN_ONLY = ("directions", "azimuths", "horizontal_angles", "height_differences", "plumb_lines")
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Where n observations of one kind come from.
+
+    file     name                   rows     (n,) first row of each, or None
+    ids      (n,) tuples of names   repeats  (n,) readings that were averaged
+    group    (n,) names of the groups whose sds are judged together ("tape 1")
+    element  (n,) tuples, a name for each value: ("x", "y"); ("",) where there is only one
+    table    as job.Readings name it; "" for everything else
+    scatter  (n,) chi-square of the readings that were averaged, about their mean; None: none were
+    """
+
+    file: str
+    rows: tuple
+    ids: tuple
+    repeats: np.ndarray
+    group: tuple
+    element: tuple
+    table: str = ""
+    scatter: np.ndarray | None = None
+
+    @property
+    def repeated(self):
+        """(chi-square (n,), degrees of freedom (n,)) of the readings that were averaged."""
+        scatter = np.zeros(len(self.rows)) if self.scatter is None else self.scatter
+        values = np.array([len(one) for one in self.element], dtype=int)
+        return scatter, (np.asarray(self.repeats) - 1) * values
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Numbers of points, instruments and sets of directions by the user's names.
+
+    points       {name: number}                  setups  {name: job.Setup}
+    instruments  {name: number}                  tools   {name: job.Instrument}
+    sets         {(set-up, set): number}
+    """
+
+    points: dict
+    setups: dict
+    instruments: dict
+    tools: dict
+    sets: dict = field(default_factory=dict)
+
+
+def bend_per_m(refraction):
+    """(1 - k) / (2 R): how far the earth bends away, less what the line of sight does."""
+    return 0.0 if refraction is None else (1.0 - refraction) / (2.0 * EARTH_RADIUS_M)
+
+
+def true_distance_m(reading_m, tool, temperature_c):
+    """Distance after the certificate of an instrument and its temperature.
+
+        true = (reading + correction_m) (1 + correction) (1 + expansion (T - T_certified))
+
+    reading_m, temperature_c  (n,), nan: not given        tool  job.Instrument
+    """
+    found = (np.asarray(reading_m) + tool.correction_m) * (1.0 + tool.correction)
+    if tool.certified_temperature_c is None or not tool.expansion_per_k:
+        return found
+    warmer = np.nan_to_num(np.asarray(temperature_c) - tool.certified_temperature_c)
+    return found * (1.0 + tool.expansion_per_k * warmer)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of readings with numbers in place of names; arrays (n,), -1: no such number."""
+
+    table: str
+    file: str
+    rows: tuple
+    value: np.ndarray
+    sd: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    origin: np.ndarray
+    rise_m: np.ndarray
+    set: np.ndarray
+    instrument: np.ndarray
+    tools: tuple
+    horizontal: np.ndarray
+    check: np.ndarray
+    ids: tuple
+    correlated: frozenset = frozenset()  # rows of the file that are correlated with others
+
+    @property
+    def angled(self):
+        """True for angles between two lines of sight."""
+        return self.table == "horizontal_angles"
+
+
+def table_of(readings, numbers, correlated=frozenset()):
+    """The Table of job.Readings, distances corrected by the certificates of their instruments.
+
+    correlated  rows of its file that are correlated with others: they are not averaged
+    """
+    n = len(readings.value)
+    setups = [numbers.setups[name] for name in readings.setup]
+    start = [one.station for one in setups] if setups else readings.start
+    tools = [one.instrument for one in setups] if setups else readings.instrument
+    of_distances = "distances" in readings.table
+    tools = tuple(tools) if of_distances and len(tools) else (None,) * n
+    heights = np.array([one.height_m for one in setups]) if setups else np.zeros(n)
+    target = readings.target_height_m
+    rise = heights - (0.0 if target is None else np.nan_to_num(target))
+    value = np.array(readings.value, dtype=float)
+    if of_distances:
+        value = _corrected(value, tools, readings.temperature_c, numbers.tools)
+    sets = readings.set or (None,) * n
+    horizontal = np.zeros(n, dtype=bool) if readings.horizontal is None else readings.horizontal
+    from_names = readings.setup or readings.start
+    ids = zip(from_names, readings.end, strict=True)
+    if readings.origin:
+        ids = zip(from_names, readings.origin, readings.end, strict=True)
+    return Table(
+        table=readings.table, file=readings.file, rows=tuple(readings.rows), value=value,
+        sd=np.asarray(readings.sd, dtype=float),
+        start=_numbered(start, numbers.points), end=_numbered(readings.end, numbers.points),
+        origin=_numbered(readings.origin or start, numbers.points), rise_m=rise,
+        set=_numbered(zip(readings.setup or sets, sets, strict=True), numbers.sets),
+        instrument=_numbered(tools, numbers.instruments), tools=tools,
+        horizontal=np.asarray(horizontal, dtype=bool),
+        check=np.asarray(readings.check, dtype=bool), ids=tuple(ids), correlated=correlated,
+    )  # fmt: skip
+
+
+def _numbered(names, numbers):
+    return np.array([numbers.get(name, -1) for name in names], dtype=int)
+
+
+def _corrected(value, tools, temperature_c, known):
+    temperature = np.full(len(value), np.nan) if temperature_c is None else temperature_c
+    for name in set(tools) - {None}:
+        mine = np.array([tool == name for tool in tools])
+        value[mine] = true_distance_m(value[mine], known[name], temperature[mine])
+    return value
+
+
+def observed(table, bend, warnings):
+    """Pairs (observations, Trace) of the readings of a Table that are adjusted.
+
+    bend      see `bend_per_m`            warnings  list that warnings of scatter are added to
+    """
+    use = _between_known(table) & ~table.check
+    if table.table == "vectors":
+        yield from _one_by_one(table, np.flatnonzero(use), bend)
+        return
+    alone = np.isin(table.rows, list(table.correlated)) if table.rows else use & False
+    yield from _one_by_one(table, np.flatnonzero(use & alone), bend)
+    use &= ~alone
+    for horizontal in (False, True):
+        rows = np.flatnonzero(use & (table.horizontal == horizontal))
+        if len(rows):
+            width = 2 if table.table == "plumb_lines" else 1
+            label, angle = _labels(table, rows), table.table in ANGLES
+            value, sd = (np.tile(a[rows, None], width) for a in (table.value, table.sd))
+            means = averaged(label, value, sd, angle=angle)
+            warnings += scatter_warnings(
+                means, lambda k, r=rows: "-".join(table.ids[r[k]]), table.file,
+                [table.rows[i] for i in rows] if table.rows else (),
+            )  # fmt: skip
+            apart = torn_apart(label, means)
+            if apart is not label:
+                means = averaged(apart, value, sd, angle=angle)
+            first = rows[means.first]
+            yield (
+                _made(table, first, means.value, means.sd, bend),
+                replace(_trace(table, first, means.repeats), scatter=means.chi2.sum(axis=1)),
+            )
+
+
+def _one_by_one(table, rows, bend):
+    """Pairs (observations, Trace) of rows (k,) that are not averaged with others: correlated."""
+    for horizontal in (False, True):
+        mine = rows[table.horizontal[rows] == horizontal]
+        if len(mine):
+            value, sd = (a[mine].reshape(len(mine), -1) for a in (table.value, table.sd))
+            yield (
+                _made(table, mine, value, sd, bend),
+                _trace(table, mine, np.ones(len(mine), dtype=int)),
+            )
+
+
+def compared_only(table, bend):
+    """Pairs (observations, Trace) of the readings of a Table that are only compared."""
+    use = _between_known(table) & table.check
+    if table.table == "vectors":
+        yield from _one_by_one(table, np.flatnonzero(use), bend)
+        return
+    if table.table == "directions":
+        use &= table.set >= 0
+    for horizontal in (False, True):
+        rows = np.flatnonzero(use & (table.horizontal == horizontal))
+        if len(rows):
+            width = 2 if table.table == "plumb_lines" else 1
+            value, sd = (np.tile(a[rows, None], width) for a in (table.value, table.sd))
+            trace = _trace(table, rows, np.ones(len(rows), dtype=int))
+            yield _made(table, rows, value, sd, bend), trace
+
+
+def _between_known(table):
+    return (table.start >= 0) & (table.end >= 0) & (table.origin >= 0)
+
+
+def _labels(table, rows):
+    """(n,) the same number for readings of the same value; taped lines go either way."""
+    start, end = table.start[rows], table.end[rows]
+    source = [table.ids[i][0] for i in rows]
+    if table.table == "distances":
+        start, end = np.minimum(start, end), np.maximum(start, end)
+        source = [None] * len(rows)
+    known = {}
+    keys = zip(
+        start.tolist(), end.tolist(), table.origin[rows].tolist() if table.angled else source,
+        table.rise_m[rows].tolist(), table.set[rows].tolist(), [table.tools[i] for i in rows],
+        source, strict=True,
+    )  # fmt: skip
+    return np.array([known.setdefault(key, len(known)) for key in keys])
+
+
+def _made(table, rows, value, sd, bend):
+    """The observations of some rows, with values and sds (n, m)."""
+    kind, start, end = table.table, table.start[rows], table.end[rows]
+    if kind == "vectors":
+        return Vectors(value, sd, start, end)
+    if kind == "plumb_lines":
+        return PlumbLines(value, sd, start, end)
+    value, sd = value[:, 0], sd[:, 0]
+    if kind == "height_differences":
+        return HeightDifferences(value, sd, start, end)
+    rise = table.rise_m[rows]
+    rise = rise if rise.any() else None
+    if kind in ("distances", "slope_distances"):
+        return Distances(
+            value, sd, start, end, instrument=table.instrument[rows],
+            horizontal=bool(table.horizontal[rows[0]]), rise_m=rise,
+        )  # fmt: skip
+    if kind == "directions":
+        return Directions(value, sd, start, end, set=table.set[rows])
+    if kind == "azimuths":
+        return Azimuths(value, sd, start, end)
+    if kind == "horizontal_angles":
+        return HorizontalAngles(value, sd, start, end, origin=table.origin[rows])
+    return VerticalAngles(
+        value, sd, start, end, zenith=kind == "zenith_angles", bend_per_m=bend, rise_m=rise
+    )
+
+
+def _trace(table, rows, repeats):
+    names = {"zenith_angles": "zenith angles", "slope_distances": "slope distances"}
+    group = tuple(table.tools[i] or names.get(table.table, "") for i in rows)
+    element = {"plumb_lines": ("x", "y"), "vectors": ("x", "y", "z")}.get(table.table, ("",))
+    return Trace(
+        table.file,
+        tuple(table.rows[i] for i in rows) if table.rows else (None,) * len(rows),
+        tuple(table.ids[i] for i in rows),
+        repeats,
+        group,
+        (element,) * len(rows),
+        table.table,
+    )

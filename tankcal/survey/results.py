@@ -1,0 +1,272 @@
+"""What the adjustment of a survey gave, by the names that the user gave to things."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.survey.measurements import RejectedReadings
+from tankcal.survey.network import Adjusted
+from tankcal.text.digits import fixed
+from tankcal.text.display import table_html
+
+_SHOWN = 20  # points that an adjustment shows of itself
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One value of one observation after the adjustment.
+
+    kind        as the observations name it: "image coordinate", "distance", "direction", ...
+    ids         names, such as ("photo 1", "215") or ("A", "B")
+    element     "x" or "y", "omega", ...; "" where there is only one
+    file, row   where it was read; of averaged readings the first row; "" and None: no file
+    repeats     readings that were averaged
+    unit        of value, residual, sd, mdb: "mm" (images), "m", "rad" or "" (weighted unknowns)
+    value       observed, as adjusted (after averaging and corrections)
+    residual    computed minus observed
+    sd          a priori            redundancy  0 to 1
+    w           Baarda's test quantity     tau  Pope's: w over sigma0 (nan: no redundancy)
+    mdb         minimal detectable bias; inf: nothing controls it
+    effect_m    largest change of a point's coordinates by an undetected bias of that size; inf as
+                well
+    removed     True: set aside by data snooping; residual and w are then those that it would have
+    check       True: it was only compared; w is then its difference over the sd of that
+    """
+
+    kind: str
+    ids: tuple
+    element: str
+    file: str
+    row: int | None
+    repeats: int
+    unit: str
+    value: float
+    residual: float
+    sd: float
+    redundancy: float
+    w: float
+    tau: float
+    mdb: float
+    effect_m: float
+    removed: bool = False
+    check: bool = False
+
+
+@dataclass(frozen=True)
+class GroupOfReadings:
+    """Is a group of observations as good as declared?
+
+    kind, name  such as "distance", "tape 1"; name "" where the kind says it all
+    count       values adjusted     removed     set aside
+    redundancy  of the group        factor      true sd over declared (variance component); nan:
+    factor_sd   its sd, if the      nothing controls the group
+                declaration holds
+    rms         of the residuals, in `unit`
+    sd_smallest, sd_largest         declared sds of the values adjusted; None: there are none
+    """
+
+    kind: str
+    name: str
+    unit: str
+    count: int
+    removed: int
+    redundancy: float
+    factor: float
+    factor_sd: float
+    rms: float
+    sd_smallest: float | None = None
+    sd_largest: float | None = None
+
+
+@dataclass(frozen=True)
+class DatumReport:
+    """What holds the frame.
+
+    choice       as asked for: "control", "fixed_photo", "minimal" or "inner"
+    defect       number of the seven ways that no observation feels, before the choice was applied
+    words        a sentence that names them; "" when the defect is 0
+    held         what holds them: names of points with axes ("P7:z"), or of the photo
+    vertical     True: observations determine the vertical, whatever the choice
+    scale        True: observations determine the scale
+    """
+
+    choice: str
+    defect: int
+    words: str
+    held: tuple
+    vertical: bool
+    scale: bool
+
+
+@dataclass(frozen=True)
+class CheckPoints:
+    """Check points against the adjustment (Silva 5, 6); lengths in m.
+
+    names          (n,)               difference_m  (n, 3) adjusted minus known; nan: not known
+    sd_m           (n, 3) of the difference: adjustment and known coordinates
+    r_xyz_m        root of the mean squared magnitude
+    largest_m      largest magnitude  mean_m        mean magnitude
+    """
+
+    names: tuple
+    difference_m: np.ndarray
+    sd_m: np.ndarray
+    r_xyz_m: float
+    largest_m: float
+    mean_m: float
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A named, shared cause of uncertainty of the coordinates: scale or offset of an instrument.
+
+    name       "tape 1"           what      "instrument_scale" or "instrument_offset"
+    u, unit    as declared: ppm or mm
+    column_m   (3 points,) change of all coordinates by one u, in the order of Adjustment.names;
+               covariance = column column' + everything else, uncorrelated
+    """
+
+    name: str
+    what: str
+    u: float
+    unit: str
+    column_m: np.ndarray
+
+
+@dataclass(frozen=True)
+class RepeatedReadings:
+    """Repeated readings of image points, before anything was averaged.
+
+    photo, point  (n,) names of the points read more than once      count  (n,) readings
+    mean_mm       (n, 2) without weights      sd_mm  (n, 2) of one reading, from the sample
+    limit_mm      sd beyond which readings were rejected; None: no limit
+    rejected      tuple of RejectedReadings, which are among the n
+    """
+
+    photo: tuple
+    point: tuple
+    count: np.ndarray
+    mean_mm: np.ndarray
+    sd_mm: np.ndarray
+    limit_mm: float | None
+    rejected: tuple[RejectedReadings, ...]
+
+    @property
+    def mean_sd_mm(self):
+        """(2,) mean of the standard deviations."""
+        return self.sd_mm.mean(axis=0)
+
+    @property
+    def pooled_sd_mm(self):
+        """(2,) root of the mean variance, by degrees of freedom: sd of one reading of any point."""
+        return np.sqrt((self.count - 1) @ self.sd_mm**2 / np.sum(self.count - 1))
+
+
+@dataclass(frozen=True)
+class DepthOfField:
+    """The outer iteration that corrects image points for the depth of their objects.
+
+    rounds      adjustments made           last_change_mm  largest change of the last correction
+    largest_mm  largest correction (x or y)       rms_mm   root mean square of all of them
+    left        image readings left uncorrected: their objects have no depth in front of the lens
+    """
+
+    rounds: int
+    last_change_mm: float
+    largest_mm: float
+    rms_mm: float
+    left: int
+
+
+@dataclass(frozen=True, repr=False)
+class Adjustment:
+    """The adjusted survey. Covariances are scaled as `cov_scale` says.
+
+    names          (n,) points that were adjusted       xyz_m    (n, 3)
+    covariance_m2  (n, 3, 3) of each point; `full_covariance_m2()` gives all of them together
+    fixed          (n, 3) True: was held
+    aside          sentences: points that could not be adjusted, and why
+    adjusted       network.Adjusted, for everything that is not here
+    readings       tuple of Reading, in the order of the files
+    removed        tuple of Reading: those that were set aside, the worst first
+    groups         tuple of GroupOfReadings
+    datum          DatumReport       check_points  CheckPoints or None
+    causes         tuple of Cause
+    cov_scale      variance factor that covariances were multiplied by: 1, or sigma0 squared
+    sigma0         a posteriori; nan: no redundancy
+    observations, unknowns, redundancy, iterations, rounds (adjustments by data snooping)
+    warnings       tuple of Problem
+    doubts         those of the warnings that put the whole result in doubt: what was set aside may
+                   be the victim of what was kept, or another reading may be wrong in its place
+    repeats        RepeatedReadings of image points; None: each was read once
+    depth          DepthOfField; None: not asked for
+    """
+
+    names: tuple
+    xyz_m: np.ndarray
+    covariance_m2: np.ndarray
+    fixed: np.ndarray
+    aside: tuple
+    adjusted: Adjusted
+    readings: tuple[Reading, ...]
+    removed: tuple[Reading, ...]
+    groups: tuple[GroupOfReadings, ...]
+    datum: DatumReport
+    check_points: CheckPoints | None
+    causes: tuple[Cause, ...]
+    cov_scale: float
+    sigma0: float
+    observations: int
+    unknowns: int
+    redundancy: int
+    iterations: int
+    rounds: int
+    warnings: tuple = ()
+    doubts: tuple = ()
+    repeats: RepeatedReadings | None = None
+    depth: DepthOfField | None = None
+
+    def __str__(self) -> str:
+        fit = "nothing redundant"
+        if self.redundancy > 0:
+            test = "passed" if self.adjusted.test().passed else "FAILED"
+            fit = f"sigma0 = {fixed(self.sigma0, 3)}, global test {test}"
+        aside = f", {len(self.removed)} readings set aside" if self.removed else ""
+        return f"{len(self.names)} points, redundancy {self.redundancy}, {fit}{aside}"
+
+    def __repr__(self) -> str:
+        return f"<tankcal.Adjustment of {self}>"
+
+    def _repr_html_(self) -> str:
+        columns = self.points
+        rows = [
+            [
+                columns["point"][i],
+                *(fixed(columns[f"{axis}_m"][i], 4) for axis in "xyz"),
+                *(fixed(columns[f"s{axis}_mm"][i], 2) for axis in "xyz"),
+            ]
+            for i in range(min(len(self.names), _SHOWN))
+        ]
+        more = len(self.names) - _SHOWN
+        headings = ["point", "x, m", "y, m", "z, m", "sx, mm", "sy, mm", "sz, mm"]
+        table = table_html(f"Adjustment: {self}", headings, rows)
+        return table + (f"<p>and {more} more points</p>" if more > 0 else "")
+
+    @property
+    def points(self) -> dict:
+        """The adjusted points by columns, as `pandas.DataFrame` takes them: m, and sds in mm."""
+        sd_mm = 1000 * np.sqrt(np.einsum("nii->ni", self.covariance_m2))
+        columns = {"point": list(self.names)}
+        columns |= {f"{axis}_m": self.xyz_m[:, i] for i, axis in enumerate("xyz")}
+        return columns | {f"s{axis}_mm": sd_mm[:, i] for i, axis in enumerate("xyz")}
+
+    @property
+    def dof(self):
+        """Degrees of freedom of the covariances: infinite unless residuals scaled them."""
+        return np.inf if self.cov_scale == 1 else float(self.redundancy)
+
+    def full_covariance_m2(self, names=None):
+        """(3k, 3k) covariance of chosen points, all when None, scaled like the others."""
+        wanted = self.names if names is None else names
+        place = {name: i for i, name in enumerate(self.adjusted.survey.points)}
+        return self.cov_scale * self.adjusted.covariance_m2([place[name] for name in wanted])

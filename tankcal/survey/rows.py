@@ -1,0 +1,175 @@
+"""Every value of every observation after the adjustment, by the names that the user gave."""
+
+from itertools import repeat
+
+import numpy as np
+
+from tankcal.camera.model import PARAMETERS, UNITS
+from tankcal.survey.network.reactions import HELD
+from tankcal.survey.network.reliability import UNCONTROLLED
+from tankcal.survey.results import GroupOfReadings, Reading
+
+TOOLS = {"scale": ("scale", ""), "offset_m": ("offset", "m")}
+
+
+def readings_of(adjusted, traces, held):
+    """Reading rows in the order of the tables, and a GroupOfReadings for each kind and name.
+
+    adjusted  network.Adjusted       traces  {source: Trace}
+    held      network.Residuals of held coordinates: rows of no group, for they are not observed
+    """
+    found, groups = [], {}
+    for number, table in enumerate((*adjusted.residuals, held)):
+        if table.source == "known beforehand":
+            trace = _known_trace(adjusted, adjusted.problem.observations[number])
+            value = adjusted.problem.observations[number].value
+        else:
+            trace = traces[table.source]
+            value = _values(adjusted.survey, table)
+        if not len(table.rows):
+            continue
+        rows = table.rows.tolist()
+        units = _units(table, trace)
+        found += _rows(
+            table, np.reshape(value, table.residual.shape), trace, units, adjusted.sigma0
+        )
+        if table.source == HELD:
+            continue
+        names = np.array([trace.group[i] for i in rows], dtype=object)
+        for name, unit in dict.fromkeys(zip(names, units, strict=True)):
+            mine = (names == name) & (np.array(units, dtype=object) == unit)
+            groups.setdefault((table.kind, name, unit), []).append((table, mine))
+    repeated = adjusted.survey.repeated
+    return found, tuple(_group(*key, parts, repeated) for key, parts in groups.items())
+
+
+def gone_with_their_points(adjusted, removed, traces):
+    """Reading rows of what was set aside, and whose points are no longer adjusted.
+
+    removed  network.cleaning.Removed
+    """
+    survey = adjusted.survey
+    listed = {(table.source, row) for table in adjusted.residuals for row in table.rows.tolist()}
+    nan, inf, found = float("nan"), float("inf"), []
+    for one in removed:
+        if (one.source, one.row) in listed or one.source not in traces:
+            continue
+        trace, images = traces[one.source], one.source == "image points"
+        of = survey.image_points if images else survey.observations[one.source]
+        values, sds = (of.xy_mm, of.sd_mm) if images else (of.value, of.sd)
+        value, sd = np.atleast_1d(values[one.row]), np.atleast_1d(sds[one.row])
+        unit = "mm" if images else of.unit
+        for k, name in enumerate(trace.element[one.row]):
+            found.append(
+                Reading(
+                    one.kind, trace.ids[one.row], name, trace.file, trace.rows[one.row],
+                    int(trace.repeats[one.row]), unit, float(value[k]), nan, float(sd[k]), 0.0,
+                    float(one.w), nan, inf, inf, True,
+                )
+            )  # fmt: skip
+    return found
+
+
+def _values(survey, table):
+    """Observed values of a table of residuals."""
+    images = table.source == "image points"
+    if table.source == HELD:
+        return survey.xyz_m.ravel()[table.rows]
+    value = survey.image_points.xy_mm if images else survey.observations[table.source].value
+    return value[table.rows]
+
+
+def _rows(table, value, trace, units, sigma0):
+    """Reading rows of a table of residuals, value by value."""
+    rows, width = table.rows.tolist(), value.shape[1]
+    tau = table.w / sigma0 if sigma0 > 0 else np.full_like(table.w, np.nan)
+    numbers = (
+        value, table.residual, table.sd, table.redundancy, table.w, tau, table.mdb, table.effect_m
+    )  # fmt: skip
+
+    def each(values):
+        return [value for value in values for _ in range(width)]
+
+    return list(
+        map(
+            Reading,
+            repeat(table.kind), each(trace.ids[i] for i in rows),
+            [name for i in rows for name in trace.element[i]], repeat(trace.file),
+            each(trace.rows[i] for i in rows), each(int(trace.repeats[i]) for i in rows),
+            each(units), *(np.ravel(a).tolist() for a in numbers), each((~table.used).tolist()),
+        )
+    )  # fmt: skip
+
+
+def _units(table, trace):
+    """[n] unit of each observation; elements of a photo and weighted unknowns differ in theirs."""
+    if isinstance(trace, _KnownTrace):
+        return trace.units
+    if table.unit != "m or rad":
+        return [table.unit] * len(table.rows)
+    return ["m" if trace.element[i][0] in "xyz" else "rad" for i in table.rows.tolist()]
+
+
+class _KnownTrace:
+    """A Trace of weighted unknowns: they stand in no row, and each has its unit."""
+
+    def __init__(self, file, ids, elements, units):
+        self.file, self.ids, self.element = file, ids, [(element,) for element in elements]
+        self.rows, self.repeats, self.units = [None] * len(ids), [1] * len(ids), units
+        self.group = [one[0] for one in ids]
+
+
+def _known_trace(adjusted, one):
+    """The _KnownTrace of weighted unknowns."""
+    names, elements, units, file = _known_names(adjusted, one)
+    return _KnownTrace(file, names, elements, units)
+
+
+def _known_names(adjusted, one):
+    """Names, elements, units and file of weighted unknowns."""
+    survey, index = adjusted.survey, np.asarray(one.index).tolist()
+    if one.of in TOOLS:
+        element, unit = TOOLS[one.of]
+        names = [(survey.instruments[i].name,) for i in index]
+        return names, [element] * len(index), [unit] * len(index), "instruments.toml"
+    table, names, elements, units = adjusted.problem.interior_of, [], [], []
+    for place in index:
+        photos, parameters = np.nonzero(table == place)
+        camera = survey.cameras[survey.photos.camera[photos[0]]]
+        of_photo = camera.scope[parameters[0]] == "photo"
+        names.append((camera.name, survey.photos.names[photos[0]]) if of_photo else (camera.name,))
+        elements.append(PARAMETERS[parameters[0]])
+        units.append(UNITS[elements[-1]])
+    return names, elements, units, "cameras.toml"
+
+
+def _group(kind, name, unit, parts, repeated):
+    """The GroupOfReadings of parts (table, mask of its rows)."""
+    used = [mine & table.used for table, mine in parts]
+    scatter = np.zeros(2)
+    for (table, _), mine in zip(parts, used, strict=True):
+        if table.source in repeated:
+            scatter += [part[table.rows[mine]].sum() for part in repeated[table.source]]
+    residual, sd, share, parts_of_chi2 = (
+        np.concatenate(
+            [
+                getattr(table, field)[mask].ravel()
+                for (table, _), mask in zip(parts, used, strict=True)
+            ]
+        )
+        for field in ("residual", "sd", "redundancy", "part_of_chi2")
+    )
+    count = sum(int(mine.sum()) * table.residual.shape[1] for table, mine in parts)
+    redundancy = float(share.sum() + scatter[1])
+    factor = factor_sd = np.nan
+    weighs = sd > 0  # what holds exactly has neither residual nor redundancy
+    if redundancy > UNCONTROLLED and weighs.any():
+        square = np.sum(parts_of_chi2[weighs]) + scatter[0]
+        factor = float(np.sqrt(max(square, 0.0) / redundancy))
+        factor_sd = float(1.0 / np.sqrt(2.0 * redundancy))
+    rms = float(np.sqrt(np.mean(residual**2))) if len(residual) else np.nan
+    low, high = (float(sd.min()), float(sd.max())) if len(sd) else (None, None)
+    return GroupOfReadings(
+        kind, name, unit, len(residual), count - len(residual), redundancy, factor, factor_sd,
+        rms, low, high,
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Start values: where points and photographs are, before anything is adjusted."""

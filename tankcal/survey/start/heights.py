@@ -1,0 +1,87 @@
+"""Heights from levelling and from slopes: all at once, by least absolute misfits.
+
+Slopes become height differences with the horizontal length of their line. The sum of absolute
+misfits is made small by least squares with weights that are renewed (Schlossmacher 1973), so a
+blunder is outvoted where a height is controlled.
+"""
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import spsolve
+
+from tankcal.survey.observations import HeightDifferences
+from tankcal.survey.start.plan import looked_up
+
+ROUNDS = 25
+NOISE_M = 1e-4  # misfits below are all alike
+
+
+def with_heights(survey, plan, xyz_m, free):
+    """Coordinates (points, 3) with all z that follow from height differences and slopes.
+
+    free  whether a part in which no z is known may start with its first point at z = 0
+    """
+    start, end, rise = _differences(survey, plan, xyz_m)
+    z = xyz_m[:, 2].copy()
+    if not len(start):
+        return xyz_m
+    n = len(z)
+    graph = coo_array((np.ones(len(start)), (start, end)), shape=(n, n))
+    label = connected_components(graph, directed=False)[1]
+    told = np.zeros(n, dtype=bool)
+    told[label[np.isfinite(z)]] = True
+    tied = np.unique(np.concatenate([start, end]))
+    if free and not np.isfinite(z).any():
+        largest = np.bincount(label[tied]).argmax()
+        z[tied[label[tied] == largest][0]] = 0.0
+        told[largest] = True
+    unknown = tied[told[label[tied]] & ~np.isfinite(z[tied])]
+    if len(unknown):
+        rows = told[label[start]]
+        z[unknown] = _balanced(z, unknown, start[rows], end[rows], rise[rows])
+    return np.column_stack([xyz_m[:, :2], z])
+
+
+def _differences(survey, plan, xyz_m):
+    """Points start, end (n,) and z of end minus z of start (n,)."""
+    pair = plan.pairs(plan.low, plan.high)
+    flat = looked_up(*plan.lengths(xyz_m[:, 2]), pair)
+    known = np.linalg.norm(xyz_m[plan.high, :2] - xyz_m[plan.low, :2], axis=1)
+    flat = np.where(np.isfinite(known), known, flat)
+    by_slope = flat * np.tan(plan.slope) + plan.lift + plan.bend * flat**2
+    good = np.isfinite(by_slope)
+    parts = [(plan.low[good], plan.high[good], by_slope[good])]
+    for one in survey.observations:
+        if isinstance(one, HeightDifferences):
+            used = np.ones(len(one), dtype=bool) if one.use is None else one.use > 0
+            parts.append((one.start[used], one.end[used], one.value[used]))
+    start, end, rise = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return start, end, rise
+
+
+def _balanced(z, unknown, start, end, rise):
+    """Heights (k,) of unknown points with the smallest sum of absolute misfits."""
+    place = np.full(len(z), -1)
+    place[unknown] = np.arange(len(unknown))
+    open_ended = (place[start] >= 0) | (place[end] >= 0)
+    start, end, rise = start[open_ended], end[open_ended], rise[open_ended]
+    rows = np.arange(len(start))
+    up, down = place[end] >= 0, place[start] >= 0
+    a = coo_array(
+        (
+            np.concatenate([np.ones(up.sum()), -np.ones(down.sum())]),
+            (
+                np.concatenate([rows[up], rows[down]]),
+                np.concatenate([place[end[up]], place[start[down]]]),
+            ),
+        ),
+        shape=(len(start), len(unknown)),
+    ).tocsr()
+    right = rise - np.where(up, 0.0, z[end]) + np.where(down, 0.0, z[start])
+    weight = np.ones(len(start))
+    for _ in range(ROUNDS):
+        heavy = a.T @ diags_array(weight)
+        found = np.atleast_1d(spsolve(csr_array(heavy @ a).tocsc(), heavy @ right))
+        weight = 1 / np.maximum(np.abs(a @ found - right), NOISE_M)
+    return found

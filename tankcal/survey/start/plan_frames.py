@@ -1,0 +1,224 @@
+"""Local frames in plan: what hangs together without known points, and how it joins what is known.
+
+A traverse between two known points has no known direction, a network without control no known
+point at all: it starts with a station at the origin and its first direction towards +y, grows, and
+is then turned and shifted (and stretched, if nothing in it was measured in metres) onto the rest.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from tankcal.survey.start.lateration import laid_out
+from tankcal.survey.start.plan import looked_up
+from tankcal.survey.start.polar import grown_in_plan, oriented
+
+MISFIT = 0.05  # of a joint, as a share of the distance between its points
+PAIRS = 60  # pairs of common points that are tried
+
+
+@dataclass(frozen=True)
+class Local:
+    """A local frame: xy_m (points, 2); whether it has metres, north; whether it may be mirrored."""
+
+    xy_m: np.ndarray
+    scaled: bool
+    north: bool
+    mirrored: bool = False
+
+    @property
+    def known(self):
+        """(points,) True where the place is known."""
+        return np.isfinite(self.xy_m[:, 0])
+
+
+def in_plan(plan, xy_m, z_m, rng):
+    """Positions (points, 2) in plan, and the Locals that could not be joined to them.
+
+    xy_m  (points, 2) nan where not known; without any known point the largest Local is the frame
+    z_m   (points,) nan where not known
+    """
+    main = Local(xy_m, True, True)
+    while True:
+        if main.known.any():
+            plain = plan if main.scaled else _without_lengths(plan)
+            main = replace(main, xy_m=grown_in_plan(plain, main.xy_m, z_m, main.north))
+        pieces = _locals(plan, main, z_m, rng)
+        if not main.known.any() and pieces:
+            pieces.sort(key=_size)
+            main = pieces.pop()
+            main = replace(main, mirrored=False)
+            continue
+        left, before = [], main.known.sum()
+        for piece in _merged(pieces):
+            joined = _joined(piece, main)
+            if joined is None:
+                left.append(piece)
+            else:
+                main = joined
+        if main.known.sum() == before:
+            return main.xy_m, left
+
+
+def _without_lengths(plan):
+    none = slice(0, 0)
+    return replace(
+        plan, start=plan.start[none], end=plan.end[none], length=plan.length[none],
+        flat=plan.flat[none], rise=plan.rise[none],
+    )  # fmt: skip
+
+
+def _locals(plan, main, z_m, rng):
+    """Locals of what the main frame does not know."""
+    lengths = plan.lengths(z_m)
+    zeros = oriented(plan, main.xy_m, main.north)
+    waiting = np.isnan(zeros) | ~main.known[np.maximum(plan.at, 0)]
+    taken, found = np.zeros(len(plan.north), dtype=bool), []
+    for circle, first, second, base in _seeds(plan, lengths, waiting & (plan.at >= 0)):
+        if taken[circle]:
+            continue
+        local = _grown(plan, z_m, plan.at[circle], second, base)
+        turned = np.isfinite(oriented(plan, local.xy_m, False)) & local.known[plan.at]
+        taken |= turned
+        if local.known.sum() > 2 or not found:
+            found.append(local)
+        del first
+    return found + _by_lengths(plan, main, lengths, rng)
+
+
+def _seeds(plan, lengths, waiting):
+    """Circle, station, target and length (nan: none) to start from, those with most lengths first.
+
+    Without a length the target must look back.
+    """
+    length = looked_up(*lengths, plan.pairs(plan.station, plan.target))
+    sights = set(zip(plan.station.tolist(), plan.target.tolist(), strict=True))
+    taped = np.bincount(plan.circle, weights=np.isfinite(length) + 1e-3, minlength=len(plan.north))
+    for circle in np.argsort(-taped, kind="stable"):
+        if not waiting[circle]:
+            continue
+        rows = np.flatnonzero(plan.circle == circle)
+        with_length = rows[np.isfinite(length[rows])]
+        if len(with_length):
+            row = with_length[0]
+            yield circle, plan.station[row], plan.target[row], float(length[row])
+            continue
+        back = [row for row in rows if (plan.target[row], plan.station[row]) in sights]
+        if back:
+            yield circle, plan.station[back[0]], plan.target[back[0]], np.nan
+
+
+def _grown(plan, z_m, first, second, base):
+    """The Local that grows from two points, one at the origin, the other towards +y."""
+    xy = np.full((plan.points, 2), np.nan)
+    xy[first], xy[second] = 0.0, (0.0, 1.0 if np.isnan(base) else base)
+    if np.isnan(base):
+        xy = grown_in_plan(_without_lengths(plan), xy, z_m, north=False)
+        pair, length = plan.lengths(z_m)
+        low, high = np.divmod(pair, plan.points)
+        ratio = length / np.linalg.norm(xy[low] - xy[high], axis=1)
+        if not np.isfinite(ratio).any():
+            return _north_up(plan, Local(xy, False, False))
+        xy = xy * np.nanmedian(ratio)
+    xy = grown_in_plan(plan, xy, z_m, north=False)
+    return _north_up(plan, Local(xy, True, False))
+
+
+def _north_up(plan, local):
+    """The Local turned so that its azimuths count from +y, if there are any."""
+    zeros = oriented(plan, local.xy_m, False)[plan.north]
+    zeros = zeros[np.isfinite(zeros)]
+    if not len(zeros):
+        return local
+    turn = np.median(np.angle(np.exp(1j * (zeros - zeros[0])))) + zeros[0]
+    return replace(local, xy_m=local.xy_m @ _turning(-turn).T, north=True)
+
+
+def _turning(angle):
+    """Matrix (2, 2) that adds an angle to azimuths."""
+    s, c = np.sin(angle), np.cos(angle)
+    return np.array([[c, s], [-s, c]])
+
+
+def _by_lengths(plan, main, lengths, rng):
+    """Locals of points that are tied by distances; those to known points included."""
+    low, high = np.divmod(lengths[0], plan.points)
+    open_ended = ~(main.known[low] & main.known[high])
+    if not open_ended.any() or np.isin(low, plan.station).any():
+        return []
+    tied = np.unique(np.concatenate([low[open_ended], high[open_ended]]))
+    firm = tied[main.known[tied]]
+    sides = np.array(list(combinations(firm, 2)), dtype=int).reshape(-1, 2)
+    between = np.linalg.norm(main.xy_m[sides[:, 0]] - main.xy_m[sides[:, 1]], axis=1)
+    start = np.concatenate([low[open_ended], sides[:, 0]])
+    end = np.concatenate([high[open_ended], sides[:, 1]])
+    length = np.concatenate([lengths[1][open_ended], between])
+    found = []
+    for points, places in laid_out(start, end, length, 2, rng):
+        xy = np.full((plan.points, 2), np.nan)
+        xy[points] = places
+        found.append(Local(xy, True, False, mirrored=True))
+    return found
+
+
+def _size(piece):
+    return piece.scaled, piece.known.sum()
+
+
+def _merged(pieces):
+    """Locals, joined with one another where they can be, the largest first."""
+    pieces = sorted(pieces, key=_size, reverse=True)
+    done = []
+    while pieces:
+        main, rest = pieces[0], pieces[1:]
+        grown = True
+        while grown:
+            grown, left = False, []
+            for piece in rest:
+                joined = None if main.mirrored else _joined(piece, main)
+                main, grown = (main, grown) if joined is None else (joined, True)
+                left += [piece] if joined is None else []
+            rest = left
+        done.append(main)
+        pieces = rest
+    return done
+
+
+def _joined(piece, onto):
+    """The Local `onto` with what a piece adds, or None when too little is common."""
+    stiff = piece.scaled and onto.scaled
+    common = np.flatnonzero(piece.known & onto.known)
+    north = piece.north and onto.north
+    enough = 1 if north and stiff else 3 if piece.mirrored else 2
+    if len(common) < enough:
+        return None
+    best, moved = np.inf, None
+    for mirror in (1.0, -1.0) if piece.mirrored else (1.0,):
+        xy = piece.xy_m * [mirror, 1.0]
+        for a, turn, scale in _motions(xy[common], onto.xy_m[common], stiff, north):
+            found = scale * (xy - xy[common[a]]) @ turn.T + onto.xy_m[common[a]]
+            misfit = np.abs(found[common] - onto.xy_m[common]).sum()
+            if misfit < best:
+                best, moved = misfit, found
+    size = np.linalg.norm(np.ptp(onto.xy_m[common], axis=0))
+    if moved is None or (len(common) > 1 and best > 2 * MISFIT * size * len(common)):
+        return None
+    return replace(
+        onto,
+        xy_m=np.where(onto.known[:, None], onto.xy_m, moved),
+        north=onto.north or piece.north,
+    )
+
+
+def _motions(here, there, stiff, north):
+    """Place, turn (2, 2) and scale of motions by single places, or by pairs."""
+    if north and stiff:
+        yield from ((a, np.eye(2), 1.0) for a in range(len(here)))
+        return
+    pairs = list(combinations(range(len(here)), 2))
+    for a, b in pairs[:: max(1, len(pairs) // PAIRS)]:
+        d, e = here[b] - here[a], there[b] - there[a]
+        if min(np.hypot(*d), np.hypot(*e)) > 0:
+            turn = np.eye(2) if north else _turning(np.arctan2(*e) - np.arctan2(*d))
+            yield a, turn, 1.0 if stiff else np.hypot(*e) / np.hypot(*d)

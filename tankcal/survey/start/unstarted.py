@@ -1,0 +1,191 @@
+"""What is left without a start value, in words."""
+
+import numpy as np
+
+from tankcal.errors import SolutionError
+from tankcal.messages import either, listed, message
+from tankcal.survey.network.survey import FEWEST
+from tankcal.survey.observations import Distances, HeightDifferences, VerticalAngles
+from tankcal.survey.start.single_points import SHOWN
+
+LISTED = 10
+
+
+class SeveralPlacesError(SolutionError):
+    """What was measured is met at several places: no mistake, but a reading too few."""
+
+
+def refuse_missing(survey, sights, xyz_m, piece, sets, reasons, why=lambda point: None):
+    """Coordinates (points, 3) without gaps; points that nothing determines stand in the middle.
+
+    Those have too few observations for an adjustment, too, which sets them aside by name. Raises
+    SolutionError when a photo, a point that something determines, or a circle has no start.
+
+    why  why(point) -> what refuses a point without a place, see `not_fixed`; or None
+    """
+    hopeless = survey.values_of_points() < FEWEST
+    missing = np.isnan(xyz_m) & ~hopeless[:, None]
+    told = []
+    known = np.isfinite(xyz_m).all(axis=1)
+    for photo in np.flatnonzero(~piece.oriented):
+        count = known[sights[photo].point].sum()
+        name = survey.photos.names[photo]
+        if count == 3:
+            told.append(
+                message(
+                    "photo_of_three",
+                    "photo {name} (3 known points, which several positions explain)",
+                    name=name,
+                )
+            )
+        else:
+            told.append(
+                message(
+                    "photo_of_points", "photo {name} ({count} known points)", name=name, count=count
+                )
+            )
+    whole = np.flatnonzero(missing[:, :2].any(axis=1))
+    points = [message("named_point", "point {point}", point=survey.points[i]) for i in whole]
+    told += points if len(points) <= LISTED else [listed(points, LISTED)]
+    flat = np.isfinite(xyz_m[:, :2]).all(axis=1) & np.isnan(xyz_m[:, 2])
+    level = np.flatnonzero(flat if (flat & ~hopeless).any() else flat & ~hopeless)
+    if not told:
+        unknown = [
+            message("named_set", "orientation of direction set {number}", number=number)
+            for number in np.flatnonzero(np.isnan(sets)) + 1
+        ]
+        told += unknown if len(unknown) <= LISTED else [listed(unknown, LISTED)]
+    sentences = (
+        [message("not_started", "no approximate values for {told}", told=[*told])] if told else []
+    )
+    if len(level):
+        sentences.append(_no_heights(survey, level))
+    if sentences:
+        errors = [one for one in map(why, whole[:LISTED]) if one is not None]
+        several = len(errors) == len(told) and all(
+            isinstance(one, SeveralPlacesError) for one in errors
+        )
+        kind = SeveralPlacesError if several and errors else SolutionError
+        texts = [*sentences, *(one.args[0] for one in errors), *(one for one in reasons if one)]
+        raise kind(one_sentence(texts))
+    middle = np.nanmean(xyz_m, axis=0) if known.any() else np.zeros(3)
+    return np.where(np.isnan(xyz_m), middle, xyz_m)
+
+
+def not_fixed(survey, found, point, centre_m):
+    """The SolutionError of a point that its ties to known ones do not fix, or None.
+
+    found  network.positioning.Sought        centre_m  (3,) added to its coordinates
+    """
+    name = survey.points[point]
+    if not found.unknowns:
+        return None
+    if found.rows < found.unknowns:
+        return SolutionError(
+            message(
+                "point_short_of_readings",
+                "point {name} has {rows} reading to known points, and {unknowns} are needed"
+                if found.rows == 1
+                else "point {name} has {rows} readings to known points, and {unknowns} are needed",
+                name=name,
+                rows=found.rows,
+                unknowns=found.unknowns,
+            )
+        )
+    if len(found.rivals_m) > SHOWN or len(found.rivals_m) == 1:
+        return SolutionError(
+            message(
+                "point_moves_freely",
+                "the readings between point {name} and known points leave it free to "
+                "move (lines or circles that coincide, or hardly cross): another reading "
+                "is needed",
+                name=name,
+            )
+        )
+    if not len(found.rivals_m):
+        return SolutionError(
+            message(
+                "point_fits_nowhere",
+                "no place of point {name} agrees with the readings between it and known points",
+                name=name,
+            )
+        )
+    places = [
+        "(" + ", ".join(f"{value:.2f}" for value in place[np.isfinite(place)]) + ")"
+        for place in found.rivals_m + centre_m
+    ]
+    return SeveralPlacesError(
+        message(
+            "point_at_several_places",
+            "point {name} may stand at {places}, which fit as well: another reading "
+            "is needed, or approximate coordinates (in control.csv, standard "
+            "deviations blank)",
+            name=name,
+            places=either(places),
+        )
+    )
+
+
+def hanging(survey, local, known):
+    """A sentence about points (points,) of a local frame in plan that joins no known ones."""
+    names = [str(survey.points[i]) for i in np.flatnonzero(local & ~known)]
+    some = listed(names, LISTED)
+    common = int((local & known).sum())
+    if common > 1:
+        return message(
+            "either_side",
+            "points {some} may stand on either side of the line through the known ones: give one "
+            "of them approximate coordinates (in control.csv, standard deviations blank)",
+            some=some,
+        )
+    if common == 1:
+        return message(
+            "points_share_one",
+            "points {some} hang together, but share only 1 known point with the rest: 2 are "
+            "needed, or 1 and an azimuth",
+            some=some,
+        )
+    return message(
+        "points_share_few",
+        "points {some} hang together, but share only {common} known points with the rest: 2 are "
+        "needed, or 1 and an azimuth",
+        some=some,
+        common=common,
+    )
+
+
+def one_sentence(parts):
+    """Parts in a row, a semicolon between them."""
+    *first, last = parts
+    if not first:
+        return last
+    before = one_sentence(first)
+    return message("and_also", "{before}; {last}", before=before, last=last)
+
+
+def _no_heights(survey, level):
+    names = listed([str(survey.points[i]) for i in level], LISTED)
+    kinds = (HeightDifferences, VerticalAngles)
+    observed = any(isinstance(one, kinds) and len(one) for one in survey.observations)
+    spatial = any(isinstance(one, Distances) and not one.horizontal for one in survey.observations)
+    why = message(
+        "no_height_observed",
+        "no zenith angle, vertical angle or levelled height difference was observed",
+    )
+    if observed:
+        why = message("heights_hang_free", "they hang on no point with a known z")
+    end = (
+        message(
+            "distances_taken_spatial",
+            "; distances are taken as spatial ones unless kind = horizontal",
+        )
+        if spatial
+        else ""
+    )
+    return message(
+        "heights_not_determined",
+        "the heights (z) of {names} are not determined: {why}; give their z as control{end}",
+        names=names,
+        why=why,
+        end=end,
+    )

@@ -1,0 +1,99 @@
+"""From adjusted targets to points of the wall, with their full covariance."""
+
+import numpy as np
+
+from tankcal.errors import SolutionError
+from tankcal.geometry.circles import taubin_circle
+from tankcal.job.model import Points
+from tankcal.messages import message
+from tankcal.survey.results import Cause
+
+LARGEST = 2500  # points whose full covariance is kept: 7500 x 7500 numbers, 450 MB
+
+
+def wall_points(adjustment, measurements, side):
+    """The job.Points of the wall: adjusted targets less their offsets, covariance, causes.
+
+        wall = target - (+ inside) offset * horizontal normal of the wall, outwards
+
+    adjustment    Adjustment                 measurements  job.Measurements that it is of
+    side          "outside" or "inside": where the observer stood
+
+    With targets.csv these are the points that it names, else all but the stations of set-ups.
+    Raises SolutionError when too many points, or none, are left.
+    """
+    targets = measurements.targets
+    place = {name: i for i, name in enumerate(adjustment.names)}
+    if targets is not None:
+        rows = {name: i for i, name in enumerate(targets.point) if name in place}
+    else:
+        stations = {one.station for one in measurements.setups}
+        rows = dict.fromkeys((name for name in place if name not in stations), None)
+    names = tuple(rows)
+    _refuse_size(len(names))
+    chosen = np.array([place[name] for name in names])
+    xyz = adjustment.xyz_m[chosen]
+    section = generatrix = numbers = (None,) * len(names)
+    if targets is not None:
+        of = list(rows.values())
+        section = tuple(targets.section[i] for i in of)
+        generatrix = tuple(targets.generatrix[i] for i in of)
+        numbers = tuple(targets.rows[i] for i in of) if targets.rows else numbers
+        offset = np.nan_to_num(np.asarray(targets.offset_m, dtype=float)[of])
+        xyz = off_the_wall(xyz, offset if side == "outside" else -offset)
+    covariance = adjustment.full_covariance_m2(names)
+    coordinates = (3 * chosen[:, None] + np.arange(3)).ravel()
+    causes = tuple(
+        Cause(one.name, one.what, one.u, one.unit, one.column_m[coordinates])
+        for one in adjustment.causes
+    )
+    return Points(
+        names=names, xyz_m=xyz, sd_m=None, covariance_m2=covariance, section=section,
+        generatrix=generatrix, rows=numbers, causes=causes, from_adjustment=True,
+    )  # fmt: skip
+
+
+def off_the_wall(xyz_m, outwards_m):
+    """Points (n, 3) moved by -outwards_m (n,) along the horizontal normal, away from the axis.
+
+    The axis is that of the circle through all points in plan (Taubin 1991). It may stand a few
+    centimetres off without changing the result: 0.1 m of 6.5 m turn a normal by 15 mrad, an offset
+    of 10 mm then errs by 1 um.
+    """
+    if not np.any(outwards_m):
+        return xyz_m
+    if len(xyz_m) < 3:
+        raise SolutionError(
+            message(
+                "offsets_of_few",
+                "offsets of targets need 3 points of the wall, {count} were given",
+                count=len(xyz_m),
+            )
+        )
+    middle = xyz_m[:, :2].mean(axis=0)
+    x, y, _ = taubin_circle(xyz_m[:, :2] - middle)
+    away = xyz_m[:, :2] - middle - [x, y]
+    normal = away / np.linalg.norm(away, axis=1, keepdims=True)
+    moved = xyz_m.copy()
+    moved[:, :2] -= outwards_m[:, None] * normal
+    return moved
+
+
+def _refuse_size(n):
+    if not n:
+        raise SolutionError(
+            message(
+                "no_target_adjusted",
+                "no target of targets.csv was adjusted: no point is left for the wall",
+            )
+        )
+    if n > LARGEST:
+        raise SolutionError(
+            message(
+                "wall_too_large",
+                "{n} points of the wall were adjusted; at most {largest} can be taken on with "
+                "their full covariance: name the targets that are to be used in targets.csv",
+                n=n,
+                largest=LARGEST,
+            )
+        )

@@ -1,0 +1,1 @@
+"""The tank: courses, bottoms, heads, solids, capacity, dips, deliveries, rules."""

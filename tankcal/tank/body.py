@@ -1,0 +1,345 @@
+"""A tank as the sum of its parts: shell, head, bottom, deadwood, roof, or one solid.
+
+Every part gives volume, free surface and derivatives below any level; the table is their sum. An
+input that several parts share (a scale, the table's zero) moves all of them at once: it is one
+column of the covariance, the sum of their derivatives times its standard uncertainty.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tankcal.tank.liquid_zone import Above
+from tankcal.tank.volumes import ShellVolume
+from tankcal.uncertainty import Source, declared_source, factor_of, grouped
+
+OWN_SCALE = "instrument_scale"  # kind of a cause that stands for the input "scale"
+MEASURED = ("diameter", "length", "end_depth", "dip_position", "plate_thickness")  # at its warmth
+ROUNDED_M = 0.001  # that the last dip of a table, a whole millimetre, stands above the top at most
+LEVELS = 9  # from empty to full, at which inputs are asked whether they move the volume
+LEAST_SHARE = 1e-6  # rounding of the share that a named cause has in the covariance
+
+
+@dataclass(frozen=True)
+class Factor:
+    """One cause of what a survey leaves uncertain, over what the survey gave.
+
+    kind        "points", "form", "own_form", or what a named cause is ("instrument_scale")
+    columns     (f, c) factor of the covariance of a shell's features or of a solid's inputs
+    dof, u, unit, type, note, contrasts  as in `uncertainty.Source`
+    """
+
+    kind: str
+    columns: np.ndarray
+    dof: float = np.inf
+    u: float | None = None
+    unit: str | None = None
+    type: str = "A"
+    note: str = ""
+    contrasts: float = np.inf
+
+    def source(self, columns_m3):
+        """The `Source` of (rows, c) columns that its own columns make in a table."""
+        return Source(
+            self.kind,
+            columns_m3,
+            self.dof,
+            self.u,
+            self.unit,
+            type=self.type,
+            note=self.note,
+            contrasts=self.contrasts,
+        )
+
+
+def survey_factors(covariance, dof=np.inf, causes=(), effects=()):
+    """`Factor`s of what a survey leaves uncertain: the points, then every named cause.
+
+    covariance  (f, f) of all causes together: the rest L L' + sum of e e' over the effects
+    dof         degrees of freedom of the covariance
+    causes      with name, what, u, unit (`surveys.Cause`); effects: (f,) of one u of each
+
+    With F F' the covariance and e = F a the rest is F (I - A A') F', which is never negative.
+    Raises ValueError for effects that are larger than the covariance.
+    """
+    whole = factor_of(covariance)
+    if len(causes) == 0:
+        return (Factor("points", whole, dof),)
+    shares = whole.T @ np.column_stack(effects) / np.sum(whole**2, axis=0)[:, None]
+    turn, size, _ = np.linalg.svd(shares)
+    if size.max(initial=0.0) > 1 + LEAST_SHARE:
+        raise ValueError("a named cause is larger than the covariance that contains it")
+    left = np.ones(len(turn))
+    left[: len(size)] = np.sqrt(np.maximum(1 - size**2, 0.0))
+    rest = whole @ (turn * left)
+    return (
+        Factor("points", rest[:, left > 0], dof),
+        *(
+            Factor(cause.what, effect[:, None], np.inf, cause.u, cause.unit, "B", cause.name)
+            for cause, effect in zip(causes, effects, strict=True)
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class ShellPart:
+    """The shell of courses as a part; it has nothing below the bottom of its first course.
+
+    volume           inside, at the table's temperature
+    factors          what the survey leaves uncertain about the shell's features: of the points, of
+                     causes that they share, and of the form between them, common to all courses
+                     ("form") or of each course ("own_form")
+    scale            of horizontal lengths, by temperature; expansion_per_k its coefficient
+    stretch          of heights, by temperature; 1 where heights are not corrected
+    bearing          which of the inputs "plate_thickness", "paint", "shell_temperature" and
+                     "expansion" were used
+    tilt             of the axis, m/m
+    """
+
+    volume: ShellVolume
+    factors: tuple[Factor, ...]
+    scale: float
+    expansion_per_k: float
+    stretch: float = 1.0
+    bearing: tuple[str, ...] = ()
+    tilt: float = 0.0
+
+    def volume_m3(self, levels_m):
+        """(rows,) volume of the shell below each level."""
+        return self.volume.volume_m3(np.maximum(levels_m, 0.0))
+
+    def area_m2(self, levels_m):
+        """(rows,) inside area at each level; 0 below the bottom."""
+        return self.volume.area_m2(np.maximum(levels_m, 0.0)) * (np.asarray(levels_m) >= 0)
+
+    def derivatives(self, levels_m):
+        """{input: (rows,)} m3 per SI unit; of "course_heights" (rows, courses), each its own.
+
+        "barrel" is the same in all courses, for in a real tank they had one sign. "scale"
+        multiplies the surveyed lengths square to the axis, "offset" adds to every surveyed radius,
+        "datum" lifts the table's zero. "tilt" leans the shell as surveyed: the horizontal cut is
+        sqrt(1 + m^2) times the one square to the axis.
+        """
+        wet = np.maximum(levels_m, 0.0)
+        features = self.volume.features, self.volume.girth_features, self.volume.scale_features
+        volume, loss, by_scale = self.volume.integrated(wet, np.column_stack(features)).T
+        area = self.area_m2(levels_m)
+        by_length = 2 * volume / self.scale
+        if self.stretch != 1.0:
+            by_length = by_length + (volume - area * wet) / self.stretch
+        of_corrections = {
+            "plate_thickness": -loss,
+            "paint": -loss,
+            "shell_temperature": -self.expansion_per_k * by_length,
+            "expansion": (self.scale - 1) / self.expansion_per_k * by_length,
+        }
+        return {
+            "scale": by_scale,
+            "datum": area,
+            "offset": loss,
+            "barrel": self.volume.by_common_barrel_m2(wet),
+            "course_heights": self.volume.by_course_heights_m2(wet),
+            "tilt": volume * self.tilt / (1 + self.tilt**2),
+            **{name: of_corrections[name] for name in self.bearing},
+        }
+
+    def sources(self, levels_m):
+        """What the survey itself leaves uncertain: the points, and the form between them."""
+        if not self.factors:
+            return ()
+        wet = np.maximum(levels_m, 0.0)
+        columns = self.volume.integrated(wet, np.hstack([one.columns for one in self.factors]))
+        ends = np.cumsum([one.columns.shape[1] for one in self.factors])[:-1]
+        parts = np.split(columns, ends, axis=1)
+        return tuple(one.source(part) for one, part in zip(self.factors, parts, strict=True))
+
+
+@dataclass(frozen=True)
+class SolidPart:
+    """A tank of one solid (lying cylinder, sphere, mesh) at the table's temperature.
+
+    solid            a part whose lengths are at that temperature already
+    scale            of its lengths by temperature; expansion_per_k its coefficient; warmed whether
+                     a temperature was given
+    surveyed         names of the inputs of the solid that a survey of its wall gave; () without one
+    factors          what that survey leaves uncertain about them
+    unused           names of the solid's inputs that have no meaning in this job
+    """
+
+    solid: object
+    scale: float = 1.0
+    expansion_per_k: float = 0.0
+    warmed: bool = False
+    surveyed: tuple[str, ...] = ()
+    factors: tuple[Factor, ...] = ()
+    unused: tuple[str, ...] = ()
+
+    def volume_m3(self, levels_m):
+        """(rows,) volume below each level."""
+        return self.solid.volume_m3(levels_m)
+
+    def area_m2(self, levels_m):
+        """(rows,) derivative of the volume by the level."""
+        return self.solid.area_m2(levels_m)
+
+    def derivatives(self, levels_m):
+        """{input: (rows,)} m3 per SI unit: those of the solid as measured, and its temperature."""
+        found = self.solid.derivatives(levels_m)
+        found |= {name: self.scale * found[name] for name in MEASURED if name in found}
+        if self.warmed:
+            by_length = found["scale"] / self.scale
+            found["shell_temperature"] = -self.expansion_per_k * by_length
+            found["expansion"] = (self.scale - 1) / self.expansion_per_k * by_length
+        if "diameter" in self.surveyed:
+            found["offset"] = 2 * found["diameter"]
+        without = {*self.unused, *self.surveyed}
+        return {name: one for name, one in found.items() if name not in without}
+
+    def sources(self, levels_m):
+        """What the survey of the wall leaves uncertain, beside the solid's own sources."""
+        own = tuple(self.solid.sources(levels_m))
+        if not self.surveyed:
+            return own
+        found = self.solid.derivatives(levels_m)
+        by_survey = np.column_stack([found[name] for name in self.surveyed])
+        return (*(one.source(by_survey @ one.columns) for one in self.factors), *own)
+
+
+@dataclass(frozen=True)
+class Body:
+    """The parts of a tank together.
+
+    declared            inputs with name, u (SI), u_as_read, unit, type, distribution, dof, note,
+                        is_default
+    lowest_m, highest_m levels between which there is a tank, in the frame of the parts
+    kinks_m             levels at which the free surface jumps: joints, edges of what stands or
+                        floats inside
+    correlations        (name, name, r) of declared inputs
+    estimates           {name of an input: its value, in the unit it is declared in}
+    """
+
+    parts: tuple
+    declared: tuple
+    lowest_m: float
+    highest_m: float
+    kinks_m: tuple[float, ...] = ()
+    correlations: tuple = ()
+    estimates: dict = field(default_factory=dict)
+
+    @property
+    def shell(self):
+        """The shell of courses among the parts; None for a tank without."""
+        inner = (getattr(part, "part", part) for part in self.parts)  # above a measured zone
+        return next((part for part in inner if isinstance(part, ShellPart)), None)
+
+    def volume_m3(self, levels_m):
+        """(rows,) volume below each level.
+
+        Above its top, where the last whole millimetre of a dip may stand, the tank goes on as wide
+        as it is there: a closed one not at all. Raises HeightError for levels farther off.
+        """
+        inside = self._inside(levels_m)
+        volume = sum(part.volume_m3(inside) for part in self.parts)
+        over = np.asarray(levels_m, dtype=float) - inside
+        if not np.any(over):
+            return volume
+        top = np.array([self.highest_m])
+        return volume + over * sum(part.area_m2(top) for part in self.parts)
+
+    def area_m2(self, levels_m):
+        """(rows,) derivative of the volume by the level: the free surface."""
+        levels_m = self._inside(levels_m)
+        return sum(part.area_m2(levels_m) for part in self.parts)
+
+    def derivatives(self, levels_m):
+        """{input: (rows,) or (rows, c)} of all parts together, m3 per SI unit."""
+        levels_m = self._inside(levels_m)
+        return summed(part.derivatives(levels_m) for part in self.parts)
+
+    def _inside(self, levels_m):
+        """The levels; the top for those less than a millimetre above it."""
+        levels = np.asarray(levels_m, dtype=float)
+        over = (levels > self.highest_m) & (levels < self.highest_m + ROUNDED_M)
+        return np.where(over, self.highest_m, levels)
+
+    def moved_m3(self, levels_m, step_m):
+        """(rows,) volumes when the table's zero stands step_m higher, a number or (rows,).
+
+        What is declared by dips (deadwood, a roof, volumes measured by liquid) goes with the zero.
+        Never below empty; above the top the tank goes on as wide as it is there.
+        """
+        levels = np.asarray(levels_m, dtype=float)
+        return sum(self._moved(part, levels, step_m) for part in self.parts)
+
+    def _moved(self, part, levels_m, step_m):
+        if "datum" not in part.derivatives(levels_m[:1]):
+            return part.volume_m3(levels_m)
+        if isinstance(part, Above):
+            upper = np.maximum(levels_m, part.level_m)
+            lower = np.full(len(levels_m), part.level_m)
+            return self._moved(part.part, upper, step_m) - self._moved(part.part, lower, step_m)
+        moved = levels_m + step_m
+        inside = np.clip(moved, self.lowest_m, self.highest_m)
+        over = np.maximum(moved - self.highest_m, 0.0)
+        volume = part.volume_m3(inside)
+        if not np.any(over):
+            return volume
+        return volume + over * part.area_m2(np.array([self.highest_m]))[0]
+
+    def undeclared(self):
+        """Names of the inputs that move some volume of the tank and have no declared u.
+
+        The scale of an instrument that was adjusted along stands for the scale of the survey.
+        """
+        moved = self.derivatives(np.linspace(self.lowest_m, self.highest_m, LEVELS))
+        known = {one.name for one in self.declared}
+        factors = [one for part in self.parts for one in getattr(part, "factors", ())]
+        if any(one.kind == OWN_SCALE for one in factors):
+            known.add("scale")
+        return tuple(name for name, by in moved.items() if name not in known and _bears(by))
+
+    def sources(self, levels_m):
+        """One `Source` for each cause of uncertainty: the parts' own, then what was declared."""
+        return self._sources(self._inside(levels_m), self.derivatives(levels_m))
+
+    def rows(self, levels_m):
+        """(volumes, areas, sources) of a table, each as its own method gives it, at one go.
+
+        The derivative by "datum" is that by the level, so it serves as the area, too; not that of
+        a part that counts from a level up, which goes with the zero.
+        """
+        inside = self._inside(levels_m)
+        derivatives = [part.derivatives(inside) for part in self.parts]
+        area = sum(
+            found["datum"]
+            if "datum" in found and not isinstance(part, Above)
+            else part.area_m2(inside)
+            for part, found in zip(self.parts, derivatives, strict=True)
+        )
+        return self.volume_m3(levels_m), area, self._sources(inside, summed(derivatives))
+
+    def _sources(self, levels_m, derivatives):
+        own = [source for part in self.parts for source in part.sources(levels_m)]
+        alone = {
+            one.name: declared_source(one, derivatives[one.name], self.estimates.get(one.name))
+            for one in self.declared
+            if one.name in derivatives
+        }
+        return (*own, *grouped(alone, self.correlations))
+
+
+def _bears(by):
+    """Whether an input moves volumes, by its derivatives (rows,) or (rows, courses).
+
+    The heights of several courses do, even where a nominal tank has equal ones: no real tank has.
+    """
+    return (by.ndim == 2 and by.shape[1] > 1) or bool(np.any(by != 0))
+
+
+def summed(derivatives):
+    """{input: sum} of what several parts give by each input."""
+    total = {}
+    for found in derivatives:
+        for name, by in found.items():
+            total[name] = total[name] + by if name in total else by
+    return total

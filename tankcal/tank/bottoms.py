@@ -1,0 +1,232 @@
+"""What lies between the bottom of a vertical tank and the plane of the bottom of its first course.
+
+Every part here gives the volume that stands on the bottom below a level, less the area times level
+that the shell counts above that plane (level 0),
+
+    V(L) = integral over the plan of (L - z)+ - L+,
+
+so it is positive below the plane and negative where the bottom rises above it. A level L = z counts
+as wet. Where the wall differs from the plan's outline between the plane and the bottom's edge is
+left out: it is the product of two small heights.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.errors import SolutionError
+from tankcal.messages import message
+from tankcal.tank.soundings import surveyed_surface
+from tankcal.tank.terrain import Surface, surface
+from tankcal.uncertainty import Source
+
+FORMS = ("flat", "cone", "dish")
+LEAN_AZIMUTHS = 720  # of the triangles of a leaning plate
+
+
+@dataclass(frozen=True)
+class ShapedBottom:
+    """A level plate, a cone, or a dish that is part of a sphere; its edge lies at level 0.
+
+    Over an outline that is no circle the form is that over a circle, drawn out to the outline along
+    each radius, so areas and volumes depend on the plan's area alone.
+
+    form      "flat", "cone" or "dish"
+    centre_m  level of the centre: above 0 the bottom bulges up, below 0 down
+    plan_m2   inside area of the first course at its bottom
+    """
+
+    form: str
+    centre_m: float
+    plan_m2: float
+
+    @property
+    def lowest_m(self):
+        """Level at which the tank is empty."""
+        return min(self.centre_m, 0.0)
+
+    def volume_m3(self, levels_m):
+        """(rows,) closed form: a cone holds A d^3 / (3 H^2), a dish pi d^2 (R - d / 3).
+
+        d is the depth at the centre, H that of the edge, R the radius of the sphere.
+        """
+        levels, rise = _rows(levels_m), self.centre_m
+        if rise <= 0:
+            return self._tip_m3(np.clip(levels - rise, 0, -rise))
+        return self._tip_m3(rise - np.clip(levels, 0, rise)) - self._tip_m3(rise)
+
+    def area_m2(self, levels_m):
+        """(rows,) derivative of `volume_m3` by the level."""
+        return self._wet_m2(levels_m) - self.plan_m2 * (_rows(levels_m) >= 0)
+
+    def derivatives(self, levels_m):
+        """{input: (rows,)} by "datum" (level), "bottom" and "scale", m3 per SI unit.
+
+        bottom lifts the whole bottom: minus its wetted plan area. scale stretches the plan.
+        """
+        levels, rise = _rows(levels_m), self.centre_m
+        by_scale = 2 * self.volume_m3(levels)
+        if self.form == "dish":
+            sag = np.clip(levels - rise, 0, -rise) if rise < 0 else rise - np.clip(levels, 0, rise)
+            whole = rise if rise > 0 else 0.0
+            by_scale = self._dish_by_scale(sag) - self._dish_by_scale(whole)
+        return {
+            "datum": self.area_m2(levels),
+            "bottom": -self._wet_m2(levels),
+            "scale": by_scale,
+        }
+
+    def sources(self, levels_m):
+        """None of its own."""
+        return ()
+
+    @property
+    def _sphere_m(self):
+        return (self.plan_m2 / np.pi / abs(self.centre_m) + abs(self.centre_m)) / 2
+
+    def _tip_m3(self, depth):
+        """Volume of the cone or dish between its tip and the depth from it."""
+        if self.centre_m == 0:
+            return 0.0 * depth
+        if self.form == "cone":
+            return self.plan_m2 * depth**3 / (3 * self.centre_m**2)
+        return np.pi * depth**2 * (self._sphere_m - depth / 3)
+
+    def _tip_m2(self, depth):
+        if self.form == "cone":
+            return self.plan_m2 * (depth / self.centre_m) ** 2
+        return np.pi * depth * (2 * self._sphere_m - depth)
+
+    def _dish_by_scale(self, depth):
+        return self.plan_m2 / abs(self.centre_m) * depth**2
+
+    def _wet_m2(self, levels_m):
+        levels, rise = _rows(levels_m), self.centre_m
+        if rise == 0:
+            return self.plan_m2 * (levels >= 0)
+        if rise < 0:
+            return self._tip_m2(np.clip(levels - rise, 0, -rise))
+        return (self.plan_m2 - self._tip_m2(rise - np.clip(levels, 0, rise))) * (levels >= 0)
+
+
+def shaped_bottom(form, plan_m2, centre_m=0.0):
+    """`ShapedBottom`; a centre at level 0 makes it flat.
+
+    Raises SolutionError for an unknown form, an area that cannot be, a flat bottom with a centre
+    off the plane, and a dish deeper than half a sphere.
+    """
+    if form not in FORMS:
+        raise SolutionError(f'bottom "{form}"; expected one of {", ".join(FORMS)}')
+    if not (np.isfinite(plan_m2) and plan_m2 > 0 and np.isfinite(centre_m)):
+        raise SolutionError(
+            message(
+                "bottom_impossible",
+                "bottom of {plan_m2:g} m2 with its centre at {centre_m:g} m",
+                plan_m2=plan_m2,
+                centre_m=centre_m,
+            )
+        )
+    if form == "flat" and centre_m != 0:
+        raise SolutionError(
+            message(
+                "flat_bottom_centre",
+                "a flat bottom with its centre at {centre_m:g} m; expected 0",
+                centre_m=centre_m,
+            )
+        )
+    if form == "dish" and abs(centre_m) > np.sqrt(plan_m2 / np.pi):
+        raise SolutionError(
+            message(
+                "dish_too_deep",
+                "a dish {depth_m:g} m deep is more than half a sphere",
+                depth_m=abs(centre_m),
+            )
+        )
+    return ShapedBottom("flat" if centre_m == 0 else form, float(centre_m), float(plan_m2))
+
+
+@dataclass(frozen=True)
+class SurfaceBottom:
+    """A bottom given as a surface of triangles: a leaning plate, or surveyed points.
+
+    surface   over the plan (`terrain.Surface`)
+    survey    `soundings.SurveyedSurface`, or None for a plate of a given slope
+    """
+
+    surface: Surface
+    survey: object = None
+
+    @property
+    def lowest_m(self):
+        """Level at which the tank is empty."""
+        return self.surface.lowest_m
+
+    def volume_m3(self, levels_m):
+        """(rows,) exact for the surface."""
+        volume, _ = self.surface.volume_and_area(_rows(levels_m))
+        return volume - self._plan_m2 * np.maximum(_rows(levels_m), 0)
+
+    def area_m2(self, levels_m):
+        """(rows,) derivative of `volume_m3` by the level."""
+        _, wet = self.surface.volume_and_area(_rows(levels_m))
+        return wet - self._plan_m2 * (_rows(levels_m) >= 0)
+
+    def derivatives(self, levels_m):
+        """{input: (rows,)} by "datum" (level), "bottom" and "scale", m3 per SI unit.
+
+        bottom lifts the whole bottom: minus its wetted plan area. scale stretches the plan; a
+        leaning plate keeps its slope, surveyed points their heights.
+        """
+        levels = _rows(levels_m)
+        volume, wet = self.surface.volume_and_area(levels)
+        by_scale = 2 * (volume - self._plan_m2 * np.maximum(levels, 0))
+        if self.survey is None:
+            by_scale += volume - levels * wet  # minus the integral of z over the wet plan
+        return {
+            "datum": wet - self._plan_m2 * (levels >= 0),
+            "bottom": -wet,
+            "scale": by_scale,
+        }
+
+    def sources(self, levels_m):
+        """Noise of the surveyed points and form between them; none for a leaning plate.
+
+        The covariance is exact at the edges of 24 bands of wet area; within a band it grows with
+        the wet area.
+        """
+        if self.survey is None:
+            return ()
+        edges = np.append(self.surface.lowest_m, self.survey.edges_m)
+        _, at_edges = self.surface.volume_and_area(edges)
+        at_edges[0] = 0.0
+        _, wet = self.surface.volume_and_area(_rows(levels_m))
+        share = np.column_stack([np.interp(wet, at_edges, unit) for unit in np.eye(len(edges))[1:]])
+        return (
+            Source("bottom_points", share @ self.survey.noise_m3, self.survey.noise_dof),
+            Source("bottom_form", share @ self.survey.form_m3, self.survey.form_dof),
+        )
+
+    @property
+    def _plan_m2(self):
+        return self.surface.areas_m2.sum()
+
+
+def leaning_bottom(footprint, slope):
+    """A plate square to the shell's axis of slope (dx/dz, dy/dz), through level 0 at the axis.
+
+    Slid along the axis to the plane of level 0, its point at the distance x down the lean lies at
+    z = - m x / (1 + m^2).
+    """
+    slope = np.asarray(slope, dtype=float)
+    plan, faces = footprint.mesh(1, LEAN_AZIMUTHS)
+    return SurfaceBottom(surface(plan, faces, -plan @ slope / (1 + slope @ slope)))
+
+
+def surveyed_bottom(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0)):
+    """The bottom through surveyed points; arguments and errors of `soundings.surveyed_surface`."""
+    survey = surveyed_surface(footprint, xyz_m, sd_m, slope)
+    return SurfaceBottom(survey.surface, survey)
+
+
+def _rows(levels_m):
+    return np.atleast_1d(np.asarray(levels_m, dtype=float))

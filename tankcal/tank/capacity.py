@@ -1,0 +1,178 @@
+"""The capacity table: volumes at dip heights with a factor of their covariance, and what follows.
+
+The covariance of all rows is factor @ factor.T with one column for each uncertain input, so rows,
+differences of rows (deliveries) and the budget all come from the same few columns.
+Source: JCGM 100:2008 5.2, JCGM 102:2011 6.2; u, degrees of freedom and k by `uncertainty.Combined`.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+
+import numpy as np
+
+from tankcal.errors import HeightError
+from tankcal.messages import message
+from tankcal.text.display import volume_text
+from tankcal.uncertainty import Source, combined
+
+SAME_ROW = 1e-9  # of a weight: a dip this near to a row is that row
+SAME_M = 1e-9  # dips nearer than this are the same
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A volume with its uncertainty: value, standard u, effective dof, factor k, expanded U.
+
+    k         None where U is not k u but Monte Carlo's
+    for_use   False where a dip stands in a zone in which the table must not be used
+    interval  whose U is: "gum", "monte_carlo"; "gum_not_simulated" of a delivery that Monte Carlo
+              did not look at, though it looked at the table
+    ends_m3   (low, high) of Monte Carlo's interval; None: value - U and value + U
+    """
+
+    value_m3: float
+    u_m3: float
+    dof: float
+    k: float | None
+    U_m3: float
+    for_use: bool = True
+    interval: str = "gum"
+    ends_m3: tuple[float, float] | None = None
+
+    @property
+    def low_m3(self) -> float:
+        """Lower end of the interval."""
+        return self.value_m3 - self.U_m3 if self.ends_m3 is None else self.ends_m3[0]
+
+    @property
+    def high_m3(self) -> float:
+        """Upper end of the interval."""
+        return self.value_m3 + self.U_m3 if self.ends_m3 is None else self.ends_m3[1]
+
+    def __str__(self) -> str:
+        return volume_text(self.value_m3, self.U_m3, self.k)
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(str(self))}{'' if self.for_use else ', not for use'}</p>"
+
+
+@dataclass(frozen=True, repr=False)
+class Capacity:
+    """The table: (rows,) dip heights from the table's zero, volumes, and areas of the cut.
+
+    critical_m  (low, high) dips between which the table is not for use, or None: a floating roof
+                that is partly afloat
+    """
+
+    height_m: np.ndarray
+    volume_m3: np.ndarray
+    area_m2: np.ndarray
+    sources: tuple[Source, ...]
+    probability: float
+    critical_m: tuple[float, float] | None = None
+
+    def __repr__(self) -> str:
+        top_m = self.height_m[-1]
+        return f"<Capacity of {len(self.height_m)} rows to {top_m:g} m: {self.at(top_m)}>"
+
+    @cached_property
+    def factor_m3(self):
+        """(rows, inputs) factor of the covariance of all rows."""
+        return np.hstack([np.empty((len(self.height_m), 0)), *(s.columns_m3 for s in self.sources)])
+
+    @cached_property
+    def u_m3(self):
+        """(rows,) standard uncertainty of each volume."""
+        return self._combined_rows.u
+
+    @cached_property
+    def dof(self):
+        """(rows,) effective degrees of freedom, inf where only such inputs contribute."""
+        return self._combined_rows.effective_dof
+
+    @cached_property
+    def k(self):
+        """(rows,) coverage factor."""
+        return self._combined_rows.k(self.probability)
+
+    @cached_property
+    def U_m3(self):
+        """(rows,) expanded uncertainty k u."""
+        return self.k * self.u_m3
+
+    @cached_property
+    def _combined_rows(self):
+        """`uncertainty.Combined` of all rows."""
+        return combined(self.sources, len(self.height_m))
+
+    def at(self, height_m):
+        """The volume at a dip, interpolated linearly between rows as a gauge does.
+
+        The top of the shell rounded to a millimetre counts as the top. Raises HeightError outside
+        the table.
+        """
+        return self._combined([(height_m, 1.0)])
+
+    def delivery(self, low_m, high_m):
+        """The volume between two dips; what both have in common cancels.
+
+        Raises HeightError outside the table.
+        """
+        return self._combined([(high_m, 1.0), (low_m, -1.0)])
+
+    def for_use(self, height_m):
+        """Whether the table may be used at each height: not inside the critical zone of a roof."""
+        height_m = np.asarray(height_m, dtype=float)
+        if self.critical_m is None:
+            return np.full(height_m.shape, True)
+        low, high = self.critical_m
+        return (height_m <= low) | (height_m >= high)
+
+    def _combined(self, terms):
+        weights = sum(sign * self.weights([height])[0] for height, sign in terms)
+        found = combined([source.weighted(weights[None, :]) for source in self.sources], 1)
+        u, dof = float(found.u[0]), float(found.effective_dof[0])
+        k = float(found.k(self.probability)[0])
+        for_use = bool(np.all(self.for_use([height for height, _ in terms])))
+        return Quantity(float(weights @ self.volume_m3), u, dof, k, k * u, for_use)
+
+    def inside(self, heights_m):
+        """(n,) dips of the table: its ends for those that are beyond them by rounding.
+
+        The top of the shell rounded to a millimetre counts as the top. Raises HeightError for
+        others outside.
+        """
+        dips = np.atleast_1d(np.asarray(heights_m, dtype=float))
+        first, last = self.height_m[0], self.height_m[-1]
+        outside = ~((dips >= first - SAME_M) & (dips <= max(round(last, 3), last + SAME_M)))
+        if np.any(outside):
+            raise HeightError(
+                message(
+                    "dip_outside_table",
+                    "dip {dip_m:g} m is outside the capacity table ({first_m:g} to {last_m:g} m)",
+                    dip_m=dips[outside][0],
+                    first_m=first,
+                    last_m=last,
+                )
+            )
+        return np.clip(dips, first, last)
+
+    def weights(self, heights_m):
+        """(n, rows) by which the rows give the volumes at n dips: linear between two rows.
+
+        The top of the shell rounded to a millimetre counts as the top. Raises HeightError outside
+        the table.
+        """
+        dips = self.inside(heights_m)
+        upper = np.clip(np.searchsorted(self.height_m, dips), 1, len(self.height_m) - 1)
+        below, above = self.height_m[upper - 1], self.height_m[upper]
+        part = (dips - below) / (above - below)
+        weights = np.zeros((len(dips), len(self.height_m)))
+        row = np.arange(len(dips))
+        weights[row, upper - 1], weights[row, upper] = 1 - part, part
+        return weights
+
+    def rows_of(self, height_m):
+        """Numbers of the rows that a dip is read from: its own, or the two that it lies between."""
+        return np.flatnonzero(self.weights([height_m])[0] > SAME_ROW)

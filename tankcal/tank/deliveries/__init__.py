@@ -1,0 +1,29 @@
+"""Deliveries: the uncertainty of V(h2) - V(h1), and the worst one of at least a given height.
+
+u(h1, h2) = |f(h2) - f(h1)| with f(h) the row of the factor at a dip, linear between rows; what
+both dips share cancels. U = k u with k from Welch-Satterthwaite for each delivery by itself.
+The worst case is found by ruling out whole blocks of rows at once; no matrix of rows by rows is
+ever made.
+
+Sources: JCGM 100:2008 5.2, G.4; JCGM 102:2011 6.2.
+"""
+
+from tankcal.tank.deliveries.pairs import Deliveries, deliveries, ratio_of
+from tankcal.tank.deliveries.worst import (
+    TOLERANCE,
+    Delivery,
+    WorstDeliveries,
+    least_delivery_m,
+    worst_deliveries,
+)
+
+__all__ = [
+    "TOLERANCE",
+    "Deliveries",
+    "Delivery",
+    "WorstDeliveries",
+    "deliveries",
+    "least_delivery_m",
+    "ratio_of",
+    "worst_deliveries",
+]

@@ -1,0 +1,205 @@
+"""The worst delivery of at least a given height, over all dips and not only over rows.
+
+Between four neighbouring rows f and V are linear in the two dips, so u is convex there and u/V
+quasi-convex: their maxima lie at the corners of that cell or, where the line h2 - h1 = minimum
+cuts it, at the ends of the cut. So the worst delivery has both dips at rows, or is exactly of the
+minimum height with one dip at a row. With finite degrees of freedom k changes within a cell; what
+that can do is in the bounds.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.tank.capacity import SAME_M
+from tankcal.tank.deliveries.blocks import Search, bounds_of, kids_of, levels_of
+from tankcal.tank.deliveries.pairs import CHUNK, Groups, Rows, between
+from tankcal.text.display import volume_text
+
+TOLERANCE = 1e-6  # relative: the worst delivery is found to this part of itself
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """One delivery: dips (m), volume, standard and expanded uncertainty (m3), dof, k, U/volume."""
+
+    low_m: float
+    high_m: float
+    volume_m3: float
+    u_m3: float
+    dof: float
+    k: float
+    U_m3: float
+    relative: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.low_m:g} to {self.high_m:g} m: {volume_text(self.volume_m3, self.U_m3, self.k)}"
+        )
+
+
+@dataclass(frozen=True)
+class WorstDeliveries:
+    """The worst of all deliveries of at least `minimum_m` whose dips are for use.
+
+    absolute, relative  the Delivery with the largest U, and the one with the largest U/volume
+    at_minimum          the one with the largest U/volume of those of exactly minimum_m; None: only
+                        higher ones are for use
+    U_bound_m3          no delivery between any two dips has a larger U
+    relative_bound      nor a larger U/volume than this
+    """
+
+    minimum_m: float
+    absolute: Delivery
+    relative: Delivery
+    at_minimum: Delivery | None
+    U_bound_m3: float
+    relative_bound: float
+
+
+def worst_deliveries(table, minimum_m):
+    """WorstDeliveries of a Capacity for a minimum delivery height (m), or None.
+
+    max of U and of U/V over all dips with h2 - h1 >= minimum_m. None where the table has no such
+    delivery: lower than the minimum, or cut by the critical zone of its roof.
+    Raises ValueError for a minimum that is not above 0.
+    """
+    if not minimum_m > 0:
+        raise ValueError(f"minimum delivery height {minimum_m}: expected above 0")
+    prepared = _prepared(table)
+    found = [_search(prepared, float(minimum_m), is_relative) for is_relative in (False, True)]
+    if found[0] is None:
+        return None
+    (absolute, U_bound), (relative, relative_bound) = found
+    dips = _best_at_minimum(prepared.searching(float(minimum_m), True))[1]
+    return WorstDeliveries(
+        minimum_m=float(minimum_m),
+        absolute=absolute,
+        relative=relative,
+        at_minimum=None if dips is None else _delivery(prepared, dips),
+        U_bound_m3=U_bound,
+        relative_bound=relative_bound,
+    )
+
+
+def least_delivery_m(table, limit, is_relative=True):
+    """Least delivery height (m, whole millimetres) from which on all deliveries keep a limit.
+
+    limit  of U/V, or of U in m3 when not is_relative
+    The worst of all deliveries of at least a height falls with that height, so halving finds it.
+    None where even the largest delivery breaks the limit.
+    """
+    prepared = _prepared(table)
+    heights = prepared.rows.height_m
+    low, high = 0, int((np.ptp(heights) + SAME_M) * 1000) if len(heights) else 0
+    while low < high:
+        middle = (low + high) // 2
+        found = _search(prepared, max(middle, 1) / 1000, is_relative)
+        if found is None or _size_of(found[0], is_relative) <= limit:
+            high = middle
+        else:
+            low = middle + 1
+    height_m = max(high, 1) / 1000
+    found = _search(prepared, height_m, is_relative) if len(heights) else None
+    return height_m if found and _size_of(found[0], is_relative) <= limit else None
+
+
+def _size_of(delivery, is_relative):
+    return delivery.relative if is_relative else delivery.U_m3
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    """Rows for use, the first row of each piece between critical zones, and their blocks."""
+
+    rows: Rows
+    pieces: list
+    levels: list
+    probability: float
+
+    def searching(self, minimum_m, is_relative):
+        return Search(self.rows, self.pieces, self.levels, self.probability, minimum_m, is_relative)
+
+
+def _prepared(table):
+    rows, pieces = _rows_for_use(table)
+    levels = levels_of(rows, pieces) if len(rows.height_m) else []
+    return _Prepared(rows, pieces, levels, table.probability)
+
+
+def _search(prepared, minimum_m, is_relative):
+    """(Delivery, bound) with the largest U/V, or U, or None where there is no delivery."""
+    rows = prepared.rows
+    if not len(rows.height_m) or np.ptp(rows.height_m) < minimum_m - SAME_M:
+        return None
+    search = prepared.searching(minimum_m, is_relative)
+    best, dips, bound = _largest(search, *_best_at_minimum(search))
+    if dips is None:
+        return None
+    return _delivery(prepared, dips), float(max(bound, best * (1 + TOLERANCE)))
+
+
+def _delivery(prepared, dips):
+    pair = np.array(dips)[:, None]
+    found = between(prepared.rows, prepared.probability, *pair, np.array([True]))
+    values = (found.low_m, found.high_m, found.volume_m3, found.u_m3, found.dof, found.k)
+    return Delivery(*(float(value[0]) for value in (*values, found.U_m3, found.relative)))
+
+
+def _largest(search, best, dips):
+    """(largest size, its dips or None, bound of what could be larger): branch and bound."""
+    bound = 0.0
+    top = len(search.levels) - 1
+    blocks = np.arange(len(search.levels[top].first))
+    stack = [(top, *(side.ravel() for side in np.meshgrid(blocks, blocks, indexing="ij")))]
+    while stack:
+        level, low, high = stack.pop()
+        if len(low) > CHUNK:
+            stack.append((level, low[CHUNK:], high[CHUNK:]))
+            low, high = low[:CHUNK], high[:CHUNK]
+        bounds, reached, pair = bounds_of(search, search.levels[level], low, high)
+        if reached > best:
+            best, dips = reached, pair
+        is_open = (bounds >= 0) & (bounds > best * (1 + TOLERANCE))
+        if level == 0:
+            bound = max(bound, bounds[is_open].max(initial=0.0))
+        elif np.any(is_open):
+            stack.append((level - 1, *kids_of(search.levels[level], low[is_open], high[is_open])))
+    return best, dips, bound
+
+
+def _rows_for_use(table):
+    """(Rows, pieces): rows outside the critical zone with its ends as rows; first row of each."""
+    rows = Rows(table.height_m, table.volume_m3, table.factor_m3, Groups(table.sources))
+    critical = table.critical_m
+    if critical is None or critical[1] - critical[0] <= SAME_M or len(table.height_m) < 2:
+        return rows, [0]
+    heights = table.height_m
+    ends = np.array(critical, dtype=float)
+    inside = (ends > heights[0]) & (ends < heights[-1])
+    new = [end for end in ends[inside] if np.abs(heights - end).min() > SAME_M]
+    heights = np.sort(np.append(heights, new))
+    low, high = ends
+    heights = heights[(heights <= low + SAME_M) | (heights >= high - SAME_M)]
+    volume, factor = rows.at(heights)
+    above = int(np.searchsorted(heights, (low + high) / 2))
+    pieces = [0, above] if 0 < above < len(heights) else [0]
+    return Rows(heights, volume, factor, rows.groups), pieces
+
+
+def _best_at_minimum(search):
+    """(size, dips) of the worst delivery of exactly the minimum height with one dip at a row."""
+    rows, minimum_m = search.rows, search.minimum_m
+    low = np.concatenate([rows.height_m, rows.height_m - minimum_m])
+    high = np.concatenate([rows.height_m + minimum_m, rows.height_m])
+    keep = (low >= rows.height_m[0] - SAME_M) & (high <= rows.height_m[-1] + SAME_M)
+    for start in search.pieces[1:]:
+        gap = rows.height_m[start - 1] + SAME_M, rows.height_m[start] - SAME_M
+        keep &= ~((low > gap[0]) & (low < gap[1])) & ~((high > gap[0]) & (high < gap[1]))
+    if not np.any(keep):
+        return -1.0, None
+    low, high = np.clip([low[keep], high[keep]], rows.height_m[0], rows.height_m[-1])
+    found = between(rows, search.probability, low, high, np.full(len(low), True))
+    sizes = search.size(found.U_m3, found.volume_m3)
+    place = int(np.argmax(sizes))
+    return sizes[place], (low[place], high[place])

@@ -1,0 +1,54 @@
+"""Dips: the rows of a table, their labels and units, what lies between them, and the way back.
+
+units         volumes in m3, L and bbl; dips in metres or in feet and inches, as numbers and text
+rows          heights of the rows, rounding
+parts         proportional parts: what the millimetres of a dip add to a row
+straightness  how far straight lines between rows are from the exact volume; the step that this asks
+reading       ullage, and the dip of a volume
+"""
+
+from tankcal.tank.dips.parts import ProportionalParts, proportional_parts
+from tankcal.tank.dips.reading import Dips, dips_of, ullage_m
+from tankcal.tank.dips.rows import MOST_ROWS, rounded, table_heights, whole_top
+from tankcal.tank.dips.straightness import (
+    LADDERS_M,
+    Rows,
+    Straightness,
+    choose_rows,
+    interpolation_errors,
+)
+from tankcal.tank.dips.units import (
+    HEIGHT_STEPS_M,
+    METRES_PER_INCH,
+    TABLE_DECIMALS,
+    VOLUME_UNITS_M3,
+    dip_label,
+    parse_dip,
+    volume_from_m3,
+    volume_to_m3,
+)
+
+__all__ = [
+    "HEIGHT_STEPS_M",
+    "LADDERS_M",
+    "METRES_PER_INCH",
+    "MOST_ROWS",
+    "TABLE_DECIMALS",
+    "VOLUME_UNITS_M3",
+    "Dips",
+    "ProportionalParts",
+    "Rows",
+    "Straightness",
+    "choose_rows",
+    "dip_label",
+    "dips_of",
+    "interpolation_errors",
+    "parse_dip",
+    "proportional_parts",
+    "rounded",
+    "table_heights",
+    "ullage_m",
+    "volume_from_m3",
+    "volume_to_m3",
+    "whole_top",
+]

@@ -1,0 +1,134 @@
+"""Rows of a table: their heights and their rounding.
+
+Dips are metres above the table's zero. Every row is computed from its own number, n * step, and
+rounded from its own exact volume: nothing is added up row by row.
+"""
+
+import numpy as np
+
+from tankcal.errors import HeightError, InputError, Problem
+from tankcal.messages import message
+from tankcal.tank.dips.units import HEIGHT_STEPS_M
+
+MOST_ROWS = 25_000
+_PER_METRE = 1_000_000_000  # steps and rows are whole nanometres, so that rows are exact decimals
+_LAST_STEP_M = 1e-6
+NEAR_MARK_M = 0.0005
+
+
+def table_heights(step_m, top_m, fine_step_m=None, fine_zones=()):
+    """(rows,) dips at 0, step, 2 step, ... and the top itself, m; each once, ascending.
+
+    step_m       row n is the number nearest to n * step
+    top_m        last row; a last step under a micron is dropped
+    fine_step_m  step of the rows from the one at or below `low` to the one at or above `high` of
+                 each (low_m, high_m) of `fine_zones`; a whole part of step_m
+    Raises InputError for steps that do not fit, and for more than MOST_ROWS rows; HeightError for
+    a zone outside the table.
+    """
+    _check_steps(step_m, top_m, fine_step_m, fine_zones)
+    pieces = [multiples_of(step_m, 0, int(np.floor(top_m / step_m + 1e-9)))]
+    for low_m, high_m in fine_zones:
+        first = int(np.floor(low_m / fine_step_m + 1e-9))
+        last = int(np.ceil(min(high_m, top_m) / fine_step_m - 1e-9))
+        pieces.append(multiples_of(fine_step_m, first, last))
+    heights = np.unique(np.concatenate(pieces))
+    heights = heights[heights <= top_m + 2e-9 * step_m]
+    if top_m - heights[-1] > _LAST_STEP_M:
+        heights = np.append(heights, top_m)
+    else:
+        heights[-1] = min(heights[-1], top_m)
+    return heights
+
+
+def whole_top(top_m, height_unit="m", *, closed=False):
+    """Dip of the last row of a table, m: a mark of the tape that stands for the top of the tank.
+
+    An open shell ends at the nearest whole millimetre, for 9.49996 m (9.5 m that lean) is 9.5 m
+    to everybody who measures it; a tank that closes at its top is full from the next one on. In
+    feet and inches the top is a mark when it is within half a millimetre of it, else as it is.
+
+    top_m  dip of the full tank; closed  whether it has no free surface there
+    """
+    step = float(HEIGHT_STEPS_M[height_unit])
+    if height_unit == "m" and closed:
+        number = np.ceil(top_m / step - _LAST_STEP_M / step)
+    else:
+        number = np.round(top_m / step)
+    mark = float(multiples_of(step, number, number)[0])
+    on_a_mark = height_unit == "m" or abs(mark - top_m) <= NEAR_MARK_M
+    return mark if number > 0 and on_a_mark else float(top_m)
+
+
+def multiples_of(step_m, first, last):
+    """first * step, ..., last * step, each the nearest number to the exact product."""
+    numbers = np.arange(first, last + 1, dtype=float)
+    step = step_m * _PER_METRE
+    if abs(step - round(step)) < 1e-3:
+        return numbers * round(step) / _PER_METRE  # exact integer product, one rounding
+    return np.round(numbers * step_m, 9)
+
+
+def _check_steps(step_m, top_m, fine_step_m, fine_zones):
+    if not step_m > 0 or not top_m > 0:
+        raise InputError(
+            Problem(
+                "table",
+                message(
+                    "steps_above_zero",
+                    "step {step_m:g} m, top {top_m:g} m; expected above 0",
+                    step_m=step_m,
+                    top_m=top_m,
+                ),
+                None,
+                "step",
+            )
+        )
+    count = top_m / step_m
+    if fine_zones:
+        ratio = step_m / (fine_step_m or np.inf)
+        if not ratio > 1.5 or abs(ratio - round(ratio)) > 1e-6:
+            found = "no fine step" if fine_step_m is None else f"{fine_step_m:g} m"
+            raise InputError(
+                Problem(
+                    "table",
+                    f"{found}; expected a whole part of the step of {step_m:g} m",
+                    None,
+                    "fine_step_m",
+                )
+            )
+        for low_m, high_m in fine_zones:
+            if not 0 <= low_m < high_m or low_m >= top_m:
+                raise HeightError(
+                    message(
+                        "fine_zone_outside",
+                        "fine zone {low_m:g} to {high_m:g} m is outside the table (0 to "
+                        "{top_m:g} m)",
+                        low_m=low_m,
+                        high_m=high_m,
+                        top_m=top_m,
+                    )
+                )
+            count += (min(high_m, top_m) - low_m) / fine_step_m
+    if count > MOST_ROWS:
+        raise InputError(
+            Problem(
+                "table",
+                message(
+                    "table_rows_too_many",
+                    "{rows:.0f} rows, expected at most {most}",
+                    rows=count,
+                    most=MOST_ROWS,
+                ),
+                None,
+                "step_m",
+            )
+        )
+
+
+def rounded(values, decimals):
+    """(rows,) each value rounded by itself, once, to the nearest decimal (a tie to the even one).
+
+    Correct for the number as stored: 2.675, which is stored a little below, gives 2.67.
+    """
+    return np.array([round(float(value), decimals) for value in values])

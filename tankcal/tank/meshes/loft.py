@@ -1,0 +1,92 @@
+"""A mesh lofted from the outlines of a shell: an independent proof of its volume, and a picture."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from tankcal.geometry.outlines import FULL_TURN
+from tankcal.quadrature import height_basis
+from tankcal.tank.meshes.checks import closed_mesh
+
+
+@dataclass(frozen=True)
+class Band:
+    """Rings of the wall from one joint to the next: k heights, q even azimuths from north.
+
+    heights_m  (k,) ascending, the first and the last at the joints
+    radii_m    (k, q) inside radii about the centre of their ring
+    centre_m   (k, 2) x and y of the centres
+    """
+
+    heights_m: np.ndarray
+    radii_m: np.ndarray
+    centre_m: np.ndarray
+
+
+def shell_bands(volume, levels_m, outlines, *, insets_m=None, scale=1.0, slices=8, azimuths=720):
+    """The bands of a shell, one a course, from what its volume was integrated from.
+
+    volume    `tankcal.tank.volumes.ShellVolume`
+    levels_m, outlines, insets_m, scale
+              as given to `course_shape`, all but the scale for each course
+    slices    of a course; azimuths of a ring
+    """
+    azimuth = np.arange(azimuths) * FULL_TURN / azimuths
+    bands = []
+    parts = zip(volume.courses, levels_m, outlines, strict=True)
+    for index, (course, levels, own) in enumerate(parts):
+        heights = np.linspace(course.bottom_m, course.top_m, slices + 1)
+        basis = height_basis(levels, heights, course.degree)
+        inset = insets_m[index] if insets_m else 0.0
+        radii = np.array([scale * (outline.radius_m(azimuth) - inset) for outline in own])
+        centres = np.array([(outline.x_m, outline.y_m) for outline in own])
+        bands.append(Band(heights, basis @ radii, basis @ centres))
+    return tuple(bands)
+
+
+def loft(bands):
+    """A closed mesh over bands from the bottom up, with a level bottom and lid.
+
+    Neighbouring rings are joined by two triangles an azimuth; a step at a joint is such a strip
+    too, a level one. The mesh falls short of the smooth shape by the square of the spacing.
+
+    bands  of one number of azimuths; each begins at the height where the one below it ends
+    Raises ValueError for bands that do not fit, InputError as `closed_mesh` does.
+    """
+    joints = [(below.heights_m[-1], above.heights_m[0]) for below, above in pairwise(bands)]
+    if any(low != high for low, high in joints):
+        raise ValueError(f"joints at {joints}; expected each band to begin where the last one ends")
+    count = bands[0].radii_m.shape[1]
+    azimuth = np.arange(count) * FULL_TURN / count
+    turn = np.column_stack([np.sin(azimuth), np.cos(azimuth)])
+    rings = []
+    for band in bands:
+        xy = band.centre_m[:, None] + band.radii_m[:, :, None] * turn
+        z = np.broadcast_to(band.heights_m[:, None, None], (*xy.shape[:2], 1))
+        rings.append(np.concatenate([xy, z], axis=2).reshape(-1, 3))
+    wall = np.concatenate(rings)
+    ends = np.array(
+        [
+            [*bands[0].centre_m[0], bands[0].heights_m[0]],
+            [*bands[-1].centre_m[-1], bands[-1].heights_m[-1]],
+        ]
+    )
+    return closed_mesh(np.concatenate([wall, ends]), _lofted_faces(len(wall), count), name="loft")
+
+
+def _lofted_faces(vertices, count):
+    """(m, 3) faces of `vertices` in rings of `count`, then the centres of bottom and lid."""
+    here = np.arange(count)
+    following = np.roll(here, -1)
+    strips = np.arange(0, vertices - count, count)[:, None, None]
+    side = np.concatenate(
+        [
+            np.column_stack([here, here + count, following]),
+            np.column_stack([following, here + count, following + count]),
+        ]
+    )
+    top = vertices - count
+    bottom = np.column_stack([here, following, np.full(count, vertices)])
+    lid = np.column_stack([following + top, here + top, np.full(count, vertices + 1)])
+    return np.concatenate([(strips + side).reshape(-1, 3), bottom, lid])

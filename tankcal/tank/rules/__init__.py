@@ -1,0 +1,22 @@
+"""Decision rules, per jurisdiction, and their verdicts on a capacity table."""
+
+from tankcal.tank.rules.deviation import DeviationVerdict, StatedVolume, conformity_probability
+from tankcal.tank.rules.expanded import UncertaintyVerdict
+from tankcal.tank.rules.model import TANKS, DeviationLimit, Rule, UncertaintyLimit
+from tankcal.tank.rules.printed import Printed
+from tankcal.tank.rules.verdict import RuleVerdict, deliveries_judged, judge
+
+__all__ = [
+    "TANKS",
+    "DeviationLimit",
+    "DeviationVerdict",
+    "Printed",
+    "Rule",
+    "RuleVerdict",
+    "StatedVolume",
+    "UncertaintyLimit",
+    "UncertaintyVerdict",
+    "conformity_probability",
+    "deliveries_judged",
+    "judge",
+]

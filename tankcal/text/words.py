@@ -1,0 +1,329 @@
+"""Codes of the record as sentences, in the reader's language (report_templates/words/)."""
+
+from numbers import Integral, Number
+
+from tankcal.errors import SHEET
+from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
+from tankcal.job.form_words import word_of
+from tankcal.messages import as_plain, filled
+from tankcal.text.digits import NOTHING, Marks, fixed, shortest
+from tankcal.text.languages import DEFAULT
+from tankcal.text.word_files import load_words as load_words  # the door to words of every kind
+
+
+def language_of(record):
+    """The language that the job of a record asks for."""
+    table = record["job"]["table"] or {}  # a survey alone has none
+    return table.get("language") or DEFAULT
+
+
+def marks_of(words):
+    """What stands between the digits of numbers in this language (digits.Marks)."""
+    return Marks(**words["language"]["marks"])
+
+
+def sentence(words, group, code, value=None):
+    """What `code` (with `value`) of the record says, as a sentence of `words[group]`.
+
+    A template may use {value}: a list comes as its items joined by ", ", a number with up to six
+    digits. A table of templates is looked up by the value as text, then "none" for null or an empty
+    list, then "other". A code or value without words comes back as "code: value", for an assumption
+    is never hidden.
+    """
+    if isinstance(value, list | tuple):
+        value = ", ".join(str(item) for item in value) or None
+    shown = shortest(value, marks_of(words)) if isinstance(value, float) else value
+    template = words.get(group, {}).get(code)
+    if isinstance(template, dict):
+        key = "none" if value is None else str(value)
+        template = template.get(key, template.get("other"))
+    if template is None:
+        return code if value is None else f"{code}: {value}"
+    return template.format(value=shown)
+
+
+def choice_sentence(words, choice):
+    """One choice {code, value} of the record as a sentence, its numbers in the reader's style."""
+    code, value = choice["code"], choice["value"]
+    if code == "coverage":
+        value = percent(words, value)
+    elif isinstance(value, int | float):
+        digits = 6 if code in _DECLARED else 3
+        value = shortest(value, marks_of(words), digits=digits)
+    elif isinstance(value, list):
+        value = [words["inputs"].get(name, name) for name in value]
+    return sentence(words, "choices", code, value)
+
+
+# ---- texts that the record has in English, with a code and the values in them
+
+MESSAGES = ("warnings", "formulas", "datum", "problems")  # groups of their templates
+
+
+def message_sentence(words, text, code, values):
+    """A text of the record in the reader's language; as it is where its code has no words."""
+    template = next((words[one][code] for one in MESSAGES if code in words.get(one, {})), None)
+    if template is None:
+        return text
+    named = {key: _named(words, key, value) for key, value in values.items()}
+    return filled(
+        template,
+        named,
+        number=lambda value, form: _number(value, form, marks_of(words)),
+        said=lambda one: message_sentence(words, one["text"], one["code"], one["values"]),
+    )
+
+
+def said(words, text):
+    """A text in the reader's language, if it is a Message; any other text as it is."""
+    known = as_plain(text)
+    return message_sentence(words, str(text), known["code"], known["values"])
+
+
+def in_language(words, record):
+    """A record whose texts are in the reader's language, as far as it says them by a code."""
+    adjustment, corrections = record["adjustment"], record["corrections"]
+    return {
+        **record,
+        "warnings": [_placed(words, _said(words, one, "text")) for one in record["warnings"]],
+        "corrections": [_said(words, one, "formula", "formula_") for one in corrections],
+        "adjustment": adjustment and _adjustment_in_language(words, adjustment),
+        "rule": record.get("rule") and _rule_in_language(words, record),
+    }
+
+
+def _adjustment_in_language(words, adjustment):
+    left_out = [_said(words, one, "text") for one in adjustment.get("left_out", [])]
+    return {
+        **adjustment,
+        "datum": _said(words, adjustment["datum"], "words", "words_"),
+        "aside": [one["text"] for one in left_out] or adjustment["aside"],
+    }
+
+
+def _rule_in_language(words, record):
+    """The verdict with the texts of a shipped rule; those of a laboratory's own file stay."""
+    rule, texts = record["rule"], words.get("rule_texts", {})
+    return {**rule, "rule": {**rule["rule"], **texts.get(record["job"]["table"]["rule"], {})}}
+
+
+def _said(words, row, key, of=""):
+    """A row of the record with the text in `key`; one of an older record has no code."""
+    code, values = row.get(f"{of}code"), row.get(f"{of}values", {})
+    return {**row, key: message_sentence(words, row[key], code, values)}
+
+
+def _placed(words, row):
+    """A row of the record whose sheet is named in the reader's language."""
+    if not row["file"].startswith(SHEET):
+        return row
+    sheet = row["file"].removeprefix(SHEET)
+    text = message_sentence(words, row["file"], "in_sheet", {"sheet": sheet})
+    return {**row, "file": text}
+
+
+def _number(value, form, marks):
+    """A number in a form of Python, ".1f", ".3g", "+g" or "" for a count, with these marks."""
+    if value is not None and not isinstance(value, Number):
+        return str(value)
+    if not form and not isinstance(value, Integral):
+        return shortest(value, marks, digits=12)
+    sign = "+" if form.startswith("+") and value > 0 else ""
+    digits = form.strip("+.fg")
+    if form.endswith("g"):
+        return sign + shortest(value, marks, digits=int(digits or 6))
+    return sign + fixed(value, int(digits or 0), marks)
+
+
+def _named(words, key, value):
+    """Codes among the values of a message as their names."""
+    if key == "row" or key.endswith("_row"):
+        return str(value)  # no count
+    if key == "note":
+        return _notes(words).get(value, value) if isinstance(value, str) else value
+    if key == "choice":
+        return word_of(words["language"].get("code"), value)
+    if key == "kind":
+        known = words["observations"]  # some by the table that they stand in
+        return known.get(value, known.get(f"{value.replace(' ', '_')}s", value))
+    if key in ("group", "of_group"):
+        name = words["observed"].get(value, value)
+        return name[:1].lower() + name[1:]
+    if key == "inputs":
+        return "; ".join(name_of_input(words, one) for one in value)
+    if key == "entries":  # of [certificate]
+        labels = words["page"] | words["labels"]
+        return "; ".join(labels.get(one, one) for one in value)
+    return value
+
+
+def _notes(words):
+    """{English note of a key or column of a job: the same in this language}."""
+    translated = words.get("input", {}).get("notes", {})
+    of_fields = {"keys": KEYS, "columns": COLUMNS, "entries": REGISTER_KEYS}
+    return {
+        field.note: translated[group][f"{owner}.{field.name}"]
+        for group, owners in of_fields.items()
+        for owner, fields in owners.items()
+        for field in fields
+        if f"{owner}.{field.name}" in translated.get(group, ())
+    }
+
+
+_DECLARED = ("head",)  # choices whose number the job gave: it is not rounded
+
+
+NAMED_INPUTS = ("deadwood", "instrument_scale", "instrument_offset")
+
+
+def input_name(words, row):
+    """The name of an input of the budget; a default is marked as such.
+
+    Some have the name of their item or instrument beside it.
+    """
+    shared = row["input"] == "deadwood" and row["unit"] == "%"
+    name = name_of_input(words, "deadwood_share" if shared else row["input"])
+    if row["input"] in NAMED_INPUTS and row["note"] and not shared:
+        name = f"{name}: {row['note']}"
+    return words["texts"]["default_input"].format(input=name) if row.get("is_default") else name
+
+
+def name_of_input(words, code):
+    """An input by its code; correlated ones are one, "a & b"."""
+    return " & ".join(words["inputs"].get(one, one) for one in code.split(" & "))
+
+
+# ---- what the record says of an adjustment: the same sentences on paper and in the workbook
+
+MOST_NAMES = 12  # that a sentence lists
+
+
+def group_name(words, group):
+    """A group of observations in words: "Distances (tape 1)", "Zenith angles"."""
+    known, name = words["observed"], group["name"]
+    if name in known:
+        return known[name]
+    kind = known.get(group["kind"], group["kind"])
+    return f"{kind} ({name})" if name else kind
+
+
+def observation_name(words, reading):
+    """What a reading is: some kinds are told apart by their files, such as zenith angles."""
+    known, kind = words["observations"], reading["kind"]
+    return known.get(reading["file"].removesuffix(".csv"), known.get(kind, kind))
+
+
+def global_test_sentence(words, adjustment):
+    """What the global test says, with its bounds."""
+    bounds = adjustment["chi2_bounds"]
+    if bounds is None:
+        return words["texts"]["test_none"]
+    verdict = "above" if adjustment["chi2"] > bounds[1] else "below"
+    low, high, chi2 = (_fixed(words, value, 1) for value in (*bounds, adjustment["chi2"]))
+    return words["texts"][f"test_{'passed' if adjustment['passed'] else verdict}"].format(
+        low=low,
+        high=high,
+        statistic=chi2,
+        dof=_fixed(words, adjustment["redundancy"]),
+        confidence=percent(words, adjustment["confidence"]),
+    )
+
+
+def scale_sentence(words, adjustment):
+    """Which variance factor the covariances bear."""
+    factor = _fixed(words, adjustment["cov_scale"], 3)
+    return words["texts"][f"scale_{adjustment['scale']}"].format(factor=factor)
+
+
+def snooping_sentence(words, adjustment):
+    """How blunders were searched, and how many observations were set aside."""
+    if not adjustment["snooping"]:
+        return words["texts"]["snooping_off"]
+    removed = {(row["kind"], tuple(row["ids"]), row["row"]) for row in adjustment["removed"]}
+    return words["texts"]["snooping_on"].format(
+        critical=_fixed(words, adjustment["critical_w"], 2),
+        rounds=_fixed(words, adjustment["rounds"]),
+        removed=_fixed(words, len(removed)),
+    )
+
+
+def datum_sentences(words, adjustment):
+    """What holds the frame, and what depends on that choice."""
+    datum, texts = adjustment["datum"], words["texts"]
+    held = [name for name in datum["held"] if datum["choice"] != "inner" or ":" not in name]
+    found = [texts[f"datum_{datum['choice']}"].format(held=listed(words, held))]
+    if len(held) < len(datum["held"]):
+        fixed = [name for name in datum["held"] if ":" in name]
+        found = [texts["datum_fixed"].format(held=listed(words, fixed)), *(found if held else [])]
+    if datum["defect"]:
+        words_of_defect = datum["words"].split(";")[0].rstrip(".")
+        found.append(texts["datum_defect"].format(words=words_of_defect))
+        by_control = "_control" if datum["choice"] == "control" else ""
+        found.append(texts[f"datum_dependent{by_control}"])
+    for what in ("vertical", "scale"):
+        found.append(texts[f"{what}_{'observed' if datum[what] else 'not_observed'}"])
+    return found
+
+
+def verdict_sentences(words, adjustment):
+    """A sentence for each group of observations that is not what was declared."""
+    return [
+        words["texts"][f"group_{row['verdict']}"].format(
+            group=group_name(words, row),
+            **{key: factor_text(words, row[name]) for key, name in _FACTORS.items()},
+        )
+        for row in adjustment["groups"]
+        if row["verdict"] in ("worse", "better")
+    ]
+
+
+_FACTORS = {"factor": "factor", "low": "factor_low", "high": "factor_high"}
+
+
+def method_line(words, adjustment):
+    """What was measured, how many points, sigma0: one line for a certificate."""
+    parts = []
+    if adjustment["photos"]:
+        cameras = listed(words, dict.fromkeys(row["camera"] for row in adjustment["photos"]))
+        photographs = words["observed"]["photographs"]
+        parts.append(f"{photographs} ({cameras}): {_fixed(words, len(adjustment['photos']))}")
+    groups = [row for row in adjustment["groups"] if row["kind"] != "weighted unknown"]
+    for row in sorted(groups, key=lambda row: row["kind"] != "image coordinate"):
+        name = group_name(words, row)
+        parts.append(f"{name[:1].lower()}{name[1:]}: {_fixed(words, row['count'])}")
+    sigma0 = adjustment["sigma0"]
+    return words["texts"]["method_of_survey"].format(
+        observed=", ".join(parts),
+        points=_fixed(words, len(adjustment["points"])),
+        sigma=NOTHING if sigma0 is None else _fixed(words, sigma0, 2),
+    )
+
+
+def listed(words, names):
+    """The first names, and how many more there are; "P7:xyz" is P7."""
+    names = [str(name).removesuffix(":xyz") for name in names]
+    if names == ["all"]:
+        return words["texts"]["all_points"]
+    if len(names) <= MOST_NAMES:
+        return ", ".join(names)
+    more, first = len(names) - MOST_NAMES, ", ".join(names[:MOST_NAMES])
+    return words["texts"]["and_more"].format(names=first, more=more)
+
+
+def as_sentence(text):
+    """A text of the record with a capital letter and a full stop."""
+    return text[:1].upper() + text[1:].rstrip(".") + "."
+
+
+def percent(words, share):
+    """A share in percent, in the reader's style."""
+    return f"{shortest(100 * share, marks_of(words))}\N{NO-BREAK SPACE}%"
+
+
+def factor_text(words, value):
+    """A factor of standard deviations."""
+    return _fixed(words, value, 2 if value < 10 else 1)
+
+
+def _fixed(words, value, decimals=0):
+    return fixed(value, decimals, marks_of(words))

@@ -1,0 +1,304 @@
+"""Circles and sections: the published table, exact shapes, the criterion and its derivatives."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+import scipy.optimize
+import scipy.sparse
+from shapes import azimuths, modes, ring, section_of
+
+from tankcal.errors import SolutionError
+from tankcal.geometry.circles import fit_circle
+from tankcal.sections import fit_section, group_by_height, group_by_name, slide
+from tankcal.tank.courses import course_shape
+from tankcal.tank.volumes import ShellVolume
+
+S_VARIANCE_M2 = 2.0e-4  # published: S table 11, coordinate variance
+
+
+@pytest.fixture(scope="module")
+def table_11(shared):
+    facts = shared / "facts"
+    circles = json.loads((facts / "silva_T11_circles.json").read_text())
+    with open(facts / "silva_T11_residuals.csv", newline="") as file:
+        residuals = list(csv.DictReader(file))
+    return circles, residuals
+
+
+def test_sds_of_centre_and_radius_published_s_table_11(table_11):
+    """Generatrix 24 of section 3 is missing; at -22.5 deg it gives the printed sds."""
+    circles, residuals = table_11
+    for number in range(5):
+        seen = [row for row in residuals if row[f"s{number + 1}_m"]]
+        azimuth = np.radians([15 * (int(row["generatrix"]) - 1) - 7.5 for row in seen])
+        circle = fit_circle(
+            ring(circles["R_m"][number], azimuth)[:, :2], np.full(2 * len(azimuth), S_VARIANCE_M2)
+        )
+        sd = np.sqrt(np.diag(circle.cofactor_m2))
+        published = [circles[key][number] for key in ("dp_XC", "dp_YC", "dp_R")]
+        assert np.round(sd, 4) == pytest.approx(published, abs=1e-9)
+
+
+def test_variance_factors_published_s_table_11(table_11):
+    circles, residuals = table_11
+    for number, published in enumerate(circles["sigma_post"], 1):
+        size = np.array([float(row[f"s{number}_m"]) for row in residuals if row[f"s{number}_m"]])
+        factor = np.sum(size**2) / S_VARIANCE_M2 / (len(size) - 3)
+        assert factor == pytest.approx(published, abs=0.025)
+
+
+def test_circle_sds_of_even_points_closed_form():
+    """s_centre = s sqrt(2/n), s_radius = s / sqrt(n)."""
+    circle = fit_circle(ring(6.5, azimuths(24))[:, :2], np.full(48, 0.01**2))
+    expected = 0.01 * np.array([np.sqrt(2 / 24), np.sqrt(2 / 24), 1 / np.sqrt(24)])
+    assert np.sqrt(np.diag(circle.cofactor_m2)) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("span_deg", [360, 90, 20])
+def test_the_circle_is_the_geometric_one_second_method(span_deg):
+    """The sum of squared distances is at its minimum, found again by a general minimiser."""
+    rng = np.random.default_rng(span_deg)
+    azimuth = np.radians(rng.uniform(0, span_deg, 40))
+    points = ring(6.5, azimuth, (15.8, 14.1))[:, :2] + rng.normal(0, 0.002, (40, 2))
+    circle = fit_circle(points, np.full(80, 0.002**2))
+
+    def distances(p):
+        return np.hypot(points[:, 0] - p[0], points[:, 1] - p[1]) - p[2]
+
+    start = [15.8, 14.1, 6.5]
+    other = scipy.optimize.least_squares(distances, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    assert (circle.x_m, circle.y_m, circle.radius_m) == pytest.approx(tuple(other.x), abs=2e-7)
+    assert np.sum(circle.residuals_m**2) <= 2 * other.cost * (1 + 1e-9)
+
+
+def test_a_circle_at_utm_coordinates_loses_nothing():
+    here = ring(6.5, azimuths(24))[:, :2] + np.random.default_rng(5).normal(0, 0.01, (24, 2))
+    near = fit_circle(here, np.full(48, 1e-4))
+    far = fit_circle(here + (500_000.0, 7_500_000.0), np.full(48, 1e-4))
+    assert far.x_m - 500_000.0 == pytest.approx(near.x_m, abs=1e-8)
+    assert far.y_m - 7_500_000.0 == pytest.approx(near.y_m, abs=1e-8)
+    assert far.radius_m == pytest.approx(near.radius_m, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        (np.zeros((2, 2)), "needs 3 points"),
+        (np.ones((6, 2)), "on one place"),
+        (np.column_stack([np.arange(6.0), 2 * np.arange(6.0)]), "on a line"),
+    ],
+)
+def test_points_that_make_no_circle_are_refused(points, message):
+    with pytest.raises(SolutionError, match=message):
+        fit_circle(points, np.full(2 * len(points), 1e-4))
+
+
+def ellipse(azimuth):
+    a, b = 6.55, 6.45
+    return a * b / np.hypot(b * np.sin(azimuth), a * np.cos(azimuth))
+
+
+@pytest.mark.parametrize(
+    ("radius", "centre", "area"),
+    [
+        (6.5, (0, 0), np.pi * 6.5**2),
+        (6.5, (123.4, -56.7), np.pi * 6.5**2),
+        (ellipse, (1.0, 2.0), np.pi * 6.55 * 6.45),
+    ],
+    ids=["circle", "shifted circle", "ellipse"],
+)
+def test_area_of_exact_shapes_closed_form(radius, centre, area):
+    section = section_of(ring(radius, azimuths(24), centre))
+    assert section.outline.kind == "interpolated"
+    assert section.outline.area_m2() == pytest.approx(area, rel=1e-7)
+
+
+@pytest.mark.parametrize(("jitter", "limit_ppm"), [(0.0, 1.0), (0.2, 5.0)])
+def test_area_of_300_random_shapes_closed_form(jitter, limit_ppm, figure):
+    """R 6.5 m, modes 2 to 5 with coefficients of sd 5 mm, 24 points."""
+    rng = np.random.default_rng(11)
+    errors = []
+    for _ in range(300):
+        outline, area = modes(6.5, 2, rng.normal(0, 0.005, 4), rng.normal(0, 0.005, 4))
+        section = section_of(ring(outline, azimuths(24, jitter, rng)))
+        errors.append(section.outline.area_m2() / area - 1)
+    ppm = 1e6 * np.array(errors)
+    rms = np.sqrt(np.mean(ppm**2))
+    figure(
+        f"area of 300 shapes, jitter {jitter:.0%}, rms and worst in ppm",
+        f"{rms:.3f}, {np.abs(ppm).max():.3f}",
+    )
+    assert rms < limit_ppm
+
+
+def test_area_of_a_spoilt_point_moves_by_the_gradient():
+    """The gradient by every coordinate against differences of the whole fit."""
+    rng = np.random.default_rng(3)
+    outline, _ = modes(6.5, 2, rng.normal(0, 0.01, 4), rng.normal(0, 0.01, 4))
+    xyz = ring(outline, azimuths(24, 0.2, rng), (3.0, 4.0))
+    section = section_of(xyz)
+    azimuth, weight = section.outline.nodes()
+    by_parameters = (section.outline.radius_m(azimuth) * weight) @ section.outline.basis(azimuth)
+    gradient = by_parameters @ section.parameters_by_points
+    differences = np.zeros_like(gradient)
+    for i in range(len(gradient)):
+        move = np.zeros(72)
+        move[i] = 1e-4
+        up, down = (section_of(xyz + sign * move.reshape(24, 3)) for sign in (1, -1))
+        differences[i] = (up.outline.area_m2() - down.outline.area_m2()) / 2e-4
+    # the origin and the knots move with the points, the gradient holds them: a part in 2000
+    assert np.abs(differences - gradient).max() < 5e-4 * np.abs(gradient).max()
+
+
+def test_sliding_along_the_axis_keeps_a_leaning_cylinder_together():
+    slope, azimuth = (0.03, -0.01), azimuths(12)
+    z = np.linspace(0, 1.5, 12)
+    xyz = ring(6.5, azimuth) + np.column_stack([z * slope[0], z * slope[1], z])
+    xy, by_xyz = slide(xyz, slope, 0.0)
+    assert np.hypot(*xy.T) == pytest.approx(6.5, abs=1e-12)
+    moved = (by_xyz @ np.tile([0.0, 0.0, 1.0], 12)).reshape(12, 2)
+    assert moved == pytest.approx(-np.tile(slope, (12, 1)))
+
+
+def test_points_without_section_numbers_are_grouped_by_height():
+    joints = np.array([0.0, 2.0, 4.0])
+    azimuth = np.tile(azimuths(12), 3)
+    height = np.repeat([0.4, 1.6, 3.0], 12) + 0.01
+    height[24:] += np.random.default_rng(1).uniform(-0.9, 0.9, 12)  # course 2: not level
+    course = np.searchsorted(joints[1:-1], height)
+    groups = group_by_height(height, azimuth, course, joints)
+    assert [(g.name, g.course, len(g.members)) for g in groups] == [
+        ("1.1", 0, 12),
+        ("1.2", 0, 12),
+        ("2", 1, 12),
+    ]
+    assert groups[0].height_m == pytest.approx(0.41)
+
+
+def test_named_sections_come_from_the_bottom_up():
+    names = ["b"] * 5 + ["a"] * 5
+    height = np.array([3.0] * 5 + [1.0] * 5)
+    groups = group_by_name(names, height, lambda z: int(z > 2))
+    assert [(g.name, g.course) for g in groups] == [("a", 0), ("b", 1)]
+
+
+JOINTS = np.array([0.0, 1.5])
+
+
+def scan(radius, n=60, seed=1, slope=(0.0, 0.0), heights=None):
+    """(n, 3) points of one course at random azimuths and heights; radius(azimuth, zeta)."""
+    rng = np.random.default_rng(seed)
+    azimuth = rng.uniform(0, 2 * np.pi, n)
+    zeta = rng.uniform(-1, 1, n) if heights is None else heights(rng, azimuth)
+    z = 0.75 * (1 + zeta)
+    xyz = ring(radius(azimuth, zeta), azimuth)
+    return xyz + np.column_stack([z * slope[0], z * slope[1], z])
+
+
+def course_group(xyz, joints=JOINTS):
+    azimuth = np.arctan2(xyz[:, 0], xyz[:, 1])
+    course = np.zeros(len(xyz), dtype=int)
+    return group_by_height(xyz[:, 2], azimuth, course, joints)[0]
+
+
+def course_of_points(xyz, form=1e-3, slope=(0.0, 0.0), group=None):
+    """The shape of the course, and the section, from a scan with 2 mm of noise declared."""
+    group = group or course_group(xyz)
+    covariance = scipy.sparse.diags_array(np.full(3 * len(xyz), 4e-6)).tocsr()
+    section = fit_section(group, xyz, covariance, slope, group.height_m, form)
+    heights = [level.height_m for level in section.levels]
+    shape = course_shape(*JOINTS, heights, [level.outline for level in section.levels])
+    return section, ShellVolume((shape,))
+
+
+HEIGHTS = np.array([0.1, 0.75, 1.2, 1.5])
+
+
+def test_points_at_all_heights_of_a_frustum_are_exact():
+    xyz = scan(lambda a, zeta: 6.5 + 0.006 * zeta)
+    section, volume = course_of_points(xyz)
+    assert (section.group.degree, len(section.levels)) == (2, 3)
+    low, high = 6.494, 6.494 + 0.008 * HEIGHTS
+    exact = np.pi * HEIGHTS * (low**2 + low * high + high**2) / 3  # closed form
+    assert volume.volume_m3(HEIGHTS) == pytest.approx(exact, rel=1e-8)
+
+
+def test_points_at_all_heights_of_a_barrel_are_exact():
+    xyz = scan(lambda a, zeta: 6.5 + 0.004 * (1 - zeta**2))
+    volume = course_of_points(xyz)[1]
+    z, w = np.polynomial.legendre.leggauss(8)  # exact: the area is of degree 4
+    t = HEIGHTS[:, None] * (1 + z) / 2
+    area = np.pi * (6.5 + 0.004 * (1 - (t / 0.75 - 1) ** 2)) ** 2
+    assert volume.volume_m3(HEIGHTS) == pytest.approx(HEIGHTS / 2 * (area @ w), rel=1e-8)
+    assert volume.barrels_m == pytest.approx([0.004], rel=1e-4)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_leaning_cylinder_is_exact_whether_its_slope_is_known_or_not(known):
+    slope = (0.002, -0.001)
+    volume = course_of_points(
+        scan(lambda a, zeta: np.full_like(a, 6.5), slope=slope), slope=slope if known else (0, 0)
+    )[1]
+    assert volume.volume_m3(HEIGHTS) == pytest.approx(np.pi * 6.5**2 * HEIGHTS, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("heights", "degree"),
+    [
+        (lambda rng, a: rng.uniform(-1, 1, len(a)), 2),
+        (lambda rng, a: rng.uniform(-0.6, 0.6, len(a)), 1),
+        (lambda rng, a: rng.uniform(-1, -0.3, len(a)), 0),
+        (lambda rng, a: a / np.pi - 1, 0),  # a spiral: its height is a function of the azimuth
+        (lambda rng, a: 0.1 * np.cos(3 * a), 0),  # level
+    ],
+    ids=["all heights", "the middle", "the lower third", "a spiral", "level"],
+)
+def test_no_slope_is_made_from_heights_that_tell_none(heights, degree):
+    xyz = scan(lambda a, zeta: np.full_like(a, 6.5), n=120, heights=heights)
+    group = course_group(xyz)
+    assert group.degree == degree
+    section, volume = course_of_points(xyz, group=group)
+    assert len(section.levels) == degree + 1
+    assert volume.courses[0].degree == degree
+
+
+def test_few_points_make_no_more_than_they_carry():
+    xyz = scan(lambda a, zeta: np.full_like(a, 6.5), n=7)
+    assert course_group(xyz).degree == 0
+
+
+def test_a_course_of_several_sections_takes_them_as_level():
+    xyz = scan(lambda a, zeta: np.full_like(a, 6.5), n=120)
+    azimuth = np.arctan2(xyz[:, 0], xyz[:, 1])
+    names = ["low" if z < 0.8 else "high" for z in xyz[:, 2]]
+    groups = group_by_name(names, xyz[:, 2], lambda z: 0, azimuth, JOINTS)
+    assert [group.degree for group in groups] == [0, 0]
+    one = group_by_name(["a"] * 120, xyz[:, 2], lambda z: 0, azimuth, JOINTS)
+    assert one[0].degree == 2
+    assert one[0].span_m == (0.0, 1.5)
+
+
+@pytest.mark.parametrize(("part", "tolerance"), [(0.0, 1e-7), (1.0, 3e-3)])
+def test_the_areas_of_a_scanned_course_move_with_its_points(part, tolerance):
+    """Every product by coordinates against differences of the whole fit.
+
+    The centre moves with the points and the gradient holds it: nothing for a cylinder, and for a
+    wall of form and taper (1 and 2 mm) as much as that bends the outline about another centre.
+    """
+    rng = np.random.default_rng(3)
+    shape, _ = modes(0.0, 2, rng.normal(0, 0.001, 4), rng.normal(0, 0.001, 4))
+    xyz = scan(lambda a, zeta: 6.5 + part * ((1 + 0.1 * zeta) * shape(a) + 0.002 * zeta), n=24)
+    section, volume = course_of_points(xyz)
+    by_points = np.vstack([level.by_points for level in section.levels])
+    analytic = volume.courses[0].upper("by_parameters") @ by_points
+    for i in (0, 1, 12, 13, 36, 37, 69, 70):
+        move = np.zeros(72)
+        move[i] = 1e-4
+        up, down = (
+            course_of_points(xyz + sign * move.reshape(24, 3), group=section.group)[1].features
+            for sign in (1, -1)
+        )
+        worst = np.abs((up - down) / 2e-4 - analytic[:, i]).max()
+        assert worst < tolerance * np.abs(analytic).max()

@@ -1,0 +1,290 @@
+"""Monte Carlo against the published cases of JCGM 101, closed forms and a second method."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tankcal.errors import ProgramError
+from tankcal.gum.distributions import Normal, Rectangular, StudentT, Triangular, UShaped, within
+from tankcal.gum.monte_carlo import Goal, QuadraticRows, numerical_tolerance, simulate, verdict
+from tankcal.gum.monte_carlo.goal import simulation
+from tankcal.gum.monte_carlo.inputs import inputs_of
+from tankcal.gum.monte_carlo.linear import linear_law, shapes_of
+from tankcal.uncertainty import coverage_factor
+
+EXACT_RECTANGULAR = 2 * np.sqrt(3) * (2 - (3 / 5) ** 0.25)
+SOME = Goal(plain_draws=200_000, fraction=1.0)
+
+
+def total(x):
+    """Sum of the inputs, one row: the additive model of JCGM 101 9.2."""
+    return x.sum(axis=1, keepdims=True)
+
+
+def rectangular(u, mean=0.0):
+    """A rectangular input of standard uncertainty u."""
+    return Rectangular(np.sqrt(3) * u, mean=mean)
+
+
+def mass(x):
+    """Deviation of a calibrated weight from its nominal 100 g, mg (JCGM 101 equation 34)."""
+    reference, added, air, weight, standard = x.T
+    return ((reference + added) * (1 + (air - 1.2) * (1 / weight - 1 / standard)) - 1e5)[:, None]
+
+
+def loss(x):
+    """Comparison loss x1^2 + x2^2 (JCGM 101 9.4)."""
+    return np.sum(x**2, axis=1, keepdims=True)
+
+
+def loss_inputs(x1):
+    """Both components of the reflection coefficient, u 0.005 (JCGM 101 9.4.2)."""
+    return [Normal(0.005, mean=x1), Normal(0.005)]
+
+
+def law_of(coefficients, inputs, levels):
+    """The law of a linear part that the control variate uses."""
+    ready = inputs_of(inputs)
+    scaled = np.atleast_2d(coefficients) @ ready.transform * ready.coordinate_scale
+    return linear_law(scaled, ready.normal, shapes_of(ready), np.asarray(levels))
+
+
+@pytest.mark.parametrize(
+    ("inputs", "u", "end"),
+    [
+        ([Normal(1.0)] * 4, 2.0, 3.92),  # JCGM 101 9.2.2, table 2
+        ([rectangular(1.0)] * 4, 2.0, EXACT_RECTANGULAR),  # 9.2.3, annex E closed form
+        ([rectangular(1.0)] * 3 + [rectangular(10.0)], np.sqrt(103), 17.0),  # 9.2.4, table 4
+    ],
+)
+def test_additive_models_of_jcgm_101(inputs, u, end, figure):
+    found = simulate(total, inputs, goal=SOME)
+    figure("additive model, end", f"{found.high[0]:.5f} +- {found.se_high[0]:.5f} ({end:.5f})")
+    published = 0.05 if end == 17.0 else 0.005 if end == 3.92 else 0.0
+    assert found.u[0] == pytest.approx(u, abs=1e-9)  # exact: the control carries all of u
+    for value, truth in ((found.low[0], -end), (found.high[0], end)):
+        assert abs(value - truth) <= published + 4 * found.se_high[0] + 5e-5
+    assert found.controlled[0]
+
+
+def test_gum_is_not_validated_where_one_rectangular_input_dominates():
+    """JCGM 101 9.2.4: GUM +-19.9 beside +-17.0 of Monte Carlo, u 10.1."""
+    found = simulate(total, [rectangular(1.0)] * 3 + [rectangular(10.0)], goal=SOME)
+    judged = verdict(found, [0.0], [np.sqrt(103)])
+    assert coverage_factor(0.95, np.inf) * np.sqrt(103) == pytest.approx(19.9, abs=0.05)
+    assert judged.d_high[0] == pytest.approx(19.9 - 17.0, abs=0.1)
+    assert not judged.validated[0]
+    assert judged.sure[0]
+    assert judged.high[0] == found.high[0]  # Monte Carlo's is what counts
+
+
+def test_gum_is_validated_for_four_normals():
+    found = simulate(total, [Normal(1.0)] * 4, goal=SOME)
+    judged = verdict(found, [0.0], [2.0])
+    assert judged.tolerance[0] == pytest.approx(0.05)  # 2.0 = 20e-1 (7.9.2)
+    assert judged.validated[0]
+    assert judged.sure[0]
+    assert judged.high[0] == pytest.approx(2 * 1.959964, abs=1e-6)
+
+
+def test_mass_calibration(figure):
+    """JCGM 101 9.3, table 5: 1.2340 mg, u 0.0754, [1.0834, 1.3825]; u 0.0539 of first order."""
+    inputs = [
+        Normal(0.050, mean=100_000), Normal(0.020, mean=1.234), within(0.10, mean=1.20),
+        within(1000, mean=8000), within(50, mean=8000),
+    ]  # fmt: skip
+    found = simulate(mass, inputs)
+    ends = f"[{found.shortest_low[0]:.4f}, {found.shortest_high[0]:.4f}]"
+    figure("mass calibration", f"{found.value[0]:.4f} {found.u[0]:.4f} {ends}")
+    assert found.value[0] == pytest.approx(1.2340, abs=1e-4)
+    assert found.u[0] == pytest.approx(0.0754, abs=1e-4)
+    length = found.shortest_high[0] - found.shortest_low[0]
+    assert length == pytest.approx(1.3825 - 1.0834, abs=5e-4)
+    assert found.shortest_low[0] == pytest.approx(1.0834, abs=2e-3)
+    assert found.shortest_high[0] == pytest.approx(1.3825, abs=2e-3)
+    judged = verdict(found, [1.2340], [np.hypot(0.050, 0.020)], digits=1)
+    assert judged.d_low[0] == pytest.approx(0.045, abs=2e-3)  # table 5: GUM1 [1.1285, 1.3395]
+    assert not judged.validated[0]
+
+
+def block(x):
+    """Deviation of a gauge block from 50 mm, nm (JCGM 101 9.5.1), of its nine inputs."""
+    standard, read, random, systematic, expansion, mean, cycle, other, colder = x.T
+    warm = mean + cycle
+    length = standard * (1 + expansion * (warm - colder)) + read + random + systematic
+    return (length / (1 + (expansion + other) * warm) - 50_000_000.0)[:, None]
+
+
+def test_gauge_block(figure):
+    """JCGM 101 9.5: u 36 nm. Other program (a paper's 1e6 draws of it): 838, 36, [745, 932] nm.
+
+    It does not say which 99 % interval: the symmetric one is compared, with 4 of our errors.
+    """
+    inputs = [
+        StudentT(25.0, dof=18, mean=50_000_623.0), StudentT(6.0, dof=24, mean=215.0),
+        StudentT(4.0, dof=5), StudentT(7.0, dof=8), Rectangular(2e-6, mean=11.5e-6),
+        Normal(0.2, mean=-0.1), UShaped(0.5), within(1e-6, inexactness=0.1e-6),
+        within(0.050, inexactness=0.025),
+    ]  # fmt: skip
+    found = simulate(block, inputs, goal=Goal(probability=0.99, plain_draws=100_000))
+    figure("gauge block, u, low, high", np.round([found.u[0], found.low[0], found.high[0]], 2))
+    assert found.value[0] == pytest.approx(838, abs=0.5)
+    assert found.u[0] == pytest.approx(36, abs=0.5)
+    assert found.low[0] == pytest.approx(745, abs=0.5 + 4 * found.se_low[0])
+    assert found.high[0] == pytest.approx(932, abs=0.5 + 4 * found.se_high[0])
+
+
+@pytest.mark.parametrize("x1", [0.0, 0.010, 0.050])
+def test_comparison_loss_uncorrelated(x1, figure):
+    """Closed form: u^2 times a non-central chi-square of 2 degrees of freedom (x1/u)^2.
+
+    x1 = 0.010: 150, 112, shortest [0, 367] in 1e-6 (JCGM 101 table 6, from draws: its 367 stands
+    1e-6 from the closed form 366.0).
+    """
+    found = simulate(loss, loss_inputs(x1), goal=SOME)
+    law = stats.ncx2(2, (x1 / 0.005) ** 2) if x1 else stats.chi2(2)
+    scale = 0.005**2
+    assert found.value[0] == pytest.approx(scale * law.mean(), abs=5 * found.se_value[0])
+    assert found.u[0] == pytest.approx(scale * law.std(), abs=5 * found.se_u[0])
+    assert found.low[0] == pytest.approx(scale * law.ppf(0.025), abs=5 * found.se_low[0])
+    assert found.high[0] == pytest.approx(scale * law.ppf(0.975), abs=5 * found.se_high[0])
+    if x1 == 0.010:
+        figure("comparison loss, shortest, 1e-6", 1e6 * found.shortest_high[0])
+        assert 1e6 * found.value[0] == pytest.approx(150, abs=0.5)
+        assert 1e6 * found.u[0] == pytest.approx(112, abs=0.5)
+        assert 1e6 * found.shortest_low[0] == pytest.approx(0, abs=0.5)
+        assert 1e6 * found.shortest_high[0] == pytest.approx(scale * law.ppf(0.95) * 1e6, abs=1)
+
+
+@pytest.mark.parametrize("x1", [0.0, 0.010, 0.050])
+def test_comparison_loss_correlated(x1):
+    """r = 0.9: mean x1^2 + 2 u^2; variance 4 x1^2 u^2 + 4 u^4 (1 + r^2), closed forms."""
+    found = simulate(loss, loss_inputs(x1), [[1, 0.9], [0.9, 1]], goal=SOME)
+    u = 0.005
+    expected = np.sqrt(4 * x1**2 * u**2 + 4 * u**4 * (1 + 0.81))
+    assert found.value[0] == pytest.approx(x1**2 + 2 * u**2, abs=5 * found.se_value[0])
+    assert found.u[0] == pytest.approx(expected, abs=5 * found.se_u[0])
+
+
+@pytest.mark.parametrize("dof", [3, 4, 5])
+def test_law_of_students_t(dof):
+    """Closed form: quantiles of one scaled t, to 1e-4 of its sd."""
+    law = law_of([2.0], [StudentT(1.0, dof=dof)], [0.025, 0.975])
+    assert law.known[0]
+    spread = 2 * np.sqrt(dof / (dof - 2))
+    assert law.quantile[0] == pytest.approx(2 * stats.t(dof).ppf([0.025, 0.975]), abs=1e-4 * spread)
+
+
+def test_law_of_two_arc_sines_and_a_normal_against_plain_draws():
+    """Simulation: the law's quantiles within 4 standard errors of 1e6 plain draws."""
+    inputs = [UShaped(1.0), UShaped(2.0), Normal(0.2), Triangular(0.5)]
+    law = law_of(np.ones(4), inputs, [0.025, 0.975])
+    generator = np.random.default_rng(3)
+    draws = sum(one.quantile(generator.random(1_000_000)) for one in inputs)
+    error = np.sqrt(0.025 * 0.975 / 1e6) / law.density[0]
+    assert np.all(np.abs(law.quantile[0] - np.quantile(draws, [0.025, 0.975])) < 4 * error)
+
+
+def test_linear_rows_of_heavy_tails_are_exact_in_u_and_close_in_the_ends(figure):
+    """Purely linear, t of 3 to 5 degrees of freedom: u closed form, ends by the law without draws.
+
+    The standard error of 1e6 plain draws in an end is sqrt(p q/1e6)/density.
+    """
+    inputs = [StudentT(1.0, dof=dof) for dof in (3, 4, 5)]
+    slopes = np.array([[1.0, 1.0, 1.0], [0.2, 1.0, 0.5]])
+    found = simulate(lambda x: x @ slopes.T, inputs, goal=SOME)
+    law = law_of(slopes, inputs, [0.025, 0.975])
+    plain = np.sqrt(0.025 * 0.975 / 1e6) / law.density[:, 1]
+    figure("linear t rows, se of the end to that of 1e6 plain draws", found.se_high / plain)
+    assert found.u == pytest.approx(np.sqrt(slopes**2 @ [3.0, 2.0, 5 / 3]), rel=1e-9)
+    assert np.all(found.se_high < plain)
+    assert np.all(np.abs(found.high - law.quantile[:, 1]) < plain)
+
+
+def test_two_degrees_of_freedom_have_no_u_but_an_interval():
+    """Closed form: t of 2 degrees of freedom, quantile 4.303; its sd does not exist."""
+    found = simulate(total, [StudentT(1.0, dof=2), Normal(1e-6)], goal=SOME)
+    assert np.isinf(found.u[0])
+    assert found.high[0] == pytest.approx(stats.t(2).ppf(0.975), abs=5e-3)
+
+
+def test_rows_that_do_not_vary_have_no_uncertainty():
+    model = QuadraticRows(
+        np.array([0.0, 5.0]), np.array([[0.0], [1.0]]), np.ones((1, 1, 1)), np.zeros((2, 1)),
+        np.zeros(1),
+    )  # fmt: skip
+    found = simulate(model, [Normal(0.1)])
+    assert found.u == pytest.approx([0.0, 0.1])
+    assert found.low == pytest.approx([0.0, 5 - 0.1959964], abs=1e-6)
+    judged = verdict(found, model.value, found.u)
+    assert np.all(judged.validated)
+
+
+def test_numerical_tolerance():
+    """JCGM 101 7.9.2, example 1 (0.00035 g, two digits), and by hand."""
+    found = numerical_tolerance([0.00035, 2, 0.0996, 0.0, np.inf])
+    assert found[:3] == pytest.approx([0.000005, 0.05, 0.005])
+    assert np.all(np.isnan(found[3:]))
+    assert numerical_tolerance(2.0, digits=1) == pytest.approx([0.5])
+
+
+def test_same_seed_same_numbers_and_progress_is_told():
+    told = []
+    found = [
+        simulate(loss, loss_inputs(0.01), goal=SOME, tell=lambda *step: told.append(step))
+        for _ in range(2)
+    ]
+    assert found[0].high[0] == found[1].high[0]
+    assert told[0][1] == 1
+    assert told[-1][1] <= told[-1][2]
+
+
+def test_inputs_that_cannot_be():
+    with pytest.raises(ValueError, match="eigenvalue"):
+        inputs_of([Normal(1.0)] * 3, [[1, 0.9, -0.9], [0.9, 1, 0.9], [-0.9, 0.9, 1]])
+    with pytest.raises(ValueError, match="symmetric 2 x 2"):
+        inputs_of([Normal(1.0)] * 2, np.eye(3))
+    with pytest.raises(ValueError, match="coverage probability"):
+        Goal(probability=1.0)
+    with pytest.raises(ValueError, match="above 0"):
+        Goal(digits=0)
+    one = QuadraticRows(
+        np.ones(1), np.ones((1, 1)), np.ones((1, 1, 1)), np.ones((1, 1)), np.ones(1)
+    )
+    with pytest.raises(ValueError, match="2 inputs"):
+        simulate(one, [Normal(1.0)] * 2)
+
+
+def test_correlated_inputs_that_are_not_normal_are_drawn_without_a_control():
+    """Sum of two equal rectangulars (scores r = 1): one of twice the width, closed form."""
+    found = simulate(total, [Rectangular(1.0)] * 2, [[1, 1], [1, 1]], goal=SOME)
+    assert not found.controlled[0]
+    assert found.high[0] == pytest.approx(1.9, abs=5 * found.se_high[0] + 1e-6)
+    assert found.u[0] == pytest.approx(2 / np.sqrt(3), abs=5 * found.se_u[0] + 1e-6)
+
+
+def products(strengths):
+    """Rows of three inputs, each bent the more the greater its strength."""
+    hessians = np.zeros((2, 3, 3))
+    hessians[0, 0, 0] = hessians[1, 1, 1] = 1.0
+    hessians[1, 0, 2] = hessians[1, 2, 0] = 0.3
+    slopes = np.tile([1.0, 0.5, 0.2], (len(strengths), 1))
+    weights = np.outer(strengths, [0.3, -0.2])
+    return QuadraticRows(np.full(len(strengths), 5.0), slopes, hessians, weights, np.zeros(3))
+
+
+def test_a_row_that_more_points_show_to_be_unsteady_is_drawn_for():
+    """Property: a row steady with 16 points and not with 64 got an interval of zeros."""
+    inputs = [rectangular(1.0), Normal(1.0), Normal(1.0)]
+    rows = products(np.linspace(0.088, 0.0955, 40))  # one of them is such a row
+    found = simulate(rows, inputs, goal=Goal(plain_draws=20_000))
+    assert np.all((found.low < 5.0) & (found.high > 5.0))
+    assert np.ptp(found.low) < 0.1  # beside one another
+    drawn = simulate(lambda x: rows(x), inputs, goal=Goal(plain_draws=20_000))
+    assert np.abs(found.low - drawn.low).max() < 0.05
+
+
+def test_an_interval_without_ends_is_an_error_of_the_program():
+    estimates = np.array([[5.0], [1.0], [3.0], [7.0], [3.0], [np.nan]])
+    with pytest.raises(ProgramError, match="contradicts itself"):
+        simulation(Goal(), estimates, np.zeros((6, 1)), np.ones(1), np.ones(1, dtype=bool))

@@ -1,0 +1,126 @@
+"""The terminal speaks the job's language, and a form's own words for choices are read."""
+
+import re
+
+import pytest
+from job_builder import write_workbook
+
+import tankcal
+from tankcal.cli import main
+from tankcal.cli.asked_language import asked_language
+from tankcal.cli.showing import said, speak
+from tankcal.errors import Problem
+from tankcal.job.contract import KEYS
+from tankcal.job.fields import Field, Refused, read_value
+from tankcal.job.form_words import meant, word_of
+from tankcal.job.starter import write_starter
+from tankcal.job.tables import in_book
+from tankcal.messages import Message
+from tankcal.record import record_of
+from tankcal.text.languages import nearest_language
+from tankcal.text.words import in_language, load_words
+
+OTHERS = ("pt-BR", "es")
+ENGLISH = re.compile(r"\b(the|expected|found|missing|blank|row|sheet|with|number|is|of)\b")
+
+
+@pytest.fixture(autouse=True)
+def plain_terminal(monkeypatch):
+    for name in ("LC_ALL", "LC_MESSAGES", "LANG"):
+        monkeypatch.delenv(name, raising=False)
+    yield
+    speak("en")
+
+
+@pytest.mark.parametrize("language", OTHERS)
+@pytest.mark.parametrize("kind", ["vertical", "horizontal", "sphere", "mesh"])
+def test_an_empty_form_is_refused_in_its_language(tmp_path, capsys, language, kind):
+    write_starter(tmp_path / "job", kind, None, language)
+    sheet = {"pt-BR": "planilha", "es": "hoja"}[language]
+    for source in (tmp_path / "job" / "job.xlsx", tmp_path / "job"):
+        assert asked_language(source) == language
+        assert main(["run", str(source), "--out", str(tmp_path / "out")]) == 2
+        lines = [line.partition(": ")[2] for line in capsys.readouterr().err.splitlines()[1:]]
+        assert len(lines) > 3
+        assert [line for line in lines if ENGLISH.search(line)] == []
+        if source.suffix:
+            assert all(line.startswith(f"job.xlsx, {sheet} ") for line in lines)
+
+
+def test_the_terminal_of_a_job_in_no_language_is_the_environments(monkeypatch):
+    problem = Problem("points.csv", "x", 12)
+    speak()
+    assert said(problem.text) == "points.csv, row 12: x"
+    monkeypatch.setenv("LANG", "pt_BR.UTF-8")
+    speak()
+    assert said(problem.text) == "points.csv, linha 12: x"
+    assert nearest_language("es_MX") == "es"
+    assert nearest_language("tlh") is None
+
+
+@pytest.mark.parametrize(
+    ("file", "placed"),
+    [
+        ("points.csv", "t.xlsx, sheet points, row 3: x"),
+        ("job.toml", "t.xlsx, sheet job, row 3: x"),
+        ("sheet courses", "t.xlsx, sheet courses, row 3: x"),
+        ("tank.stl", "tank.stl, row 3: x"),
+    ],
+)
+def test_a_problem_of_a_workbook_names_it(file, placed):
+    assert str(in_book(Problem(file, "x", 3), "t.xlsx")) == placed
+
+
+def test_warnings_of_a_workbook_name_it_and_its_words_are_read(tmp_path):
+    settings = {
+        "survey.side": "fora",
+        "table.language": "pt-BR",
+        "table.monte_carlo": "não",
+        "tank.nominal_volume_m3": 10.0,
+    }
+    path = write_workbook(tmp_path / "tanque.xlsx", settings=settings)
+    job = tankcal.load(path)
+    assert (job.survey.side, job.table.monte_carlo) == ("outside", False)
+    result = tankcal.run(job)
+    (told,) = (one for one in result.warnings if "nominal_volume" in str(one.column))
+    assert str(told).startswith("tanque.xlsx, sheet job, tank.nominal_volume_m3: ")
+    assert asked_language(path) == "pt-BR"
+    record = in_language(load_words("pt-BR"), record_of(result))
+    assert {one["file"] for one in record["warnings"]} <= {"planilha job", "planilha uncertainty"}
+    speak("pt-BR")
+    assert said(told.text).startswith("tanque.xlsx, planilha job, tank.nominal_volume_m3: a capac")
+
+
+CHOICES = [field.choices for fields in KEYS.values() for field in fields if field.kind == "choice"]
+
+
+def test_each_word_of_a_form_means_one_choice():
+    for language in OTHERS:
+        for choices in CHOICES:
+            for choice in choices:
+                word = word_of(language, choice)
+                assert word in choices or meant(word, choices) == choice
+
+
+@pytest.mark.parametrize(
+    ("word", "value"),
+    [("sim", True), ("Não", False), ("nao", False), ("sí", True), ("NO", False), ("true", True)],
+)
+def test_yes_and_no_of_a_form(word, value):
+    assert read_value(Field("x", "flag", ""), word) is value
+
+
+@pytest.mark.parametrize(
+    ("word", "value"),
+    [("fora", "outside"), ("Dentro", "inside"), ("fuera", "outside"), ("por fora", "outside")],
+)
+def test_sides_of_a_form(word, value):
+    assert read_value(Field("x", "choice", "", choices=("outside", "inside")), word) == value
+
+
+def test_another_word_is_refused_with_what_is_expected():
+    with pytest.raises(Refused) as told:
+        read_value(Field("x", "choice", "", choices=("outside", "inside")), "talvez")
+    assert isinstance(told.value.text, Message)
+    speak("pt-BR")
+    assert said(told.value.text) == "encontrado 'talvez'; esperado 'fora' ou 'dentro'"

@@ -1,0 +1,880 @@
+"""The linter: no false alarm on exact tables of many shapes, and what it finds in spoilt ones."""
+
+import contextlib
+import json
+from collections import defaultdict
+from itertools import pairwise
+
+import numpy as np
+import openpyxl
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tankcal.errors import InputError, TankcalError
+from tankcal.linter import Nominal, lint
+from tankcal.linter.examination import examine
+from tankcal.linter.headings import heading_of
+from tankcal.linter.numbers import Style, read_number, style_of
+from tankcal.linter.screening import Rows, leave_one_out, most_suspicious
+from tankcal.linter.suggestions import suggestion
+from tankcal.tank.dips import dip_label, table_heights
+
+# exact volumes (closed forms) of many shapes, m3, as functions of dips, m
+
+
+def lying(h, radius=1.2, length=10.0):
+    h = np.clip(h, 0, 2 * radius)
+    across = np.sqrt(2 * radius * h - h**2)
+    return length * (radius**2 * np.arccos(1 - h / radius) - (radius - h) * across)
+
+
+def ellipsoidal_ends(h, radius=1.2, depth=0.6):
+    h = np.clip(h, 0, 2 * radius)
+    return lying(h, radius) + np.pi * depth * h**2 * (1 - h / (3 * radius))
+
+
+def courses(h, radii, joints):
+    edges = [0.0, *joints, 100.0]
+    return sum(
+        np.pi * r**2 * (np.clip(h, low, high) - low)
+        for r, (low, high) in zip(radii, pairwise(edges), strict=True)
+    )
+
+
+def cone_bottom(h, radius=6.5, depth=0.15):
+    below = np.pi * (radius * np.minimum(h, depth) / depth) ** 2 * np.minimum(h, depth) / 3
+    return below + np.pi * radius**2 * np.maximum(h - depth, 0)
+
+
+def dished_bottom(h, radius=6.5, depth=0.15):
+    sphere = (radius**2 + depth**2) / (2 * depth)
+    low = np.minimum(h, depth)
+    return np.pi * low**2 * (sphere - low / 3) + np.pi * radius**2 * np.maximum(h - depth, 0)
+
+
+def liquid_head(h, radius=20.0, plates=(0.012, 0.010, 0.008, 0.006, 0.006), course=1.9):
+    """Integral of pi (r + c (h - z) / t)^2 over the courses, c = rho g r^2 / E."""
+    total, bottom = np.zeros_like(h), 0.0
+    for plate in plates:
+        c = 1000 * 9.80665 * radius**2 / (206e9 * plate)
+        low, high = np.maximum(h - bottom - course, 0), np.maximum(h - bottom, 0)
+        grown = radius**2 * (high - low) + radius * c * (high**2 - low**2)
+        total += np.pi * (grown + c**2 * (high**3 - low**3) / 3)
+        bottom += course
+    return total
+
+
+def barrels(h, radius=20.0, course=1.9, bulge=0.004, steps=(0, 0.004, 0.010, 0.012, 0.020)):
+    """Courses with r = R + d + 4 b t (1 - t), t the part of the course: the exact polynomial."""
+    total = np.zeros_like(h)
+    for k, step in enumerate(steps):
+        t = np.clip((h - k * course) / course, 0, 1)
+        r, b = radius + step, 4 * bulge
+        square = r**2 * t + r * b * (t**2 - 2 * t**3 / 3) + b**2 * (t**3 / 3 - t**4 / 2 + t**5 / 5)
+        total += np.pi * course * square
+    return total
+
+
+def with_deadwood(h):
+    total = np.pi * 6.5**2 * h
+    for low, high, volume in ((0.3, 0.9, -0.2), (2.0, 2.5, -0.05), (0, 9.5, -0.3), (0.55, 1, 0.1)):
+        total = total + volume * np.clip((h - low) / (high - low), 0, 1)
+    return total
+
+
+FIVE = (6.48, 6.4815, 6.483, 6.479, 6.4835)
+WIDE = (30, 30.004, 30.02, 30.015, 30.03)
+SHAPES = {
+    "cylinder": (lambda h: np.pi * 6.478**2 * h, 9.5),
+    "five courses": (lambda h: courses(h, FIVE, (1.9, 3.8, 5.7, 7.6)), 9.49996),
+    "wide courses": (lambda h: courses(h, WIDE, (2.4, 4.7, 7.01, 9.6)), 11.873),
+    "barrels": (barrels, 9.5),
+    "liquid head": (liquid_head, 9.5),
+    "lying": (lying, 2.4),
+    "lying, small": (lambda h: lying(h, 0.4, 1.5), 0.8),
+    "lying, long": (lambda h: lying(h, 1.6, 30.0), 3.2),
+    "ellipsoidal ends": (ellipsoidal_ends, 2.4),
+    "sphere": (lambda h: np.pi * h**2 * (10 - h / 3), 20.0),
+    "cone": (cone_bottom, 9.5),
+    "steep cone": (lambda h: cone_bottom(h, 1.5, 1.234), 6.0),
+    "dish": (dished_bottom, 9.5),
+    "deadwood": (with_deadwood, 9.5),
+    "roof": (lambda h: with_deadwood(h) - 8 * np.clip((h - 1.6) / 0.25, 0, 1), 9.5),
+    "plate below": (lambda h: courses(np.maximum(h - 0.0234, 0), (6.5, 6.504), (5.0,)), 9.5),
+    "plate below, lying": (lambda h: lying(h - 0.0234), 2.4234),
+    "plate above, lying": (lambda h: lying(h + 0.0234), 2.3766),
+}
+STEPS = {"mm": 0.001, "cm": 0.01, "dm": 0.1, "eighths": 0.003175}
+DECIMALS = (2, 3, 4)  # of cubic metres: 10 L, 1 L, 0.1 L
+
+
+def rows_of(shape, step, decimals):
+    """Rows of a table as text, each rounded once from the exact volume."""
+    volume, top = SHAPES[shape]
+    heights = table_heights(STEPS[step], top)
+    places = {"mm": 3, "cm": 2, "dm": 1, "eighths": 6}[step]
+    texts = [f"{h:.{places}f}" for h in heights[:-1]] + [f"{heights[-1]:.6f}"]
+    return list(zip(texts, (f"{v:.{decimals}f}" for v in volume(heights)), strict=True))
+
+
+def lint_text(folder, text, name="table.csv", **options):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return lint(path, **options)
+
+
+def lint_rows(folder, rows, separator=",", **options):
+    lines = [f"height_m{separator}volume_m3", *(separator.join(row) for row in rows)]
+    return lint_text(folder, "\n".join(lines) + "\n", **options)
+
+
+def found(report):
+    """{row: texts} of the findings."""
+    texts = defaultdict(list)
+    for finding in report.findings:
+        texts[finding.problem.row].append(str(finding))
+    return {row: "\n".join(lines) for row, lines in texts.items()}
+
+
+# no false alarms
+
+
+# fittings with edges at 0.9 and 1.0 m: in a dm table a step of its own, which deserves a look
+DESERVES_A_LOOK = {("roof", "dm", 3), ("roof", "dm", 4)}
+
+
+def assert_clean(folder, shape, step, decimals):
+    nominal = Nominal(height_m=SHAPES[shape][1])
+    report = lint_rows(folder, rows_of(shape, step, decimals), nominal=nominal)
+    if (shape, step, decimals) in DESERVES_A_LOOK:
+        assert [finding.severity for finding in report.findings] == ["warning"]
+        assert "or the edge of a fitting" in found(report)[11]
+    else:
+        assert [str(finding) for finding in report.findings] == []
+    assert len(report.summaries) == 1
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_an_exact_table_has_no_faults(shape, tmp_path):
+    """Truth: closed forms, rounded once; whatever is found in them is a false alarm."""
+    for step, decimals in (("cm", 3), ("dm", 4)):
+        assert_clean(tmp_path, shape, step, decimals)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("shape", SHAPES)
+def test_exact_tables_of_every_step_and_rounding_have_no_faults(shape, tmp_path):
+    for step in STEPS:
+        for decimals in DECIMALS:
+            assert_clean(tmp_path, shape, step, decimals)
+
+
+@pytest.mark.parametrize("shape", ["lying", "five courses", "barrels", "sphere"])
+def test_unrounded_tables_have_no_faults(shape):
+    """A workbook holds all digits: then the table's own roughness is the measure."""
+    volume, top = SHAPES[shape]
+    heights = table_heights(0.01, top)
+    volumes = volume(heights)
+    examination = examine(heights / 0.01, volumes / (1e-9 * volumes[-1]), np.zeros(len(heights)))
+    assert examination.faults == ()
+    assert examination.complete
+
+
+@pytest.mark.parametrize("shape", ["lying", "five courses", "dish"])
+def test_tables_made_by_linear_interpolation_have_no_faults(shape):
+    """A joint every ten rows: mm rows interpolated in a cm table, rounded once more."""
+    volume, top = SHAPES[shape]
+    heights = table_heights(0.001, min(top, 1.2))
+    known = np.unique(np.append(np.arange(0, len(heights), 10), len(heights) - 1))
+    rough = np.interp(heights, heights[known], np.round(volume(heights[known]), 3))
+    assert examine(heights / 0.001, np.round(rough / 0.001), 0 * heights).faults == ()
+
+
+def test_sums_of_rounded_steps_have_no_faults():
+    """Accumulated rounding is bad practice but no slip: the table is judged by its own noise."""
+    steps = np.round(np.diff(lying(table_heights(0.01, 2.4))), 3)
+    volumes = np.concatenate([[0], np.cumsum(steps)])
+    assert examine(np.arange(241.0), np.round(volumes / 0.001), np.zeros(241)).faults == ()
+
+
+def test_joints_are_recognised():
+    heights = table_heights(0.01, 11.87)
+    volumes = np.round(courses(heights, WIDE, (2.4, 4.7, 7.01, 9.6)) / 0.001)
+    joints = np.array(examine(heights / 0.01, volumes, 0 * heights).joints)
+    for joint in (240, 470, 701, 960):
+        assert np.abs(joints - joint).min() <= 2
+
+
+@given(
+    coefficients=st.lists(st.floats(-5, 5), min_size=4, max_size=4),
+    seed=st.integers(0, 10**6),
+    gaps=st.booleans(),
+)
+def test_rounding_alone_is_never_suspicious(coefficients, seed, gaps):
+    """Property: any cubic, rounded, with any rows missing, stays within what rounding allows."""
+    rng = np.random.default_rng(seed)
+    heights = np.sort(rng.choice(200, 60, replace=False)).astype(float) if gaps else np.arange(60.0)
+    exact = np.polynomial.Polynomial(
+        [1e4, *(1e2 * np.array(coefficients[1:]) / 60.0 ** np.arange(3))]
+    )
+    rows = examined(heights, np.round(exact(heights) + coefficients[0]))
+    difference, allowed = leave_one_out(rows)
+    assert np.all(np.abs(difference) <= allowed)
+    assert most_suspicious(rows) is None
+
+
+def examined(heights, volumes):
+    count = len(heights)
+    flags = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
+    return Rows(heights, volumes, *flags, [], np.ones(count), 0.5 + 1e-9)
+
+
+# spoilt tables: the study
+
+
+def wrong_digit(rows, k, rng, column=1):
+    """By 3 units of the last digit or more: smaller ones have a study of their own."""
+    text = rows[k][column]
+    digits = [place for place, char in enumerate(text) if char.isdigit()]
+    rows[k][column] = _other_digit(text, rng.choice(digits), rng)
+    by = round(abs(float(rows[k][column]) - float(text)) * 10 ** len(text.partition(".")[2]))
+    return {k} if by >= 3 or column == 0 else None
+
+
+def wrong_height(rows, k, rng):
+    return wrong_digit(rows, k, rng, 0)
+
+
+def swapped_digits(rows, k, rng):
+    chars = list(rows[k][1])
+    digits = [place for place, char in enumerate(chars) if char.isdigit()]
+    different = [(a, b) for a, b in pairwise(digits) if chars[a] != chars[b]]
+    if not different:
+        return None
+    a, b = different[rng.integers(len(different))]
+    chars[a], chars[b] = chars[b], chars[a]
+    rows[k][1] = "".join(chars)
+    return {k}
+
+
+def swapped_rows(rows, k, rng):
+    rows[k - 1], rows[k] = rows[k], rows[k - 1]
+    return {k - 1, k}
+
+
+def missing_row(rows, k, rng):
+    del rows[k]
+    return {k}
+
+
+def doubled_row(rows, k, rng):
+    rows.insert(k, list(rows[k]))
+    return {k, k + 1}
+
+
+def moved_mark(rows, k, rng):
+    text = rows[k][1]
+    decimals = len(text.partition(".")[2])
+    rows[k][1] = f"{float(text) * 10.0 ** rng.choice([-3, -1, 1, 3]):.{decimals}f}"
+    return {k} if rows[k][1] != text else None
+
+
+def shifted_block(rows, k, rng):
+    """100 L, to the end of the table or to any row."""
+    end = len(rows) if rng.random() < 0.5 else int(rng.integers(k + 1, len(rows)))
+    decimals, shift = len(rows[k][1].partition(".")[2]), 0.1 * rng.choice([-1, 1])
+    for row in rows[k:end]:
+        row[1] = f"{float(row[1]) + shift:.{decimals}f}"
+    return {k, end}
+
+
+def thousands_mark(rows, k, rng):
+    whole, _, part = rows[k][1].partition(".")
+    rows[k][1] = f"{whole[:-3]},{whole[-3:]}.{part}"
+    return {k} if len(whole) > 3 else None
+
+
+def cut_last_row(rows, k, rng):
+    text = rows[-1][1]
+    rows[-1][1] = text[: int(rng.integers(1, len(text)))]
+    return {len(rows) - 1} if float(rows[-1][1]) != float(text) else None
+
+
+def missing_last_row(rows, k, rng):
+    rows.pop()
+    return {None}
+
+
+SPOILING = (
+    *(wrong_digit, swapped_digits, swapped_rows, missing_row, doubled_row, moved_mark),
+    *(shifted_block, thousands_mark, wrong_height, cut_last_row, missing_last_row),
+)
+
+
+def _other_digit(text, place, rng):
+    other = [digit for digit in "0123456789" if digit != text[place]]
+    return text[:place] + other[rng.integers(9)] + text[place + 1 :]
+
+
+def study(folder, tables, seed, steps):
+    """{kind: [spoilt tables, found, the row named, told as an error]}, ready to be shown."""
+    rng = np.random.default_rng(seed)
+    counts = defaultdict(lambda: np.zeros(4, dtype=int))
+    while sum(count[0] for count in counts.values()) < tables:
+        shape = list(SHAPES)[rng.integers(len(SHAPES))]
+        step, decimals = steps[rng.integers(len(steps))], DECIMALS[rng.integers(3)]
+        spoil = SPOILING[rng.integers(len(SPOILING))]
+        rows = [list(row) for row in rows_of(shape, step, decimals)]
+        expected = spoil(rows, int(rng.integers(1, len(rows) - 1)), rng)
+        if expected is None or len(rows) < 20:
+            continue
+        nominal = Nominal(height_m=SHAPES[shape][1])
+        separator = ";" if spoil is thousands_mark else ","
+        report = lint_rows(folder, rows, separator, nominal=nominal)
+        named = {None if row is None else row - 2 for row in found(report)}
+        counts[spoil] += [1, bool(report.findings), bool(named & expected), bool(report.errors)]
+    return counts
+
+
+def show(figure, counts, title):
+    for spoil in SPOILING:
+        total, seen, named, errors = counts[spoil]
+        text = f"{seen} found, {named} with their row, {errors} as errors, of {total}"
+        figure(f"{title}, {spoil.__name__.replace('_', ' ')}", text)
+
+
+def test_what_is_found_in_spoilt_tables(tmp_path, figure):
+    """One twentieth of the study, of its own seed: nearly everything must be found and located."""
+    counts = study(tmp_path, 60, seed=2, steps=("cm", "dm"))
+    show(figure, counts, "linter, 60 spoilt tables of cm and dm")
+    all_but_tops = sum(counts[spoil] for spoil in SPOILING if spoil is not missing_last_row)
+    assert all_but_tops[1] >= 0.93 * all_but_tops[0]
+    assert all_but_tops[2] >= 0.93 * all_but_tops[0]
+
+
+@pytest.mark.study
+def test_the_study_of_spoilt_tables(tmp_path, figure):
+    counts = study(tmp_path, 600, seed=1, steps=list(STEPS))
+    show(figure, counts, "linter, 600 spoilt tables")
+    for spoil in SPOILING:
+        total, seen, named, _ = counts[spoil]
+        if spoil is not missing_last_row:
+            assert seen >= 0.93 * total
+            assert named >= 0.93 * total
+
+
+@pytest.mark.parametrize(
+    "tables", [50, pytest.param(1000, marks=pytest.mark.study)], ids=["50", "1000"]
+)
+def test_how_small_an_error_is_found(tables, figure):
+    """One volume of a cm table of three shapes is off by so many units of its last digit."""
+    rng = np.random.default_rng(3)
+    each, located = tables // 5, {}
+    for size in (1, 2, 3, 5, 10):
+        seen = named = 0
+        for _ in range(each):
+            shape = ("five courses", "lying", "barrels")[rng.integers(3)]
+            volume, top = SHAPES[shape]
+            heights = table_heights(0.01, top)[:-1]
+            volumes = np.round(volume(heights) / 0.001)
+            row = int(rng.integers(1, len(heights) - 1))
+            volumes[row] += size * rng.choice([-1, 1])
+            faults = examine(heights / 0.01, volumes, 0 * heights).faults
+            seen += bool(faults)
+            named += any(fault.first <= row <= fault.last for fault in faults)
+        located[size] = named
+        text = f"{100 * seen / each:.0f} % found, {100 * named / each:.0f} % with their row"
+        figure(f"linter, {each} errors of {size} in the last digit of a cm table", text)
+    assert located[3] + located[5] + located[10] >= 0.85 * 3 * each
+
+
+# what is said
+
+
+def cylinder_rows(count=101, area=130.0):
+    return [(f"{k / 100:.2f}", f"{area * k / 100:.3f}") for k in range(count)]
+
+
+def changed(row, volume=None, height=None, rows=None):
+    rows = [list(one) for one in rows or cylinder_rows()]
+    if volume is not None:
+        rows[row][1] = volume
+    if height is not None:
+        rows[row][0] = height
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("written", "words"),
+    [
+        ("65.400", "found 65.400; expected about 65.000: 65.000? (one digit)"),
+        ("56.000", "expected about 65.000: 65.000? (two digits changed places)"),
+        ("650.000", "expected about 65.000: 65.000? (the decimal mark)"),
+        ("6.000", "expected about 65.000: 65.000? (a digit is missing)"),
+        ("655.000", "found 655.000; expected about 65.000: 65."),
+        ("71.234", "found 71.234; expected about 65.000"),
+        ("", "nothing stands here; expected a number"),
+        ("65.OOO", "found '65.OOO'; expected a number"),
+        ("-65.000", "expected a volume of 0 or more"),
+    ],
+)
+def test_one_wrong_volume_is_told_with_what_was_meant(written, words, tmp_path):
+    report = lint_rows(tmp_path, changed(50, written))
+    assert words in found(report)[52]
+    assert found(report)[52].startswith("table.csv, row 52, volume_m3: error: ")
+    assert {finding.problem.row for finding in report.findings} == {52}
+    assert report.errors >= 1
+
+
+def test_a_long_blank_is_told_once_and_a_short_one_row_by_row(tmp_path):
+    """A critical zone is left blank in a table that is whole."""
+    for blanks, told, errors in ((10, 1, 0), (9, 0, 9)):
+        rows = [list(row) for row in cylinder_rows()]
+        for row in rows[50 : 50 + blanks]:
+            row[1] = ""
+        report = lint_rows(tmp_path, rows)
+        said = list(found(report).values())
+        assert sum("no volumes from here to row" in text for text in said) == told
+        assert sum("nothing stands here" in text for text in said) == report.errors == errors
+
+
+def test_shifted_rows_are_told_together(tmp_path):
+    rows = cylinder_rows()
+    for row in range(40, 60):
+        rows = changed(row, f"{float(rows[row][1]) + 0.1:.3f}", rows=rows)
+    report = lint_rows(tmp_path, rows)
+    (text,) = [str(finding) for finding in report.findings]
+    assert "row 42, volume_m3: error" in text
+    assert "volumes are 0.100 too large for the rows around, rows 42 to 61" in text
+
+
+def test_a_shift_that_may_be_a_fitting_is_a_warning(tmp_path):
+    rows = cylinder_rows()
+    for row in range(40, 101):
+        rows = changed(row, f"{float(rows[row][1]) - 0.1:.3f}", rows=rows)
+    report = lint_rows(tmp_path, rows)
+    (finding,) = report.findings
+    assert finding.severity == "warning"
+    assert "0.100 too small for the rows around, from row 42 on, or the edge" in str(finding)
+    assert report.errors == 0
+
+
+def test_swapped_volumes_and_swapped_rows(tmp_path):
+    rows = cylinder_rows()
+    volumes_only = changed(50, rows[51][1], rows=changed(51, rows[50][1]))
+    assert "volumes of rows 52 and 53 are swapped" in found(lint_rows(tmp_path, volumes_only))[52]
+    rows[50], rows[51] = rows[51], rows[50]
+    assert "rows 52 and 53 are swapped" in found(lint_rows(tmp_path, rows))[52]
+    rows = cylinder_rows()
+    rows[20], rows[70] = rows[70], rows[20]
+    assert "rows 22 and 72 are swapped" in found(lint_rows(tmp_path, rows))[22]
+
+
+def test_rows_that_are_missing_or_doubled(tmp_path):
+    rows = cylinder_rows()
+    assert found(lint_rows(tmp_path, rows[:50] + rows[51:])) == {
+        52: "table.csv, row 52, height_m: error: found that 0.51 follows 0.49; expected 0.5 next: "
+        "a row is missing"
+    }
+    assert "3 rows are missing" in found(lint_rows(tmp_path, rows[:50] + rows[53:]))[52]
+    doubled = found(lint_rows(tmp_path, [*rows[:50], rows[49], *rows[50:]]))
+    assert "height 0.49 stands in row" in next(iter(doubled.values()))
+    assert "a row stands twice" in next(iter(doubled.values()))
+    other = found(lint_rows(tmp_path, [*rows[:50], ["0.49", "64.000"], *rows[50:]]))
+    assert any("with volume 6" in text for text in other.values())
+
+
+@pytest.mark.parametrize("written", ["0.05", "5.00", "0.503", "0.80"])
+def test_one_wrong_height_is_told_with_the_right_one(written, tmp_path):
+    report = lint_rows(tmp_path, changed(50, height=written))
+    assert {finding.problem.row for finding in report.findings} == {52}
+    assert "expected 0.5" in found(report)[52]
+    assert found(report)[52].startswith("table.csv, row 52, height_m: error")
+
+
+def test_a_volume_that_falls(tmp_path):
+    rows = [("0", "0"), ("1", "10"), ("2", "9"), ("3", "20")]
+    assert (
+        "found 9 after 10; expected volumes that do not fall" in found(lint_rows(tmp_path, rows))[4]
+    )
+
+
+def test_decimals_that_differ(tmp_path):
+    report = lint_rows(tmp_path, changed(50, "65.0"))
+    assert "warning: found 65.0; expected 3 decimals" in found(report)[52]
+    report = lint_rows(tmp_path, changed(100, "130.0"))
+    assert (
+        "error: found 130.0; expected 3 decimals as in the other rows: is the last row cut?"
+        in (found(report)[102])
+    )
+    report = lint_rows(tmp_path, changed(50, "65.00001"))
+    assert "warning: found 65.00001; expected 3 decimals" in found(report)[52]
+
+
+def test_zones_of_finer_rows_are_no_fault(tmp_path):
+    heights = table_heights(0.01, 2.4, 0.001, ((0.0, 0.13), (2.27, 2.4)))
+    rows = [(f"{h:.3f}", f"{v:.4f}") for h, v in zip(heights, lying(heights), strict=True)]
+    assert found(lint_rows(tmp_path, rows)) == {}
+    del rows[60]
+    assert "a row is missing" in found(lint_rows(tmp_path, rows))[62]
+
+
+def test_heights_rounded_to_millimetres_of_an_inch_table(tmp_path):
+    heights = table_heights(0.0254, 9.5)[:-1]
+    rows = [(f"{h:.3f}", f"{130 * h:.1f}") for h in heights]
+    assert found(lint_rows(tmp_path, rows)) == {}
+
+
+# layouts
+
+CM = np.arange(951)
+LITRES = np.round(np.pi * 65**2 / 100 * CM * 10).astype(int)  # closed form, R = 6.5 m
+
+
+def pairs(separator=";", volume=str, height=str):
+    return "".join(f"{height(h)}{separator}{volume(v)}\n" for h, v in zip(CM, LITRES, strict=True))
+
+
+def comma(value):
+    return str(value).replace(".", ",")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Altura (cm);Volume (litros)\n" + pairs(),
+        "Altura;Volume\n(cm);(L)\n" + pairs(),
+        "NÍVEL cm\tCAPACIDADE em litros\n" + pairs("\t"),
+        "dip_cm,volume_L\n" + pairs(","),
+        "Nivel (m);Volumen (m³)\n"
+        + pairs(
+            volume=lambda v: comma(f"{v / 1000:.3f}"), height=lambda h: comma(f"{h / 100:.2f}")
+        ),
+        "height [m],capacity [m3]\n"
+        + pairs(",", volume=lambda v: f"{v / 1000:.3f}", height=lambda h: f"{h / 100:.2f}"),
+        "# a comment\nTank 7;;\n\nAltura (cm);Volume (litros);obs\n" + pairs() + "Assinado;por\n",
+        "height_cm,volume_L,u_L,L/cm\n" + pairs(",", volume=lambda v: f"{v},1.0,1327.3"),
+    ],
+)
+def test_headings_units_and_marks(text, tmp_path):
+    report = lint_text(tmp_path, text, nominal=Nominal(1261.0, 13.0, 9.5))
+    assert found(report) == {}
+    assert report.summaries == ("table.csv: 951 rows, 0 to 9.5 m, step 0.01 m, total 1260.957 m3",)
+
+
+def page(columns=5, lines=50, by_row=False):
+    text = ""
+    for first in range(0, len(CM), columns * lines):
+        text += ";".join(["cm;litros"] * columns) + "\n"
+        for line in range(lines):
+            cells = []
+            for column in range(columns):
+                k = first + (line * columns + column if by_row else column * lines + line)
+                cells += [str(CM[k]), str(LITRES[k])] if k < len(CM) else ["", ""]
+            text += ";".join(cells) + "\n"
+    return text
+
+
+@pytest.mark.parametrize("by_row", [False, True])
+def test_pairs_of_columns_across_printed_pages(by_row, tmp_path):
+    assert found(lint_text(tmp_path, page(by_row=by_row))) == {}
+    wrong = page(by_row=by_row).replace(f"487;{LITRES[487]}", f"487;{LITRES[487] + 300}")
+    (finding,) = lint_text(tmp_path, wrong).findings
+    assert f"expected about {LITRES[487]}" in str(finding)
+    line = wrong.splitlines()[finding.problem.row - 1]
+    assert f"487;{LITRES[487] + 300}" in line
+    assert "litros (column " in finding.problem.column
+
+
+def test_feet_and_inches(tmp_path):
+    heights = table_heights(0.003175, 9.5)
+    rows = [f"{dip_label(h, 'ft-in-8')};{131.8 * h / 0.158987294928:.2f}" for h in heights]
+    report = lint_text(tmp_path, "Dip (ft-in);Volume (bbl)\n" + "\n".join(rows) + "\n")
+    assert found(report) == {}
+    assert "2994 rows" in report.summaries[0]
+    assert "step 0.003175 m" in report.summaries[0]
+    del rows[100]
+    assert (
+        "a row is missing" in found(lint_text(tmp_path, "dip_ft_in;bbl\n" + "\n".join(rows)))[102]
+    )
+
+
+def test_ullage_and_tables_from_the_top_down(tmp_path):
+    text = "Ullage (m),Volume (L)\n" + pairs(",", height=lambda h: f"{9.8 - h / 100:.2f}")
+    assert found(lint_text(tmp_path, text, nominal=Nominal(height_m=9.5))) == {}
+    wrong = lint_text(tmp_path, text.replace("Ullage", "Height"))
+    assert "heights fall while volumes rise" in found(wrong)[None]
+    lines = ("height_cm,volume_L\n" + pairs(",")).splitlines()
+    assert found(lint_text(tmp_path, "\n".join([lines[0], *lines[:0:-1]]))) == {}
+
+
+def test_no_heading(tmp_path):
+    report = lint_text(tmp_path, pairs("\t"))
+    texts = [str(finding) for finding in report.findings]
+    assert "no heading: taken as heights in column 1, volumes in column 2" in texts[0]
+    assert "no unit in a heading: taken as heights in 0.01 m, volumes in 0.001 m3" in texts[1]
+    assert report.errors == 0
+
+
+def test_thousands_marks(tmp_path):
+    heading = "Altura (cm);Volume (L)\n"
+    everywhere = lint_text(tmp_path, heading + pairs(volume=lambda v: f"{v:,}".replace(",", ".")))
+    (finding,) = everywhere.findings
+    assert (finding.severity, finding.problem.row) == ("warning", 3)
+    assert "a thousands mark in 950 volumes" in str(finding)
+    one = (heading + pairs()).replace(f"500;{LITRES[500]}", f"500;{LITRES[500]:,}")
+    (finding,) = lint_text(tmp_path, one).findings
+    assert (finding.severity, finding.problem.row) == ("error", 502)
+    assert f"found a thousands mark; expected {LITRES[500]}" in str(finding)
+    split = ("cm,L\n" + pairs(",")).replace(f"500,{LITRES[500]}", f"500,{LITRES[500]:,}")
+    (finding,) = lint_text(tmp_path, split).findings
+    assert (finding.severity, finding.problem.row) == ("error", 502)
+    assert "3 cells, expected 2" in str(finding)
+
+
+@pytest.mark.parametrize(
+    ("cell", "role", "unit"),
+    [
+        ("Dip height (m)", "height", 1.0),
+        ("Volume (m³)", "volume", 1.0),
+        ("volume_m3", "volume", 1.0),
+        ("Metros cúbicos", "volume", 1.0),
+        ("CAPACIDADE (LITROS)", "volume", 0.001),
+        ("litros", "volume", 0.001),
+        ("cm", "height", 0.01),
+        ("Medição (mm)", "height", 0.001),
+        ("Gauge, inches", "height", 0.0254),
+        ("US gallons", "volume", 0.003785411784),
+        ("Altura", "height", None),
+        ("Espacio vacío (m)", "ullage", 1.0),
+        ("Volume at 700 kg/m³ (m³)", "volume", 1.0),
+        ("Litres per centimetre (L/cm)", "", None),
+        ("L/cm", "", None),
+        ("Expanded uncertainty U (m³)", "", None),
+        ("u_m3", "", None),
+        ("Incerteza (L)", "", None),
+        ("k", "", None),
+        ("", "", None),
+        (12.5, "", None),
+    ],
+)
+def test_headings_in_three_languages(cell, role, unit):
+    heading = heading_of(cell)
+    assert (heading.role, heading.unit if role else None) == (role, unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "style", "value", "decimals"),
+    [
+        ("1.234", Style(".", ""), 1.234, 3),
+        ("1.234", Style(",", "."), 1234, 0),
+        ("1.234,50", Style(",", "."), 1234.5, 2),
+        ("12 345.6", Style(".", " "), 12345.6, 1),
+        ("1.5e3", Style(".", ""), 1500, 0),
+        ("1,23,4", Style(".", ","), None, 0),
+        ("1.2", Style(",", ""), None, 0),
+        ("nan", Style(".", ""), None, 0),
+        ("1e999", Style(".", ""), None, 0),
+        ("１２", Style(".", ""), None, 0),
+    ],
+)
+def test_numbers(text, style, value, decimals):
+    reading = read_number(text, style)
+    assert (reading.value, reading.decimals) == (value, decimals)
+    assert bool(reading.complaint) == (value is None)
+
+
+def test_the_style_is_the_one_in_which_the_columns_rise():
+    assert style_of([["0,01", "0,02"], ["1,5", "2,5"]]) == Style(",", "")
+    assert style_of([["1", "2", "3"], ["990", "1.000", "1.010"]]) == Style(",", ".")
+    assert style_of([["1", "2", "3"], ["0.990", "1.000", "1.010"]]) == Style(".", "")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected", "found_text", "slip"),
+    [
+        ("1253.412", 1252.4121, "1252.412", "one digit"),
+        ("1523.412", 1253.41, "1253.412", "two digits changed places"),
+        ("12534.12", 1253.41, "1253.412", "the decimal mark"),
+        ("123.412", 1253.41, "1253.412", "a digit is missing"),
+        ("12553.412", 1253.41, "1253.412", "a digit too many"),
+    ],
+)
+def test_suggestions(text, expected, found_text, slip):
+    assert suggestion(text, expected, 0.003, 3) == (found_text, slip)
+    assert suggestion(text, expected + 7777, 0.003, 3) is None
+
+
+# the whole table
+
+
+@pytest.mark.parametrize(
+    ("nominal", "severity", "words"),
+    [
+        (Nominal(1260.0), None, ""),
+        (Nominal(1400.0), "warning", "total 1260.96 m3, expected about 1400 m3 (nominal)"),
+        (Nominal(2000.0), "error", "expected about 2000 m3"),
+        (Nominal(1.26), "error", "1000 times larger; are the units, or thousands marks, right?"),
+        (Nominal(1.26e6), "error", "1000 times smaller"),
+        (Nominal(None, 13.0, 9.5), None, ""),
+        (Nominal(None, 13.2, 9.5), "warning", "expected about 1300.0"),
+        (Nominal(height_m=9.504), None, ""),
+        (Nominal(height_m=9.51), "warning", "the table ends at 9.5 m, nominal height 9.51 m: are"),
+        (Nominal(height_m=12.0), "error", "are the last rows missing?"),
+        (Nominal(height_m=9.3), "error", "the table ends at 9.5 m, nominal height 9.3 m"),
+    ],
+)
+def test_total_and_last_row_against_nominal(nominal, severity, words, tmp_path):
+    report = lint_text(tmp_path, "height_cm,volume_L\n" + pairs(","), nominal=nominal)
+    if severity is None:
+        assert report.findings == ()
+    else:
+        (finding,) = report.findings
+        assert (finding.severity, finding.problem.row) == (severity, None)
+        assert words in str(finding)
+
+
+@pytest.mark.parametrize("unit", ["m3", "mL"])
+def test_units_that_are_off_by_a_thousand(unit, tmp_path):
+    text = "height_cm,volume_m3\n"
+    volume = str if unit == "m3" else lambda v: f"{v / 1e6:.6f}"
+    (finding,) = lint_text(tmp_path, text + pairs(",", volume=volume)).findings
+    assert finding.severity == "warning"
+    assert "expected a tank: are the units right?" in str(finding)
+
+
+PARTS = [round(np.pi * 6.5**2 * part) for part in range(1, 10)]
+
+
+def with_parts(parts, heading="Partes proporcionais\nmm;litros"):
+    lines = "".join(f"{mark};{part}\n" for mark, part in enumerate(parts, 1))
+    return "Altura (cm);Volume (litros)\n" + pairs() + f"\n{heading}\n" + lines
+
+
+def test_proportional_parts(tmp_path):
+    assert found(lint_text(tmp_path, with_parts(PARTS))) == {}
+    assert found(lint_text(tmp_path, with_parts(PARTS, "mm;L"))) == {}
+    wrong = lint_text(tmp_path, with_parts([*PARTS[:4], 646, *PARTS[5:]]))
+    (text,) = found(wrong).values()
+    assert "row 960" in text
+    assert "found 646; expected about 664, in proportion to the others" in text
+    other = lint_text(tmp_path, with_parts([round(1.1 * part) for part in PARTS]))
+    assert "as the table rises" in next(iter(found(other).values()))
+
+
+# files
+
+
+def write_book(path, sheets):
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for title, rows in sheets.items():
+        sheet = book.create_sheet(title)
+        for row in rows:
+            sheet.append(row)
+    book.save(path)
+    return path
+
+
+def book_rows():
+    rows = [[h / 100, v / 1000] for h, v in zip(CM.tolist(), LITRES.tolist(), strict=True)]
+    return [["Capacity table"], [], ["Dip height (m)", "Volume (m³)"], *rows]
+
+
+def test_workbooks(tmp_path):
+    notes = [["height", "volume"], [0, 0], [1, 1], [2, 2]]
+    path = write_book(tmp_path / "t.xlsx", {"Notes": notes, "Table": book_rows()})
+    assert lint(path).summaries == (
+        "t.xlsx, sheet Table: 951 rows, 0 to 9.5 m, step 0.01 m, total 1260.957 m3",
+    )
+    assert "t.xlsx, sheet Notes: 3 rows" in lint(path, sheet="Notes").summaries[0]
+    with pytest.raises(InputError, match=r"no sheet 'Tabel' \(did you mean Table\?\)"):
+        lint(path, sheet="Tabel")
+
+
+def test_cells_of_a_workbook(tmp_path):
+    rows = book_rows()
+    rows[103][1] = str(rows[103][1])
+    rows[203][1] += 0.4
+    rows[303][1] = "=1+1"
+    path = write_book(tmp_path / "t.xlsx", {"Table": rows})
+    texts = found(lint(path))
+    assert set(texts) == {104, 204, 304}
+    assert "sheet Table, row 104, Volume (m³): error: found a text, not a number" in texts[104]
+    assert "expected about 265.465" in texts[204]
+    assert "a formula without its result" in texts[304]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("t.csv", b"", "empty"),
+        ("t.csv", b"a,b\nx,y\n", "no table found"),
+        ("t.csv", b"height_m,volume_m3\n", "no table found"),
+        ("t.csv", "Altura;Volume\n1;é".encode("latin-1"), "not UTF-8"),
+        ("t.csv", b"height,volume\n0,01,1,5\n" + b"0,02,3,0\n" * 20, "write ; between the cells"),
+        ("t.xlsx", b"PK\x03\x04" + b"\0" * 100, "not an Excel workbook"),
+        ("t.xls", b"\xd0\xcf\x11\xe0" + b"\0" * 600, "old .xls"),
+        ("t.json", b"{", "not a record of tankcal"),
+        ("t.json", b'{"format": "tankcal-record/1", "capacity": {}}', "not a record of tankcal"),
+        ("t.json", b"[" * 100_000, "not a record of tankcal"),
+    ],
+)
+def test_files_without_a_table(name, content, words, tmp_path):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=words):
+        lint(tmp_path / name)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(InputError, match="not found"):
+        lint(tmp_path / "nowhere.csv")
+
+
+def test_records(tmp_path):
+    table = {"height_m": (CM / 100).tolist(), "volume_m3": (LITRES / 1000).tolist()}
+    record = {"format": "tankcal-record/1", "capacity": table}
+    (tmp_path / "record.json").write_text(json.dumps(record))
+    assert lint(tmp_path / "record.json").findings == ()
+    table["volume_m3"][400] += 0.2
+    (tmp_path / "record.json").write_text(json.dumps(record))
+    assert (
+        "record.json, capacity, row 401, volume_m3: error"
+        in found(lint(tmp_path / "record.json"))[401]
+    )
+    table["volume_m3"].pop()
+    (tmp_path / "record.json").write_text(json.dumps(record))
+    with pytest.raises(InputError, match="951 heights and 950 volumes"):
+        lint(tmp_path / "record.json")
+
+
+def test_our_own_record_is_clean(example_record):
+    assert lint(example_record).findings == ()
+
+
+TOKENS = st.sampled_from(
+    ["0", "1", "2.5", "1e300", "-1", "1,5", "1.000,5", "x", "", "nan", "9" * 30, "3' 4\"", '"', "#"]
+)
+HEADINGS = st.sampled_from(["height_m,volume_m3", "cm;L;cm;L", "a,b", "", "Ullage (m)\tVolume (L)"])
+
+
+@settings(max_examples=150, suppress_health_check=list(HealthCheck))
+@given(
+    heading=HEADINGS,
+    separator=st.sampled_from([",", ";", "\t"]),
+    spoilt_cells=st.lists(st.tuples(st.integers(0, 30), st.integers(0, 1), TOKENS), max_size=12),
+    garbage=st.lists(st.lists(TOKENS, min_size=1, max_size=5), max_size=8),
+)
+def test_whatever_stands_in_a_file_is_told_in_words(
+    heading, separator, spoilt_cells, garbage, tmp_path_factory
+):
+    """Property: findings or one of our exceptions, never another one."""
+    rows = [[f"{k / 100:.2f}", f"{1.3 * k:.3f}"] for k in range(31)]
+    for row, column, token in spoilt_cells:
+        rows[row][column] = token
+    lines = [heading, *(separator.join(row) for row in rows + garbage)]
+    path = tmp_path_factory.getbasetemp() / "any.csv"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    with contextlib.suppress(TankcalError):
+        assert all(str(finding) for finding in lint(path, Nominal(10.0, 3.0, 1.0)).findings)

@@ -1,0 +1,61 @@
+"""PDF/A-3a and PDF/UA-1: what veraPDF says of every PDF, in every language."""
+
+import os
+import shlex
+import shutil
+import subprocess
+
+import pytest
+from conftest import EXAMPLE
+
+from tankcal.planning import load_plan, predict
+from tankcal.report import build
+from tankcal.report import planning as planning_papers
+from tankcal.report.letterhead import load
+from tankcal.text.languages import LANGUAGES
+
+FLAVOURS = ("3a", "ua1")
+LOGO = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 3 1">'
+    '<rect width="3" height="1" fill="#0b3d2e" opacity="0.5"/></svg>'
+)
+
+
+@pytest.fixture(scope="module")
+def verapdf():
+    """The command of veraPDF: that in VERAPDF, else the one on the PATH."""
+    command = shlex.split(os.environ.get("VERAPDF", "")) or ["verapdf"]
+    if not shutil.which(command[0]):
+        pytest.skip("veraPDF is not on this machine: set VERAPDF to its command")
+    return command
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_pdf_conforms(verapdf, example_record, tmp_path, language):
+    (tmp_path / "logo.svg").write_text(LOGO, encoding="utf-8")
+    letterhead = tmp_path / "lab.toml"
+    letterhead.write_text('[laboratory]\nname = "Lab"\nlogo = "logo.svg"', encoding="utf-8")
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "capacity.xlsx").write_bytes(b"any workbook")
+    build(example_record, out, language=language, letterhead=load(letterhead))
+    names = ("certificate", "working-papers", "field-table", "report")
+    paths = [str(out / f"{name}.pdf") for name in names]
+    assert_conform(verapdf, paths)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_the_papers_of_a_plan_conform(verapdf, tmp_path, language):
+    prediction = predict(load_plan(EXAMPLE.parent / "plan-silva"))
+    planning_papers.write(prediction, tmp_path / "out", language=language)
+    names = ("prediction.pdf", "field-sheets.pdf")
+    assert_conform(verapdf, [str(tmp_path / "out" / name) for name in names])
+
+
+def assert_conform(verapdf, paths):
+    for flavour in FLAVOURS:
+        command = [*verapdf, "--format", "text", "--flavour", flavour, *paths]
+        said = subprocess.run(command, capture_output=True, encoding="utf-8", check=False).stdout
+        assert sorted(said.splitlines()) == sorted(f"PASS {path} {flavour}" for path in paths)

@@ -1,0 +1,235 @@
+"""What an error in an observation does to the points, and other linear functions of a solution."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from networks import photographed
+
+import tankcal.survey.network.reliability
+from tankcal.camera.model import PARAMETERS
+from tankcal.errors import SolutionError
+from tankcal.solver.effects import cofactors_within, responses
+from tankcal.survey.network import Instrument, adjust, correlations, snoop
+from tankcal.survey.network.datum import dependent
+from tankcal.survey.network.quality import compared
+from tankcal.survey.observations import (
+    Azimuths,
+    ControlCoordinates,
+    Distances,
+    HeightDifferences,
+    PhotoOrientation,
+)
+
+SURVEY, TRUTH = photographed()
+CONTROL, TAPES = SURVEY.observations
+C_KNOWN = replace(
+    SURVEY.cameras[0],
+    state=tuple("weighted" if name == "c" else "free" for name in PARAMETERS),
+    sd=np.where(np.arange(13) == 0, 0.01, np.nan),
+)
+WITH_TOOLS = replace(
+    SURVEY,
+    observations=(CONTROL, replace(TAPES, instrument=np.zeros(8, dtype=int))),
+    instruments=(Instrument("tape", scale_sd=1e-4, offset_sd_m=1e-3),),
+    cameras=(C_KNOWN,),
+)
+FREE = replace(WITH_TOOLS, observations=WITH_TOOLS.observations[1:])
+CASES = {"control": WITH_TOOLS, "inner": FREE}
+
+
+def sharply(survey, datum):
+    return adjust(survey, datum=datum, tolerance=1e-7)
+
+
+def biased(survey, source, row, value, by):
+    """The survey with an error in one value."""
+    if source == "image points":
+        xy = survey.image_points.xy_mm.copy()
+        xy[row, value] += by
+        return replace(survey, image_points=replace(survey.image_points, xy_mm=xy))
+    one = survey.observations[source]
+    changed = one.value.copy()
+    changed[row] += by
+    observations = list(survey.observations)
+    observations[source] = replace(one, value=changed)
+    return replace(survey, observations=tuple(observations))
+
+
+@pytest.mark.parametrize("datum", CASES)
+def test_effect_of_an_undetected_blunder(datum, figure):
+    """Second method: a hundredth of the bias put in, adjusted again."""
+    survey, worst = CASES[datum], 0.0
+    found = sharply(survey, datum)
+    for table in found.residuals:
+        if table.source == "known beforehand":
+            continue
+        for i, j in ((1, 0), (len(table.rows) // 2, -1)):
+            j %= table.mdb.shape[1]
+            if not np.isfinite(table.mdb[i, j]):
+                continue
+            other = biased(survey, table.source, table.rows[i], j, table.mdb[i, j] / 100)
+            moved = 100 * np.abs(sharply(other, datum).xyz_m - found.xyz_m).max()
+            worst = max(worst, abs(moved / table.effect_m[i, j] - 1))
+    figure(f"effect of a blunder against adjusting again, datum {datum}", f"{worst:.1e}")
+    assert worst < 2e-3
+
+
+@pytest.mark.parametrize("datum", CASES)
+def test_effects_in_large_surveys(datum, monkeypatch, figure):
+    """Second method: the exact effects; of the own point they are met, elsewhere bounded."""
+    found = sharply(CASES[datum], datum)
+    exact = next(t for t in found.residuals if t.source == "image points")
+    assert exact.elsewhere_m is None  # worked out here, when first asked for
+    monkeypatch.setattr(tankcal.survey.network.reliability, "EXACTLY", 0)
+    again = tankcal.survey.network.reliability.residuals_of(found.problem, found.solution)
+    large = next(t for t in again if t.source == "image points")
+    assert (large.effect_m <= exact.effect_m * (1 + 1e-9)).all()
+    assert (np.maximum(large.effect_m, large.elsewhere_m) >= exact.effect_m * (1 - 1e-9)).all()
+    share = np.mean(large.effect_m > exact.effect_m * (1 - 1e-9))
+    figure(f"a blunder moves its own point most, datum {datum}", f"{100 * share:.0f} % of values")
+    assert share > 0.8
+    size = (large.elsewhere_m / exact.effect_m).ravel()
+    figure(f"bound elsewhere over largest effect, datum {datum}", f"median {np.median(size):.1f}")
+
+
+def test_what_is_set_aside_moves_nothing():
+    use = np.ones(len(SURVEY.image_points.point))
+    use[7] = 0
+    found = adjust(replace(SURVEY, image_points=replace(SURVEY.image_points, use=use)))
+    table = next(t for t in found.residuals if t.source == "image points")
+    place = int(np.flatnonzero(table.rows == 7)[0])
+    assert (table.effect_m[place] == 0).all()
+    assert (np.delete(table.effect_m, place, axis=0) > 0).all()
+
+
+@pytest.mark.parametrize("datum", CASES)
+def test_effect_of_an_unknown_known_beforehand(datum, figure):
+    """Second method: adjusted again with the value known beforehand shifted."""
+    survey = CASES[datum]
+    found = sharply(survey, datum)
+    tool, camera = survey.instruments[0], survey.cameras[0]
+    shifted = camera.values + np.where(np.arange(13) == 0, 1e-4, 0.0)
+    cases = {
+        ("scale", 0): replace(survey, instruments=(replace(tool, scale=1e-6),)),
+        ("offset_m", 0): replace(survey, instruments=(replace(tool, offset_m=1e-5),)),
+        ("interior", int(found.problem.interior_of[0, 0])): replace(
+            survey, cameras=(replace(camera, values=shifted),)
+        ),
+    }
+    whole = found.covariance_m2()
+    for (of, index), other in cases.items():
+        column = found.effect_of_known_m(of, index)
+        moved = 100 * (sharply(other, datum).xyz_m - found.xyz_m).ravel()
+        worst = np.abs(column - moved).max() / np.abs(column).max()
+        figure(f"one sd of {of}, datum {datum}: largest change, off by", f"{worst:.1e}")
+        assert worst < 3e-3
+        rest = whole - np.outer(column, column)
+        assert np.linalg.eigvalsh(rest).min() > -1e-6 * np.trace(whole) / len(whole)
+    assert not found.effect_of_known_m("scale", 5).any()
+
+
+@pytest.mark.parametrize("datum", CASES)
+def test_thousands_of_check_observations(datum):
+    """Second method: the cofactors of each row by themselves."""
+    found = adjust(CASES[datum], datum=datum)
+    rng = np.random.default_rng(5)
+    start = rng.integers(0, 48, 3000)
+    end = (start + rng.integers(1, 48, 3000)) % 48
+    check = Distances(
+        np.ones(3000), np.full(3000, 0.01), start, end, instrument=np.zeros(3000, dtype=int)
+    )
+    table = compared(found, check)
+    columns = check.columns(found.problem.layout)
+    jac = check.computed(found.solution.state, True)[1]
+    for i in range(0, 3000, 500):
+        q = found.solution.cofactors(columns[i])
+        assert table.sd[i, 0] ** 2 == pytest.approx(1e-4 + (jac[i] @ q @ jac[i].T)[0, 0], rel=1e-9)
+    exact = compared(found, replace(check, sd=np.zeros(3000)))
+    assert exact.sd == pytest.approx(np.sqrt(np.square(table.sd) - 1e-4), rel=1e-6)
+
+
+def test_the_tau_test_does_not_need_the_true_sds(figure):
+    """Property: sds declared three times too small: w sets half the survey aside, tau does not."""
+    images = SURVEY.image_points
+    hopeful = replace(
+        SURVEY,
+        image_points=replace(images, sd_mm=images.sd_mm / 3),
+        observations=tuple(replace(one, sd=one.sd / 3) for one in SURVEY.observations),
+    )
+    xy = images.xy_mm.copy()
+    xy[50] += 0.15
+    hopeful = replace(hopeful, image_points=replace(hopeful.image_points, xy_mm=xy))
+    by_w = snoop(hopeful, robust=False)
+    by_tau = snoop(hopeful, robust=False, test="tau")
+    figure("set aside by w and tau, sds three times too small", f"{len(by_w.removed)}, "
+           f"{len(by_tau.removed)}")  # fmt: skip
+    assert [(one.source, one.row) for one in by_tau.removed] == [("image points", 50)]
+    assert len(by_w.removed) > 10
+    with pytest.raises(ValueError, match="w or tau"):
+        snoop(SURVEY, test="t")
+
+
+def test_correlations_of_photos_and_cameras():
+    """Second method: the cofactors of all unknowns; angles by differences are checked elsewhere."""
+    found = adjust(SURVEY)
+    names, covariance = found.photo_and_camera(3)
+    assert names[:7] == ("x", "y", "z", "omega", "phi", "kappa", "c")
+    assert covariance[:6, :6] == pytest.approx(found.photos[2][3], rel=1e-9)
+    assert covariance[6:, 6:] == pytest.approx(found.camera(3)[2], rel=1e-9)
+    both = found.photo_covariance([3, 5])
+    assert both[:6, :6] == pytest.approx(covariance[:6, :6], rel=1e-9)
+    assert found.photo_covariance()[18:24, 30:36] == pytest.approx(both[:6, 6:], rel=1e-9)
+    r = correlations(covariance)
+    assert np.diag(r) == pytest.approx(1)
+    assert np.abs(r).max() <= 1 + 1e-12
+    sd = np.sqrt(np.diag(covariance))
+    assert r[0, 6] * sd[0] * sd[6] == pytest.approx(covariance[0, 6])
+
+
+def test_scale_of_the_covariances():
+    found = adjust(SURVEY)
+    assert found.scale() == 1.0
+    assert found.scale("a_posteriori") == pytest.approx(found.sigma0**2)
+    with pytest.raises(ValueError, match="a_priori"):
+        found.scale("larger")
+    point, axis = np.repeat([0, 9], 3), np.tile([0, 1, 2], 2)
+    few = ControlCoordinates(np.zeros(6), np.ones(6), point, axis)
+    bare = replace(SURVEY, points=SURVEY.points[:1], xyz_m=np.zeros((1, 3)), image_points=None,
+                   photos=None, cameras=(), observations=(few.taken(slice(0, 3)),))  # fmt: skip
+    with pytest.raises(SolutionError, match="no observation is redundant"):
+        adjust(bare).scale("a_posteriori")
+
+
+def test_which_quantities_depend_on_the_datum():
+    """Closed form: photos and tapes give the shape, not its place nor its attitude."""
+    free = adjust(replace(SURVEY, observations=SURVEY.observations[1:]), datum="inner")
+    two, ends = np.ones(2), {"start": np.array([0, 4]), "end": np.array([17, 30])}
+    tape = Distances(two, two, **ends, instrument=np.array([-1, -1]))
+    for one, depends in (
+        (tape, False),
+        (ControlCoordinates(two, two, np.array([0, 3]), np.array([0, 2])), True),
+        (HeightDifferences(two, two, **ends), True),
+        (Azimuths(two, two, **ends), True),
+        (PhotoOrientation(two, two, np.array([0, 1]), np.array([0, 4])), True),
+    ):
+        assert dependent(free, one).tolist() == [depends] * 2
+        assert not dependent(adjust(SURVEY), one).any()
+    without = adjust(replace(SURVEY, observations=()), datum="inner")
+    assert dependent(without, tape).all()
+
+
+@pytest.mark.parametrize("datum", CASES)
+def test_cofactors_of_an_observation_are_its_rows_times_its_responses(datum):
+    """Second method: the change of all unknowns, Q J', through the rows once more."""
+    found = sharply(CASES[datum], datum)
+    solution, model = found.solution, found.problem.model
+    for group, jac in zip(model.groups, solution.jacobians, strict=True):
+        columns, own = group.columns[:7], jac[:7]
+        changes = np.hstack([part for _, part in responses(solution, columns, own)])
+        changes = np.vstack([changes, np.zeros((1, changes.shape[1]))])
+        wide = np.einsum("nmk,nkd->nmd", own, changes[columns]).reshape(
+            *own.shape[:2], *own.shape[:2]
+        )
+        expected = np.array([wide[n, :, n, :] for n in range(len(own))])
+        np.testing.assert_allclose(cofactors_within(solution, columns, own), expected, atol=1e-9)
