@@ -3,58 +3,16 @@
 What every paper shares, whatever it is about; nothing here computes a number.
 """
 
-from dataclasses import dataclass
 from datetime import date
 
 from tankcal.errors import VocabularyError
 from tankcal.report import blocks, numbers
-from tankcal.text.digits import (
-    NOTHING,
-    decimals_of,
-    decimals_of_height,
-    decimals_of_rows,
-    fixed,
-    shortest,
-    with_digits,
-)
+from tankcal.report.tables import Column, decimals_of_cells
+from tankcal.text.digits import decimals_of, decimals_of_height, fixed, shortest, with_digits
 from tankcal.text.words import marks_of, percent
 
+__all__ = ["Column", "PlainPaper"]
 _SPACE = "\N{NO-BREAK SPACE}"
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column of a table of the record.
-
-    key       key of the value in each row; its heading is word `table_headings.<key>`
-    unit      unit in which it is shown, one of numbers.UNITS; "" for text and bare numbers
-    u         key of the standard or expanded uncertainty that sets the decimals (two digits of it);
-              whole digits are rounded off in the column of that uncertainty alone
-    least     but never fewer decimals than this
-    most      nor more than this, where an uncertainty may be the rounding of what is exact
-    decimals  this many decimals; beside u: where no row has an uncertainty; or
-    digits    this many significant digits, or
-    height    True: a height, in millimetres or finer where it must be; none of these: text
-    words     group of words that a code is looked up in
-    heading   key of another heading
-    nothing   what is printed for a value that does not exist
-    align     one of blocks.ALIGNMENTS; None: text to the left, numbers by their decimal marks
-    formulas  True: formulas of the record in this text are set as such
-    """
-
-    key: str
-    unit: str = ""
-    decimals: int | None = None
-    u: str | None = None
-    least: int = 0
-    most: int | None = None
-    digits: int | None = None
-    height: bool = False
-    words: str | None = None
-    heading: str | None = None
-    nothing: str = NOTHING
-    align: str | None = None
-    formulas: bool = False
 
 
 class PlainPaper:
@@ -149,6 +107,17 @@ class PlainPaper:
             for values in zip(*(table[key] for key in keys), strict=True)
         ]
 
+    def show(self, table, rows=None, *, on=None, across=None, **values):
+        """A declared Table as a block: of these rows (None: its own of the record).
+
+        on      name of the paper's table, and of its caption; None: that of the Table
+        across  sets a long table in so many columns of the page
+        values  for the places in the caption
+        """
+        rows = table.rows(self.record) if rows is None else rows
+        columns = table.on_paper(on, rows)
+        return self.table(on or table.name, rows, columns, across=across, **values)
+
     def table(self, name, rows, columns, /, across=None, **values):
         """A table with caption `captions.<name>`; `across` sets a long one in columns."""
         texts = [self.column_texts(rows, column) for column in columns]
@@ -156,7 +125,7 @@ class PlainPaper:
             [self.word(f"table_headings.{c.heading or c.key}"), self._unit_in_words(c.unit)]
             for c in columns
         ]
-        align = [c.align or ("left" if _is_text(c) else "decimal") for c in columns]
+        align = [c.align or ("left" if c.is_text or c.text else "decimal") for c in columns]
         cells = [list(row) for row in zip(*texts, strict=True)]
         caption = self.word(f"captions.{name}", **values)
         mark = self.marks.decimal
@@ -171,37 +140,34 @@ class PlainPaper:
 
     def column_texts(self, rows, column):
         """The cells of a column, as text."""
-        values = [row.get(column.key) for row in rows]
-        if _is_text(column):
-            texts = [self._text(value, column) for value in values]
+        if column.text is not None:
+            values = texts = [column.text(self, row) for row in rows]
         else:
-            texts = self._numbers(values, rows, column)
+            values = [row.get(column.key) for row in rows]
+            texts = self._texts(values, column) if column.is_text else self._numbers(rows, column)
         return [
             column.nothing if value is None else text
             for value, text in zip(values, texts, strict=True)
         ]
 
-    def _text(self, value, column):
+    def _texts(self, values, column):
+        known = self.words[column.words] if column.words else {}
+        return [self._text(value, known) for value in values]
+
+    def _text(self, value, known):
         if isinstance(value, list):
             return ", ".join(map(str, value))
-        known = self.words[column.words] if column.words else {}
+        if isinstance(value, bool) and str(value) not in known:
+            return self.words["yes_no"]["yes" if value else "no"]
         return known.get(str(value), str(value))
 
-    def _numbers(self, values, rows, column):
+    def _numbers(self, rows, column):
         factor = numbers.unit(column.unit).factor
+        values = [row.get(column.key) for row in rows]
         scaled = [None if value is None else value * factor for value in values]
         if column.digits is not None:
             return [with_digits(value, column.digits, self.marks) for value in scaled]
-        decimals = [column.decimals] * len(rows)
-        if column.height:
-            decimals = [decimals_of_height(value or 0.0) for value in values]
-        if column.u is not None:
-            of_rows = [(row.get(column.u) or 0.0) * factor for row in rows]
-            least = None if column.u == column.key else column.least  # 420 L has two digits
-            limits = {"least": least, "most": column.most}
-            if column.decimals is not None:
-                limits["unknown"] = column.decimals
-            decimals = decimals_of_rows(of_rows, **limits)
+        decimals = decimals_of_cells(column, rows, factor)
         return [
             fixed(value, places, self.marks) for value, places in zip(scaled, decimals, strict=True)
         ]
@@ -213,8 +179,3 @@ class PlainPaper:
         caption = self.word(f"captions.{name}", **values)
         figure = with_decimal_mark(figure, self.marks.decimal)
         return blocks.figure(figure, caption, self.word(f"captions.{name}_alt"), width)
-
-
-def _is_text(column):
-    numeric = (column.decimals, column.u, column.digits)
-    return not column.height and all(rule is None for rule in numeric)

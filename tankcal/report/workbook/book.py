@@ -1,12 +1,14 @@
 """The workbook as a file: its properties, its sheets and their page set-up and protection."""
 
 from datetime import datetime
+from functools import cached_property
 from itertools import pairwise
 
 import xlsxwriter
 from xlsxwriter.exceptions import FileCreateError
 from xlsxwriter.utility import quote_sheetname, xl_range_abs
 
+from tankcal.report.paper import Paper
 from tankcal.report.workbook.look import (
     ACCENT,
     FONT,
@@ -41,7 +43,7 @@ class Book(Writer):
     """
 
     def __init__(self, path, record, words, about=None, shown=None):
-        self._path = path
+        self._path, self._record = path, record
         self._shown = shown
         options = {
             "strings_to_formulas": False,
@@ -75,6 +77,11 @@ class Book(Writer):
             }
         )
         self._file.set_custom_property("Language", self.words["language"]["code"], "text")
+
+    @cached_property
+    def paper(self):
+        """The record in the words of the workbook, as papers show it: for declared tables."""
+        return Paper(self._record, self.words)
 
     def __enter__(self):
         return self

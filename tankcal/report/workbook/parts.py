@@ -1,10 +1,11 @@
 """Sheets beside the capacity table: proportional parts, other densities, what is in the tank."""
 
 from tankcal.report.numbers import unit
-from tankcal.report.paper import DECIMALS_OF_PARTS, Paper
+from tankcal.report.paper import DECIMALS_OF_PARTS
+from tankcal.report.tables.tank import DEADWOOD
 from tankcal.report.uncertainty.stated import stated_U_m3
 from tankcal.report.workbook.look import Column, height_digits, number_format, values_of
-from tankcal.report.workbook.tables import set_widths
+from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import LITRE_DECIMALS, decimals_of_rows, shortest, with_digits
 from tankcal.text.words import marks_of
 
@@ -75,7 +76,7 @@ def name_of_density(place):
 
 def inside_sheet(book, record):
     """Dimensions of a solid; bottom, deadwood and roof, or that none was declared."""
-    paper, corrections = Paper(record, book.words), book.words["corrections"]
+    paper, corrections = book.paper, book.words["corrections"]
     sheet = book.sheet("inside")
     book.widths(sheet, *_WIDTHS)
     row = _HEAD_ROW
@@ -95,7 +96,7 @@ def inside_sheet(book, record):
             book.paragraph(sheet, row, text, _WIDTHS)
             row += 1
         if declared and code == "deadwood":
-            row = book.table(sheet, row + 1, "deadwood", _deadwood(book, declared)) + 1
+            row = book.table(sheet, row + 1, "deadwood", columns_of(book, DEADWOOD)) + 1
         row += 1
 
 
@@ -115,15 +116,3 @@ def _described(book, sheet, row, title, lines):
         book.put(sheet, row, 1, shown.factor * value, **look)
         book.put(sheet, row, 2, shown.symbol, indent=1)
     return row + 2
-
-
-def _deadwood(book, items):
-    u = values_of(items, "u_m3")
-    digits = decimals_of_rows(u, unknown=LITRE_DECIMALS + 1)
-    return [
-        book.column("item", values_of(items, "name"), None, _WIDTHS[0]),
-        book.column("bottom_m", values_of(items, "bottom_m"), 3),
-        book.column("top_m", values_of(items, "top_m"), 3),
-        book.column("volume_m3", values_of(items, "volume_m3"), digits, 14),
-        book.column("u_m3", u, digits),
-    ]

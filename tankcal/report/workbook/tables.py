@@ -1,8 +1,56 @@
-"""Tables that share the columns of a sheet: their widths, and tables without rows."""
+"""Declared tables on sheets: their columns as cells, the widths they share, tables without rows."""
 
 from itertools import zip_longest
 
-from tankcal.report.workbook.look import width_of
+from tankcal.report import numbers
+from tankcal.report.tables import decimals_of_cells
+from tankcal.report.workbook.look import Column, width_of
+from tankcal.text.digits import NOTHING, decimals_of
+
+
+def columns_of(book, table, rows=None):
+    """The columns of a declared Table as cells, of these rows (None: its own of the record)."""
+    rows = table.rows(book.paper.record) if rows is None else rows
+    return [_cells(book, book.paper, one, rows) for one in table.in_workbook(rows)]
+
+
+def _cells(book, paper, column, rows):
+    """One declared column as cells: numbers as numbers in its unit, texts in the words."""
+    unit = numbers.unit(column.unit)
+    heading = _heading(book, column, unit)
+    if column.is_text or column.text:
+        return Column(heading, _texts(paper, column, rows), None, column.width)
+    nothing = None if column.nothing == NOTHING else column.nothing
+    is_share = column.unit == "share"  # a format of the spreadsheet makes percent of it
+    factor = 1.0 if is_share else unit.factor
+    values = [row.get(column.key) for row in rows]
+    cells = [
+        nothing if value is None else value if factor == 1.0 else factor * value for value in values
+    ]
+    return Column(heading, cells, _digits(column, rows, unit.factor), column.width, is_share)
+
+
+def _heading(book, column, unit):
+    if column.sheet is not True:
+        return book.word(f"columns.{column.sheet}", **column.named)
+    heading = book.words["table_headings"][column.heading or column.key]
+    return f"{heading}, {unit.symbol}" if unit.symbol else heading
+
+
+def _texts(paper, column, rows):
+    if column.text is not None:
+        return [column.text(paper, row) for row in rows]
+    values = [row.get(column.key) for row in rows]
+    known = paper.words[column.words] if column.words else {}
+    return [known.get(str(value), value) for value in values] if known else values
+
+
+def _digits(column, rows, factor):
+    if column.digits is None:
+        return decimals_of_cells(column, rows, factor, rounds_whole=False)
+    most = 99 if column.most is None else column.most
+    values = [factor * abs(row.get(column.key) or 0.0) for row in rows]
+    return [min(decimals_of(value, significant=column.digits), most) for value in values]
 
 
 def set_widths(book, sheet, *tables, least=()):

@@ -1,0 +1,183 @@
+"""Tables of a calibrated tank: courses, sections, corrections, what is inside, where it is from."""
+
+from tankcal.report.tables.table import Column, Table
+from tankcal.text.digits import LITRE_DECIMALS
+from tankcal.text.words import choice_sentence, sentence
+
+TO_ITS_SD = {"decimals": 4}  # in the workbook: where no row has an sd
+SD = {"decimals": 2, "most": 3}  # of an sd in mm, in the workbook
+
+COURSES = Table(
+    "courses",
+    (
+        Column("course", sheet="course", width=9),
+        Column("bottom_m", "m", decimals=3, sheet="bottom_m", width=9),
+        Column("height_m", "m", decimals=3, on="courses"),
+        Column("top_m", "m", decimals=3, on="courses_surveyed", sheet="top_m", width=9),
+        Column("thickness_m", "mm", decimals=2, on="courses", sheet="plate_mm", width=9),
+        Column("paint_m", "mm", decimals=2, on="courses", sheet="paint_mm", width=9),
+        Column("sections", on="courses_surveyed"),
+        Column("points", decimals=0, on="courses_surveyed", sheet="points_used", width=9),
+        Column("rejected", decimals=0, on="courses_surveyed", sheet="points_rejected", width=9),
+        Column("radius_m", "m", u="radius_sd_m", on="courses_surveyed", sheet="radius_m",
+               width=10, in_sheet=TO_ITS_SD),
+        Column("radius_sd_m", "mm", u="radius_sd_m", on="courses_surveyed", sheet="u_radius_mm",
+               width=10, in_sheet=SD),
+        Column("inside_radius_m", "m", u="radius_sd_m", on="courses", sheet="inside_radius_m",
+               width=10, in_sheet=TO_ITS_SD),
+        Column("area_m2", "m2", u="area_sd_m2", heading="inside_area_m2", on="courses_surveyed",
+               sheet="inside_area_m2", width=11, in_sheet=TO_ITS_SD),
+        Column("area_sd_m2", "m2", u="area_sd_m2", on="courses_surveyed", sheet="u_area_m2",
+               width=10, in_sheet=TO_ITS_SD),
+        Column("volume_m3", "m3", u="u_m3", on="courses", sheet="volume_m3", width=11,
+               in_sheet=TO_ITS_SD),
+        Column("u_m3", "m3", u="u_m3", on="courses", sheet="u_volume_m3", width=11,
+               in_sheet=TO_ITS_SD),
+    ),
+    rows=lambda record: record["courses"],
+)  # fmt: skip
+
+SECTIONS = Table(
+    "sections",
+    (
+        Column("section", sheet="section", width=9, csv="section"),
+        Column("course", on="section_areas", sheet="course", width=9, csv="course"),
+        Column("height_m", "m", decimals=3, sheet="height_m", width=9, csv="height_m"),
+        Column("n", decimals=0, on="sections", sheet="points", width=9, csv="n"),
+        *(
+            Column(f"{axis}_m", "m", u=f"{axis}_sd_m", on="sections", sheet="centre_m",
+                   named={"axis": axis}, width=10, in_sheet=TO_ITS_SD, csv=f"{axis}_m")
+            for axis in "xy"
+        ),
+        *(
+            Column(f"{axis}_sd_m", "mm", u=f"{axis}_sd_m", on="sections", sheet="u_of_mm",
+                   named={"axis": axis}, width=9, in_sheet=SD, csv=f"{axis}_sd_m")
+            for axis in "xy"
+        ),
+        Column("radius_m", "m", u="radius_sd_m", on="sections", sheet="radius_m", width=10,
+               in_sheet=TO_ITS_SD, csv="radius_m"),
+        Column("radius_sd_m", "mm", u="radius_sd_m", on="sections", sheet="u_radius_mm", width=10,
+               in_sheet=SD, csv="radius_sd_m"),
+        Column("variance_factor", decimals=3, on="sections", sheet="variance_factor", width=10,
+               in_sheet={"decimals": 2}, csv="variance_factor"),
+        Column("shape", words="shapes", on="section_areas", sheet="shape", width=13, csv="shape"),
+        Column("area_m2", "m2", u="area_sd_m2", on="section_areas", sheet="area_m2", width=11,
+               in_sheet=TO_ITS_SD, csv="area_m2"),
+        Column("area_sd_m2", "m2", u="area_sd_m2", on="section_areas", sheet="u_area_m2",
+               width=10, in_sheet=TO_ITS_SD, csv="area_sd_m2"),
+    ),
+    rows=lambda record: record["sections"],
+    last={"sheet": "variance_factor shape"},
+    csv_style="%.6f",
+)  # fmt: skip
+
+REJECTED = Table(
+    "rejected",
+    (
+        Column("point"),
+        *(Column(f"{axis}_m", "m", decimals=3) for axis in "xyz"),
+        Column("residual_m", "mm", decimals=1),
+        Column("w", decimals=1),
+        Column("reason", words="reasons"),
+        Column("row", decimals=0),
+    ),
+    rows=lambda record: record["rejected"],
+)
+
+
+def _correction(paper, row):
+    return sentence(paper.words, "corrections", row["code"])
+
+
+CORRECTIONS = Table(
+    "corrections",
+    (
+        Column("code", text=_correction, sheet="correction", width=34),
+        Column("applied", sheet="applied", width=10),
+        Column("size_m3", "m3", decimals=LITRE_DECIMALS, sheet="size_m3"),
+        Column("size_percent", "percent", decimals=3, sheet="size_percent", width=10,
+               in_sheet={"decimals": 4}),
+        Column("formula", formulas=True, sheet="formula", width=40),
+        Column("source", sheet="source", width=34),
+    ),
+    rows=lambda record: record["corrections"],
+)  # fmt: skip
+
+DEADWOOD = Table(
+    "deadwood",
+    (
+        Column("name", heading="item", sheet="item", width=50),
+        Column("bottom_m", "m", decimals=3, sheet="bottom_m"),
+        Column("top_m", "m", decimals=3, sheet="top_m"),
+        Column("volume_m3", "m3", u="u_m3", decimals=LITRE_DECIMALS + 1, sheet="volume_m3",
+               width=14),
+        Column("u_m3", "m3", u="u_m3", decimals=LITRE_DECIMALS + 1, sheet="u_m3"),
+    ),
+    rows=lambda record: record["deadwood"],
+)  # fmt: skip
+
+
+# ---- where it is from
+
+
+def _value_of_choice(paper, row):
+    """A choice's value as text: a list by its items, a number in full."""
+    value = row["value"]
+    if isinstance(value, list | tuple):
+        return ", ".join(str(item) for item in value)
+    return "" if value is None else str(value)
+
+
+def _place_of_warning(paper, row):
+    """Row and column of a warning, as far as they are known."""
+    of_row = row["row"] and paper.words["workbook"]["texts"]["row"].format(row=row["row"])
+    return ", ".join(part for part in (of_row, row["column"]) if part)
+
+
+CHOICES = Table(
+    "choices",
+    (
+        Column("code", sheet="code", width=24),
+        Column("value", text=_value_of_choice, sheet="value", width=24),
+        Column("meaning", text=lambda paper, row: choice_sentence(paper.words, row),
+               sheet="meaning", width=80),
+    ),
+    rows=lambda record: record["choices"],
+)  # fmt: skip
+
+WARNINGS = Table(
+    "warnings",
+    (
+        Column("file", sheet="file", width=24),
+        Column("row", decimals=0),
+        Column("column"),
+        Column("place", text=_place_of_warning, on="", sheet="place", width=24),
+        Column("text", sheet="warning", width=80),
+    ),
+    rows=lambda record: record["warnings"],
+)
+
+FILES = Table(
+    "files",
+    (
+        Column("file", sheet="file", width=24),
+        Column("bytes", decimals=0, sheet="bytes", width=24),
+        Column("sha256", sheet="sha256", width=80),
+    ),
+    rows=lambda record: record["files"],
+)
+
+
+def _programs(record):
+    programs = {"tankcal": record["tankcal"], **record["versions"]}
+    return [{"name": name, "version": version} for name, version in programs.items()]
+
+
+PROGRAMS = Table(
+    "versions",
+    (
+        Column("name", sheet="program", width=24),
+        Column("version", sheet="version", width=24),
+    ),
+    rows=_programs,
+)
