@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from tankcal.camera.formats import reading, writing
 from tankcal.camera.formats.frame import frame_points, framed, image_of, rays_of
 from tankcal.camera.formats.reading import cameras_of, read_camera
-from tankcal.camera.formats.register import as_cameras_toml, sd_key_of, value_key
 from tankcal.camera.formats.texts import LONGEST
-from tankcal.camera.formats.writing import write_camera
+from tankcal.camera.formats.writing import as_cameras_toml, sd_key_of, value_key, write_camera
 from tankcal.camera.model import PARAMETERS, Form
 from tankcal.errors import InputError
 from tankcal.job.calibrations import read_cameras

@@ -13,11 +13,10 @@ from hypothesis import strategies as st
 
 from tankcal.errors import InputError, TankcalError
 from tankcal.linter import Nominal, lint
-from tankcal.linter.examination import examine
+from tankcal.linter.examination import Rows, examine, leave_one_out, most_suspicious
 from tankcal.linter.headings import heading_of
 from tankcal.linter.numbers import Style, read_number, style_of
-from tankcal.linter.screening import Rows, leave_one_out, most_suspicious
-from tankcal.linter.suggestions import suggestion
+from tankcal.linter.volumes import suggestion
 from tankcal.tank.dips import dip_label, table_heights
 
 # exact volumes (closed forms) of many shapes, m3, as functions of dips, m

@@ -15,8 +15,7 @@ from tankcal.gum.monte_carlo import Goal
 from tankcal.gum.volume_budgets import budget
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.simulation import simulate_table
-from tankcal.pipeline.simulation.curvature import curvature
-from tankcal.pipeline.simulation.variation import VARIED, varied
+from tankcal.pipeline.simulation.curvature import VARIED, curvature, varied
 from tankcal.pipeline.tanks import body_of
 from tankcal.uncertainty import declared_source
 

@@ -4,11 +4,242 @@ import numpy as np
 
 from tankcal.job.checks.common import is_not_given, tell
 from tankcal.job.tables import Log, nearest
-from tankcal.messages import message
-from tankcal.planning.checks.pattern import check_targets
-from tankcal.planning.checks.tied import check_tied
+from tankcal.messages import joined, listed, message
 from tankcal.planning.given import PLAN_FILE
+from tankcal.planning.model import Pillar
+from tankcal.planning.places import joints_m
+from tankcal.planning.rings import TOUCH_M, plate_m
 from tankcal.planning.units import warn_of_places
+from tankcal.planning.visibility import GRAZE_M, cut
+
+# Ties and control: names that are there, lines that nothing cuts, control at its place.
+
+THINNER_M = 0.02  # by which the tank is taken thinner, so that what lies on the wall passes
+OFF_M = 0.5  # between control and the place that the plan gives the same point
+OUT_OF_PLUMB_M = 0.5  # between the ends of a plumb line, in plan
+
+
+def check_tied(plan, given, log):
+    """Every end of a tie is a point, no tape runs through the tank, control is where it stands."""
+    points = plan.points
+    for table in given.tables.values():
+        for end in ("from", "to") if table is not None else ():
+            for row, name in zip(table.rows, table.of(end), strict=True):
+                if name not in points:
+                    expected = message(
+                        "plan_no_such_end",
+                        "found {found!r}; expected a target, or a point of control.csv{hint}",
+                        found=name,
+                        hint=nearest(name, points),
+                    )
+                    log.problem(table.file, expected, row, end)
+    _check_distances(plan, given, log)
+    _check_plumb_lines(plan, given, log)
+    if given.control is not None:
+        _check_control(plan, given.control, log)
+
+
+def _rows(plan, table):
+    """(row, names of both ends, (2, 3) their places) of a table, where both are points."""
+    points = plan.points
+    rows = () if table is None else zip(table.rows, table.of("from"), table.of("to"), strict=True)
+    for row, *ends in rows:
+        if all(name in points for name in ends):
+            yield row, ends, np.array([points[name] for name in ends])
+
+
+def _check_distances(plan, given, log):
+    for row, ends, xyz in _rows(plan, given.tables["distances"]):
+        if why := _through(plan, ends, xyz):
+            log.problem("distances.csv", why, row, "to")
+    for entry in given.repeated["tapes"]:
+        ends = [f"{entry['name']}{end}" for end in "ab"]
+        if why := _through(plan, ends, np.array([plan.extra[name] for name in ends])):
+            entry.tell(log.problem, "length_m", why)
+
+
+def _through(plan, ends, xyz):
+    """Why no tape can be stretched between two places (2, 3); "" where one can."""
+    shell, (one, other) = plan.shell, ends
+    if shell.outside:
+        plates = [plate_m(course, True) for course in plan.job.courses]
+        radius = shell.radius_m + min(plates) - plates[0] - THINNER_M
+        tank = Pillar(shell.axis_m, radius, shell.low_m, shell.high_m, "tank")
+        if cut(tank, xyz[0], xyz[1:])[0]:
+            return message(
+                "plan_line_through_tank",
+                "the line from {one} to {other} runs through the tank; expected it outside",
+                one=one,
+                other=other,
+            )
+        return ""
+    away = np.hypot(*(xyz[:, :2] - shell.axis_m).T)
+    beyond = [name for name, off in zip(ends, away, strict=True) if off > shell.radius_m + GRAZE_M]
+    if beyond:
+        return message(
+            "plan_tape_beyond_wall",
+            "{ends} beyond the wall of the tank; expected both ends within it",
+            ends=joined(beyond),
+        )
+    return ""
+
+
+def _check_plumb_lines(plan, given, log):
+    for row, (one, other), xyz in _rows(plan, given.tables["plumb_lines"]):
+        off = np.hypot(*(xyz[1, :2] - xyz[0, :2]))
+        if off > OUT_OF_PLUMB_M:
+            expected = message(
+                "plan_out_of_plumb",
+                "{one} and {other} are {off:.3f} m apart in plan; a plumb line hangs: "
+                "expected at most {most:g} m",
+                one=one,
+                other=other,
+                off=off,
+                most=OUT_OF_PLUMB_M,
+            )
+            log.problem("plumb_lines.csv", expected, row, "to")
+
+
+def _check_control(plan, control, log):
+    """Control that the plan places itself is there; what only control places has all of x, y, z."""
+    points, setups = plan.points, [one.name for one in plan.setups]
+    own = {name: points[name] for name in (*plan.targets.names, *plan.facing, *setups)}
+    acting = {one.name for one in plan.known}
+    given = np.column_stack([control.numbers(f"{axis}_m") for axis in "xyz"])
+    for row, name, xyz in zip(control.rows, control.of("point"), given, strict=True):
+        if name in own:
+            off = np.nan_to_num(xyz - own[name])
+            if np.linalg.norm(off) > OFF_M:
+                where = ", ".join(f"{value:.3f}" for value in own[name])
+                expected = message(
+                    "plan_control_off",
+                    "{point} is given {off:.3f} m from its place in the plan ({where}); "
+                    "expected it within {most:g} m, or blank",
+                    point=name,
+                    off=np.linalg.norm(off),
+                    where=where,
+                    most=OFF_M,
+                )
+                column = f"{'xyz'[np.argmax(np.abs(off))]}_m"
+                log.problem(control.file, expected, row, column)
+        elif name in acting and np.isnan(xyz).any():
+            expected = message(
+                "plan_control_no_target",
+                "{point} is no target of the plan; expected all its coordinates",
+                point=name,
+            )
+            log.problem(control.file, expected, row, "point")
+
+
+# Targets above the shell, on one another, on welds.
+
+SHOWN = 5  # lines and rows in a message
+ROUNDING_M = 1e-6
+
+
+def check_targets(plan, pattern, log):
+    """Rows within the shell, lines and rows apart from one another and from welds."""
+    heights = plan.targets.height_m
+    top = plan.shell.high_m - plan.shell.low_m
+    for height in np.unique(heights[(heights > top) | (heights < 0)]):
+        where = message("plan_below_shell", "below the shell")
+        if height > top:
+            where = message("plan_above_shell", "above the shell")
+        expected = message(
+            "plan_row_off_shell",
+            "a row of targets at {height:g} m is {where}; expected 0 to {top:g} m",
+            height=height,
+            where=where,
+            top=top,
+        )
+        pattern.tell(log.problem, "heights_m", expected)
+    _check_lines(plan, pattern, log)
+    _check_rows(plan, pattern, log)
+
+
+def _check_lines(plan, pattern, log):
+    """Lines that touch, and lines beside a weld that were moved onto another one."""
+    targets, radius = plan.targets, plan.shell.radius_m
+    first = [name == targets.section[0] for name in targets.section]
+    names = [name for name, is_first in zip(targets.generatrix, first, strict=True) if is_first]
+    east, north, _ = targets.outwards[first].T * (1.0 if plan.shell.outside else -1.0)
+    azimuth = np.arctan2(east, north)
+    order = np.argsort(azimuth)
+    gap = np.diff(azimuth[order], append=azimuth[order[0]] + 2 * np.pi) * radius
+    after = np.roll(order, -1)
+    touching = [
+        message("plan_two_lines", "{one} and {other}", one=names[one], other=names[other])
+        for one, other, off in zip(order, after, gap, strict=True)
+        if off < TOUCH_M and one != other
+    ]
+    clearance = 1000 * targets.clearance_m
+    if touching:
+        expected = message(
+            "plan_lines_touch",
+            "lines {names} are nearer than {touch_mm:g} mm to one another where they "
+            "keep {clearance:g} mm from welds; expected fewer generatrices, another "
+            "first_azimuth_deg or a smaller weld_clearance_mm",
+            names=_first(touching),
+            touch_mm=1000 * TOUCH_M,
+            clearance=clearance,
+        )
+        pattern.tell(log.problem, "generatrices", expected)
+    welds = np.array(targets.welds_rad)
+    off = np.abs(np.angle(np.exp(1j * (azimuth[:, None] - welds)))) * radius
+    close = (off < targets.clearance_m - ROUNDING_M).any(axis=1)
+    if close.any():
+        near = _first([names[i] for i in np.flatnonzero(close)])
+        expected = message(
+            "plan_lines_on_weld",
+            "lines {names} are as near as {off_mm:.0f} mm to a weld, moved away from "
+            "another one; expected welds further apart, or a weld_clearance_mm below "
+            "{clearance:g}",
+            names=near,
+            off_mm=1000 * off.min(),
+            clearance=clearance,
+        )
+        pattern.tell(log.problem, "weld_azimuths_deg", expected)
+
+
+def _check_rows(plan, pattern, log):
+    """Rows that touch; rows that were asked for on a horizontal weld, which may be meant."""
+    if not pattern["heights_m"]:
+        return
+    rows = np.sort(pattern["heights_m"])
+    touching = np.flatnonzero(np.diff(rows) < TOUCH_M)
+    if len(touching):
+        pairs = _first(
+            [
+                message("plan_two_rows", "{low:g} and {high:g} m", low=rows[i], high=rows[i + 1])
+                for i in touching
+            ]
+        )
+        expected = message(
+            "plan_rows_touch",
+            "rows at {pairs}; expected rows at least {touch_mm:g} mm apart",
+            pairs=pairs,
+            touch_mm=1000 * TOUCH_M,
+        )
+        pattern.tell(log.problem, "heights_m", expected)
+    clearance = plan.targets.clearance_m
+    off = np.abs(rows[:, None] - joints_m(plan)).min(axis=1)
+    close = rows[off < clearance - ROUNDING_M]
+    if len(close):
+        text = message(
+            "plan_targets_on_welds",
+            "{count} rows of targets are nearer than {clearance_mm:g} mm to a horizontal weld:"
+            " {heights} m; are they meant there?",
+            count=len(close),
+            clearance_mm=1000 * clearance,
+            heights=listed([f"{height:g}" for height in close], SHOWN),
+        )
+        pattern.tell(log.warning, "heights_m", text)
+
+
+def _first(names):
+    """The first names in a row, and how many more there are."""
+    return message("plan_first", "{names}", names=listed(names, SHOWN))
+
 
 NEAR_M = 0.05  # of the wall: a station nearer than this stands in it
 WITHOUT_FORM = (
