@@ -15,7 +15,7 @@ from tankcal.pipeline.tanks.vertical import volume_by_points
 from tankcal.pipeline.wall import Wall, find_wall
 from tankcal.planning.covariance import PredictedCovariance
 from tankcal.survey.causes import causes_of
-from tankcal.survey.wall_points import off_the_wall
+from tankcal.survey.wall import off_the_wall
 
 MANY = 400  # points of a wall whose covariance is written out for its outlines
 

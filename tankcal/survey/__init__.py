@@ -4,7 +4,7 @@ from tankcal.survey.adjustment import adjust_survey
 from tankcal.survey.diagnosis.datum_dependence import Dependence, datum_dependence
 from tankcal.survey.prediction import Nominal, Predicted, predict_survey
 from tankcal.survey.results import Adjustment, Cause, Reading
-from tankcal.survey.wall_points import wall_points
+from tankcal.survey.wall import wall_points
 
 __all__ = [
     "Adjustment",

@@ -16,7 +16,7 @@ from tankcal.survey.means import averaged
 from tankcal.survey.measurements import AdjustmentSettings, Instrument, Measurements, Targets
 from tankcal.survey.network import adjust
 from tankcal.survey.readings import EARTH_RADIUS_M, true_distance_m
-from tankcal.survey.wall_points import off_the_wall
+from tankcal.survey.wall import off_the_wall
 
 
 @pytest.fixture(scope="module")
@@ -352,7 +352,7 @@ def test_points_of_the_wall(photos, adjustment):
 
 
 def test_too_many_points_of_the_wall_are_refused(photos, adjustment, monkeypatch):
-    monkeypatch.setattr("tankcal.survey.wall_points.LARGEST", 20)
+    monkeypatch.setattr("tankcal.survey.wall.LARGEST", 20)
     with pytest.raises(SolutionError, match="48 points of the wall were adjusted; at most 20 can"):
         wall_points(adjustment, photos[0], "outside")
 
