@@ -10,7 +10,7 @@ import numpy as np
 
 from tankcal.pipeline.chain import run
 from tankcal.pipeline.plausibility import refuse_undetermined
-from tankcal.pipeline.wall import among_themselves
+from tankcal.pipeline.wall import s_transform
 from tankcal.survey import wall_points
 
 STEP_M = 0.1  # of the table: only its top row is wanted
@@ -54,7 +54,7 @@ class TopOfTank:
     def _result(self, adjustment):
         job = self.job
         points = wall_points(adjustment, job.measurements, job.survey.side)
-        points, snooping = among_themselves(points), job.snooping
+        points, snooping = s_transform(points), job.snooping
         if self._wall is not None:
             points, snooping = _chosen(points, self._wall), False
         table = replace(

@@ -40,7 +40,7 @@ def parameters(options):
         job = _load(options.source, show, options.language)
         if job.measurements is not None:
             _refuse_several(options, sets_to_be(job.measurements, **of))
-        found = analyse_job(job, choices, **of, dropping=not options.no_trials, tell=show.part)
+        found = analyse_job(job, choices, **of, dropping=not options.no_trials, progress=show.part)
     paths = [] if job is not None else [options.source]
     _finish([as_json(one) for one in found], options, show, paths, job, record)
 
@@ -89,7 +89,7 @@ def influence(options):
         calibrations,
         states=options.states,
         camera=options.camera,
-        tell=show.part,
+        progress=show.part,
         file=Path(options.cameras).name,
     )
     warn(warnings)

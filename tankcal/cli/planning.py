@@ -123,8 +123,8 @@ def _studied(plan, prediction, options, show):
     """Effects of all changes, and the path to the smallest design; () and None: not asked for."""
     from tankcal.planning.improvements import smallest, what_helps
 
-    effects = what_helps(plan, tell=show.part, before=prediction) if options.changes else ()
-    return effects, smallest(plan, tell=show.part) if options.smallest else None
+    effects = what_helps(plan, progress=show.part, before=prediction) if options.changes else ()
+    return effects, smallest(plan, progress=show.part) if options.smallest else None
 
 
 def _simulated(prediction, options, show):

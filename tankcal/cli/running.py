@@ -158,7 +158,7 @@ def _compute(source, out, quiet, strict=False, papers=(), tell=_tell):
     show = Progress(quiet)
     job = read_job(source, show)
     outputs.refuse_foreign(out)
-    result = tankcal.run(job, show.step, counting=show.part)
+    result = tankcal.run(job, show.step, part_progress=show.part)
     adjustment = result.adjustment
     if strict:
         _refuse_failed(adjustment)

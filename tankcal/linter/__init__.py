@@ -3,7 +3,7 @@
 grids, headings, numbers, layout   from a file to pairs of height and volume
 heights                            order, steps, rows missing, doubled or swapped
 volumes, examination               rounding, falls, rows that are not where the others put them
-screening, stories, suggestions    how that is found, how it is explained, what was meant
+screening, hypotheses, suggestions   how that is found, how it is explained, what was meant
 linting, totals, parts             units, total, last row; proportional parts
 """
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.linter.stories import explain
+from tankcal.linter.hypotheses import explain
 
 # Screening of a table: is each volume where its neighbours put it?
 #
@@ -166,16 +166,16 @@ def examine(height, volume, rounding):
                 break
             _reopen(rows, doubtful.pop())
             continue
-        story = _beyond_joint(rows, explain(rows, row), moved)
-        if story.kind == "joint" and story.rows[0] not in rows.joints:
-            rows.joints = sorted([*rows.joints, story.rows[0]])
-            if story.excess > 1 and story.rows[0] not in seen:
-                doubtful.append(story.rows[0])
-                seen.add(story.rows[0])
-        elif story.is_innocent:
+        hypothesis = _beyond_joint(rows, explain(rows, row), moved)
+        if hypothesis.kind == "joint" and hypothesis.rows[0] not in rows.joints:
+            rows.joints = sorted([*rows.joints, hypothesis.rows[0]])
+            if hypothesis.excess > 1 and hypothesis.rows[0] not in seen:
+                doubtful.append(hypothesis.rows[0])
+                seen.add(hypothesis.rows[0])
+        elif hypothesis.is_null:
             rows.is_settled[row] = True
         else:
-            faults += _mend(rows, story)
+            faults += _mend(rows, hypothesis)
     else:
         row = -1
     mended = np.where(rows.is_sound, rows.volume, np.nan)
@@ -189,33 +189,39 @@ def _reopen(rows, joint):
     rows.is_settled[max(joint - _SECOND_LOOK, 0) : joint + _SECOND_LOOK] = False
 
 
-def _beyond_joint(rows, story, moved):
-    """The story, or a better one: a wrong row beside a joint may be a joint that stands elsewhere.
+def _beyond_joint(rows, hypothesis, moved):
+    """The hypothesis, or a better one: a wrong row beside a joint may be a joint elsewhere.
 
     moved  joints that were asked about already
     """
-    beside = [j for j in rows.joints if story.kind == "row" and story.rows[0] in (j, j - 1)]
+    beside = [
+        j for j in rows.joints if hypothesis.kind == "row" and hypothesis.rows[0] in (j, j - 1)
+    ]
     if not beside or beside[0] in moved:
-        return story
+        return hypothesis
     joint = beside[0]
     moved.add(joint)
     rows.joints = [one for one in rows.joints if one != joint]
-    other = explain(rows, story.rows[0])
+    other = explain(rows, hypothesis.rows[0])
     if other.kind == "joint" and other.rows[0] != joint:
         return other
     rows.joints = sorted([*rows.joints, joint])
-    return story
+    return hypothesis
 
 
-def _mend(rows, story):
-    """The faults of a guilty story; its rows are mended, or left out from now on."""
-    first, last = story.rows[0], story.rows[-1]
-    if story.kind == "swap":
+def _mend(rows, hypothesis):
+    """The faults of an alternative; its rows are mended, or left out from now on."""
+    first, last = hypothesis.rows[0], hypothesis.rows[-1]
+    if hypothesis.kind == "swap":
         rows.volume[[first, last]] = rows.volume[[last, first]]
         return [Fault("swap", first, last, 0.0)]
-    if story.kind in ("row", "pair"):
+    if hypothesis.kind in ("row", "pair"):
         wrong = dict(
-            zip(story.rows if story.kind == "pair" else (first,), story.sizes, strict=True)
+            zip(
+                hypothesis.rows if hypothesis.kind == "pair" else (first,),
+                hypothesis.sizes,
+                strict=True,
+            )
         )
         rows.is_sound[list(wrong)] = False
         return [
@@ -224,8 +230,8 @@ def _mend(rows, story):
             if not (rows.volume[row] == 0 and size > 0)  # an empty tank above its bottom
         ]
     end = len(rows.height) if last is None else last + 1
-    rows.volume[first:end] -= story.sizes[0]
-    return [Fault(story.kind, first, end - 1, story.sizes[0])]
+    rows.volume[first:end] -= hypothesis.sizes[0]
+    return [Fault(hypothesis.kind, first, end - 1, hypothesis.sizes[0])]
 
 
 def _merged(faults, count):

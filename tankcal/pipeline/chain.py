@@ -32,7 +32,7 @@ from tankcal.pipeline.statements import (
 from tankcal.pipeline.table import doubts_of_table, tabled
 from tankcal.pipeline.tanks import body_of, shell_volume
 from tankcal.pipeline.views import plot
-from tankcal.pipeline.wall import Wall, among_themselves, find_wall
+from tankcal.pipeline.wall import Wall, find_wall, s_transform
 from tankcal.survey import Adjustment, adjust_survey, wall_points
 from tankcal.tank import dips
 from tankcal.tank.body import Body
@@ -225,13 +225,13 @@ def run(
     job: Job,
     progress: Callable[[str], None] | None = None,
     *,
-    counting: Callable[[str, int, int], None] | None = None,
+    part_progress: Callable[[str, int, int], None] | None = None,
     simulated: bool | None = None,
 ) -> Result:
     """Compute a job: adjusted points, wall and axis, parts of the tank, table with covariance.
 
     progress  called with a line of text as each step begins
-    counting  called as counting(text, done, total) while a long step goes on
+    part_progress  called with (text, done, total) while a long step goes on
     simulated whether the table is simulated, too; None: as the job says. One without any
               uncertainty never is
     Raises InputError when a course is left with too few points, SolutionError when the survey does
@@ -240,19 +240,19 @@ def run(
     """
     _refuse_other(job, "run")
     with _telling(job):
-        return _run(job, progress or (lambda text: None), counting, simulated)
+        return _run(job, progress or (lambda text: None), part_progress, simulated)
 
 
-def _run(job, tell, counting, simulated):
+def _run(job, progress, part_progress, simulated):
     if job.tank is None:
         raise InputError(
             Problem("job.toml", message("no_tank", "no tank: only its survey can be adjusted"))
         )
     adjustment = None
     if job.measurements is not None:
-        job, adjustment = _adjusted(job, tell)
+        job, adjustment = _adjusted(job, progress)
     try:
-        survey = _survey(job, tell, np.inf if adjustment is None else adjustment.dof)
+        survey = _survey(job, progress, np.inf if adjustment is None else adjustment.dof)
     except SolutionError as error:
         if adjustment is None or not adjustment.warnings:
             raise
@@ -263,17 +263,17 @@ def _run(job, tell, counting, simulated):
         refuse_other_side(job, partial(is_within_wall, wall), adjustment)
     elif adjustment is not None and isinstance(survey, Scan):
         refuse_other_side(job, survey.is_within, adjustment)
-    made = tabled(job, survey, tell)
+    made = tabled(job, survey, progress)
     body, zero, table = made.body, made.zero_m, made.table
-    tell(message("stating", "stating volumes and deliveries"))
+    progress(message("stating", "stating volumes and deliveries"))
     stated = statements(job, table, made.straightness.largest_m3)
     simulation = None
     intervals = gum_intervals(table.volume_m3, table.u_m3, table.U_m3)
     wanted = job.table.monte_carlo if simulated is None else simulated
     if wanted and table.sources:
-        tell(SIMULATING)
+        progress(SIMULATING)
         pairs = pairs_to_simulate(stated, job, body, table)
-        simulation = simulate_table(job, survey, body, zero, table, pairs, tell=counting)
+        simulation = simulate_table(job, survey, body, zero, table, pairs, progress=part_progress)
         intervals = simulation.intervals(table)
     return Result(
         job=job,
@@ -349,7 +349,7 @@ def _refuse_other(job, name):
         raise TypeError(f"found {type(job).__name__}; expected a Job: {name}(tankcal.load(path))")
 
 
-def _adjusted(job, tell):
+def _adjusted(job, progress):
     """The job with the points of its adjusted survey, and the adjustment."""
     if job.points is not None and not job.points.from_adjustment:
         expected = message(
@@ -357,21 +357,21 @@ def _adjusted(job, tell):
             "given beside a survey; expected one of them: the points are adjusted from it",
         )
         raise InputError(Problem("points.csv", expected))
-    adjustment = adjust_survey(job.measurements, tell)
+    adjustment = adjust_survey(job.measurements, progress)
     refuse_undetermined(adjustment.datum)
     points = wall_points(adjustment, job.measurements, job.survey.side)
-    return replace(job, points=among_themselves(points)), adjustment
+    return replace(job, points=s_transform(points)), adjustment
 
 
-def _survey(job, tell, dof):
+def _survey(job, progress, dof):
     """What was surveyed: a wall of courses, a mesh, the scan of another wall; None: sizes alone."""
     if job.tank.kind == "vertical":
-        return find_wall(job, tell, dof)
+        return find_wall(job, progress, dof)
     if job.mesh is not None:
-        tell(message("checking_mesh", "checking the mesh {file}", file=job.mesh.file))
+        progress(message("checking_mesh", "checking the mesh {file}", file=job.mesh.file))
         return parse_mesh(job.mesh.file, job.mesh.data, job.mesh.unit_m)
     if job.points is not None:
-        tell(
+        progress(
             message(
                 "fitting_wall", "fitting the wall to {count} points", count=len(job.points.names)
             )
@@ -384,7 +384,7 @@ def _parts(spec, made, U_m3):
     """Proportional parts of a centimetre table where their error is a small part of U."""
     if spec.step_m is None or abs(spec.step_m - PARTS * MILLIMETRE) > 1e-9:
         return ()
-    edges = np.unique(np.round([0.0, *made.kinks_m, made.top_m], 3))
+    edges = np.unique(np.round([0.0, *made.breakpoints_m, made.top_m], 3))
     allowed = np.maximum(PARTS_OF_U * np.minimum(U_m3, VAST_M3), PARTS_M3)
 
     def bound_m3(dips_m):

@@ -37,7 +37,7 @@ class Tabled:
     body          the tank as the sum of its parts (`body.Body`)
     zero_m        level of the table's zero: dip 0 in the frame of the parts
     levels_m      (rows,) levels of the rows there
-    kinks_m       dips between empty and full at which the area jumps
+    breakpoints_m dips between empty and full at which the area jumps
     table         `capacity.Capacity`
     straightness  how far linear interpolation between the rows is from the exact volume
     """
@@ -45,7 +45,7 @@ class Tabled:
     body: Body
     zero_m: float
     levels_m: np.ndarray
-    kinks_m: np.ndarray
+    breakpoints_m: np.ndarray
     table: Capacity
     straightness: Straightness
 
@@ -64,21 +64,21 @@ class Tabled:
         return _exact(self.body, self.zero_m)(dips_m)
 
 
-def tabled(job, survey, tell=lambda text: None):
+def tabled(job, survey, progress=lambda text: None):
     """The `Tabled` of a job.
 
     survey  its `wall.Wall`, `scan.Scan` or mesh, None where sizes alone tell of the tank
-    tell    called with a line of text as each step begins
+    progress  called with a line of text as each step begins
     """
-    tell(message("integrating", "integrating volumes"))
+    progress(message("integrating", "integrating volumes"))
     body = body_of(job, survey)
     zero = zero_height(job, survey)
-    tell(message("propagating", "propagating the covariance to every row of the table"))
+    progress(message("propagating", "propagating the covariance to every row of the table"))
     spec = job.table
     top = whole_top(body.highest_m - zero, spec.height_unit, closed=_is_closed(body))
-    kinks = np.unique([kink - zero for kink in body.kinks_m if 0 < kink - zero < top])
+    breakpoints = np.unique([edge - zero for edge in body.breakpoints_m if 0 < edge - zero < top])
     exact = _exact(body, zero)
-    heights = _rows(spec, exact, top, kinks)
+    heights = _rows(spec, exact, top, breakpoints)
     levels = heights + zero
     volumes, areas, sources = _without_rounding(*body.rows(levels))
     table = Capacity(
@@ -89,10 +89,10 @@ def tabled(job, survey, tell=lambda text: None):
         probability=spec.coverage_probability,
         critical_m=critical_zone(job),
     )
-    dips = np.union1d(heights, kinks)
+    dips = np.union1d(heights, breakpoints)
     refuse_falling(job, body, zero, dips, exact(dips))
-    straightness = interpolation_errors(exact, heights, kinks)
-    return Tabled(body, zero, levels, kinks, table, straightness)
+    straightness = interpolation_errors(exact, heights, breakpoints)
+    return Tabled(body, zero, levels, breakpoints, table, straightness)
 
 
 def doubts_of_table(job, survey, made):
@@ -139,7 +139,7 @@ def _is_closed(body):
     return bool(areas[-1] < CLOSED * areas.max())
 
 
-def _rows(spec, exact, top_m, kinks_m):
+def _rows(spec, exact, top_m, breakpoints_m):
     """Dips of the rows: by the step asked for, or by the bound on linear interpolation."""
     step = spec.step_m
     if step is None and spec.height_unit != "m":
@@ -149,7 +149,7 @@ def _rows(spec, exact, top_m, kinks_m):
             exact,
             top_m,
             spec.max_interpolation_error_m3,
-            kinks_m,
+            breakpoints_m,
             step_m=step,
             ladder_m=LADDERS_M[spec.height_unit],
         ).height_m

@@ -54,16 +54,16 @@ class Wall:
     sections: tuple[Section, ...]
 
 
-def find_wall(job, tell, dof=np.inf, form=None):
+def find_wall(job, progress, dof=np.inf, form=None):
     """The wall, its axis and its sections, from the points of a job.
 
-    tell  called with a line of text as each step begins
+    progress  called with a line of text as each step begins
     dof   degrees of freedom of the points' covariance, where it was given
     form  `Form` of the shell where it is known beforehand; None: the points tell it
     Raises InputError when a course is left with too few points, SolutionError when there is no
     wall.
     """
-    tell(
+    progress(
         message(
             "separating",
             "separating the wall from clutter in {count} points",
@@ -75,7 +75,7 @@ def find_wall(job, tell, dof=np.inf, form=None):
     shell = _shell(job, heights, sds)
     accepted = np.flatnonzero(shell.reason == "")
     joints = heights / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
-    tell(
+    progress(
         message(
             "fitting_sections",
             "fitting sections through {count} points of the wall",
@@ -192,7 +192,7 @@ def _azimuths(job, shell, wall):
     return polar(xyz[:, :2] - axis, 0.0, 0.0)[0]
 
 
-def among_themselves(points):
+def s_transform(points):
     """Adjusted points with the covariance that they have among themselves.
 
     C' = S C S + s2 D D',  S = I - D D',  D an orthonormal basis of their common shift and their
@@ -220,7 +220,7 @@ def common_motions(xyz_m):
 
 
 def taken_along(basis, spread, trace):
-    """A (3n, 4) of C' = C - D A' - A D', which is S C S + s2 D D' of `among_themselves`.
+    """A (3n, 4) of C' = C - D A' - A D', which is S C S + s2 D D' of `s_transform`.
 
     A = C D - D (D'C D + s2 I) / 2; basis D, spread C D, trace of C
     """

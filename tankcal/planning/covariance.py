@@ -3,7 +3,7 @@
 What a volume needs of all points together are products with a few columns: Q M comes from the
 reduced normal equations, 3n times d numbers and not 3n times 3n.
 
-Shifts and the turn about the vertical are taken out as `wall.among_themselves` takes them out,
+Shifts and the turn about the vertical are taken out as `wall.s_transform` takes them out,
 by its D and A: C' = C - D A' - A D'.
 """
 

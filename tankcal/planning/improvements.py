@@ -79,23 +79,23 @@ class Path:
         return cost_of(self.plan)
 
 
-def what_helps(plan, changes=None, tell=None, before=None):
+def what_helps(plan, changes=None, progress=None, before=None):
     """An Effect of each Change of a Plan, the one that helps most first.
 
-    changes  tuple of Change; None: all of one item        tell  tell(text, done, total)
+    changes  tuple of Change; None: all of one item        progress  progress(text, done, total)
     before   Prediction of the plan, where it is known
     """
     changes = changes_of(plan) if changes is None else changes
     before = predict(plan) if before is None else before
-    tell = tell or (lambda text, done, total: None)
+    progress = progress or (lambda text, done, total: None)
     found = []
     for number, one in enumerate(changes, 1):
-        tell(message("plan_trying_changes", "trying changes"), number, len(changes))
+        progress(message("plan_trying_changes", "trying changes"), number, len(changes))
         found.append(_effect(one, before))
     return tuple(sorted(found, key=lambda one: one.relative_u))
 
 
-def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, tell=None):
+def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, progress=None):
     """The Path of the best change of each round.
 
     add      True: items are added and repeated until the plan's limit is met, or `steps` are done;
@@ -109,7 +109,7 @@ def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, tell=No
     for _ in range(steps):
         if add and now.meets:
             break
-        effects = what_helps(now.plan, choose(now.plan), tell, now)
+        effects = what_helps(now.plan, choose(now.plan), progress, now)
         tried += len(effects)
         step, after = _best(effects, now, limit, add)
         if step is None:
@@ -119,7 +119,7 @@ def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, tell=No
     return Path(start, tuple(made), now, tried)
 
 
-def smallest(plan, tell=None, items=ITEMS):
+def smallest(plan, progress=None, items=ITEMS):
     """The Path to the smallest design that meets the limit of a Plan.
 
     Items are added until the limit is met, then dropped as long as it is. Raises ValueError for a
@@ -127,10 +127,10 @@ def smallest(plan, tell=None, items=ITEMS):
     """
     if plan.limits.relative_u is None:
         raise ValueError("a search needs limits.relative_u in the plan")
-    first = greedy(plan, add=True, steps=100, items=items, tell=tell)
+    first = greedy(plan, add=True, steps=100, items=items, progress=progress)
     if not first.prediction.meets:
         return first
-    last = greedy(first.plan, add=False, steps=1000, items=items, tell=tell)
+    last = greedy(first.plan, add=False, steps=1000, items=items, progress=progress)
     steps = first.steps + last.steps
     return Path(first.start, steps, last.prediction, first.tried + last.tried)
 

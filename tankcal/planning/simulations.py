@@ -12,7 +12,7 @@ import numpy as np
 from tankcal.errors import SolutionError, TankcalError
 from tankcal.messages import message
 from tankcal.pipeline.table import tabled
-from tankcal.pipeline.wall import among_themselves, find_wall
+from tankcal.pipeline.wall import find_wall, s_transform
 from tankcal.planning.measurements import measured
 from tankcal.planning.prediction import Prediction
 from tankcal.survey import adjust_survey, wall_points
@@ -60,19 +60,19 @@ class Simulated:
         return float(1 / np.sqrt(2 * (self.runs - 1)))
 
 
-def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, tell=None):
+def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=None):
     """The Simulated of a Prediction.
 
     blunders  share of readings that are off by BLUNDER_SDS of their standard deviations
-    tell      tell(text, done, total)
+    progress  progress(text, done, total)
 
     Raises SolutionError when fewer than two of the surveys have a solution.
     """
     rng, failed = np.random.default_rng(seed), []
     found, volumes, aside = [], [], []
     for run in range(1, runs + 1):
-        if tell:
-            tell(message("plan_simulating", "simulating surveys"), run, runs)
+        if progress:
+            progress(message("plan_simulating", "simulating surveys"), run, runs)
         drawn = measured(prediction.plan, prediction.measurements, prediction.predicted, rng)
         try:
             adjustment, volume = _made(prediction.plan, _spoilt(drawn, blunders, rng))
@@ -115,7 +115,7 @@ def _made(plan, measurements):
     measurements = replace(measurements, settings=quiet)
     adjustment = adjust_survey(measurements)
     points = wall_points(adjustment, measurements, plan.job.survey.side)
-    job = replace(plan.job, points=among_themselves(points), measurements=None)
+    job = replace(plan.job, points=s_transform(points), measurements=None)
     wall = find_wall(job, lambda text: None, adjustment.dof, plan.form)
     body = tabled(job, wall).body
     return adjustment, float(body.volume_m3(np.array([body.highest_m]))[0])

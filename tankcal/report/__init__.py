@@ -80,15 +80,15 @@ def set_papers(notebook, directory, parts, progress=None):
     from tankcal.report.web import page
 
     total = len(notebook.cells) + len(parts) + 2
-    tell = progress or (lambda done, total: None)
-    execute(notebook, directory, on_cell=lambda done: tell(done, total))
+    progress = progress or (lambda done, total: None)
+    execute(notebook, directory, on_cell=lambda done: progress(done, total))
 
     contents = {"report.ipynb": nbformat.writes(notebook).encode("utf-8")}
     for name, part in parts:
         contents[name] = pdf(blocks_of(notebook, part), directory)
-        tell(len(notebook.cells) + len(contents), total)
+        progress(len(notebook.cells) + len(contents), total)
     contents["report.html"] = page(blocks_of(notebook)).encode("utf-8")
     for name, content in contents.items():
         (directory / name).write_bytes(content)
-    tell(total, total)
+    progress(total, total)
     return [directory / name for name in contents]

@@ -53,7 +53,7 @@ def _through(solution, rows):
         return scipy.sparse.csr_array((rows.shape[0], 0)), reduced
     of_blocks = rows[:, plan.reduced :]
     own = scipy.sparse.csr_array(of_blocks @ _block_diagonal(solution))
-    return own, reduced + of_blocks @ solution.following
+    return own, reduced + of_blocks @ solution.back_substitution
 
 
 def responses(solution, columns, jac):
@@ -91,7 +91,7 @@ def covariances(solution, columns, jac):
 def _response(solution, rows):
     """Q J' (unknowns, k) of a sparse matrix of rows (k, unknowns), in the datum of the factor."""
     own, reduced = _through(solution, rows)
-    found = solution.followed(solution.factor.solved(reduced.T))
+    found = solution.back_substitute_covariance(solution.factor.solved(reduced.T))
     if solution.plan.blocks:
         found[solution.plan.reduced :] += (_block_diagonal(solution) @ own.T).toarray()
     return found
@@ -158,7 +158,7 @@ def own_leverage(solution, group, jac):
     return out
 
 
-def pulls(solution):
+def constraint_reactions(solution):
     """What pulls at the exact conditions: k (m,), its sd (m,), and changes (unknowns, m).
 
     The changes are those of all unknowns when a condition's value changes by one. Conditions that
@@ -169,7 +169,7 @@ def pulls(solution):
     k, sd = np.zeros(conditions.rows), np.zeros(conditions.rows)
     changes = np.zeros((solution.model.unknowns, conditions.rows))
     first, _ = tangent.split(factor.scale * _gradient(solution))
-    s11, s12 = factor.pull[:, :rank], factor.pull[:, rank:]
+    s11, s12 = factor.reaction_part[:, :rank], factor.reaction_part[:, rank:]
     follow = scipy.linalg.cho_solve((factor.lower, True), s12.T)
     back = scipy.linalg.solve_triangular(tangent.r, np.eye(rank))  # R^-1
     q = back @ (s11 - s12 @ follow) @ back.T
@@ -178,11 +178,11 @@ def pulls(solution):
     variance, alone = np.diag(q), np.diag(back @ s11 @ back.T)
     sd[which] = np.sqrt(np.where(variance > UNTESTED * alone, variance, 0.0)) / length
     y = back.T / length
-    reduced = factor.scale[:, None] * tangent.whole(-follow @ y, y)
-    changes[:, which] = solution.followed(reduced)
+    reduced = factor.scale[:, None] * tangent.from_null_space(-follow @ y, y)
+    changes[:, which] = solution.back_substitute_covariance(reduced)
     if solution.datum is not None:
-        changes -= factor.free @ np.linalg.solve(
-            factor.ties.T @ factor.free, factor.ties.T @ changes
+        changes -= factor.null_space @ np.linalg.solve(
+            factor.datum_basis.T @ factor.null_space, factor.datum_basis.T @ changes
         )
     return k, sd, changes
 
@@ -225,12 +225,12 @@ def times(solution, matrix):
     return np.concatenate([reduced, blocks.reshape(in_all)])
 
 
-def followed(solution, reduced):
+def back_substitute_covariance(solution, reduced):
     """Changes (unknowns, d) of all unknowns, when the reduced ones change by (nr, d)."""
-    return np.concatenate([reduced, solution.following @ reduced])
+    return np.concatenate([reduced, solution.back_substitution @ reduced])
 
 
-def following(solution):
+def back_substitution(solution):
     """-V^-1 W' (3 nb, nr): how the blocks follow the reduced unknowns; dense if small enough."""
     plan, normals = solution.plan, solution.factor.normals
     if not plan.blocks:

@@ -125,11 +125,11 @@ class Tangent:
         turned = self._turned(matrix, True)
         return turned[: self.rank], turned[self.rank :]
 
-    def inside(self, matrix):
+    def in_null_space(self, matrix):
         """Q2' M: the part in the null space of a matrix (nr,) or (nr, k)."""
         return self.split(matrix)[1]
 
-    def whole(self, inner, outer=None):
+    def from_null_space(self, inner, outer=None):
         """Q2 inner (+ Q1 outer): (nr,) or (nr, k) from the part in the null space."""
         above = np.zeros((self.rank, *inner.shape[1:])) if outer is None else outer
         return self._turned(np.concatenate([above, inner]), False)
@@ -143,7 +143,7 @@ class Tangent:
         """The shortest step (nr,), scaled, that closes misclosures (m,) of independent rows."""
         right = (c / self.lengths)[self.independent]
         y = scipy.linalg.solve_triangular(self.r, -right, trans=1) if self.rank else right
-        return self.whole(np.zeros(self._rows.shape[1] - self.rank), y)
+        return self.from_null_space(np.zeros(self._rows.shape[1] - self.rank), y)
 
     def companions(self, row):
         """Rows with which a dependent row is tied up."""

@@ -176,23 +176,25 @@ class _Work:
         if bad >= 0:
             return self._look(state, damping, bad)
         scale = 1.0 / np.sqrt(diagonal)
-        free = ties = held = None
-        if self.model.free is not None and not damping:
-            free = self.model.free(state)
-            ties = free * self.model.inner[:, None]
-            if np.linalg.matrix_rank(ties.T @ free) < free.shape[1]:
+        null_space = datum_basis = held = None
+        if self.model.null_space is not None and not damping:
+            null_space = self.model.null_space(state)
+            datum_basis = null_space * self.model.inner[:, None]
+            if np.linalg.matrix_rank(datum_basis.T @ null_space) < null_space.shape[1]:
                 raise SolutionError(
                     message("datum_not_fixed", "what is to hold the datum does not fix it")
                 )
-            held = np.linalg.qr(free[:nr] / scale[:, None])[0]
+            held = np.linalg.qr(null_space[:nr] / scale[:, None])[0]
         if self.plan.blocks == 0 and self.rows * nr * nr < SMALL:
-            lower, sound, pull = self._dense_root(scale, untouched, damping, held, tangent)
+            lower, sound, reaction_part = self._dense_root(scale, untouched, damping, held, tangent)
         else:
-            lower, sound, pull = self._root(scale, untouched, damping, held, tangent)
+            lower, sound, reaction_part = self._root(scale, untouched, damping, held, tangent)
         if not sound:
             return self._look(state, damping, None)
         untouched = np.flatnonzero(untouched)
-        return Factor(normals, scale, lower, untouched, free, ties, tangent, pull)
+        return Factor(
+            normals, scale, lower, untouched, null_space, datum_basis, tangent, reaction_part
+        )
 
     def _root(self, scale, untouched, damping, held, tangent):
         """Cholesky factor of the scaled reduced system, and whether its pivots are sound.
@@ -209,12 +211,12 @@ class _Work:
         corner += damping
         if held is not None:
             s += held @ held.T
-        pull = None
+        reaction_part = None
         if tangent is not None:
-            s, pull = tangent.square(s)
+            s, reaction_part = tangent.square(s)
         lower, info = scipy.linalg.lapack.dpotrf(s.T, lower=1, clean=0, overwrite_a=1)
         sound = not info and determined(lower.diagonal(), self.rows, of_normals=True).all()
-        return lower, sound, pull
+        return lower, sound, reaction_part
 
     def _dense_root(self, scale, untouched, damping, held, tangent):
         """The same factor by QR of the rows themselves: nothing is squared."""
@@ -229,13 +231,13 @@ class _Work:
             columns = np.broadcast_to(batch.columns[:, None, :], jac.shape)
             dense[np.arange(n)[:, None, None], np.arange(m)[:, None], columns] = jac
             rows.append(dense.reshape(n * m, dense.shape[-1])[:, :nr] * scale)
-        rows, pull = np.vstack(rows), None
+        rows, reaction_part = np.vstack(rows), None
         if tangent is not None:
             outer, rows = tangent.split(rows.T)
-            pull, rows = outer @ np.vstack([outer, rows]).T, rows.T
+            reaction_part, rows = outer @ np.vstack([outer, rows]).T, rows.T
         r = np.linalg.qr(rows, mode="r")
         lower = np.asfortranarray((r * np.sign(r.diagonal())[:, None]).T)
-        return lower, determined(lower.diagonal(), self.rows).all(), pull
+        return lower, determined(lower.diagonal(), self.rows).all(), reaction_part
 
     def _look(self, state, damping, bad_block):
         """A factor that could not be had: raise when it is the survey's fault."""
@@ -249,7 +251,9 @@ class _Work:
         reduced = -factor.solved(n.g[:-1])
         blocks = -back_substitute(self.plan, n, reduced)
         step = np.concatenate([reduced, blocks.ravel()])
-        if factor.free is not None:
-            step -= factor.free @ np.linalg.solve(factor.ties.T @ factor.free, factor.ties.T @ step)
+        if factor.null_space is not None:
+            step -= factor.null_space @ np.linalg.solve(
+                factor.datum_basis.T @ factor.null_space, factor.datum_basis.T @ step
+            )
         decrement = -float(n.g[:-1] @ reduced) + float(np.vdot(n.b, n.b))
         return step, decrement

@@ -29,8 +29,8 @@ class Model:
     blocks      number of eliminated blocks of three unknowns; they come last
     groups      tuple of Group; no row touches two eliminated blocks
     moved       moved(state, step) -> state, step (reduced + 3 blocks,)
-    free        free(state) -> (unknowns, d) directions in which nothing is observed (a datum to be
-                chosen), or None when the observations give the datum
+    null_space  null_space(state) -> (unknowns, d) directions in which nothing is observed (a datum
+                to be chosen), or None when the observations give the datum
     name_of     name_of(column) -> what the user calls that unknown
     in_words    in_words(directions) -> the unknowns that take part in directions (unknowns, d), all
                 columns of length one, in words; None: their names
@@ -44,7 +44,7 @@ class Model:
     blocks: int
     groups: tuple
     moved: Callable
-    free: Callable = None
+    null_space: Callable = None
     name_of: Callable = str
     in_words: Callable = None
     inner: np.ndarray = None
@@ -53,11 +53,11 @@ class Model:
 
     def in_datum(self, state, step):
         """A step (unknowns,) without what the inner constraints forbid; there may be none."""
-        if self.free is None:
+        if self.null_space is None:
             return step
-        free = self.free(state)
-        ties = free * self.inner[:, None]
-        return step - free @ np.linalg.solve(ties.T @ free, ties.T @ step)
+        null_space = self.null_space(state)
+        datum_basis = null_space * self.inner[:, None]
+        return step - null_space @ np.linalg.solve(datum_basis.T @ null_space, datum_basis.T @ step)
 
     @property
     def unknowns(self):

@@ -24,8 +24,8 @@ def diagnosis(work, state, bad_block):
         names = ", ".join(model.name_of(column) for column in range(first, first + 3))
         return message("undetermined", "not determined by the observations: {names}", names=names)
     directions, lengths = undetermined(work, state)
-    if model.free is not None:
-        directions = _without(directions, model.free(state) * lengths[:, None])
+    if model.null_space is not None:
+        directions = _without(directions, model.null_space(state) * lengths[:, None])
     if not directions.shape[1]:
         return None
     told = _in_words(model, directions)
@@ -41,8 +41,8 @@ def weakness(work, state):
     """Words on the direction that the rows feel least, or "" when they feel all."""
     model = work.model
     directions, lengths = undetermined(work, state, WEAK, np.inf)
-    if model.free is not None:
-        directions = _without(directions, model.free(state) * lengths[:, None])
+    if model.null_space is not None:
+        directions = _without(directions, model.null_space(state) * lengths[:, None])
     if not directions.shape[1]:
         return ""
     return message(
@@ -82,7 +82,7 @@ def undetermined(work, state, faint=FAINT, nothing=NOTHING):
     tangent = work.conditions.tangent(state, scale[:nr]) if work.conditions else None
     values, vectors = np.linalg.eigh(s if tangent is None else tangent.square(s)[0])
     if tangent is not None:
-        vectors = tangent.whole(vectors)
+        vectors = tangent.from_null_space(vectors)
     normals.b[:] = 0.0
     found = []
     for vector in vectors[:, values < faint].T:
@@ -95,9 +95,9 @@ def undetermined(work, state, faint=FAINT, nothing=NOTHING):
     return found, lengths
 
 
-def _without(directions, free):
+def _without(directions, null_space):
     """The directions that are left when those that the datum fixes are taken out."""
-    basis = np.linalg.qr(free)[0]
+    basis = np.linalg.qr(null_space)[0]
     vectors, sizes, _ = np.linalg.svd(
         directions - basis @ (basis.T @ directions), full_matrices=False
     )

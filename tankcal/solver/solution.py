@@ -5,7 +5,7 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
-from tankcal.solver.effects import followed, following, times
+from tankcal.solver.effects import back_substitute_covariance, back_substitution, times
 from tankcal.solver.elimination import block_cofactors, leverage
 from tankcal.solver.threads import threads_for
 
@@ -13,13 +13,15 @@ from tankcal.solver.threads import threads_for
 class Factor:
     """The factored reduced system: scale and Cholesky factor; eliminated parts in `normals`.
 
-    tangent, pull  where conditions hold exactly: their Tangent, and Q1' S Q, see there
+    tangent, reaction_part  where conditions hold exactly: their Tangent, and Q1' S Q, see there
     """
 
-    def __init__(self, normals, scale, lower, untouched, free, ties, tangent, pull):
+    def __init__(
+        self, normals, scale, lower, untouched, null_space, datum_basis, tangent, reaction_part
+    ):
         self.normals, self.scale, self.lower = normals, scale, lower
-        self.untouched, self.free, self.ties = untouched, free, ties
-        self.tangent, self.pull = tangent, pull
+        self.untouched, self.null_space, self.datum_basis = untouched, null_space, datum_basis
+        self.tangent, self.reaction_part = tangent, reaction_part
 
     def inverse(self):
         """(nr, nr) inverse of the reduced system; in the null space, where conditions hold."""
@@ -31,7 +33,7 @@ class Factor:
         inverse = np.tril(inverse)
         inverse += np.tril(inverse, -1).T
         if self.tangent is not None:
-            inverse = self.tangent.whole(self.tangent.whole(inverse).T)
+            inverse = self.tangent.from_null_space(self.tangent.from_null_space(inverse).T)
         inverse *= self.scale
         inverse *= self.scale[:, None]
         return inverse
@@ -40,7 +42,7 @@ class Factor:
         """L^-1 D columns, so that columns' S^-1 columns is a sum of squares; columns (nr, k)."""
         scaled = columns * self.scale[:, None]
         if self.tangent is not None:
-            scaled = self.tangent.inside(scaled)
+            scaled = self.tangent.in_null_space(scaled)
         return scipy.linalg.solve_triangular(self.lower, scaled, lower=True, check_finite=False)
 
     def solved(self, columns):
@@ -48,9 +50,9 @@ class Factor:
         scale = self.scale if columns.ndim == 1 else self.scale[:, None]
         inner = scale * columns
         if self.tangent is not None:
-            inner = self.tangent.inside(inner)
+            inner = self.tangent.in_null_space(inner)
         inner = scipy.linalg.cho_solve((self.lower, True), inner, check_finite=False)
-        return scale * (inner if self.tangent is None else self.tangent.whole(inner))
+        return scale * (inner if self.tangent is None else self.tangent.from_null_space(inner))
 
 
 class Solution:
@@ -74,8 +76,8 @@ class Solution:
         self.conditions = work.conditions
         self.nearly = nearly
         self.rank_defect = 0
-        if self.model.free is not None:
-            self.rank_defect = self.model.free(state).shape[1]
+        if self.model.null_space is not None:
+            self.rank_defect = self.model.null_space(state).shape[1]
         self.unknowns = self.model.unknowns
         if self.conditions:
             self.unknowns -= self.factor.tangent.rank
@@ -157,31 +159,36 @@ class Solution:
 
         With T = I - G B C', B = (C'G)^-1: T Q T' = Q - G H' - H G' + G M G', H = Q C B', M = B C'H.
         """
-        free, ties = self.factor.free, self.factor.ties
-        if free is None:
+        null_space, datum_basis = self.factor.null_space, self.factor.datum_basis
+        if null_space is None:
             return None
-        inverse = np.linalg.inv(ties.T @ free)
-        h = self.times(ties) @ inverse.T
-        return free, h, inverse @ (ties.T @ h)
+        inverse = np.linalg.inv(datum_basis.T @ null_space)
+        h = self.times(datum_basis) @ inverse.T
+        return null_space, h, inverse @ (datum_basis.T @ h)
 
     def _in_datum(self, q, rows, columns):
         """Cofactors (..., r, k) between unknowns (..., r) and (..., k), brought into the datum."""
-        free, h, m = self.datum
-        g = np.swapaxes(free[columns], -1, -2)
-        return q - free[rows] @ np.swapaxes(h[columns], -1, -2) - h[rows] @ g + free[rows] @ m @ g
+        null_space, h, m = self.datum
+        g = np.swapaxes(null_space[columns], -1, -2)
+        return (
+            q
+            - null_space[rows] @ np.swapaxes(h[columns], -1, -2)
+            - h[rows] @ g
+            + null_space[rows] @ m @ g
+        )
 
     def times(self, matrix):
         """Cofactor matrix times a matrix (unknowns, d), in the datum of the factor."""
         return times(self, matrix)
 
-    def followed(self, reduced):
+    def back_substitute_covariance(self, reduced):
         """Changes (unknowns, d) of all unknowns, when the reduced ones change by (nr, d)."""
-        return followed(self, reduced)
+        return back_substitute_covariance(self, reduced)
 
     @cached_property
-    def following(self):
+    def back_substitution(self):
         """-V^-1 W' (3 nb, nr), how the blocks follow the reduced unknowns; dense or sparse."""
-        return following(self)
+        return back_substitution(self)
 
     def _through_reduced(self, columns):
         """How each unknown follows the reduced ones: (nr, k), d unknown / d reduced."""

@@ -14,8 +14,8 @@ from tankcal.survey.diagnosis.blunders import searched
 from tankcal.survey.diagnosis.checks import check_points, check_readings, disagreeing
 from tankcal.survey.diagnosis.diagnoses import MIRROR, diagnosed
 from tankcal.survey.diagnosis.double_names import names_alike, same_place
+from tankcal.survey.diagnosis.fixed_datum_check import strained, wrong_control, wrongly_held
 from tankcal.survey.diagnosis.gross_errors import gross_readings, swapped_at_start
-from tankcal.survey.diagnosis.held_control import strained, wrong_control, wrongly_held
 from tankcal.survey.diagnosis.misread_files import likely_mistake, photos_that_do_not_fit
 from tankcal.survey.diagnosis.outlier_attribution import SOME, one_sided, set_aside, undecided
 from tankcal.survey.diagnosis.scales import check_readings_off, scale_of_control
@@ -36,40 +36,40 @@ TRIED = 25  # iterations of a survey that is only supposed
 FILES = ("image_points.csv", "photos.csv", "control.csv")  # first in the list of readings
 
 
-def adjust_survey(measurements, tell=None):
+def adjust_survey(measurements, progress=None):
     """Adjust everything that was measured on site: the Adjustment of job.Measurements.
 
-    tell  tell(text) is called with what is being done
+    progress  progress(text) is called with what is being done
 
     Raises InputError for what cannot be meant, SolutionError (in words, with a likely cause where
     one is found) when the survey does not determine what is asked for.
     """
-    tell = tell or (lambda text: None)
+    progress = progress or (lambda text: None)
 
     def adjusted(measured, like):
-        return _adjusted(measured, tell, like=like)
+        return _adjusted(measured, progress, like=like)
 
     try:
-        found, measurements, depth = in_depth(measurements, adjusted, tell)
+        found, measurements, depth = in_depth(measurements, adjusted, progress)
     except SolutionError as error:
         if not measurements.settings.explain or isinstance(error, SeveralPlacesError):
             raise
-        tell(message("looking_for_faults", "looking for what is wrong"))
+        progress(message("looking_for_faults", "looking for what is wrong"))
         told = _why_not(measurements, str(error))
         if not told:
             raise
         raise SolutionError(*error.args, *(one.text for one in told)) from error
-    tell(message("judging_residuals", "working out what the residuals say"))
+    progress(message("judging_residuals", "working out what the residuals say"))
     return replace(_complete(*found, measurements), depth=depth)
 
 
-def _adjusted(measurements, tell, snooping=None, most=100, like=None):
+def _adjusted(measurements, progress, snooping=None, most=100, like=None):
     """Searched, Gathered and Frame of measurements; like: network.Adjusted that is close to it."""
     gathered = gather(measurements)
     if not gathered.survey.points:
         nothing = message("nothing_observed", "the survey has no observations to be adjusted")
         raise InputError([Problem("job.toml", nothing), *gathered.warnings])
-    tell(
+    progress(
         message(
             "finding_starts",
             "finding approximate values of {count} points",
@@ -82,7 +82,7 @@ def _adjusted(measurements, tell, snooping=None, most=100, like=None):
     if swapped:
         raise SolutionError("\n".join(map(str, swapped)))
     frame = framed(survey, gathered, measurements.settings)
-    tell(message("adjusting", "adjusting {count} observations", count=_count(frame.survey)))
+    progress(message("adjusting", "adjusting {count} observations", count=_count(frame.survey)))
     wanted = measurements.settings.snooping if snooping is None else snooping
     gross = gross_readings(frame.survey) if wanted else None
     options = {**frame.options, "max_iterations": most}

@@ -8,7 +8,7 @@ import scipy.linalg
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import listed, message
 from tankcal.survey.network.assembly import assemble
-from tankcal.survey.network.datum import defect_in_words, directions, in_words, unobserved
+from tankcal.survey.network.datum import defect_in_words, directions, in_words, null_space
 from tankcal.survey.observations import ControlCoordinates
 from tankcal.survey.results import DatumReport
 
@@ -72,7 +72,7 @@ def _free(problem):
     A rotation about a line on which everything lies (heights alone, all at one place; one point
     that hangs on one known point) moves nothing: it is none of them.
     """
-    found = unobserved(problem)
+    found = null_space(problem)
     if not found.shape[1]:
         return found
     ways = directions(problem.layout, problem.state)

@@ -19,7 +19,7 @@ MOST_ROUNDS = 20
 NEAREST = 2.0  # focal lengths: an object nearer than that has no image
 
 
-def in_depth(measurements, adjust, tell):
+def in_depth(measurements, adjust, progress):
     """(what `adjust` gave, the Measurements that it was given, DepthOfField or None).
 
     adjust  adjust(measurements, like) -> (Searched, ...); like: network.Adjusted close to it, None
@@ -39,7 +39,7 @@ def in_depth(measurements, adjust, tell):
             size = corrected - given.xy_mm
             largest, rms = np.abs(size).max(initial=0.0), np.sqrt(np.mean(size**2))
             return found, now, DepthOfField(rounds, change, float(largest), float(rms), left)
-        tell(
+        progress(
             message(
                 "focusing",
                 "correcting image points for their depth: round {rounds}, {change:.3g} um",

@@ -212,7 +212,7 @@ class Body:
     declared            inputs with name, u (SI), u_as_read, unit, type, distribution, dof, note,
                         is_default
     lowest_m, highest_m levels between which there is a tank, in the frame of the parts
-    kinks_m             levels at which the free surface jumps: joints, edges of what stands or
+    breakpoints_m       levels at which the free surface jumps: joints, edges of what stands or
                         floats inside
     correlations        (name, name, r) of declared inputs
     estimates           {name of an input: its value, in the unit it is declared in}
@@ -222,7 +222,7 @@ class Body:
     declared: tuple
     lowest_m: float
     highest_m: float
-    kinks_m: tuple[float, ...] = ()
+    breakpoints_m: tuple[float, ...] = ()
     correlations: tuple = ()
     estimates: dict = field(default_factory=dict)
 

@@ -341,7 +341,9 @@ def calibration(job, name, values=INTERIOR, **by):
 def of_tank(tank):
     calibrations = (calibration(tank, "true"), calibration(tank, "long", c=0.2))
     heard = []
-    found = influence(tank, calibrations, ("fixed", "free"), tell=lambda *one: heard.append(one))
+    found = influence(
+        tank, calibrations, ("fixed", "free"), progress=lambda *one: heard.append(one)
+    )
     return found, heard
 
 

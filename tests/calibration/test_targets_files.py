@@ -47,7 +47,7 @@ def test_corners_get_their_names(photos, tmp_path):
         photos,
         out,
         Wanted(names=names, dictionary=ARUCO),
-        tell=lambda *a: steps.append(a),
+        progress=lambda *a: steps.append(a),
     )
     rows = rows_of(out)
     assert [row["point"] for row in rows[:8]] == [

@@ -125,7 +125,7 @@ def test_a_camera_that_cannot_be_read_is_told_in_the_language(
 ROOMS = ("planning", "linter", "camera/formats", "calibration", "report/planning",
          "report/camera", "cli")  # fmt: skip
 TOLD_BY = {"Problem", "InputError", "SolutionError", "problem", "warning", "warn", "print", "say",
-           "complain", "step", "part", "tell"}  # fmt: skip
+           "complain", "step", "part", "tell", "progress"}  # fmt: skip
 
 
 def test_no_plain_text_is_told_in_these_rooms():

@@ -231,7 +231,7 @@ def test_numerical_tolerance():
 def test_same_seed_same_numbers_and_progress_is_told():
     told = []
     found = [
-        simulate(loss, loss_inputs(0.01), goal=SOME, tell=lambda *step: told.append(step))
+        simulate(loss, loss_inputs(0.01), goal=SOME, progress=lambda *step: told.append(step))
         for _ in range(2)
     ]
     assert found[0].high[0] == found[1].high[0]

@@ -12,7 +12,7 @@ from tankcal.job.model import DeclaredInput, Sphere
 from tankcal.pipeline.chain import adjust_job, run
 from tankcal.pipeline.plausibility import refuse_undetermined
 from tankcal.pipeline.tanks import body_of, insets_of, shell_volume
-from tankcal.pipeline.wall import among_themselves, find_wall
+from tankcal.pipeline.wall import find_wall, s_transform
 from tankcal.sections import coordinates_of, covariance_of, fit_section
 from tankcal.survey import Cause, wall_points
 from tankcal.survey.measurements import AdjustmentSettings, Instrument, Measurements
@@ -210,7 +210,7 @@ def test_the_common_motion_of_points_is_taken_out(job, survey):
     away = Cause("tape", "instrument_scale", 1.0, "ppm", motion @ [1e-3, 0, 0, 1e-5])
     noise = 1e-6 * np.eye(144)
     moved = replace(points, covariance_m2=noise + 25.0 * motion @ motion.T, causes=(away,))
-    left = among_themselves(moved)
+    left = s_transform(moved)
     assert left.covariance_m2 == pytest.approx(noise, abs=1e-11)
     assert left.causes[0].column_m == pytest.approx(np.zeros(144), abs=1e-15)
 
@@ -300,7 +300,7 @@ def surveys_of_one_tank(job, count):
         readings = tape, levelled(survey, rng)
         surveyed = measurements(survey, *readings, settings=INNER, instruments=(TAPE,))
         adjustment = adjust_job(replace(job, measurements=surveyed))
-        points = among_themselves(wall_points(adjustment, surveyed, "outside"))
+        points = s_transform(wall_points(adjustment, surveyed, "outside"))
         one = replace(job, points=replace(points, causes=()))
         wall = find_wall(one, lambda text: None)
         true = true_sections(one, wall)

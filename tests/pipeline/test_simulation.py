@@ -362,7 +362,7 @@ def test_the_result_has_what_the_job_asks_for(tmp_path):
     settings = {"table.step_m": 1.0, "table.monte_carlo": True}
     job = tankcal.load(write_job(tmp_path / "job", settings=settings))
     told = []
-    result = tankcal.run(job, counting=lambda *one: told.append(one))
+    result = tankcal.run(job, part_progress=lambda *one: told.append(one))
     assert len(result.simulation.found.u) == len(result.table.height_m)
     delivered = result.simulation.delivered
     assert tuple(zip(delivered.low_m, delivered.high_m, strict=True)) == result.stated.pairs

@@ -11,7 +11,7 @@ from plan_folders import with_setups
 import tankcal
 from tankcal.geometry.rotations import from_angles
 from tankcal.pipeline.table import tabled
-from tankcal.pipeline.wall import among_themselves, find_wall
+from tankcal.pipeline.wall import find_wall, s_transform
 from tankcal.planning import load_plan, predict
 from tankcal.planning.measurements import measured
 from tankcal.planning.table import predicted_table, recomputed
@@ -66,7 +66,7 @@ def test_the_table_is_that_of_the_chain(prediction, filled, figure):
     """Second method: points with their full covariance, wall and table, as a job goes."""
     plan = prediction.plan
     adjustment = adjust_survey(filled)
-    points = among_themselves(wall_points(adjustment, filled, "outside"))
+    points = s_transform(wall_points(adjustment, filled, "outside"))
     job = replace(plan.job, points=points, measurements=None)
     table = tabled(job, find_wall(job, lambda text: None, form=plan.form)).table
     off = np.abs(prediction.table.U_m3 / table.U_m3 - 1).max()
@@ -100,7 +100,7 @@ def test_a_free_network(plan, figure):
     )  # fmt: skip
     found = predict(replace(plan, job=job, photos=(*plan.photos, *rolled)))
     covariance = found.tabled.covariance
-    points = among_themselves(
+    points = s_transform(
         replace(
             found.tabled.job.points,
             covariance_m2=covariance.adjusted.covariance_m2(covariance.points),
@@ -203,7 +203,7 @@ def residual_sizes(prediction, group):
 
 def volume_of(plan, measurements):
     adjustment = adjust_survey(measurements)
-    points = among_themselves(wall_points(adjustment, measurements, "outside"))
+    points = s_transform(wall_points(adjustment, measurements, "outside"))
     job = replace(plan.job, points=points, measurements=None)
     return tabled(job, find_wall(job, lambda text: None, form=plan.form)).table.volume_m3[-1]
 

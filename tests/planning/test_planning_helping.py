@@ -126,7 +126,9 @@ def test_greedy_goes_on_until_the_limit_is_met(plan):
     start = predict(plan).relative_u
     limited = replace(plan, limits=replace(plan.limits, relative_u=0.99 * start))
     told = []
-    path = greedy(limited, steps=5, items=("tape", "reading"), tell=lambda *one: told.append(one))
+    path = greedy(
+        limited, steps=5, items=("tape", "reading"), progress=lambda *one: told.append(one)
+    )
     assert path.steps
     assert path.start_u == pytest.approx(start)
     assert path.relative_u <= 0.99 * start

@@ -9,7 +9,7 @@ from plan_folders import changed_plan, fill_folder, with_setups
 import tankcal.survey.readings
 from tankcal.job import load
 from tankcal.pipeline.table import tabled
-from tankcal.pipeline.wall import among_themselves, find_wall
+from tankcal.pipeline.wall import find_wall, s_transform
 from tankcal.planning import load_plan, predict
 from tankcal.planning.measurements import measured
 from tankcal.report.planning import empty_job
@@ -128,6 +128,6 @@ def spoilt(measurements, ids, size):
 
 def volume_of(plan, measurements):
     adjustment = adjust_survey(measurements)
-    points = among_themselves(wall_points(adjustment, measurements, "outside"))
+    points = s_transform(wall_points(adjustment, measurements, "outside"))
     job = replace(plan.job, points=points, measurements=None)
     return tabled(job, find_wall(job, lambda text: None, form=plan.form)).table.volume_m3[-1]

@@ -157,7 +157,7 @@ def test_what_is_set_aside_is_as_a_bias_unknown(network):
     np.testing.assert_allclose(table.w[4], -biases / sds, rtol=1e-5)
     assert not table.used[4]
     square = biases @ np.linalg.inv(cofactors[12:, 12:]) @ biases
-    assert table.whole[4] == pytest.approx(
+    assert table.test_statistic[4] == pytest.approx(
         np.sqrt(square) * 3.2905267 / np.sqrt(16.26624), rel=1e-5
     )
 

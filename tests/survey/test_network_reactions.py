@@ -84,7 +84,7 @@ def test_the_reaction_is_what_a_release_says(held, tied):
         largest = np.abs(again.xyz_m - found.xyz_m)[~survey.fixed].max()
         effect = table.effect_m[i, 0] / table.mdb[i, 0]
         assert effect * abs(change) == pytest.approx(largest, rel=2e-2, abs=1e-7)
-    assert one.rows[np.argmax(table.whole)] == 3 * 13
+    assert one.rows[np.argmax(table.test_statistic)] == 3 * 13
 
 
 def test_held_is_the_limit_of_observed_with_a_small_sd(held):

@@ -15,7 +15,7 @@ def quantity(survey, uses, row):
     """Test quantity of an image point in the survey adjusted anew."""
     tables = adjust(with_use(survey, {"image points": uses})).residuals
     table = next(one for one in tables if one.source == "image points")
-    return float(table.whole[table.rows == row][0])
+    return float(table.test_statistic[table.rows == row][0])
 
 
 def test_without_what_is_named_an_image_point_agrees_again_and_else_it_does_not():

@@ -225,7 +225,7 @@ def test_whatever_may_be_wrong_instead_explains_it_as_well():
             uses = np.ones(size)
             uses[row] = 0.0
             again = adjust(with_use(found.adjusted.survey, {0: uses}))
-            agrees = again.residuals[0].whole[0] <= CRITICAL
+            agrees = again.residuals[0].test_statistic[0] <= CRITICAL
             assert ((0, row) in likely) == (agrees and whole.chi2 - again.chi2 > CRITICAL**2)
     assert not any("as well be" in str(one) for one in found.warnings)
 
@@ -420,4 +420,4 @@ def test_a_reading_of_a_held_point_may_be_right_and_the_point_wrong():
             else:
                 uses[row] = 0.0
             again = adjust(with_use(replace(survey, fixed=fixed), {0: uses})).residuals[0]
-            assert again.whole[again.rows == one.row - 2] < CRITICAL * 1.01
+            assert again.test_statistic[again.rows == one.row - 2] < CRITICAL * 1.01

@@ -240,7 +240,7 @@ def test_a_joint_between_rows(joint, known):
     assert len(found.deviation_m3) == 950
 
 
-def test_two_kinks_in_one_interval_are_both_looked_at():
+def test_two_breakpoints_in_one_interval_are_both_looked_at():
     """A ring of deadwood thinner than a step: the exact volume holds back, then goes on."""
 
     def volume(h):

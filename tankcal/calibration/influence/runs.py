@@ -99,7 +99,15 @@ class Influence:
 
 
 def influence(
-    job, calibrations, states=STATES, camera=None, tell=None, *, alpha=ALPHA, volume=True, file=FILE
+    job,
+    calibrations,
+    states=STATES,
+    camera=None,
+    progress=None,
+    *,
+    alpha=ALPHA,
+    volume=True,
+    file=FILE,
 ):
     """The Influence of calibrations on the block of a job, and on its tank if it has one.
 
@@ -107,7 +115,7 @@ def influence(
     calibrations  tuple of job.CameraSetup, as tankcal.job.calibrations.read_cameras gives them
     states        which of "fixed", "weighted", "free"
     camera        name of the job's camera that is replaced; None: its only one
-    tell          tell(text, done, total) is called before each run and at the end
+    progress      progress(text, done, total) is called before each run and at the end
     alpha         of the tests at check points
     volume        False for a job that was loaded for its adjustment only: it may have courses, but
                   no bottom, deadwood or uncertainties, so its volume would be another one
@@ -124,22 +132,22 @@ def influence(
     refuse_others(setup, calibrations, file)
     calibrations = tuple(counted_in(one, calibrations) for one in calibrations)
     free = free_parameters(setup, calibrations)
-    tell = tell or (lambda text, done, total: None)
+    progress = progress or (lambda text, done, total: None)
     total = 1 + len(calibrations) * len(states)
-    tell(message("camera_reference_run", "reference"), 0, total)
+    progress(message("camera_reference_run", "reference"), 0, total)
     top = TopOfTank(job) if volume and _is_whole(job) else None
     reference, removed = _reference(job, counted_in(setup, calibrations), alpha, top)
     common = without(job.measurements, removed)
     runs = [reference]
     for one in calibrations:
         for state in states:
-            tell(
+            progress(
                 message("camera_run", "{name}, {state}", name=one.camera.name, state=state),
                 len(runs),
                 total,
             )
             runs.append(_run(job, common, setup, one, state, free, alpha, top))
-    tell(message("camera_runs_done", "done"), total, total)
+    progress(message("camera_runs_done", "done"), total, total)
     return Influence(
         camera=setup.camera.name,
         states=states,

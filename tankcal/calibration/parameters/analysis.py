@@ -77,19 +77,19 @@ def _statistics_in(record):
 
 
 def analyse_job(
-    job, choices=None, *, camera=None, photo=None, adjustment=None, dropping=True, tell=None
+    job, choices=None, *, camera=None, photo=None, adjustment=None, dropping=True, progress=None
 ):
     """A tuple of CameraParameters of a job, one for each set of interior parameters.
 
     camera, photo  names, to have the sets of these only
     adjustment  surveys.Adjustment of job.measurements, where it is at hand
     dropping    whether the survey is adjusted again without each candidate
-    tell        tell(text, done, total) is called as the work goes on
+    progress    progress(text, done, total) is called as the work goes on
 
     Raises InputError for a job without photographs, without adjusted parameters or without such a
     camera or photo, SolutionError when the survey cannot be adjusted.
     """
-    tell = tell or (lambda text, done, total: None)
+    progress = progress or (lambda text, done, total: None)
     if job.measurements is None or not job.measurements.photos:
         raise InputError(
             Problem(
@@ -100,14 +100,14 @@ def analyse_job(
     photos = {one.name: one.camera for one in job.measurements.photos}
     refuse_unknown(photos, camera, photo)
     if adjustment is None:
-        tell(message("camera_adjusting_all", "adjusting the survey with all parameters"), 0, 1)
+        progress(message("camera_adjusting_all", "adjusting the survey with all parameters"), 0, 1)
         adjustment = adjust_job(job)
     groups = [(g.kind, g.name, g.count, g.redundancy, g.rms) for g in adjustment.groups]
     statistics = Statistics(adjustment.sigma0, adjustment.redundancy, adjustment.cov_scale, groups)
     interiors = interiors_of(adjustment, job.measurements)
     interiors = chosen(interiors, photos, camera, photo)
     found = _of_all(interiors, statistics, choices or Choices(), "cameras.toml", source="job")
-    return _with_outcomes(found, job, adjustment, tell) if dropping else found
+    return _with_outcomes(found, job, adjustment, progress) if dropping else found
 
 
 def _of_all(interiors, statistics, choices, file, source="record"):
@@ -124,10 +124,10 @@ def _of_all(interiors, statistics, choices, file, source="record"):
         raise InputError(Problem(file, error.args[0])) from error
 
 
-def _with_outcomes(found, job, adjustment, tell):
+def _with_outcomes(found, job, adjustment, progress):
     """All CameraParameters with each of their trials adjusted again, then what they advise."""
     outcomes, total = {}, 1 + sum(len(without_advised(one).trials) for one in found)
-    tell(message("camera_volume_all", "computing the volume with all parameters"), 0, total)
+    progress(message("camera_volume_all", "computing the volume with all parameters"), 0, total)
     again = Dropping(job, adjustment)
 
     def tried(stage):
@@ -143,7 +143,7 @@ def _with_outcomes(found, job, adjustment, tell):
                         parameters=" ".join(trial.names),
                         camera=key[0],
                     )
-                    tell(told, done, max(done, total))
+                    progress(told, done, max(done, total))
                     outcomes[key] = again.without(*key)
         return tuple(advised(_tried(one, outcomes, adjustment, again)) for one in staged)
 
@@ -152,7 +152,7 @@ def _with_outcomes(found, job, adjustment, tell):
     while any(fewer is not one for fewer, one in zip(map(with_fewer, found), found, strict=True)):
         found = tuple(advised(with_fewer(one)) for one in found)
         found = tried(with_advised)
-    tell("done", total, total)
+    progress("done", total, total)
     return tuple(told_together(one) for one in found)
 
 

@@ -78,14 +78,14 @@ class Reading:
     warnings: tuple
 
 
-def read_photographs(paths, out_csv, wanted=None, replace=False, tell=None):
+def read_photographs(paths, out_csv, wanted=None, replace=False, progress=None):
     """Read targets in photographs and write image_points.csv: a Reading. All or nothing.
 
     paths    of the pictures; a photo's name is that of its file, without the ending
     out_csv  path of image_points.csv; what was refused goes to ..._refused.csv beside it
     wanted   a Wanted
     replace  whether files that are there may be overwritten
-    tell     function (text, done, total), called before each photo and at the end
+    progress function (text, done, total), called before each photo and at the end
 
     Raises InputError with everything that is wrong with files, names and settings.
     """
@@ -98,8 +98,8 @@ def read_photographs(paths, out_csv, wanted=None, replace=False, tell=None):
         warn_of_unused(places, [title for _, title in titles], Path(wanted.places).name, log)
     photos, encodings = [], Counter()
     for done, (path, title) in enumerate(titles):
-        if tell:
-            tell(title, done, len(titles))
+        if progress:
+            progress(title, done, len(titles))
         picture = read_picture(path, log, wanted.encoding if wanted.encoding in ENCODINGS else None)
         if picture is not None:
             encodings[picture.encoding] += 1
@@ -116,8 +116,8 @@ def read_photographs(paths, out_csv, wanted=None, replace=False, tell=None):
         )
         log.warning("photographs", expected)
     written = write_image_points(photos, out_csv, replace)
-    if tell:
-        tell(message("targets_done", "done"), len(titles), len(titles))
+    if progress:
+        progress(message("targets_done", "done"), len(titles), len(titles))
     return Reading(
         tuple(photos),
         *written,

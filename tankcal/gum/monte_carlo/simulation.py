@@ -22,7 +22,7 @@ from tankcal.gum.monte_carlo.table import table_estimates
 DIFFERENCE = 1e-3  # step of the derivatives, in scales of the input
 
 
-def simulate(model, inputs, correlation=None, *, goal=None, sensitivities=None, tell=None):
+def simulate(model, inputs, correlation=None, *, goal=None, sensitivities=None, progress=None):
     """Mean, u and 95 % intervals of every row of a model, by Monte Carlo.
 
     model        model(x) -> (draws, rows) for x (draws, n), or QuadraticRows: then no matrix of
@@ -32,30 +32,30 @@ def simulate(model, inputs, correlation=None, *, goal=None, sensitivities=None, 
     correlation  (n, n) of the inputs, of their normal scores where they are not normal
     goal         Goal: probability, tolerance, seed, memory
     sensitivities  (rows, n) derivatives at the means; by default by differences
-    tell         tell(text, done, total) is called after every batch
+    progress     progress(text, done, total) is called after every batch
     Returns a Simulation. Raises ValueError for what cannot be a correlation or has other shapes.
     """
     goal = goal or Goal()
     ready = inputs_of(inputs, correlation)
-    tell = tell or (lambda text, done, total: None)
+    progress = progress or (lambda text, done, total: None)
     if not isinstance(model, QuadraticRows):
         control = None
         if ready.transform is not None:
             slopes = differences(model, ready) if sensitivities is None else sensitivities
             control = control_of(np.asarray(slopes, dtype=float), ready, goal)
-        return simulation(goal, *in_batches(model, ready, control, goal, tell))
+        return simulation(goal, *in_batches(model, ready, control, goal, progress))
     if model.jacobian.shape[1] != len(ready.mean):
         raise ValueError(
             f"{len(ready.mean)} inputs, {model.jacobian.shape[1]} columns of the model"
         )
     if ready.transform is None or not _symmetric(ready):
-        return simulation(goal, *in_batches(model, ready, None, goal, tell))
-    estimates, errors, draws, controlled, sound = table_estimates(model, ready, goal, tell)
+        return simulation(goal, *in_batches(model, ready, None, goal, progress))
+    estimates, errors, draws, controlled, sound = table_estimates(model, ready, goal, progress)
     hard = np.flatnonzero(~sound)
     if len(hard):
         part = model.subset(hard)
         control = control_of(part.jacobian, ready, goal)
-        found = in_batches(part, ready, control, goal, tell)
+        found = in_batches(part, ready, control, goal, progress)
         estimates[:, hard], errors[:, hard], draws[hard], controlled[hard] = found
     return simulation(goal, estimates, errors, draws, controlled)
 
@@ -86,7 +86,7 @@ def _symmetric(ready):
     return all(normal or hasattr(one, "characteristic") for one, normal in pairs)
 
 
-def in_batches(model, ready, control, goal, tell):
+def in_batches(model, ready, control, goal, progress):
     """Estimates, errors (6, rows), draws and use of the control (rows,), by batches of draws."""
     rows = np.asarray(model(ready.mean[None, :])).shape[1]
     size = batch_size(rows, len(ready.mean), goal)
@@ -96,7 +96,7 @@ def in_batches(model, ready, control, goal, tell):
         x, coordinates = ready.draws(uniforms(size, len(ready.mean), seed))
         values = np.asarray(model(x), dtype=float)
         batches.add(*estimates_of(values, coordinates, control, goal.probability))
-        tell("Monte Carlo", number + 1, total)
+        progress("Monte Carlo", number + 1, total)
         done = batches.count >= FEWEST
         if done and np.all(enough(goal, batches.mean, batches.errors, batches.plain)):
             break

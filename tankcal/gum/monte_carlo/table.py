@@ -20,7 +20,7 @@ PILOT = 64  # points of the first set that place the ends before they are estima
 SIDES = np.array([0.6, 1.0, 1.4])  # levels about an end, by that end's own
 
 
-def table_estimates(model, ready, goal, tell):
+def table_estimates(model, ready, goal, progress):
     """Estimates and errors (6, rows), draws, control (rows,), and which rows are sound.
 
     A row is not sound where its quadratic part is too large for one parabola to be followed, its
@@ -53,7 +53,7 @@ def table_estimates(model, ready, goal, tell):
         part[1][:2] = 0.0  # mean and u come from all points already
         done = enough(goal, *part)
         pending, count = pending[~done & steady], 4 * count
-        tell("Monte Carlo", len(law.known) - len(pending), len(law.known))
+        progress("Monte Carlo", len(law.known) - len(pending), len(law.known))
     return estimates, errors, draws, law.known.copy(), sound
 
 

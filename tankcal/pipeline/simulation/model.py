@@ -101,11 +101,11 @@ class Model:
         places = (self.some_even, self.some_bent)
         return sum(int(np.count_nonzero(one < self.rows)) for one in places)
 
-    def simulated(self, goal, tell):
+    def simulated(self, goal, progress):
         """`monte_carlo.Simulation` of all volumes."""
         even, bent = self.some_even, self.some_bent
         found = simulate(
-            self.quadratic.subset(even), self.inputs.distributions, goal=goal, tell=tell
+            self.quadratic.subset(even), self.inputs.distributions, goal=goal, progress=progress
         )
         if len(bent):
             found = _merged(found, even, self._of_bent(bent, goal), bent)

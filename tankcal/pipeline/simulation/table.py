@@ -49,20 +49,20 @@ class TableSimulation:
         return judged_intervals(self.of_deliveries[1], one.volume_m3, one.u_m3, one.U_m3)
 
 
-def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, tell=None):
+def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, progress=None):
     """`TableSimulation` of a `Capacity`.
 
     job, survey, body, zero_m  what the table was made of, as in `chain.Result`
     pairs   of dips whose deliveries are simulated as well
     goal    `monte_carlo.Goal`; the probability is the table's
-    tell    called as tell(text, done, total)
+    progress  called as progress(text, done, total)
     Raises HeightError for a dip outside the table.
     """
     goal = replace(goal or Goal(), probability=table.probability)
-    telling = tell and (lambda text, done, total: tell(SIMULATING, done, total))
+    shown = progress and (lambda text, done, total: progress(SIMULATING, done, total))
     low, high = np.array(pairs, dtype=float).reshape(-1, 2).T
     model = Model(job, survey, body, zero_m, table, table.weights(high) - table.weights(low))
-    found = model.simulated(goal, telling)
+    found = model.simulated(goal, shown)
     rows, others = (_part(found, part) for part in model.parts)
     delivered = deliveries(table, low, high)
     of_delivered = delivered.volume_m3, delivered.u_m3, delivered.dof

@@ -148,20 +148,22 @@ def vertical_body(job, wall, switches, uncertain):
         job.inputs,
         lowest_m=min(getattr(part, "lowest_m", 0.0) for part in parts),
         highest_m=shell.volume.height_m,
-        kinks_m=_kinks(shell, parts, job, zero),
+        breakpoints_m=_breakpoints(shell, parts, job, zero),
         correlations=job.correlations,
         estimates=estimates_of(job),
     )
 
 
-def _kinks(shell, parts, job, zero):
+def _breakpoints(shell, parts, job, zero):
     """Levels at which the area jumps: bottom and joints, edges of bottom, deadwood and roof."""
-    kinks = {course.bottom_m for course in shell.volume.courses}
-    kinks |= {zero + edge for item in job.deadwood for edge in (item.bottom_m, item.top_m)}
-    kinks |= {zero + edge for edge in critical_zone(job) or ()}
+    breakpoints = {course.bottom_m for course in shell.volume.courses}
+    breakpoints |= {zero + edge for item in job.deadwood for edge in (item.bottom_m, item.top_m)}
+    breakpoints |= {zero + edge for edge in critical_zone(job) or ()}
     for part in parts:
-        kinks |= {getattr(part, name) for name in ("lowest_m", "highest_m") if hasattr(part, name)}
-    return tuple(sorted(kink for kink in kinks if np.isfinite(kink)))
+        breakpoints |= {
+            getattr(part, name) for name in ("lowest_m", "highest_m") if hasattr(part, name)
+        }
+    return tuple(sorted(edge for edge in breakpoints if np.isfinite(edge)))
 
 
 def _on_its_bottom(job, wall, shell, zero, parts):

@@ -59,7 +59,7 @@ def write(result, directory, progress=None, language=None):
     from tankcal.report.notebook import joined  # not for lines in a terminal: it takes a second
 
     kind = CameraPaper(result, language).result["kind"]
-    tell = progress or (lambda text, done, total: None)
+    progress = progress or (lambda text, done, total: None)
     with folders.replaced(directory) as temporary:
         text = json.dumps(result, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
         (temporary / RECORD).write_text(text + "\n", encoding="utf-8")
@@ -72,7 +72,7 @@ def write(result, directory, progress=None, language=None):
             notebook,
             temporary,
             (("report.pdf", ""),),
-            lambda done, total: tell(
+            lambda done, total: progress(
                 message("camera_writing_report", "writing the report"), done, total
             ),
         )

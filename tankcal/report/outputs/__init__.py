@@ -116,24 +116,24 @@ def record_file(path):
 def _write(prepare, directory, progress, language=None, letterhead=None, papers=True):
     """Write everything into `directory`; `prepare` puts the record into a folder and gives it."""
     refuse_foreign(directory)
-    tell = progress or (lambda text, done, total: None)
+    progress = progress or (lambda text, done, total: None)
     with folders.replaced(directory) as temporary:
-        tell(message("writing_record", "writing the record and the tables"), 0, 1)
+        progress(message("writing_record", "writing the record and the tables"), 0, 1)
         with without_collection():
             record = prepare(temporary)
             tables.write_tables(record, temporary)
         if papers:
-            _write_papers(record, temporary, tell, language, letterhead)
+            _write_papers(record, temporary, progress, language, letterhead)
     return [Path(directory) / name for name in FILES if (Path(directory) / name).exists()]
 
 
-def _write_papers(record, folder, tell, language, letterhead):
+def _write_papers(record, folder, progress, language, letterhead):
     """Workbook, notebook, PDFs and HTML beside the record."""
     from tankcal.report import (
         workbook,  # a second to import, which record and tables need not wait for
     )
 
-    tell(message("writing_workbook", "writing the workbook"), 0, 1)
+    progress(message("writing_workbook", "writing the workbook"), 0, 1)
     of_tank, of_survey = WORKBOOKS
     name = of_tank if record["capacity"] else of_survey
     with without_collection():
@@ -141,7 +141,7 @@ def _write_papers(record, folder, tell, language, letterhead):
     report.build(
         folder / RECORD,
         folder,
-        lambda done, total: tell(message("writing_report", "writing the report"), done, total),
+        lambda done, total: progress(message("writing_report", "writing the report"), done, total),
         language,
         letterhead,
         record,

@@ -35,27 +35,27 @@ def write(
     Raises InputError for a folder that holds other things, or an empty job that was filled in.
     """
     refuse_foreign(directory)
-    tell = progress or (lambda text: None)
+    progress = progress or (lambda text: None)
     with folders.replaced(directory) as temporary:
         paper = PlanPaper(prediction, language, effects, design, simulated)
-        _write(paper, temporary, tell)
+        _write(paper, temporary, progress)
         if design is not None and design.steps:
             (temporary / DESIGN).mkdir()
-            _write(PlanPaper(design.prediction, language), temporary / DESIGN, tell)
+            _write(PlanPaper(design.prediction, language), temporary / DESIGN, progress)
     names = (*FILES, JOB, DESIGN)
     return [path for path in (Path(directory) / name for name in names) if path.exists()]
 
 
-def _write(paper, folder, tell):
+def _write(paper, folder, progress):
     """The files of a PlanPaper."""
     from tankcal.report.planning import empty_job, files, papers, workbook
 
-    tell(message("plan_writing_job", "writing the empty job"))
+    progress(message("plan_writing_job", "writing the empty job"))
     empty_job.write(paper.prediction, folder / JOB)
-    tell(message("plan_writing_tables", "writing the tables"))
+    progress(message("plan_writing_tables", "writing the tables"))
     files.write(paper, folder, empty_job.fingerprints(folder / JOB))
     workbook.write(paper, folder / "field-sheets.xlsx")
-    tell(message("plan_setting_papers", "setting prediction and field sheets"))
+    progress(message("plan_setting_papers", "setting prediction and field sheets"))
     papers.write(paper, folder)
 
 

@@ -13,7 +13,7 @@ from tankcal.camera.model import corrected
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.survey.diagnosis.diagnoses import GON, MIRROR, mirrored_fits, mirrored_photo
-from tankcal.survey.diagnosis.held_control import ALIKE
+from tankcal.survey.diagnosis.fixed_datum_check import ALIKE
 from tankcal.survey.readings import ANGLES
 
 BETTER = 0.2  # share of sigma0 that may be left by what explains a survey

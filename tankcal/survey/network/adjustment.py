@@ -4,7 +4,7 @@ from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver import UndeterminedError, linearise, solve
 from tankcal.survey.network.assembly import assemble
-from tankcal.survey.network.datum import held, in_words, unobserved
+from tankcal.survey.network.datum import held, in_words, null_space
 from tankcal.survey.network.results import Adjusted
 from tankcal.survey.network.soundness import hanging_datum, refuse_worthless_cameras
 from tankcal.survey.observations import PlumbLines
@@ -48,7 +48,7 @@ def _in_datum(survey, datum, over, photo):
     """The Problem of a survey, with inner constraints where they are asked for and needed."""
     problem = assemble(survey)
     if datum == "inner":
-        free = unobserved(problem)
+        free = null_space(problem)
         return held(problem, over, free, photo) if free.shape[1] else problem
     if any(isinstance(one, PlumbLines) for one in survey.observations):
         _refuse_defect(problem)  # a plumb line that is not quite plumb would hide one
@@ -78,6 +78,6 @@ def _adjusted(survey, problem, datum, solved):
 
 def _refuse_defect(problem):
     """Raise when the datum is missing, in words."""
-    free = unobserved(problem)
+    free = null_space(problem)
     if free.shape[1]:
         raise SolutionError(in_words(free, problem))

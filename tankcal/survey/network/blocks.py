@@ -30,7 +30,7 @@ class Members:
     """Values of a block, those between points that are used.
 
     source, row, component  (k,) see Block       share  (k,) with which each takes part
-    covariance              (k, k) as declared   whole  Correlated of all of them
+    covariance              (k, k) as declared   block  Correlated of all of them
     """
 
     source: np.ndarray
@@ -38,7 +38,7 @@ class Members:
     component: np.ndarray
     share: np.ndarray
     covariance: np.ndarray
-    whole: Correlated
+    block: Correlated
 
 
 def relative(one, centre):
@@ -82,8 +82,7 @@ def correlated_groups(survey, used, centre, state):
         )
         covariance = block.covariance[np.ix_(keep, keep)]
         fields = survey, centre, all_of, source, row, component
-        whole = _made(*fields, covariance)
-        members = Members(source, row, component, share, covariance, whole)
+        members = Members(source, row, component, share, covariance, _made(*fields, covariance))
         acting = share > 0
         if not acting.any():
             yield None, members
@@ -143,7 +142,7 @@ class ValueTests:
     mdb: np.ndarray
     external: np.ndarray
     change: np.ndarray
-    whole: np.ndarray
+    test_statistic: np.ndarray
     pull: np.ndarray
 
 
@@ -210,19 +209,19 @@ def expected(members, part, mine, v, jac):
 
 
 def tested(problem, solution, number, members, delta0):
-    """The ValueTests of the values of a block; `whole` for each value that of its observation.
+    """The ValueTests of the values of a block; the test statistic of a value is its observation's.
 
     number  of its group in the problem; None: all of it is set aside
     """
-    v, jac = members.whole.linearised(solution.state)
-    whole_columns = members.whole.columns(problem.layout)
+    v, jac = members.block.linearised(solution.state)
+    columns = members.block.columns(problem.layout)
     part = acting(problem, solution, number, members, v)
     q, own, back, spread = members.covariance, part.own, part.back, part.spread
     points = np.unique(problem.layout.points)
     points = points[points >= 0]
     k = len(v)
     w, mdb, external = np.zeros(k), np.full(k, np.inf), np.full(k, np.inf)
-    redundancy, change, whole = np.ones(k), np.zeros(k), np.zeros(k)
+    redundancy, change, statistic = np.ones(k), np.zeros(k), np.zeros(k)
     inner = back.T @ spread @ back
     size = np.sum(back**2, axis=0)
     free, right = np.diag(inner), back.T @ part.t
@@ -238,18 +237,18 @@ def tested(problem, solution, number, members, delta0):
         if members.share[mine[0]] > 0:
             place = np.searchsorted(own, mine)
             test = _together(right[place], inner[np.ix_(place, place)], size[place])
-            whole[mine] = test / np.sqrt(members.share[mine[0]])
+            statistic[mine] = test / np.sqrt(members.share[mine[0]])
         else:
             off, away, unexplained, _ = expected(members, part, mine, v, jac)
-            total = unexplained + away @ _moves(solution, whole_columns, away)[whole_columns[0]]
+            total = unexplained + away @ _moves(solution, columns, away)[columns[0]]
             sds = np.sqrt(np.diag(total))
             w[mine], mdb[mine] = off / sds, delta0 * sds
             inverse = np.linalg.inv(total)
-            whole[mine] = _together(inverse @ off, inverse, np.diag(inverse))
+            statistic[mine] = _together(inverse @ off, inverse, np.diag(inverse))
     sd = np.sqrt(np.diag(q))
     pull = np.zeros(k)
     pull[own] = right * sd[own]
-    return ValueTests(v, sd, redundancy, w, mdb, external, change * sd, whole, pull)
+    return ValueTests(v, sd, redundancy, w, mdb, external, change * sd, statistic, pull)
 
 
 def observations_of(members):

@@ -74,7 +74,7 @@ def _of_places(xyz):
     return out
 
 
-def unobserved(problem, unfelt=UNFELT, fixed=True, state=None, count=None):
+def null_space(problem, unfelt=UNFELT, fixed=True, state=None, count=None):
     """Combinations (7, d) of the seven ways that neither observations nor fixed unknowns feel.
 
     unfelt  see UNFELT      fixed  False: as if only observations held anything
@@ -142,7 +142,7 @@ def dependent(adjusted, quantities, fixed=False):
     fixed       True: coordinates and photos held fixed count as known, not as a choice
     """
     problem, state = adjusted.problem, adjusted.solution.state
-    free = unobserved(problem, fixed=fixed)
+    free = null_space(problem, fixed=fixed)
     if not free.shape[1]:
         return np.zeros(len(quantities), dtype=bool)
     first, parts, whole = 0, {}, []
@@ -267,7 +267,7 @@ def held(problem, over, combinations, photo=None):
     """The Problem with a datum by inner constraints over chosen points, or over one photo.
 
     over          (k,) points that take part, or None: all
-    combinations  (7, d) from `unobserved`
+    combinations  (7, d) from `null_space`
     photo         number of the photo that is moved and turned as little as can be, in place of the
                   points; None: the points take part
     """
@@ -280,9 +280,9 @@ def held(problem, over, combinations, photo=None):
 
     d = combinations.shape[1]
 
-    def free(state):
+    def moves(state):
         # what turns about held coordinates turns about where they are now, not at the start
-        ways = unobserved(problem, state=state, count=d) if state is not problem.state else None
+        ways = null_space(problem, state=state, count=d) if state is not problem.state else None
         return directions(layout, state) @ (combinations if ways is None else ways)
 
-    return replace(problem, model=replace(problem.model, free=free, inner=mask[:-1]))
+    return replace(problem, model=replace(problem.model, null_space=moves, inner=mask[:-1]))

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse
 
-from tankcal.solver.effects import pulls
+from tankcal.solver.effects import constraint_reactions
 from tankcal.survey.network.reliability import Residuals, noncentrality
 
 HELD = "held coordinates"  # source of their Residuals; rows are 3 point + axis
@@ -60,7 +60,7 @@ class Reactions:
         return Residuals(
             kind="control coordinate", unit="m", source=HELD, rows=self.rows,
             used=np.ones(len(self.rows), dtype=bool), residual=none, sd=none, redundancy=none,
-            w=self.w[:, None], whole=np.abs(self.w), mdb=mdb[:, None],
+            w=self.w[:, None], test_statistic=np.abs(self.w), mdb=mdb[:, None],
             external=np.full(none.shape, np.inf), exact=True,
             changes=lambda: (moves[:, None], None),
         )  # fmt: skip
@@ -115,6 +115,6 @@ def _conditioned(problem, solution, layout, x):
     d, d_held = d[:, :unknowns], d[:, unknowns:].toarray()
     if not d_held.any():
         return x, np.ones(x.shape[1], dtype=bool)
-    x = x - pulls(solution)[2] @ d_held
+    x = x - constraint_reactions(solution)[2] @ d_held
     left = np.abs(d_held + d @ x).max(axis=0, initial=0.0)
     return x, left < CONTRADICTED

@@ -6,8 +6,9 @@
     delta0 sqrt((1 - r) / r)         its effect on any adjusted quantity, at most, in sds of that
     Q J' delta0 / sqrt(r)            its effect on the coordinates, J whitened row, Q cofactors
 
-with the redundancy number r. What holds exactly (sd 0) has no residual; it is tested by what pulls
-at it, the limit of all this for s -> 0: w = k / s_k, MDB = delta0 / s_k, k the Lagrange multiplier.
+with the redundancy number r. What holds exactly (sd 0) has no residual; it is tested by the
+reaction of its constraint, the limit of all this for s -> 0: w = k / s_k, MDB = delta0 / s_k, with
+the Lagrange multiplier k.
 Source: Baarda 1968, A testing procedure for use in geodetic networks; Pope 1976, The statistics of
 residuals; Foerstner 1987.
 """
@@ -18,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtri, ndtri, stdtrit
 
-from tankcal.solver.effects import own_leverage, own_responses, pulls, responses
+from tankcal.solver.effects import constraint_reactions, own_leverage, own_responses, responses
 from tankcal.survey.network.blocks import tested
 from tankcal.survey.observations import lever
 
@@ -37,8 +38,8 @@ class Residuals:
     sd          (n, m) of the observation, a priori
     redundancy  (n, m) 0 to 1; 1 for those set aside
     w           (n, m) test quantity; of those set aside: of the difference to what the others say
-    whole       (n,) test quantity of the observation with all its values: |w|, or the root of what
-                v'Pv would lose without it, brought to the critical value of w (0.1 %)
+    test_statistic (n,) of the observation with all its values: |w|, or the root of what v'Pv would
+                lose without it, brought to the critical value of w (0.1 %)
     mdb         (n, m) minimal detectable bias; inf where nothing controls the observation; of those
                 set aside: what it would be with them, r = 1 / (1 + leverage)
     external    (n, m) effect of a blunder of that size on the adjusted quantities, in their sds
@@ -63,7 +64,7 @@ class Residuals:
     sd: np.ndarray
     redundancy: np.ndarray
     w: np.ndarray
-    whole: np.ndarray
+    test_statistic: np.ndarray
     mdb: np.ndarray
     external: np.ndarray
     exact: bool = False
@@ -142,12 +143,12 @@ def _of_block(problem, solution, number, members, delta0):
             return table
 
         used, test = np.zeros(shape[0], dtype=bool), np.zeros(shape[0])
-        used[place], test[place] = members.share[mine] > 0, found.whole[mine]
+        used[place], test[place] = members.share[mine] > 0, found.test_statistic[mine]
         change = filled(found.change)
         yield Residuals(
             kind=one.kind, unit=one.unit, source=source, rows=rows, used=used,
             residual=filled(found.residual), sd=filled(found.sd),
-            redundancy=filled(found.redundancy), w=filled(found.w), whole=test,
+            redundancy=filled(found.redundancy), w=filled(found.w), test_statistic=test,
             mdb=filled(found.mdb), external=filled(found.external),
             changes=lambda change=change: (change, None), pull=filled(found.pull),
         )  # fmt: skip
@@ -158,7 +159,7 @@ def _first_parts(members):
     sources = [members.source[first] for first in np.flatnonzero(
         np.append(True, np.diff(members.source) != 0))]  # fmt: skip
     parts = {}
-    for source, (one, _) in zip(sources, members.whole.parts, strict=True):
+    for source, (one, _) in zip(sources, members.block.parts, strict=True):
         parts.setdefault(source, one)
     return [parts[source] for source in sorted(parts)]
 
@@ -188,7 +189,7 @@ def _table(problem, solution, number, delta0):
         test = _both(solution, number, v, jac, share, leverage, variance, test)
     return Residuals(
         kind=one.kind, unit=one.unit, source=problem.sources[number], rows=problem.rows_of[number],
-        used=use > 0, residual=v * sd, sd=sd, redundancy=r, w=w, whole=test, mdb=mdb * sd,
+        used=use > 0, residual=v * sd, sd=sd, redundancy=r, w=w, test_statistic=test, mdb=mdb * sd,
         external=hidden, changes=lambda: _changes(problem, solution, number, share),
     )  # fmt: skip
 
@@ -228,7 +229,7 @@ def _of_exact(problem, solution, delta0):
     """Residuals of the observations that hold exactly; several rows of one: the last one counts."""
     if not problem.exact:
         return
-    k, sd, changes = pulls(solution)
+    k, sd, changes = constraint_reactions(solution)
     points = np.unique(problem.layout.points)
     moves = np.abs(changes[points[points >= 0]]).max(axis=0, initial=0.0)
     levers = [lever(held.conditions, solution.state).ravel() for held in problem.exact]
@@ -255,7 +256,7 @@ def _of_exact(problem, solution, delta0):
         yield Residuals(
             kind=one.kind, unit=one.unit, source=held.source, rows=held.rows,
             used=np.ones(shape[0], dtype=bool), residual=none, sd=none, redundancy=none,
-            w=parts[0], whole=np.abs(parts[0]).max(axis=1), mdb=parts[1],
+            w=parts[0], test_statistic=np.abs(parts[0]).max(axis=1), mdb=parts[1],
             external=np.full(shape, np.inf), exact=True,
             changes=lambda moves=parts[2]: (moves, None),
         )  # fmt: skip

@@ -65,7 +65,7 @@ def alternatives(adjusted, source, row, held=None):
         found += _correlated(problem, solution, k, members, aside)
     found = [(own, *which) for own, instead, *which in found if instead]
     if held is not None and len(held.rows):
-        place = aside.whole.columns(held.layout)[0] - problem.model.unknowns
+        place = aside.one.columns(held.layout)[0] - problem.model.unknowns
         c = np.zeros((len(aside.e), len(held.rows)))
         c[:, place[place >= 0]] = aside.jac[:, place >= 0]
         changes = np.vstack([held.changes, np.zeros((1, len(held.rows)))])
@@ -80,7 +80,7 @@ class _Aside:
     e, jac    (m,), (m, K) difference to what is expected of it, and derivatives
     columns   (K,) of the unknowns        moves    (unknowns + 1, m) Q J', a row of zeros below
     inverse   (m, m) S^-1                 back     (m,) its residual with it back, v_i
-    whole     the Observations            members  of its block, or None
+    one       the Observations            members  of its block, or None
     follows   (m, k) of a block: -L_i^-1 S, change of e by biases of the values that take part
     """
 
@@ -89,7 +89,7 @@ class _Aside:
     columns: np.ndarray
     moves: np.ndarray
     inverse: np.ndarray
-    whole: object
+    one: object
     members: object = None
     follows: np.ndarray | None = None
 
@@ -103,22 +103,22 @@ def _aside(problem, solution, source, row):
     for number in range(len(problem.sources)):
         if problem.sources[number] == source and row in problem.rows_of[number]:
             mine = np.flatnonzero(problem.rows_of[number] == row)
-            whole = problem.observations[number].taken(mine).using(np.ones(1))
+            one = problem.observations[number].taken(mine).using(np.ones(1))
             columns = problem.model.groups[number].columns[mine]
-            e, jac = np.empty((1, whole.rows)), np.empty((1, whole.rows, columns.shape[1]))
-            whole.fill(solution.state, e, jac)
-            return _made(solution, e[0], jac[0], columns, whole)
+            e, jac = np.empty((1, one.rows)), np.empty((1, one.rows, columns.shape[1]))
+            one.fill(solution.state, e, jac)
+            return _made(solution, e[0], jac[0], columns, one)
     for number, members in problem.blocks:
         mine = np.flatnonzero((members.source == source) & (members.row == row))
         if not len(mine):
             continue
-        v, jac = members.whole.linearised(solution.state)
+        v, jac = members.block.linearised(solution.state)
         part = acting(problem, solution, number, members, v)
         off, away, unexplained, share = expected(members, part, mine, v, jac)
         root = np.linalg.cholesky(unexplained)
         e, jac, share = (solve_triangular(root, one, lower=True) for one in (off, away, share))
-        columns = members.whole.columns(problem.layout)
-        return _made(solution, e, jac, columns, members.whole, members, -share)
+        columns = members.block.columns(problem.layout)
+        return _made(solution, e, jac, columns, members.block, members, -share)
     return None
 
 
@@ -133,7 +133,7 @@ def _correlated(problem, solution, number, members, aside):
     """(T of j, whether i agrees without it, source, row) of observations j of a block."""
     if number is None:
         return
-    v, _ = members.whole.linearised(solution.state)
+    v, _ = members.block.linearised(solution.state)
     part = acting(problem, solution, number, members, v)
     b = part.a @ aside.moves[part.columns]
     t = part.t - b @ aside.back

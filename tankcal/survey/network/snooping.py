@@ -107,10 +107,10 @@ def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, *
 def _suspects(adjusted, limit):
     """Observations that hold exactly against the others, the worst first."""
     found = [
-        Removed(table.kind, table.source, int(table.rows[i]), float(table.whole[i]))
+        Removed(table.kind, table.source, int(table.rows[i]), float(table.test_statistic[i]))
         for table in adjusted.residuals
         if table.exact
-        for i in np.flatnonzero(table.whole > limit)
+        for i in np.flatnonzero(table.test_statistic > limit)
     ]
     return tuple(sorted(found, key=lambda one: -one.w))
 
@@ -168,7 +168,7 @@ def _tables(adjusted):
 
 def _worst(adjusted):
     """Largest |w| of each observation, all groups one after the other."""
-    return np.concatenate([table.whole for table in _tables(adjusted)])
+    return np.concatenate([table.test_statistic for table in _tables(adjusted)])
 
 
 def _robust(survey, adjusted, critical, options):
@@ -177,7 +177,7 @@ def _robust(survey, adjusted, critical, options):
         size = max(1.0, 1.4826 * float(np.median(_worst(adjusted))) / 1.4)
         shares, change = _shares(survey), 0.0
         for table in _tables(adjusted):
-            away = table.whole / size
+            away = table.test_statistic / size
             if turn < HUBER_ROUNDS:
                 share = np.minimum(1.0, HUBER / np.maximum(away, 1e-9))
             else:
@@ -192,7 +192,7 @@ def _robust(survey, adjusted, critical, options):
             break
     shares = _shares(survey)
     for table in _tables(adjusted):
-        good = table.whole / size <= critical
+        good = table.test_statistic / size <= critical
         shares[table.source][table.rows] = good.astype(float)
     return with_use(survey, shares), turn + 2
 
@@ -209,7 +209,9 @@ def _verdict(adjusted, critical, back, needed, few):
     may = [
         table.used & ~np.isin(table.rows, list(needed.get(table.source, ()))) for table in tables
     ]
-    off = [np.where(mine, table.whole, 0.0) for table, mine in zip(tables, may, strict=True)]
+    off = [
+        np.where(mine, table.test_statistic, 0.0) for table, mine in zip(tables, may, strict=True)
+    ]
     worst = max((float(one.max(initial=0)) for one in off), default=0.0)
     least = max(critical, (1.0 if few else AT_ONCE) * worst)
     goes = [(one > critical) & (one >= least) for one in off]
@@ -232,7 +234,9 @@ def _one_of_each_point(adjusted, tables, goes):
         tied.append([np.asarray(getattr(of, name))[table.rows] for name in ties])
     counts = sum((np.bincount(one, minlength=n) for owners in tied for one in owners), np.zeros(n))
     counts[(adjusted.problem.layout.points < 0).all(axis=1)] = np.inf  # fixed points follow nothing
-    off = np.concatenate([np.where(o, t.whole, 0.0) for t, o in zip(tables, goes, strict=True)])
+    off = np.concatenate(
+        [np.where(o, t.test_statistic, 0.0) for t, o in zip(tables, goes, strict=True)]
+    )
     alone = n + np.arange(len(off))  # what belongs to no point
     parts, first = [], 0
     for table, owners in zip(tables, tied, strict=True):
@@ -256,11 +260,11 @@ def _coming_back(tables, critical, back):
         np.array([back.get(table.source, {}).get(row, 0) for row in table.rows.tolist()], dtype=int)
         for table in tables
     ]
-    agrees = [~table.used & (table.whole < critical) for table in tables]
+    agrees = [~table.used & (table.test_statistic < critical) for table in tables]
     comes = [one & (n == 0) for one, n in zip(agrees, times, strict=True)]
     if not any(one.any() for one in comes):
         again = [
-            np.where(one & (n < RETURNS), table.whole, np.inf)
+            np.where(one & (n < RETURNS), table.test_statistic, np.inf)
             for table, one, n in zip(tables, agrees, times, strict=True)
         ]
         nearest = min((float(one.min(initial=np.inf)) for one in again), default=np.inf)
@@ -274,7 +278,7 @@ def _coming_back(tables, critical, back):
 
 def _quantities(table):
     """{(source, row): test quantity} of a table of residuals."""
-    rows, values = table.rows.tolist(), table.whole.tolist()
+    rows, values = table.rows.tolist(), table.test_statistic.tolist()
     return {(table.source, row): value for row, value in zip(rows, values, strict=True)}
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.survey.network.datum import in_words, unobserved
+from tankcal.survey.network.datum import in_words, null_space
 
 WORTHLESS = 0.1  # sd over the principal distance, or over the extent of the survey
 HANGING = 0.03  # see datum.UNFELT: what holds the survey so weakly, noise alone can hold
@@ -57,5 +57,5 @@ def hardly_determined(adjusted):
 
 def hanging_datum(problem):
     """Words on a datum that hangs on next to nothing, "" when it does not."""
-    free = unobserved(problem, HANGING)
+    free = null_space(problem, HANGING)
     return f"; {in_words(free, problem)}" if free.shape[1] else ""

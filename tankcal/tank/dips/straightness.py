@@ -6,7 +6,7 @@ All gauging systems interpolate linearly. In the interval (a, b) the table says
 
 and T - V is largest where the area of the cut is the mean area of the interval. The rule of thumb
 step^2/8 |A'| fails where A' has no bound (the ends of a lying cylinder) and at joints; here the
-largest deviation itself is searched for in every interval, on each side of every kink.
+largest deviation itself is searched for in every interval, on each side of every breakpoint.
 """
 
 from dataclasses import dataclass
@@ -64,17 +64,17 @@ class Rows:
     at_m: float
 
 
-def interpolation_errors(volume_m3, height_m, kinks_m=()):
+def interpolation_errors(volume_m3, height_m, breakpoints_m=()):
     """`Straightness` of a table with rows at height_m.
 
     volume_m3  function of (n,) dips, m, to (n,) exact volumes, m3
     height_m   (rows,) dips, ascending
-    kinks_m    dips where the area jumps (joints, edges of deadwood); others need not be known
-    Between rows and kinks the area is taken to turn at most once in an eighth of the interval.
+    breakpoints_m  dips where the area jumps (joints, edges of deadwood); others need not be known
+    Between rows and breakpoints the area is taken to turn at most once in an eighth of an interval.
     """
     rows = np.asarray(height_m, dtype=float)
-    kinks = np.asarray(kinks_m, dtype=float)
-    edges = np.union1d(rows, kinks[(kinks > rows[0]) & (kinks < rows[-1])])
+    breakpoints = np.asarray(breakpoints_m, dtype=float)
+    edges = np.union1d(rows, breakpoints[(breakpoints > rows[0]) & (breakpoints < rows[-1])])
     interval = np.searchsorted(rows, edges[:-1], side="right") - 1
     at_rows = volume_m3(rows)
     slope = np.diff(at_rows) / np.diff(rows)
@@ -115,12 +115,12 @@ def _largest(deviation, low, high):
     return np.where(at_inner.max(axis=0) > size[piece, best], found, samples[piece, best])
 
 
-def choose_rows(volume_m3, top_m, bound_m3, kinks_m=(), step_m=None, ladder_m=METRIC_STEPS_M):
+def choose_rows(volume_m3, top_m, bound_m3, breakpoints_m=(), step_m=None, ladder_m=METRIC_STEPS_M):
     """`Rows` that keep the bound with the fewest rows: one step, or a finer one where needed.
 
     volume_m3  function of (n,) dips, m, to (n,) exact volumes, m3
     bound_m3   of the deviation of linear interpolation from the exact volume
-    kinks_m    dips where the area jumps
+    breakpoints_m  dips where the area jumps
     step_m     the table's step when it is given; then only finer zones are added. None: chosen
     ladder_m   steps to choose from, the coarsest first (`LADDERS_M` has them by unit of heights)
     Raises InputError, with the deviation that is reached, when no step of the ladder is enough.
@@ -129,7 +129,7 @@ def choose_rows(volume_m3, top_m, bound_m3, kinks_m=(), step_m=None, ladder_m=ME
     for step in ladder_m if step_m is None else (step_m,):
         if best is not None and top_m / step >= len(best.height_m):
             break
-        for candidate in _candidates(volume_m3, top_m, bound_m3, kinks_m, step, ladder_m):
+        for candidate in _candidates(volume_m3, top_m, bound_m3, breakpoints_m, step, ladder_m):
             if reached is None or candidate.largest_m3 < reached.largest_m3:
                 reached = candidate
             is_good = candidate.largest_m3 <= bound_m3
@@ -150,12 +150,12 @@ def _not_met(reached, bound_m3):
     )
 
 
-def _candidates(volume_m3, top_m, bound_m3, kinks_m, step, ladder_m):
+def _candidates(volume_m3, top_m, bound_m3, breakpoints_m, step, ladder_m):
     """`Rows` with one step; where that breaks the bound, with each finer step in those zones."""
     if top_m / step > MOST_ROWS:
         return
     heights = table_heights(step, top_m)
-    plain = interpolation_errors(volume_m3, heights, kinks_m)
+    plain = interpolation_errors(volume_m3, heights, breakpoints_m)
     yield Rows(step, None, (), heights, plain.largest_m3, plain.at_m)
     zones = _zones(heights, np.abs(plain.deviation_m3) > bound_m3)
     for fine in ladder_m:
@@ -164,7 +164,7 @@ def _candidates(volume_m3, top_m, bound_m3, kinks_m, step, ladder_m):
         if not zones or not is_part or marks + len(heights) > MOST_ROWS:
             continue
         rows = table_heights(step, top_m, fine, zones)
-        found = interpolation_errors(volume_m3, rows, kinks_m)
+        found = interpolation_errors(volume_m3, rows, breakpoints_m)
         yield Rows(step, fine, zones, rows, found.largest_m3, found.at_m)
 
 

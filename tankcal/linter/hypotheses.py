@@ -1,13 +1,13 @@
-"""What explains a row that is not where its neighbours put it? The plainest story is believed.
+"""What explains a row that is not where its neighbours put it: the simplest hypothesis.
 
-Innocent stories: the rows around are smooth after all (a polynomial, or the series of a lying
+Null hypotheses: the rows around are smooth after all (a polynomial, or the series of a lying
 cylinder at its end), or the area of the cut jumps there (a joint, an edge of deadwood): then the
-curves through the rows on its two sides meet between its two rows. Guilty stories: one volume is
+curves through the rows on its two sides meet between its two rows. Alternatives: one volume is
 wrong, two neighbouring volumes are swapped, some rows are shifted together, two volumes are wrong.
 
-A guilty story is believed when it leaves nothing but rounding about a cubic (or less) while no
-story of fewer parameters does; or, where rows lie too far apart for that, when it leaves a sixth of
-what the best innocent story leaves.
+An alternative is believed when it leaves nothing but rounding about a cubic (or less) while no
+hypothesis of fewer parameters does; or, where rows lie too far apart for that, when it leaves a
+sixth of what the best null hypothesis leaves.
 """
 
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ from functools import cached_property
 
 import numpy as np
 
-WIDTHS = 17, 11  # rows that are looked at together; fewer where more tell no plain story
+WIDTHS = 17, 11  # rows that are looked at together; fewer where more fit no simple hypothesis
 PLAIN = 4  # parameters of a cubic
-MOST_IN_FEW = 4  # parameters of a story that few rows may tell: a line and one wrong row
+MOST_IN_FEW = 4  # parameters of a hypothesis that few rows may fit: a line and one wrong row
 BETTER_FACTOR = 6.0
 LEAST_SIZE = 2.5  # quanta
 POINTS_BETWEEN, TOUCH = 9, 0.02  # gap of curves that touch, seen at 9 points, over its largest
@@ -25,7 +25,7 @@ PRICE = 3.0  # of a parameter, in units of twice the log likelihood; about the l
 
 
 @dataclass(frozen=True)
-class Story:
+class Hypothesis:
     """One explanation of a few rows.
 
     kind        "smooth", "joint", "row", "swap", "block", "shift" or "pair"
@@ -44,12 +44,12 @@ class Story:
     sizes: tuple = ()
 
     @property
-    def is_innocent(self):
+    def is_null(self):
         return self.kind in ("smooth", "joint")
 
     @property
     def is_telling(self):
-        """Innocent, or of a size that two rounded digits do not explain."""
+        """A null hypothesis, or of a size that two rounded digits do not explain."""
         return not self.sizes or max(abs(size) for size in self.sizes) >= LEAST_SIZE
 
 
@@ -106,13 +106,13 @@ def _excess(residuals, maker, noise):
 
 
 def explain(rows, row):
-    """The `Story` to be believed about a row that is suspicious."""
-    story = _explain(rows, row, WIDTHS[0])
-    if story.is_innocent and story.excess > 1:
+    """The `Hypothesis` to be believed about a row that is suspicious."""
+    hypothesis = _explain(rows, row, WIDTHS[0])
+    if hypothesis.is_null and hypothesis.excess > 1:
         closer = _explain(rows, row, WIDTHS[1])
         is_plain = closer.excess <= 1 and closer.parameters <= MOST_IN_FEW
-        return closer if is_plain else story
-    return story
+        return closer if is_plain else hypothesis
+    return hypothesis
 
 
 def _explain(rows, row, width):
@@ -122,13 +122,13 @@ def _explain(rows, row, width):
     x, y = x / scale, rows.volume[members] - rows.volume[row]
     weight = rows.weight[members]
     curves = [Curve(basis, y, weight, rows.noise) for basis in _bases(rows, members, x)]
-    stories = [Story("smooth", c.parameters, c.rss, c.excess) for c in curves]
-    stories += _joints(Curve(x, y, weight, rows.noise), members)
+    hypotheses = [Hypothesis("smooth", c.parameters, c.rss, c.excess) for c in curves]
+    hypotheses += _joints(Curve(x, y, weight, rows.noise), members)
     for curve in curves:
         if len(x) - curve.parameters >= 4:
-            stories += _blocks(curve, members, _ends(rows, members))
-            stories += _swaps(curve, members)
-    return _believed(stories, curves, members, rows.noise)
+            hypotheses += _blocks(curve, members, _ends(rows, members))
+            hypotheses += _swaps(curve, members)
+    return _believed(hypotheses, curves, members, rows.noise)
 
 
 def _bases(rows, members, x):
@@ -152,7 +152,7 @@ def _ends(rows, members):
 
 
 def _blocks(curve, members, ends):
-    """Stories of one row, or of neighbouring rows, that are off together.
+    """Hypotheses of one row, or of neighbouring rows, that are off together.
 
     Where the members begin or end for good, "all but the first" is the first that is wrong, and
     the last alone is no shift of what follows.
@@ -173,7 +173,7 @@ def _blocks(curve, members, ends):
     size = residuals @ blocks[:, keep] / norm
     rss = np.maximum(curve.rss - size**2 * norm, 0.0)
     parameters = curve.parameters
-    stories = []
+    hypotheses = []
     for k in np.argsort(rss)[:12]:
         left = residuals - size[k] * moved[:, k]
         maker_left = maker - np.outer(moved[:, k], moved[:, k]) / norm[k]
@@ -185,15 +185,15 @@ def _blocks(curve, members, ends):
         else:
             kind, price = ("shift", 2) if is_open else ("block", 3)
         where = (low, None) if kind == "shift" else (low, high)
-        stories.append(
-            Story(kind, parameters + price, float(rss[k]), excess, where, (float(size[k]),))
+        hypotheses.append(
+            Hypothesis(kind, parameters + price, float(rss[k]), excess, where, (float(size[k]),))
         )
-    return stories
+    return hypotheses
 
 
 def _swaps(curve, members):
-    """Stories of two neighbouring volumes in each other's place."""
-    stories = []
+    """Hypotheses of two neighbouring volumes in each other's place."""
+    hypotheses = []
     maker = curve.residual_maker
     for first in range(len(members) - 1):
         values = curve.values.copy()
@@ -202,16 +202,16 @@ def _swaps(curve, members):
         parameters = curve.parameters
         excess = _excess(left, maker, curve.noise) if parameters <= PLAIN else np.inf
         where = (int(members[first]), int(members[first + 1]))
-        stories.append(Story("swap", parameters + 1, float(left @ left), excess, where))
-    return stories
+        hypotheses.append(Hypothesis("swap", parameters + 1, float(left @ left), excess, where))
+    return hypotheses
 
 
 def _joints(all_rows, members):
-    """Stories of two curves that meet between two rows, neither of them falling there.
+    """Hypotheses of two curves that meet between two rows, neither of them falling there.
 
     At a joint of courses they cross, at the edge of a cone they only touch.
     """
-    stories, x = [], all_rows.basis
+    hypotheses, x = [], all_rows.basis
     bottom = 0 if members[0] == 0 else 1  # bottoms have shapes of their own, two rows are enough
     for cut in range(2, len(x) - 1):
         between = np.linspace(x[cut - 1], x[cut], POINTS_BETWEEN)
@@ -226,8 +226,10 @@ def _joints(all_rows, members):
                 if is_meeting and len(x) >= parameters + 2:
                     excess = max(low.excess, high.excess)
                     where = (int(members[cut]), None)
-                    stories.append(Story("joint", parameters, low.rss + high.rss, excess, where))
-    return stories
+                    hypotheses.append(
+                        Hypothesis("joint", parameters, low.rss + high.rss, excess, where)
+                    )
+    return hypotheses
 
 
 def _side(all_rows, part, between, spare):
@@ -248,7 +250,7 @@ def _side(all_rows, part, between, spare):
 
 
 def _pairs(curve, members):
-    """The best story of two rows that are wrong, each by its own amount."""
+    """The best hypothesis of two rows that are wrong, each by its own amount."""
     maker, residuals = curve.residual_maker, curve.residuals
     first, second = np.triu_indices(len(members), 1)
     a, b, c = maker[first, first], maker[first, second], maker[second, second]
@@ -268,32 +270,32 @@ def _pairs(curve, members):
         float(size_2[k] / curve.weight[second[k]]),
     )
     parameters = curve.parameters + 4
-    return [Story("pair", parameters, max(float(rss[k]), 0.0), np.inf, where, sizes)]
+    return [Hypothesis("pair", parameters, max(float(rss[k]), 0.0), np.inf, where, sizes)]
 
 
-def _believed(stories, curves, members, noise):
+def _believed(hypotheses, curves, members, noise):
     count = len(members)
 
-    def cost(story):
-        return count * np.log(story.rss / count + noise**2 / 3) + PRICE * story.parameters
+    def cost(hypothesis):
+        return count * np.log(hypothesis.rss / count + noise**2 / 3) + PRICE * hypothesis.parameters
 
-    stories = [story for story in stories if story.is_telling]
-    possible = [s for s in stories if s.excess <= 1 + 1e-6]
+    hypotheses = [hypothesis for hypothesis in hypotheses if hypothesis.is_telling]
+    possible = [s for s in hypotheses if s.excess <= 1 + 1e-6]
     if possible:
-        return min(possible, key=lambda s: (s.parameters, not s.is_innocent, s.rss))
-    innocent = min(
-        (s for s in stories if s.is_innocent), key=cost, default=Story("smooth", 0, 0, 0)
+        return min(possible, key=lambda s: (s.parameters, not s.is_null, s.rss))
+    null = min(
+        (s for s in hypotheses if s.is_null), key=cost, default=Hypothesis("smooth", 0, 0, 0)
     )
-    guilty = [s for s in stories if not s.is_innocent]
+    alternatives = [s for s in hypotheses if not s.is_null]
     margin = 2 * count * np.log(BETTER_FACTOR)
-    best = min(guilty, key=cost, default=innocent)
-    if cost(best) + margin < cost(innocent):
+    best = min(alternatives, key=cost, default=null)
+    if cost(best) + margin < cost(null):
         return best
     pairs = [
-        story
+        hypothesis
         for curve in curves
         if curve.parameters <= PLAIN and count - curve.parameters >= 6
-        for story in _pairs(curve, members)
+        for hypothesis in _pairs(curve, members)
     ]
-    best = min(pairs, key=cost, default=innocent)
-    return best if cost(best) + margin < cost(innocent) else innocent
+    best = min(pairs, key=cost, default=null)
+    return best if cost(best) + margin < cost(null) else null

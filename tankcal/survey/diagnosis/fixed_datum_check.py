@@ -150,7 +150,7 @@ class _Release:
             return np.flatnonzero(self.doubted & self.gone)[:TRIED]
         table = next(t for t in found.residuals if t.exact and t.source == self.number)
         size = np.zeros(len(self.control))
-        size[table.rows] = table.whole
+        size[table.rows] = table.test_statistic
         most = size.max(initial=0.0)
         order = np.argsort(-size, kind="stable")
         return order[(size[order] > LIKELY * most) & (most > CRITICAL)][:TRIED]
