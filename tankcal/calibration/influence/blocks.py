@@ -9,7 +9,7 @@ from tankcal.calibration.product.differences import differences_of
 from tankcal.camera.model import PARAMETERS, UNITS, Form
 from tankcal.geometry.rotations import rotation_vector, turned
 from tankcal.survey.network.assembly import assemble
-from tankcal.survey.network.datum import unobserved
+from tankcal.survey.network.datum import null_space
 from tankcal.survey.network.results import GlobalTest
 
 ROUNDS = 20
@@ -112,7 +112,7 @@ def _ways(adjustment):
         fixed[[name in datum.held for name in survey.photos.names]] = False
     photos = replace(survey.photos, fixed=fixed)
     loose = assemble(replace(survey, fixed=None, photos=photos))
-    return unobserved(loose), loose.centre_m
+    return null_space(loose), loose.centre_m
 
 
 def _own_photos(adjustment, setup):
