@@ -2,8 +2,8 @@
 
 from tankcal.report.dip_point import dip_point_text
 from tankcal.report.numbers import unit
-from tankcal.report.paper import Column
-from tankcal.report.uncertainty.table import NOT_FOR_USE, capacity_rows, times_across, use_columns
+from tankcal.report.tables.capacity import capacity_rows, capacity_table, parts_table
+from tankcal.report.uncertainty.table import note_on_use, times_across
 
 MOST_ACROSS = 6
 
@@ -32,16 +32,12 @@ def facts(paper):
 
 def table(paper):
     """Heights and volumes, to the litre, as many times side by side as there is room."""
-    spec, rows = paper.record["job"]["table"], capacity_rows(paper)
-    shown = unit(spec["volume_unit"])
-    height = Column("dip") if spec["height_unit"] != "m" else Column("height_m", "m", height=True)
-    columns = [height, Column("volume_m3", spec["volume_unit"], decimals=shown.least)]
-    columns += use_columns(rows)
-    across = times_across(paper, rows, columns, most=MOST_ACROSS)
-    found = [paper.table("field_table", rows, columns, across=across, unit=shown.symbol)]
-    if len(columns) > 2:
-        found.insert(0, paper.paragraph("not_for_use_marked", mark=NOT_FOR_USE))
-    return found
+    record, name = paper.record, "field_table"
+    declared, rows = capacity_table(record), capacity_rows(record)
+    across = times_across(paper, rows, declared.on_paper(name, rows), most=MOST_ACROSS)
+    symbol = unit(record["job"]["table"]["volume_unit"]).symbol
+    block = paper.show(declared, rows, on=name, across=across, unit=symbol)
+    return [*note_on_use(paper, rows), block]
 
 
 def proportional_parts(paper):
@@ -49,13 +45,5 @@ def proportional_parts(paper):
     parts, name = paper.record["proportional_parts"], paper.record["job"]["table"]["volume_unit"]
     if not parts["zones"]:
         return []
-    of_mm = [Column(f"part_{n}", name, digits=4) for n in range(1, parts["parts"])]
-    rows = [
-        zone | {f"part_{n}": part for n, part in enumerate(zone["part_m3"], 1)}
-        for zone in parts["zones"]
-    ]
-    heights = [Column(f"{end}_m", "m", height=True) for end in ("bottom", "top")]
     largest = paper.number(parts["largest_m3"], name, digits=2)
-    symbol = unit(name).symbol
-    columns = [*heights, *of_mm]
-    return [paper.table("proportional_parts", rows, columns, unit=symbol, largest=largest)]
+    return [paper.show(parts_table(paper.record), unit=unit(name).symbol, largest=largest)]

@@ -55,6 +55,26 @@ UNITS = {
 }
 
 
+# Of what was observed and of its residuals: {unit in the record: (unit shown, factor)}.
+_LARGE = {"mm": ("image mm", 1.0), "m": ("m", 1.0), "rad": ("deg", 180 / pi)}
+_SMALL = {"mm": ("um", 1e3), "m": ("image mm", 1e3), "rad": ("arcsec", 648000 / pi)}
+
+
+def large_unit(name):
+    """(unit, factor) in which readings of a unit are shown; ("", 1.0) where it has no such."""
+    return _LARGE.get(name, ("", 1.0))
+
+
+def small_unit(name):
+    """The same of residuals and sds: micrometres, millimetres, arc seconds."""
+    return _SMALL.get(name, ("", 1.0))
+
+
+def spelled(name):
+    """A unit of large_unit or small_unit in ASCII, for programs."""
+    return name.removeprefix("image ")
+
+
 def unit(name):
     """The unit called `name`; raises VocabularyError when it is not one of UNITS."""
     if name not in UNITS:

@@ -3,16 +3,58 @@
 import csv
 from math import isnan
 
-from pandas import NA
+from tankcal.report import numbers
+
+_YES = {True: "yes", False: "no"}
 
 
-def write_csv(table, path, style):
-    """Write a DataFrame with its headings; `style` ("%.6f") is that of numbers, "" for none."""
-    columns = [_texts(table[name].tolist(), style) for name in table.columns]
+def write_table(table, path, rows):
+    """Write a declared Table with its headings.
+
+    rows  dicts, or {key: values}; a column that none of them knows is left out
+    """
+    values_of = rows if isinstance(rows, dict) else _by_keys(rows)
+    columns = {}
+    for column in table.in_csv():
+        if column.key not in values_of:
+            continue
+        cells = _plain(values_of[column.key], numbers.unit(column.csv_unit).factor)
+        if any(isinstance(cell, list) for cell in cells):
+            columns |= _spread(column.csv, cells)
+        else:
+            columns[column.csv] = cells
+    write_csv(columns, path, table.csv_style)
+
+
+def _by_keys(rows):
+    keys = dict.fromkeys(key for row in rows for key in row)
+    return {key: [row.get(key) for row in rows] for key in keys}
+
+
+def _plain(values, factor):
+    """The values in another unit; yes and no for True and False."""
+    types = set(map(type, values))
+    if bool in types:
+        return [_YES.get(value, value) for value in values]
+    if factor == 1.0:
+        return values
+    return [None if value is None else factor * value for value in values]
+
+
+def _spread(heading, lists):
+    """Lists of one or more as columns of their own: id_1, id_2."""
+    width = max(map(len, lists), default=0)
+    padded = ([*one, *[""] * (width - len(one))] for one in lists)
+    return {f"{heading}_{i}": list(cells) for i, cells in enumerate(zip(*padded, strict=True), 1)}
+
+
+def write_csv(columns, path, style):
+    """Write {heading: cells}; `style` ("%.6f") is that of numbers, "" for none."""
+    cells = [_texts(list(values), style) for values in columns.values()]
     with open(path, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(table.columns)
-        writer.writerows(zip(*columns, strict=True))
+        writer.writerow(columns)
+        writer.writerows(zip(*cells, strict=True))
 
 
 def _texts(values, style):
@@ -26,7 +68,7 @@ def _texts(values, style):
 
 
 def _text(value, style):
-    if value is None or value is NA:
+    if value is None:
         return ""
     if isinstance(value, float):
         return "" if isnan(value) else style % value

@@ -2,8 +2,6 @@
 
 MOST_ROWS = 50  # of a table; how many there are in all is said beside it
 MOST_CAMERAS = 12  # sets of camera parameters that are shown
-SMALL_UNITS = {"mm": "image um", "m": "mm", "rad": "rad arcsec"}  # of residuals
-LARGE_UNITS = {"mm": "image mm", "m": "m", "rad": "rad deg"}  # of what was observed
 
 
 def chapter(paper, name, found):

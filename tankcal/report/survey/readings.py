@@ -1,14 +1,11 @@
 """Single readings: those set aside, those that fit worst, those that nothing controls."""
 
-from tankcal.report import numbers
-from tankcal.report.paper import Column
-from tankcal.report.survey.common import LARGE_UNITS, MOST_ROWS, SMALL_UNITS, with_note
-from tankcal.text.digits import fixed, with_digits
-from tankcal.text.words import observation_name
+from tankcal.record.plain_data import columns_of, rows_of
+from tankcal.report.survey.common import MOST_ROWS, with_note
+from tankcal.report.tables.survey import READINGS, in_their_units
 
 WORST = 16  # rows of a table of the worst readings
 WEAK = 0.1  # redundancy number below which a blunder has to be 13 sds to be found
-_DECIMALS = {"mm": 1, "m": 2, "rad": 1}  # of residuals in um, mm and arc seconds
 
 
 def adjusted(paper):
@@ -24,97 +21,16 @@ def held(paper):
     if not rows:
         return []
     rows = sorted(rows, key=lambda row: -abs(row["w"] or 0.0))
-    shown = []
-    for row in rows[:MOST_ROWS]:
-        unit = row["unit"]
-        small = numbers.unit(SMALL_UNITS.get(unit, ""))
-        of_release = {
-            f"released_{key}": _in_small(paper, row[key], unit, small) for key in ("change", "sd")
-        }
-        shown.append(_reading(paper, row) | of_release)
-    block = paper.table(
-        "held",
-        shown,
-        [
-            Column("observation"),
-            Column("between"),
-            Column("value", align="right"),
-            Column("released_change", align="right"),
-            Column("released_sd", align="right"),
-            Column("small_unit", heading="unit"),
-            Column("w", decimals=1),
-            Column("mdb", align="right"),
-            Column("effect_m", "mm", decimals=1),
-            Column("row", decimals=0),
-        ],
-        critical=paper.number(paper.record["adjustment"]["critical_w"], digits=3),
-    )
-    return with_note(paper, block, shown, rows)
+    critical = paper.number(paper.record["adjustment"]["critical_w"], digits=3)
+    return table(paper, "held", rows, critical=critical)
 
 
-def table(paper, name, rows, columns=("residual", "w"), **values):
-    """A table of readings, cut to the first MOST_ROWS; columns beside what names a reading."""
+def table(paper, name, rows, **values):
+    """The table of readings of that name, cut to the first MOST_ROWS."""
     if not rows:
         return []
-    shown = [_reading(paper, row) for row in rows[:MOST_ROWS]]
-    residual = [Column("residual", align="right"), Column("small_unit", heading="unit")]
-    known = {
-        "residual": residual,
-        "redundancy": [Column("redundancy", digits=2)],
-        "w": [Column("w", decimals=1)],
-        "sd": [Column("declared_sd", align="right")],
-        "mdb": [Column("mdb", align="right")],
-        "effect": [Column("effect_m", "mm", decimals=1)],
-    }
-    block = paper.table(
-        name,
-        shown,
-        [
-            Column("observation"),
-            Column("between"),
-            Column("value", align="right"),
-            *(column for name in columns for column in known[name]),
-            Column("file"),
-            Column("row", decimals=0),
-        ],
-        **values,
-    )
-    return with_note(paper, block, shown, rows)
-
-
-def _reading(paper, row):
-    unit, number = row["unit"], paper.number
-    between = " – ".join(map(str, row["ids"]))
-    element = _element(paper, row["element"])
-    small = numbers.unit(SMALL_UNITS.get(unit, ""))
-    shown = {
-        key: _in_small(paper, row[key], unit, small) for key in ("residual", "mdb") if key in row
-    }
-    return row | {
-        "observation": observation_name(paper.words, row),
-        "declared_sd": paper.number(row["sd"], SMALL_UNITS.get(unit, ""), digits=2),
-        "between": f"{between}, {element}" if element else between,
-        "value": number(row["value"], LARGE_UNITS[unit], decimals=4)
-        if unit in LARGE_UNITS
-        else number(row["value"], digits=4),
-        **shown,
-        "small_unit": small.symbol or None,
-        "file": row["file"] or None,
-    }
-
-
-def _element(paper, code):
-    """The name of what was observed of it: an angle, or the scale of an instrument."""
-    words = paper.words
-    return words["elements"].get(code) or words["instrument_parts"].get(code, code)
-
-
-def _in_small(paper, value, unit, small):
-    if value is None:
-        return None
-    if unit not in _DECIMALS:
-        return with_digits(value, 2, paper.marks)
-    return fixed(value * small.factor, _DECIMALS[unit], paper.marks)
+    shown = rows_of(in_their_units(columns_of(rows[:MOST_ROWS])))
+    return with_note(paper, paper.show(READINGS, shown, on=name, **values), shown, rows)
 
 
 def removed(paper):
@@ -132,7 +48,7 @@ def control(paper):
     """What nothing controls, and where an undetected blunder would do most."""
     a, alone = paper.record["adjustment"], [row for row in adjusted(paper) if not row["controlled"]]
     numbers_of = [row["redundancy"] for row in adjusted(paper) if row["controlled"]]
-    found = table(paper, "uncontrolled", alone, ["sd"], count=len(alone), all=len(adjusted(paper)))
+    found = table(paper, "uncontrolled", alone, count=len(alone), all=len(adjusted(paper)))
     if not alone and numbers_of:
         smallest, largest, mean = (
             paper.number(value, digits=2)
@@ -148,7 +64,6 @@ def control(paper):
         paper,
         "weakest_readings",
         _weakest(paper),
-        ["residual", "redundancy", "mdb", "effect"],
         power=paper.percent(a["power"]),
         alpha=paper.percent(a["alpha"]),
     )

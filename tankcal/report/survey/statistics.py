@@ -1,8 +1,8 @@
 """How well everything fits: statistics, datum, groups of observations."""
 
-from tankcal.report import blocks, numbers
-from tankcal.report.paper import Column
-from tankcal.report.survey.common import MOST_ROWS, SMALL_UNITS
+from tankcal.report import blocks
+from tankcal.report.survey.common import MOST_ROWS
+from tankcal.report.tables.survey import GROUPS
 from tankcal.text import words
 from tankcal.text.digits import NOTHING
 
@@ -49,47 +49,6 @@ def aside(paper):
 def groups(paper):
     """The groups of observations with their variance factors, and what is not as declared."""
     a = paper.record["adjustment"]
-    table = paper.table(
-        "groups",
-        [_group(paper, row) for row in a["groups"]],
-        [
-            Column("group", heading="observations"),
-            Column("count", decimals=0),
-            Column("removed", decimals=0, heading="set_aside"),
-            Column("declared_sd", align="right"),
-            Column("rms", align="right"),
-            Column("redundancy", decimals=1),
-            Column("factor", align="right"),
-            Column("interval", align="right"),
-            Column("verdict", words="verdicts"),
-        ],
-        confidence=paper.percent(a["confidence"]),
-    )
+    table = paper.show(GROUPS, confidence=paper.percent(a["confidence"]))
     sentences = words.verdict_sentences(paper.words, a)
     return [table, blocks.listing(sentences)] if sentences else [table]
-
-
-def _group(paper, row):
-    factor = interval = None
-    if row["verdict"] in ("as_declared", "better", "worse"):
-        keys = ("factor", "factor_low", "factor_high")
-        factor, low, high = (words.factor_text(paper.words, row[key]) for key in keys)
-        interval = f"{low}–{high}"
-    smallest, largest = row["sd_smallest"], row["sd_largest"]
-    declared = _small(paper, smallest, row["unit"])
-    if smallest is not None and largest > smallest * (1 + 1e-9):
-        unit = numbers.unit(SMALL_UNITS.get(row["unit"], ""))
-        low = paper.number(smallest * unit.factor, digits=2)
-        declared = f"{low}–{_small(paper, largest, row['unit'])}"
-    return row | {
-        "group": words.group_name(paper.words, row),
-        "factor": factor,
-        "declared_sd": declared,
-        "rms": _small(paper, row["rms"], row["unit"]),
-        "interval": interval,
-    }
-
-
-def _small(paper, value, unit):
-    """A residual or an sd with its small unit: um, mm or arc seconds."""
-    return paper.number(value, SMALL_UNITS.get(unit, ""), digits=2)

@@ -16,8 +16,9 @@ class Column:
         Key of the value in each row; on paper its heading is word `table_headings.<key>`.
     unit : str
         Unit in which it is shown, one of numbers.UNITS; "" for text and bare numbers.
-    decimals : int, optional
-        So many decimals; beside `u`: where no row has an uncertainty.
+    decimals : int or callable, optional
+        So many decimals, or what gives them from a row (in the workbook maybe a number format);
+        beside `u`: where no row has an uncertainty.
     u : str, optional
         Key of the standard or expanded uncertainty that sets the decimals (two digits of it);
         whole digits are rounded off in the column of that uncertainty alone, and on paper only.
@@ -56,12 +57,12 @@ class Column:
     csv_unit : str
         Unit in which the file has it; "": that of the record.
     optional : bool
-        It is left out where no row has a value.
+        It is left out where no row has the key.
     """
 
     key: str
     unit: str = ""
-    decimals: int | str | None = None
+    decimals: int | Callable | None = None
     u: str | None = None
     least: int = 0
     most: int | None = None
@@ -118,12 +119,12 @@ class Table:
         """The columns of the paper's table of that name (None: its own)."""
         name = name or self.name
         shown = [one for one in self.columns if one.on is None or name in one.on.split()]
-        return self._in_order(name, _with_values(shown, rows))
+        return self._in_order(name, _known(shown, rows))
 
     def in_workbook(self, rows=None):
         """The columns of its sheet."""
         shown = [replace(one, **one.in_sheet) for one in self.columns if one.sheet]
-        return self._in_order("sheet", _with_values(shown, rows))
+        return self._in_order("sheet", _known(shown, rows))
 
     def in_csv(self):
         """The columns of its file."""
@@ -139,15 +140,11 @@ class Table:
         return sorted(columns, key=lambda one: later.index(one.key) if one.key in later else -1)
 
 
-def _with_values(columns, rows):
-    """The columns without those that are optional and have no value in any row."""
+def _known(columns, rows):
+    """The columns without those that are optional and that no row knows."""
     if rows is None:
         return columns
-    return [
-        one
-        for one in columns
-        if not one.optional or any(row.get(one.key) is not None for row in rows)
-    ]
+    return [one for one in columns if not one.optional or any(one.key in row for row in rows)]
 
 
 def decimals_of_cells(column, rows, factor=1.0, rounds_whole=True):
@@ -158,6 +155,8 @@ def decimals_of_cells(column, rows, factor=1.0, rounds_whole=True):
     if column.u is None:
         if column.height:
             return [decimals_of_height(row.get(column.key) or 0.0) for row in rows]
+        if callable(column.decimals):
+            return [column.decimals(row) for row in rows]
         return [column.decimals] * len(rows)
     of_rows = [(row.get(column.u) or 0.0) * factor for row in rows]
     rounds_whole = rounds_whole and column.u == column.key

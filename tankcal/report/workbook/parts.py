@@ -2,9 +2,10 @@
 
 from tankcal.report.numbers import unit
 from tankcal.report.paper import DECIMALS_OF_PARTS
+from tankcal.report.tables.capacity import capacity_rows, capacity_table, parts_table
 from tankcal.report.tables.tank import DEADWOOD
 from tankcal.report.uncertainty.stated import stated_U_m3
-from tankcal.report.workbook.look import Column, height_digits, number_format, values_of
+from tankcal.report.workbook.look import Column, height_digits, number_format
 from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import LITRE_DECIMALS, decimals_of_rows, shortest, with_digits
 from tankcal.text.words import marks_of
@@ -16,19 +17,12 @@ _WIDTHS = (50, 16, 16, 16, 16)
 def proportional_parts_sheet(book, record):
     """What 1 to 9 mm add to the row below a dip, course by course; no sheet for other tables."""
     parts = record["proportional_parts"]
-    zones = parts["zones"]
-    if not zones:
+    if not parts["zones"]:
         return
     largest = with_digits(1000 * parts["largest_m3"], 2, marks_of(book.words))
     subtitle = book.word("texts.parts_subtitle", largest=largest)
     sheet = book.sheet("proportional_parts", subtitle, landscape=True, tab="result")
-    columns = [
-        book.column(code, values_of(zones, key), height_digits(values_of(zones, key)), 10)
-        for code, key in (("from_m", "bottom_m"), ("to_m", "top_m"))
-    ]
-    for place in range(parts["parts"] - 1):
-        litres = [1000 * zone["part_m3"][place] for zone in zones]
-        columns.append(book.column("part_l", litres, 1, 11, millimetres=place + 1))
+    columns = columns_of(book, parts_table(record))
     set_widths(book, sheet, columns)
     book.table(sheet, _HEAD_ROW, "proportional_parts", columns)
     book.freeze(sheet, _HEAD_ROW)
@@ -55,7 +49,7 @@ def densities_sheet(book, record):
     named = range(2, len(columns))
     muted = [row for row, good in enumerate(capacity["for_use"]) if not good]
     if muted:
-        columns.append(use_column(book, capacity))
+        columns.append(_use_column(book, record))
     set_widths(book, sheet, columns)
     last = book.table(sheet, _HEAD_ROW, "other_densities", columns, muted=muted)
     book.freeze(sheet, _HEAD_ROW)
@@ -63,10 +57,11 @@ def densities_sheet(book, record):
         book.name(name_of_density(place), sheet, _HEAD_ROW + 1, last, place)
 
 
-def use_column(book, capacity):
+def _use_column(book, record):
     """The column that says which rows are not for use."""
-    refused = book.words["texts"]["not_for_use"]
-    return book.column("use", ["" if good else refused for good in capacity["for_use"]], None, 14)
+    table, rows = capacity_table(record), capacity_rows(record)
+    places = [column.key for column in table.in_workbook(rows)]
+    return columns_of(book, table, rows)[places.index("for_use")]
 
 
 def name_of_density(place):

@@ -1,14 +1,13 @@
 """The sheet Adjustment of a survey: statistics, groups, datum, instruments and check points."""
 
-from tankcal.report.workbook.look import ANGLES, in_mm, number_format, values_of
-from tankcal.report.workbook.observations import SMALL
-from tankcal.report.workbook.tables import set_widths
-from tankcal.text.digits import decimals_of, decimals_of_rows
+from tankcal.report.tables.survey import CHECK_POINTS, GROUPS, INSTRUMENTS, SYSTEMS
+from tankcal.report.workbook.look import in_mm, number_format
+from tankcal.report.workbook.tables import columns_of, set_widths
+from tankcal.text.digits import decimals_of
 from tankcal.text.words import (
     as_sentence,
     datum_sentences,
     global_test_sentence,
-    group_name,
     scale_sentence,
     snooping_sentence,
     verdict_sentences,
@@ -23,10 +22,10 @@ def adjustment_sheet(book, record):
     """Statistics, groups, datum, instruments and check points of the adjustment."""
     a, words = record["adjustment"], book.words
     tables = [
-        ("adjusted_groups", "groups", _groups(book, a["groups"])),
-        ("adjusted_instruments", "instruments", _instruments(book, a["instruments"])),
-        ("adjusted_systems", "systems", _systems(book, a["systems"])),
-        ("adjusted_checks", "check_points", _check_points(book, a["check_points"])),
+        ("adjusted_groups", "groups", columns_of(book, GROUPS)),
+        ("adjusted_instruments", "instruments", columns_of(book, INSTRUMENTS)),
+        ("adjusted_systems", "systems", columns_of(book, SYSTEMS)),
+        ("adjusted_checks", "check_points", columns_of(book, CHECK_POINTS)),
     ]
     sheet = book.sheet("adjustment", landscape=True)
     widths = set_widths(book, sheet, *(columns for _, _, columns in tables), least=_LEAST)
@@ -92,94 +91,3 @@ def _sentences(book, sheet, row, sentences, widths):
         book.paragraph(sheet, row, sentence, widths)
         row += 1
     return row + bool(sentences)
-
-
-def _small(rows, key):
-    """Values in their small unit, with the decimals that two digits need."""
-    values = [
-        None if row[key] is None else row[key] * SMALL.get(row["unit"], ("", 1.0))[1]
-        for row in rows
-    ]
-    return values, [decimals_of(value) if value else 1 for value in values]
-
-
-def _groups(book, rows):
-    words = book.words
-    judged = [row["verdict"] in ("as_declared", "better", "worse") for row in rows]
-    intervals = {
-        key: [row[key] if good else None for row, good in zip(rows, judged, strict=True)]
-        for key in ("factor", "factor_low", "factor_high")
-    }
-    units = [SMALL.get(row["unit"], ("", 1.0))[0] for row in rows]
-    verdicts = [words["verdicts"][row["verdict"]] for row in rows]
-    return [
-        book.column("observations", [group_name(words, row) for row in rows], None, 34),
-        book.column("values", values_of(rows, "count"), 0, 10),
-        book.column("set_aside", values_of(rows, "removed"), 0, 10),
-        book.column("sd_smallest", *_small(rows, "sd_smallest"), 11),
-        book.column("sd_largest", *_small(rows, "sd_largest"), 11),
-        book.column("rms", *_small(rows, "rms"), 11),
-        book.column("unit", units, None, 8),
-        book.column("redundancy", values_of(rows, "redundancy"), 1, 11),
-        book.column("factor", intervals["factor"], 2, 12),
-        book.column("factor_low", intervals["factor_low"], 2, 11),
-        book.column("factor_high", intervals["factor_high"], 2, 11),
-        book.column("verdict", verdicts, None, 16),
-    ]
-
-
-def _instruments(book, rows):
-    kinds = book.words["instruments"]
-    certificates = [row["details"].get("certificate", "") for row in rows]
-    estimates = [
-        column
-        for code, key, unit in (
-            ("scale_declared", "declared_scale", "ppm"),
-            ("scale_estimated", "scale", "ppm"),
-            ("offset_declared", "declared_offset", "mm"),
-            ("offset_estimated", "offset", "mm"),
-        )
-        for column in _beside_sd(book, rows, code, key, unit)
-    ]
-    return [
-        book.column("instrument", values_of(rows, "instrument"), None, 34),
-        book.column("kind", [kinds.get(row["kind"], row["kind"] or "") for row in rows]),
-        book.column("certificate", certificates),
-        *estimates,
-    ]
-
-
-def _beside_sd(book, rows, code, key, unit):
-    """A column of values and one of their sds, both to two digits of the sd."""
-    values, sds = (values_of(rows, f"{key}{part}_{unit}") for part in ("", "_sd"))
-    digits = decimals_of_rows(sds, most=3, unknown=2)
-    return [book.column(code, values, digits), book.column(f"sd_{code}", sds, digits)]
-
-
-def _systems(book, rows):
-    return [
-        book.column("system", values_of(rows, "system"), None, 34),
-        *(book.column("of_m", values_of(rows, f"{axis}_m"), 4, axis=axis) for axis in "xyz"),
-        *(
-            book.column("of_deg", values_of(rows, f"{key}_deg"), 5, axis=sign)
-            for sign, key in ANGLES
-        ),
-        *_beside_sd(book, rows, "scale", "scale", "ppm"),
-    ]
-
-
-def _check_points(book, found):
-    rows = found["points"] if found else []
-    sds = {axis: values_of(rows, f"s{axis}_m", 1e3) for axis in "xyz"}
-    digits = {axis: decimals_of_rows(sd, most=3, unknown=2) for axis, sd in sds.items()}
-    differences = [
-        book.column("difference_mm", values_of(rows, f"d{axis}_m", 1e3), digits[axis], axis=axis)
-        for axis in "xyz"
-    ]
-    return [
-        book.column("check_point", values_of(rows, "point"), None, 34),
-        *differences,
-        book.column("magnitude_mm", values_of(rows, "size_m", 1e3), 2),
-        *(book.column("sd_of_mm", sds[axis], digits[axis], axis=axis) for axis in "xyz"),
-        book.column("largest_w", values_of(rows, "largest_w"), 1),
-    ]
