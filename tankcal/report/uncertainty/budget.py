@@ -3,12 +3,14 @@
 from tankcal.pipeline.plots import even_groups
 from tankcal.report import blocks
 from tankcal.report.numbers import degrees_of_freedom, like_its_sd, symbol
-from tankcal.report.paper import Column
+from tankcal.report.tables import Column, Table
 from tankcal.text.digits import NOTHING, decimals_of, fixed, shortest
 from tankcal.text.words import name_of_input
 
 ACROSS = 7  # volumes and deliveries beside each other
 USEFUL = 0.995  # of U: an input that would change it less is not worth measuring better
+UNLIMITED = "∞"  # degrees of freedom
+LEAST_WRITTEN_OUT = 1e-4  # of a sensitivity in the workbook
 SMALL = 5e-4  # share of the variance that prints as 0.0 %
 
 
@@ -43,35 +45,61 @@ def _first_delivery(paper):
 
 
 def _table(paper, name, lines, values, /, **places):
-    decimals = decimals_of(values["U_m3"]) + 1
     u, U = (paper.number(values[key], "m3", u=values["u_m3"]) for key in ("u_m3", "U_m3"))
-    columns = [
-        Column("input"),
-        Column("estimate", align="right"),
-        Column("u", digits=2, align="right"),
-        Column("unit"),
-        Column("how"),
-        Column("dof", align="right"),
-        Column("sensitivity", "m3/unit", digits=3, align="right"),
-        Column("contribution_m3", "m3", decimals=decimals),
-        Column("share", "share", decimals=1),
-    ]
     k, nu = paper.number(values["k"], decimals=2), degrees_of_freedom(values["dof"], paper.marks)
-    rows = [_line(paper, line) for line in lines]
-    return paper.table(name, rows, columns, u=u, U=U, k=k, nu=nu, **places)
+    table = budget_table(decimals_of(values["U_m3"]) + 1)
+    return paper.show(table, lines, on=name, u=u, U=U, k=k, nu=nu, **places)
 
 
-def _line(paper, line):
-    """A line of a budget, its words in the language of the paper."""
-    distribution = paper.words["distributions"].get(line["distribution"], line["distribution"])
+def _distribution(paper, line):
+    return paper.words["distributions"].get(line["distribution"], line["distribution"])
+
+
+def _estimate(paper, line):
     estimate = line.get("estimate")
-    return line | {
-        "input": paper.input_name(line),
-        "estimate": None if estimate is None else like_its_sd(estimate, line["u"], paper.marks),
-        "unit": symbol(line["unit"]),
-        "how": f"{line['type']}, {distribution}",
-        "dof": degrees_of_freedom(line["dof"], paper.marks),
-    }
+    return None if estimate is None else like_its_sd(estimate, line["u"], paper.marks)
+
+
+def _note(paper, line):
+    """What was declared beside an input, and what it is correlated with."""
+    return "; ".join(filter(None, [line["note"], *correlations(paper, [line])]))
+
+
+def _digits_of_sensitivity(line):
+    """Four digits, or a power of ten where they would stand behind many zeros."""
+    size = abs(line["sensitivity"] or 0)
+    return "0.00E+00" if 0 < size < LEAST_WRITTEN_OUT else decimals_of(size, significant=4)
+
+
+def budget_table(decimals):
+    """The Table of the lines of a budget, its contributions with so many decimals."""
+    of_u, as_number = {"u": "u", "decimals": 4, "digits": None}, {"text": None}
+    return Table(
+        "budget",
+        (
+            Column("input", text=lambda paper, line: paper.input_name(line), sheet="input",
+                   width=38),
+            Column("estimate", text=_estimate, align="right", sheet="estimate",
+                   in_sheet=as_number | of_u),
+            Column("u", digits=2, align="right", sheet="u_of_input", width=10, in_sheet=of_u),
+            Column("unit", text=lambda paper, line: symbol(line["unit"]), sheet="unit", width=9),
+            Column("how", text=lambda paper, line: f"{line['type']}, {_distribution(paper, line)}"),
+            Column("type", on="", sheet="type", width=7),
+            Column("distribution", text=_distribution, on="", sheet="distribution", width=13),
+            Column("dof", text=lambda paper, line: degrees_of_freedom(line["dof"], paper.marks),
+                   align="right", sheet="dof", width=9,
+                   in_sheet=as_number | {"decimals": 0, "nothing": UNLIMITED}),
+            Column("sensitivity", "m3/unit", digits=3, align="right", sheet="sensitivity",
+                   width=10, in_sheet={"digits": None, "decimals": _digits_of_sensitivity}),
+            Column("sensitivity_unit", text=lambda paper, line: symbol(line["sensitivity_unit"]),
+                   on="", sheet="sensitivity_unit", width=11),
+            Column("contribution_m3", "m3", decimals=decimals, sheet="contribution_m3", width=10),
+            Column("share", "share", decimals=1, sheet="share", width=9),
+            Column("halved", "share", decimals=1, on="", sheet="halved", width=10),
+            Column("note", text=_note, on="", sheet="note", width=40),
+        ),
+        rows=lambda record: record["budget"],
+    )  # fmt: skip
 
 
 def _notes(paper, lines):

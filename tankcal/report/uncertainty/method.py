@@ -3,8 +3,9 @@
 from math import inf
 
 from tankcal.report import blocks, numbers
-from tankcal.report.paper import Column
+from tankcal.report.tables import Column, Table
 from tankcal.report.uncertainty.stated import MARK, by_monte_carlo, k_of_rows, stated_rows
+from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 
 FROM_SURVEY = (
     "instrument_scale",
@@ -143,32 +144,47 @@ def _with_unit(paper, u, unit):
 
 def stated_blocks(paper):
     """The table of the volumes and deliveries that are stated; nothing when there are none."""
-    rows = [_row(paper, row) for row in stated_rows(paper.record)]
+    rows = stated_rows(paper.record)
     if not rows:
         return []
-    unit = paper.record["job"]["table"]["volume_unit"]
-    columns = [
-        Column("high_m", "m", height=True, heading="height_m"),
-        Column("low_m", "m", height=True, heading="down_to"),
-        Column("volume_m3", unit, u="U_m3", least=numbers.unit(unit).least),
-        Column("U_m3", unit, u="U_m3"),
-        Column("k", decimals=2, nothing=""),
-        Column("dof", align="right"),
-        Column("relative", "share", digits=2, align="right"),
-        Column("remark", nothing=""),
-    ]
-    marked = any(row["by_monte_carlo"] for row in rows)
-    if marked:
-        columns.insert(4, Column("by_monte_carlo", nothing=""))
-    return [paper.table("stated_marked" if marked else "stated", rows, columns)]
+    name = "stated_marked" if any(row["simulated"] for row in rows) else "stated"
+    return [paper.show(stated_table(paper.record), rows, on=name)]
 
 
-def _row(paper, row):
-    return row | {
-        "by_monte_carlo": MARK if row["simulated"] else None,
-        "dof": numbers.degrees_of_freedom(row["dof"], paper.marks),
-        "remark": "; ".join(remarks(paper, row)) or None,
-    }
+def _dof(paper, row):
+    return numbers.degrees_of_freedom(row["dof"], paper.marks)
+
+
+def _interval(paper, row):
+    return paper.words["intervals"]["monte_carlo" if row["simulated"] else "gum"]
+
+
+def stated_table(record):
+    """The Table of the volumes and deliveries that are stated, in the unit of a record's table."""
+    unit = record["job"]["table"]["volume_unit"]
+    litres = {"u": "U_m3", "least": LITRE_DECIMALS}
+    return Table(
+        "stated",
+        (
+            Column("high_m", "m", height=True, heading="height_m", sheet="from_dip_m"),
+            Column("low_m", "m", height=True, heading="down_to", sheet="down_to_m"),
+            Column("volume_m3", unit, u="U_m3", least=numbers.unit(unit).least, sheet="volume_m3",
+                   width=14, in_sheet=litres | {"unit": "m3"}),
+            Column("U_m3", unit, u="U_m3", sheet="U_m3", in_sheet={"unit": "m3"}),
+            Column("by_monte_carlo", text=lambda paper, row: MARK if row["simulated"] else None,
+                   nothing="", on="stated_marked"),
+            Column("k", decimals=2, nothing="", sheet="k", width=10, in_sheet={"nothing": NOTHING}),
+            Column("dof", text=_dof, align="right"),
+            Column("relative", "share", digits=2, align="right", sheet="relative"),
+            Column("interval", text=_interval, on="", sheet="interval", width=14),
+            *(Column(f"{end}_m3", "m3", **litres, on="", sheet=code, width=14)
+              for end, code in (("low", "uneven_from_m3"), ("high", "uneven_to_m3"))),
+            Column("remark", text=lambda paper, row: "; ".join(remarks(paper, row)) or None,
+                   nothing="", sheet="remark", width=44,
+                   in_sheet={"text": lambda paper, row: "; ".join(remarks(paper, row))}),
+        ),
+        rows=stated_rows,
+    )  # fmt: skip
 
 
 def remarks(paper, row):

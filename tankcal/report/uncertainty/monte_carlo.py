@@ -2,9 +2,11 @@
 
 from itertools import groupby
 
-from tankcal.report import blocks, numbers
-from tankcal.report.paper import Column
+from tankcal.record.plain_data import rows_of
+from tankcal.report import blocks
+from tankcal.report.tables import Column, Table
 from tankcal.report.uncertainty import method
+from tankcal.text.digits import LITRE_DECIMALS
 from tankcal.text.words import name_of_input
 
 MOST_RANGES = 40
@@ -70,50 +72,95 @@ def _range(capacity, rows, places):
     }
 
 
-def range_blocks(paper):
-    """The table of the ranges."""
-    found = ranges(paper.record)
-    columns = [
+def _differences():
+    return [
+        *(Column(key, "m3", digits=2, align="right") for key in ("d_low", "d_high")),
+        Column("tolerance", "m3", digits=1, heading="tolerance_m3", align="right"),
+    ]
+
+
+RANGES = Table(
+    "ranges",
+    (
         Column("low_m", "m", height=True, heading="range_low"),
         Column("high_m", "m", height=True, heading="range_high"),
         Column("count", decimals=0, heading="rows"),
         Column("validated", words="validated", heading="interval_code"),
         Column("at_m", "m", height=True),
-        *_differences("m3"),
+        *_differences(),
         Column("share", "share", digits=2, heading="d_percent", align="right"),
-    ]
+    ),
+    rows=ranges,
+)
+DELIVERIES = Table(
+    "simulated_deliveries",
+    (
+        Column("high_m", "m", height=True, heading="dip_high"),
+        Column("low_m", "m", height=True, heading="dip_low"),
+        *(
+            Column(key, "m3", u="U_m3", least=LITRE_DECIMALS)
+            for key in ("volume_m3", "low", "high")
+        ),
+        *_differences(),
+        Column("validated", words="validated", heading="interval_code"),
+    ),
+    rows=lambda record: [
+        {**one, **one["monte_carlo"]} for one in record["budgets"] if one["monte_carlo"] is not None
+    ],
+)
+
+
+def simulated_columns(record):
+    """Every row of the table as it was simulated, beside the GUM's interval: {key: values}."""
+    capacity, rows = record["capacity"], record["monte_carlo"]["rows"]
+    pairs = list(zip(capacity["volume_m3"], capacity["U_m3"], strict=True))
+    return rows | {
+        "height_m": capacity["height_m"],
+        "stated_U_m3": capacity["stated_U_m3"],
+        "gum_low": [one - expanded for one, expanded in pairs],
+        "gum_high": [one + expanded for one, expanded in pairs],
+    }
+
+
+_LITRES = {"u": "stated_U_m3", "least": LITRE_DECIMALS, "width": 10}
+SIMULATED = Table(
+    "monte_carlo",
+    (
+        Column("height_m", "m", height=True, sheet="dip_height_m", width=9),
+        Column("value", sheet="mean_m3", **_LITRES),
+        Column("u", u="u", sheet="u_m3", width=10),
+        *(
+            Column(key, sheet=code, **_LITRES)
+            for key, code in (
+                *(("low", "from_m3"), ("high", "to_m3")),
+                *(("gum_low", "gum_from_m3"), ("gum_high", "gum_to_m3")),
+            )
+        ),
+        Column("d_low", digits=2, most=6, sheet="lower_difference_m3", width=10),
+        Column("d_high", digits=2, most=6, sheet="upper_difference_m3", width=10),
+        Column("tolerance", digits=1, most=6, sheet="tolerance_m3", width=10),
+        Column("validated", sheet="validated", width=10),
+        Column("sure", sheet="sure"),
+        Column("draws", decimals=0, sheet="draws", width=8),
+    ),
+    rows=lambda record: rows_of(simulated_columns(record)),
+)
+
+
+def range_blocks(paper):
+    """The table of the ranges."""
+    found = ranges(paper.record)
     shown = found[:MOST_RANGES]
-    table = paper.table("ranges", shown, columns)
+    table = paper.show(RANGES, shown)
     if len(shown) == len(found):
         return [table]
     return [table, paper.paragraph("only_first_ranges", shown=len(shown), all=len(found))]
 
 
-def _differences(unit):
-    return [
-        *(Column(key, unit, digits=2, align="right") for key in ("d_low", "d_high")),
-        Column("tolerance", unit, digits=1, heading="tolerance_m3", align="right"),
-    ]
-
-
 def delivery_blocks(paper):
     """The table of the deliveries that were simulated; nothing where there are none."""
-    rows = [
-        {**one, **one["monte_carlo"]}
-        for one in paper.record["budgets"]
-        if one["monte_carlo"] is not None
-    ]
-    if not rows:
-        return []
-    of_ends = {"u": "U_m3", "least": numbers.unit("m3").least}
-    columns = [
-        Column("high_m", "m", height=True, heading="dip_high"),
-        Column("low_m", "m", height=True, heading="dip_low"),
-        *(Column(key, "m3", **of_ends) for key in ("volume_m3", "low", "high")),
-        *_differences("m3"),
-        Column("validated", words="validated", heading="interval_code"),
-    ]
-    return [paper.table("simulated_deliveries", rows, columns), *_why(paper, rows)]
+    rows = DELIVERIES.rows(paper.record)
+    return [paper.show(DELIVERIES, rows), *_why(paper, rows)] if rows else []
 
 
 def _why(paper, rows):

@@ -1,10 +1,13 @@
 """The verdict of the job's decision rule: sentences for a certificate, tables for the papers."""
 
 from tankcal.report import blocks, numbers
-from tankcal.report.paper import Column
+from tankcal.report.tables import Column, Table
+from tankcal.text.digits import decimals_of
 
 CERTAIN = 1e-4  # a probability nearer to 0 or 1 is not printed in full
 _LITRES = numbers.unit("m3").least
+_LITRES_OF_U, _LITRES_OF_WORST = ({"u": u, "least": _LITRES} for u in ("U_m3", "worst_U_m3"))
+_ENDS = ("TL_m3", "TU_m3", "AL_m3", "AU_m3")  # of tolerance and of acceptance
 
 
 def facts(paper):
@@ -117,19 +120,32 @@ def worst_text(paper, one):
     )
 
 
+LIMITS = Table(
+    "limits",
+    (
+        Column("limit_of", text=limit_text, sheet="limit", width=40),
+        Column("limit", "share", digits=2, on="", sheet="at_most"),
+        Column("verdict", text=lambda paper, one: paper.word(f"limit_codes.{one['code']}"),
+               sheet="verdict", width=16),
+        Column("kept_from", text=place_text, heading="from_m"),
+        Column("worst", text=worst_text),
+        Column("from_m", "m", height=True, on="", sheet="kept_from_m"),
+        Column("from_m3", "m3", on="", sheet="kept_from_m3", **_LITRES_OF_WORST),
+        Column("worst_m", "m", height=True, on="", sheet="worst_dip_m"),
+        Column("worst_low_m", "m", height=True, on="", sheet="worst_down_to_m"),
+        Column("worst_m3", "m3", on="", sheet="worst_m3", **_LITRES_OF_WORST),
+        Column("worst_U_m3", "m3", u="worst_U_m3", on="", sheet="worst_U_m3"),
+        Column("worst_ratio", "share", digits=2, on="", sheet="worst_ratio"),
+        Column("clause", on="", sheet="clause", width=40),
+        Column("verified", on="", sheet="verified"),
+    ),
+    rows=lambda record: record["rule"]["uncertainty"],
+)  # fmt: skip
+
+
 def limit_blocks(paper):
     """The limits of U as a table; nothing when there are none."""
-    rows = [
-        {
-            "limit_of": limit_text(paper, one),
-            "verdict": paper.word(f"limit_codes.{one['code']}"),
-            "from_m": place_text(paper, one),
-            "worst": worst_text(paper, one),
-        }
-        for one in paper.record["rule"]["uncertainty"]
-    ]
-    names = ("limit_of", "verdict", "from_m", "worst")
-    return [paper.table("limits", rows, [Column(name) for name in names])] if rows else []
+    return [paper.show(LIMITS)] if LIMITS.rows(paper.record) else []
 
 
 # ---- deviations from stated volumes
@@ -179,17 +195,81 @@ def probability(paper, share):
     return paper.number(share, "share", decimals=2)
 
 
+def deviation_limit_text(paper, one):
+    """What a limit of a deviation says."""
+    of = paper.word(f"limited_deviation.{one['of']}")
+    limit = deviation_texts(paper, one)["limit"]
+    return paper.word("texts.rule_deviation_limit", of=of, limit=limit)
+
+
+def _in_words(name, **more):
+    """A column of the paper with a text of a deviation."""
+    return Column(name, text=lambda paper, one: deviation_texts(paper, one)[name],
+                  heading=f"deviation_{name}", **more)  # fmt: skip
+
+
+def _decimals_of_probability(one):
+    """Near to 0 and 1 with as many decimals as tell them from these."""
+    rest = 100 * min(one["probability"], 1 - one["probability"])
+    return min(decimals_of(rest, significant=1, least=2), 6)
+
+
+DEVIATIONS = Table(
+    "stated_deviations",
+    (
+        Column("dips", text=_dips, heading="deviation_place"),
+        Column("limit_of", text=deviation_limit_text, on="", sheet="limit", width=40),
+        Column("high_m", "m", height=True, on="", sheet="from_dip_m"),
+        Column(
+            "verdict_there",
+            text=lambda paper, one: paper.word(f"deviation_codes.{one['code']}"),
+            on="",
+            sheet="verdict",
+            width=16,
+        ),
+        Column("low_m", "m", height=True, on="", sheet="down_to_m"),
+        _in_words("volume", align="right"),
+        _in_words("stated", align="right"),
+        _in_words("deviation", align="right"),
+        Column("stated_m3", "m3", on="", sheet="stated_m3", **_LITRES_OF_U),
+        Column("volume_m3", "m3", on="", sheet="table_m3", **_LITRES_OF_U),
+        Column("deviation_m3", "m3", on="", sheet="deviation_m3", **_LITRES_OF_U),
+        _in_words("U", align="right"),
+        Column("U_m3", "m3", u="U_m3", on="", sheet="U_m3"),
+        _in_words("limit"),
+        _in_words("guard", sheet="guard"),
+        _in_words("verdict"),
+        _in_words("probability", align="right"),
+        Column(
+            "conformity",
+            "share",
+            on="",
+            sheet="conformity",
+            in_sheet={"key": "probability", "decimals": _decimals_of_probability},
+        ),
+        Column("clause", on="", sheet="clause", width=40),
+        Column("verified", on="", sheet="verified"),
+    ),
+    rows=lambda record: record["rule"]["deviation"],
+)
+ACCEPTANCE = Table(
+    "acceptance",
+    (
+        Column("limit_of", text=deviation_limit_text, sheet="limit", width=40),
+        Column("high_m", "m", height=True, sheet="from_dip_m"),
+        Column("guard_m3", "m3", sheet="guard_band_m3", width=16, **_LITRES_OF_U),
+        *(Column(code, "m3", sheet=code, **_LITRES_OF_U) for code in _ENDS),
+    ),
+    rows=lambda record: [
+        one | dict(zip(_ENDS, (*one["tolerance_m3"], *one["accepted_m3"]), strict=True))
+        for one in record["rule"]["deviation"]
+    ],
+)  # fmt: skip
+
+
 def deviation_blocks(paper):
     """The deviations as a table; nothing when there are none."""
-    rows = [deviation_texts(paper, one) for one in paper.record["rule"]["deviation"]]
-    names = ("volume", "stated", "deviation", "U", "limit", "guard", "verdict", "probability")
-    columns = [Column("dips", heading="deviation_place")]
-    columns += [Column(name, heading=f"deviation_{name}", align=_right(name)) for name in names]
-    return [paper.table("stated_deviations", rows, columns)] if rows else []
-
-
-def _right(name):
-    return "right" if name in ("volume", "stated", "deviation", "U", "probability") else None
+    return [paper.show(DEVIATIONS)] if DEVIATIONS.rows(paper.record) else []
 
 
 def clauses(paper):
@@ -208,13 +288,6 @@ def clauses(paper):
     ]
     found = [*dict.fromkeys(found), *_by_law(paper)]
     return [blocks.listing(found)] if found else []
-
-
-def deviation_limit_text(paper, one):
-    """What a limit of a deviation says."""
-    texts = deviation_texts(paper, one)
-    of = paper.word(f"limited_deviation.{one['of']}")
-    return paper.word("texts.rule_deviation_limit", of=of, limit=texts["limit"])
 
 
 def _volume(paper, value_m3, decimals):

@@ -1,7 +1,6 @@
 """The sheet Certificate: what was calibrated, the main result, and what was assumed."""
 
 from tankcal.report.certificate import doubts_of
-from tankcal.report.paper import Paper
 from tankcal.report.uncertainty import method, rule
 from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
 from tankcal.report.workbook.look import ACCENT, DATE, LINE_PT, MUTED, lines_of, number_format
@@ -29,7 +28,7 @@ def certificate_sheet(book, record):
     row = _entries(book, sheet, row, sentence(words, "headings", "tank"), _tank(record, words))
     row = _entries(book, sheet, row, book.word("headings.certificate"), _certificate(record, words))
     row = _entries(book, sheet, row, book.word("headings.survey"), _survey(record, words))
-    row = _uncertainty(book, sheet, row, Paper(record, words))
+    row = _uncertainty(book, sheet, row, book.paper)
     row = _corrections(book, sheet, row, record)
     row = _choices(book, sheet, row, record)
     _authorisation(book, sheet, row)
