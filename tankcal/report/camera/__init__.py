@@ -14,8 +14,8 @@ from tankcal.record.camera_versions import KINDS
 from tankcal.report import folders
 from tankcal.report.camera.paper import CameraPaper
 from tankcal.report.camera.provenance import made_from
-from tankcal.report.camera.tables import write_csv
-from tankcal.report.camera.terminal import lines_of
+from tankcal.report.outputs.csv_files import write_rows
+from tankcal.report.terminal import lines_of
 
 __all__ = ["CameraPaper", "lines", "made_from", "refuse_foreign", "write"]
 
@@ -65,7 +65,7 @@ def write(result, directory, progress=None, language=None):
         (temporary / RECORD).write_text(text + "\n", encoding="utf-8")
         for name, rows in _of_kind(result).tables(result).items():
             if rows:
-                write_csv(temporary / name, rows)
+                write_rows(rows, temporary / name)
         others = [other for other in KINDS if other != kind]
         notebook = joined(RECORD, others, (TEMPLATE,), LANGUAGE=language)
         report.set_papers(

@@ -5,6 +5,7 @@ from math import isnan
 
 from tankcal.report import numbers
 
+FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 _YES = {True: "yes", False: "no"}
 
 
@@ -46,6 +47,24 @@ def _spread(heading, lists):
     width = max(map(len, lists), default=0)
     padded = ([*one, *[""] * (width - len(one))] for one in lists)
     return {f"{heading}_{i}": list(cells) for i, cells in enumerate(zip(*padded, strict=True), 1)}
+
+
+def write_rows(rows, path):
+    """Write rows (dicts with the same keys) with twelve digits, lists with blanks between.
+
+    A text that a spreadsheet would take for a formula gets an apostrophe before it.
+    """
+    columns = {key: [_safe(row[key]) for row in rows] for key in rows[0]}
+    write_csv(columns, path, "%.12g")
+
+
+def _safe(value):
+    if isinstance(value, bool):
+        return _YES[value]
+    if isinstance(value, list):
+        value = " ".join(map(str, value))
+    is_formula = isinstance(value, str) and value.startswith(FORMULA_SIGNS)
+    return f"'{value}" if is_formula else value
 
 
 def write_csv(columns, path, style):
