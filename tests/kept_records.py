@@ -1,7 +1,7 @@
 """Records of every kind of job, small, and those of released versions that are kept.
 
-python tests/kept_records.py layout   writes the list of keys of the version that is being made
-python tests/kept_records.py keep     keeps a record of each kind, when that version is released
+python tests/kept_records.py   keeps a record of each kind, and lists their keys, when a version is
+                               released
 """
 
 import gzip
@@ -11,14 +11,13 @@ import tempfile
 from pathlib import Path
 
 from job_builder import write_job
+from schemas import keys_in
 from test_adjustment_outputs import write_station
 from test_jobs_of_film import film_job
 from workbook_records import records_of_every_kind
 
 import tankcal
 from tankcal.record import VERSION, record_of, record_of_adjustment
-from tankcal.record.layout import keys_in
-from tankcal.record.versions import RECORD
 
 KEPT = Path(__file__).with_name("records")
 FREE = (  # dicts whose keys a user or a message gives
@@ -86,7 +85,7 @@ def _cells(lines, count):
 def records_with_every_key(folder, records=None):
     """{kind: record} of jobs that together have something of everything; written into `folder`."""
     found = dict(records or records_of_every_kind(folder))
-    clutter = {"settings": {"table.step_m": 0.5}, "extra_points": [("stair", 7.4, 0.0, 3.0)]}
+    clutter = {"settings": {"table.step_m": 0.01}, "extra_points": [("stair", 7.4, 0.0, 3.0)]}
     job = tankcal.load(write_job(folder / "cluttered", **clutter))
     found["cluttered"] = record_of(tankcal.run(job))
     for kind, write in (("film", write_film), ("station", write_station)):
@@ -100,23 +99,18 @@ def layout_made(records):
     return sorted(set().union(*(keys_in(record, FREE) for record in records.values())))
 
 
-def _main(what):
-    if kept_files(VERSION):
+def _main():
+    place = KEPT / str(VERSION)
+    if (place / "keys.txt").exists():
         sys.exit(f"version {VERSION} has kept records: it is released; VERSION has to count up")
     with tempfile.TemporaryDirectory() as folder:
         records = records_with_every_key(Path(folder))
-    if what == "layout":
-        text = "\n".join(layout_made(records)) + "\n"
-        RECORD.layout_file(VERSION).write_text(text, encoding="utf-8")
-        return
-    (KEPT / str(VERSION)).mkdir(parents=True)
+    place.mkdir(parents=True, exist_ok=True)
+    (place / "keys.txt").write_text("\n".join(layout_made(records)) + "\n", encoding="utf-8")
     for kind, record in records.items():
         text = json.dumps(record, ensure_ascii=False, separators=(",", ":"))
-        path = KEPT / str(VERSION) / f"{kind}.json.gz"
-        path.write_bytes(gzip.compress(text.encode("utf-8"), mtime=0))
+        (place / f"{kind}.json.gz").write_bytes(gzip.compress(text.encode("utf-8"), mtime=0))
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] not in (["layout"], ["keep"]):
-        sys.exit(__doc__)
-    _main(sys.argv[1])
+    _main()

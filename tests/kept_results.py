@@ -8,8 +8,9 @@ import json
 import sys
 from pathlib import Path
 
+from schemas import keys_in
+
 from tankcal.record.camera_versions import CAMERA
-from tankcal.record.layout import keys_in
 from tankcal.record.plan_versions import PLAN
 
 KEPT = Path(__file__).with_name("kept")
@@ -34,6 +35,11 @@ def read(path):
     return json.loads(gzip.decompress(path.read_bytes()))
 
 
+def keys_file(path):
+    """Path of the list of the keys of a kept file."""
+    return path.with_name(path.name.replace(".json.gz", ".txt"))
+
+
 def keep(path):
     """Keep a result, as written, under its format and version, with the list of its keys."""
     saved = json.loads(path.read_text(encoding="utf-8"))
@@ -45,7 +51,7 @@ def keep(path):
     text = json.dumps(saved, ensure_ascii=False, separators=(",", ":"))
     place.write_bytes(gzip.compress(text.encode("utf-8"), mtime=0))
     keys = "\n".join(sorted(keys_in(saved, FREE))) + "\n"
-    one.layout_file(int(version), saved.get("kind")).write_text(keys, encoding="utf-8")
+    keys_file(place).write_text(keys, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from tankcal.job import Switches
-from tankcal.messages import message
+from tankcal.messages import Message, message
 from tankcal.pipeline.tanks import body_of, thermal_scale
 from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 
@@ -27,7 +27,7 @@ class Correction:
     applied: bool
     size_m3: float
     size_percent: float
-    formula: str
+    formula: Message
     source: str
 
 

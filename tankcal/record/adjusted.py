@@ -1,5 +1,7 @@
 """The part of the record that lists what was adjusted: points, photos, cameras, instruments."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.special import fdtri, gammaincinv
 
@@ -7,37 +9,167 @@ from tankcal.calibration.edges import Frame, own_shift
 from tankcal.calibration.interiors import interiors_of
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.geometry.rotations import angle_derivatives, angles_of
-from tankcal.record.plain_data import plain, rows_of
+from tankcal.record.schema import filled_from, key
 from tankcal.survey.network import correlations
 from tankcal.survey.network.quality import ellipsoid_factor, ellipsoids, precision
 
 ELLIPSE = 0.95  # probability of the ellipses and ellipsoids that are drawn and listed
 PROBABILITIES = (0.20, 0.90, 0.95, 0.99)
-_AXES, _ANGLES = ("x", "y", "z"), ("omega", "phi", "kappa")
+
+
+@dataclass(frozen=True)
+class AdjustedPoint:
+    """A point after the adjustment, with its error ellipsoid and its ellipse in plan of 95 %."""
+
+    point: str = key("name")
+    kind: str = key('"point", "control", "check" or "station"')
+    rays: int = key("photos that it was measured in and kept")
+    fixed: list[bool] = key("x, y, z: whether the coordinate was held")
+    spherical_sd_m: float = key("(sx + sy + sz) / 3")
+    quadratic_sd_m: float = key("sqrt(sx² + sy² + sz²)")
+    ellipsoid_m: list[float] = key("three semi-axes, the largest first")
+    ellipsoid_azimuth_deg: float = key("of the first")
+    ellipsoid_elevation_deg: float = key("of the first")
+    ellipse_m: list[float] = key("two semi-axes in plan, the largest first")
+    ellipse_azimuth_deg: float = key("of the first")
+
+
+@dataclass(frozen=True)
+class EllipsoidFactor:
+    """Semi-axes of an ellipsoid in those of the standard one."""
+
+    probability: float = key("that it holds the point")
+    factor: float = key("times the standard ellipsoid")
+
+
+@dataclass(frozen=True)
+class PointPrecision:
+    """Precision of all points that are not fixed."""
+
+    points: int = key("that are not fixed")
+    mean_sd_m: float = key("sqrt(trace / 3n)")
+    axis_sd_m: list[float] = key("the same along x, y, z")
+    smallest_sd_m: list[float] = key("along x, y, z")
+    largest_sd_m: list[float] = key("along x, y, z")
+    range_m: list[float] = key("largest minus smallest sd along x, y, z")
+    spherical_sd_m: float = key("mean of the points")
+    quadratic_sd_m: float = key("mean of the points")
+    extent_m: float = key("diagonal of the box around the points")
+    proportional: float = key("precision is 1 : this")
+    ellipsoid_factors: list[EllipsoidFactor] = key("for other probabilities")
+    ellipse_probability: float = key("of the ellipses and ellipsoids that are listed")
+
+
+@dataclass(frozen=True)
+class AdjustedPhoto:
+    """A photo: where it was taken, its angles, their sds, and how well its points fit."""
+
+    photo: str = key("name")
+    camera: str = key("name")
+    x_m: float = key("projection centre")
+    y_m: float = key("projection centre")
+    z_m: float = key("projection centre")
+    omega_deg: float = key("angle about x")
+    phi_deg: float = key("angle about y")
+    kappa_deg: float = key("angle about z")
+    sx_m: float = key("sd")
+    sy_m: float = key("sd")
+    sz_m: float = key("sd")
+    s_omega_deg: float = key("sd")
+    s_phi_deg: float = key("sd")
+    s_kappa_deg: float = key("sd")
+    points: int = key("used")
+    rms_mm: float = key("root mean square residual of an image coordinate")
+
+
+@dataclass(frozen=True)
+class AdjustedCamera:
+    """A set of interior parameters: photos with the same parameters share one."""
+
+    camera: str = key("name")
+    photos: list[str] | None = key("those of a set that is not of the whole camera")
+    convention: str = key(
+        "sign of the distortion's terms, as in cameras.toml", of="form.convention"
+    )
+    affinity: str = key("form of the affinity terms", of="form.affinity")
+    radial_balance_mm: float = key(
+        "radius at which radial distortion is 0; 0: not balanced", of="form.radial_balance_mm"
+    )
+    format_mm: list[float] | None = key("width and height of the image")
+    pixel_mm: list[float] | None = key("sides of a pixel", of="frame.pixel_mm")
+    edge_mm: list[float] = key("half width and half height that edge_um is of", of="frame.half_mm")
+    edge_known: bool = key(
+        "whether the format was declared, or only seen by the points", of="frame_known"
+    )
+    reach_mm: float = key("of the farthest image point from the middle", of="frame.reach_mm")
+    parameters: list[str] = key("names of those of the model; the lists below are in their order")
+    units: list[str] = key("of the values")
+    values: list[float] = key("as adjusted")
+    sds: list[float] = key("0: fixed")
+    scopes: list[str] = key('"block", "camera" or "photo"')
+    states: list[str] = key('"free", "weighted" or "fixed"')
+    edge_um: list[float] = key("shift that the value makes in a corner of the image; c: null")
+    free: list[str] = key("names of the parameters that were adjusted")
+    covariance: list[list[float]] = key("of the free ones")
+    correlation: list[list[float]] = key("of the free ones")
+
+
+@dataclass(frozen=True)
+class AdjustedInstrument:
+    """Scale and offset of an instrument: reading = true (1 + scale) + offset."""
+
+    instrument: str = key("name")
+    kind: str | None = key('"tape", "edm", ...')
+    details: dict[str, str] = key("as declared")
+    scale_ppm: float = key("as adjusted")
+    scale_sd_ppm: float = key("its sd")
+    declared_scale_ppm: float = key("before")
+    declared_scale_sd_ppm: float = key("before")
+    offset_mm: float = key("as adjusted")
+    offset_sd_mm: float = key("its sd")
+    declared_offset_mm: float = key("before")
+    declared_offset_sd_mm: float = key("before")
+
+
+@dataclass(frozen=True)
+class ControlSystem:
+    """A further system of control: X_system = (1 + scale) R X + shift."""
+
+    system: str = key("name")
+    x_m: float = key("shift")
+    y_m: float = key("shift")
+    z_m: float = key("shift")
+    omega_deg: float = key("of R")
+    phi_deg: float = key("of R")
+    kappa_deg: float = key("of R")
+    s_omega_deg: float = key("sd")
+    s_phi_deg: float = key("sd")
+    s_kappa_deg: float = key("sd")
+    scale_ppm: float = key("of lengths")
+    scale_sd_ppm: float = key("its sd")
 
 
 def adjusted_points_of(adjustment, measurements=None):
-    """Each adjusted point: what it is, rays, sds, error ellipsoid and ellipse in plan at 95 %."""
+    """The `AdjustedPoint` of each point, in their order."""
     covariance, dof = np.asarray(adjustment.covariance_m2), adjustment.dof
     sd = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
     axes, directions = ellipsoids(covariance, ELLIPSE, dof)
     azimuth, elevation = _direction(directions[:, :, 0])
     plan, plan_azimuth = _ellipses(covariance[:, :2, :2], dof)
     rays = _rays(adjustment)
-    columns = {
-        "point": adjustment.names,
-        "kind": _kinds(adjustment, measurements),
-        "rays": [rays.get(name, 0) for name in adjustment.names],
-        "fixed": adjustment.fixed,
-        "spherical_sd_m": sd.mean(axis=1),
-        "quadratic_sd_m": np.sqrt(np.sum(sd**2, axis=1)),
-        "ellipsoid_m": axes,
-        "ellipsoid_azimuth_deg": azimuth,
-        "ellipsoid_elevation_deg": elevation,
-        "ellipse_m": plan,
-        "ellipse_azimuth_deg": plan_azimuth,
-    }
-    return rows_of(plain(columns))
+    spherical, quadratic = sd.mean(axis=1), np.sqrt(np.sum(sd**2, axis=1))
+    columns = (spherical, quadratic, axes, azimuth, elevation, plan, plan_azimuth)
+    return [
+        AdjustedPoint(*row)
+        for row in zip(
+            adjustment.names,
+            _kinds(adjustment, measurements),
+            [rays.get(name, 0) for name in adjustment.names],
+            np.asarray(adjustment.fixed).tolist(),
+            *(np.asarray(column).tolist() for column in columns),
+            strict=True,
+        )
+    ]
 
 
 def _direction(vectors):
@@ -80,59 +212,48 @@ def _kinds(adjustment, measurements):
 
 
 def precision_of(adjustment):
-    """Precision of all points that are not fixed, m; None when every point is."""
+    """`PointPrecision`; None when every point is fixed."""
     free = ~np.asarray(adjustment.fixed).all(axis=1)
     if not free.any():
         return None
     xyz, dof = np.asarray(adjustment.xyz_m)[free], adjustment.dof
     found = precision(xyz, np.asarray(adjustment.covariance_m2)[free])
     sd = np.sqrt(np.einsum("nii->ni", np.asarray(adjustment.covariance_m2)[free]))
-    return {
-        "points": int(free.sum()),
-        "mean_sd_m": found.mean_sd_m,
-        "axis_sd_m": found.axis_sd_m,
-        "smallest_sd_m": sd.min(axis=0),
-        "largest_sd_m": sd.max(axis=0),
-        "range_m": found.range_m,
-        "spherical_sd_m": found.spherical_sd_m.mean(),
-        "quadratic_sd_m": found.quadratic_sd_m.mean(),
-        "extent_m": float(np.linalg.norm(np.ptp(xyz, axis=0))),
-        "proportional": found.proportional,
-        "ellipsoid_factors": [
-            {
-                "probability": p,
-                "factor": 1.0 if p == PROBABILITIES[0] else ellipsoid_factor(p, dof),
-            }
+    return filled_from(
+        PointPrecision,
+        found,
+        points=int(free.sum()),
+        smallest_sd_m=sd.min(axis=0),
+        largest_sd_m=sd.max(axis=0),
+        spherical_sd_m=found.spherical_sd_m.mean(),
+        quadratic_sd_m=found.quadratic_sd_m.mean(),
+        extent_m=float(np.linalg.norm(np.ptp(xyz, axis=0))),
+        ellipsoid_factors=[
+            EllipsoidFactor(p, 1.0 if p == PROBABILITIES[0] else ellipsoid_factor(p, dof))
             for p in PROBABILITIES
         ],
-        "ellipse_probability": ELLIPSE,
-    }
+        ellipse_probability=ELLIPSE,
+    )
 
 
 def photos_of(adjustment):
-    """Each photo: where it was taken, its angles, their sds, and how well its points fit."""
+    """The `AdjustedPhoto` of each photo."""
     survey = adjustment.adjusted.survey
     if survey.photos is None or not len(survey.photos.names):
         return []
     xyz, angles, covariance = adjustment.adjusted.photos
     sd = np.sqrt(adjustment.cov_scale * np.maximum(np.einsum("nii->ni", covariance), 0.0))
     fit = _fit_of_photos(adjustment)
-    rows = []
-    for i, name in enumerate(survey.photos.names):
-        points, rms = fit.get(name, (0, None))
-        rows.append(
-            {
-                "photo": name,
-                "camera": survey.cameras[survey.photos.camera[i]].name,
-                **{f"{axis}_m": xyz[i, k] for k, axis in enumerate(_AXES)},
-                **{f"{a}_deg": np.degrees(angles[i, k]) for k, a in enumerate(_ANGLES)},
-                **{f"s{axis}_m": sd[i, k] for k, axis in enumerate(_AXES)},
-                **{f"s_{a}_deg": np.degrees(sd[i, 3 + k]) for k, a in enumerate(_ANGLES)},
-                "points": points,
-                "rms_mm": rms,
-            }
+    degrees, sd_deg = np.degrees(angles), np.degrees(sd[:, 3:])
+    return [
+        AdjustedPhoto(
+            name,
+            survey.cameras[survey.photos.camera[i]].name,
+            *(*xyz[i], *degrees[i], *sd[i, :3], *sd_deg[i]),
+            *fit.get(name, (0, None)),
         )
-    return rows
+        for i, name in enumerate(survey.photos.names)
+    ]
 
 
 def _fit_of_photos(adjustment):
@@ -146,11 +267,7 @@ def _fit_of_photos(adjustment):
 
 
 def cameras_of(adjustment, measurements=None):
-    """Each set of interior parameters: values, sds, correlations, effect at the edge of the frame.
-
-    Photos with the same parameters share a set; "photos" names those of a set that is not of the
-    whole camera.
-    """
+    """The `AdjustedCamera` of each set of interior parameters."""
     return [_camera(one) for one in interiors_of(adjustment, measurements)]
 
 
@@ -162,30 +279,21 @@ def _camera(interior):
     scope = dict(zip(PARAMETERS, interior.scope, strict=True))
     state = dict(zip(PARAMETERS, interior.state, strict=True))
     names = [name for name in PARAMETERS if scope[name] != "off"]
-    return {
-        "camera": interior.camera,
-        "photos": interior.photos,
-        "convention": interior.form.convention,
-        "affinity": interior.form.affinity,
-        "radial_balance_mm": interior.form.radial_balance_mm,
-        "format_mm": interior.format_mm,
-        "pixel_mm": interior.frame.pixel_mm,
-        "edge_mm": interior.frame.half_mm,
-        "edge_known": interior.frame_known,
-        "reach_mm": interior.frame.reach_mm,
-        "parameters": names,
-        "units": [UNITS[name] for name in names],
-        "values": [values[name] for name in names],
-        "sds": [sds.get(name, 0.0) for name in names],
-        "scopes": [scope[name] for name in names],
-        "states": [state[name] for name in names],
-        "edge_um": [
+    return filled_from(
+        AdjustedCamera,
+        interior,
+        parameters=names,
+        units=[UNITS[name] for name in names],
+        values=[values[name] for name in names],
+        sds=[sds.get(name, 0.0) for name in names],
+        scopes=[scope[name] for name in names],
+        states=[state[name] for name in names],
+        edge_um=[
             _edge_effect(name, values, interior.form, interior.frame.half_mm) for name in names
         ],
-        "free": list(interior.free),
-        "covariance": interior.covariance,
-        "correlation": correlations(interior.covariance),
-    }
+        free=list(interior.free),
+        correlation=correlations(interior.covariance),
+    )
 
 
 def _edge_effect(name, values, form, corner_mm):
@@ -196,36 +304,27 @@ def _edge_effect(name, values, form, corner_mm):
 
 
 def instruments_of(adjustment, measurements=None):
-    """Scale and offset of each instrument: as declared, and as adjusted."""
+    """The `AdjustedInstrument` of each instrument."""
     adjusted = adjustment.adjusted
     state, layout = adjusted.solution.state, adjusted.problem.layout
     declared = {one.name: one for one in getattr(measurements, "instruments", ())}
     rows = []
     for i, tool in enumerate(adjusted.survey.instruments):
         source = declared.get(tool.name)
-        details = getattr(source, "details", {})
+        sds = [_sd_of(adjustment, one[i]) for one in (layout.scale, layout.offset)]
         rows.append(
-            {
-                "instrument": tool.name,
-                "kind": getattr(source, "kind", None),
-                "details": {key: str(value) for key, value in details.items()},
-                **_tool("scale", "ppm", 1e6, tool.scale, tool.scale_sd, state.scale[i],
-                        _sd_of(adjustment, layout.scale[i])),
-                **_tool("offset", "mm", 1e3, tool.offset_m, tool.offset_sd_m, state.offset_m[i],
-                        _sd_of(adjustment, layout.offset[i])),
-            }
-        )  # fmt: skip
+            AdjustedInstrument(
+                tool.name,
+                getattr(source, "kind", None),
+                {one: str(value) for one, value in getattr(source, "details", {}).items()},
+                *(1e6 * one for one in (state.scale[i], sds[0], tool.scale, tool.scale_sd)),
+                *(
+                    1e3 * one
+                    for one in (state.offset_m[i], sds[1], tool.offset_m, tool.offset_sd_m)
+                ),
+            )
+        )
     return rows
-
-
-def _tool(what, unit, factor, declared, declared_sd, value, sd):
-    """What the readings say of an instrument: reading = true (1 + scale) + offset."""
-    return {
-        f"{what}_{unit}": factor * value,
-        f"{what}_sd_{unit}": factor * sd,
-        f"declared_{what}_{unit}": factor * declared,
-        f"declared_{what}_sd_{unit}": factor * declared_sd,
-    }
 
 
 def _sd_of(adjustment, column):
@@ -236,7 +335,7 @@ def _sd_of(adjustment, column):
 
 
 def systems_of(adjustment):
-    """Transformation X_system = (1 + scale) R X + shift of each further system of control."""
+    """The `ControlSystem` of each further system of control."""
     adjusted = adjustment.adjusted
     state, problem = adjusted.solution.state, adjusted.problem
     rows = []
@@ -247,14 +346,6 @@ def systems_of(adjustment):
         turn = angle_derivatives(rotation[None])[0]
         q = adjusted.solution.cofactors(problem.layout.system[i, :3])
         sd = np.degrees(np.sqrt(adjustment.cov_scale * np.diag(turn @ q @ turn.T)))
-        rows.append(
-            {
-                "system": system.name,
-                **{f"{axis}_m": shift[k] for k, axis in enumerate(_AXES)},
-                **{f"{a}_deg": angles[k] for k, a in enumerate(_ANGLES)},
-                **{f"s_{a}_deg": sd[k] for k, a in enumerate(_ANGLES)},
-                "scale_ppm": 1e6 * scale,
-                "scale_sd_ppm": 1e6 * _sd_of(adjustment, problem.layout.system[i, 6]),
-            }
-        )
+        scale_sd = _sd_of(adjustment, problem.layout.system[i, 6])
+        rows.append(ControlSystem(system.name, *shift, *angles, *sd, 1e6 * scale, 1e6 * scale_sd))
     return rows

@@ -1,12 +1,18 @@
 """The part of the record that says how the survey was adjusted, and how good that is."""
 
-from dataclasses import asdict, fields
+from dataclasses import dataclass, fields
+from typing import Annotated
 
 import numpy as np
 from scipy.special import gammaincinv
 
-from tankcal.messages import as_plain
 from tankcal.record.adjusted import (
+    AdjustedCamera,
+    AdjustedInstrument,
+    AdjustedPhoto,
+    AdjustedPoint,
+    ControlSystem,
+    PointPrecision,
     adjusted_points_of,
     cameras_of,
     instruments_of,
@@ -14,98 +20,195 @@ from tankcal.record.adjusted import (
     precision_of,
     systems_of,
 )
-from tankcal.record.images import depth_of, fiducials_of, image_readings_of
+from tankcal.record.images import (
+    DepthCorrection,
+    FiducialTransformation,
+    ImageReadings,
+    depth_of,
+    fiducials_of,
+    image_readings_of,
+)
+from tankcal.record.schema import Columns, filled_from, key
+from tankcal.record.texts import Text, text_of
 from tankcal.survey.network.reliability import UNCONTROLLED, noncentrality, tau_limit
 from tankcal.survey.network.snooping import CRITICAL
-from tankcal.survey.results import Reading
+from tankcal.survey.results import DatumReport, GroupOfReadings, Reading
 
 CONFIDENCE = 0.95  # of the global test and of the intervals of variance factors
 ALPHA, POWER = 0.001, 0.80  # of the tests of single readings
 CHECKABLE = 1.0  # a group with less redundancy says next to nothing about its variance
 
 
+@dataclass(frozen=True, kw_only=True)
+class AdjustedReading(Reading):
+    """A value of an observation: the keys of `Reading`; what is infinite or not known is null."""
+
+    controlled: bool = key("whether others would show an error of it")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AdjustedGroup(GroupOfReadings):
+    """Is a group as good as declared? The keys of `GroupOfReadings`, and the 95 % interval."""
+
+    factor_low: float | None = key("lower end of the interval of `factor`")
+    factor_high: float | None = key("upper end")
+    verdict: str = key("a code: as_declared, worse, better, hardly_controlled, not_controlled")
+
+
+@dataclass(frozen=True)
+class HeldValue:
+    """A value that holds exactly, and what its release would say of it."""
+
+    kind: str = key("of observation")
+    ids: list[str] = key("names")
+    element: str = key('"x", "omega", ...')
+    file: str = key("where it was read")
+    row: int | None = key("of the file")
+    unit: str = key("of value, change, sd and mdb")
+    value: float = key("that is held")
+    released: float | None = key("value that the others give")
+    change: float | None = key("released minus value")
+    sd: float | None = key("of the change")
+    w: float | None = key("change over its sd")
+    mdb: float = key("minimal detectable bias")
+    effect_m: float = key("of such a bias on a point")
+    controlled: bool = key("whether others would show an error of it")
+
+
+@dataclass(frozen=True)
+class CheckPoint:
+    """A check point: adjusted minus known."""
+
+    point: str = key("name")
+    dx_m: float = key("adjusted minus known")
+    dy_m: float = key("adjusted minus known")
+    dz_m: float = key("adjusted minus known")
+    sx_m: float = key("sd of the difference")
+    sy_m: float = key("sd of the difference")
+    sz_m: float = key("sd of the difference")
+    size_m: float = key("of the difference")
+    largest_w: float | None = key("largest difference over its sd")
+
+
+@dataclass(frozen=True)
+class CheckedPoints:
+    """Check points against the adjustment."""
+
+    points: list[CheckPoint] = key("each of them")
+    r_xyz_m: float = key("root of the mean squared magnitude")
+    largest_m: float = key("magnitude")
+    mean_m: float = key("magnitude")
+
+
+@dataclass(frozen=True)
+class SharedCause:
+    """A shared cause of uncertainty that the budget names."""
+
+    name: str = key("of the instrument")
+    what: str = key('"instrument_scale" or "instrument_offset"')
+    u: float = key("standard uncertainty")
+    unit: str = key("ppm or mm")
+
+
+@dataclass(frozen=True)
+class AdjustedSetup:
+    """A set-up of an instrument on a station."""
+
+    setup: str = key("name", of="name")
+    station: str = key("name")
+    instrument: str | None = key("name")
+    height_m: float | None = key("of the instrument")
+
+
+@dataclass(frozen=True)
+class AdjustmentRecord:
+    """How the survey was adjusted, and how good that is."""
+
+    sigma0: float = key("a posteriori; null: nothing is redundant")
+    observations: int = key("values adjusted")
+    unknowns: int = key("number")
+    redundancy: int = key("of the whole")
+    iterations: int = key("of the last adjustment")
+    rounds: int = key("adjustments that the search for blunders took")
+    chi2: float = key("v'Pv")
+    chi2_bounds: list[float] | None = key("two-sided bounds of chi2; null: nothing is redundant")
+    confidence: float = key("of these bounds")
+    passed: bool | None = key("whether chi2 lies between them")
+    cov_scale: float = key("factor of every covariance of the record: 1, or sigma0 squared")
+    scale: str = key('"a_priori" or "a_posteriori"')
+    snooping: bool = key("whether blunders were searched for")
+    critical_w: float = key("beyond which a reading is set aside")
+    critical_tau: float | None = key("of tau")
+    alpha: float = key("level of the tests of single readings")
+    power: float = key("of these tests, for the mdb")
+    datum: DatumReport = key("what holds the frame")
+    groups: list[AdjustedGroup] = key("kinds of observations and instruments")
+    held: list[HeldValue] = key("values that hold exactly: sd 0")
+    removed: list[AdjustedReading] = key("readings set aside, the worst first")
+    residuals: Annotated[dict, Columns(AdjustedReading)] = key("all readings, a list for each key")
+    cameras: list[AdjustedCamera] = key("sets of interior parameters")
+    photos: list[AdjustedPhoto] = key("each photo")
+    image_readings: ImageReadings | None = key("repeated readings; null: each point was read once")
+    fiducials: list[FiducialTransformation] = key("photos read on a comparator")
+    depth_of_field: DepthCorrection | None = key("null: not asked for")
+    instruments: list[AdjustedInstrument] = key("each instrument")
+    systems: list[ControlSystem] = key("further systems of control")
+    setups: list[AdjustedSetup] = key("each set-up")
+    points: list[AdjustedPoint] = key("in the order of `points` of the record")
+    precision: PointPrecision | None = key("null: every point is fixed")
+    check_points: CheckedPoints | None = key("null: there are none")
+    causes: list[SharedCause] = key("that points have in common")
+    aside: list[str] = key("sentences: points that could not be adjusted, and why")
+    left_out: list[Text] = key("the same with their codes")
+
+
 def adjustment_of(adjustment, measurements=None):
-    """Statistics, groups, readings, instruments, cameras, photos, points of an `Adjustment`.
+    """The `AdjustmentRecord` of an `Adjustment`.
 
     measurements  `job.Measurements` that it was made from: settings, formats of the images
     """
     settings = getattr(measurements, "settings", None)
-    return {
-        **_statistics(adjustment, settings),
-        "datum": _datum(adjustment.datum),
-        "groups": [_group(group) for group in adjustment.groups],
-        "held": [_held(reading) for reading in adjustment.readings if _holds(reading)],
-        "removed": [_reading(reading) for reading in adjustment.removed],
-        "residuals": _columns(adjustment.readings),
-        "cameras": cameras_of(adjustment, measurements),
-        "photos": photos_of(adjustment),
-        "image_readings": image_readings_of(adjustment.repeats),
-        "fiducials": fiducials_of(getattr(measurements, "fiducials", ())),
-        "depth_of_field": depth_of(adjustment.depth),
-        "instruments": instruments_of(adjustment, measurements),
-        "systems": systems_of(adjustment),
-        "setups": [
-            {
-                "setup": one.name,
-                "station": one.station,
-                "instrument": one.instrument,
-                "height_m": one.height_m,
-            }
-            for one in getattr(measurements, "setups", ())
-        ],
-        "points": adjusted_points_of(adjustment, measurements),
-        "precision": precision_of(adjustment),
-        "check_points": _check_points(adjustment.check_points),
-        "causes": [
-            {"name": cause.name, "what": cause.what, "u": cause.u, "unit": cause.unit}
-            for cause in adjustment.causes
-        ],
-        "aside": list(adjustment.aside),
-        "left_out": [{"text": str(one), **as_plain(one)} for one in adjustment.aside],
-    }
-
-
-def _datum(datum):
-    said = as_plain(datum.words)
-    return {**asdict(datum), "words_code": said["code"], "words_values": said["values"]}
-
-
-def _statistics(adjustment, settings):
     test = adjustment.adjusted.test(CONFIDENCE)
-    redundant = adjustment.redundancy > 0
-    return {
-        "sigma0": adjustment.sigma0,
-        "observations": adjustment.observations,
-        "unknowns": adjustment.unknowns,
-        "redundancy": adjustment.redundancy,
-        "iterations": adjustment.iterations,
-        "rounds": adjustment.rounds,
-        "chi2": test.chi2,
-        "chi2_bounds": [test.low, test.high] if redundant else None,
-        "confidence": CONFIDENCE,
-        "passed": bool(test.passed) if redundant else None,
-        "cov_scale": adjustment.cov_scale,
-        "scale": getattr(settings, "scale", "a_priori"),
-        "snooping": getattr(settings, "snooping", True),
-        "critical_w": CRITICAL,
-        "critical_tau": tau_limit(ALPHA, adjustment.redundancy)
-        if adjustment.redundancy > 1
-        else None,
-        "alpha": ALPHA,
-        "power": POWER,
-    }
+    dof = adjustment.redundancy
+    return filled_from(
+        AdjustmentRecord,
+        adjustment,
+        chi2=test.chi2,
+        chi2_bounds=[test.low, test.high] if dof > 0 else None,
+        confidence=CONFIDENCE,
+        passed=bool(test.passed) if dof > 0 else None,
+        scale=getattr(settings, "scale", "a_priori"),
+        snooping=getattr(settings, "snooping", True),
+        critical_w=CRITICAL,
+        critical_tau=tau_limit(ALPHA, dof) if dof > 1 else None,
+        alpha=ALPHA,
+        power=POWER,
+        groups=[_group(group) for group in adjustment.groups],
+        held=[_held(reading) for reading in adjustment.readings if _holds(reading)],
+        removed=[_reading(reading) for reading in adjustment.removed],
+        residuals=_columns(adjustment.readings),
+        cameras=cameras_of(adjustment, measurements),
+        photos=photos_of(adjustment),
+        image_readings=image_readings_of(adjustment.repeats),
+        fiducials=fiducials_of(getattr(measurements, "fiducials", ())),
+        depth_of_field=depth_of(adjustment.depth),
+        instruments=instruments_of(adjustment, measurements),
+        systems=systems_of(adjustment),
+        setups=[filled_from(AdjustedSetup, one) for one in getattr(measurements, "setups", ())],
+        points=adjusted_points_of(adjustment, measurements),
+        precision=precision_of(adjustment),
+        check_points=_check_points(adjustment.check_points),
+        causes=[filled_from(SharedCause, cause) for cause in adjustment.causes],
+        left_out=[text_of(one) for one in adjustment.aside],
+    )
 
 
 def _reading(reading):
-    """One reading; what is infinite (nothing controls it) is null in the record."""
-    row = asdict(reading)
-    row["ids"] = list(reading.ids)
-    row["controlled"] = _controlled(reading)
-    return row
+    return AdjustedReading(**vars(reading), controlled=_controlled(reading))
 
 
 def _columns(readings):
-    """{key: values} of all readings, the keys being those of `_reading`; there may be 200 000."""
+    """{key: values} of all readings, as `AdjustedReading` has them; there may be 200 000."""
     columns = {one.name: [getattr(r, one.name) for r in readings] for one in fields(Reading)}
     columns["ids"] = [list(names) for names in columns["ids"]]
     columns["controlled"] = [_controlled(reading) for reading in readings]
@@ -125,42 +228,30 @@ def _holds(reading):
 
 
 def _held(reading):
-    """What the release of a value that is held would say of it."""
+    """The `HeldValue` of a reading."""
     controlled = _controlled(reading)
     sd = reading.mdb / noncentrality(ALPHA, POWER) if controlled else None
-    return {
-        "kind": reading.kind,
-        "ids": list(reading.ids),
-        "element": reading.element,
-        "file": reading.file,
-        "row": reading.row,
-        "unit": reading.unit,
-        "value": reading.value,
-        "released": reading.value + reading.w * sd if controlled else None,
-        "change": reading.w * sd if controlled else None,
-        "sd": sd,
-        "w": reading.w if controlled else None,
-        "mdb": reading.mdb,
-        "effect_m": reading.effect_m,
-        "controlled": controlled,
-    }
+    return filled_from(
+        HeldValue,
+        reading,
+        released=reading.value + reading.w * sd if controlled else None,
+        change=reading.w * sd if controlled else None,
+        sd=sd,
+        w=reading.w if controlled else None,
+        controlled=controlled,
+    )
 
 
 def _group(group):
-    """A group with the 95 % interval of its true sd over the declared one, and what follows."""
-    row = asdict(group)
+    """The `AdjustedGroup` of a group: with the interval of its true sd over the declared one."""
     low = high = None
     if group.redundancy > UNCONTROLLED and np.isfinite(group.factor):
         tail = (1 - CONFIDENCE) / 2
         square = group.factor**2 * group.redundancy
         bounds = 2 * gammaincinv(group.redundancy / 2, [1 - tail, tail])
         low, high = (float(np.sqrt(square / one)) if one > 0 else None for one in bounds)
-    return {
-        **row,
-        "factor_low": low,
-        "factor_high": high,
-        "verdict": _verdict(group, low, high),
-    }
+    verdict = _verdict(group, low, high)
+    return AdjustedGroup(**vars(group), factor_low=low, factor_high=high, verdict=verdict)
 
 
 def _verdict(group, low, high):
@@ -176,24 +267,18 @@ def _verdict(group, low, high):
 def _check_points(found):
     if found is None:
         return None
-    axes = ("x", "y", "z")
-    return {
-        "points": [
-            {
-                "point": name,
-                **{f"d{axis}_m": value for axis, value in zip(axes, difference, strict=True)},
-                **{f"s{axis}_m": value for axis, value in zip(axes, sd, strict=True)},
-                "size_m": float(np.sqrt(np.nansum(np.square(difference)))),
-                "largest_w": _largest(difference, sd),
-            }
-            for name, difference, sd in zip(
-                found.names, found.difference_m, found.sd_m, strict=True
-            )
-        ],
-        "r_xyz_m": found.r_xyz_m,
-        "largest_m": found.largest_m,
-        "mean_m": found.mean_m,
-    }
+    rows = zip(found.names, found.difference_m, found.sd_m, strict=True)
+    points = [
+        CheckPoint(
+            name,
+            *difference,
+            *sd,
+            size_m=float(np.sqrt(np.nansum(np.square(difference)))),
+            largest_w=_largest(difference, sd),
+        )
+        for name, difference, sd in rows
+    ]
+    return filled_from(CheckedPoints, found, points=points)
 
 
 def _largest(difference, sd):

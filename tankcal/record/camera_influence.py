@@ -1,193 +1,235 @@
-"""What calibrations do to a block, as plain lists and dicts, ready for JSON.
+"""What calibrations do to a block as it is saved: kind "influence" of camera.json."""
 
-format         "tankcal-camera/2"            kind  "influence"
-camera         name of the job's camera that was replaced
-states         those asked for: "fixed", "weighted", "free"
-calibrations   names, in their order
-photos, points numbers of them in the reference
-search         {searched (whether blunders were searched in the reference), removed: [{kind, ids
-                (names), element, file, row, w}]}: the readings set aside there are left out of
-                all runs, and no run searches again, so that all have the same observations
-free           names of the parameters that the runs "free" adjust
-runs           [RUN], the reference (the job's own settings) first
-pairs          [PAIR] of all runs that could be adjusted, the first of the two in the order of
-               `runs`; those with the reference (one = 0) come first
-
-RUN
-label          "reference", or "NAME, fixed"      calibration  NAME, null for the reference
-state          "fixed", "weighted", "free"; null for the reference
-outcome        "adjusted", "failed" or "skipped"
-message        why it failed (words), else null
-skipped        null or {code: "no_sds"}: a calibration without sds cannot be weighted
-held           parameters held at a value that is not 0 in a run "weighted", for want of an sd
-quality        null or {sigma0, chi2, chi2_low, chi2_high, passed (two-sided, 95 %), redundancy,
-                confidence}; sigma0 and passed null: nothing is redundant
-images         null or {n, rms_um: [x, y], largest_um, largest_photo, largest_point,
-                rms_px: [x, y] or null, largest_px or null}: residuals of the camera's photos
-convention, affinity  of the run's parameters; null: it was not adjusted
-interior       null or [{parameter, unit, value, sd, start, start_sd}] after and before
-                the adjustment; sd 0: held; start_sd null: not given
-product        null or the dict of tankcal.record.camera_product: check points
-volume         null or {volume_m3, u_m3, U_m3, k, height_m, points (of the wall)}: at the top
-volume_failed  null or why there is no volume (words), of a job with a tank
-shifts         null or SHIFTS: what the run changes against the reference; null for it
-
-PAIR
-one, other     numbers in `runs`: other minus one
-...            and the keys of SHIFTS
-
-SHIFTS
-points         {n, rms_mm: [x, y, z], largest_mm: [x, y, z], rms_xyz_mm (of the magnitudes),
-                largest_xyz_mm, largest_point}
-photos         {n, rms_mm: [x, y, z], rms_xyz_mm, largest_xyz_mm, largest_photo,
-                rms_arcsec: [x, y, z] (turn about the axes of the image), rms_turn_arcsec,
-                largest_turn_arcsec, largest_turn_photo}
-aligned        ways of the datum that nothing observes, and that were therefore taken out of the
-               differences first (0 to 7)
-volume         null or {difference_m3, percent (of that of `one`)}
-"""
-
-from dataclasses import asdict
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from tankcal.record.camera_product import as_json as product_as_json
-from tankcal.record.camera_versions import FORMAT
-from tankcal.record.plain_data import plain
+from tankcal.calibration.influence.blocks import InteriorValue
+from tankcal.record.camera_product import ProductFile, product_of
+from tankcal.record.camera_versions import CameraFile
+from tankcal.record.plain_data import to_plain
+from tankcal.record.schema import filled_from, key
+
+MM, UM = 1e3, 1e3
+ARCSEC = np.degrees(1.0) * 3600
+
+
+@dataclass(frozen=True)
+class ReadingSetAside:
+    """A reading that was set aside in the reference, and is left out of all runs."""
+
+    kind: str = key("of observation")
+    ids: list[str] = key("names")
+    element: str = key('"x", "omega", ...')
+    file: str = key("where it was read")
+    row: int | None = key("of the file")
+    w: float = key("test quantity")
+
+
+@dataclass(frozen=True)
+class BlunderSearch:
+    """The search in the reference; no run searches again, so that all have the same readings."""
+
+    searched: bool = key("whether blunders were searched for")
+    removed: list[ReadingSetAside] = key("readings set aside")
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """Why a run was left out."""
+
+    code: str = key('"no_sds": a calibration without sds cannot be weighted')
+
+
+@dataclass(frozen=True)
+class RunQuality:
+    """Global test of a run; null: nothing is redundant."""
+
+    sigma0: float | None = key("a posteriori")
+    chi2: float = key("v'Pv", of="test.chi2")
+    chi2_low: float | None = key("two-sided bound")
+    chi2_high: float | None = key("two-sided bound")
+    passed: bool | None = key("whether chi2 lies between them")
+    redundancy: int = key("of the run")
+    confidence: float = key("of the bounds", of="test.confidence")
+
+
+@dataclass(frozen=True)
+class RunImages:
+    """Residuals of the camera's photos."""
+
+    n: int = key("images")
+    rms_um: list[float] = key("x, y", of="rms_mm", times=UM)
+    largest_um: float = key("of a single coordinate", of="largest_mm", times=UM)
+    largest_photo: str = key("its photo")
+    largest_point: str = key("its point")
+    rms_px: list[float] | None = key("x, y")
+    largest_px: float | None = key("of a single coordinate")
+
+
+@dataclass(frozen=True)
+class RunVolume:
+    """Volume of the tank at the top of its table."""
+
+    volume_m3: float = key("at the top", of="value_m3")
+    u_m3: float = key("standard uncertainty")
+    U_m3: float = key("expanded uncertainty")
+    k: float = key("coverage factor")
+    height_m: float = key("dip of the top")
+    points: int | None = key("of the wall; null: not surveyed")
+
+
+@dataclass(frozen=True)
+class PointShifts:
+    """Differences of the points; null where there are none."""
+
+    n: int = key("points")
+    rms_mm: list[float] = key("along x, y, z", of="rms_m", times=MM)
+    largest_mm: list[float] = key("along x, y, z", of="largest_m", times=MM)
+    rms_xyz_mm: float = key("of the magnitudes", of="rms_xyz_m", times=MM)
+    largest_xyz_mm: float = key("magnitude", of="largest_xyz_m", times=MM)
+    largest_point: str | None = key("that differs most", of="largest_name")
+
+
+@dataclass(frozen=True)
+class PhotoShifts:
+    """Differences of the photos' places and turns about the axes of the image."""
+
+    n: int = key("photos")
+    rms_mm: list[float] = key("along x, y, z", of="rms_m", times=MM)
+    rms_xyz_mm: float = key("of the magnitudes", of="rms_xyz_m", times=MM)
+    largest_xyz_mm: float = key("magnitude", of="largest_xyz_m", times=MM)
+    largest_photo: str | None = key("that differs most", of="largest_name")
+    rms_arcsec: list[float] = key("about x, y, z", of="rms_rad", times=ARCSEC)
+    rms_turn_arcsec: float = key("of the whole turns", of="rms_turn_rad", times=ARCSEC)
+    largest_turn_arcsec: float = key("whole turn", of="largest_turn_rad", times=ARCSEC)
+    largest_turn_photo: str | None = key("that turns most", of="largest_turn_name")
+
+
+@dataclass(frozen=True)
+class VolumeShift:
+    """Difference of the capacities at the top."""
+
+    difference_m3: float = key("other minus one", of="volume_m3")
+    percent: float = key("of that of one", of="volume_percent")
+
+
+@dataclass(frozen=True)
+class Shifts:
+    """What a run changes against another."""
+
+    points: PointShifts = key("of the points")
+    photos: PhotoShifts = key("of the photos")
+    aligned: int = key("ways that nothing observes, taken out of the differences first (0 to 7)")
+    volume: VolumeShift | None = key("of the tank")
+
+
+@dataclass(frozen=True)
+class RunNumbers:
+    """Two runs, by their numbers in `runs`."""
+
+    one: int = key("the reference is 0")
+    other: int = key("that is compared with it")
+
+
+@dataclass(frozen=True)
+class PairOfRuns(Shifts, RunNumbers):
+    """Two runs that could be adjusted: other minus one. Those with the reference come first."""
+
+
+@dataclass(frozen=True)
+class AdjustedRun:
+    """One adjustment of the block; what a run that was not adjusted does not have is null."""
+
+    label: str = key('"reference", or "NAME, fixed"')
+    calibration: str | None = key("NAME; null for the reference")
+    state: str | None = key('"fixed", "weighted" or "free"; null for the reference')
+    outcome: str = key('"adjusted", "failed" or "skipped"')
+    message: str | None = key("why it failed, in words")
+    skipped: Skipped | None = key("why it was left out")
+    held: list[str] = key("parameters held at a value that is not 0, for want of an sd")
+    quality: RunQuality | None = key("global test")
+    images: RunImages | None = key("residuals of the camera's photos")
+    convention: str | None = key("sign of the distortion's terms")
+    affinity: str | None = key("form of the affinity terms")
+    interior: list[InteriorValue] | None = key("parameters; sd 0: held; start_sd null: not given")
+    product: ProductFile | None = key("check points")
+    volume: RunVolume | None = key("at the top of the table")
+    volume_failed: str | None = key("why there is no volume, of a job with a tank")
+    shifts: Shifts | None = key("against the reference; null for it")
+
+
+@dataclass(frozen=True, kw_only=True)
+class InfluenceFile(CameraFile):
+    """What calibrations do to a block."""
+
+    kind: Literal["influence"] = key("influence", default="influence")
+    camera: str = key("of the job, that was replaced")
+    states: list[str] = key("those asked for")
+    calibrations: list[str] = key("names, in their order")
+    photos: int = key("in the reference")
+    points: int = key("in the reference")
+    search: BlunderSearch = key("for blunders, in the reference")
+    free: list[str] = key('parameters that the runs "free" adjust')
+    runs: list[AdjustedRun] = key("the reference first: the job's own settings")
+    pairs: list[PairOfRuns] = key("all runs that could be adjusted, in the order of `runs`")
 
 
 def as_json(influence):
-    """The dict of an Influence, as the head of this module describes it."""
-    reference = influence.runs[0]
-    found = {
-        "format": FORMAT,
-        "kind": "influence",
-        "camera": influence.camera,
-        "states": list(influence.states),
-        "calibrations": list(influence.calibrations),
-        "photos": len(reference.block.photos) if reference.block else 0,
-        "points": len(reference.block.points) if reference.block else 0,
-        "search": {
-            "searched": influence.searched,
-            "removed": [
-                {
-                    "kind": one.kind,
-                    "ids": list(one.ids),
-                    "element": one.element,
-                    "file": one.file,
-                    "row": one.row,
-                    "w": one.w,
-                }
-                for one in influence.removed
-            ],
-        },
-        "free": list(influence.free),
-        "runs": [_run(number, one, influence) for number, one in enumerate(influence.runs)],
-        "pairs": [{"one": one.one, "other": one.other, **_shifts(one)} for one in influence.pairs],
-    }
-    return plain(found)
+    """The `InfluenceFile` of an Influence, as plain data."""
+    block = influence.runs[0].block
+    found = filled_from(
+        InfluenceFile,
+        influence,
+        photos=len(block.photos) if block else 0,
+        points=len(block.points) if block else 0,
+        search=BlunderSearch(
+            influence.searched, [filled_from(ReadingSetAside, one) for one in influence.removed]
+        ),
+        runs=[_run(number, one, influence) for number, one in enumerate(influence.runs)],
+        pairs=[_shifts(PairOfRuns, one, one=one.one, other=one.other) for one in influence.pairs],
+    )
+    return to_plain(found)
 
 
 def _run(number, run, influence):
     against = [one for one in influence.pairs if (one.one, one.other) == (0, number)]
-    return {
-        "label": run.label,
-        "calibration": run.calibration,
-        "state": run.state,
-        "outcome": run.outcome,
-        "message": run.message,
-        "skipped": {"code": run.skipped} if run.skipped else None,
-        "held": list(run.held),
-        "quality": _quality(run.block),
-        "images": _images(run.block),
-        "convention": run.block and run.block.form.convention,
-        "affinity": run.block and run.block.form.affinity,
-        "interior": _interior(run.block),
-        "product": product_as_json(run.block.check) if run.block and run.block.check else None,
-        "volume": _volume(run.volume),
-        "volume_failed": run.volume_failed,
-        "shifts": _shifts(against[0]) if against else None,
-    }
+    block = run.block
+    return filled_from(
+        AdjustedRun,
+        run,
+        skipped=Skipped(run.skipped) if run.skipped else None,
+        quality=_quality(block),
+        images=block and filled_from(RunImages, block.images),
+        convention=block and block.form.convention,
+        affinity=block and block.form.affinity,
+        interior=block and block.interior,
+        product=product_of(block.check) if block and block.check else None,
+        volume=filled_from(RunVolume, run.volume),
+        shifts=_shifts(Shifts, against[0]) if against else None,
+    )
 
 
 def _quality(block):
     if block is None:
         return None
     test = block.test
-    return {
-        "sigma0": block.sigma0,
-        "chi2": test.chi2,
-        "chi2_low": test.low if test.dof else None,
-        "chi2_high": test.high if test.dof else None,
-        "passed": bool(test.passed) if test.dof else None,
-        "redundancy": int(test.dof),
-        "confidence": test.confidence,
-    }
+    return filled_from(
+        RunQuality,
+        block,
+        chi2_low=test.low if test.dof else None,
+        chi2_high=test.high if test.dof else None,
+        passed=bool(test.passed) if test.dof else None,
+        redundancy=int(test.dof),
+    )
 
 
-def _images(block):
-    if block is None or block.images is None:
-        return None
-    images = block.images
-    return {
-        "n": images.n,
-        "rms_um": 1e3 * images.rms_mm,
-        "largest_um": 1e3 * images.largest_mm,
-        "largest_photo": images.largest_photo,
-        "largest_point": images.largest_point,
-        "rms_px": images.rms_px,
-        "largest_px": images.largest_px,
-    }
-
-
-def _interior(block):
-    if block is None:
-        return None
-    return [
-        {
-            "parameter": one.parameter,
-            "unit": one.unit,
-            "value": one.value,
-            "sd": one.sd,
-            "start": one.start,
-            "start_sd": one.start_sd,
-        }
-        for one in block.interior
-    ]
-
-
-def _volume(volume):
-    if volume is None:
-        return None
-    rest = asdict(volume)
-    return {"volume_m3": rest.pop("value_m3"), **rest}
-
-
-def _shifts(pair):
-    points, photos = pair.points, pair.photos
-    arcsec = np.degrees(1.0) * 3600
-    return {
-        "points": {
-            "n": points.n,
-            "rms_mm": 1e3 * points.rms_m,
-            "largest_mm": 1e3 * points.largest_m,
-            "rms_xyz_mm": 1e3 * points.rms_xyz_m,
-            "largest_xyz_mm": 1e3 * points.largest_xyz_m,
-            "largest_point": points.largest_name,
-        },
-        "photos": {
-            "n": photos.n,
-            "rms_mm": 1e3 * photos.rms_m,
-            "rms_xyz_mm": 1e3 * photos.rms_xyz_m,
-            "largest_xyz_mm": 1e3 * photos.largest_xyz_m,
-            "largest_photo": photos.largest_name,
-            "rms_arcsec": arcsec * photos.rms_rad,
-            "rms_turn_arcsec": arcsec * photos.rms_turn_rad,
-            "largest_turn_arcsec": arcsec * photos.largest_turn_rad,
-            "largest_turn_photo": photos.largest_turn_name,
-        },
-        "aligned": pair.aligned,
-        "volume": None
-        if pair.volume_m3 is None
-        else {"difference_m3": pair.volume_m3, "percent": pair.volume_percent},
-    }
+def _shifts(cls, pair, **numbers):
+    return cls(
+        points=filled_from(PointShifts, pair.points),
+        photos=filled_from(PhotoShifts, pair.photos),
+        aligned=pair.aligned,
+        volume=None if pair.volume_m3 is None else filled_from(VolumeShift, pair),
+        **numbers,
+    )

@@ -1,97 +1,127 @@
-"""A product check as plain lists and dicts, ready for JSON.
+"""A product check as it is saved: kind "product" of camera.json."""
 
-format         "tankcal-camera/2"            kind  "product"
-alpha          level of the tests of bias (two-sided) and of precision (upper)
-n              number of points
-axes           [{axis: "x" | "y" | "z", part: "plan" | "height", n,
-                 mean_m, sd_m, t, t_limit, biased (true, false or null: cannot be said),
-                 rmse_m, rmse_unbiased_m (less the mean, where it is significant),
-                 largest_m, largest_point,
-                 precision: null or PRECISION (against an expected sd)}]
-               null: too few points; t is null, too, where nothing scatters
-parts          [{part, n, rmse_m, rmse_unbiased_m, largest_m}], plan: x and y together
-notes          [{code, n}]: "few_points" (fewer than `advised`), "no_tests" (fewer than 2),
-               "share_means_all" (fewer than 10: 90 % of them are all of them),
-               "axis_without_points" (n: number of the axis), "no_plan", "no_height" (the table
-               has limits of a part that cannot be judged)
-advised        points that a test of accuracy should have
-table          null or {name, source, verified, remark, share, code (of a shipped table, else null)}
-verdicts       [{part, scale (text, such as "1000"), grade, tolerance_m, sd_m, n,
-                 as_is: REACHED, unbiased: REACHED (less the significant means),
-                 precision: [PRECISION of each axis], precise (true, false, null)}]
-best           [{part, scale, grade, grade_unbiased}], null: no class is reached; a class is
-               reached when `share` of the points lie within tolerance_m and rmse_m within sd_m
-differences    [{point, dx_m, dy_m, dz_m}] product minus truth; null: not known; only the axes
-               that there are
+from dataclasses import dataclass
+from typing import Literal
 
-PRECISION      {axis, sigma_m, chi2, limit, passed}; null: fewer than two points
-REACHED        {within (points), share (0 to 1), rmse_m, reached,
-                why: [] or some of "too_few_points" (under 3), "share_too_small",
-                "rmse_too_large"}
-"""
+from tankcal.calibration.product.check import ADVISED, AxisCheck, Precision, Reached
+from tankcal.record.camera_versions import CameraFile
+from tankcal.record.plain_data import to_plain
+from tankcal.record.schema import filled_from, key
 
-from dataclasses import asdict
 
-from tankcal.calibration.product.check import ADVISED
-from tankcal.record.camera_versions import FORMAT
-from tankcal.record.plain_data import plain
+@dataclass(frozen=True)
+class PartJudged:
+    """Differences of a part."""
+
+    part: str = key('"plan" (x and y together) or "height"')
+    n: int = key("points")
+    rmse_m: float = key("as the differences are")
+    rmse_unbiased_m: float = key("less the significant means")
+    largest_m: float = key("largest magnitude")
+
+
+@dataclass(frozen=True)
+class ProductNote:
+    """What should be read: few_points, no_tests, share_means_all, axis_without_points, ..."""
+
+    code: str = key("fewer than `advised`; than 2; than 10: 90 % of them are all of them; ...")
+    n: float = key("points, or the number of the axis")
+
+
+@dataclass(frozen=True)
+class LimitsUsed:
+    """The limit table."""
+
+    name: str = key("of the table")
+    source: str = key("where its limits were read")
+    share: float = key("of the points that must lie within the tolerance, 0 to 1")
+    verified: bool | None = key("whether they were read in the text itself; null: not said")
+    remark: str = key("what is to stand beside it")
+    code: str | None = key("of a shipped table")
+
+
+@dataclass(frozen=True)
+class ClassJudged:
+    """A class of a scale: reached with `share` of the points within tolerance_m, rmse_m in sd_m."""
+
+    part: str = key('"plan" or "height"')
+    scale: str = key('text, such as "1000"')
+    grade: str = key("name of the class")
+    tolerance_m: float = key("that a share of the points must keep")
+    sd_m: float = key("bound of the RMSE")
+    n: int = key("points")
+    as_is: Reached = key("as the differences are")
+    unbiased: Reached = key("less the significant means")
+    precision: list[Precision] = key("of each axis")
+    precise: bool | None = key("whether all of them passed; null: cannot be said")
+
+
+@dataclass(frozen=True)
+class BestClass:
+    """The best class of a scale; null: none is reached."""
+
+    part: str = key('"plan" or "height"')
+    scale: str = key('text, such as "1000"')
+    grade: str | None = key("as the differences are")
+    grade_unbiased: str | None = key("less the significant means")
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Product minus truth at a point; only the axes that there are; null: not known."""
+
+    point: str = key("name")
+    dx_m: float | None = key("along x", optional=True)
+    dy_m: float | None = key("along y", optional=True)
+    dz_m: float | None = key("along z", optional=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProductFile(CameraFile):
+    """What differences at check points say of a product."""
+
+    kind: Literal["product"] = key("product", default="product")
+    alpha: float = key("level of the tests of bias (two-sided) and of precision (upper)")
+    n: int = key("points")
+    axes: list[AxisCheck] = key("each axis")
+    parts: list[PartJudged] = key("plan and height where known")
+    notes: list[ProductNote] = key("what should be read")
+    advised: int = key("points that a test of accuracy should have")
+    table: LimitsUsed | None = key("null: no limits were asked for")
+    verdicts: list[ClassJudged] = key("each class")
+    best: list[BestClass] = key("each scale")
+    differences: list[Difference] = key("each point")
+
+
+def product_of(check):
+    """The `ProductFile` of a ProductCheck."""
+    return filled_from(
+        ProductFile,
+        check,
+        n=len(check.names),
+        axes=check.checks,
+        parts=[filled_from(PartJudged, one, largest_m=one.size_m.max()) for one in check.parts],
+        notes=[ProductNote(*one) for one in check.notes],
+        advised=ADVISED,
+        table=filled_from(LimitsUsed, check.table),
+        verdicts=[filled_from(ClassJudged, one) for one in check.verdicts],
+        best=_best(check),
+        differences=[
+            {"point": name}
+            | {f"d{axis}_m": value for axis, value in zip(check.axes, row, strict=True)}
+            for name, row in zip(check.names, check.difference_m, strict=True)
+        ],
+    )
 
 
 def as_json(check):
-    """The dict of a ProductCheck, as the head of this module describes it."""
-    return {
-        "format": FORMAT,
-        "kind": "product",
-        "alpha": check.alpha,
-        "n": len(check.names),
-        "axes": [asdict(one) for one in check.checks],
-        "parts": [
-            {
-                "part": one.part,
-                "n": one.n,
-                "rmse_m": one.rmse_m,
-                "rmse_unbiased_m": one.rmse_unbiased_m,
-                "largest_m": float(one.size_m.max()),
-            }
-            for one in check.parts
-        ],
-        "notes": [{"code": code, "n": n} for code, n in check.notes],
-        "advised": ADVISED,
-        "table": _table(check.table),
-        "verdicts": [_verdict(one) for one in check.verdicts],
-        "best": _best(check),
-        "differences": [
-            {
-                "point": name,
-                **{f"d{axis}_m": plain(value) for axis, value in zip(check.axes, row, strict=True)},
-            }
-            for name, row in zip(check.names, check.difference_m, strict=True)
-        ],
-    }
-
-
-def _table(table):
-    if table is None:
-        return None
-    return {key: value for key, value in vars(table).items() if key != "limits"}
-
-
-def _verdict(one):
-    row = {**asdict(one), "precise": one.precise}
-    for key in ("as_is", "unbiased"):
-        row[key]["why"] = list(row[key]["why"])
-    row["precision"] = list(row["precision"])
-    return row
+    """The same as plain data."""
+    return to_plain(product_of(check))
 
 
 def _best(check):
     scales = dict.fromkeys((one.part, one.scale) for one in check.verdicts)
     return [
-        {
-            "part": part,
-            "scale": scale,
-            "grade": check.best(part, scale),
-            "grade_unbiased": check.best(part, scale, unbiased=True),
-        }
+        BestClass(part, scale, check.best(part, scale), check.best(part, scale, unbiased=True))
         for part, scale in scales
     ]

@@ -1,8 +1,9 @@
 """The versions of camera.json, and what is added to an older one so that it is of the last."""
 
-from pathlib import Path
+from dataclasses import dataclass
 
 from tankcal.record.saved_formats import SavedFormat
+from tankcal.record.schema import key
 
 VERSION = 2
 KINDS = ("stability", "parameters", "influence", "product")
@@ -20,12 +21,14 @@ def _from_1(result):
     return result | {"terrain": terrain, "pairs": pairs, "conventions": conventions}
 
 
-CAMERA = SavedFormat(
-    "tankcal-camera",
-    VERSION,
-    "camera.json",
-    Path(__file__).with_name("layouts") / "camera",
-    {1: _from_1},
-    KINDS,
-)  # fmt: skip
+CAMERA = SavedFormat("tankcal-camera", VERSION, "camera.json", {1: _from_1}, KINDS)
 FORMAT = CAMERA.format  # of the plain data that every analysis gives
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraFile:
+    """What all kinds of camera.json have."""
+
+    format: str = key("see Versions", default=FORMAT)
+    kind: str = key("one of: " + ", ".join(KINDS))
+    made_from: dict | None = key("files, version and job", optional=True, default=None)

@@ -1,19 +1,24 @@
-"""The part of the record that says what the tank is beside its shell.
+"""The part of the record that says what the tank is beside its shell."""
 
-What a part is made of is a list of {code, value, unit}: a text where unit is null, else a number in
-SI that is shown in that unit.
-"""
-
-from dataclasses import asdict
+from dataclasses import dataclass
 from math import degrees
+
+from tankcal.record.schema import key
+
+
+@dataclass(frozen=True)
+class Detail:
+    """What a part is made of."""
+
+    code: str = key("what it is")
+    value: str | float = key("a text where unit is null, else a number in SI")
+    unit: str | None = key("that it is shown in")
 
 
 def described(**values):
-    """[{code, value, unit}] of code=(value, unit) pairs, but for those whose value is None."""
+    """The `Detail` of each code=(value, unit), but for those whose value is None."""
     return [
-        {"code": code, "value": value, "unit": unit}
-        for code, (value, unit) in values.items()
-        if value is not None
+        Detail(code, value, unit) for code, (value, unit) in values.items() if value is not None
     ]
 
 
@@ -33,11 +38,6 @@ def bottom_of(result):
         bottom_levels=(levels, ""),
         bottom_lowest=(result.body.lowest_m - result.zero_m, "m"),
     )
-
-
-def deadwood_of(result):
-    """The declared items, whether or not they are taken into account."""
-    return [asdict(item) for item in result.job.deadwood]
 
 
 def roof_of(result):

@@ -1,96 +1,183 @@
-"""A prediction as plain numbers and texts, units in the keys: what plan.json holds."""
+"""A prediction as it is saved: plan.json."""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.record.plain_data import plain, plain_problems
+from tankcal.planning.doubtful import GroupReliability
+from tankcal.planning.prediction import PointOutlook, SectionOutlook
+from tankcal.record.plain_data import to_plain
 from tankcal.record.plan_versions import PLAN
+from tankcal.record.schema import filled_from, key
+from tankcal.record.texts import WarningRecord, warnings_of
 
 
-def plain_of(prediction):
-    """{key: value} of a Prediction, ready for JSON: NaN and infinity are null."""
-    plan, table, stated = prediction.plan, prediction.table, prediction.tabled.stated
-    return plain(
-        {
-            "format": PLAN.format,
-            "tank": plan.job.tank.id,
-            "side": plan.job.survey.side,
-            "survey": _survey(prediction),
-            "limit": {
-                "relative_u": plan.limits.relative_u,
-                "of": plan.limits.of,
-                "predicted": prediction.relative_u,
-                "met": prediction.meets,
-            },
-            "table": {
-                "height_m": table.height_m,
-                "volume_m3": table.volume_m3,
-                "u_m3": table.u_m3,
-                "k": table.k,
-                "U_m3": table.U_m3,
-            },
-            "sources": [
-                {"input": one.kind, "u_top_m3": float(np.linalg.norm(one.columns_m3[-1]))}
-                for one in table.sources
-            ],
-            "worst_deliveries": [_worst(one) for one in stated.worst],
-            "sections": [vars(one) for one in prediction.sections],
-            "points": [vars(one) for one in prediction.points],
-            "precision": _precision(prediction.precision),
-            "reliability": [vars(one) for one in prediction.reliability],
-            "warnings": plain_problems(prediction.warnings),
-        }
+@dataclass(frozen=True)
+class PlannedDatum:
+    """What holds the frame."""
+
+    choice: str = key("as asked for")
+    defect: int = key("of the seven ways, those that no observation feels")
+    words: str = key("a sentence that names them")
+    held: list[str] = key("what holds them: points with axes, or the photo")
+    vertical: bool = key("whether observations determine the vertical")
+    scale: bool = key("whether observations determine the scale")
+
+
+@dataclass(frozen=True)
+class PlannedSurvey:
+    """How large the survey is."""
+
+    photo_stations: int = key("number")
+    photographs: int = key("number")
+    setups: int = key("number")
+    ties: int = key("number")
+    control_points: int = key("number")
+    targets: int = key("number")
+    observations: int = key("values")
+    unknowns: int = key("number")
+    redundancy: int = key("number")
+    datum: PlannedDatum = key("what holds the frame")
+
+
+@dataclass(frozen=True)
+class PlanLimit:
+    """The limit that the plan is to keep."""
+
+    relative_u: float | None = key("U over volume; null: no limit")
+    of: str = key("what it is for")
+    predicted: float = key("U over volume")
+    met: bool | None = key("whether it is kept")
+
+
+@dataclass(frozen=True)
+class PlannedTable:
+    """The capacity table with its uncertainty."""
+
+    height_m: list[float] = key("dips")
+    volume_m3: list[float] = key("below the dip")
+    u_m3: list[float] = key("standard uncertainty")
+    k: list[float] = key("coverage factor")
+    U_m3: list[float] = key("expanded uncertainty")
+
+
+@dataclass(frozen=True)
+class PlannedSource:
+    """What an input contributes."""
+
+    input: str = key("kind of input")
+    u_top_m3: float = key("to the top row")
+
+
+@dataclass(frozen=True)
+class PlannedDelivery:
+    """The worst delivery of a minimum height, by U over its volume."""
+
+    minimum_m: float = key("least height")
+    low_m: float = key("dip", of="relative.low_m")
+    high_m: float = key("dip", of="relative.high_m")
+    volume_m3: float = key("delivered", of="relative.volume_m3")
+    u_m3: float = key("standard uncertainty", of="relative.u_m3")
+    dof: float = key("degrees of freedom; null: infinite", of="relative.dof")
+    k: float = key("coverage factor", of="relative.k")
+    U_m3: float = key("expanded uncertainty", of="relative.U_m3")
+    relative: float = key("U over volume", of="relative.relative")
+
+
+@dataclass(frozen=True)
+class PlannedPrecision:
+    """Precision of all points together."""
+
+    mean_sd_m: float = key("sqrt(trace / 3n)")
+    axis_sd_m: list[float] = key("the same along x, y, z")
+    range_m: list[float] = key("largest minus smallest sd along x, y, z")
+    proportional: float = key("precision is 1 : this")
+
+
+@dataclass(frozen=True)
+class SimulatedPlan:
+    """What many simulated surveys of the plan gave."""
+
+    seed: int = key("of the draws")
+    blunders: float = key("share of readings that were off")
+    runs: int = key("that had a solution")
+    failed: list[str] = key("messages of the others")
+    coordinates_scatter_over_predicted: float = key("rms over rms", of="ratio")
+    volume_scatter_over_predicted: float = key("of the full tank", of="volume_ratio")
+    volume_scatter_over_predicted_sd: float = key("its sd", of="volume_ratio_sd")
+    set_aside: list[int] = key("values that the search took out, of each run")
+    volumes_m3: list[float] = key("of the full tank, of each run")
+
+
+@dataclass(frozen=True)
+class Fingerprint:
+    """A file of the empty job, by which a filled one is told from it."""
+
+    file: str = key("name")
+    sha256: str = key("of its bytes")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanFile:
+    """What a survey would give, before it is made."""
+
+    format: str = key("see Versions", default=PLAN.format)
+    tank: str = key("id", of="plan.job.tank.id")
+    side: str = key('"outside" or "inside"', of="plan.job.survey.side")
+    survey: PlannedSurvey = key("how large it is")
+    limit: PlanLimit = key("that the plan is to keep")
+    table: PlannedTable = key("the capacity table")
+    sources: list[PlannedSource] = key("of the uncertainty of the top row")
+    worst_deliveries: list[PlannedDelivery] = key("of each minimum height")
+    sections: list[SectionOutlook] = key("from the bottom up")
+    points: list[PointOutlook] = key("targets first")
+    precision: PlannedPrecision = key("of the points")
+    reliability: list[GroupReliability] = key("of the kinds of observations")
+    warnings: list[WarningRecord] = key("what should be read")
+    simulated: SimulatedPlan | None = key("null: it was not asked for", default=None)
+    job: list[Fingerprint] = key("files of the empty job", default=())
+
+
+def plain_of(prediction, simulated=None, job=()):
+    """The `PlanFile` of a Prediction, as plain data.
+
+    simulated  `simulations.Simulated`, or None        job  [{file, sha256}] of the empty job
+    """
+    table = prediction.table
+    found = filled_from(
+        PlanFile,
+        prediction,
+        survey=_survey(prediction),
+        limit=PlanLimit(
+            prediction.plan.limits.relative_u,
+            prediction.plan.limits.of,
+            prediction.relative_u,
+            prediction.meets,
+        ),
+        table=filled_from(PlannedTable, table),
+        sources=[
+            PlannedSource(one.kind, np.linalg.norm(one.columns_m3[-1])) for one in table.sources
+        ],
+        worst_deliveries=[
+            filled_from(PlannedDelivery, one) for one in prediction.tabled.stated.worst
+        ],
+        precision=filled_from(PlannedPrecision, prediction.precision),
+        warnings=warnings_of(prediction.warnings),
     )
+    return to_plain(replace(found, simulated=filled_from(SimulatedPlan, simulated), job=job))
 
 
 def _survey(prediction):
-    plan, datum = prediction.plan, prediction.datum
-    solution = prediction.predicted.adjusted.solution
-    return {
-        "photo_stations": len(plan.stations),
-        "photographs": len(plan.photos),
-        "setups": len(plan.setups),
-        "ties": len(plan.ties),
-        "control_points": len(plan.known),
-        "targets": len(plan.targets.names),
-        "observations": solution.rows,
-        "unknowns": solution.unknowns,
-        "redundancy": solution.dof,
-        "datum": {
-            "choice": datum.choice,
-            "defect": datum.defect,
-            "words": datum.words,
-            "held": datum.held,
-            "vertical": datum.vertical,
-            "scale": datum.scale,
-        },
-    }
-
-
-def _worst(one):
-    return {"minimum_m": one.minimum_m, **vars(one.relative)}
-
-
-def _precision(one):
-    return {
-        "mean_sd_m": one.mean_sd_m,
-        "axis_sd_m": one.axis_sd_m,
-        "range_m": one.range_m,
-        "proportional": one.proportional,
-    }
-
-
-def simulated_plain(found):
-    """{key: value} of a `simulations.Simulated`, ready for JSON."""
-    return plain(
-        {
-            "seed": found.seed,
-            "blunders": found.blunders,
-            "runs": found.runs,
-            "failed": found.failed,
-            "coordinates_scatter_over_predicted": found.ratio,
-            "volume_scatter_over_predicted": found.volume_ratio,
-            "volume_scatter_over_predicted_sd": found.volume_ratio_sd,
-            "set_aside": found.set_aside,
-            "volumes_m3": found.volumes_m3,
-        }
+    plan, solution = prediction.plan, prediction.predicted.adjusted.solution
+    return PlannedSurvey(
+        photo_stations=len(plan.stations),
+        photographs=len(plan.photos),
+        setups=len(plan.setups),
+        ties=len(plan.ties),
+        control_points=len(plan.known),
+        targets=len(plan.targets.names),
+        observations=solution.rows,
+        unknowns=solution.unknowns,
+        redundancy=solution.dof,
+        datum=filled_from(PlannedDatum, prediction.datum),
     )

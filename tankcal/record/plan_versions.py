@@ -1,10 +1,6 @@
 """The versions of plan.json: so far one."""
 
-from pathlib import Path
-
 from tankcal.record.saved_formats import SavedFormat
 
 VERSION = 1
-PLAN = SavedFormat(
-    "tankcal-plan", VERSION, "plan.json", Path(__file__).with_name("layouts") / "plan"
-)
+PLAN = SavedFormat("tankcal-plan", VERSION, "plan.json")

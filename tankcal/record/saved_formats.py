@@ -1,20 +1,24 @@
 """Formats of what is saved as JSON: which versions are read, and how an older one becomes new.
 
 A key that comes, goes or changes its meaning makes a new version, once the last one has been
-released: `version` counts up, a file of `layouts` lists its keys, and a step says what data of the
-version before get for each of them. Every released version has kept files in the tests.
+released: `version` counts up, and a step says what data of the version before get for each of them.
+Every released version has kept files in the tests. The keys of the version that is written are in
+the folder `schemas`, as JSON schemas that follow from dataclasses (`tankcal.record.schema`).
 """
 
+import json
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import listed, message
-from tankcal.record.layout import missing_keys
+from tankcal.record.schema import missing_keys, problems_in
 
 MOST_NAMED = 3  # keys that are missing
+SCHEMAS = Path(__file__).with_name("schemas")
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,6 @@ class SavedFormat:
     name       such as "tankcal-record"
     version    the one that is written
     file       name of the file as tankcal writes it
-    layouts    folder of the lists of keys: `2.txt`, or `2-KIND.txt` where there are kinds
     steps      {version: function that makes data of the next version of it}
     kinds      what may stand under the key "kind"; none: there is no such key
     completed  function that adds to data of a version what its drafts did not have:
@@ -34,7 +37,6 @@ class SavedFormat:
     name: str
     version: int
     file: str
-    layouts: Path
     steps: dict = field(default_factory=dict)
     kinds: tuple = ()
     completed: Callable = lambda saved, version: saved
@@ -44,9 +46,14 @@ class SavedFormat:
         """What stands under the key "format" in what is written."""
         return f"{self.name}/{self.version}"
 
-    def layout_file(self, version, kind=None):
-        """Path of the list of keys of a version, and of a kind where there are any."""
-        return self.layouts / (f"{version}-{kind}.txt" if self.kinds else f"{version}.txt")
+    def schema_file(self, kind=None):
+        """Path of the JSON schema of what is written, of a kind where there are any."""
+        name = f"{self.name}-{self.version}"
+        return SCHEMAS / (f"{name}-{kind}.json" if self.kinds else f"{name}.json")
+
+    def schema(self, kind=None):
+        """The JSON schema of what is written, of a kind where there are any."""
+        return _read(self.schema_file(kind))
 
     def version_of(self, saved):
         """The version of data that can be read; None of anything else."""
@@ -60,7 +67,8 @@ class SavedFormat:
 
         saved  as parsed; it is not changed        name  of its file, for problems
 
-        Raises InputError in one line, with the version, for what cannot be read.
+        Raises InputError: in one line, with the version, for what lacks keys or is of another
+        format; with a line for each value that is not of its type.
         """
         version = self.version_of(saved)
         if version is None:
@@ -80,8 +88,7 @@ class SavedFormat:
             raise InputError(Problem(name, expected))
         try:
             saved = self.completed(saved, version)
-            missing = list(missing_keys(saved, self.layout_file(version, kind)))
-            for step in range(version, self.version) if not missing else ():
+            for step in range(version, self.version):
                 saved = self.steps[step](saved)
         except (LookupError, TypeError, ValueError, AttributeError) as error:
             expected = message(
@@ -91,6 +98,8 @@ class SavedFormat:
                 found=f"{self.name}/{version}", what=str(error), file=self.file,
             )  # fmt: skip
             raise InputError(Problem(name, expected)) from error
+        schema = self.schema(kind)
+        missing = missing_keys(saved, schema)
         if missing:
             expected = message(
                 "record_lacks_keys",
@@ -99,7 +108,15 @@ class SavedFormat:
                 found=f"{self.name}/{version}", keys=listed(missing, MOST_NAMED), file=self.file,
             )  # fmt: skip
             raise InputError(Problem(name, expected))
+        problems = problems_in(saved, schema, name)
+        if problems:
+            raise InputError(problems)
         return saved
+
+
+@cache
+def _read(path):
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def _is_text(found):

@@ -1,39 +1,147 @@
 """The part of the record that says what is stated: budgets, deliveries, rule, Monte Carlo."""
 
-from dataclasses import asdict, fields
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from tankcal.gum.volume_budgets import budget
-from tankcal.record.rules import as_json
+from tankcal.record.schema import Finite, filled_from, key
+
+
+@dataclass(frozen=True)
+class BudgetLine:
+    """What an input contributes to the uncertainty of a volume; null: it does not have that."""
+
+    input: str = key("name", of="name")
+    kind: str = key("of input, see below", of="name")
+    estimate: float | None = key("in `unit`")
+    u: float | None = key("standard uncertainty, in `unit`")
+    unit: str | None = key("of estimate and u")
+    type: str = key('"A" or "B"')
+    distribution: str = key("normal, rectangular, ...")
+    dof: float | None = key("degrees of freedom; null: infinite")
+    sensitivity: float | None = key("change of the volume by one unit")
+    sensitivity_unit: str | None = key("of the sensitivity")
+    contribution_m3: float = key("sensitivity times u", of="contribution")
+    share: float = key("of the variance; they add up to 1, correlations may take away")
+    halved: float | None = key("factor of U if u were half as large")
+    is_default: bool | None = key("whether nobody declared the input")
+    correlations: list = key("[input, r] of the inputs that it is correlated with")
+    note: str = key("as declared")
+
+
+@dataclass(frozen=True)
+class VolumeJudged:
+    """The comparison of the intervals of one volume, GUM and Monte Carlo."""
+
+    d_low: float = key("distance of the lower ends, m3")
+    d_high: float = key("distance of the upper ends, m3")
+    tolerance: float = key("numerical tolerance of u, m3")
+    validated: bool = key("whether both distances are within it")
+    sure: bool = key("whether two standard errors would not change that")
+    low: float = key("interval that counts, m3")
+    high: float = key("interval that counts, m3")
+
+
+@dataclass(frozen=True)
+class StatedBudget:
+    """A volume or a delivery that the report states, with its budget and its interval."""
+
+    low_m: float | None = key("lower dip of a delivery; null: the volume below high_m")
+    high_m: float = key("dip")
+    volume_m3: Finite = key("of the table")
+    table_u_m3: float = key("standard uncertainty without what reading the table adds")
+    u_m3: Finite = key("with it")
+    dof: float = key("degrees of freedom; null: infinite")
+    k: Finite = key("coverage factor")
+    U_m3: Finite = key("expanded uncertainty")
+    for_use: bool = key("whether the dips are outside the critical zone of a roof")
+    stated_U_m3: Finite = key("that counts: the larger distance of the ends from the volume")
+    low_m3: Finite = key("interval that counts")
+    high_m3: Finite = key("interval that counts")
+    interval: str = key('where it comes from: "gum" or "monte_carlo"')
+    stated_m3: float | None = key("as in stated.csv")
+    note: str = key("as in stated.csv")
+    monte_carlo: VolumeJudged | None = key("of a delivery")
+    lines: list[BudgetLine] = key("of its budget")
+
+
+@dataclass(frozen=True)
+class DipColumns:
+    """Dips of deliveries."""
+
+    low_m: list[float] = key("lower dips")
+    high_m: list[float] = key("upper dips")
+
+
+@dataclass(frozen=True)
+class SimulatedVolumes:
+    """Monte Carlo by volume, m3: estimates, their standard errors, the comparison with the GUM."""
+
+    value: list[float] = key("mean")
+    u: list[float] = key("standard deviation")
+    low: list[float] = key("probabilistically symmetric interval")
+    high: list[float] = key("probabilistically symmetric interval")
+    shortest_low: list[float] = key("shortest interval")
+    shortest_high: list[float] = key("shortest interval")
+    se_value: list[float] = key("standard error")
+    se_u: list[float] = key("standard error")
+    se_low: list[float] = key("standard error")
+    se_high: list[float] = key("standard error")
+    se_shortest_low: list[float] = key("standard error")
+    se_shortest_high: list[float] = key("standard error")
+    tolerance: list[float] = key("numerical tolerance of u")
+    reached: list[bool] = key("whether two standard errors are within it")
+    draws: list[int] = key("evaluations of the model")
+    controlled: list[bool] = key("whether the linear part was the control variate")
+    d_low: list[float] = key("distance of the lower ends of both intervals")
+    d_high: list[float] = key("distance of the upper ends of both intervals")
+    validated: list[bool] = key("whether the GUM interval stands")
+    sure: list[bool] = key("whether two standard errors would not change that")
+
+
+@dataclass(frozen=True)
+class SimulatedRows(SimulatedVolumes):
+    """Monte Carlo of the rows."""
+
+    bent: list[bool] = key("whether the tank's own volumes were drawn, not a parabola")
+
+
+@dataclass(frozen=True)
+class SimulatedDeliveries(SimulatedVolumes, DipColumns):
+    """Monte Carlo of the deliveries."""
+
+
+@dataclass(frozen=True)
+class MonteCarlo:
+    """The simulation of every row, and whether the GUM interval stands."""
+
+    seed: int = key("of all draws")
+    probability: float = key("of the intervals", of="found.probability")
+    digits: int = key("of u that the verdict counts")
+    curved: list[list[str]] = key("pairs of inputs whose second derivatives count")
+    drawn: int = key("rows; the others of a long table follow their neighbours")
+    validated: int = key("rows whose GUM interval stands")
+    rows: SimulatedRows = key("of the table")
+    deliveries: SimulatedDeliveries = key("that the report states")
 
 
 def budget_of(result):
-    """What contributes to the uncertainty of the top row, by the table alone."""
-    top = budget(result.table, result.table.height_m[-1])
-    return [line_of(line) for line in top.lines]
+    """The `BudgetLine`s of the top row, by the table alone."""
+    return _lines(budget(result.table, result.table.height_m[-1]).lines)
 
 
-def line_of(line):
-    """A `gum.BudgetRow`, with the unit of its sensitivity."""
-    return {
-        "input": line.name,
-        "kind": line.name,
-        "estimate": line.estimate,
-        "u": line.u,
-        "unit": line.unit or None,
-        "type": line.type,
-        "distribution": line.distribution,
-        "dof": line.dof,
-        "sensitivity": line.sensitivity,
-        "sensitivity_unit": _sensitivity_unit(line.unit),
-        "contribution_m3": line.contribution,
-        "share": line.share,
-        "halved": line.halved,
-        "is_default": line.is_default,
-        "correlations": line.correlations,
-        "note": line.note,
-    }
+def _lines(rows):
+    """The `BudgetLine` of each `gum.BudgetRow`."""
+    return [
+        filled_from(
+            BudgetLine,
+            one,
+            unit=one.unit or None,
+            sensitivity_unit=_sensitivity_unit(one.unit),
+        )
+        for one in rows
+    ]
 
 
 def _sensitivity_unit(unit):
@@ -44,7 +152,7 @@ def _sensitivity_unit(unit):
 
 
 def budgets_of(result):
-    """Volumes and deliveries that the report states, each with its budget and its interval."""
+    """The `StatedBudget` of each volume and delivery that the report states."""
     simulation = result.simulation
     asked = {(one.low_m, one.high_m): one for one in result.job.stated}
     found = [_budget_of(one, asked, None, _of_volume(one, result)) for one in result.stated.volumes]
@@ -99,17 +207,15 @@ def _interval(U_m3, low_m3, high_m3, source):
 
 def _budget_of(one, asked, judged, interval):
     stated = asked.get((one.low_m, one.high_m))
-    return {
-        **{key: getattr(one, key) for key in _BUDGET},
+    return filled_from(
+        StatedBudget,
+        one,
         **interval,
-        "stated_m3": stated and stated.volume_m3,
-        "note": stated.note if stated else "",
-        "monte_carlo": judged,
-        "lines": [line_of(line) for line in one.lines],
-    }
-
-
-_BUDGET = ("low_m", "high_m", "volume_m3", "table_u_m3", "u_m3", "dof", "k", "U_m3", "for_use")
+        stated_m3=stated and stated.volume_m3,
+        note=stated.note if stated else "",
+        monte_carlo=judged and VolumeJudged(**judged),
+        lines=_lines(one.lines),
+    )
 
 
 def _of_place(columns, number):
@@ -117,35 +223,23 @@ def _of_place(columns, number):
     return {one.name: getattr(columns, one.name)[number] for one in fields(columns)}
 
 
-def deliveries_of(result):
-    """The worst delivery of each minimum height."""
-    return [asdict(worst) for worst in result.stated.worst]
-
-
-def rule_of(result):
-    """The verdict of the job's decision rule; None without one."""
-    return None if result.rule is None else as_json(result.rule)
-
-
 def monte_carlo_of(result):
-    """The simulation of every row, and whether the GUM interval stands; None where it is off."""
+    """`MonteCarlo` of the table; None where it is off."""
     simulation = result.simulation
     if simulation is None:
         return None
-    return {
-        "seed": simulation.seed,
-        "probability": simulation.found.probability,
-        "digits": simulation.digits,
-        "curved": simulation.curved,
-        "drawn": simulation.drawn,
-        "validated": int(np.sum(simulation.judged.validated)),
-        "rows": _of_volumes(simulation.found, simulation.judged) | {"bent": simulation.bent},
-        "deliveries": {
-            "low_m": simulation.delivered.low_m,
-            "high_m": simulation.delivered.high_m,
+    rows = _of_volumes(simulation.found, simulation.judged)
+    return filled_from(
+        MonteCarlo,
+        simulation,
+        validated=int(np.sum(simulation.judged.validated)),
+        rows=SimulatedRows(**rows, bent=simulation.bent),
+        deliveries=SimulatedDeliveries(
+            low_m=simulation.delivered.low_m,
+            high_m=simulation.delivered.high_m,
             **_of_volumes(*simulation.of_deliveries),
-        },
-    }
+        ),
+    )
 
 
 def _of_volumes(found, judged):

@@ -1,78 +1,178 @@
 """The part of the record that says what was measured: wall, points, sections, courses."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
+from tankcal.record.schema import filled_from, key
 from tankcal.tank.courses import FORM_GRID
 
 
+@dataclass(frozen=True)
+class Wall:
+    """The wall as one body."""
+
+    x_m: float = key("a point of the axis, at half height")
+    y_m: float = key("its y")
+    z_m: float = key("its z")
+    slope_x: float = key("of the axis, m/m")
+    slope_y: float = key("of the axis, m/m")
+    tilt: float = key("length of the slope, m/m")
+    tilt_sd: float = key("its sd")
+    tilt_azimuth_deg: float = key("towards which the top leans, clockwise from +y")
+    residual_sd_m: float = key("of the accepted points about the circles of their sections")
+    points: int = key("surveyed")
+    accepted: int = key("taken for the wall")
+    noise_sd_m: float = key("of a point about the smooth form, used or not", of="noise_m")
+    noise_dof: float = key("its degrees of freedom")
+    height_m: float = key("of the shell, along the vertical")
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point and its coordinates."""
+
+    point: str = key("name")
+    x_m: float = key("in the survey's frame")
+    y_m: float = key("in the survey's frame")
+    z_m: float = key("in the survey's frame")
+
+
+@dataclass(frozen=True)
+class SurveyedPoint(Place):
+    """A surveyed point; of an adjusted survey the target itself, with its covariance."""
+
+    cov_m2: list | None = key("3 x 3; of points that were handed in only where they were used")
+    course: str | None = key("that it is on")
+    section: str | None = key("that it is in")
+    generatrix: str | None = key("as given")
+    residual_m: float | None = key("distance to the circle of its section, outwards positive")
+    used: bool = key("whether the wall was taken from it")
+
+
+@dataclass(frozen=True)
+class RejectedPoint(Place):
+    """A point that is not on the wall."""
+
+    residual_m: float = key("to the smooth form without its vote, or to the leaning cylinder")
+    w: float | None = key("over its sd; null far from the wall")
+    reason: str = key("a code, see below")
+    row: int | None = key("of the file")
+
+
+@dataclass(frozen=True)
+class SectionOutline:
+    """The irregular section r(theta) about the circle's centre."""
+
+    azimuth_deg: list[float] = key("each degree")
+    radius_m: list[float] = key("there")
+
+
+@dataclass(frozen=True)
+class FormMode:
+    """A harmonic of the section's form."""
+
+    k: int = key("waves around")
+    amplitude_m: float = key("of the wave")
+    azimuth_deg: float = key("of its first crest")
+
+
+@dataclass(frozen=True)
+class SectionCircle:
+    """A horizontal section of the surface as surveyed (outside for an outside survey)."""
+
+    section: str = key("name", of="group.name")
+    course: str = key("that it is in")
+    height_m: float = key("above the bottom", of="group.height_m")
+    n: int = key("points")
+    x_m: float = key("centre of the circle", of="circle.x_m")
+    y_m: float = key("centre of the circle", of="circle.y_m")
+    x_sd_m: float = key("its sd")
+    y_sd_m: float = key("its sd")
+    radius_m: float = key("of the circle", of="circle.radius_m")
+    radius_sd_m: float = key("its sd")
+    variance_factor: float = key("v'Pv/(n-3): how far from a circle", of="circle.variance_factor")
+    shape: str = key('"interpolated" or "smoothed"', of="outline.kind")
+    points: list[str] = key("names")
+    azimuth_deg: list[float] = key("of the points")
+    residual_m: list[float] = key("of the points from the circle", of="circle.residuals_m")
+    area_m2: float = key("of the irregular section")
+    area_sd_m2: float = key("its sd")
+    outline: SectionOutline = key("the irregular section")
+    modes: list[FormMode] = key("of its form, from k = 2 on")
+
+
+@dataclass(frozen=True)
+class CourseOfShell:
+    """A course: those of the shell, without head, bottom, deadwood or roof."""
+
+    course: str = key("name", of="name")
+    bottom_m: float = key("above the bottom of the tank")
+    top_m: float = key("above the bottom of the tank")
+    height_m: float = key("of the plates")
+    thickness_m: float = key("of the plates")
+    paint_m: float = key("thickness")
+    sections: list[str] = key("names")
+    points: int = key("that were used")
+    rejected: int = key("near the wall")
+    radius_m: float = key("mean, as surveyed")
+    radius_sd_m: float = key("its sd")
+    inside_radius_m: float = key("of equal area, after plate, paint and temperature")
+    area_m2: float = key("inside, mean over the course")
+    area_sd_m2: float = key("its sd")
+    volume_m3: float = key("of the course")
+    u_m3: float = key("its standard uncertainty")
+
+
 def shell_of(result):
-    """The wall as one body: axis, tilt, residuals; None for a tank without courses."""
+    """The `Wall` of a tank; None for a tank without courses."""
     if result.wall is None:
         return None
     shell, sections = result.wall.shell, result.wall.sections
     residuals = np.concatenate([section.circle.residuals_m for section in sections])
-    return {
-        "x_m": shell.axis_m[0],
-        "y_m": shell.axis_m[1],
-        "z_m": shell.z_m,
-        "slope_x": shell.slope[0],
-        "slope_y": shell.slope[1],
-        "tilt": shell.tilt,
-        "tilt_sd": shell.tilt_sd,
-        "tilt_azimuth_deg": np.degrees(shell.tilt_azimuth_rad),
-        "residual_sd_m": np.sqrt(np.sum(residuals**2) / (len(residuals) - 3 * len(sections))),
-        "points": len(shell.reason),
-        "accepted": len(result.wall.accepted),
-        "noise_sd_m": shell.noise_m,
-        "noise_dof": shell.noise_dof,
-        "height_m": result.body.shell.volume.height_m,
-    }
-
-
-def adjustment_in(result):
-    """The `surveys.Adjustment` that the points come from; None where they were handed in."""
-    return result.adjustment
+    return filled_from(
+        Wall,
+        shell,
+        x_m=shell.axis_m[0],
+        y_m=shell.axis_m[1],
+        slope_x=shell.slope[0],
+        slope_y=shell.slope[1],
+        tilt_azimuth_deg=np.degrees(shell.tilt_azimuth_rad),
+        residual_sd_m=np.sqrt(np.sum(residuals**2) / (len(residuals) - 3 * len(sections))),
+        points=len(shell.reason),
+        accepted=len(result.wall.accepted),
+        height_m=result.body.shell.volume.height_m,
+    )
 
 
 def points_of(result):
-    """Every surveyed point, used or not; of an adjusted survey every adjusted point."""
-    adjustment = adjustment_in(result)
+    """Every `SurveyedPoint`, used or not; of an adjusted survey every adjusted point first."""
     rows = _points_of_tank(result)
-    if adjustment is None:
+    if result.adjustment is None:
         return rows
-    of_tank = {row["point"]: row for row in rows}
-    adjusted = points_of_adjustment(adjustment)
-    names = {row["point"] for row in adjusted}
-    own = ("x_m", "y_m", "z_m", "cov_m2")  # of the target itself, not of the wall behind it
+    of_tank = {row.point: row for row in rows}
+    adjusted = points_of_adjustment(result.adjustment)
+    names = {row.point for row in adjusted}
     return [
-        {**row, **of_tank.get(row["point"], {}), **{key: row[key] for key in own}}
+        # coordinates and covariance of the target itself, not of the wall behind it
+        replace(
+            of_tank.get(row.point, row), x_m=row.x_m, y_m=row.y_m, z_m=row.z_m, cov_m2=row.cov_m2
+        )
         for row in adjusted
-    ] + [row for row in rows if row["point"] not in names]
+    ] + [row for row in rows if row.point not in names]
 
 
 def points_of_adjustment(adjustment):
     """Every adjusted point with its covariance, in their order; nothing of a tank."""
-    return [
-        {
-            "point": name,
-            **_coordinates(xyz),
-            "cov_m2": covariance,
-            "course": None,
-            "section": None,
-            "generatrix": None,
-            "residual_m": None,
-            "used": False,
-        }
-        for name, xyz, covariance in zip(
-            adjustment.names,
-            np.asarray(adjustment.xyz_m).tolist(),
-            np.asarray(adjustment.covariance_m2).tolist(),
-            strict=True,
-        )
-    ]
+    xyz, covariances = np.asarray(adjustment.xyz_m), np.asarray(adjustment.covariance_m2)
+    rows = zip(adjustment.names, xyz.tolist(), covariances.tolist(), strict=True)
+    return [_surveyed(name, place, cov_m2=covariance) for name, place, covariance in rows]
+
+
+def _surveyed(name, xyz, **more):
+    nothing = dict.fromkeys(("cov_m2", "course", "section", "generatrix", "residual_m"))
+    return SurveyedPoint(name, *xyz, **(nothing | {"used": False} | more))
 
 
 def _points_of_tank(result):
@@ -82,56 +182,27 @@ def _points_of_tank(result):
     place = {}
     for section in result.wall.sections:
         for member, residual in zip(section.group.members, section.circle.residuals_m, strict=True):
-            place[result.wall.accepted[member]] = (section.group, residual, member)
-    rows = []
-    for index, name in enumerate(job.points.names):
-        group, residual, member = place.get(index, (None, None, None))
-        rows.append(
-            {
-                "point": name,
-                **_coordinates(job.points.xyz_m[index]),
-                "cov_m2": None if group is None else _covariance_of(result, member),
-                "course": job.courses[group.course].name if group else None,
-                "section": group.name if group else None,
-                "generatrix": job.points.generatrix[index],
+            place[result.wall.accepted[member]] = {
+                "cov_m2": _covariance_of(result, member),
+                "course": job.courses[section.group.course].name,
+                "section": section.group.name,
                 "residual_m": residual,
-                "used": shell.reason[index] == "",
             }
-        )
-    return rows
+    return [
+        _surveyed(name, job.points.xyz_m[index], **place.get(index, {}),
+                  generatrix=job.points.generatrix[index], used=shell.reason[index] == "")
+        for index, name in enumerate(job.points.names)
+    ]  # fmt: skip
 
 
 def _points_of_scan(result):
     points, scan = result.job.points, result.scan
     used = set(scan.accepted.tolist())
     return [
-        {
-            "point": name,
-            **_coordinates(points.xyz_m[index]),
-            "cov_m2": None,
-            "course": None,
-            "section": None,
-            "generatrix": points.generatrix[index],
-            "residual_m": scan.residuals_m[index] if index in used else None,
-            "used": index in used,
-        }
+        _surveyed(name, points.xyz_m[index], generatrix=points.generatrix[index],
+                  residual_m=scan.residuals_m[index] if index in used else None, used=index in used)
         for index, name in enumerate(points.names)
-    ]
-
-
-def _rejected_of_scan(result):
-    points, scan = result.job.points, result.scan
-    return [
-        {
-            "point": points.names[i],
-            **_coordinates(points.xyz_m[i]),
-            "residual_m": scan.residuals_m[i],
-            "w": scan.residuals_m[i] / scan.noise_m,
-            "reason": "far_off",
-            "row": points.rows[i],
-        }
-        for i in np.setdiff1d(np.arange(len(points.names)), scan.accepted)
-    ]
+    ]  # fmt: skip
 
 
 def _covariance_of(result, member):
@@ -139,30 +210,29 @@ def _covariance_of(result, member):
     return block if isinstance(block, np.ndarray) else block.toarray()
 
 
-def _coordinates(xyz):
-    return dict(zip(("x_m", "y_m", "z_m"), xyz, strict=True))
-
-
 def rejected_of(result):
-    """Every point that is not on the wall, with the reason."""
-    if result.wall is None:
-        return _rejected_of_scan(result) if result.scan is not None else []
-    job, shell = result.job, result.wall.shell
+    """Every `RejectedPoint`, with the reason."""
+    points = result.job.points
+    if result.wall is not None:
+        shell = result.wall.shell
+        found = np.flatnonzero(shell.reason != "")
+        residual_m, w, reason = shell.residual_m, shell.w, shell.reason
+    elif result.scan is not None:
+        residual_m = result.scan.residuals_m
+        found = np.setdiff1d(np.arange(len(points.names)), result.scan.accepted)
+        w, reason = residual_m / result.scan.noise_m, ["far_off"] * len(points.names)
+    else:
+        return []
     return [
-        {
-            "point": job.points.names[i],
-            **_coordinates(job.points.xyz_m[i]),
-            "residual_m": shell.residual_m[i],
-            "w": shell.w[i],
-            "reason": shell.reason[i],
-            "row": job.points.rows[i],
-        }
-        for i in np.flatnonzero(shell.reason != "")
+        RejectedPoint(
+            points.names[i], *points.xyz_m[i], residual_m[i], w[i], reason[i], points.rows[i]
+        )
+        for i in found
     ]
 
 
 def sections_of(result):
-    """Circle and outline of each section, as surveyed, from the bottom up."""
+    """`SectionCircle` of each section, as surveyed, from the bottom up."""
     if result.wall is None:
         return []
     return [_section_of(result, section) for section in result.wall.sections]
@@ -171,41 +241,33 @@ def sections_of(result):
 def _section_of(result, section):
     circle, outline, group = section.circle, section.outline, section.group
     sd = np.sqrt(np.diag(circle.cofactor_m2))
-    xyz = result.job.points.xyz_m[result.wall.accepted[group.members]]
+    members = result.wall.accepted[group.members]
+    xyz = result.job.points.xyz_m[members]
     height = xyz[:, 2] - result.job.datum.bottom_z_m - group.height_m
     offset = xyz[:, :2] - np.outer(height, result.wall.shell.slope) - (circle.x_m, circle.y_m)
-    modes = outline.modes_m()
-    return {
-        "section": group.name,
-        "course": result.job.courses[group.course].name,
-        "height_m": group.height_m,
-        "n": len(group.members),
-        "x_m": circle.x_m,
-        "y_m": circle.y_m,
-        "x_sd_m": sd[0],
-        "y_sd_m": sd[1],
-        "radius_m": circle.radius_m,
-        "radius_sd_m": sd[2],
-        "variance_factor": circle.variance_factor,
-        "shape": outline.kind,
-        "points": [result.job.points.names[i] for i in result.wall.accepted[group.members]],
-        "azimuth_deg": np.degrees(np.arctan2(offset[:, 0], offset[:, 1])) % 360,
-        "residual_m": circle.residuals_m,
-        "area_m2": outline.area_m2(),
-        "area_sd_m2": _area_sd(result, section),
-        "outline": {
-            "azimuth_deg": np.arange(360.0),
-            "radius_m": outline.radius_m(np.radians(np.arange(360.0))),
-        },
-        "modes": [
-            {
-                "k": k,
-                "amplitude_m": np.hypot(*modes[k]),
-                "azimuth_deg": np.degrees(np.arctan2(modes[k, 1], modes[k, 0])) / k % (360 / k),
-            }
+    modes, even = outline.modes_m(), np.arange(360.0)
+    return filled_from(
+        SectionCircle,
+        section,
+        course=result.job.courses[group.course].name,
+        n=len(group.members),
+        x_sd_m=sd[0],
+        y_sd_m=sd[1],
+        radius_sd_m=sd[2],
+        points=[result.job.points.names[i] for i in members],
+        azimuth_deg=np.degrees(np.arctan2(offset[:, 0], offset[:, 1])) % 360,
+        area_m2=outline.area_m2(),
+        area_sd_m2=_area_sd(result, section),
+        outline=SectionOutline(even, outline.radius_m(np.radians(even))),
+        modes=[
+            FormMode(
+                k=k,
+                amplitude_m=np.hypot(*modes[k]),
+                azimuth_deg=np.degrees(np.arctan2(modes[k, 1], modes[k, 0])) / k % (360 / k),
+            )
             for k in range(2, len(modes))
         ],
-    }
+    )
 
 
 def _area_sd(result, section):
@@ -222,7 +284,7 @@ def _area_sd(result, section):
 
 
 def courses_of(result):
-    """Each course: plates, radii, and the volume of its shell, without head or parts inside."""
+    """The `CourseOfShell` of each course."""
     if result.wall is None:
         return []
     job, rows = result.job, []
@@ -241,24 +303,22 @@ def courses_of(result):
             for i in rejected
         ]
         rows.append(
-            {
-                "course": course.name,
-                "bottom_m": shape.bottom_m,
-                "top_m": top_m,
-                "height_m": course.height_m,
-                "thickness_m": course.thickness_m,
-                "paint_m": course.paint_m,
-                "sections": [section.group.name for section in own],
-                "points": sum(len(section.group.members) for section in own),
-                "rejected": sum(in_course),
-                "radius_m": np.mean([section.circle.radius_m for section in own]),
-                "radius_sd_m": _radius_sd(result, shape),
-                "inside_radius_m": np.sqrt(volume / height / np.pi),
-                "area_m2": volume / height,
-                "area_sd_m2": u / height,
-                "volume_m3": volume,
-                "u_m3": u,
-            }
+            filled_from(
+                CourseOfShell,
+                course,
+                bottom_m=shape.bottom_m,
+                top_m=top_m,
+                sections=[section.group.name for section in own],
+                points=sum(len(section.group.members) for section in own),
+                rejected=sum(in_course),
+                radius_m=np.mean([section.circle.radius_m for section in own]),
+                radius_sd_m=_radius_sd(result, shape),
+                inside_radius_m=np.sqrt(volume / height / np.pi),
+                area_m2=volume / height,
+                area_sd_m2=u / height,
+                volume_m3=volume,
+                u_m3=u,
+            )
         )
     return rows
 

@@ -1,15 +1,15 @@
 """The part of the record that says what follows: the table, its densities, choices."""
 
-from dataclasses import asdict
+from dataclasses import dataclass
 
 import numpy as np
 
 from tankcal.geometry.snooping import CRITICAL_W
 from tankcal.pipeline.chain import PARTS
+from tankcal.record.schema import Finite, filled_from, key
 from tankcal.record.statements import intervals_of
-from tankcal.record.survey import adjustment_in
 from tankcal.survey.network.snooping import CRITICAL
-from tankcal.tank.dips import dip_label
+from tankcal.tank.dips import ProportionalParts, dip_label
 
 LEAST_PART_M3 = 1e-4  # last place of a printed part: an error below it is not told apart
 
@@ -19,48 +19,98 @@ SIGHTS = {  # of a total station, a theodolite or a level: a tape beside photogr
 }  # fmt: skip
 
 
+@dataclass(frozen=True)
+class CapacityTable:
+    """The capacity table and its covariance: factor_m3 times its transpose."""
+
+    zero: str = key("what heights count from, a code")
+    zero_m: Finite = key("height of the zero above the bottom")
+    height_m: list[Finite] = key("dips of the rows, above the zero")
+    dip: list[str] = key("the same as text in the table's unit")
+    volume_m3: list[Finite] = key("below the dip")
+    u_m3: list[Finite] = key("standard uncertainty")
+    U_m3: list[Finite] = key("expanded uncertainty")
+    k: list[Finite] = key("coverage factor")
+    dof: list[float] = key("degrees of freedom; null: infinite")
+    area_m2: list[float] = key("derivative of the volume by the dip")
+    for_use: list[bool] = key("false inside the critical zone of a floating roof")
+    low_m3: list[Finite] = key("interval that counts")
+    high_m3: list[Finite] = key("interval that counts")
+    interval: list[str] = key('where it comes from: "gum", or "monte_carlo", which does not agree')
+    stated_U_m3: list[Finite] = key("as printed: the larger distance of the ends from the volume")
+    inputs: list[str] = key("name of each column of factor_m3")
+    input_kind: list[str] = key("kind of input, see below")
+    factor_m3: list[list[Finite]] = key("rows x inputs")
+
+
+@dataclass(frozen=True)
+class InterpolationError:
+    """The largest error of linear interpolation between two rows."""
+
+    largest_m3: float = key("of a volume")
+    at_m: float = key("dip where it is")
+
+
+@dataclass(frozen=True)
+class PartsOfRows:
+    """What 1 to 9 millimetres add to a row of a centimetre table."""
+
+    parts: int = key("of a row")
+    zones: list[ProportionalParts] = key("between joints and edges; only where the error is small")
+    largest_m3: float | None = key("largest error, at least the last place that is printed")
+
+
+@dataclass(frozen=True)
+class VolumesOfDensity:
+    """The volumes of the same rows for a further density of the liquid."""
+
+    density_kg_m3: float = key("of the liquid")
+    volume_m3: list[Finite] = key("of each row")
+
+
+@dataclass(frozen=True)
+class GrossShell:
+    """The shell as surveyed, without any correction, over its full height."""
+
+    volume_m3: float = key("of the shell")
+    area_m2: float = key("mean")
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Something that was assumed; the sentence is the template's, in its language."""
+
+    code: str = key("see below")
+    value: str | float | bool | list | None = key("of the choice")
+
+
 def capacity_of(result):
-    """The table and the factor of its covariance, each column named."""
+    """The `CapacityTable` of a result, each column of the factor named."""
     table = result.table
     kinds = [source.kind for source in table.sources for _ in range(source.columns_m3.shape[1])]
     counts = {kind: kinds.count(kind) for kind in kinds}
     numbers = [kinds[: i + 1].count(kind) for i, kind in enumerate(kinds)]
-    return {
-        "zero": zero_of(result),
-        "zero_m": result.zero_m,
-        "height_m": table.height_m,
-        "dip": [dip_label(height, result.job.table.height_unit) for height in table.height_m],
-        "volume_m3": table.volume_m3,
-        "u_m3": table.u_m3,
-        "U_m3": table.U_m3,
-        "k": table.k,
-        "dof": table.dof,
-        "area_m2": table.area_m2,
-        "for_use": table.for_use(table.height_m),
+    return filled_from(
+        CapacityTable,
+        table,
+        zero=zero_of(result),
+        zero_m=result.zero_m,
+        dip=[dip_label(height, result.job.table.height_unit) for height in table.height_m],
+        for_use=table.for_use(table.height_m),
         **intervals_of(result),
-        "inputs": [
+        inputs=[
             kind if counts[kind] == 1 else f"{kind} {number}"
             for kind, number in zip(kinds, numbers, strict=True)
         ],
-        "input_kind": kinds,
-        "factor_m3": table.factor_m3,
-    }
-
-
-def interpolation_of(result):
-    """The largest error of linear interpolation between two rows, and the dip where it is."""
-    found = result.straightness
-    return {"largest_m3": found.largest_m3, "at_m": found.at_m}
+        input_kind=kinds,
+    )
 
 
 def proportional_parts_of(result):
-    """What the millimetres of a dip add to a row of a centimetre table, zone by zone."""
+    """`PartsOfRows`: what the millimetres of a dip add to a row, zone by zone."""
     zones = result.proportional_parts
-    return {
-        "parts": PARTS,
-        "zones": [asdict(zone) for zone in zones],
-        "largest_m3": max((_printed_error_m3(zone) for zone in zones), default=None),
-    }
+    largest_m3 = max((_printed_error_m3(zone) for zone in zones), default=None)
+    return PartsOfRows(PARTS, zones, largest_m3)
 
 
 def _printed_error_m3(zone):
@@ -68,11 +118,8 @@ def _printed_error_m3(zone):
 
 
 def densities_of(result):
-    """The volumes of the same rows for each further density of the liquid."""
-    return [
-        {"density_kg_m3": density, "volume_m3": volume_m3}
-        for density, volume_m3 in result.by_density.items()
-    ]
+    """The `VolumesOfDensity` of each further density of the liquid."""
+    return [VolumesOfDensity(*one) for one in result.by_density.items()]
 
 
 def zero_of(result):
@@ -83,7 +130,7 @@ def zero_of(result):
 
 
 def gross_of(result):
-    """Volume and mean area of the shell as surveyed; None for a tank without courses."""
+    """`GrossShell` of a tank; None for a tank without courses."""
     shell = result.gross
     if shell is None:
         return None
@@ -91,11 +138,11 @@ def gross_of(result):
     over_m = top_row_m - result.body.highest_m  # as the corrections, so that they add up
     area = float(shell.area_m2(shell.height_m)[0])
     volume = float(shell.volume_m3(shell.height_m)[0]) + over_m * area
-    return {"volume_m3": volume, "area_m2": volume / (shell.height_m + over_m)}
+    return GrossShell(volume, volume / (shell.height_m + over_m))
 
 
 def choices_of(result):
-    """Everything that was assumed, as codes and values."""
+    """The `Choice`s of a result: everything that was assumed."""
     job = result.job
     values = {
         "zero": zero_of(result),
@@ -111,14 +158,18 @@ def choices_of(result):
         "expansion": "given" if job.material.expansion_given else "default",
         "not_in_budget": list(result.body.undeclared()),
     }
-    adjustment = adjustment_in(result)
-    if adjustment is not None:
-        values = adjustment_choices(adjustment, getattr(job, "measurements", None)) | values
-    return [{"code": code, "value": value} for code, value in values.items()]
+    if result.adjustment is not None:
+        of_survey = _adjustment_values(result.adjustment, getattr(job, "measurements", None))
+        values = of_survey | values
+    return [Choice(*one) for one in values.items()]
 
 
 def adjustment_choices(adjustment, measurements):
-    """{code: value} of what was assumed when the survey was adjusted."""
+    """Each `Choice` that was assumed when the survey was adjusted."""
+    return [Choice(*one) for one in _adjustment_values(adjustment, measurements).items()]
+
+
+def _adjustment_values(adjustment, measurements):
     settings = getattr(measurements, "settings", None)
     kinds = {group.kind for group in adjustment.groups}
     photographs = "image coordinate" in kinds
@@ -143,7 +194,7 @@ def _shell_choices(job, result):
     roof = job.roof and job.roof.weighing
     return {
         "bottom": job.bottom.form if job.switches.bottom else "off",
-        "covariance": _covariance_choice(job) if adjustment_in(result) is None else "adjusted",
+        "covariance": _covariance_choice(job) if result.adjustment is None else "adjusted",
         "course_of_points": "section" if any(job.points.section) else "height",
         "shape": _one_or_mixed(section.outline.kind for section in wall.sections),
         "between_sections": _between_sections(result),

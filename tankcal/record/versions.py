@@ -1,13 +1,9 @@
 """The versions of the record, and what is added to an older one so that it is of the last."""
 
-from pathlib import Path
-
-from tankcal.record.layout import layout_of
 from tankcal.record.plain_data import columns_of
 from tankcal.record.saved_formats import SavedFormat
 
 VERSION = 2
-LAYOUTS = Path(__file__).with_name("layouts") / "record"
 
 
 def _completed_draft(record, version):
@@ -42,16 +38,22 @@ def _intervals_of_draft(volume_m3=(), U_m3=(), **_):
 
 def _from_1(record):
     """Version 2 from version 1: readings in columns, what held coordinates react with unknown."""
-    adjustment = record["adjustment"]
-    if adjustment is not None:
-        names = layout_of(RECORD.layout_file(2))["adjustment"]["residuals"]
-        columns = columns_of(adjustment["residuals"], names)
+    adjustment = record.get("adjustment")
+    if adjustment is not None and "residuals" in adjustment:
+        columns = columns_of(adjustment["residuals"], _READING)
         adjustment = {"held": []} | adjustment | {"residuals": columns}
-    return record | {"format": "tankcal-record/2", "adjustment": adjustment}
+        record = record | {"adjustment": adjustment}
+    return record | {"format": "tankcal-record/2"}
+
+
+_READING = (
+    "kind", "ids", "element", "file", "row", "repeats", "unit", "value", "residual", "sd",
+    "redundancy", "w", "tau", "mdb", "effect_m", "removed", "check", "controlled",
+)  # fmt: skip
 
 
 RECORD = SavedFormat(
-    "tankcal-record", VERSION, "record.json", LAYOUTS, {1: _from_1}, completed=_completed_draft
+    "tankcal-record", VERSION, "record.json", {1: _from_1}, completed=_completed_draft
 )
 FORMAT = RECORD.format
 migrated, version_of = RECORD.migrated, RECORD.version_of

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.messages import Message
 from tankcal.survey.measurements import RejectedReadings
 from tankcal.survey.network import Adjusted
 from tankcal.text.digits import fixed
@@ -92,7 +93,7 @@ class DatumReport:
 
     choice: str
     defect: int
-    words: str
+    words: Message
     held: tuple
     vertical: bool
     scale: bool

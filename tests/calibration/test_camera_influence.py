@@ -28,6 +28,7 @@ from tankcal.geometry.rotations import from_angles, rotation_vector
 from tankcal.job.model import Job, Material
 from tankcal.record.adjustment import adjustment_of
 from tankcal.record.camera_influence import as_json
+from tankcal.record.plain_data import to_plain
 from tankcal.survey.measurements import (
     AdjustmentSettings,
     CameraSetup,
@@ -160,7 +161,7 @@ def test_the_check_points_are_those_of_the_record():
     # second method: the record of the same adjustment
     job = flight(1.0, False, GROUND)
     adjustment = tankcal.adjust_job(job)
-    record = adjustment_of(adjustment, job.measurements)
+    record = to_plain(adjustment_of(adjustment, job.measurements))
     found = influence(job, (setup_of(FLIGHT, "same"),), ("fixed",)).runs[0]
     names, d = differences_at(found)
     for source in (record, adjustment):

@@ -17,6 +17,7 @@ import tankcal
 from tankcal.job import load
 from tankcal.record.adjustment import adjustment_of
 from tankcal.record.images import fiducials_of
+from tankcal.record.plain_data import to_plain
 from tankcal.report.survey.images import images
 from tankcal.survey.network_of_survey import gather
 from tankcal.text.words import load_words
@@ -139,7 +140,7 @@ def test_readings_repeated_share_the_error_of_the_marks(film):
 
 def test_the_record_of_a_film_job(film):
     job, found = film
-    record = adjustment_of(found, job.measurements)
+    record = to_plain(adjustment_of(found, job.measurements))
     photos = [one.name for one in job.measurements.photos]
     assert [row["photo"] for row in record["fiducials"]] == photos
     row = record["fiducials"][0]
@@ -460,7 +461,7 @@ def test_the_working_papers_show_readings_and_marks(tmp_path):
     }  # fmt: skip
     folder = film_job(tmp_path / "job", readings=2)
     job = load(folder)
-    record["adjustment"]["fiducials"] = fiducials_of(job.measurements.fiducials)
+    record["adjustment"]["fiducials"] = to_plain(fiducials_of(job.measurements.fiducials))
     paper = SimpleNamespace(
         record=record,
         paragraph=lambda name, **values: (name, values),

@@ -6,6 +6,7 @@ from job_builder import job_parts, write_folder, write_job
 
 import tankcal
 from tankcal.errors import InputError
+from tankcal.record.plain_data import to_plain
 from tankcal.record.statements import budgets_of
 
 RULE = """
@@ -74,7 +75,9 @@ def test_deliveries_hold_a_limit_from_where_those_to_the_empty_tank_do(tmp_path)
     (again,) = result.rule.uncertainty
     assert again.code == "holds_from"
     kept = [
-        one for one in budgets_of(result) if one["low_m"] == 0.0 and one["high_m"] >= again.from_m
+        one
+        for one in to_plain(budgets_of(result))
+        if one["low_m"] == 0.0 and one["high_m"] >= again.from_m
     ]
     assert kept
     assert all(one["monte_carlo"]["high"] - one["monte_carlo"]["low"] > 0 for one in kept)
@@ -94,7 +97,7 @@ READING[-2:] = [[*row, None, "B", "normal", None, None] for row in READING[-2:]]
 def test_what_reading_adds_is_in_u_whichever_method_counts(tmp_path):
     """Two readings between rows: 0.3 and 0.4 m3 twice each, 0.707 m3 in squares."""
     result = computed(tmp_path, "1.13,0,,\n5.13,4.02,,\n1,,,\n0.13,,,\n", inputs=READING, rule="")
-    by_dips = {(one["low_m"], one["high_m"]): one for one in budgets_of(result)}
+    by_dips = {(one["low_m"], one["high_m"]): one for one in to_plain(budgets_of(result))}
     to_empty, between = by_dips[0.0, 1.13], by_dips[4.02, 5.13]
     assert (to_empty["interval"], between["interval"]) == ("monte_carlo", "gum")
     assert between["stated_U_m3"] == between["U_m3"]
@@ -111,7 +114,7 @@ def test_what_reading_adds_is_in_u_whichever_method_counts(tmp_path):
 def test_with_its_reading_no_tank_holds_less_than_nothing(tmp_path):
     """At a dip of 5 mm with a zero known to 5 mm: 0.66 m3, u of 0.66 and 0.4 m3 of reading."""
     result = computed(tmp_path, "0.005,,,\n", {"table.step_m": 0.005}, inputs=READING, rule="")
-    (low,) = (one for one in budgets_of(result) if one["high_m"] == 0.005)
+    (low,) = (one for one in to_plain(budgets_of(result)) if one["high_m"] == 0.005)
     assert (low["interval"], low["low_m3"]) == ("monte_carlo", 0.0)
     assert low["stated_U_m3"] > low["volume_m3"]
 

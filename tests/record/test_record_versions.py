@@ -5,26 +5,28 @@ import json
 import re
 
 import pytest
-from kept_records import kept_files, layout_made, records_with_every_key
+from kept_records import KEPT, kept_files, layout_made, records_with_every_key
 from paper_cells import paper_blocks
+from schemas import keys_of_schema
 from uncertain_job import as_before
 
 from tankcal import report
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.record import FORMAT, VERSION, load, migrated, version_of
-from tankcal.record.layout import missing_keys
+from tankcal.record.making import Record
+from tankcal.record.plain_data import to_plain
+from tankcal.record.schema import from_plain, missing_keys, problems_in
 from tankcal.record.versions import RECORD
 from tankcal.report import outputs
 
 ALL = kept_files()
 QUICK = ("film.json.gz", "uncertain.json.gz", "photographed.json.gz")  # between them, every part
 WHAT_TO_DO = f"""The keys of the record are not those of version {VERSION} any more.
-While no record of version {VERSION} is kept in tests/records, it is still being made. Then:
-1. python tests/kept_records.py layout (tests on PYTHONPATH) lists the keys anew;
-2. tankcal/record/versions.py: the last step says what an older record gets for each new key;
-3. docs/record-format.md describes it.
-Is it kept, the version has been released: count VERSION up, begin a new step, and do the same."""
+Is tests/records/{VERSION}/keys.txt not there, it is still being made. Then:
+1. python tests/schemas.py (tests on PYTHONPATH) writes its schema and docs/record-format.md anew;
+2. tankcal/record/versions.py: the last step says what an older record gets for each new key.
+Is it there, the version has been released: count VERSION up, begin a new step, and do the same."""
 
 
 @pytest.fixture(scope="module")
@@ -33,16 +35,12 @@ def made(records_of_kinds, tmp_path_factory):
     return records_with_every_key(tmp_path_factory.mktemp("records"), records_of_kinds)
 
 
-def listed_keys(version):
-    return RECORD.layout_file(version).read_text(encoding="utf-8").split()
-
-
 def kept(path):
     return json.loads(gzip.decompress(path.read_bytes()))
 
 
 def test_no_key_comes_or_goes_without_the_version(made):
-    found, listed = set(layout_made(made)), set(listed_keys(VERSION))
+    found, listed = set(layout_made(made)), keys_of_schema(RECORD.schema())
     came, went = sorted(found - listed), sorted(listed - found)
     assert (came, went) == ([], []), WHAT_TO_DO
 
@@ -50,16 +48,25 @@ def test_no_key_comes_or_goes_without_the_version(made):
 def test_a_record_has_every_key_of_its_version(made):
     for record in made.values():
         assert record["format"] == FORMAT
-        assert list(missing_keys(record, RECORD.layout_file(VERSION))) == []
+        plain = json.loads(json.dumps(record))
+        assert missing_keys(plain, RECORD.schema()) == []
+        assert problems_in(plain, RECORD.schema(), "record.json") == []
+
+
+def test_a_record_goes_into_its_dataclass_and_back(made):
+    """Second way: every key has its field, and the types of the fields are those of the values."""
+    for record in made.values():
+        plain = json.loads(json.dumps(record))
+        assert to_plain(from_plain(Record, plain)) == plain
 
 
 def test_every_released_version_has_kept_records_with_all_its_keys():
     """A list of keys that was released stays as it is: the kept records say the same."""
-    kept_versions = {int(path.parent.name) for path in ALL}
-    assert kept_versions >= set(range(1, VERSION))
-    for version in kept_versions:
-        records = {path: kept(path) for path in kept_files(version)}
-        assert layout_made(records) == listed_keys(version), version
+    listed = {int(path.parent.name): path for path in KEPT.glob("*/keys.txt")}
+    assert set(listed) >= set(range(1, VERSION))
+    for version, path in listed.items():
+        records = {one: kept(one) for one in kept_files(version)}
+        assert layout_made(records) == path.read_text(encoding="utf-8").split(), version
 
 
 @pytest.mark.parametrize("path", ALL, ids=lambda path: f"{path.parent.name}-{path.name}")
@@ -70,7 +77,7 @@ def test_a_kept_record_is_read_as_one_of_this_version(path):
     read = migrated(record, "record.json")
     assert json.dumps(record) == before
     assert read["format"] == FORMAT
-    assert list(missing_keys(read, RECORD.layout_file(VERSION))) == []
+    assert missing_keys(read, RECORD.schema()) == []
 
 
 @pytest.mark.parametrize(

@@ -3,14 +3,16 @@
 import json
 
 import pytest
-from kept_results import FREE, kept_files, read
+from kept_results import FREE, KEPT, kept_files, keys_file, read
+from schemas import SAVED, keys_in, keys_of_schema
 
 from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict
 from tankcal.record.camera_versions import CAMERA
-from tankcal.record.layout import keys_in, missing_keys
+from tankcal.record.plain_data import to_plain
 from tankcal.record.plan import plain_of
 from tankcal.record.plan_versions import PLAN
+from tankcal.record.schema import from_plain, missing_keys, problems_in
 from tankcal.report import camera as camera_papers
 from tankcal.report.camera.paper import load
 from tankcal.report.planning import empty_job
@@ -19,12 +21,22 @@ pytest_plugins = ("camera_results",)
 
 ALL = kept_files()
 WHAT_TO_DO = """The keys are not those of the version any more: count VERSION up in versions.py, say
-in a step what an older file gets for each new key, keep results of the version before and list
-the keys of the new one (tests/kept_results.py), and describe it in docs/record-format.md."""
+in a step what an older file gets for each new key, write the schema of the new one
+(tests/schemas.py), and keep results of it with the list of their keys (tests/kept_results.py)."""
 
 
-def listed_keys(saved_format, version, kind=None):
-    return set(saved_format.layout_file(version, kind).read_text(encoding="utf-8").split())
+def listed_keys(saved_format, version, kind="plan"):
+    path = KEPT / saved_format.name / str(version) / f"{kind}.json.gz"
+    return set(keys_file(path).read_text(encoding="utf-8").split())
+
+
+def assert_is_of_its_schema(saved, saved_format):
+    """Every key is there, none is unknown, every value is of its type."""
+    schema = saved_format.schema(saved.get("kind"))
+    assert missing_keys(saved, schema) == []
+    assert problems_in(saved, schema, "kept") == []
+    unknown = keys_in(saved, FREE) - keys_of_schema(schema, optional=True)
+    assert unknown == set()
 
 
 def short(value):
@@ -37,6 +49,7 @@ def test_no_key_of_a_result_comes_or_goes_without_the_version(kind, results):
     result = json.loads(json.dumps(results[kind]))
     assert result["format"] == CAMERA.format
     assert keys_in(result, FREE) == listed_keys(CAMERA, CAMERA.version, kind), WHAT_TO_DO
+    assert_is_of_its_schema(result, CAMERA)
 
 
 def test_no_key_of_a_plan_comes_or_goes_without_the_version():
@@ -44,8 +57,9 @@ def test_no_key_of_a_plan_comes_or_goes_without_the_version():
 
     plan = plain_of(predict(load_plan(EXAMPLE)))
     assert plan["format"] == PLAN.format
-    listed = {key for key in listed_keys(PLAN, PLAN.version) if key.split(".")[0] != "simulated"}
-    assert keys_in(plan, FREE) | {"job", "job[].file", "job[].sha256"} == listed, WHAT_TO_DO
+    listed = {key for key in listed_keys(PLAN, PLAN.version) if not key.startswith("simulated.")}
+    assert keys_in(plan, FREE) | {"job[].file", "job[].sha256"} == listed, WHAT_TO_DO
+    assert_is_of_its_schema(json.loads(json.dumps(plan)), PLAN)
 
 
 def test_every_released_version_of_every_kind_is_kept():
@@ -60,12 +74,13 @@ def test_a_kept_file_is_read_as_one_of_this_version(saved_format, version, path)
     saved = read(path)
     before = json.dumps(saved)
     assert saved_format.version_of(saved) == version
-    assert keys_in(saved, FREE) == listed_keys(saved_format, version, saved.get("kind"))
+    assert keys_in(saved, FREE) == listed_keys(saved_format, version, saved.get("kind", "plan"))
     found = saved_format.migrated(saved, "kept")
     assert json.dumps(saved) == before
     assert found["format"] == saved_format.format
-    file = saved_format.layout_file(saved_format.version, found.get("kind"))
-    assert list(missing_keys(found, file)) == []
+    assert_is_of_its_schema(found, saved_format)
+    (cls,) = (cls for one, kind, cls in SAVED if (one, kind) == (saved_format, found.get("kind")))
+    assert to_plain(from_plain(cls, found)) == found
 
 
 @pytest.mark.parametrize(

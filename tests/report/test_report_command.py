@@ -76,7 +76,7 @@ def test_the_covariance_that_no_record_holds_is_taken_over(again, tmp_path):
         (
             {"densities": [{"density_kg_m3": "x", "volume_m3": []}]},
             [],
-            "record.json: does not hold what a record does",
+            "record.json, densities[0].density_kg_m3: found 'x', expected a number",
         ),
         ({}, ["--language", "pt"], "--language: found 'pt'; expected one of en, pt-BR, es"),
         ({}, ["--letterhead", "none.toml"], "none.toml: not found"),

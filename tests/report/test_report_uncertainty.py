@@ -21,6 +21,7 @@ from tankcal.gum.distributions import NAMES
 from tankcal.job.contract.inputs import INPUTS
 from tankcal.pipeline import plots
 from tankcal.record import record_of, save
+from tankcal.record.plain_data import to_plain
 from tankcal.record.statements import budgets_of
 from tankcal.report import figures
 from tankcal.report.paper import Paper
@@ -188,7 +189,7 @@ def _stated(result, **intervals):
     """The stated rows of a result with other intervals in the rows of its table."""
     changed = {key: np.array(column) for key, column in intervals.items()}
     other = replace(result, intervals=replace(result.intervals, **changed))
-    return stated_rows({"budgets": budgets_of(other)})
+    return stated_rows({"budgets": to_plain(budgets_of(other))})
 
 
 @pytest.mark.parametrize("largest", ["budget", 17, 18])
@@ -215,7 +216,7 @@ def test_a_delivery_has_monte_carlos_interval_where_gums_is_not_validated(result
     columns["low"][place], columns["high"][place] = volume - 0.5, volume + 0.2
     of_deliveries = found, replace(judged, **columns)
     simulation = replace(result.simulation, of_deliveries=of_deliveries)
-    other = record | {"budgets": budgets_of(replace(result, simulation=simulation))}
+    other = record | {"budgets": to_plain(budgets_of(replace(result, simulation=simulation)))}
     one, two = (b for b in other["budgets"] if b["low_m"] in (1.0, 1.4))
     rows = {row["low_m"]: row for row in stated_rows(other)}
     down, up = np.hypot([0.5, 0.2], of_reading(one))

@@ -7,6 +7,7 @@ import pytest
 from surveyed import by_instruments, by_photographs, known, table
 
 from tankcal.record.adjustment import adjustment_of
+from tankcal.record.plain_data import to_plain
 from tankcal.survey import adjust_survey
 from tankcal.survey.measurements import Instrument, Measurements
 from tankcal.survey.network import adjust
@@ -33,7 +34,7 @@ def test_groups_whose_residuals_are_zero_keep_their_declared_sds():
     measurements = two_tapes()
     found = adjust_survey(measurements)
     assert found.sigma0 == 0
-    rows = {row["name"]: row for row in adjustment_of(found, measurements)["groups"]}
+    rows = {row["name"]: row for row in to_plain(adjustment_of(found, measurements))["groups"]}
     assert (rows["A"]["sd_smallest"], rows["A"]["sd_largest"]) == (0.001, 0.002)
     assert rows["B"]["sd_smallest"] == pytest.approx(0.001 / np.sqrt(2))
     assert {row["factor"] for row in rows.values()} == {0.0}
@@ -55,7 +56,7 @@ def test_surveys_without_noise_have_a_record(make, scale):
     found = adjust_survey(measurements)
     assert found.removed == ()
     assert found.cov_scale == 1
-    record = adjustment_of(found, measurements)
+    record = to_plain(adjustment_of(found, measurements))
     assert all(row["sd_smallest"] > 0 for row in record["groups"])
 
 

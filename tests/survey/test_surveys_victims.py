@@ -9,6 +9,7 @@ from surveyed import by_instruments, by_photographs, changed, known, table, told
 from tankcal.cli import main
 from tankcal.errors import SolutionError
 from tankcal.record.adjustment import adjustment_of
+from tankcal.record.plain_data import to_plain
 from tankcal.survey import adjust_survey
 from tankcal.survey.means import averaged, torn_apart
 from tankcal.survey.measurements import Measurements
@@ -318,7 +319,7 @@ def test_every_held_coordinate_has_a_row_with_its_test(stations):
     assert [(one.ids[0], one.element) for one in rows] == [
         (name, axis) for name in stations.control.point for axis in "xyz"
     ]
-    record = adjustment_of(found, measurements)
+    record = to_plain(adjustment_of(found, measurements))
     assert [row["ids"] for row in record["held"]] == [list(one.ids) for one in rows]
     assert all(row["controlled"] for row in record["held"])
     control = measurements.control

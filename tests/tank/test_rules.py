@@ -10,7 +10,8 @@ from scipy import stats
 
 from tankcal.errors import HeightError
 from tankcal.job.rule_files import shipped_names, shipped_rule
-from tankcal.record.rules import as_json
+from tankcal.record.plain_data import to_plain
+from tankcal.record.rules import rule_of
 from tankcal.tank.capacity import Capacity
 from tankcal.tank.deliveries import worst_deliveries
 from tankcal.tank.rules import TANKS, Printed, StatedVolume, conformity_probability, judge
@@ -416,14 +417,15 @@ def test_the_verdict_is_ready_for_json():
     rule = shipped_rule("france_2020_recalibration")
     both = replace(rule, uncertainty=shipped_rule("france_2003").uncertainty)
     former = (StatedVolume(1000.0, 10.0),)
-    found = as_json(judge(both, table(datum=0.5), "vertical_fixed_roof", stated=former))
+    verdict = judge(both, table(datum=0.5), "vertical_fixed_roof", stated=former)
+    found = to_plain(rule_of(verdict))
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert found["code"] == "passed_in_part"
     assert found["uncertainty"][0]["worst_ratio"] is None
     assert found["uncertainty"][0]["verified"] is True
     assert found["deviation"][0]["dof"] is None
     assert found["deviation"][0]["stated_m3"] == 1000
-    nothing = as_json(judge(rule, table(critical=(-1, 11)), "sphere"))
+    nothing = to_plain(rule_of(judge(rule, table(critical=(-1, 11)), "sphere")))
     assert nothing["capacity_m3"] is None
 
 

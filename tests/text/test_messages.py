@@ -14,7 +14,7 @@ import tankcal
 from tankcal.job.rule_files import shipped_names
 from tankcal.messages import as_plain, fields_of, joined, listed, message
 from tankcal.record import record_of
-from tankcal.record.plain_data import plain
+from tankcal.record.plain_data import to_plain
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import MESSAGES, in_language, load_words, message_sentence
 
@@ -62,7 +62,7 @@ def values_of(call):
 
 
 def in_portuguese(text):
-    plainly = plain(as_plain(text))
+    plainly = to_plain(as_plain(text))
     return message_sentence(WORDS, str(text), plainly["code"], plainly["values"])
 
 
@@ -169,7 +169,7 @@ def result(tmp_path_factory):
 
 
 def test_every_warning_of_the_record_has_its_code(result):
-    record = plain(record_of(result))
+    record = to_plain(record_of(result))
     assert lines(result.warnings)
     assert [one["text"] for one in record["warnings"]] == [one.expected for one in result.warnings]
     assert all(one["code"] for one in record["warnings"])

@@ -39,7 +39,7 @@ class Advice:
 
     name: str
     keep: bool
-    reasons: tuple
+    reasons: tuple[dict, ...]
 
 
 @dataclass(frozen=True)

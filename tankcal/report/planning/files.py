@@ -1,9 +1,9 @@
 """A prediction for programs: plan.json, and CSV files with the units in their headings."""
 
 import csv
-import json
 
-from tankcal.record.plan import plain_of, simulated_plain
+from tankcal.record import save
+from tankcal.record.plan import plain_of
 from tankcal.report.planning.rows import place_of_change
 
 PLACE = ("arc_m", "off_m", "height_m")  # of what a change adds
@@ -14,15 +14,8 @@ def write(paper, folder, fingerprints):
 
     fingerprints  [{file, sha256}] of the empty job, by which a filled one is told from it
     """
-    found = plain_of(paper.prediction)
-    simulated = None if paper.simulated is None else simulated_plain(paper.simulated)
-    text = json.dumps(
-        found | {"simulated": simulated, "job": fingerprints},
-        ensure_ascii=False,
-        allow_nan=False,
-        separators=(",", ":"),
-    )
-    (folder / "plan.json").write_text(text + "\n", encoding="utf-8")
+    found = plain_of(paper.prediction, paper.simulated, fingerprints)
+    save(found, folder / "plan.json")
     for name, (headings, rows) in _tables(found).items():
         _write(folder / name, headings, rows)
     steps = () if paper.design is None else paper.design.steps

@@ -5,7 +5,7 @@ import numpy as np
 from tankcal import __version__
 from tankcal.messages import as_plain
 from tankcal.planning.changes import IMAGES
-from tankcal.record.plain_data import plain
+from tankcal.record.plain_data import to_plain
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
 from tankcal.report.planning import rows
@@ -63,7 +63,7 @@ class PlanPaper(PlainPaper):
 
     def said(self, text):
         """A Message of the program in the language."""
-        found = plain(as_plain(text))
+        found = to_plain(as_plain(text))
         return message_sentence(self.words, str(text), found["code"], found["values"])
 
     def change(self, change):

@@ -1,0 +1,383 @@
+"""The layout of what is saved, declared once: dataclasses, from which its JSON schema follows.
+
+A dataclass is an object of JSON, its fields are the keys, in their order, with the unit in the
+name. A float may be null, for NaN and infinity are written so; anything else only where its type
+has None. A Message `x` is written as `x`, and as `x_code` and `x_values` at the end of its object.
+"""
+
+import types
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from functools import cache
+from inspect import getdoc
+from itertools import islice
+from math import isfinite
+from operator import attrgetter
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+from tankcal.messages import Message, message
+
+DRAFT = "https://json-schema.org/draft/2020-12/schema"
+MOST_TOLD = 20  # problems of one file
+Finite = Annotated[float, "finite"]  # a number that is never null
+_SCALARS = {bool: "boolean", int: "integer", str: "string"}
+_TYPES = {  # of Python, for a type of JSON
+    "boolean": {bool}, "integer": {int}, "number": {int, float}, "string": {str},
+    "null": {type(None)}, "array": {list}, "object": {dict},
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Marks a dict of columns, {key: values}, whose keys are the fields of a dataclass."""
+
+    of: type
+
+
+def key(doc, *, of=None, times=None, named=None, optional=False, **options):
+    """A field that is a key of what is saved.
+
+    doc    what it holds, in one line
+    of     the attribute that `filled_from` takes it from ("wall.shell.tilt"); None: of its own name
+    times  factor that it is multiplied by: of another unit
+    named  the key, where that is no name of Python ("from")
+    optional  whether the key is left out where the value is None
+    """
+    about = {"doc": doc, "of": of, "times": times, "named": named, "optional": optional}
+    return field(metadata=about, **options)
+
+
+def filled_from(cls, source, **values):
+    """A `cls` with these values, the others being attributes of `source`; None of None.
+
+    Fields that have a default keep it.
+    """
+    if source is None:
+        return None
+    for one in fields(cls):
+        if one.name not in values and one.default is MISSING:
+            found = attrgetter(one.metadata.get("of") or one.name)(source)
+            times = one.metadata.get("times")
+            scaled = times is not None and found is not None
+            values[one.name] = times * found if scaled else found
+    return cls(**values)
+
+
+# ---- the keys of a dataclass
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key: its name as written, the field, its type, and what it holds ("": not said)."""
+
+    key: str
+    name: str
+    type: Any
+    doc: str = ""
+    required: bool = True
+
+
+@cache
+def keys_of(cls):
+    """Keys of a dataclass, as they are written."""
+    hints = get_type_hints(cls, include_extras=True)
+    found = []
+    for one in fields(cls):
+        optional = one.metadata.get("optional", False)
+        doc, named = one.metadata.get("doc", ""), one.metadata.get("named") or one.name
+        found.append(Key(named, one.name, hints[one.name], doc, not optional))
+    told = [one for one in found if one.type is Message]
+    for one in told:
+        found.append(Key(f"{one.key}_code", "", str | None, f"code of `{one.key}`"))
+        found.append(Key(f"{one.key}_values", "", dict, f"values of `{one.key}`"))
+    return tuple(found)
+
+
+# ---- its JSON schema
+
+
+def json_schema(cls, title=None):
+    """The JSON schema of what `to_plain` makes of a dataclass, from the types of its fields.
+
+    Parameters
+    ----------
+    cls : type
+        The dataclass.
+    title : str, optional
+        Name of the format.
+
+    Returns
+    -------
+    dict
+        Draft 2020-12; each dataclass below `cls` stands once, under `$defs`.
+    """
+    definitions = {}
+    schema = _schema_of(cls, definitions)
+    head = {"$schema": DRAFT} | ({"title": title} if title else {})
+    return head | schema | {"$defs": dict(sorted(definitions.items()))}
+
+
+def _schema_of(kind, definitions):
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        base, mark = arguments
+        if isinstance(mark, Columns):
+            return _columns(mark.of, definitions)
+        return {"type": "number"} if mark == "finite" else _schema_of(base, definitions)
+    if origin in (Union, types.UnionType):
+        return _either(arguments, definitions)
+    if kind in _SCALARS:
+        return {"type": _SCALARS[kind]}
+    if kind is float:
+        return {"type": ["number", "null"]}
+    if kind is Message:
+        return {"type": "string"}
+    if is_dataclass(kind):
+        return _reference(kind, definitions)
+    if origin in (tuple, list):
+        return _array(origin, arguments, definitions)
+    if kind in (tuple, list, np.ndarray):
+        return {"type": "array"}
+    if origin is dict:
+        return {"type": "object", "additionalProperties": _schema_of(arguments[1], definitions)}
+    return {"type": "object"} if kind is dict else {}
+
+
+def _either(arguments, definitions):
+    """One of several types, at most one of which is no scalar."""
+    found = [_schema_of(one, definitions) for one in arguments if one is not type(None)]
+    nullable = ["null"] if type(None) in arguments else []
+    if all(set(one) == {"type"} for one in found):
+        names = [name for one in found for name in np.atleast_1d(one["type"]).tolist()]
+        return {"type": list(dict.fromkeys(names + nullable))}
+    return {"anyOf": [*found, *({"type": one} for one in nullable)]}
+
+
+def _array(origin, arguments, definitions):
+    items = _schema_of(arguments[0], definitions)
+    if origin is list or Ellipsis in arguments:
+        return {"type": "array", "items": items}
+    length = len(arguments)
+    return {"type": "array", "items": items, "minItems": length, "maxItems": length}
+
+
+def _reference(cls, definitions):
+    if cls.__name__ not in definitions:
+        definitions[cls.__name__] = {}
+        properties = {one.key: _property(one, definitions) for one in keys_of(cls)}
+        definitions[cls.__name__] = {
+            "description": getdoc(cls),
+            "type": "object",
+            "properties": properties,
+            "required": [one.key for one in keys_of(cls) if one.required],
+        }
+    return {"$ref": f"#/$defs/{cls.__name__}"}
+
+
+def _property(one, definitions):
+    schema = _schema_of(one.type, definitions)
+    return {"description": one.doc} | schema if one.doc else schema
+
+
+def _columns(cls, definitions):
+    columns = {
+        one.key: {"type": "array", "items": _schema_of(one.type, definitions)}
+        for one in keys_of(cls)
+    }
+    return {"type": "object", "properties": columns, "required": list(columns)}
+
+
+# ---- what is wrong with data
+
+
+def missing_keys(data, schema):
+    """Sorted paths of the keys that data lack, `[]` being any row: "sections[].modes"."""
+    return sorted({path for path, what in _faults(data, schema, schema, "", "") if what is None})
+
+
+def problems_in(data, schema, name):
+    """A Problem for each value that is not what a schema says, the first MOST_TOLD of them.
+
+    name  of the file
+    """
+    found = (one for one in _faults(data, schema, schema, "", None) if one[1] is not None)
+    told = list(islice(found, MOST_TOLD + 1))
+    problems = [Problem(name, expected, column=path) for path, expected in told[:MOST_TOLD]]
+    if len(told) > MOST_TOLD:
+        more = message("record_has_more", "further values are not what they should be, either")
+        problems.append(Problem(name, more))
+    return problems
+
+
+def _faults(value, schema, root, path, row):
+    """(path, what was expected) of each fault; None in place of the latter where a key is missing.
+
+    row  how a row of a list stands in a path: its number when None
+    """
+    for one in schema.get("anyOf", ()):
+        if value is None and one.get("type") == "null":
+            return
+    schema = _resolved(schema, root)
+    names = schema.get("type", ())
+    names = [names] if isinstance(names, str) else names
+    if names and not any(type(value) in _TYPES[one] for one in names):
+        if names == ["object"] and schema.get("required"):  # it has none of its keys
+            yield from ((_below(path, one), None) for one in schema["required"])
+        elif names == ["array"]:
+            yield path, None
+        yield path, _expected(names, value)
+    elif isinstance(value, dict):
+        yield from _faults_of_object(value, schema, root, path, row)
+    elif isinstance(value, list):
+        yield from _faults_of_array(value, schema, root, path, row)
+    elif type(value) in (int, float) and not _is_finite(value):
+        yield path, _expected(names, value)
+
+
+def _resolved(schema, root):
+    """The schema that is referred to, and of several that of what is not null."""
+    if "anyOf" in schema:
+        schema = schema["anyOf"][0]
+    while "$ref" in schema:
+        schema = root["$defs"][schema["$ref"].rpartition("/")[2]]
+    return schema
+
+
+def _faults_of_object(value, schema, root, path, row):
+    for one in schema.get("required", ()):
+        if one not in value:
+            yield _below(path, one), None
+    properties, other = schema.get("properties", {}), schema.get("additionalProperties")
+    for one, item in value.items():
+        below = properties.get(one, other)
+        if below is not None:
+            yield from _faults(item, below, root, _below(path, one), row)
+
+
+def _faults_of_array(value, schema, root, path, row):
+    length = schema.get("minItems")
+    if length is not None and len(value) != length:
+        yield path, message("record_length", "found {found} values, expected {length}",
+                            found=len(value), length=length)  # fmt: skip
+    items = schema.get("items", {})
+    if not items or _are_scalars(value, items):
+        return
+    for number, item in enumerate(value):
+        place = f"{path}[{number if row is None else row}]"
+        yield from _faults(item, items, root, place, row)
+
+
+def _are_scalars(values, items):
+    """Whether all values are of a type that needs no look at each: a column may have 200 000."""
+    names = items.get("type", ())
+    allowed = set().union(*(_TYPES[one] for one in ([names] if isinstance(names, str) else names)))
+    found = set(map(type, values))
+    if not found <= allowed - {list, dict}:
+        return False
+    return not found & {int, float} or all(
+        _is_finite(one) for one in values if type(one) in (int, float)
+    )
+
+
+def _is_finite(number):
+    try:
+        return isfinite(number)
+    except OverflowError:  # a whole number that no float holds
+        return False
+
+
+def _below(path, one):
+    return f"{path}.{one}" if path else one
+
+
+def _expected(names, value):
+    found = repr(value) if not isinstance(value, list | dict) else type(value).__name__
+    found = found if len(found) <= 40 else f"{found[:37]}..."
+    name = next(one for one in names if one != "null")
+    words = {
+        "number": message("record_number", "a number"),
+        "integer": message("record_integer", "a whole number"),
+        "string": message("record_string", "a text"),
+        "boolean": message("record_boolean", "true or false"),
+        "array": message("record_array", "a list"),
+        "object": message("record_object", "an object with keys"),
+    }
+    return message("record_value", "found {found}, expected {expected}",
+                   found=found, expected=words[name])  # fmt: skip
+
+
+# ---- from plain data
+
+
+def from_plain(cls, data, name="data"):
+    """The dataclass that plain data hold, its types checked.
+
+    Parameters
+    ----------
+    cls : type
+        The dataclass.
+    data : dict
+        As parsed from JSON.
+    name : str, optional
+        Name of the file, for problems.
+
+    Raises
+    ------
+    InputError
+        With one line for each problem: "record.json, capacity.volume_m3[3]: expected a number".
+    """
+    schema = json_schema(cls)
+    missing = [
+        Problem(name, message("record_key_missing", "missing"), column=path)
+        for path in missing_keys(data, schema)
+    ]
+    problems = missing or problems_in(data, schema, name)
+    if problems:
+        raise InputError(problems)
+    return _made(cls, data)
+
+
+def _made(kind, data):
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return data if isinstance(arguments[1], Columns) else _made(arguments[0], data)
+    if origin in (Union, types.UnionType):
+        others = [one for one in arguments if one is not type(None)]
+        return data if data is None or len(others) > 1 else _made(others[0], data)
+    if kind is float:
+        return np.nan if data is None else float(data)
+    if is_dataclass(kind):
+        return _object(kind, data)
+    if origin in (tuple, list):
+        kinds = arguments if len(arguments) > 1 and Ellipsis not in arguments else arguments[:1]
+        kinds = kinds if len(kinds) > 1 else kinds * len(data)
+        return origin(_made(one, item) for one, item in zip(kinds, data, strict=True))
+    if kind is np.ndarray:
+        return _array_of(data)
+    return tuple(data) if kind is tuple else data
+
+
+def _array_of(data):
+    """An array of any shape; of numbers NaN stands for null."""
+    found = np.array(data)
+    return found if found.dtype != object else np.array(data, dtype=float)
+
+
+def _object(cls, data):
+    values = {}
+    for one in keys_of(cls):
+        if not one.name or one.key not in data:
+            continue
+        value = data[one.key]
+        if one.type is Message:
+            text = Message(value)
+            text.code, text.values = data[f"{one.key}_code"], data[f"{one.key}_values"]
+            values[one.name] = text
+        else:
+            values[one.name] = _made(one.type, value)
+    for one in fields(cls):  # an optional key that is not there
+        if one.name not in values and one.default is MISSING and one.default_factory is MISSING:
+            values[one.name] = None
+    return cls(**values)

@@ -1,0 +1,81 @@
+"""The JSON schemas of what is saved, and the lists of keys in docs/record-format.md.
+
+python tests/schemas.py   writes both, from the dataclasses
+"""
+
+import json
+
+from tankcal.record.camera_influence import InfluenceFile
+from tankcal.record.camera_parameters import ParametersFile
+from tankcal.record.camera_product import ProductFile
+from tankcal.record.camera_stability import StabilityFile
+from tankcal.record.camera_versions import CAMERA
+from tankcal.record.making import Record
+from tankcal.record.plan import PlanFile
+from tankcal.record.plan_versions import PLAN
+from tankcal.record.schema import json_schema
+from tankcal.record.versions import RECORD
+
+SAVED = (
+    (RECORD, None, Record),
+    (CAMERA, "stability", StabilityFile),
+    (CAMERA, "parameters", ParametersFile),
+    (CAMERA, "influence", InfluenceFile),
+    (CAMERA, "product", ProductFile),
+    (PLAN, None, PlanFile),
+)
+
+
+def schema_text(saved_format, kind, cls):
+    """The JSON schema of a format, as its file holds it."""
+    title = saved_format.format + (f", kind {kind}" if kind else "")
+    return json.dumps(json_schema(cls, title), ensure_ascii=False, indent=1) + "\n"
+
+
+def keys_in(saved, free=()):
+    """Set of the paths of all keys that plain data have, in every row of their lists.
+
+    free  paths of dicts with any keys: "job.certificate"
+    """
+    return set(_keys(saved, "", frozenset(free)))
+
+
+def _keys(value, path, free):
+    if path in free:
+        yield f"{path}.*"
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            place = f"{path}.{key}".lstrip(".")
+            yield place
+            yield from _keys(item, place, free)
+    elif isinstance(value, list):
+        for item in value:
+            if isinstance(item, dict | list):
+                yield from _keys(item, path + "[]", free)
+
+
+def keys_of_schema(schema, optional=False):
+    """The same of a JSON schema: every key that must be there (or may be), `.*`: any may be."""
+    return set(_keys_of_schema(schema, schema, "", "properties" if optional else "required"))
+
+
+def _keys_of_schema(schema, root, path, which):
+    schema = schema["anyOf"][0] if "anyOf" in schema else schema
+    if "$ref" in schema:
+        schema = root["$defs"][schema["$ref"].rpartition("/")[2]]
+    for key in schema.get(which, ()):
+        place = f"{path}.{key}".lstrip(".")
+        yield place
+        yield from _keys_of_schema(schema["properties"][key], root, place, which)
+    if isinstance(schema.get("items"), dict):
+        yield from _keys_of_schema(schema["items"], root, path + "[]", which)
+    types = schema.get("type", ())
+    if "object" in ([types] if isinstance(types, str) else types) and "required" not in schema:
+        yield f"{path}.*"
+
+
+if __name__ == "__main__":
+    for one in SAVED:
+        path = one[0].schema_file(one[1])
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(schema_text(*one), encoding="utf-8")
