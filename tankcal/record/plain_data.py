@@ -81,9 +81,9 @@ def without_collection():
             gc.enable()
 
 
-def columns_of(rows, names):
-    """{key: values} of rows, dicts that have these keys."""
-    return {key: [row[key] for row in rows] for key in names}
+def columns_of(rows, names=()):
+    """{key: values} of rows that have the same keys; of none, empty columns of these names."""
+    return {one: [row[one] for row in rows] for one in (rows[0] if rows else names)}
 
 
 def rows_of(columns):
