@@ -25,33 +25,50 @@ SMALLEST_PIVOT = 1e-12  # of normal equations with ones in the diagonal: below i
 
 @dataclass(frozen=True)
 class Adjustment:
-    """What an adjustment found; u unknowns, n observations, m conditions.
+    """What any adjustment found: of `adjust` here, or with blocks eliminated (tankcal.solver).
 
-    unknowns            (u,) estimates
-    cofactor            (u, u) covariance of the unknowns for variance factor 1
-    observations        (n,) adjusted observations l + v
-    residuals           (n,) v, in the units of the observations
-    normalised          (m,) whitened residual of each condition
-    redundancy          (m,) part of each condition's error that shows in its residual, 0 to 1
-    chi2                v' Q^-1 v
-    dof                 m - u
-    iterations          until the last step was below the tolerance
+    unknowns      (u,) estimates, in the model's units; of a solver.Model its state
+    cofactor      covariance of the unknowns for variance factor 1: (u, u), or the solver.Cofactors
+                  that works it out for any unknowns and any functions of them
+    normalised    (m,) whitened residual of each condition; of a solver.Model a tuple of (n, rows),
+                  computed minus observed, one array a group
+    chi2          v' Q^-1 v
+    rows          number of conditions that weigh anything
+    estimated     number of unknowns, less those that exact conditions take
+    iterations    until the last step was below the tolerance
+    rank_defect   number of directions of the unknowns that only the datum fixes
+    observations  (n,) adjusted observations l + v; None: the solver.Model keeps its own
+    residuals     (n,) v, in the units of the observations; None likewise
+    redundancy    (m,) part of each condition's error that shows in its residual, 0 to 1; None:
+                  Cofactors.redundancy works it out
     """
 
-    unknowns: np.ndarray
-    cofactor: np.ndarray
-    observations: np.ndarray
-    residuals: np.ndarray
-    normalised: np.ndarray
-    redundancy: np.ndarray
+    unknowns: object
+    cofactor: object
+    normalised: object
     chi2: float
-    dof: int
+    rows: int
+    estimated: int
     iterations: int
+    rank_defect: int = 0
+    observations: np.ndarray | None = None
+    residuals: np.ndarray | None = None
+    redundancy: np.ndarray | None = None
+
+    @property
+    def dof(self):
+        """Degrees of freedom: rows minus unknowns, plus what the datum takes up."""
+        return self.rows - self.estimated + self.rank_defect
 
     @property
     def variance_factor(self):
         """A-posteriori variance factor chi2 / dof; nan when nothing is redundant."""
         return self.chi2 / self.dof if self.dof > 0 else np.nan
+
+    @property
+    def sigma0(self):
+        """Root of the a-posteriori variance factor."""
+        return float(np.sqrt(self.variance_factor))
 
 
 def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tolerance=1e-8):
@@ -103,13 +120,14 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
             return Adjustment(
                 unknowns=x,
                 cofactor=cofactor,
+                normalised=normalised,
+                chi2=float(normalised @ normalised),
+                rows=len(w),
+                estimated=len(x),
+                iterations=iteration,
                 observations=l + v,
                 residuals=v,
-                normalised=normalised,
                 redundancy=1.0 - np.sum(basis**2, axis=1),
-                chi2=float(normalised @ normalised),
-                dof=len(w) - len(x),
-                iterations=iteration,
             )
     raise SolutionError(
         message(

@@ -153,7 +153,7 @@ def _summary(prediction):
         "network: {rows} observations, {unknowns} unknowns, redundancy {dof}; mean sd of a target "
         "{sd} mm",
         rows=solution.rows,
-        unknowns=solution.unknowns,
+        unknowns=solution.estimated,
         dof=solution.dof,
         sd=with_digits(1000 * prediction.precision.mean_sd_m, 3, marks()),
     )

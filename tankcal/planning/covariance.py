@@ -43,7 +43,7 @@ class PredictedCovariance:
     def _in_frame(self, matrix):
         """C matrix in the datum of the network."""
         columns = self.adjusted.problem.layout.points[self.points].ravel()
-        found = covariances(self.adjusted.solution, columns, matrix.T)
+        found = covariances(self.adjusted.solution.cofactor, columns, matrix.T)
         return np.vstack([found, np.zeros((1, found.shape[1]))])[columns]
 
     @cached_property

@@ -155,8 +155,8 @@ def reliability(plan, predicted, covariance, by_points_m2):
     for number, (one, source, rows) in enumerate(parts):
         if source not in predicted.gathered.traces:
             continue
-        trace, jac = predicted.gathered.traces[source], solution.jacobians[number]
-        r = 1.0 - solution.leverage(number, jac)
+        trace, jac = predicted.gathered.traces[source], solution.cofactor.jacobians[number]
+        r = 1.0 - solution.cofactor.leverage(number, jac)
         columns = problem.model.groups[number].columns
         effect = np.abs(np.einsum("nmk,nk->nm", jac, pull[columns]))
         single = single_readings(plan, one, trace, rows)
@@ -166,7 +166,7 @@ def reliability(plan, predicted, covariance, by_points_m2):
 
 def _pull(solution, columns, gradient):
     """(unknowns + 1,) Q g' of a gradient by some unknowns; the last is 0, for the fixed ones."""
-    return np.append(covariances(solution, columns, gradient[None])[:, 0], 0.0)
+    return np.append(covariances(solution.cofactor, columns, gradient[None])[:, 0], 0.0)
 
 
 def _by_name(one, trace, rows, single, redundancy, effect):

@@ -306,7 +306,7 @@ def _edge_effect(name, values, form, corner_mm):
 def instruments_of(adjustment, measurements=None):
     """The `AdjustedInstrument` of each instrument."""
     adjusted = adjustment.adjusted
-    state, layout = adjusted.solution.state, adjusted.problem.layout
+    state, layout = adjusted.solution.unknowns, adjusted.problem.layout
     declared = {one.name: one for one in getattr(measurements, "instruments", ())}
     rows = []
     for i, tool in enumerate(adjusted.survey.instruments):
@@ -330,21 +330,21 @@ def instruments_of(adjustment, measurements=None):
 def _sd_of(adjustment, column):
     if column < 0:
         return 0.0
-    q = adjustment.adjusted.solution.cofactors(np.array([column]))[0, 0]
+    q = adjustment.adjusted.solution.cofactor.among(np.array([column]))[0, 0]
     return float(np.sqrt(adjustment.cov_scale * max(q, 0.0)))
 
 
 def systems_of(adjustment):
     """The `ControlSystem` of each further system of control."""
     adjusted = adjustment.adjusted
-    state, problem = adjusted.solution.state, adjusted.problem
+    state, problem = adjusted.solution.unknowns, adjusted.problem
     rows = []
     for i, system in enumerate(adjusted.survey.systems):
         rotation, scale = state.system[i], float(state.system_scale[i])
         shift = state.system_shift_m[i] - (1 + scale) * (rotation @ problem.centre_m)
         angles = np.degrees(angles_of(rotation))
         turn = angle_derivatives(rotation[None])[0]
-        q = adjusted.solution.cofactors(problem.layout.system[i, :3])
+        q = adjusted.solution.cofactor.among(problem.layout.system[i, :3])
         sd = np.degrees(np.sqrt(adjustment.cov_scale * np.diag(turn @ q @ turn.T)))
         scale_sd = _sd_of(adjustment, problem.layout.system[i, 6])
         rows.append(ControlSystem(system.name, *shift, *angles, *sd, 1e6 * scale, 1e6 * scale_sd))

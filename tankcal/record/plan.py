@@ -177,7 +177,7 @@ def _survey(prediction):
         control_points=len(plan.known),
         targets=len(plan.targets.names),
         observations=solution.rows,
-        unknowns=solution.unknowns,
+        unknowns=solution.estimated,
         redundancy=solution.dof,
         datum=filled_from(PlannedDatum, prediction.datum),
     )

@@ -11,6 +11,5 @@ Source: Brown 1958; Triggs et al. 2000, Bundle adjustment - a modern synthesis, 
 
 from tankcal.solver.iteration import UndeterminedError, linearise, solve
 from tankcal.solver.model import Group, Model
-from tankcal.solver.solution import Solution
 
-__all__ = ["Group", "Model", "Solution", "UndeterminedError", "linearise", "solve"]
+__all__ = ["Group", "Model", "UndeterminedError", "linearise", "solve"]

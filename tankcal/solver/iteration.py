@@ -3,15 +3,15 @@
 import numpy as np
 import scipy.linalg
 
-from tankcal.adjust import SMALLEST_PIVOT, determined
+from tankcal.adjust import SMALLEST_PIVOT, Adjustment, determined
 from tankcal.errors import SolutionError
 from tankcal.messages import message
+from tankcal.solver.cofactors import Cofactors, Factor
 from tankcal.solver.elimination import add_rows, back_substitute, eliminate
 from tankcal.solver.exact import Conditions
 from tankcal.solver.model import Normals
 from tankcal.solver.plan import plan
 from tankcal.solver.rank import diagnosis, weakness
-from tankcal.solver.solution import Factor, Solution
 from tankcal.solver.threads import threads_for
 
 SMALL = 2e7  # rows times unknowns squared: below it a system without blocks is solved by QR
@@ -31,7 +31,7 @@ def solve(model, state, *, max_iterations=100, tolerance=1e-4):
     tolerance  of the last step: root of the sum of squares of what it changes in the rows, per root
                of the number of rows; the step itself is taken, so the error left is far smaller
 
-    Returns a Solution. Raises SolutionError when the observations do not determine the unknowns
+    Returns an Adjustment. Raises SolutionError when the observations do not determine the unknowns
     (the message names them) or when the iteration does not converge.
     """
     with threads_for(model.reduced):
@@ -39,7 +39,7 @@ def solve(model, state, *, max_iterations=100, tolerance=1e-4):
 
 
 def linearise(model, state):
-    """The Solution of a Model with its derivatives at `state`: no step is made.
+    """The Adjustment of a Model with its derivatives at `state`: no step is made.
 
     Its cofactors are those of a survey whose observations are what `state` computes, so it tells
     how well the unknowns will be known before anything is measured. Raises SolutionError when the
@@ -47,17 +47,9 @@ def linearise(model, state):
     """
     with threads_for(model.reduced):
         work = _Work(model)
-        cost, factor = work.evaluate(state), work.factor(state, 0.0)
-        if factor is None:
-            raise SolutionError(
-                message(
-                    "no_factor",
-                    "the normal equations have no factor{weakness}",
-                    weakness=weakness(work, state),
-                )
-            )
+        cost, factor = work.evaluate(state), work.sound_factor(state)
         _refuse_untouched(model, factor)
-        return Solution(work, state, cost, 0, factor, factor)
+        return work.adjustment(state, cost, 0, factor)
 
 
 def _solved(work, state, max_iterations, tolerance):
@@ -80,7 +72,7 @@ def _solved(work, state, max_iterations, tolerance):
             _refuse_untouched(model, factor)
             cost = work.evaluate(candidate, derivatives=False)
             sharp = decrement < SHARP * max(work.rows, 1)
-            return Solution(work, candidate, cost, iteration, factor if sharp else None, factor)
+            return work.adjustment(candidate, cost, iteration, factor if sharp else None)
         before, cost = cost, work.evaluate(candidate)
         if cost <= before * (1 + 1e-12):
             gain = 2 * (before - cost) / decrement
@@ -155,6 +147,36 @@ class _Work:
             group.fill(state, w, jac if derivatives else jac[:0])
             cost += 0.5 * float(np.vdot(w, w))
         return cost if np.isfinite(cost) else np.inf
+
+    def adjustment(self, state, cost, iterations, factor):
+        """The Adjustment at a minimum; factor  that of its normal equations, None: not made yet."""
+        rows = int(sum(np.count_nonzero(jac.any(axis=2)) for jac in self.jac))
+        if factor is None:
+            self.evaluate(state)
+            factor = self.sound_factor(state)
+        return Adjustment(
+            unknowns=state,
+            cofactor=Cofactors(self, factor),
+            normalised=tuple(self.w),
+            chi2=2.0 * cost,
+            rows=rows,
+            estimated=self.model.unknowns - (factor.tangent.rank if self.conditions else 0),
+            iterations=iterations,
+            rank_defect=0 if factor.null_space is None else factor.null_space.shape[1],
+        )
+
+    def sound_factor(self, state):
+        """The Factor at the evaluated state; a SolutionError when there is none."""
+        factor = self.factor(state, 0.0)
+        if factor is None:
+            raise SolutionError(
+                message(
+                    "no_factor",
+                    "the normal equations have no factor{weakness}",
+                    weakness=weakness(self, state),
+                )
+            )
+        return factor
 
     def factor(self, state, damping):
         """Normal equations at the evaluated state, eliminated and factored; None: damp more."""

@@ -125,7 +125,6 @@ def _complete(search, gathered, frame, measurements):
     readings += check_readings(adjusted, gathered.checks, scale)
     readings = _in_order(readings)
     there = np.flatnonzero(np.isfinite(adjusted.xyz_m).all(axis=1))
-    names = tuple(adjusted.survey.points[i] for i in there)
     late = {i: why for i, why in enumerate(adjusted.problem.set_aside) if why}
     warnings += [_lost(measurements, adjusted.survey.points[i], why) for i, why in late.items()]
     warnings += [_kept(one, gathered.traces) for one in search.needed if one.w > CRITICAL]
@@ -148,12 +147,9 @@ def _complete(search, gathered, frame, measurements):
     warnings += check_readings_off(readings)
     warnings += scale_of_control(adjusted, readings, measurements, scale)
     return Adjustment(
-        names=names,
-        xyz_m=adjusted.xyz_m[there],
-        covariance_m2=scale * adjusted.point_covariances_m2[there],
-        fixed=adjusted.problem.layout.points[there] < 0,
-        aside=(*gathered.aside, *late.values()),
         adjusted=adjusted,
+        there=there,
+        aside=(*gathered.aside, *late.values()),
         readings=tuple(readings),
         removed=tuple(removed),
         groups=groups,
@@ -161,11 +157,6 @@ def _complete(search, gathered, frame, measurements):
         check_points=checked,
         causes=causes_of(adjusted, there, scale),
         cov_scale=scale,
-        sigma0=adjusted.sigma0,
-        observations=adjusted.solution.rows + adjusted.within[1],
-        unknowns=adjusted.solution.unknowns,
-        redundancy=adjusted.dof,
-        iterations=adjusted.solution.iterations,
         rounds=search.rounds,
         warnings=tuple(dict.fromkeys(warnings)),
         doubts=tuple(doubts),

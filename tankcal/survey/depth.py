@@ -62,7 +62,7 @@ def in_depth(measurements, adjust, progress):
 
 def _corrected(images, adjusted, lenses):
     """Image points (n, 2) in focus, and the number of those that have no depth to speak of."""
-    survey, problem, state = adjusted.survey, adjusted.problem, adjusted.solution.state
+    survey, problem, state = adjusted.survey, adjusted.problem, adjusted.solution.unknowns
     points = {name: i for i, name in enumerate(survey.points)}
     photos = {name: i for i, name in enumerate(survey.photos.names)}
     point = np.array([points.get(name, -1) for name in images.point], dtype=int)

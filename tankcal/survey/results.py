@@ -1,6 +1,7 @@
 """What the adjustment of a survey gave, by the names that the user gave to things."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -183,19 +184,16 @@ class DepthOfField:
 class Adjustment:
     """The adjusted survey. Covariances are scaled as `cov_scale` says.
 
-    names          (n,) points that were adjusted       xyz_m    (n, 3)
-    covariance_m2  (n, 3, 3) of each point; `full_covariance_m2()` gives all of them together
-    fixed          (n, 3) True: was held
+    adjusted       network.Adjusted: numbers and covariances of everything, points by their number
+    there          (n,) numbers of the points that could be adjusted
     aside          sentences: points that could not be adjusted, and why
-    adjusted       network.Adjusted, for everything that is not here
     readings       tuple of Reading, in the order of the files
     removed        tuple of Reading: those that were set aside, the worst first
     groups         tuple of GroupOfReadings
     datum          DatumReport       check_points  CheckPoints or None
     causes         tuple of Cause
     cov_scale      variance factor that covariances were multiplied by: 1, or sigma0 squared
-    sigma0         a posteriori; nan: no redundancy
-    observations, unknowns, redundancy, iterations, rounds (adjustments by data snooping)
+    rounds         adjustments by data snooping
     warnings       tuple of Problem
     doubts         those of the warnings that put the whole result in doubt: what was set aside may
                    be the victim of what was kept, or another reading may be wrong in its place
@@ -203,12 +201,9 @@ class Adjustment:
     depth          DepthOfField; None: not asked for
     """
 
-    names: tuple
-    xyz_m: np.ndarray
-    covariance_m2: np.ndarray
-    fixed: np.ndarray
-    aside: tuple
     adjusted: Adjusted
+    there: np.ndarray
+    aside: tuple
     readings: tuple[Reading, ...]
     removed: tuple[Reading, ...]
     groups: tuple[GroupOfReadings, ...]
@@ -216,16 +211,56 @@ class Adjustment:
     check_points: CheckPoints | None
     causes: tuple[Cause, ...]
     cov_scale: float
-    sigma0: float
-    observations: int
-    unknowns: int
-    redundancy: int
-    iterations: int
     rounds: int
     warnings: tuple = ()
     doubts: tuple = ()
     repeats: RepeatedReadings | None = None
     depth: DepthOfField | None = None
+
+    @cached_property
+    def names(self) -> tuple:
+        """(n,) names of the points that were adjusted."""
+        return tuple(self.adjusted.survey.points[i] for i in self.there)
+
+    @cached_property
+    def xyz_m(self) -> np.ndarray:
+        """(n, 3) adjusted coordinates."""
+        return self.adjusted.xyz_m[self.there]
+
+    @cached_property
+    def covariance_m2(self) -> np.ndarray:
+        """(n, 3, 3) covariance of each point; `full_covariance_m2` has all of them together."""
+        return self.cov_scale * self.adjusted.point_covariances_m2[self.there]
+
+    @property
+    def fixed(self) -> np.ndarray:
+        """(n, 3) True: was held."""
+        return self.adjusted.problem.layout.points[self.there] < 0
+
+    @property
+    def sigma0(self) -> float:
+        """A posteriori; nan: no redundancy."""
+        return self.adjusted.sigma0
+
+    @property
+    def observations(self) -> int:
+        """Number of values adjusted, each repeated reading counted."""
+        return self.adjusted.solution.rows
+
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns."""
+        return self.adjusted.solution.estimated
+
+    @property
+    def redundancy(self) -> int:
+        """Degrees of freedom of the adjustment."""
+        return self.adjusted.dof
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of the last adjustment."""
+        return self.adjusted.solution.iterations
 
     def __str__(self) -> str:
         fit = "nothing redundant"

@@ -74,7 +74,7 @@ def certified(name):
 
 
 def fitted(function, start, x, y, sd):
-    """The Solution with rows over one sd."""
+    """The Adjustment with rows over one sd."""
     n, u = len(y), len(start)
 
     def fill(b, w, jac):
@@ -97,11 +97,11 @@ def digits(name, number):
     b, sd = starts[number], max(np.std(y) / 10, 1e-6)
     for _ in range(4):  # the sd of the observations is not known: found on the way
         found = fitted(MODELS[name], b, x, y, sd)
-        b, sd = found.state, max(sd * np.sqrt(found.variance_factor), 1e-9)
-    last = np.sqrt(np.diag(found.cofactors(np.arange(len(b)))) * found.variance_factor)
+        b, sd = found.unknowns, max(sd * np.sqrt(found.variance_factor), 1e-9)
+    last = np.sqrt(np.diag(found.cofactor.among(np.arange(len(b)))) * found.variance_factor)
     with np.errstate(divide="ignore"):
         agree = [
-            -np.log10(np.abs(a / c - 1).max()) for a, c in ((found.state, values), (last, sds))
+            -np.log10(np.abs(a / c - 1).max()) for a, c in ((found.unknowns, values), (last, sds))
         ]
     return np.minimum(agree, 11.0)
 

@@ -42,7 +42,7 @@ def test_the_plan_is_the_network_of_the_dissertation(prediction):
     assert len(prediction.plan.stations) == 11
     assert len(prediction.points) == 137
     assert len(prediction.plan.ties) == 8
-    assert prediction.predicted.adjusted.solution.unknowns == 487
+    assert prediction.predicted.adjusted.solution.estimated == 487
     assert prediction.seen.rays.min() >= 3
     assert not prediction.undetermined
     assert not prediction.weak

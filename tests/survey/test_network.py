@@ -33,7 +33,7 @@ def whole_matrix(adjusted):
     """All whitened rows as one dense matrix (rows, unknowns)."""
     model = adjusted.problem.model
     rows = []
-    for group, jac in zip(model.groups, adjusted.solution.jacobians, strict=True):
+    for group, jac in zip(model.groups, adjusted.solution.cofactor.jacobians, strict=True):
         n, m, _ = jac.shape
         dense = np.zeros((n, m, model.unknowns + 1))
         index = np.broadcast_to(group.columns[:, None, :], jac.shape)
@@ -61,7 +61,7 @@ def test_right_answer_of_three_programs(shared, tmp_path, monkeypatch):
 
     found = adjust(problems.tank(sim_tank.make()))
     assert found.problem.model.unknowns == 487
-    assert found.solution.cost == pytest.approx(2.0725167112e02, rel=1e-10)
+    assert 0.5 * found.solution.chi2 == pytest.approx(2.0725167112e02, rel=1e-10)
     assert found.sigma0 == pytest.approx(0.96840, abs=5e-6)
     covariance = found.covariance_m2()
     assert covariance.shape == (411, 411)
@@ -76,7 +76,7 @@ def test_cofactors_are_the_inverse_of_the_whole_normal_matrix(adjusted):
     inverse = np.linalg.inv(r) / scale[:, None]
     q = inverse @ inverse.T
     n = adjusted.problem.model.unknowns
-    found = adjusted.solution.cofactors(np.arange(n))
+    found = adjusted.solution.cofactor.among(np.arange(n))
     size = np.sqrt(np.diag(q))
     assert np.abs((found - q) / np.outer(size, size)).max() < 1e-8
     columns = adjusted.problem.layout.points
@@ -86,7 +86,7 @@ def test_cofactors_are_the_inverse_of_the_whole_normal_matrix(adjusted):
     assert adjusted.covariance_m2(some) == pytest.approx(
         q[np.ix_(columns[some].ravel(), columns[some].ravel())], rel=1e-7, abs=1e-14
     )
-    redundancy = np.concatenate([r.ravel() for r in adjusted.solution.redundancy()])
+    redundancy = np.concatenate([r.ravel() for r in adjusted.solution.cofactor.redundancy()])
     assert redundancy == pytest.approx(1 - np.sum(basis**2, axis=1), abs=1e-9)
     assert redundancy.sum() == pytest.approx(adjusted.dof, rel=1e-9)
 
@@ -106,7 +106,7 @@ def test_compiled_loops_and_arrays_agree(make, monkeypatch):
         assert found[-1].residuals  # leverages too
         assert found[-1].point_covariances_m2.any()
     first, second = found
-    assert second.solution.cost == pytest.approx(first.solution.cost, rel=1e-10)
+    assert second.solution.chi2 == pytest.approx(first.solution.chi2, rel=1e-10)
     assert second.xyz_m == pytest.approx(first.xyz_m, abs=1e-9)
     assert second.covariance_m2() == pytest.approx(first.covariance_m2(), rel=1e-6, abs=1e-13)
     assert second.point_covariances_m2 == pytest.approx(
@@ -136,7 +136,7 @@ def test_finds_the_truth_without_noise(convention, affinity):
     """Property: observations without error give the truth back, in every convention."""
     survey, truth = photographed(form=Form(convention, affinity), noise=0.0)
     found = adjust(survey)
-    assert found.solution.cost < 1e-12
+    assert 0.5 * found.solution.chi2 < 1e-12
     assert found.xyz_m == pytest.approx(truth.xyz_m, abs=1e-7)
     values = np.array(list(found.camera()[0].values()))
     sds = np.sqrt(np.diag(found.camera()[2]))
@@ -174,7 +174,7 @@ def moved(survey, rotation, shift, order=None):
 
 def test_large_coordinates_and_a_turned_frame_change_nothing(survey, adjusted, figure):
     """Property: UTM-sized shift, any rotation (one photo then looks along x), any order of rows."""
-    r0 = adjusted.solution.state.rotation[0]
+    r0 = adjusted.solution.unknowns.rotation[0]
     along_x = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]) @ r0  # that photo gets phi = 90 deg
     shift = np.array([5.0e5, 7.5e6, 800.0])
     order = np.random.default_rng(3).permutation(len(survey.image_points.point))
@@ -243,7 +243,7 @@ def test_inner_constraints_give_the_smallest_trace(survey):
     found = adjust(replace(survey, observations=survey.observations[1:]), datum="inner")
     assert found.solution.rank_defect == 6
     a = whole_matrix(found)
-    free = directions(found.problem.layout, found.solution.state)[:, :6]
+    free = directions(found.problem.layout, found.solution.unknowns)[:, :6]
     scale = np.linalg.norm(a, axis=0)
     assert np.abs((a / scale) @ (free * scale[:, None])).max() < 1e-3 * np.linalg.norm(a)
     ties = free * found.problem.model.inner[:, None]
@@ -359,7 +359,7 @@ def test_check_observations_are_compared_not_adjusted(survey, adjusted):
     distance = Distances(
         np.array([5.0]), np.array([0.01]), np.array([3]), np.array([30]), instrument=np.array([-1])
     )
-    truth = distance.computed(replace(adjusted.solution.state), False)[0]
+    truth = distance.computed(replace(adjusted.solution.unknowns), False)[0]
     distance = replace(distance, value=truth.ravel() + 0.004)
     found = compared(adjusted, distance)
     both = adjust(replace(survey, observations=(*survey.observations, distance)))

@@ -141,9 +141,9 @@ def test_thousands_of_check_observations(datum):
     )
     table = compared(found, check)
     columns = check.columns(found.problem.layout)
-    jac = check.computed(found.solution.state, True)[1]
+    jac = check.computed(found.solution.unknowns, True)[1]
     for i in range(0, 3000, 500):
-        q = found.solution.cofactors(columns[i])
+        q = found.solution.cofactor.among(columns[i])
         assert table.sd[i, 0] ** 2 == pytest.approx(1e-4 + (jac[i] @ q @ jac[i].T)[0, 0], rel=1e-9)
     exact = compared(found, replace(check, sd=np.zeros(3000)))
     assert exact.sd == pytest.approx(np.sqrt(np.square(table.sd) - 1e-4), rel=1e-6)
@@ -224,12 +224,14 @@ def test_cofactors_of_an_observation_are_its_rows_times_its_responses(datum):
     """Second method: the change of all unknowns, Q J', through the rows once more."""
     found = sharply(CASES[datum], datum)
     solution, model = found.solution, found.problem.model
-    for group, jac in zip(model.groups, solution.jacobians, strict=True):
+    for group, jac in zip(model.groups, solution.cofactor.jacobians, strict=True):
         columns, own = group.columns[:7], jac[:7]
-        changes = np.hstack([part for _, part in responses(solution, columns, own)])
+        changes = np.hstack([part for _, part in responses(solution.cofactor, columns, own)])
         changes = np.vstack([changes, np.zeros((1, changes.shape[1]))])
         wide = np.einsum("nmk,nkd->nmd", own, changes[columns]).reshape(
             *own.shape[:2], *own.shape[:2]
         )
         expected = np.array([wide[n, :, n, :] for n in range(len(own))])
-        np.testing.assert_allclose(cofactors_within(solution, columns, own), expected, atol=1e-9)
+        np.testing.assert_allclose(
+            cofactors_within(solution.cofactor, columns, own), expected, atol=1e-9
+        )

@@ -147,7 +147,7 @@ def test_covariance_is_that_of_the_null_space(survey):
     expected = q[np.ix_(columns, columns)]
     size = np.sqrt(np.maximum(np.diag(expected), 1e-20))
     assert np.abs((found.covariance_m2() - expected) / np.outer(size, size)).max() < 1e-6
-    redundancy = np.concatenate([r.ravel() for r in found.solution.redundancy()])
+    redundancy = np.concatenate([r.ravel() for r in found.solution.cofactor.redundancy()])
     assert redundancy.sum() == pytest.approx(found.dof, rel=1e-9)
 
 
@@ -173,9 +173,9 @@ def test_a_single_angle_near_phi_90(survey, element, phi_deg):
         observations=(control, tapes, held),
     )
     found = adjust(turned_survey)
-    assert found.solution.cost < 1e-10
+    assert 0.5 * found.solution.chi2 < 1e-10
     assert found.xyz_m == pytest.approx(truth.xyz_m @ frame.T, abs=1e-7)
-    rotation = found.solution.state.rotation[2]
+    rotation = found.solution.unknowns.rotation[2]
     angles = angles_of(rotation)
     if phi_deg < 90:
         assert angles[element - 3] == pytest.approx(value[0], abs=1e-7)
@@ -300,7 +300,7 @@ def test_a_further_system_held_exactly(survey):
         "site", turned(rotation[None], np.array([[0.01, 0, 0.02]]))[0], np.array([5.1, -3, 1])
     )
     found = adjust(replace(survey, systems=(system,), observations=(*survey.observations, known)))
-    state = found.solution.state
+    state = found.solution.unknowns
     back = found.xyz_m[point] - found.problem.centre_m
     values = np.einsum("ij,nj->ni", state.system[0], back) + state.system_shift_m[0]
     assert values[np.arange(9), axis] == pytest.approx(known.value, abs=1e-11)

@@ -53,7 +53,7 @@ def test_same_as_the_network_adjustment(photos, adjustment):
     q = direct.covariance_m2(order)
     assert adjustment.full_covariance_m2() == pytest.approx(q, rel=1e-5, abs=1e-13)
     assert (adjustment.observations, adjustment.unknowns, adjustment.redundancy) == (
-        direct.solution.rows, direct.solution.unknowns, direct.dof,
+        direct.solution.rows, direct.solution.estimated, direct.dof,
     )  # fmt: skip
 
 
@@ -74,7 +74,7 @@ def test_every_value_has_its_row(photos, adjustment):
     assert tape.ids == ("P0", "P36")
     assert tape.row == 2
     xyz = dict(zip(adjustment.names, adjustment.xyz_m, strict=True))
-    scale = adjustment.adjusted.solution.state.scale[0]
+    scale = adjustment.adjusted.solution.unknowns.scale[0]
     computed = (1 + scale) * np.linalg.norm(xyz["P0"] - xyz["P36"])
     assert tape.residual == pytest.approx(computed - tape.value, abs=1e-9)
     known_before = next(r for r in readings if r.kind == "weighted unknown")
@@ -170,7 +170,9 @@ def test_averaging_is_adjusting_all_readings(photos):
     assert alone.xyz_m == pytest.approx(means.adjusted.xyz_m, abs=1e-8)
     assert alone.point_covariances_m2 == pytest.approx(means.covariance_m2, rel=1e-6, abs=1e-13)
     within = len(images.photo) * 2 * 2 // 3 + 8
-    assert means.adjusted.solution.dof + within == alone.dof == means.redundancy
+    values = sum(one.size for one in means.adjusted.solution.normalised)
+    assert values + within == alone.solution.rows
+    assert means.adjusted.solution.dof == alone.dof == means.redundancy
     assert means.adjusted.chi2 == pytest.approx(alone.chi2, rel=1e-6)
     assert means.sigma0 == pytest.approx(alone.sigma0, rel=1e-6)
     assert means.observations == alone.solution.rows
@@ -226,7 +228,7 @@ def test_check_rows_change_nothing(photos, adjustment):
     assert {one.kind for one in checks} == {"image coordinate", "distance"}
     distance = next(one for one in checks if one.kind == "distance")
     xyz = dict(zip(found.names, found.xyz_m, strict=True))
-    scale = found.adjusted.solution.state.scale[0]
+    scale = found.adjusted.solution.unknowns.scale[0]
     length = (1 + scale) * np.linalg.norm(xyz["P4"] - xyz["P20"])
     assert distance.residual == pytest.approx(length - 12.0, abs=1e-9)
     assert abs(distance.w) > 100
@@ -498,7 +500,7 @@ def test_a_second_system_of_control(photos):
         rows=tuple(range(2, 16)),
     )  # fmt: skip
     found = adjust_survey(replace(measurements, control=both))
-    state = found.adjusted.solution.state
+    state = found.adjusted.solution.unknowns
     assert state.system[0] == pytest.approx(rotation, abs=1e-3)
     assert found.redundancy == adjust_survey(measurements).redundancy + 18 - 6
     assert 0.7 < found.sigma0 < 1.3

@@ -74,7 +74,7 @@ def _facts(paper):
                 ("targets", _count(paper, len(plan.targets.names))),
                 ("unseen_targets", _count(paper, unseen_targets(found))),
                 ("observations", _count(paper, solution.rows)),
-                ("unknowns", _count(paper, solution.unknowns)),
+                ("unknowns", _count(paper, solution.estimated)),
                 ("redundancy", _count(paper, solution.dof)),
                 ("mean_sd", paper.number(found.precision.mean_sd_m, "mm", digits=2)),
                 ("homogeneity", _axes(paper, found.precision.range_m)),

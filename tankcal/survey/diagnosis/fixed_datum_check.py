@@ -255,9 +255,9 @@ def _explaining(trials, limit, run):
 
 
 def _sd_of(adjusted, column):
-    return (
-        0.0 if column < 0 else float(adjusted.solution.cofactors(np.array([column]))[0, 0]) ** 0.5
-    )
+    if column < 0:
+        return 0.0
+    return float(adjusted.solution.cofactor.among(np.array([column]))[0, 0]) ** 0.5
 
 
 def _scale(name):
@@ -268,7 +268,7 @@ def _scale(name):
         if name not in names:
             return None  # it measured no distance
         i = names.index(name)
-        scale = float(adjusted.solution.state.scale[i])
+        scale = float(adjusted.solution.unknowns.scale[i])
         sd = _sd_of(adjusted, adjusted.problem.layout.scale[i])
         text = message(
             "scale_explains",
@@ -292,7 +292,7 @@ def _principal_distance(name, held_mm):
             return None  # it took no photo
         photo = int(np.flatnonzero(adjusted.survey.photos.camera == names.index(name))[0])
         place = adjusted.problem.interior_of[photo, 0]
-        c = float(adjusted.solution.state.interior[place])
+        c = float(adjusted.solution.unknowns.interior[place])
         sd = _sd_of(adjusted, adjusted.problem.layout.interior[place])
         text = message(
             "principal_distance_explains",

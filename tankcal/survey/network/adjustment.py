@@ -1,5 +1,9 @@
 """Adjust a survey: one call from observations to adjusted points with their covariance."""
 
+from dataclasses import replace
+
+import numpy as np
+
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver import UndeterminedError, linearise, solve
@@ -73,7 +77,21 @@ def _adjusted(survey, problem, datum, solved):
         raise SolutionError(text) from error
     if survey.photos is not None:
         refuse_worthless_cameras(survey, problem, solution)
+    chi2, dof = _scatter_of_repeats(survey, problem)
+    solution = replace(solution, chi2=solution.chi2 + chi2, rows=solution.rows + dof)
     return Adjusted(survey, problem, solution)
+
+
+def _scatter_of_repeats(survey, problem):
+    """Chi-square of repeated readings about their means, and its degrees of freedom."""
+    found = np.zeros(2)
+    for source, one, rows in zip(
+        problem.sources, problem.observations, problem.rows_of, strict=True
+    ):
+        if source in survey.repeated:
+            use = np.ones(len(one)) if one.use is None else np.asarray(one.use) > 0
+            found += [use @ part[rows] for part in survey.repeated[source]]
+    return float(found[0]), round(found[1])
 
 
 def _refuse_defect(problem):

@@ -179,7 +179,7 @@ def acting(problem, solution, number, members, v):
         return Acting(
             own, np.zeros(0), none, none, columns, np.zeros((problem.model.unknowns + 1, 0)), none
         )
-    group, a = problem.observations[number], solution.jacobians[number][0]
+    group, a = problem.observations[number], solution.cofactor.jacobians[number][0]
     columns = problem.model.groups[number].columns
     back = group.whitened(np.eye(len(own)))
     moves = _moves(solution, columns, a)
@@ -188,7 +188,7 @@ def acting(problem, solution, number, members, v):
 
 def _moves(solution, columns, jac):
     """Change (unknowns + 1, m) of the unknowns by an error of one of rows jac (m, K)."""
-    found = np.hstack([part for _, part in responses(solution, columns, jac[None])])
+    found = np.hstack([part for _, part in responses(solution.cofactor, columns, jac[None])])
     return np.vstack([found, np.zeros((1, found.shape[1]))])
 
 
@@ -213,7 +213,7 @@ def tested(problem, solution, number, members, delta0):
 
     number  of its group in the problem; None: all of it is set aside
     """
-    v, jac = members.block.linearised(solution.state)
+    v, jac = members.block.linearised(solution.unknowns)
     columns = members.block.columns(problem.layout)
     part = acting(problem, solution, number, members, v)
     q, own, back, spread = members.covariance, part.own, part.back, part.spread

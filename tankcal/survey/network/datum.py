@@ -141,7 +141,7 @@ def dependent(adjusted, quantities, fixed=False):
                 and sds do not matter
     fixed       True: coordinates and photos held fixed count as known, not as a choice
     """
-    problem, state = adjusted.problem, adjusted.solution.state
+    problem, state = adjusted.problem, adjusted.solution.unknowns
     free = null_space(problem, fixed=fixed)
     if not free.shape[1]:
         return np.zeros(len(quantities), dtype=bool)

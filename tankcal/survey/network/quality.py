@@ -122,11 +122,11 @@ def compared(adjusted, observations):
 
     observations  of tankcal.survey.observations, between points of the adjusted survey
     """
-    problem, state = adjusted.problem, adjusted.solution.state
+    problem, state = adjusted.problem, adjusted.solution.unknowns
     one = problem.relative(observations)
     computed, derivatives = one.computed(state, True)
     variance = np.reshape(np.square(one.sd), computed.shape).astype(float)
-    variance += variances(adjusted.solution, one.columns(problem.layout), derivatives)
+    variance += variances(adjusted.solution.cofactor, one.columns(problem.layout), derivatives)
     difference = one.difference(computed)
     sd = np.sqrt(variance)
     w = np.divide(difference, sd, out=np.zeros_like(sd), where=sd > 0)

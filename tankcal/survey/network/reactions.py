@@ -74,13 +74,15 @@ def reactions(problem, solution, fixed):
     points = problem.layout.points.copy()
     points.flat[held] = unknowns + np.arange(k)
     layout = replace(problem.layout, points=points)
-    a = _rows_of(zip(problem.observations, solution.jacobians, strict=True), layout, unknowns + k)
+    a = _rows_of(
+        zip(problem.observations, solution.cofactor.jacobians, strict=True), layout, unknowns + k
+    )
     a, c = a[:, :unknowns], a[:, unknowns:]
-    x = -solution.times((a.T @ c).toarray())
+    x = -solution.cofactor.times((a.T @ c).toarray())
     sound = np.ones(k, dtype=bool)
     if problem.exact:
         x, sound = _conditioned(problem, solution, layout, x)
-    w = np.concatenate([np.zeros(0), *(one.ravel() for one in solution.misclosures)])
+    w = np.concatenate([np.zeros(0), *(one.ravel() for one in solution.normalised)])
     reaction, square, step = np.zeros(k), np.zeros(k), max(1, int(AT_ONCE / max(len(w), 1)))
     for first in range(0, k, step):
         part = slice(first, first + step)
@@ -109,12 +111,12 @@ def _conditioned(problem, solution, layout, x):
     for held in problem.exact:
         one = held.conditions
         jac = np.empty((len(one), one.rows, one.columns(layout).shape[1]))
-        one.fill(solution.state, np.empty(jac.shape[:2]), jac)
+        one.fill(solution.unknowns, np.empty(jac.shape[:2]), jac)
         parts.append((one, jac))
     d = _rows_of(parts, layout, unknowns + x.shape[1])
     d, d_held = d[:, :unknowns], d[:, unknowns:].toarray()
     if not d_held.any():
         return x, np.ones(x.shape[1], dtype=bool)
-    x = x - constraint_reactions(solution)[2] @ d_held
+    x = x - constraint_reactions(solution.cofactor)[2] @ d_held
     left = np.abs(d_held + d @ x).max(axis=0, initial=0.0)
     return x, left < CONTRADICTED

@@ -172,8 +172,8 @@ def _table(problem, solution, number, delta0):
     columns = problem.model.groups[number].columns
     v = np.empty((len(one), one.rows))
     jac = np.empty((*v.shape, columns.shape[1]))
-    whole.fill(solution.state, v, jac)
-    leverage = solution.leverage(number, jac)
+    whole.fill(solution.unknowns, v, jac)
+    leverage = solution.cofactor.leverage(number, jac)
     share = use[:, None]
     r = 1.0 - share * leverage
     variance = np.where(share > 0, r, 1.0 + leverage)
@@ -203,24 +203,24 @@ def _changes(problem, solution, number, share):
     one, columns = problem.observations[number], problem.model.groups[number].columns
     jac = np.empty((len(one), one.rows, columns.shape[1]))
     whole = one if one.use is None else one.using(np.ones(len(one)))
-    whole.fill(solution.state, np.empty(jac.shape[:2]), jac)
+    whole.fill(solution.unknowns, np.empty(jac.shape[:2]), jac)
     points = np.unique(problem.layout.points)
     points = points[points >= 0]
     own, products = one.ties == ("point",), problem.model.unknowns * max(problem.model.reduced, 1)
     if not own or jac.shape[0] * jac.shape[1] * products <= EXACTLY:
         found = np.zeros(jac.shape[0] * jac.shape[1])
-        for part, response in responses(solution, columns, jac):
+        for part, response in responses(solution.cofactor, columns, jac):
             found[part] = np.abs(response[points]).max(axis=0, initial=0.0)
         return share * found.reshape(jac.shape[:2]), None
-    nearest = np.abs(own_responses(solution, number, jac)).max(axis=2)
-    reduced = solution.leverage(number, jac)
-    sd = np.einsum("nii->ni", solution.block_cofactors)
-    if solution.datum is None:
-        reduced = reduced - own_leverage(solution, number, jac)
-        inverse = solution.inverse_roots
+    nearest = np.abs(own_responses(solution.cofactor, number, jac)).max(axis=2)
+    reduced = solution.cofactor.leverage(number, jac)
+    sd = np.einsum("nii->ni", solution.cofactor.block_cofactors)
+    if solution.cofactor.datum is None:
+        reduced = reduced - own_leverage(solution.cofactor, number, jac)
+        inverse = solution.cofactor.inverse_roots
         sd = sd - np.einsum("nji,nji->ni", inverse, inverse)
     rest = points[points < problem.model.reduced]
-    of_rest = solution.reduced_blocks(rest[:, None])[:, 0, 0]
+    of_rest = solution.cofactor.reduced_blocks(rest[:, None])[:, 0, 0]
     largest = np.sqrt(max(sd.max(initial=0.0), of_rest.max(initial=0.0)))
     return share * nearest, share * largest * np.sqrt(np.maximum(reduced, 0.0))
 
@@ -229,10 +229,10 @@ def _of_exact(problem, solution, delta0):
     """Residuals of the observations that hold exactly; several rows of one: the last one counts."""
     if not problem.exact:
         return
-    k, sd, changes = constraint_reactions(solution)
+    k, sd, changes = constraint_reactions(solution.cofactor)
     points = np.unique(problem.layout.points)
     moves = np.abs(changes[points[points >= 0]]).max(axis=0, initial=0.0)
-    levers = [lever(held.conditions, solution.state).ravel() for held in problem.exact]
+    levers = [lever(held.conditions, solution.unknowns).ravel() for held in problem.exact]
     levers = np.concatenate(levers)
     moves, k, sd = moves * levers, k * levers, sd * levers
     tested, first = sd > 0, 0
@@ -267,7 +267,7 @@ def _both(solution, group, v, jac, share, leverage, variance, single):
 
     single  (n,) the quantity where only one direction is controlled
     """
-    sum_of_both = solution.leverage(group, jac.sum(axis=1, keepdims=True))[:, 0]
+    sum_of_both = solution.cofactor.leverage(group, jac.sum(axis=1, keepdims=True))[:, 0]
     between = 0.5 * (sum_of_both - leverage.sum(axis=1))
     between = np.where(share[:, 0] > 0, -share[:, 0] * between, between)
     a, d = variance.T

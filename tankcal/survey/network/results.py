@@ -59,7 +59,7 @@ class Adjusted:
 
     survey    as it was handed in
     problem   the Problem that was solved
-    solution  tankcal.solver.Solution
+    solution  tankcal.adjust.Adjustment; its rows and chi2 with the scatter of repeated readings
 
     One rule for their scale: what goes on to the capacity table is the covariance a priori, from
     the declared sds, whatever sigma0 came out; the report shows sigma0 and the global test beside
@@ -76,35 +76,17 @@ class Adjusted:
     @property
     def sigma0(self):
         """A-posteriori root of the variance factor; nan when nothing is redundant."""
-        return float(np.sqrt(self.variance_factor))
-
-    @property
-    def variance_factor(self):
-        """v'Pv over the redundancy, both with the scatter of repeated readings; nan without."""
-        return self.chi2 / self.dof if self.dof > 0 else np.nan
+        return self.solution.sigma0
 
     @property
     def chi2(self):
         """v'Pv, with the scatter of repeated readings about their means."""
-        return self.solution.chi2 + self.within[0]
-
-    @cached_property
-    def within(self):
-        """Chi-square of repeated readings about their means, and its degrees of freedom."""
-        found = np.zeros(2)
-        sources = zip(
-            self.problem.sources, self.problem.observations, self.problem.rows_of, strict=True
-        )
-        for source, one, rows in sources:
-            if source in self.survey.repeated:
-                use = np.ones(len(one)) if one.use is None else np.asarray(one.use) > 0
-                found += [use @ part[rows] for part in self.survey.repeated[source]]
-        return float(found[0]), round(found[1])
+        return self.solution.chi2
 
     @property
     def dof(self):
         """Degrees of freedom, those of repeated readings among them."""
-        return self.solution.dof + self.within[1]
+        return self.solution.dof
 
     def scale(self, choice="a_priori"):
         """What all covariances are multiplied by: 1 for "a_priori", sigma0^2 for "a_posteriori".
@@ -122,7 +104,7 @@ class Adjusted:
                     "no a-posteriori variance factor: no observation is redundant",
                 )
             )
-        return float(self.variance_factor)
+        return float(self.solution.variance_factor)
 
     @property
     def xyz_m(self):
@@ -131,7 +113,7 @@ class Adjusted:
 
     @property
     def _state(self):
-        return self.solution.state
+        return self.solution.unknowns
 
     @property
     def _aside(self):
@@ -157,8 +139,8 @@ class Adjusted:
                 continue
             for row in np.flatnonzero(one.index == index):
                 group = problem.model.groups[number].columns[row : row + 1]
-                jac = solution.jacobians[number][row : row + 1]
-                _, response = next(responses(solution, group, jac))
+                jac = solution.cofactor.jacobians[number][row : row + 1]
+                _, response = next(responses(solution.cofactor, group, jac))
                 found += np.append(response[:, 0], 0.0)[columns]
         return found
 
@@ -170,10 +152,10 @@ class Adjusted:
     def _cofactors(self, columns):
         """Cofactors (k, k) of unknowns, 0 for those that are fixed."""
         if (columns >= 0).all():
-            return self.solution.cofactors(columns)
+            return self.solution.cofactor.among(columns)
         whole = np.zeros((len(columns), len(columns)))
         free = np.flatnonzero(columns >= 0)
-        whole[np.ix_(free, free)] = self.solution.cofactors(columns[free])
+        whole[np.ix_(free, free)] = self.solution.cofactor.among(columns[free])
         return whole
 
     @cached_property
@@ -182,7 +164,7 @@ class Adjusted:
         columns, nr = self.problem.layout.points, self.problem.model.reduced
         whole = np.zeros((len(columns), 3, 3))
         last = self.problem.eliminated
-        whole[last] = self.solution.block_cofactors[(columns[last, 0] - nr) // 3]
+        whole[last] = self.solution.cofactor.block_cofactors[(columns[last, 0] - nr) // 3]
         rest = np.flatnonzero(~last)
         if len(rest):
             whole[rest] = self._small_blocks(columns[rest])
@@ -191,7 +173,7 @@ class Adjusted:
     def _small_blocks(self, columns):
         """Covariances (n, k, k) of small groups (n, k) of reduced unknowns."""
         pair = columns[:, :, None], columns[:, None, :]
-        found = self.solution.reduced_blocks(columns)
+        found = self.solution.cofactor.reduced_blocks(columns)
         return np.where((pair[0] >= 0) & (pair[1] >= 0), found, 0.0)
 
     @property
@@ -244,7 +226,7 @@ class Adjusted:
         values = dict(zip(PARAMETERS, self._state.interior[places].tolist(), strict=True))
         columns = self.problem.layout.interior[places]
         names = tuple(name for name, column in zip(PARAMETERS, columns, strict=True) if column >= 0)
-        return values, names, self.solution.cofactors(columns[columns >= 0])
+        return values, names, self.solution.cofactor.among(columns[columns >= 0])
 
     @cached_property
     def residuals(self):

@@ -56,7 +56,7 @@ def alternatives(adjusted, source, row, held=None):
         if table.source == "known beforehand":
             continue
         columns = problem.model.groups[k].columns
-        b = solution.jacobians[k] @ np.take(aside.moves, columns, axis=0)
+        b = solution.cofactor.jacobians[k] @ np.take(aside.moves, columns, axis=0)
         for i, v, cofactors, b_i in _near(solution, problem, table, k, b, aside):
             tests = _tests(v, cofactors, -aside.inverse @ b_i.T, aside)
             if tests is not None:
@@ -106,13 +106,13 @@ def _aside(problem, solution, source, row):
             one = problem.observations[number].taken(mine).using(np.ones(1))
             columns = problem.model.groups[number].columns[mine]
             e, jac = np.empty((1, one.rows)), np.empty((1, one.rows, columns.shape[1]))
-            one.fill(solution.state, e, jac)
+            one.fill(solution.unknowns, e, jac)
             return _made(solution, e[0], jac[0], columns, one)
     for number, members in problem.blocks:
         mine = np.flatnonzero((members.source == source) & (members.row == row))
         if not len(mine):
             continue
-        v, jac = members.block.linearised(solution.state)
+        v, jac = members.block.linearised(solution.unknowns)
         part = acting(problem, solution, number, members, v)
         off, away, unexplained, share = expected(members, part, mine, v, jac)
         root = np.linalg.cholesky(unexplained)
@@ -123,7 +123,7 @@ def _aside(problem, solution, source, row):
 
 
 def _made(solution, e, jac, columns, *more):
-    moves = np.hstack([part for _, part in responses(solution, columns, jac[None])])
+    moves = np.hstack([part for _, part in responses(solution.cofactor, columns, jac[None])])
     moves = np.vstack([moves, np.zeros((1, moves.shape[1]))])
     inverse = np.linalg.inv(np.eye(len(e)) + jac @ moves[columns[0]])
     return _Aside(e, jac, columns[0], moves, inverse, *more)
@@ -133,7 +133,7 @@ def _correlated(problem, solution, number, members, aside):
     """(T of j, whether i agrees without it, source, row) of observations j of a block."""
     if number is None:
         return
-    v, _ = members.block.linearised(solution.state)
+    v, _ = members.block.linearised(solution.unknowns)
     part = acting(problem, solution, number, members, v)
     b = part.a @ aside.moves[part.columns]
     t = part.t - b @ aside.back
@@ -164,8 +164,9 @@ def _near(solution, problem, table, number, b, aside):
     near = near[np.argsort(-square[near], kind="stable")][:LOOKED_AT]
     if not len(near):
         return
-    columns, jac = problem.model.groups[number].columns[near], solution.jacobians[number][near]
-    for j, own in zip(near, cofactors_within(solution, columns, jac), strict=True):
+    columns = problem.model.groups[number].columns[near]
+    jac = solution.cofactor.jacobians[number][near]
+    for j, own in zip(near, cofactors_within(solution.cofactor, columns, jac), strict=True):
         yield j, v[j], np.eye(len(own)) - own + b[j] @ inverse @ b[j].T, b[j]
 
 

@@ -125,7 +125,7 @@ def _limit(adjusted, critical, test):
 
 def started(survey, adjusted):
     """The survey with the adjusted values as its start values, where there are any."""
-    state, centre = adjusted.solution.state, adjusted.problem.centre_m
+    state, centre = adjusted.solution.unknowns, adjusted.problem.centre_m
     found = np.isfinite(adjusted.xyz_m)
     changes = {"xyz_m": np.where(found, centre + state.xyz_m, survey.xyz_m)}
     changes["sets"] = state.orientation_rad

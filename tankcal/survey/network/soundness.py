@@ -19,8 +19,8 @@ def refuse_worthless_cameras(survey, problem, solution):
         return
     unit = np.zeros((problem.model.reduced, len(columns)))
     unit[columns, np.arange(len(columns))] = 1.0
-    sd = np.sqrt(np.sum(solution.nearly.whitened(unit) ** 2, axis=0))
-    value = solution.state.interior[problem.interior_of[photo, 0]]
+    sd = np.sqrt(np.sum(solution.cofactor.factor.whitened(unit) ** 2, axis=0))
+    value = solution.unknowns.interior[problem.interior_of[photo, 0]]
     for i in np.flatnonzero(~(sd < WORTHLESS * np.abs(value)))[:1]:
         camera = survey.cameras[survey.photos.camera[photo[i]]].name
         raise SolutionError(

@@ -1,13 +1,15 @@
-"""What the solver found, with the cofactors of anything that is asked for."""
+"""The factored normal equations, and the cofactors of anything that is asked for."""
 
 from functools import cached_property
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse
 
-from tankcal.solver.effects import back_substitute_covariance, back_substitution, times
-from tankcal.solver.elimination import block_cofactors, leverage
+from tankcal.solver.elimination import block_cofactors, block_rows, leverage, roots
 from tankcal.solver.threads import threads_for
+
+DENSE = 4e6  # numbers
 
 
 class Factor:
@@ -55,61 +57,16 @@ class Factor:
         return scale * (inner if self.tangent is None else self.tangent.from_null_space(inner))
 
 
-class Solution:
-    """A minimum of a Model.
+class Cofactors:
+    """Cofactors of the unknowns of a Model, at its minimum, and of anything that hangs on them.
 
-    state        adjusted, as the model writes it
-    cost         half the sum of squares of the rows
-    misclosures  list of (n, m) whitened, computed minus observed, one array a group
-    iterations   until the last step was below the tolerance
-    rows         number of rows that weigh anything
-    unknowns     number of unknowns that are estimated, less those that exact conditions take
-    nearly       Factor before the last step
-    plan, factor, conditions  of the solver, for tankcal.solver.effects
-    rank_defect  number of directions that only the datum fixes
+    model, plan, factor, conditions   of the solver; the Factor is that at the minimum
+    misclosures, jacobians            (n, m) and (n, m, K) whitened, one array a group
     """
 
-    def __init__(self, work, state, cost, iterations, factor, nearly):
-        self.model, self.state, self.cost, self.iterations = work.model, state, cost, iterations
-        self.misclosures = work.w
-        self.plan, self._work, self._last = work.plan, work, factor
-        self.conditions = work.conditions
-        self.nearly = nearly
-        self.rank_defect = 0
-        if self.model.null_space is not None:
-            self.rank_defect = self.model.null_space(state).shape[1]
-        self.unknowns = self.model.unknowns
-        if self.conditions:
-            self.unknowns -= self.factor.tangent.rank
-        self.rows = int(sum(np.count_nonzero(j.any(axis=2)) for j in work.jac))
-
-    @cached_property
-    def factor(self):
-        """Normal equations at the solution itself, not before the last step."""
-        if self._last is not None:
-            return self._last
-        self._work.evaluate(self.state)
-        return self._work.factor(self.state, 0.0)
-
-    @property
-    def jacobians(self):
-        """List of (n, m, K) whitened derivatives at the solution, one array a group."""
-        return self.factor and self._work.jac
-
-    @property
-    def dof(self):
-        """Rows minus unknowns, plus what the datum takes up."""
-        return self.rows - self.unknowns + self.rank_defect
-
-    @property
-    def chi2(self):
-        """Sum of squares of the rows, v'Pv."""
-        return 2.0 * self.cost
-
-    @property
-    def variance_factor(self):
-        """A-posteriori variance factor chi2 / dof; nan when nothing is redundant."""
-        return self.chi2 / self.dof if self.dof > 0 else np.nan
+    def __init__(self, work, factor):
+        self.model, self.plan, self.conditions = work.model, work.plan, work.conditions
+        self.factor, self.misclosures, self.jacobians = factor, tuple(work.w), tuple(work.jac)
 
     @cached_property
     def reduced_cofactors(self):
@@ -138,7 +95,7 @@ class Solution:
         own = self.reduced_cofactors[columns[:, :, None], columns[:, None, :]]
         return own if self.datum is None else self._in_datum(own, columns, columns)
 
-    def cofactors(self, columns):
+    def among(self, columns):
         """Full cofactor matrix (k, k) of any unknowns, in the order given; columns (k,)."""
         with threads_for(max(self.plan.reduced, len(columns))):
             return self._cofactors(np.asarray(columns))
@@ -179,16 +136,36 @@ class Solution:
 
     def times(self, matrix):
         """Cofactor matrix times a matrix (unknowns, d), in the datum of the factor."""
-        return times(self, matrix)
+        nr, plan, normals = self.plan.reduced, self.plan, self.factor.normals
+        wide, root = block_rows(plan, normals.wide), roots(normals)
+        one_by_one, in_all = (plan.blocks, 3, matrix.shape[1]), (3 * plan.blocks, matrix.shape[1])
+        own = np.linalg.solve(root, matrix[nr:].reshape(one_by_one)).reshape(in_all)
+        reduced = self.factor.solved(matrix[:nr] - wide.T @ own)
+        own = (own - wide @ reduced).reshape(one_by_one)
+        blocks = np.linalg.solve(root.transpose(0, 2, 1), own)
+        return np.concatenate([reduced, blocks.reshape(in_all)])
 
     def back_substitute_covariance(self, reduced):
         """Changes (unknowns, d) of all unknowns, when the reduced ones change by (nr, d)."""
-        return back_substitute_covariance(self, reduced)
+        return np.concatenate([reduced, self.back_substitution @ reduced])
 
     @cached_property
     def back_substitution(self):
-        """-V^-1 W' (3 nb, nr), how the blocks follow the reduced unknowns; dense or sparse."""
-        return back_substitution(self)
+        """-V^-1 W' (3 nb, nr): how the blocks follow the reduced unknowns; sparse if large."""
+        plan, normals = self.plan, self.factor.normals
+        if not plan.blocks:
+            return np.zeros((0, plan.reduced))
+        found = -(self.block_diagonal @ block_rows(plan, normals.wide))
+        return found.toarray() if 3 * plan.blocks * plan.reduced < DENSE else found.tocsr()
+
+    @property
+    def block_diagonal(self):
+        """L^-T of all blocks as one sparse matrix (3 nb, 3 nb)."""
+        blocks = self.plan.blocks
+        return scipy.sparse.bsr_array(
+            (self.inverse_roots.transpose(0, 2, 1), np.arange(blocks), np.arange(blocks + 1)),
+            shape=(3 * blocks, 3 * blocks),
+        )
 
     def _through_reduced(self, columns):
         """How each unknown follows the reduced ones: (nr, k), d unknown / d reduced."""
