@@ -12,6 +12,7 @@ covariance. Source: Mikhail & Ackermann 1976, Observations and Least Squares, ch
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import count
 
 import numpy as np
 import scipy.linalg
@@ -20,6 +21,7 @@ import scipy.sparse
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
+CRITICAL = 3.29  # of a test statistic, two-sided normal: 0.1 % of sound ones are above it
 SMALLEST_PIVOT = 1e-12  # of normal equations with ones in the diagonal: below it is rounding
 
 
@@ -136,6 +138,82 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
             iterations=max_iterations,
         )
     )
+
+
+@dataclass(frozen=True)
+class Snooped:
+    """What data snooping left of k candidates.
+
+    adjustment  the last one                statistic  (k,) last test statistic; nan: never tested
+    needed      (k,) True: disagrees, and was kept for something would not be determined without it
+    rounds      readjustments that were made or tried
+    """
+
+    adjustment: object
+    statistic: np.ndarray
+    needed: np.ndarray
+    rounds: int
+
+
+def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=False, rounds=None):
+    """Data snooping: set aside what disagrees, the worst first; take back what agrees after all.
+
+    tests     tests(adjustment) -> used (k,) bool, |test statistic| (k,) of the candidates, nan
+              where one is not tested, and the critical value
+    readjust  readjust(adjustment, goes, comes) -> the adjustment when these (k,) masks are followed
+    at_once   candidates whose statistic is above this share of the largest go together
+    returns   times that a candidate may come back: all that agree the first time, later one by one
+    choose    choose(adjustment, goes, statistic) -> (k,) bool, those of `goes` that do; None: all
+    keep      True: where a readjustment fails without a candidate, that one is kept from then on
+    rounds    at most; None: no limit
+
+    Returns a Snooped. Raises SolutionError when a readjustment does (unless `keep`), or when the
+    search does not come to rest. Source: Baarda 1968, A testing procedure for use in geodetic
+    networks.
+    """
+    few = False
+    statistic = back = needed = None
+    for tried in range(rounds) if rounds else count():
+        used, now, critical = tests(adjustment)
+        if statistic is None:
+            statistic = np.full(len(now), np.nan)
+            back, needed = np.zeros(len(now), dtype=int), np.zeros(len(now), dtype=bool)
+        statistic = np.where(np.isnan(now), statistic, now)
+        off = np.where(used & ~needed & ~np.isnan(now), now, 0.0)
+        worst = off.max(initial=0.0)
+        goes = (off > critical) & (off >= (1.0 if few else at_once) * worst)
+        comes = np.zeros(len(now), dtype=bool)
+        if goes.any():
+            goes = goes if choose is None else choose(adjustment, goes, off)
+        else:
+            comes = _coming_back(~used & (now < critical), now, back, returns)
+            back[comes] += 1
+        if not (goes.any() or comes.any()):
+            return Snooped(adjustment, statistic, needed, tried)
+        try:
+            adjustment, few = readjust(adjustment, goes, comes), False
+        except SolutionError:
+            if not keep:
+                raise
+            if few or np.count_nonzero(goes) == 1:
+                needed |= goes
+            few = True
+    raise SolutionError(
+        message(
+            "snooping_unsteady",
+            "data snooping did not come to rest in {rounds} rounds",
+            rounds=rounds,
+        )
+    )
+
+
+def _coming_back(agrees, statistic, back, returns):
+    """Mask of what comes back: all that agrees the first time, later the one that agrees best."""
+    first = agrees & (back == 0)
+    again = np.where(agrees & (back < returns), statistic, np.inf)
+    if first.any() or not np.isfinite(again).any():
+        return first
+    return again == again.min()
 
 
 def determined(pivots, rows, of_normals=False):

@@ -11,7 +11,7 @@ import numpy as np
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
-from tankcal.geometry.snooping import LEAST_NOISE_M, from_axis, shell_problem, snoop
+from tankcal.geometry.snooping import LEAST_NOISE_M, find_form, from_axis, shell_problem
 from tankcal.messages import message
 
 WIDE_BAND, WALL_BAND = 0.03, 0.01  # of the nominal radius: start, and largest believed deviation
@@ -92,11 +92,11 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
     believed = np.ones(len(xyz_m)) if sd_m is None else np.maximum(sd_m, LEAST_NOISE_M)
     relative = believed / np.median(believed)
     zeta = _within_course(xyz_m[:, 2], course, np.asarray(joints_m, dtype=float))
-    found = snoop(local, course, zeta, wall, axis, relative, WIDEST_SLOPE, snooping)
+    found = find_form(local, course, zeta, wall, axis, relative, WIDEST_SLOPE, snooping)
     tilt_known = np.sqrt(np.diag(found.slope_cofactor).max()) < VAGUE_TILT
     if not tilt_known:
         upright = np.array([*axis[:2], 0.0, 0.0])
-        found = snoop(local, course, zeta, wall, upright, relative, 1e-9, snooping)
+        found = find_form(local, course, zeta, wall, upright, relative, 1e-9, snooping)
     in_band, wall, axis = wall, found.wall, found.axis
     reason[(reason == "") & ~wall] = "snooping"
     if wall.sum() < LEAST_PART * candidates.sum():

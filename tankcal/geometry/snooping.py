@@ -10,10 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.adjust import Adjustment, adjust
+from tankcal.adjust import CRITICAL, Adjustment, adjust, snoop
 from tankcal.geometry.form import harmonics, mode_variances
 
-CRITICAL_W = 3.29  # two-sided, 0.1 % of sound points are rejected (Baarda 1968)
 MODES = 24  # highest mode of the form that the snooping allows for
 TAPER_M, RING_M = 0.010, 0.005  # prior sd of a radius: at the ends of a course; of a ring beside it
 FEWEST_OF_RING, WIDEST_GAP = 8, np.pi / 2  # points, and rad between two: they go round
@@ -35,8 +34,8 @@ class Wall:
     noise_dof: float
 
 
-def snoop(local, course, zeta, candidates, axis, relative, slope_sd, snooping):
-    """Reject the worst points about the smooth form until all are sound; re-admit whom it spares.
+def find_form(local, course, zeta, candidates, axis, relative, slope_sd, snooping):
+    """The `Wall`: points about the smooth form of a shell, without those that deny it.
 
     A pass rejects the points within a tenth of the worst and fits anew. When none is left to
     reject, rejected points that agree with the fit after all come back, each once.
@@ -44,39 +43,41 @@ def snoop(local, course, zeta, candidates, axis, relative, slope_sd, snooping):
     index = np.flatnonzero(candidates)
     xyz, of, relative = local[index], course[index], relative[index]
     uneven = unevenness(xyz, of, zeta[index], axis)
-    accepted, returned = np.ones(len(index), dtype=bool), np.zeros(len(index), dtype=bool)
-    state = None
-    while True:
-        state = _fit_form(xyz, of, uneven, axis, relative, slope_sd, accepted, state)
-        size = np.abs(state.w)
-        worst = accepted & (size > CRITICAL_W)
-        sound = ~accepted & ~returned & (size <= CRITICAL_W)
-        if snooping and worst.any():
-            accepted &= ~(worst & (size >= 0.9 * size[worst].max()))
-        elif snooping and sound.any():
-            accepted, returned = accepted | sound, returned | sound
-        else:
-            return _wall_of(state, index, accepted, len(local))
+
+    def refit(before, goes, comes):
+        accepted = before.accepted & ~goes | comes
+        return _fit_form(xyz, of, uneven, axis, relative, slope_sd, accepted, before)
+
+    everything = np.ones(len(index), dtype=bool)
+    fit = _fit_form(xyz, of, uneven, axis, relative, slope_sd, everything, None)
+    if snooping:
+        fit = snoop(fit, _FormFit.tests, refit, at_once=0.9, returns=1).adjustment
+    return _wall_of(fit, index, len(local))
 
 
-def _wall_of(state, index, accepted, count):
+def _wall_of(form, index, count):
     """The `Wall` of all `count` points from the fit of the candidates `index`."""
     wall, w, residual = np.zeros(count, dtype=bool), np.full(count, np.nan), np.full(count, np.nan)
-    wall[index], w[index], residual[index] = accepted, state.w, state.residual
-    fit = state.fit
-    dof = float(np.sum(fit.redundancy[: len(index)][accepted]))
-    return Wall(wall, fit.unknowns[:4], fit.cofactor[2:4, 2:4], w, residual, state.noise, dof)
+    wall[index], w[index], residual[index] = form.accepted, form.w, form.residual
+    fit = form.fit
+    dof = float(np.sum(fit.redundancy[: len(index)][form.accepted]))
+    return Wall(wall, fit.unknowns[:4], fit.cofactor[2:4, 2:4], w, residual, form.noise, dof)
 
 
 @dataclass(frozen=True)
 class _FormFit:
-    """A fit of the form: its components, and residual and test quantity of every candidate."""
+    """A fit of the form: its components, and residual and test statistic of every candidate."""
 
     fit: Adjustment
     noise: float
     form: float
+    accepted: np.ndarray
     residual: np.ndarray
     w: np.ndarray
+
+    def tests(self):
+        """What `snoop` asks for."""
+        return self.accepted, np.abs(self.w), CRITICAL
 
 
 def _fit_form(xyz, course, uneven, axis, relative, slope_sd, accepted, before):
@@ -101,7 +102,8 @@ def _fit_form(xyz, course, uneven, axis, relative, slope_sd, accepted, before):
         form = max(form * _component(fit, slice(n, n + 4 * (MODES - 1))), 0.1 * noise)
         if np.allclose(was, (noise, form), rtol=0.05):
             break
-    return _FormFit(fit, noise, form, residual, _left_out(fit, residual, sd, noise * relative))
+    w = _left_out(fit, residual, sd, noise * relative)
+    return _FormFit(fit, noise, form, accepted, residual, w)
 
 
 def _left_out(fit, residual, sd, noise):

@@ -6,6 +6,7 @@ from typing import Annotated
 import numpy as np
 from scipy.special import gammaincinv
 
+from tankcal.adjust import CRITICAL
 from tankcal.record.adjusted import (
     AdjustedCamera,
     AdjustedInstrument,
@@ -31,7 +32,6 @@ from tankcal.record.images import (
 from tankcal.record.schema import Columns, filled_from, key
 from tankcal.record.texts import Text, text_of
 from tankcal.survey.network.reliability import UNCONTROLLED, noncentrality, tau_limit
-from tankcal.survey.network.snooping import CRITICAL
 from tankcal.survey.results import DatumReport, GroupOfReadings, Reading
 
 CONFIDENCE = 0.95  # of the global test and of the intervals of variance factors

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.geometry.snooping import CRITICAL_W
+from tankcal.adjust import CRITICAL
 from tankcal.pipeline.chain import PARTS
 from tankcal.record.schema import Finite, filled_from, key
 from tankcal.record.statements import intervals_of
-from tankcal.survey.network.snooping import CRITICAL
 from tankcal.tank.dips import ProportionalParts, dip_label
 
 LEAST_PART_M3 = 1e-4  # last place of a printed part: an error below it is not told apart
@@ -201,7 +200,7 @@ def _shell_choices(job, result):
         "tilt": _tilt_choice(job, wall.shell),
         "course_heights": "along_axis",
         "roof": _fitting_choice(job.switches.roof, roof, roof),
-        "snooping": CRITICAL_W if job.snooping else "off",
+        "snooping": CRITICAL if job.snooping else "off",
         "form": "estimated",
         "covariance_sd_mm": 1000 * np.sqrt(np.median(wall.covariance_m2.diagonal())),
     }

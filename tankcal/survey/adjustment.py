@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from tankcal.adjust import CRITICAL
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.survey.causes import causes_of
@@ -20,7 +21,6 @@ from tankcal.survey.diagnosis.misread_files import likely_mistake, photos_that_d
 from tankcal.survey.diagnosis.outlier_attribution import SOME, one_sided, set_aside, undecided
 from tankcal.survey.diagnosis.scales import check_readings_off, scale_of_control
 from tankcal.survey.network.reactions import HELD, reactions
-from tankcal.survey.network.snooping import CRITICAL
 from tankcal.survey.network.soundness import hardly_determined
 from tankcal.survey.network_of_survey import gather, held_trace, named_in
 from tankcal.survey.results import Adjustment

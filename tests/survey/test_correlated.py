@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.special import chdtri
 
+from tankcal.adjust import CRITICAL
 from tankcal.survey.network import Survey, adjust
 from tankcal.survey.network.reliability import noncentrality
 from tankcal.survey.network.separability import alternatives
-from tankcal.survey.network.snooping import CRITICAL
 from tankcal.survey.observations import (
     Block,
     ControlCoordinates,

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 from surveyed import by_photographs
 
+from tankcal.adjust import CRITICAL
 from tankcal.survey import adjust_survey
 from tankcal.survey.network import adjust, separability
 from tankcal.survey.network.separability import alternatives
-from tankcal.survey.network.snooping import CRITICAL, with_use
+from tankcal.survey.network.snooping import with_use
 
 
 def quantity(survey, uses, row):

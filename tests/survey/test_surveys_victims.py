@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from surveyed import by_instruments, by_photographs, changed, known, table, told
 
+from tankcal.adjust import CRITICAL
 from tankcal.cli import main
 from tankcal.errors import SolutionError
 from tankcal.record.adjustment import adjustment_of
@@ -16,7 +17,7 @@ from tankcal.survey.measurements import Measurements
 from tankcal.survey.network import adjust
 from tankcal.survey.network.reactions import HELD, reactions
 from tankcal.survey.network.separability import alternatives
-from tankcal.survey.network.snooping import CRITICAL, with_use
+from tankcal.survey.network.snooping import with_use
 
 TRUTH = by_photographs(photos=6)[1].xyz_m, by_instruments()[1].xyz_m
 

@@ -73,9 +73,9 @@ def test_printed_digits_with_the_blunders_in():
     exact = adjust(adjustment.adjusted.survey, tolerance=1e-8)
     sharp = replace(
         adjustment,
-        xyz_m=exact.xyz_m,
-        covariance_m2=exact.scale("a_posteriori") * exact.point_covariances_m2,
-        names=exact.survey.points,
+        adjusted=exact,
+        there=np.arange(len(exact.survey.points)),
+        cov_scale=exact.scale("a_posteriori"),
     )
     coordinate, sd = differences(sharp, PUBLISHED[BLUNDERS])
     assert coordinate < COORDINATE_M

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.messages import message
-from tankcal.survey.network.snooping import CRITICAL
 from tankcal.survey.start.photographs import sights_of
 from tankcal.survey.start.resection import resected
 

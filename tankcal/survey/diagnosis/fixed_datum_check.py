@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ndtri
 
+from tankcal.adjust import CRITICAL
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.survey.diagnosis.diagnoses import swapped_points
@@ -16,7 +17,7 @@ from tankcal.survey.diagnosis.outlier_attribution import LEVEL, LISTED, set_asid
 from tankcal.survey.measurements import Instrument
 from tankcal.survey.network import adjust, snoop
 from tankcal.survey.network.reliability import noncentrality
-from tankcal.survey.network.snooping import CRITICAL, started
+from tankcal.survey.network.snooping import started
 from tankcal.survey.observations import ControlCoordinates
 
 FEWER = 0.5  # share of the values set aside that may be left by what explains them

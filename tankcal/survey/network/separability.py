@@ -28,11 +28,11 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import chdtri
 
+from tankcal.adjust import CRITICAL
 from tankcal.solver.effects import cofactors_within, responses
 from tankcal.survey.network.blocks import acting, expected, observations_of
 from tankcal.survey.network.reactions import HELD
 from tankcal.survey.network.reliability import UNCONTROLLED
-from tankcal.survey.network.snooping import CRITICAL
 
 # limits of T, by the number of values tested
 LIMITS = (0.0, CRITICAL**2, *(float(chdtri(count, 0.001)) for count in range(2, 7)))

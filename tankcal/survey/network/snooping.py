@@ -10,16 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtr
 
+from tankcal.adjust import CRITICAL
+from tankcal.adjust import snoop as search
 from tankcal.errors import SolutionError
-from tankcal.messages import message
 from tankcal.survey.network.adjustment import adjust
 from tankcal.survey.network.reliability import tau_limit
 
-CRITICAL = 3.29  # two-sided normal, 0.1 %
 HUBER_ROUNDS, ROUNDS = 5, 25
 HUBER, DANISH = 2.0, 3.0
 AT_ONCE = 0.6  # those whose test quantity is above this share of the largest go together
-RETURNS = 3  # times that one observation may come back
+RETURNS = 3  # times that one observation may come back, else the search could circle
 
 
 @dataclass(frozen=True)
@@ -73,35 +73,24 @@ def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, *
             adjusted, survey = adjust(thinner, **options), thinner
         except SolutionError:
             rounds += 1  # too much went at once: one by one then
-    seen, back, needed, few = {}, {}, {}, False
-    for _ in range(max_rounds):
-        before = _shares(survey)
-        uses, changed = _verdict(adjusted, _limit(adjusted, critical, test), back, needed, few)
-        for table in _tables(adjusted):
-            seen.update(_quantities(table))
-        if not changed:
-            kept = _listed(survey, seen, needed)
-            return Cleaned(adjusted, survey, _removed(survey, seen), rounds, suspects, kept)
-        rounds += 1
-        try:
-            thinner = with_use(started(survey, adjusted), uses)
-            adjusted, survey, few = adjust(thinner, **options), thinner, False
-        except SolutionError:
-            goes = {
-                source: np.flatnonzero((was > 0) & (uses[source] == 0))
-                for source, was in before.items()
-            }
-            if few or sum(map(len, goes.values())) == 1:
-                for source, rows in goes.items():
-                    needed.setdefault(source, set()).update(rows.tolist())
-            few = True
-    raise SolutionError(
-        message(
-            "snooping_unsteady",
-            "data snooping did not come to rest in {rounds} rounds",
-            rounds=max_rounds,
-        )
-    )
+    candidates = _Candidates(survey)
+
+    def tests(now):
+        return candidates.tests(now, _limit(now, critical, test))
+
+    def readjust(now, goes, comes):
+        changed = candidates.shares(now.survey, goes, comes)
+        return adjust(with_use(started(now.survey, now), changed), **options)
+
+    found = search(
+        adjusted, tests, readjust, at_once=AT_ONCE, returns=RETURNS,
+        choose=candidates.one_of_each_point, keep=True, rounds=max_rounds,
+    )  # fmt: skip
+    survey = found.adjustment.survey
+    gone = np.concatenate([np.zeros(0, dtype=bool), *(s == 0 for s in _shares(survey).values())])
+    removed = candidates.listed(gone, found.statistic)
+    needed = candidates.listed(found.needed, found.statistic)
+    return Cleaned(found.adjustment, survey, removed, rounds + found.rounds, suspects, needed)
 
 
 def _suspects(adjusted, limit):
@@ -197,103 +186,68 @@ def _robust(survey, adjusted, critical, options):
     return with_use(survey, shares), turn + 2
 
 
-def _verdict(adjusted, critical, back, needed, few):
-    """The shares that the residuals ask for, and whether they differ from those there are.
+class _Candidates:
+    """The observations of a Survey in one row, those of one source after those of another."""
 
-    back    {source: {row: times}} that came back before: `RETURNS` times, else the search could
-            circle
-    needed  {source: rows} that stay whatever they say
-    few     True: only what is furthest off goes
-    """
-    shares, tables = _shares(adjusted.survey), _tables(adjusted)
-    may = [
-        table.used & ~np.isin(table.rows, list(needed.get(table.source, ()))) for table in tables
-    ]
-    off = [
-        np.where(mine, table.test_statistic, 0.0) for table, mine in zip(tables, may, strict=True)
-    ]
-    worst = max((float(one.max(initial=0)) for one in off), default=0.0)
-    least = max(critical, (1.0 if few else AT_ONCE) * worst)
-    goes = [(one > critical) & (one >= least) for one in off]
-    goes = _one_of_each_point(adjusted, tables, goes)
-    comes = _coming_back(tables, critical, back) if worst <= critical else goes
-    for table, out, into in zip(tables, goes, comes, strict=True):
-        shares[table.source][table.rows[into]] = 1.0
-        shares[table.source][table.rows[out]] = 0.0
-    return shares, any(one.any() for one in (*goes, *comes))
+    def __init__(self, survey):
+        self.kinds = {number: one.kind for number, one in enumerate(survey.observations)}
+        self.count, self.slices = 0, {}
+        for source, share in _shares(survey).items():
+            self.slices[source] = slice(self.count, self.count + len(share))
+            self.count += len(share)
 
+    def places(self, table):
+        """(n,) places of the rows of Residuals."""
+        return self.slices[table.source].start + table.rows
 
-def _one_of_each_point(adjusted, tables, goes):
-    """Masks of what goes, at most one of each point: the others may only follow its blunder."""
-    survey = adjusted.survey
-    n, tied = len(survey.points), []
-    for table in tables:
-        images = table.source == "image points"
-        of = survey.image_points if images else survey.observations[table.source]
-        ties = ("point",) if images else of.ties
-        tied.append([np.asarray(getattr(of, name))[table.rows] for name in ties])
-    counts = sum((np.bincount(one, minlength=n) for owners in tied for one in owners), np.zeros(n))
-    counts[(adjusted.problem.layout.points < 0).all(axis=1)] = np.inf  # fixed points follow nothing
-    off = np.concatenate(
-        [np.where(o, t.test_statistic, 0.0) for t, o in zip(tables, goes, strict=True)]
-    )
-    alone = n + np.arange(len(off))  # what belongs to no point
-    parts, first = [], 0
-    for table, owners in zip(tables, tied, strict=True):
-        mine = alone[first : first + len(table.rows)]
-        first += len(table.rows)
-        if owners:
-            owners = np.array(owners)
-            mine = np.take_along_axis(owners, np.argmin(counts[owners], axis=0)[None], 0)[0]
-        parts.append(mine)
-    owner = np.concatenate(parts)
-    order = np.lexsort((-off, owner))
-    largest = np.zeros(len(off), dtype=bool)
-    largest[order[np.append(True, np.diff(owner[order]) > 0)]] = True
-    cuts = np.cumsum([len(table.rows) for table in tables])[:-1]
-    return [out & one for out, one in zip(goes, np.split(largest, cuts), strict=True)]
+    def tests(self, adjusted, critical):
+        """Whether each is used, its test statistic (nan: it does not occur), and the limit."""
+        used, statistic = np.zeros(self.count, dtype=bool), np.full(self.count, np.nan)
+        for table in _tables(adjusted):
+            mine = self.places(table)
+            used[mine], statistic[mine] = table.used, table.test_statistic
+        return used, statistic, critical
 
+    def shares(self, survey, goes, comes):
+        """{source: (n,)} the shares of a survey when some go and others come back."""
+        shares = _shares(survey)
+        for source, share in shares.items():
+            share[comes[self.slices[source]]] = 1.0
+            share[goes[self.slices[source]]] = 0.0
+        return shares
 
-def _coming_back(tables, critical, back):
-    """Masks of what agrees after all: all of it the first time, later one by one."""
-    times = [
-        np.array([back.get(table.source, {}).get(row, 0) for row in table.rows.tolist()], dtype=int)
-        for table in tables
-    ]
-    agrees = [~table.used & (table.test_statistic < critical) for table in tables]
-    comes = [one & (n == 0) for one, n in zip(agrees, times, strict=True)]
-    if not any(one.any() for one in comes):
-        again = [
-            np.where(one & (n < RETURNS), table.test_statistic, np.inf)
-            for table, one, n in zip(tables, agrees, times, strict=True)
+    def one_of_each_point(self, adjusted, goes, off):
+        """Mask of what goes, at most one of each point: the others may only follow its blunder."""
+        survey = adjusted.survey
+        n, tied = len(survey.points), []
+        for table in _tables(adjusted):
+            images = table.source == "image points"
+            of = survey.image_points if images else survey.observations[table.source]
+            ties = ("point",) if images else of.ties
+            owners = [np.asarray(getattr(of, name))[table.rows] for name in ties]
+            tied.append((self.places(table), owners))
+        counts = sum(
+            (np.bincount(one, minlength=n) for _, owners in tied for one in owners), np.zeros(n)
+        )
+        fixed = (adjusted.problem.layout.points < 0).all(axis=1)
+        counts[fixed] = np.inf  # fixed points follow nothing
+        owner = n + np.arange(self.count)  # what belongs to no point
+        for mine, owners in tied:
+            if owners:
+                owners = np.array(owners)
+                least = np.argmin(counts[owners], axis=0)[None]
+                owner[mine] = np.take_along_axis(owners, least, 0)[0]
+        order = np.lexsort((-np.where(goes, off, 0.0), owner))
+        largest = np.zeros(self.count, dtype=bool)
+        largest[order[np.append(True, np.diff(owner[order]) > 0)]] = True
+        return goes & largest
+
+    def listed(self, which, statistic):
+        """Removed for each of `which`, the worst first."""
+        w = np.where(np.isnan(statistic), 0.0, statistic)
+        found = [
+            Removed(self.kinds.get(source, "image coordinate"), source, int(i), float(w[mine][i]))
+            for source, mine in self.slices.items()
+            for i in np.flatnonzero(which[mine])
         ]
-        nearest = min((float(one.min(initial=np.inf)) for one in again), default=np.inf)
-        comes = [(one == nearest) & np.isfinite(one) for one in again]
-    for table, one in zip(tables, comes, strict=True):
-        mine = back.setdefault(table.source, {})
-        for row in table.rows[one].tolist():
-            mine[row] = mine.get(row, 0) + 1
-    return comes
-
-
-def _quantities(table):
-    """{(source, row): test quantity} of a table of residuals."""
-    rows, values = table.rows.tolist(), table.test_statistic.tolist()
-    return {(table.source, row): value for row, value in zip(rows, values, strict=True)}
-
-
-def _removed(survey, seen):
-    """Every observation that is set aside, with the last test quantity it had, the worst first."""
-    gone = {source: np.flatnonzero(share == 0) for source, share in _shares(survey).items()}
-    return _listed(survey, seen, {source: rows.tolist() for source, rows in gone.items()})
-
-
-def _listed(survey, seen, rows_of):
-    """Removed for each of {source: rows}, the worst first."""
-    kinds = {number: one.kind for number, one in enumerate(survey.observations)}
-    found = [
-        Removed(kinds.get(source, "image coordinate"), source, row, seen.get((source, row), 0))
-        for source, rows in rows_of.items()
-        for row in rows
-    ]
-    return tuple(sorted(found, key=lambda one: -one.w))
+        return tuple(sorted(found, key=lambda one: -one.w))
