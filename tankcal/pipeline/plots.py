@@ -8,6 +8,7 @@ import io
 import logging
 import textwrap
 from dataclasses import dataclass
+from functools import wraps
 from math import ceil, floor, log10
 
 import matplotlib
@@ -41,6 +42,7 @@ WORDS = {
     "section_height": "height {height}",
 }
 INK, RED, PALE = "#1f4e79", "#b03a2e", "#9db8d2"
+GREY, FAINT = "#445566", "#9aa5b1"
 LEAST_SHARE = 1e-3  # of the variance: less is no bar
 WIDTH = 6.5
 LETTERS_OF_A_BAR = 46  # in a line of its name
@@ -48,6 +50,17 @@ MANY = 500  # points in a panel: from here on their picture is smaller than thei
 SHELL_SHARE = 0.03  # of its cut: so far the cut of a shell changes with height
 BOTTOM_SHARE = 0.8  # of the cut of the shell: below it the curve of a bottom would hide the shell's
 _TURN = (-4, 364)  # degrees: points at north are not cut off
+
+
+def styled(draw, **more):
+    """A function that draws, in the one style of notebooks and papers."""
+
+    @wraps(draw)
+    def drawing(*arguments, **options):
+        with matplotlib.rc_context(STYLE | more):
+            return draw(*arguments, **options)
+
+    return drawing
 
 
 class Drawing(Figure):
@@ -106,25 +119,23 @@ def residual_panels(rings, words=english, most=8):
     ]
 
 
+@styled
 def _residual_panels(rings, limit_mm, words):
-    with matplotlib.rc_context(STYLE):
-        figure = Drawing(figsize=(WIDTH, 0.55 * len(rings) + 0.55))
-        axes = figure.subplots(len(rings), 1, sharex=True, squeeze=False)[:, 0]
-        for ax, ring in zip(axes, rings, strict=True):
-            residual_mm = 1e3 * np.asarray(ring.residual_m)
-            azimuth = ring.azimuth_deg
-            if len(azimuth) <= 72:
-                ax.vlines(azimuth, 0, residual_mm, color=INK, linewidth=0.8)
-            ax.plot(azimuth, residual_mm, "o", color=INK, markersize=2.2, **light(azimuth))
-            ax.axhline(0, color="#445566", linewidth=0.5)
-            ax.set(xlim=_TURN, ylim=(-limit_mm, limit_mm), xticks=range(0, 361, 45))
-            ax.grid(True)
-            ax.set_title(
-                ", ".join(ring.title(words)), loc="left", fontsize=8, pad=2, parse_math=False
-            )
-        axes[-1].set_xlabel(words("azimuth"))
-        figure.supylabel(words("residual"), fontsize=8.5, x=0.005)
-        set_margins(figure, left=0.55, right=0.12, bottom=0.42, top=0.2, hspace=0.6)
+    figure = Drawing(figsize=(WIDTH, 0.55 * len(rings) + 0.55))
+    axes = figure.subplots(len(rings), 1, sharex=True, squeeze=False)[:, 0]
+    for ax, ring in zip(axes, rings, strict=True):
+        residual_mm = 1e3 * np.asarray(ring.residual_m)
+        azimuth = ring.azimuth_deg
+        if len(azimuth) <= 72:
+            ax.vlines(azimuth, 0, residual_mm, color=INK, linewidth=0.8)
+        ax.plot(azimuth, residual_mm, "o", color=INK, markersize=2.2, **light(azimuth))
+        ax.axhline(0, color=GREY, linewidth=0.5)
+        ax.set(xlim=_TURN, ylim=(-limit_mm, limit_mm), xticks=range(0, 361, 45))
+        ax.grid(True)
+        ax.set_title(", ".join(ring.title(words)), loc="left", fontsize=8, pad=2, parse_math=False)
+    axes[-1].set_xlabel(words("azimuth"))
+    figure.supylabel(words("residual"), fontsize=8.5, x=0.005)
+    set_margins(figure, left=0.55, right=0.12, bottom=0.42, top=0.2, hspace=0.6)
     return figure
 
 
@@ -150,29 +161,29 @@ def polar(rings, words=english, most=12):
     return [_polar_panels(group, factor, words) for group in even_groups(rings, most)]
 
 
+@styled
 def _polar_panels(rings, factor, words):
     across = 3 if len(rings) <= 6 else 4
     down = ceil(len(rings) / across)
-    with matplotlib.rc_context(STYLE):
-        figure = Drawing(figsize=(WIDTH, 5.4 / across * down))
-        axes = figure.subplots(down, across, squeeze=False).ravel()
-        turn = np.linspace(0, 2 * np.pi, 361)
-        for ax, ring in zip(axes, rings, strict=False):
-            ax.plot(np.sin(turn), np.cos(turn), color="#9aa5b1", linewidth=0.6)
-            line = _enlarged(ring.outline_deg, ring.deviation_m / ring.radius_m, factor)
-            closed = np.concatenate([line, line[:, :1]], axis=1)
-            ax.plot(*closed, color=INK)
-            residual = np.asarray(ring.residual_m) / ring.radius_m
-            points = _enlarged(ring.azimuth_deg, residual, factor)
-            few = points.shape[1] <= 200  # many would hide the outline: smaller, and below it
-            style = {"markersize": 2.2, "zorder": 3} if few else {"markersize": 1.0, "zorder": 1}
-            ax.plot(*points, ".", color=RED, **style, **light(points[0]))
-            ax.set(aspect="equal", xlim=(-1.32, 1.32), ylim=(-1.32, 1.32))
-            title = "\n".join(ring.title(words))
-            ax.text(0, 0, title, ha="center", va="center", fontsize=8, parse_math=False)
-        for ax in axes:
-            ax.axis("off")
-        figure.subplots_adjust(left=0, right=1, bottom=0, top=1, wspace=0, hspace=0)
+    figure = Drawing(figsize=(WIDTH, 5.4 / across * down))
+    axes = figure.subplots(down, across, squeeze=False).ravel()
+    turn = np.linspace(0, 2 * np.pi, 361)
+    for ax, ring in zip(axes, rings, strict=False):
+        ax.plot(np.sin(turn), np.cos(turn), color=FAINT, linewidth=0.6)
+        line = _enlarged(ring.outline_deg, ring.deviation_m / ring.radius_m, factor)
+        closed = np.concatenate([line, line[:, :1]], axis=1)
+        ax.plot(*closed, color=INK)
+        residual = np.asarray(ring.residual_m) / ring.radius_m
+        points = _enlarged(ring.azimuth_deg, residual, factor)
+        few = points.shape[1] <= 200  # many would hide the outline: smaller, and below it
+        style = {"markersize": 2.2, "zorder": 3} if few else {"markersize": 1.0, "zorder": 1}
+        ax.plot(*points, ".", color=RED, **style, **light(points[0]))
+        ax.set(aspect="equal", xlim=(-1.32, 1.32), ylim=(-1.32, 1.32))
+        title = "\n".join(ring.title(words))
+        ax.text(0, 0, title, ha="center", va="center", fontsize=8, parse_math=False)
+    for ax in axes:
+        ax.axis("off")
+    figure.subplots_adjust(left=0, right=1, bottom=0, top=1, wspace=0, hspace=0)
     return figure
 
 
@@ -182,29 +193,29 @@ def _enlarged(azimuth_deg, deviation, factor):
     return np.array([radius * np.sin(azimuth), radius * np.cos(azimuth)])
 
 
+@styled
 def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english):
     """The wall unrolled: azimuth by height, every point coloured by its residual."""
     residual_mm = 1e3 * np.asarray(residual_m)
     limit = np.max(np.abs(residual_mm), initial=0.0) or 1.0
-    with matplotlib.rc_context(STYLE):
-        figure = Drawing(figsize=(WIDTH, 2.6))
-        ax = figure.subplots()
-        size = 14 if len(azimuth_deg) <= 300 else 6
-        if len(azimuth_deg) > 3000:  # no room for edges: grey behind the points shows white ones
-            size = 2
-            ax.set_facecolor("#d5dae0")
-        shown = ax.scatter(
-            azimuth_deg, height_m, c=residual_mm, s=size, cmap="RdBu_r", vmin=-limit, vmax=limit,
-            edgecolors="#445566", linewidths=0.25 if size > 2 else 0, zorder=3,
-            **light(azimuth_deg),
-        )  # fmt: skip
-        ax.hlines(joints_m, *_TURN, color="#445566", linewidth=0.5)
-        ax.set(xlim=_TURN, xticks=range(0, 361, 45))
-        ax.set_xlabel(words("azimuth"))
-        ax.set_ylabel(words("height"))
-        bar = figure.colorbar(shown, ax=ax, pad=0.02, aspect=30)
-        bar.set_label(words("residual"))
-        figure.subplots_adjust(left=0.075, right=1.04, bottom=0.14, top=0.98)
+    figure = Drawing(figsize=(WIDTH, 2.6))
+    ax = figure.subplots()
+    size = 14 if len(azimuth_deg) <= 300 else 6
+    if len(azimuth_deg) > 3000:  # no room for edges: grey behind the points shows white ones
+        size = 2
+        ax.set_facecolor("#d5dae0")
+    shown = ax.scatter(
+        azimuth_deg, height_m, c=residual_mm, s=size, cmap="RdBu_r", vmin=-limit, vmax=limit,
+        edgecolors=GREY, linewidths=0.25 if size > 2 else 0, zorder=3,
+        **light(azimuth_deg),
+    )  # fmt: skip
+    ax.hlines(joints_m, *_TURN, color=GREY, linewidth=0.5)
+    ax.set(xlim=_TURN, xticks=range(0, 361, 45))
+    ax.set_xlabel(words("azimuth"))
+    ax.set_ylabel(words("height"))
+    bar = figure.colorbar(shown, ax=ax, pad=0.02, aspect=30)
+    bar.set_label(words("residual"))
+    figure.subplots_adjust(left=0.075, right=1.04, bottom=0.14, top=0.98)
     return figure
 
 
@@ -225,34 +236,35 @@ def bottom_rows(area_m2):
     return int(off[-1]) + 1
 
 
+@styled
 def capacity_curves(height_m, area_m2, U_m3, words=english):
     """Litres per centimetre, and U, against height; a bottom has a panel of its own."""
     height_m = np.asarray(height_m)
     litres_per_cm = 10.0 * np.array(area_m2, dtype=float)  # 1 m2 is 10 L/cm
     of_bottom = bottom_rows(area_m2)
     parts = [slice(of_bottom + 1), slice(of_bottom, None)] if of_bottom else [slice(None)]
-    with matplotlib.rc_context(STYLE):
-        figure = Drawing(figsize=(WIDTH, 2.4))
-        *left, right = figure.subplots(1, len(parts) + 1)
-        for ax, rows in zip(left, parts, strict=True):
-            ax.plot(height_m[rows], litres_per_cm[rows], color=INK)
-            ax.ticklabel_format(useOffset=False)
-            ax.set_xlim(height_m[rows][0], height_m[rows][-1])
-        left[0].set_ylabel(words("litres_per_cm"))
-        if of_bottom:
-            left[0].set_ylim(bottom=0)
-        right.plot(height_m, U_m3, color=INK)
-        right.set_ylabel(words("U_m3"))
-        right.set_ylim(bottom=0)
-        right.set_xlim(height_m[0], height_m[-1])
-        for ax in (*left, right):
-            ax.set_xlabel(words("height"))
-            ax.grid(True)
-        space = 0.3 if len(parts) == 1 else 0.45
-        set_margins(figure, left=0.65, right=0.12, bottom=0.42, top=0.08, wspace=space)
+    figure = Drawing(figsize=(WIDTH, 2.4))
+    *left, right = figure.subplots(1, len(parts) + 1)
+    for ax, rows in zip(left, parts, strict=True):
+        ax.plot(height_m[rows], litres_per_cm[rows], color=INK)
+        ax.ticklabel_format(useOffset=False)
+        ax.set_xlim(height_m[rows][0], height_m[rows][-1])
+    left[0].set_ylabel(words("litres_per_cm"))
+    if of_bottom:
+        left[0].set_ylim(bottom=0)
+    right.plot(height_m, U_m3, color=INK)
+    right.set_ylabel(words("U_m3"))
+    right.set_ylim(bottom=0)
+    right.set_xlim(height_m[0], height_m[-1])
+    for ax in (*left, right):
+        ax.set_xlabel(words("height"))
+        ax.grid(True)
+    space = 0.3 if len(parts) == 1 else 0.45
+    set_margins(figure, left=0.65, right=0.12, bottom=0.42, top=0.08, wspace=space)
     return figure
 
 
+@styled
 def budget_bars(bars, words=english):
     """The share of the variance of each input, in percent; defaults are pale.
 
@@ -263,20 +275,20 @@ def budget_bars(bars, words=english):
     high = 0.24 if not any("\n" in name for name in names) else 0.32
     colours = [PALE if is_default else INK for _, _, is_default in bars]
     shares = [100 * share for _, share, _ in bars]
-    with matplotlib.rc_context(STYLE):
-        figure = Drawing(figsize=(WIDTH, high * len(bars) + 0.6))
-        ax = figure.subplots()
-        ax.barh(range(len(bars)), shares, color=colours, height=0.6)
-        ax.set_yticks(range(len(bars)), names, parse_math=False)
-        ax.invert_yaxis()
-        ax.set_xlabel(words("share"))
-        ax.set_xlim(1.1 * min([0, *shares]), max([100, *(1.05 * share for share in shares)]))
-        ax.grid(True, axis="x")
-        ax.set_axisbelow(True)
-        set_margins(figure, left=2.9, right=0.2, bottom=0.42, top=0.05)
+    figure = Drawing(figsize=(WIDTH, high * len(bars) + 0.6))
+    ax = figure.subplots()
+    ax.barh(range(len(bars)), shares, color=colours, height=0.6)
+    ax.set_yticks(range(len(bars)), names, parse_math=False)
+    ax.invert_yaxis()
+    ax.set_xlabel(words("share"))
+    ax.set_xlim(1.1 * min([0, *shares]), max([100, *(1.05 * share for share in shares)]))
+    ax.grid(True, axis="x")
+    ax.set_axisbelow(True)
+    set_margins(figure, left=2.9, right=0.2, bottom=0.42, top=0.05)
     return figure
 
 
+@styled
 def network(names, xy_m, covariance_m2, most_names=60):
     """Points from above with their standard error ellipses, enlarged.
 
@@ -290,25 +302,24 @@ def network(names, xy_m, covariance_m2, most_names=60):
     extent = float(np.ptp(xy_m, axis=0).max()) or 1.0
     largest = float(half_m.max(initial=0.0))
     factor = round_factor(0.04 * extent / largest) if largest > 0 else 1
-    with matplotlib.rc_context(STYLE):
-        figure = Drawing(figsize=(WIDTH, 4.6))
-        ax = figure.subplots()
-        width, height = 2 * factor * half_m[:, 1], 2 * factor * half_m[:, 0]
-        turn = np.degrees(np.arctan2(axes[:, 1, 1], axes[:, 0, 1]))
-        ellipses = EllipseCollection(
-            width, height, turn, units="xy", offsets=xy_m, offset_transform=ax.transData,
-            facecolors="none", edgecolors=RED, linewidths=0.6,
-        )  # fmt: skip
-        ax.add_collection(ellipses)
-        ax.plot(*xy_m.T, ".", color=INK, markersize=2.5, **light(xy_m))
-        if len(names) <= most_names:
-            for name, place in zip(names, xy_m, strict=True):
-                ax.annotate(
-                    name, place, (2, 2), textcoords="offset points", fontsize=6, parse_math=False
-                )
-        ax.set(aspect="equal", xlabel="x / m", ylabel="y / m")
-        ax.set_title(f"standard error ellipses, {factor} times", loc="left", fontsize=8)
-        ax.grid(True)
+    figure = Drawing(figsize=(WIDTH, 4.6))
+    ax = figure.subplots()
+    width, height = 2 * factor * half_m[:, 1], 2 * factor * half_m[:, 0]
+    turn = np.degrees(np.arctan2(axes[:, 1, 1], axes[:, 0, 1]))
+    ellipses = EllipseCollection(
+        width, height, turn, units="xy", offsets=xy_m, offset_transform=ax.transData,
+        facecolors="none", edgecolors=RED, linewidths=0.6,
+    )  # fmt: skip
+    ax.add_collection(ellipses)
+    ax.plot(*xy_m.T, ".", color=INK, markersize=2.5, **light(xy_m))
+    if len(names) <= most_names:
+        for name, place in zip(names, xy_m, strict=True):
+            ax.annotate(
+                name, place, (2, 2), textcoords="offset points", fontsize=6, parse_math=False
+            )
+    ax.set(aspect="equal", xlabel="x / m", ylabel="y / m")
+    ax.set_title(f"standard error ellipses, {factor} times", loc="left", fontsize=8)
+    ax.grid(True)
     return figure
 
 

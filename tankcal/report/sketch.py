@@ -3,14 +3,12 @@
 Not to scale; every measure in it is a value of the record. Lengths of the page are inches.
 """
 
-import matplotlib
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Rectangle
 
-from tankcal.pipeline.plots import INK, PALE, RED, STYLE, WIDTH
+from tankcal.pipeline.plots import GREY, INK, PALE, RED, WIDTH, styled
 from tankcal.report.dip_point import dip_point
 
-_GREY = "#445566"
 _LEFT, _RIGHT = 2.0, 4.0  # of the tank on the page
 _BOTTOM = 0.5
 _LEAST_HEIGHT, _MOST_HEIGHT = 1.1, 1.6
@@ -20,7 +18,7 @@ _ROUNDING = 0.3  # of the ends of a lying tank
 _SMALL = 7.5
 _NEAR_WALL = 0.93  # of the radius: a gauge at the wall is drawn beside it
 _WITH_DIP_POINT = ("vertical", "horizontal")  # kinds whose dip point can be declared
-_ARROW = {"arrowstyle": "<->", "color": _GREY, "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0}
+_ARROW = {"arrowstyle": "<->", "color": GREY, "linewidth": 0.7, "shrinkA": 0, "shrinkB": 0}
 
 
 def has_sketch(record):
@@ -42,6 +40,7 @@ def _page(height, below=0.0):
     return figure, ax
 
 
+@styled
 def _upright(paper):
     record = paper.record
     courses = record["courses"]
@@ -49,23 +48,22 @@ def _upright(paper):
     shape = tank["nominal_height_m"] / tank["nominal_diameter_m"] * (_RIGHT - _LEFT)
     height = max(_LEAST_HEIGHT, min(_MOST_HEIGHT, shape), _OF_COURSE * len(courses))
     per_m = height / courses[-1]["top_m"]
-    with matplotlib.rc_context(STYLE):
-        rise = per_m * _rise_m(record)
-        below = max(-rise, 0.0)
-        figure, ax = _page(height, below)
-        _ground(ax, open_below=below > 0)
-        top, middle = _BOTTOM + height, (_LEFT + _RIGHT) / 2
-        x = [_LEFT, _LEFT, middle, _RIGHT, _RIGHT]
-        ax.plot(x, [top, _BOTTOM, _BOTTOM + rise, _BOTTOM, top], color=INK, linewidth=1.4)
-        _open_top(ax, top)
-        for course in courses:
-            _course(ax, paper, course, per_m)
-        _level_of(ax, paper, per_m)
-        _critical_zone(ax, paper, per_m)
-        _gauge(ax, paper, _dip_x(record), top, _zero_y(record, per_m), below)
-        _measure(ax, _LEFT - 0.35, _BOTTOM, top, _of(paper, "shell", courses[-1]["top_m"]))
-        nominal = _of(paper, "diameter", tank["nominal_diameter_m"])
-        _across(ax, nominal, below=below)
+    rise = per_m * _rise_m(record)
+    below = max(-rise, 0.0)
+    figure, ax = _page(height, below)
+    _ground(ax, open_below=below > 0)
+    top, middle = _BOTTOM + height, (_LEFT + _RIGHT) / 2
+    x = [_LEFT, _LEFT, middle, _RIGHT, _RIGHT]
+    ax.plot(x, [top, _BOTTOM, _BOTTOM + rise, _BOTTOM, top], color=INK, linewidth=1.4)
+    _open_top(ax, top)
+    for course in courses:
+        _course(ax, paper, course, per_m)
+    _level_of(ax, paper, per_m)
+    _critical_zone(ax, paper, per_m)
+    _gauge(ax, paper, _dip_x(record), top, _zero_y(record, per_m), below)
+    _measure(ax, _LEFT - 0.35, _BOTTOM, top, _of(paper, "shell", courses[-1]["top_m"]))
+    nominal = _of(paper, "diameter", tank["nominal_diameter_m"])
+    _across(ax, nominal, below=below)
     return figure
 
 
@@ -96,7 +94,7 @@ def _ground(ax, open_below=False):
     ends = [_LEFT - 0.35, _RIGHT + 0.35]
     parts = [(ends[0], _LEFT), (_RIGHT, ends[1])] if open_below else [ends]
     for part in parts:
-        ax.plot(part, [_BOTTOM - 0.03] * 2, color=_GREY, linewidth=0.6)
+        ax.plot(part, [_BOTTOM - 0.03] * 2, color=GREY, linewidth=0.6)
 
 
 def _open_top(ax, y):
@@ -136,7 +134,7 @@ def _critical_zone(ax, paper, per_m):
         return
     zero = _zero_y(paper.record, per_m)
     size = (_RIGHT - _LEFT, per_m * (high - low))
-    style = {"facecolor": "none", "edgecolor": _GREY, "hatch": "////", "linewidth": 0.4}
+    style = {"facecolor": "none", "edgecolor": GREY, "hatch": "////", "linewidth": 0.4}
     ax.add_patch(Rectangle((_LEFT, zero + per_m * low), *size, **style))
     label = paper.word("sketch.critical", low=paper.height(low), high=paper.height(high))
     _text(ax, _LEFT + 0.06, zero + per_m * high + 0.07, label, "left", over_lines=True)
@@ -148,9 +146,9 @@ def _gauge(ax, paper, x, top, zero, below=0.0):
     record = paper.record
     known = dip_point(record) is not None or record["job"]["tank"]["kind"] not in _WITH_DIP_POINT
     line = "-" if known else (0, (5, 3))  # its place was not declared
-    ax.plot([x, x], [zero, upper], color=_GREY, linewidth=0.7, linestyle=line)
+    ax.plot([x, x], [zero, upper], color=GREY, linewidth=0.7, linestyle=line)
     ax.plot([x - 0.12, x + 0.12], [zero, zero], color=RED, linewidth=2.2)
-    ax.plot([x - 0.06, x + 0.06], [upper, upper], color=_GREY, linewidth=1.2)
+    ax.plot([x - 0.06, x + 0.06], [upper, upper], color=GREY, linewidth=1.2)
     height_m = record["job"]["datum"]["reference_height_m"]
     label = paper.word("sketch.reference_height_open") if height_m is None else _of(
         paper, "reference_height", height_m)  # fmt: skip
@@ -160,39 +158,39 @@ def _gauge(ax, paper, x, top, zero, below=0.0):
     _text(ax, x + 0.16, y - 0.12, paper.word("sketch.zero", zero=named), "left", RED)
 
 
+@styled
 def _lying(paper):
     sizes = {one["code"]: one["value"] for one in paper.record["solid"]}
     length, high = _RIGHT + 0.5 - _LEFT, 1.0
-    with matplotlib.rc_context(STYLE):
-        figure, ax = _page(high)
-        _ground(ax)
-        style = {"facecolor": "none", "edgecolor": INK, "linewidth": 1.4}
-        rounded = f"round,pad=0,rounding_size={_ROUNDING}"
-        corner = (_LEFT + 0.25, _BOTTOM)
-        shape = FancyBboxPatch(corner, length - 0.5, high, boxstyle=rounded, **style)
-        flat = sizes.get("end_a") == sizes.get("end_b") == "flat"
-        ax.add_patch(Rectangle((_LEFT, _BOTTOM), length, high, **style) if flat else shape)
-        end = 0.0 if flat else 0.25 + _ROUNDING
-        x = _LEFT + end + dip_point(paper.record).share * (length - 2 * end)
-        _gauge(ax, paper, x, _BOTTOM + high, _BOTTOM)
-        inside = _of(paper, "inside_diameter", sizes["section_height"])
-        _measure(ax, _LEFT - 0.35, _BOTTOM, _BOTTOM + high, inside)
-        of_cylinder = _of(paper, "length", sizes["cylinder_length"])
-        _across(ax, of_cylinder, _LEFT + end, _LEFT + length - end)
+    figure, ax = _page(high)
+    _ground(ax)
+    style = {"facecolor": "none", "edgecolor": INK, "linewidth": 1.4}
+    rounded = f"round,pad=0,rounding_size={_ROUNDING}"
+    corner = (_LEFT + 0.25, _BOTTOM)
+    shape = FancyBboxPatch(corner, length - 0.5, high, boxstyle=rounded, **style)
+    flat = sizes.get("end_a") == sizes.get("end_b") == "flat"
+    ax.add_patch(Rectangle((_LEFT, _BOTTOM), length, high, **style) if flat else shape)
+    end = 0.0 if flat else 0.25 + _ROUNDING
+    x = _LEFT + end + dip_point(paper.record).share * (length - 2 * end)
+    _gauge(ax, paper, x, _BOTTOM + high, _BOTTOM)
+    inside = _of(paper, "inside_diameter", sizes["section_height"])
+    _measure(ax, _LEFT - 0.35, _BOTTOM, _BOTTOM + high, inside)
+    of_cylinder = _of(paper, "length", sizes["cylinder_length"])
+    _across(ax, of_cylinder, _LEFT + end, _LEFT + length - end)
     return figure
 
 
+@styled
 def _round(paper):
     sizes = {one["code"]: one["value"] for one in paper.record["solid"]}
     high = 1.6
-    with matplotlib.rc_context(STYLE):
-        figure, ax = _page(high)
-        _ground(ax)
-        middle = ((_LEFT + _RIGHT) / 2, _BOTTOM + high / 2)
-        ax.add_patch(Circle(middle, high / 2, facecolor="none", edgecolor=INK, linewidth=1.4))
-        _gauge(ax, paper, middle[0], _BOTTOM + high, _BOTTOM)
-        inside = _of(paper, "inside_diameter", sizes["diameter"])
-        _measure(ax, _LEFT - 0.35, _BOTTOM, _BOTTOM + high, inside)
+    figure, ax = _page(high)
+    _ground(ax)
+    middle = ((_LEFT + _RIGHT) / 2, _BOTTOM + high / 2)
+    ax.add_patch(Circle(middle, high / 2, facecolor="none", edgecolor=INK, linewidth=1.4))
+    _gauge(ax, paper, middle[0], _BOTTOM + high, _BOTTOM)
+    inside = _of(paper, "inside_diameter", sizes["diameter"])
+    _measure(ax, _LEFT - 0.35, _BOTTOM, _BOTTOM + high, inside)
     return figure
 
 

@@ -1,28 +1,17 @@
 """What the figures of the camera's papers share: style, colours, matrices as colours."""
 
 import re
-from functools import wraps
+from functools import partial
 from math import ceil, floor, log10
 
-import matplotlib
 import numpy as np
 
-from tankcal.pipeline.plots import INK, RED, STYLE
+from tankcal.pipeline import plots
+from tankcal.pipeline.plots import INK, RED
 
 COLOURS = (INK, RED, "#3b7d4f", "#b8860b", "#6a4c93", "#1b998b", "#8a5a44", "#555555")
 DASHES = ("-", "--", ":")
-FAINT = "#9aa5b1"
-
-
-def styled(draw):
-    """A function that draws, in the style of the papers."""
-
-    @wraps(draw)
-    def drawing(*arguments, **options):
-        with matplotlib.rc_context(STYLE | {"mathtext.fontset": "stix"}):
-            return draw(*arguments, **options)
-
-    return drawing
+styled = partial(plots.styled, **{"mathtext.fontset": "stix"})
 
 
 def line_style(number):
@@ -31,13 +20,6 @@ def line_style(number):
         "color": COLOURS[number % len(COLOURS)],
         "linestyle": DASHES[number // len(COLOURS) % len(DASHES)],
     }
-
-
-def in_parts(items, most):
-    """The items in parts of nearly equal size, at most `most` in each."""
-    count = max(1, ceil(len(items) / most))
-    size = max(1, ceil(len(items) / count))
-    return [items[i : i + size] for i in range(0, len(items), size)]
 
 
 def over_whole_decades(ax):

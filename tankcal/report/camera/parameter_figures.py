@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import INK, RED, WIDTH, set_margins
-from tankcal.report.camera.drawings import FAINT, mathematical, matrix, over_whole_decades, styled
+from tankcal.pipeline.plots import FAINT, INK, RED, WIDTH, set_margins
+from tankcal.report.camera.drawings import mathematical, matrix, over_whole_decades, styled
 from tankcal.report.camera.parameter_tests import in_pixels
 from tankcal.text.digits import fixed
 

@@ -3,9 +3,9 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import INK, RED, WIDTH, set_margins
+from tankcal.pipeline.plots import FAINT, GREY, INK, RED, WIDTH, set_margins
 from tankcal.report import numbers
-from tankcal.report.camera.drawings import FAINT, line_style, styled
+from tankcal.report.camera.drawings import line_style, styled
 from tankcal.report.camera.influence import adjusted, label
 from tankcal.report.camera.product import unit_of
 
@@ -84,7 +84,7 @@ def _volumes(paper, ax, runs, places):
         ((run["shifts"] or {}).get("volume") or {}).get("difference_m3", np.nan) for run in runs
     ]
     ax.barh(places, np.array(changes, dtype=float), 0.5, color=INK)
-    ax.axvline(0, color="#445566", linewidth=0.6)
+    ax.axvline(0, color=GREY, linewidth=0.6)
     reference = runs[0]["volume"]
     if runs[0]["calibration"] is None and reference and reference["U_m3"]:
         u_m3 = reference["U_m3"]

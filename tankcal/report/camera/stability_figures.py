@@ -9,8 +9,8 @@ from matplotlib.patches import Rectangle
 
 from tankcal.calibration.curves import decentring_profile, radial_curve
 from tankcal.camera.model import PARAMETERS, Form
-from tankcal.pipeline.plots import INK, WIDTH, set_margins
-from tankcal.report.camera.drawings import FAINT, in_parts, line_style, mathematical, matrix, styled
+from tankcal.pipeline.plots import FAINT, INK, WIDTH, even_groups, set_margins
+from tankcal.report.camera.drawings import line_style, mathematical, matrix, styled
 from tankcal.report.camera.naming import numbered
 from tankcal.report.camera.stability import KEYS, numbered_labels
 from tankcal.text.digits import fixed
@@ -27,7 +27,7 @@ def maps(paper):
     pairs = paper.result["pairs"]
     norm = _norm(paper, [np.max(row["difference_px"]) for row in pairs])
     found, first = [], 1
-    for part in in_parts(pairs, MOST_PANELS):
+    for part in even_groups(pairs, MOST_PANELS):
         found.append((_panels(paper, part, norm), first, first + len(part) - 1))
         first += len(part)
     return found

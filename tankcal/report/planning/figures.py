@@ -1,29 +1,16 @@
 """The figures of a prediction: U against dip, weak areas, rays of the points, what helps most."""
 
-from functools import wraps
-
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import INK, PALE, RED, STYLE, WIDTH, set_margins
+from tankcal.pipeline.plots import GREY, INK, PALE, RED, WIDTH, set_margins, styled
 from tankcal.report.planning.sketches import unrolled
 
 MOST = 32  # bars
 COLOURS = {"add": INK, "repeat": PALE, "drop": RED}
-GREY = "#445566"
 
 
-def _styled(draw):
-    @wraps(draw)
-    def drawing(*arguments):
-        with matplotlib.rc_context(STYLE):
-            return draw(*arguments)
-
-    return drawing
-
-
-@_styled
+@styled
 def uncertainty(paper):
     """U of every row, in m3 and over the volume, against the dip; the limit where there is one."""
     table, limits = paper.prediction.table, paper.plan.limits
@@ -46,7 +33,7 @@ def uncertainty(paper):
     return figure
 
 
-@_styled
+@styled
 def weak_areas(paper):
     """The wall unrolled: every target coloured by its largest sd; weak and lost ones are marked."""
     targets, points = paper.plan.targets, _of_targets(paper)
@@ -73,7 +60,7 @@ def weak_areas(paper):
     return figure
 
 
-@_styled
+@styled
 def rays(paper):
     """How many targets are seen from how many stations; those too few to be sound in red."""
     counts = np.bincount([one.rays for one in _of_targets(paper)])
@@ -94,7 +81,7 @@ def _of_targets(paper):
     return paper.prediction.points[: len(paper.plan.targets.names)]
 
 
-@_styled
+@styled
 def changes(paper):
     """Bars of the change of U over volume, in ppm, by each `helping.Effect` that still works.
 

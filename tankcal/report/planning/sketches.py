@@ -1,16 +1,14 @@
 """The wall of a plan unrolled: targets, control, tapes, welds."""
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import INK, RED, STYLE, WIDTH, set_margins
+from tankcal.pipeline.plots import FAINT, GREY, INK, RED, WIDTH, set_margins, styled
 from tankcal.planning.model import TAPED
 from tankcal.planning.places import joints_m, place_of, reference_rad
 from tankcal.planning.rings import full_turn
 from tankcal.report.planning.rows import lost_points
 
-GREY, FAINT = "#445566", "#9aa5b1"
 GREEN, OCHRE = "#2e7d5b", "#b9770e"
 SMALL = 6.5
 MOST_LABELS = 60  # lines of targets that are all numbered
@@ -19,24 +17,24 @@ DASHES = {"distances": "-", "height_differences": ":", "plumb_lines": "--"}
 BEHIND = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6}
 
 
+@styled
 def wall(paper):
     """The wall unrolled from the reference weld: targets by line and row, control, tapes."""
     plan, lost = paper.plan, lost_points(paper.prediction)
-    with matplotlib.rc_context(STYLE):
-        figure, ax = unrolled(paper, named=True)
-        targets = plan.targets
-        seen = np.array([name not in lost for name in targets.names])
-        ax.plot(targets.arc_m[seen], targets.height_m[seen], ".", color=INK, markersize=3,
-                zorder=3, label=paper.word("legend.targets"))  # fmt: skip
-        _control(ax, paper)
-        _marks(ax, paper, lost)
-        for table in TAPED:
-            _ties(ax, paper, table)
-        _unseen(ax, paper, lost)
-        _names(ax, targets)
-        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=5, frameon=False,
-                  fontsize=7.5, columnspacing=1.2)  # fmt: skip
-        set_margins(figure, left=0.5, right=0.35, bottom=0.85, top=0.3)
+    figure, ax = unrolled(paper, named=True)
+    targets = plan.targets
+    seen = np.array([name not in lost for name in targets.names])
+    ax.plot(targets.arc_m[seen], targets.height_m[seen], ".", color=INK, markersize=3,
+            zorder=3, label=paper.word("legend.targets"))  # fmt: skip
+    _control(ax, paper)
+    _marks(ax, paper, lost)
+    for table in TAPED:
+        _ties(ax, paper, table)
+    _unseen(ax, paper, lost)
+    _names(ax, targets)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=5, frameon=False,
+              fontsize=7.5, columnspacing=1.2)  # fmt: skip
+    set_margins(figure, left=0.5, right=0.35, bottom=0.85, top=0.3)
     return figure
 
 

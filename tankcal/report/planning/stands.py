@@ -1,18 +1,16 @@
 """The tank of a plan from above: stations, set-ups, obstacles, tapes, marks."""
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
-from tankcal.pipeline.plots import INK, PALE, STYLE, WIDTH, round_factor
+from tankcal.pipeline.plots import GREY, INK, PALE, WIDTH, round_factor, styled
 from tankcal.planning.model import TAPED, Box
 from tankcal.planning.places import reference_rad
 from tankcal.report.planning.sketches import (
     BEHIND,
     DASHES,
     GREEN,
-    GREY,
     OCHRE,
     marks_of,
     own_name,
@@ -27,28 +25,28 @@ SMALL_SHARE = 0.6  # of the radius of the tank: the name of a smaller obstacle s
 MOST_NAMES = 40  # marks that are all named
 
 
+@styled
 def stands(paper):
     """The tank from above: stations, set-ups, obstacles, tapes, the reference weld, north."""
     plan = paper.plan
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, HIGH))
-        ax = figure.add_axes((0.0, 0.08, 1.0, 0.92))
-        ax.set_aspect("equal")
-        ax.axis("off")
-        _set_frame(ax, plan)
-        _tank(ax, paper)
-        _obstacles(ax, plan)
-        for table in TAPED:
-            _ties(ax, paper, table)
-        _marks(ax, paper)
-        _views(ax, paper)
-        photos = {one.station: one.xyz_m for one in plan.photos}
-        setups = {one.name: one.xyz_m for one in plan.setups}
-        _stands(ax, plan, photos, "o", INK, paper.word("legend.stations"))
-        _stands(ax, plan, setups, "^", GREEN, paper.word("legend.setups"))
-        _rose(ax, paper)
-        ax.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=5, frameon=False,
-                  fontsize=7.5)  # fmt: skip
+    figure = Figure(figsize=(WIDTH, HIGH))
+    ax = figure.add_axes((0.0, 0.08, 1.0, 0.92))
+    ax.set_aspect("equal")
+    ax.axis("off")
+    _set_frame(ax, plan)
+    _tank(ax, paper)
+    _obstacles(ax, plan)
+    for table in TAPED:
+        _ties(ax, paper, table)
+    _marks(ax, paper)
+    _views(ax, paper)
+    photos = {one.station: one.xyz_m for one in plan.photos}
+    setups = {one.name: one.xyz_m for one in plan.setups}
+    _stands(ax, plan, photos, "o", INK, paper.word("legend.stations"))
+    _stands(ax, plan, setups, "^", GREEN, paper.word("legend.setups"))
+    _rose(ax, paper)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=5, frameon=False,
+              fontsize=7.5)  # fmt: skip
     return figure
 
 

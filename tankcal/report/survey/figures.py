@@ -7,7 +7,18 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import INK, MANY, RED, STYLE, WIDTH, round_factor, set_margins
+from tankcal.pipeline.plots import (
+    FAINT,
+    GREY,
+    INK,
+    MANY,
+    PALE,
+    RED,
+    WIDTH,
+    round_factor,
+    set_margins,
+    styled,
+)
 from tankcal.text.labels import MARK, Label, write_labels
 
 MOST_PHOTOS = 12
@@ -16,7 +27,6 @@ MOST_AT_A_PLACE = 4  # names beside one place
 LARGEST_ELLIPSE = 0.04  # of the plan
 SAME_PLACE = 0.015  # of the plan
 PLAN_POINTS = 300  # typographic points that the plan measures
-_GREY = "#445566"
 _BEHIND = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.3}
 _MARKS = {"control": ("^", INK), "check": ("s", "#6b4c9a"), "station": ("D", "#2e7d32")}
 
@@ -45,6 +55,7 @@ def plan_name(paper):
     return "plan_many" if len(paper.record["adjustment"]["points"]) > MANY else "plan"
 
 
+@styled
 def plan(paper):
     """The network from above: points with their error ellipses, stations, photos, distances."""
     adjustment, places = paper.record["adjustment"], _places(paper)
@@ -52,30 +63,29 @@ def plan(paper):
     xy = np.array([places[one["point"]] for one in points])
     origin = np.floor(xy.min(axis=0) / 1000) * 1000 if np.abs(xy).max() > 1e5 else np.zeros(2)
     factor, extent = plan_factor(paper), _extent(paper)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 4.6))
-        ax = figure.subplots()
-        _lines(ax, paper, places, origin)
-        many = {"rasterized": len(points) > MANY}
-        _ellipses(ax, points, xy - origin, factor)
-        _marks(ax, paper, points, xy - origin, many)
-        photos = _photos(ax, paper, adjustment["photos"], origin)
-        ax.set_aspect("equal")
-        ax.autoscale_view()
-        ax.margins(0.06)
-        ax.set_xlabel(_axis(paper, "x", origin[0]))
-        ax.set_ylabel(_axis(paper, "y", origin[1]))
-        ax.grid(True)
-        ax.set_axisbelow(True)
-        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=5, frameon=False)
-        set_margins(figure, left=0.65, right=0.1, bottom=0.75, top=0.08)
-        labels = _names(points, xy - origin, factor, extent)
-        labels += _photo_names(adjustment["photos"], photos)
-        marks = np.vstack([xy - origin, photos])
-        largest = factor * np.array([one["ellipse_m"][0] for one in points])
-        ellipses = 0.75 * _on_page(largest, extent)
-        room = np.maximum([*ellipses, *(0.0 for _ in photos)], MARK)
-        write_labels(ax, labels, marks, size=6, room=room, color=_GREY, zorder=5, bbox=_BEHIND)
+    figure = Figure(figsize=(WIDTH, 4.6))
+    ax = figure.subplots()
+    _lines(ax, paper, places, origin)
+    many = {"rasterized": len(points) > MANY}
+    _ellipses(ax, points, xy - origin, factor)
+    _marks(ax, paper, points, xy - origin, many)
+    photos = _photos(ax, paper, adjustment["photos"], origin)
+    ax.set_aspect("equal")
+    ax.autoscale_view()
+    ax.margins(0.06)
+    ax.set_xlabel(_axis(paper, "x", origin[0]))
+    ax.set_ylabel(_axis(paper, "y", origin[1]))
+    ax.grid(True)
+    ax.set_axisbelow(True)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=5, frameon=False)
+    set_margins(figure, left=0.65, right=0.1, bottom=0.75, top=0.08)
+    labels = _names(points, xy - origin, factor, extent)
+    labels += _photo_names(adjustment["photos"], photos)
+    marks = np.vstack([xy - origin, photos])
+    largest = factor * np.array([one["ellipse_m"][0] for one in points])
+    ellipses = 0.75 * _on_page(largest, extent)
+    room = np.maximum([*ellipses, *(0.0 for _ in photos)], MARK)
+    write_labels(ax, labels, marks, size=6, room=room, color=GREY, zorder=5, bbox=_BEHIND)
     return figure
 
 
@@ -113,14 +123,14 @@ def _lines(ax, paper, places, origin):
         (x0, y0), (x1, y1) = places[start], places[end]
         ax.plot(
             [x0 - origin[0], x1 - origin[0]], [y0 - origin[1], y1 - origin[1]],
-            color="#9aa5b1", linewidth=0.4, zorder=1,
+            color=FAINT, linewidth=0.4, zorder=1,
         )  # fmt: skip
 
 
 def _marks(ax, paper, points, xy, many):
     kinds = np.array([one["kind"] for one in points])
     plain = kinds == "point"
-    ax.plot(*xy[plain].T, ".", color=_GREY, markersize=2, zorder=3,
+    ax.plot(*xy[plain].T, ".", color=GREY, markersize=2, zorder=3,
             label=paper.word("plan.point"), **many)  # fmt: skip
     for kind, (mark, colour) in _MARKS.items():
         own = kinds == kind
@@ -189,6 +199,7 @@ def _photo_names(photos, xy):
     return [Label(*place, (one["photo"],), 5.0) for one, place in zip(photos, xy, strict=True)]
 
 
+@styled
 def distributions(paper):
     """Histogram of w against the normal distribution, and of the redundancy numbers."""
     rows = [
@@ -197,25 +208,24 @@ def distributions(paper):
     ]  # fmt: skip
     w = np.array([row["w"] for row in rows if row["controlled"] and row["w"] is not None])
     redundancy = np.array([row["redundancy"] for row in rows if row["redundancy"] is not None])
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 2.5))
-        left, right = figure.subplots(1, 2)
-        edges = np.arange(-5, 5.01, 0.5 if len(w) < 400 else 0.25)
-        left.hist(np.clip(w, -4.99, 4.99), edges, color="#9db8d2", edgecolor="white", linewidth=0.4)
-        x = np.linspace(-5, 5, 201)
-        step = edges[1] - edges[0]
-        left.plot(x, len(w) * step * np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color=RED)
-        left.set_xlim(-5, 5)
-        left.set_xlabel(paper.word("axes.w"))
-        left.set_ylabel(paper.word("axes.readings"))
-        right.hist(redundancy, np.arange(0, 1.01, 0.05), color="#9db8d2", edgecolor="white",
-                   linewidth=0.4)  # fmt: skip
-        right.set_xlim(0, 1)
-        right.set_xlabel(paper.word("axes.redundancy"))
-        for ax in (left, right):
-            ax.grid(True, axis="y")
-            ax.set_axisbelow(True)
-        set_margins(figure, left=0.6, right=0.12, bottom=0.42, top=0.08, wspace=0.2)
+    figure = Figure(figsize=(WIDTH, 2.5))
+    left, right = figure.subplots(1, 2)
+    edges = np.arange(-5, 5.01, 0.5 if len(w) < 400 else 0.25)
+    left.hist(np.clip(w, -4.99, 4.99), edges, color=PALE, edgecolor="white", linewidth=0.4)
+    x = np.linspace(-5, 5, 201)
+    step = edges[1] - edges[0]
+    left.plot(x, len(w) * step * np.exp(-(x**2) / 2) / np.sqrt(2 * np.pi), color=RED)
+    left.set_xlim(-5, 5)
+    left.set_xlabel(paper.word("axes.w"))
+    left.set_ylabel(paper.word("axes.readings"))
+    right.hist(redundancy, np.arange(0, 1.01, 0.05), color=PALE, edgecolor="white",
+               linewidth=0.4)  # fmt: skip
+    right.set_xlim(0, 1)
+    right.set_xlabel(paper.word("axes.redundancy"))
+    for ax in (left, right):
+        ax.grid(True, axis="y")
+        ax.set_axisbelow(True)
+    set_margins(figure, left=0.6, right=0.12, bottom=0.42, top=0.08, wspace=0.2)
     return figure
 
 
@@ -238,6 +248,7 @@ def _vectors_factor(paper, of_photo):
     return round_factor(0.4 * half / max(size)) if max(size, default=0.0) > 0 else 1
 
 
+@styled
 def photo_residuals(paper):
     """Residuals of the image points as vectors, one panel a photo; crosses were set aside."""
     photos, of_photo = shown_photos(paper), _image_residuals(paper)
@@ -246,34 +257,33 @@ def photo_residuals(paper):
     down = ceil(len(photos) / across)
     shape = half[1] / half[0]
     height = WIDTH / across * shape + 0.22
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, down * height))
-        axes = figure.subplots(down, across, squeeze=False).ravel()
-        for ax, photo in zip(axes, photos, strict=False):
-            xy, v, aside = of_photo[photo["photo"]]
-            ax.add_patch(
-                matplotlib.patches.Rectangle(
-                    (-half[0], -half[1]), 2 * half[0], 2 * half[1], fill=False, linewidth=0.5,
-                    edgecolor=_GREY,
-                )
-            )  # fmt: skip
-            many = {"rasterized": len(xy) > MANY}
-            ends = xy + factor * v
-            vectors = np.stack([xy, ends, np.full_like(xy, np.nan)], axis=1)  # one broken line
-            ax.plot(*vectors.reshape(-1, 2).T, color=INK, linewidth=0.6, **many)
-            ax.plot(*xy.T, ".", color=INK, markersize=1.6, **many)
-            ax.plot(*aside.T, "x", color=RED, markersize=3.5, markeredgewidth=0.8)
-            ax.set(aspect="equal", xlim=(-1.03 * half[0], 1.03 * half[0]),
-                   ylim=(-1.03 * half[1], 1.03 * half[1]))  # fmt: skip
-            rms = paper.number(photo["rms_mm"], "image um", decimals=1)
-            title = paper.word("axes.photo", photo=photo["photo"], rms=rms)
-            ax.set_title(title, fontsize=8, pad=2, parse_math=False)
-        for ax in axes:
-            ax.axis("off")
-        figure.subplots_adjust(
-            left=0.005, right=0.995, bottom=0.005, top=1 - 0.18 / (down * height), wspace=0.04,
-            hspace=0.22 / (height - 0.22),
+    figure = Figure(figsize=(WIDTH, down * height))
+    axes = figure.subplots(down, across, squeeze=False).ravel()
+    for ax, photo in zip(axes, photos, strict=False):
+        xy, v, aside = of_photo[photo["photo"]]
+        ax.add_patch(
+            matplotlib.patches.Rectangle(
+                (-half[0], -half[1]), 2 * half[0], 2 * half[1], fill=False, linewidth=0.5,
+                edgecolor=GREY,
+            )
         )  # fmt: skip
+        many = {"rasterized": len(xy) > MANY}
+        ends = xy + factor * v
+        vectors = np.stack([xy, ends, np.full_like(xy, np.nan)], axis=1)  # one broken line
+        ax.plot(*vectors.reshape(-1, 2).T, color=INK, linewidth=0.6, **many)
+        ax.plot(*xy.T, ".", color=INK, markersize=1.6, **many)
+        ax.plot(*aside.T, "x", color=RED, markersize=3.5, markeredgewidth=0.8)
+        ax.set(aspect="equal", xlim=(-1.03 * half[0], 1.03 * half[0]),
+               ylim=(-1.03 * half[1], 1.03 * half[1]))  # fmt: skip
+        rms = paper.number(photo["rms_mm"], "image um", decimals=1)
+        title = paper.word("axes.photo", photo=photo["photo"], rms=rms)
+        ax.set_title(title, fontsize=8, pad=2, parse_math=False)
+    for ax in axes:
+        ax.axis("off")
+    figure.subplots_adjust(
+        left=0.005, right=0.995, bottom=0.005, top=1 - 0.18 / (down * height), wspace=0.04,
+        hspace=0.22 / (height - 0.22),
+    )  # fmt: skip
     return figure
 
 

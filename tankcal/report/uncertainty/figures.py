@@ -1,17 +1,16 @@
 """Figures: uncertainty of deliveries against their height, GUM beside Monte Carlo."""
 
-import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 
-from tankcal.pipeline.plots import INK, RED, STYLE, WIDTH, set_margins
+from tankcal.pipeline.plots import FAINT, INK, RED, WIDTH, set_margins, styled
 
-_GREY = "#9aa5b1"
 _SHORT_AXIS = 20  # from its lowest number to its highest: beyond, powers of ten are enough
 _MOST = 98  # per cent of the differences that the frame holds at least
 
 
+@styled
 def delivery_curve(paper):
     """Standard uncertainty of volumes and of deliveries from the full tank, against height.
 
@@ -34,28 +33,27 @@ def delivery_curve(paper):
         "volume": np.array([one["volume_m3"] for one in found]),
         "u": np.array([one["u_m3"] for one in found]),
     }
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 2.9))
-        left, right = figure.subplots(1, 2)
-        for one, look, name in (
-            (below, {"color": _GREY}, "volume_below"),
-            (delivered, {"color": INK}, "delivery_from_full"),
-            (worst, {"color": RED, "marker": "o", "markersize": 3, "linestyle": ""}, "worst"),
-        ):
-            left.plot(one["height"], one["u"], label=paper.word(f"axes.{name}"), **look)
-            right.plot(one["height"], 100 * one["u"] / one["volume"], **look)
-        left.set_ylabel(paper.word("axes.u_m3"))
-        left.set_ylim(bottom=0)
-        right.set_ylabel(paper.word("axes.u_percent"))
-        right.set_yscale("log")
-        right.yaxis.set_major_formatter(ScalarFormatter())
-        right.yaxis.set_minor_formatter(_few_decades(right))
-        for ax in (left, right):
-            ax.set_xlabel(paper.word("axes.delivery_height"))
-            ax.set_xlim(0, height_m[-1])
-            ax.grid(True)
-        figure.legend(loc="upper center", ncols=3, frameon=False, fontsize=8)
-        set_margins(figure, left=0.65, right=0.12, bottom=0.42, top=0.32, wspace=0.3)
+    figure = Figure(figsize=(WIDTH, 2.9))
+    left, right = figure.subplots(1, 2)
+    for one, look, name in (
+        (below, {"color": FAINT}, "volume_below"),
+        (delivered, {"color": INK}, "delivery_from_full"),
+        (worst, {"color": RED, "marker": "o", "markersize": 3, "linestyle": ""}, "worst"),
+    ):
+        left.plot(one["height"], one["u"], label=paper.word(f"axes.{name}"), **look)
+        right.plot(one["height"], 100 * one["u"] / one["volume"], **look)
+    left.set_ylabel(paper.word("axes.u_m3"))
+    left.set_ylim(bottom=0)
+    right.set_ylabel(paper.word("axes.u_percent"))
+    right.set_yscale("log")
+    right.yaxis.set_major_formatter(ScalarFormatter())
+    right.yaxis.set_minor_formatter(_few_decades(right))
+    for ax in (left, right):
+        ax.set_xlabel(paper.word("axes.delivery_height"))
+        ax.set_xlim(0, height_m[-1])
+        ax.grid(True)
+    figure.legend(loc="upper center", ncols=3, frameon=False, fontsize=8)
+    set_margins(figure, left=0.65, right=0.12, bottom=0.42, top=0.32, wspace=0.3)
     return figure
 
 
@@ -65,6 +63,7 @@ def _few_decades(ax):
     return ScalarFormatter() if high / low < _SHORT_AXIS else NullFormatter()
 
 
+@styled
 def interval_differences(paper):
     """Ends of Monte Carlo's intervals less those of the GUM intervals, in percent of U."""
     capacity, rows = paper.record["capacity"], paper.record["monte_carlo"]["rows"]
@@ -79,18 +78,17 @@ def interval_differences(paper):
     allowed = tolerance[known] * percent
     largest = np.percentile(np.abs([*ends.values()]), _MOST, axis=1).max(initial=0.0)
     limit = 1.2 * max(largest, np.median(allowed))
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 2.7))
-        ax = figure.subplots()
-        for sign in (-1, 1):
-            ax.plot(height[known], sign * allowed, color=_GREY, linewidth=0.7)
-        for (name, difference), colour in zip(ends.items(), (INK, RED), strict=True):
-            ax.plot(height[known], difference, color=colour, label=paper.word(f"axes.{name}"))
-        ax.set_ylim(-limit, limit)
-        ax.set_xlim(height[0], height[-1])
-        ax.set_xlabel(paper.word("axes.height"))
-        ax.set_ylabel(paper.word("axes.ends_percent"))
-        ax.grid(True)
-        figure.legend(loc="upper center", ncols=2, frameon=False, fontsize=8)
-        set_margins(figure, left=0.65, right=0.12, bottom=0.42, top=0.32)
+    figure = Figure(figsize=(WIDTH, 2.7))
+    ax = figure.subplots()
+    for sign in (-1, 1):
+        ax.plot(height[known], sign * allowed, color=FAINT, linewidth=0.7)
+    for (name, difference), colour in zip(ends.items(), (INK, RED), strict=True):
+        ax.plot(height[known], difference, color=colour, label=paper.word(f"axes.{name}"))
+    ax.set_ylim(-limit, limit)
+    ax.set_xlim(height[0], height[-1])
+    ax.set_xlabel(paper.word("axes.height"))
+    ax.set_ylabel(paper.word("axes.ends_percent"))
+    ax.grid(True)
+    figure.legend(loc="upper center", ncols=2, frameon=False, fontsize=8)
+    set_margins(figure, left=0.65, right=0.12, bottom=0.42, top=0.32)
     return figure
