@@ -410,7 +410,7 @@ def test_the_workbook_of_a_tank_has_the_sheets_beside_its_own(whole):
 
 
 def test_very_many_readings_are_cut_to_the_worst(only, tmp_path, monkeypatch):
-    monkeypatch.setattr(workbook.observations, "MOST_ROWS", 20)
+    monkeypatch.setattr(workbook.survey, "MOST_READINGS", 20)
     workbook.write(only[0], tmp_path / "adjustment.xlsx")
     sheet = openpyxl.load_workbook(tmp_path / "adjustment.xlsx")["Observations"]
     assert sheet.max_row == 4 + 20
@@ -424,7 +424,7 @@ def test_very_many_readings_are_cut_to_the_worst(only, tmp_path, monkeypatch):
 
 def test_of_very_many_points_the_sheet_has_the_weakest(only, tmp_path, monkeypatch):
     record = records.load(only[1] / "record.json")
-    monkeypatch.setattr(workbook.points, "MOST_ROWS", 10)
+    monkeypatch.setattr(workbook.survey, "MOST_POINTS", 10)
     workbook.write(record, tmp_path / "cut.xlsx")
     sheet = openpyxl.load_workbook(tmp_path / "cut.xlsx")["Adjusted points"]
     names = [sheet.cell(row, 1).value for row in range(5, sheet.max_row + 1)]

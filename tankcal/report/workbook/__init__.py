@@ -6,18 +6,24 @@ No number is computed here. What stands in a cell is the record's value, at most
 
 from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.calculator import calculator_sheets, factor_sheet
-from tankcal.report.workbook.cameras import cameras_sheet
 from tankcal.report.workbook.capacity import capacity_sheet
 from tankcal.report.workbook.certificate import certificate_sheet
 from tankcal.report.workbook.charts import charts_sheets
 from tankcal.report.workbook.millimetres import millimetres_sheet
-from tankcal.report.workbook.observations import observations_sheet
 from tankcal.report.workbook.papers import corrections_sheet, courses_sheet, provenance_sheet
 from tankcal.report.workbook.parts import densities_sheet, inside_sheet, proportional_parts_sheet
-from tankcal.report.workbook.points import points_sheet
-from tankcal.report.workbook.rule import rule_sheet
-from tankcal.report.workbook.survey import adjustment_sheet
-from tankcal.report.workbook.uncertainty import budget_sheet, deliveries_sheet, monte_carlo_sheet
+from tankcal.report.workbook.survey import (
+    adjustment_sheet,
+    cameras_sheet,
+    observations_sheet,
+    points_sheet,
+)
+from tankcal.report.workbook.uncertainty import (
+    budget_sheet,
+    deliveries_sheet,
+    monte_carlo_sheet,
+    rule_sheet,
+)
 from tankcal.text.words import in_language, language_of, load_words
 
 # What a gauger uses and an owner prints. The others are for reviewers and programs, and hidden:

@@ -1,6 +1,19 @@
-"""The sheet Adjustment of a survey: statistics, groups, datum, instruments and check points."""
+"""The sheets of an adjusted survey: Adjustment, Points, Observations, Cameras and photos."""
 
-from tankcal.report.tables.survey import CHECK_POINTS, GROUPS, INSTRUMENTS, SYSTEMS
+from tankcal.record.plain_data import rows_of
+from tankcal.report.tables.survey import (
+    CHECK_POINTS,
+    GROUPS,
+    INSTRUMENTS,
+    PHOTOS,
+    POINTS,
+    READINGS,
+    SYSTEMS,
+    camera_rows,
+    camera_table,
+    in_their_units,
+    point_rows,
+)
 from tankcal.report.workbook.look import in_mm, number_format
 from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import decimals_of
@@ -13,9 +26,12 @@ from tankcal.text.words import (
     verdict_sentences,
 )
 
+MOST_READINGS = 5_000  # of the sheet: those with the largest |w|
+MOST_POINTS = 5_000  # of the sheet: those that were not used, then the weakest
 _LEAST = (34, 12)  # widths of the first columns, where labels and values stand
 _HEAD_ROW = 3
 _MOST_ASIDE = 50  # sentences on points that were set aside
+_MOST_LETTERS = 200  # of the names of photographs in a heading
 
 
 def adjustment_sheet(book, record):
@@ -91,3 +107,110 @@ def _sentences(book, sheet, row, sentences, widths):
         book.paragraph(sheet, row, sentence, widths)
         row += 1
     return row + bool(sentences)
+
+
+# ---- points
+
+
+def points_sheet(book, record):
+    """Every surveyed point with its residual, and why it was rejected when it was.
+
+    Of an adjusted survey with sds and error ellipsoids; without a tank with nothing else.
+    """
+    of_tank = record["capacity"] is not None
+    code = "points" if of_tank else "adjusted_points"
+    used = sum(row["used"] for row in record["points"]) if of_tank else 0
+    subtitle = book.word(f"texts.{code}_subtitle", count=len(record["points"]), used=used)
+    shown = _weakest(record["points"])
+    if len(shown) == MOST_POINTS:
+        subtitle = book.word("texts.weakest_points", text=subtitle, shown=len(shown))
+    sheet = book.sheet(code, subtitle, landscape=True)
+    without_sds = {} if record["adjustment"] else {f"s{axis}_m": {"sheet": None} for axis in "xyz"}
+    columns = columns_of(book, POINTS.but(**without_sds), point_rows(record, shown))
+    set_widths(book, sheet, columns)
+    muted = [index for index, row in enumerate(shown) if of_tank and not row["used"]]
+    if shown:
+        book.table(sheet, _HEAD_ROW, "points", columns, muted=muted, autofilter=True)
+    book.freeze(sheet, _HEAD_ROW, 1)
+
+
+def _weakest(rows):
+    """The rows, in their order; of very many those not used, then those with the largest sds."""
+    if len(rows) < MOST_POINTS:
+        return rows
+
+    def rank(i):
+        covariance = rows[i]["cov_m2"]
+        variance = 0.0 if covariance is None else sum(covariance[k][k] for k in range(3))
+        return rows[i]["used"] is not False, -variance
+
+    return [rows[i] for i in sorted(sorted(range(len(rows)), key=rank)[:MOST_POINTS])]
+
+
+# ---- observations
+
+
+def observations_sheet(book, record):
+    """One row a reading, to be filtered; those set aside stand back and say so."""
+    readings = record["adjustment"]["residuals"]
+    count = len(readings["w"])
+    subtitle = book.word("texts.residuals_subtitle")
+    if count > MOST_READINGS:
+        subtitle = book.word("texts.worst_subtitle", shown=MOST_READINGS, all=count)
+        readings = _worst(readings)
+    rows = rows_of(in_their_units(readings))
+    sheet = book.sheet("observations", subtitle, landscape=True)
+    columns = columns_of(book, READINGS, rows)
+    set_widths(book, sheet, columns)
+    muted = [i for i, row in enumerate(rows) if row["removed"]]
+    book.table(sheet, _HEAD_ROW, "observations", columns, muted=muted, autofilter=True)
+    book.freeze(sheet, _HEAD_ROW, 1)
+
+
+def _worst(readings):
+    """The worst readings, in their order: those set aside first, then by test quantity."""
+    rank = [
+        (not removed, -abs(w or 0.0))
+        for removed, w in zip(readings["removed"], readings["w"], strict=True)
+    ]
+    kept = sorted(sorted(range(len(rank)), key=rank.__getitem__)[:MOST_READINGS])
+    return {key: [values[i] for i in kept] for key, values in readings.items()}
+
+
+# ---- cameras and photographs
+
+
+def cameras_sheet(book, record):
+    """Interior orientation with correlations, and the photographs; no sheet without any."""
+    a = record["adjustment"]
+    if not a["photos"]:
+        return
+    sheet = book.sheet("cameras", landscape=True)
+    photos = columns_of(book, PHOTOS)
+    cameras = [
+        columns_of(book, camera_table(camera["free"], book.words), camera_rows(camera))
+        for camera in a["cameras"]
+    ]
+    widths = set_widths(book, sheet, photos, *cameras)
+    title = book.words["headings"]["adjusted_photos"]
+    book.heading(sheet, _HEAD_ROW, title, len(photos))
+    row = _HEAD_ROW + 1
+    row = book.table(sheet, row, "photos", photos, autofilter=True, widths=widths) + 2
+    for number, (camera, columns) in enumerate(zip(a["cameras"], cameras, strict=True), 1):
+        book.heading(sheet, row, _name_of_camera(camera), len(photos))
+        book.put(sheet, row + 1, 0, _model_of_camera(book, camera))
+        row = book.table(sheet, row + 2, f"camera_{number}", columns, widths=widths) + 2
+
+
+def _name_of_camera(camera):
+    if camera["photos"] is None:
+        return camera["camera"]
+    return f"{camera['camera']}: {', '.join(map(str, camera['photos']))}"[:_MOST_LETTERS]
+
+
+def _model_of_camera(book, camera):
+    """The convention of its distortion, and the form of its affinity."""
+    words, form = book.words, camera["affinity"]
+    convention = words["conventions"][camera["convention"]]
+    affinity = words["camera"]["affinities"].get(form, form)
+    return book.word("texts.affinity", convention=convention, affinity=affinity)

@@ -1,6 +1,6 @@
-"""Sheets of the uncertainty: budgets, stated volumes and deliveries, the simulation."""
+"""Sheets of the uncertainty: budgets, stated volumes, deliveries, simulation, decision rule."""
 
-from tankcal.report.uncertainty import budget, monte_carlo
+from tankcal.report.uncertainty import budget, monte_carlo, rule
 from tankcal.report.uncertainty.deliveries import WORST_DELIVERIES, worst_rows
 from tankcal.report.uncertainty.method import stated_table
 from tankcal.report.workbook.look import number_format
@@ -8,6 +8,7 @@ from tankcal.report.workbook.tables import columns_of, set_widths, write_table, 
 from tankcal.text.digits import decimals_of
 
 _HEAD_ROW = 3
+_RULE_FACTS = (40, 16, 16, 16, 16, 16)  # widths of the columns that the facts of a rule go over
 _FACT = 4  # column in which facts of the simulation stand beside their labels
 
 
@@ -98,3 +99,28 @@ def monte_carlo_sheet(book, record):
     head = row + 2
     book.table(sheet, head, "monte_carlo", columns, autofilter=True, widths=widths)
     book.freeze(sheet, head, 1)
+
+
+# ---- decision rule
+
+
+def rule_sheet(book, record):
+    """The rule, its verdict, and its limits; of U first, then of deviations."""
+    paper = book.paper
+    sheet = book.sheet("rule", landscape=True, tab="result")
+    row = _HEAD_ROW
+    for key, text in rule.facts(paper):
+        if text:
+            book.paragraph_in(sheet, row, 1, text, _RULE_FACTS[1:])
+            book.label(sheet, row, paper.label(key), _RULE_FACTS[0])
+            row += 1
+    tables = [("limits", rule.LIMITS)]
+    if record["rule"]["deviation"]:
+        tables += [("deviations", rule.DEVIATIONS), ("acceptance", rule.ACCEPTANCE)]
+    tables = [
+        (book.word(f"headings.{name}"), name, columns_of(book, table)) for name, table in tables
+    ]
+    row = write_tables(book, sheet, row + 1, tables)
+    for text in rule.sentences(paper):
+        book.paragraph(sheet, row, text, (*_RULE_FACTS, *_RULE_FACTS[1:4]))
+        row += 1
