@@ -12,8 +12,7 @@ from tankcal import report
 from tankcal.messages import message
 from tankcal.record.camera_versions import KINDS
 from tankcal.report import folders
-from tankcal.report.camera.paper import CameraPaper
-from tankcal.report.camera.provenance import made_from
+from tankcal.report.camera.paper import CameraPaper, made_from
 from tankcal.report.outputs.csv_files import write_rows
 from tankcal.report.terminal import lines_of
 

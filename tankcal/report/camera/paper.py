@@ -1,8 +1,10 @@
 """A result of the camera's analyses on paper: its values in the words of its language."""
 
+import hashlib
 import json
 from pathlib import Path
 
+import tankcal
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.record.camera_versions import CAMERA
@@ -130,3 +132,13 @@ def _variant(reason):
     if reason.get("volume_change_m3", 0) is None:
         return "_points"
     return "_together" if reason["code"] == "not_determined_without" and "names" in reason else ""
+
+
+def made_from(paths=(), job=None):
+    """{"version", "notice", "files": [{file, sha256}]} of files that were read, and of a job."""
+    files = [] if job is None else [{"file": f.file, "sha256": f.sha256} for f in job.files]
+    for path in map(Path, paths):
+        path = path / "cameras.toml" if path.is_dir() else path
+        files.append({"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()})
+    notice = "" if job is None else str(job.certificate.get("notice", ""))
+    return {"version": tankcal.__version__, "notice": notice, "files": files}

@@ -48,7 +48,10 @@ def write(
 
 def _write(paper, folder, progress):
     """The files of a PlanPaper."""
-    from tankcal.report.planning import empty_job, files, papers, workbook
+    from tankcal.report.pdf import pdf
+    from tankcal.report.planning import empty_job, figures, files, workbook
+    from tankcal.report.planning.field_sheets import sheets
+    from tankcal.report.planning.outlook import outlook
 
     progress(message("plan_writing_job", "writing the empty job"))
     empty_job.write(paper.prediction, folder / JOB)
@@ -56,7 +59,10 @@ def _write(paper, folder, progress):
     files.write(paper, folder, empty_job.fingerprints(folder / JOB))
     workbook.write(paper, folder / "field-sheets.xlsx")
     progress(message("plan_setting_papers", "setting prediction and field sheets"))
-    papers.write(paper, folder)
+    for name, blocks in (("prediction.pdf", outlook(paper)), ("field-sheets.pdf", sheets(paper))):
+        (folder / name).write_bytes(pdf([block.data for block in blocks], folder))
+    if any(not one.why for one in paper.effects):
+        figures.changes(paper).savefig(folder / "changes.png", dpi=150)
 
 
 def refuse_foreign(directory):

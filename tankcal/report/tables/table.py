@@ -135,6 +135,10 @@ class Table:
         columns = [replace(one, **changed.get(one.key, {})) for one in self.columns]
         return replace(self, columns=tuple(columns))
 
+    def only(self, *keys):
+        """The same table with these columns alone."""
+        return replace(self, columns=tuple(one for one in self.columns if one.key in keys))
+
     def _in_order(self, medium, columns):
         later = self.last.get(medium, "").split()
         return sorted(columns, key=lambda one: later.index(one.key) if one.key in later else -1)

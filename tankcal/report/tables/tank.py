@@ -71,6 +71,51 @@ SECTIONS = Table(
     csv_style="%.6f",
 )  # fmt: skip
 
+
+def modes_table(record):
+    """Amplitudes of the form of each section: mode 2 is the ellipse, mode 3 has three lobes."""
+    orders = sorted({mode["k"] for row in record["sections"] for mode in row["modes"]})
+    return Table(
+        "modes",
+        (
+            Column("section", sheet="section", width=9),
+            *(
+                Column(f"mode_{k}_m", "mm", decimals=1, sheet="mode_mm", named={"order": k},
+                       width=9)
+                for k in orders
+            ),
+        ),
+        rows=lambda record: [
+            row | {f"mode_{mode['k']}_m": mode["amplitude_m"] for mode in row["modes"]}
+            for row in record["sections"]
+        ],
+    )  # fmt: skip
+
+
+SHELL = Table(
+    "shell",
+    (
+        Column("height_m", "m", decimals=3, sheet="shell_height_m"),
+        Column("tilt", "mm/m", u="tilt_sd", sheet="tilt_mm_m"),
+        Column("tilt_sd", "mm/m", u="tilt_sd", sheet="u_tilt_mm_m"),
+        Column("tilt_azimuth_deg", "deg", decimals=1, sheet="tilt_azimuth_deg"),
+        Column("residual_sd_m", "mm", decimals=2, sheet="residual_sd_mm"),
+    ),
+    rows=lambda record: [record["shell"]],
+)
+
+DEVIATIONS = Table(
+    "deviations_of_points",
+    (
+        Column("point", sheet="point", width=20),
+        Column("course", sheet="course", width=14, optional=True),
+        Column("section", sheet="section", width=14, optional=True),
+        Column("azimuth_deg", "deg", decimals=2, sheet="azimuth_deg", width=16, optional=True),
+        Column("z_m", "m", decimals=3, sheet="of_m", named={"axis": "z"}, width=14, optional=True),
+        Column("residual_mm", "image mm", decimals=1, sheet="residual_mm", width=16),
+    ),
+)
+
 REJECTED = Table(
     "rejected",
     (

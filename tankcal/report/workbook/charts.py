@@ -3,8 +3,9 @@
 from itertools import groupby
 from math import floor, log10
 
-from tankcal.report.workbook.look import ACCENT, in_mm, values_of
-from tankcal.report.workbook.tables import set_widths
+from tankcal.report.tables.tank import DEVIATIONS
+from tankcal.report.workbook.look import ACCENT
+from tankcal.report.workbook.tables import columns_of, set_widths
 
 _HEAD_ROW = 3
 _MOST_POINTS = 20_000  # of the sheet Deviations
@@ -75,7 +76,7 @@ def _deviations_sheet(book, rows):
     shown = rows[::every]
     subtitle = book.word("texts.deviations_subtitle", shown=len(shown), all=len(rows))
     sheet = book.sheet("deviations", subtitle, tab="paper")
-    columns = _columns(book, shown)
+    columns = columns_of(book, DEVIATIONS, shown)
     set_widths(book, sheet, columns)
     book.table(sheet, _HEAD_ROW, "radial_deviations", columns)
     book.freeze(sheet, _HEAD_ROW, 1)
@@ -99,7 +100,7 @@ def _of_sections(record):
             "course": section["course"],
             "section": section["section"],
             "azimuth_deg": azimuth,
-            "residual_mm": in_mm(residual),
+            "residual_mm": 1000.0 * residual,
         }
         for section in record["sections"]
         for azimuth, point, residual in sorted(
@@ -112,22 +113,8 @@ def _of_solid(record):
     """One row a used point of a wall without sections, by its height."""
     used = [row for row in record["points"] or [] if row["used"]]
     return [
-        {"point": row["point"], "z_m": row["z_m"], "residual_mm": in_mm(row["residual_m"])}
+        {"point": row["point"], "z_m": row["z_m"], "residual_mm": 1000.0 * row["residual_m"]}
         for row in sorted(used, key=lambda row: row["z_m"])
-    ]
-
-
-def _columns(book, rows):
-    residual = book.column("residual_mm", values_of(rows, "residual_mm"), 1, 16)
-    if "section" not in rows[0]:
-        height = book.column("of_m", values_of(rows, "z_m"), 3, 14, axis="z")
-        return [book.column("point", values_of(rows, "point"), None, 20), height, residual]
-    return [
-        book.column("point", values_of(rows, "point"), None, 20),
-        book.column("course", values_of(rows, "course"), None, 14),
-        book.column("section", values_of(rows, "section"), None, 14),
-        book.column("azimuth_deg", values_of(rows, "azimuth_deg"), 2, 16),
-        residual,
     ]
 
 

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from xlsxwriter.utility import xl_pixel_width
 
-from tankcal.text.digits import decimals_of, decimals_of_height, decimals_of_rows
+from tankcal.text.digits import decimals_of_height
 
 ACCENT = "#1F4E79"
 RULE = "#BFC9D4"
@@ -17,7 +17,6 @@ FONT = {"font_name": "Arial", "font_size": 10}  # or its equal in measure, on ev
 DATE = 14  # Excel's built-in short date: in the order and with the marks of the reader's system
 LINE_PT = 15.0  # height of a line of text
 ROW_PT = 15.75  # of a row of one line: the 13.5 that XlsxWriter takes for Arial 10 clip its digits
-ANGLES = (("ω", "omega"), ("φ", "phi"), ("κ", "kappa"))  # their signs, and keys of the record
 _MOST_LINES = 27  # Excel allows a row 409 pt
 _UNIT_PX = 7  # of width of a column: one digit
 _EMPTY_PX = 8  # of a cell, at both sides of its text
@@ -55,29 +54,9 @@ def number_format(digits, percent=False, unit="", power=False):
     return form + (" %" if percent else "") + (f' "{unit}"' if unit else "")
 
 
-def sd_digits(sds):
-    """Decimals of standard uncertainties in mm, ppm or seconds, two digits of each."""
-    return decimals_of_rows(sds, most=3, unknown=2)
-
-
 def height_digits(heights_m):
     """Decimals of heights: millimetres, or finer where they are."""
     return [3 if one is None else decimals_of_height(one) for one in heights_m]
-
-
-def share_digits(shares, significant=2):
-    """Decimals in percent of shares, each with so many digits."""
-    return [decimals_of(100 * (one or 0), significant=significant) for one in shares]
-
-
-def values_of(rows, key, factor=1.0):
-    """The values of one key, row by row, times a factor."""
-    return [row[key] if row[key] is None or factor == 1.0 else factor * row[key] for row in rows]
-
-
-def in_mm(value_m):
-    """A length in m as mm; None stays None."""
-    return None if value_m is None else value_m * 1000.0
 
 
 def day(text):

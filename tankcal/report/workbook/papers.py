@@ -1,7 +1,7 @@
 """The working papers: courses, corrections, choices and provenance."""
 
 from tankcal.report.tables import tank
-from tankcal.report.workbook.look import in_mm, number_format, values_of
+from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
 
@@ -14,34 +14,10 @@ def courses_sheet(book, record):
     tables = [
         (book.word("headings.courses"), "courses", columns_of(book, tank.COURSES)),
         (book.word("headings.sections"), "sections", columns_of(book, tank.SECTIONS)),
-        (book.word("headings.modes"), "modes", _modes(book, record["sections"])),
-        (book.word("headings.shell"), "shell", _shell(book, record["shell"])),
+        (book.word("headings.modes"), "modes", columns_of(book, tank.modes_table(record))),
+        (book.word("headings.shell"), "shell", columns_of(book, tank.SHELL)),
     ]
     write_tables(book, sheet, _HEAD_ROW, tables)
-
-
-def _modes(book, rows):
-    """Amplitudes of the form of each section: mode 2 is the ellipse, mode 3 has three lobes."""
-    columns = [book.column("section", values_of(rows, "section"), None, 9)]
-    for order in sorted({mode["k"] for row in rows for mode in row["modes"]}):
-        amplitude = [
-            next((in_mm(mode["amplitude_m"]) for mode in row["modes"] if mode["k"] == order), None)
-            for row in rows
-        ]
-        columns.append(book.column("mode_mm", amplitude, 1, 9, order=order))
-    return columns
-
-
-def _shell(book, shell):
-    """The wall as one body: one row."""
-    tilt = decimals_of(in_mm(shell["tilt_sd"]))
-    return [
-        book.column("shell_height_m", [shell["height_m"]], 3),
-        book.column("tilt_mm_m", [in_mm(shell["tilt"])], tilt),
-        book.column("u_tilt_mm_m", [in_mm(shell["tilt_sd"])], tilt),
-        book.column("tilt_azimuth_deg", [shell["tilt_azimuth_deg"]], 1),
-        book.column("residual_sd_mm", [in_mm(shell["residual_sd_m"])], 2),
-    ]
 
 
 def corrections_sheet(book, record):

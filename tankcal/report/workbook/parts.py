@@ -2,10 +2,10 @@
 
 from tankcal.report.numbers import unit
 from tankcal.report.paper import DECIMALS_OF_PARTS
-from tankcal.report.tables.capacity import capacity_rows, capacity_table, parts_table
+from tankcal.report.tables.capacity import capacity_table, parts_table
 from tankcal.report.tables.tank import DEADWOOD
 from tankcal.report.uncertainty.stated import stated_U_m3
-from tankcal.report.workbook.look import Column, height_digits, number_format
+from tankcal.report.workbook.look import Column, number_format
 from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import LITRE_DECIMALS, decimals_of_rows, shortest, with_digits
 from tankcal.text.words import marks_of
@@ -39,29 +39,20 @@ def densities_sheet(book, record):
     subtitle = book.word("texts.densities_subtitle", capacity=name)
     sheet = book.sheet("other_densities", subtitle, tab="result")
     digits = decimals_of_rows(stated_U_m3(capacity), least=LITRE_DECIMALS)
-    heights = capacity["height_m"]
     tables = [(own, capacity["volume_m3"])]
     tables += [(other["density_kg_m3"], other["volume_m3"]) for other in others]
-    columns = [book.column("dip_height_m", heights, height_digits(heights), 13)]
-    for density, volumes in tables:
-        heading = f"{shortest(density, marks_of(book.words))} kg/m³"
-        columns.append(Column(heading, volumes, digits, 16))
-    named = range(2, len(columns))
+    whole = capacity_table(record).but(height_m={"width": 13})
+    columns = columns_of(book, whole.only("height_m", "for_use"))
+    columns[1:1] = [
+        Column(f"{shortest(density, marks_of(book.words))} kg/m³", volumes, digits, 16)
+        for density, volumes in tables
+    ]
     muted = [row for row, good in enumerate(capacity["for_use"]) if not good]
-    if muted:
-        columns.append(_use_column(book, record))
     set_widths(book, sheet, columns)
     last = book.table(sheet, _HEAD_ROW, "other_densities", columns, muted=muted)
     book.freeze(sheet, _HEAD_ROW)
-    for place in named:
+    for place in range(2, 1 + len(tables)):
         book.name(name_of_density(place), sheet, _HEAD_ROW + 1, last, place)
-
-
-def _use_column(book, record):
-    """The column that says which rows are not for use."""
-    table, rows = capacity_table(record), capacity_rows(record)
-    places = [column.key for column in table.in_workbook(rows)]
-    return columns_of(book, table, rows)[places.index("for_use")]
 
 
 def name_of_density(place):

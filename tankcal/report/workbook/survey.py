@@ -14,7 +14,7 @@ from tankcal.report.tables.survey import (
     in_their_units,
     point_rows,
 )
-from tankcal.report.workbook.look import in_mm, number_format
+from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import decimals_of
 from tankcal.text.words import (
@@ -85,7 +85,7 @@ def _statistics(a, words):
 
 def _millimetres(label, size_m):
     """A line with a size in mm, with three digits as in the working papers."""
-    size = in_mm(size_m)
+    size = None if size_m is None else 1000.0 * size_m
     return label, size, number_format(decimals_of(size, significant=3), unit="mm")
 
 

@@ -6,7 +6,6 @@ from tankcal.report.workbook.look import (
     LINE_PT,
     MUTED,
     RULE,
-    Column,
     day,
     lines_in,
     lines_of,
@@ -122,10 +121,6 @@ class Writer:
         sheet.repeat_rows(head_row)
 
     # ---- tables
-
-    def column(self, code, cells, digits=None, width=12, percent=False, **values):
-        """A Column with its heading from [workbook.columns]."""
-        return Column(self.word(f"columns.{code}", **values), cells, digits, width, percent)
 
     def table(self, sheet, row, name, columns, muted=(), autofilter=False, widths=None):
         """An Excel table with its headings in `row`; returns the number of its last row.
