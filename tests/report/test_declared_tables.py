@@ -26,12 +26,14 @@ from tankcal.text.word_files import load_words
 
 ADDED = Column("half_m", "m", decimals=3, heading="tolerance_m3", sheet=True, csv="half_m")
 WORDS = load_words("en")
-OF_THE_WORKBOOK = (
+OF_THE_WORKBOOK = (  # alone
     tank.CHOICES,
+    tank.SHELL,
+    tank.DEVIATIONS,
     survey.INSTRUMENTS,
     rule.ACCEPTANCE,
     monte_carlo.SIMULATED,
-)  # alone
+)
 
 
 def kept(name):
