@@ -42,6 +42,8 @@ def to_plain(value):
         return _object(value)
     if isinstance(value, np.generic):
         return to_plain(value.item())
+    if isinstance(value, str):  # a Message
+        return str(value)
     if isinstance(value, float) and not isfinite(value):
         return None
     return value
