@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tankcal.tank.liquid_zone import Above
+from tankcal.tank.parts import Part, sum_derivatives
 from tankcal.tank.volumes import ShellVolume
 from tankcal.uncertainty import Source, declared_source, factor_of, grouped
 
@@ -82,7 +82,7 @@ def survey_factors(covariance, dof=np.inf, causes=(), effects=()):
 
 
 @dataclass(frozen=True)
-class ShellPart:
+class ShellPart(Part):
     """The shell of courses as a part; it has nothing below the bottom of its first course.
 
     volume           inside, at the table's temperature
@@ -103,6 +103,11 @@ class ShellPart:
     stretch: float = 1.0
     bearing: tuple[str, ...] = ()
     tilt: float = 0.0
+
+    @property
+    def breakpoints_m(self):
+        """Bottoms of the courses."""
+        return tuple(course.bottom_m for course in self.volume.courses)
 
     def volume_m3(self, levels_m):
         """(rows,) volume of the shell below each level."""
@@ -155,7 +160,7 @@ class ShellPart:
 
 
 @dataclass(frozen=True)
-class SolidPart:
+class SolidPart(Part):
     """A tank of one solid (lying cylinder, sphere, mesh) at the table's temperature.
 
     solid            a part whose lengths are at that temperature already
@@ -166,7 +171,7 @@ class SolidPart:
     unused           names of the solid's inputs that have no meaning in this job
     """
 
-    solid: object
+    solid: Part
     scale: float = 1.0
     expansion_per_k: float = 0.0
     warmed: bool = False
@@ -212,25 +217,24 @@ class Body:
     declared            inputs with name, u (SI), u_as_read, unit, type, distribution, dof, note,
                         is_default
     lowest_m, highest_m levels between which there is a tank, in the frame of the parts
-    breakpoints_m       levels at which the free surface jumps: joints, edges of what stands or
-                        floats inside
     correlations        (name, name, r) of declared inputs
     estimates           {name of an input: its value, in the unit it is declared in}
+    shell               the shell of courses that is among the parts; None for a tank without
     """
 
-    parts: tuple
+    parts: tuple[Part, ...]
     declared: tuple
     lowest_m: float
     highest_m: float
-    breakpoints_m: tuple[float, ...] = ()
     correlations: tuple = ()
     estimates: dict = field(default_factory=dict)
+    shell: ShellPart | None = None
 
     @property
-    def shell(self):
-        """The shell of courses among the parts; None for a tank without."""
-        inner = (getattr(part, "part", part) for part in self.parts)  # above a measured zone
-        return next((part for part in inner if isinstance(part, ShellPart)), None)
+    def breakpoints_m(self):
+        """Levels at which the free surface jumps: joints, edges of what stands or floats inside."""
+        every = {edge for part in self.parts for edge in part.breakpoints_m}
+        return tuple(sorted(edge for edge in every if np.isfinite(edge)))
 
     def volume_m3(self, levels_m):
         """(rows,) volume below each level.
@@ -254,7 +258,7 @@ class Body:
     def derivatives(self, levels_m):
         """{input: (rows,) or (rows, c)} of all parts together, m3 per SI unit."""
         levels_m = self._inside(levels_m)
-        return summed(part.derivatives(levels_m) for part in self.parts)
+        return sum_derivatives(part.derivatives(levels_m) for part in self.parts)
 
     def _inside(self, levels_m):
         """The levels; the top for those less than a millimetre above it."""
@@ -269,32 +273,18 @@ class Body:
         Never below empty; above the top the tank goes on as wide as it is there.
         """
         levels = np.asarray(levels_m, dtype=float)
-        return sum(self._moved(part, levels, step_m) for part in self.parts)
-
-    def _moved(self, part, levels_m, step_m):
-        if "datum" not in part.derivatives(levels_m[:1]):
-            return part.volume_m3(levels_m)
-        if isinstance(part, Above):
-            upper = np.maximum(levels_m, part.level_m)
-            lower = np.full(len(levels_m), part.level_m)
-            return self._moved(part.part, upper, step_m) - self._moved(part.part, lower, step_m)
-        moved = levels_m + step_m
-        inside = np.clip(moved, self.lowest_m, self.highest_m)
-        over = np.maximum(moved - self.highest_m, 0.0)
-        volume = part.volume_m3(inside)
-        if not np.any(over):
-            return volume
-        return volume + over * part.area_m2(np.array([self.highest_m]))[0]
+        ends = self.lowest_m, self.highest_m
+        return sum(part.moved_m3(levels, step_m, *ends) for part in self.parts)
 
     def undeclared(self):
         """Names of the inputs that move some volume of the tank and have no declared u.
 
         The scale of an instrument that was adjusted along stands for the scale of the survey.
         """
-        moved = self.derivatives(np.linspace(self.lowest_m, self.highest_m, LEVELS))
+        levels = np.linspace(self.lowest_m, self.highest_m, LEVELS)
+        moved = self.derivatives(levels)
         known = {one.name for one in self.declared}
-        factors = [one for part in self.parts for one in getattr(part, "factors", ())]
-        if any(one.kind == OWN_SCALE for one in factors):
+        if any(one.kind == OWN_SCALE for part in self.parts for one in part.sources(levels)):
             known.add("scale")
         return tuple(name for name, by in moved.items() if name not in known and _bears(by))
 
@@ -305,18 +295,14 @@ class Body:
     def rows(self, levels_m):
         """(volumes, areas, sources) of a table, each as its own method gives it, at one go.
 
-        The derivative by "datum" is that by the level, so it serves as the area, too; not that of
-        a part that counts from a level up, which goes with the zero.
+        The derivative by "datum" is that by the level, so it serves as the area, too.
         """
         inside = self._inside(levels_m)
         derivatives = [part.derivatives(inside) for part in self.parts]
         area = sum(
-            found["datum"]
-            if "datum" in found and not isinstance(part, Above)
-            else part.area_m2(inside)
-            for part, found in zip(self.parts, derivatives, strict=True)
+            part.area_by(found, inside) for part, found in zip(self.parts, derivatives, strict=True)
         )
-        return self.volume_m3(levels_m), area, self._sources(inside, summed(derivatives))
+        return self.volume_m3(levels_m), area, self._sources(inside, sum_derivatives(derivatives))
 
     def _sources(self, levels_m, derivatives):
         own = [source for part in self.parts for source in part.sources(levels_m)]
@@ -334,12 +320,3 @@ def _bears(by):
     The heights of several courses do, even where a nominal tank has equal ones: no real tank has.
     """
     return (by.ndim == 2 and by.shape[1] > 1) or bool(np.any(by != 0))
-
-
-def summed(derivatives):
-    """{input: sum} of what several parts give by each input."""
-    total = {}
-    for found in derivatives:
-        for name, by in found.items():
-            total[name] = total[name] + by if name in total else by
-    return total

@@ -16,7 +16,8 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.tank.soundings import surveyed_surface
+from tankcal.tank.parts import Part, as_levels
+from tankcal.tank.soundings import SurveyedSurface, surveyed_surface
 from tankcal.tank.terrain import Surface, surface
 from tankcal.uncertainty import Source
 
@@ -25,7 +26,7 @@ LEAN_AZIMUTHS = 720  # of the triangles of a leaning plate
 
 
 @dataclass(frozen=True)
-class ShapedBottom:
+class ShapedBottom(Part):
     """A level plate, a cone, or a dish that is part of a sphere; its edge lies at level 0.
 
     Over an outline that is no circle the form is that over a circle, drawn out to the outline along
@@ -39,32 +40,38 @@ class ShapedBottom:
     form: str
     centre_m: float
     plan_m2: float
+    kind = "bottom"
 
     @property
     def lowest_m(self):
         """Level at which the tank is empty."""
         return min(self.centre_m, 0.0)
 
+    @property
+    def breakpoints_m(self):
+        """Where the tank is empty."""
+        return (self.lowest_m,)
+
     def volume_m3(self, levels_m):
         """(rows,) closed form: a cone holds A d^3 / (3 H^2), a dish pi d^2 (R - d / 3).
 
         d is the depth at the centre, H that of the edge, R the radius of the sphere.
         """
-        levels, rise = _rows(levels_m), self.centre_m
+        levels, rise = as_levels(levels_m), self.centre_m
         if rise <= 0:
             return self._tip_m3(np.clip(levels - rise, 0, -rise))
         return self._tip_m3(rise - np.clip(levels, 0, rise)) - self._tip_m3(rise)
 
     def area_m2(self, levels_m):
         """(rows,) derivative of `volume_m3` by the level."""
-        return self._wet_m2(levels_m) - self.plan_m2 * (_rows(levels_m) >= 0)
+        return self._wet_m2(levels_m) - self.plan_m2 * (as_levels(levels_m) >= 0)
 
     def derivatives(self, levels_m):
         """{input: (rows,)} by "datum" (level), "bottom" and "scale", m3 per SI unit.
 
         bottom lifts the whole bottom: minus its wetted plan area. scale stretches the plan.
         """
-        levels, rise = _rows(levels_m), self.centre_m
+        levels, rise = as_levels(levels_m), self.centre_m
         by_scale = 2 * self.volume_m3(levels)
         if self.form == "dish":
             sag = np.clip(levels - rise, 0, -rise) if rise < 0 else rise - np.clip(levels, 0, rise)
@@ -75,10 +82,6 @@ class ShapedBottom:
             "bottom": -self._wet_m2(levels),
             "scale": by_scale,
         }
-
-    def sources(self, levels_m):
-        """None of its own."""
-        return ()
 
     @property
     def _sphere_m(self):
@@ -101,7 +104,7 @@ class ShapedBottom:
         return self.plan_m2 / abs(self.centre_m) * depth**2
 
     def _wet_m2(self, levels_m):
-        levels, rise = _rows(levels_m), self.centre_m
+        levels, rise = as_levels(levels_m), self.centre_m
         if rise == 0:
             return self.plan_m2 * (levels >= 0)
         if rise < 0:
@@ -146,7 +149,7 @@ def shaped_bottom(form, plan_m2, centre_m=0.0):
 
 
 @dataclass(frozen=True)
-class SurfaceBottom:
+class SurfaceBottom(Part):
     """A bottom given as a surface of triangles: a leaning plate, or surveyed points.
 
     surface   over the plan (`terrain.Surface`)
@@ -154,22 +157,28 @@ class SurfaceBottom:
     """
 
     surface: Surface
-    survey: object = None
+    survey: SurveyedSurface | None = None
+    kind = "bottom"
 
     @property
     def lowest_m(self):
         """Level at which the tank is empty."""
         return self.surface.lowest_m
 
+    @property
+    def breakpoints_m(self):
+        """Where the tank is empty."""
+        return (self.lowest_m,)
+
     def volume_m3(self, levels_m):
         """(rows,) exact for the surface."""
-        volume, _ = self.surface.volume_and_area(_rows(levels_m))
-        return volume - self._plan_m2 * np.maximum(_rows(levels_m), 0)
+        volume, _ = self.surface.volume_and_area(as_levels(levels_m))
+        return volume - self._plan_m2 * np.maximum(as_levels(levels_m), 0)
 
     def area_m2(self, levels_m):
         """(rows,) derivative of `volume_m3` by the level."""
-        _, wet = self.surface.volume_and_area(_rows(levels_m))
-        return wet - self._plan_m2 * (_rows(levels_m) >= 0)
+        _, wet = self.surface.volume_and_area(as_levels(levels_m))
+        return wet - self._plan_m2 * (as_levels(levels_m) >= 0)
 
     def derivatives(self, levels_m):
         """{input: (rows,)} by "datum" (level), "bottom" and "scale", m3 per SI unit.
@@ -177,7 +186,7 @@ class SurfaceBottom:
         bottom lifts the whole bottom: minus its wetted plan area. scale stretches the plan; a
         leaning plate keeps its slope, surveyed points their heights.
         """
-        levels = _rows(levels_m)
+        levels = as_levels(levels_m)
         volume, wet = self.surface.volume_and_area(levels)
         by_scale = 2 * (volume - self._plan_m2 * np.maximum(levels, 0))
         if self.survey is None:
@@ -199,7 +208,7 @@ class SurfaceBottom:
         edges = np.append(self.surface.lowest_m, self.survey.edges_m)
         _, at_edges = self.surface.volume_and_area(edges)
         at_edges[0] = 0.0
-        _, wet = self.surface.volume_and_area(_rows(levels_m))
+        _, wet = self.surface.volume_and_area(as_levels(levels_m))
         share = np.column_stack([np.interp(wet, at_edges, unit) for unit in np.eye(len(edges))[1:]])
         return (
             Source("bottom_points", share @ self.survey.noise_m3, self.survey.noise_dof),
@@ -226,7 +235,3 @@ def surveyed_bottom(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0)):
     """The bottom through surveyed points; arguments and errors of `soundings.surveyed_surface`."""
     survey = surveyed_surface(footprint, xyz_m, sd_m, slope)
     return SurfaceBottom(survey.surface, survey)
-
-
-def _rows(levels_m):
-    return np.atleast_1d(np.asarray(levels_m, dtype=float))

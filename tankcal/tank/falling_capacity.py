@@ -4,7 +4,6 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
-from tankcal.tank.liquid_zone import Above
 
 ROUNDING = 1e-9  # of the capacity: a table that falls by less does not
 
@@ -42,18 +41,17 @@ def _cause(job, body, dips_m, zero_m):
     """(file, column, words) of what takes most between two dips; no file: the wall itself."""
     takes = []
     for part in body.parts:
-        inner = part.part if isinstance(part, Above) else part
         low, high = part.volume_m3(dips_m + zero_m)
-        takes.append((float(high - low), type(inner).__name__))
+        takes.append((float(high - low), part.kind))
     _, kind = min(takes)
-    if kind == "Deadwood":
+    if kind == "deadwood":
         low, high = dips_m
         deepest = min(job.deadwood, key=lambda one: _between(one, low, high))
         named = message("deadwood_named", "deadwood {name}", name=deepest.name)
         return "deadwood.csv", "volume_m3", named
-    if kind == "FloatingRoof":
+    if kind == "roof":
         return "job.toml", "roof.mass_kg", message("floating_roof", "the floating roof")
-    if kind in ("ShellPart", "SolidPart", "Head", "LiquidHead"):
+    if kind == "wall":
         return None, None, message("wall_itself", "the wall itself")
     return "job.toml", "bottom", message("its_bottom", "the bottom")
 

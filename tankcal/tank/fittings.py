@@ -9,13 +9,14 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.messages import message
+from tankcal.tank.parts import Part, as_levels
 from tankcal.uncertainty import Source
 
 AIR_KG_M3, WEIGHTS_KG_M3 = 1.2, 8000.0  # of conventional weighing (OIML D 28)
 
 
 @dataclass(frozen=True)
-class Deadwood:
+class Deadwood(Part):
     """Items inside (negative volume) or beside a tank (positive), each linear in height.
 
         V(h) = sum v_i (h - b_i) / (t_i - b_i), kept between 0 and v_i
@@ -33,11 +34,17 @@ class Deadwood:
     tops_m: np.ndarray
     volumes_m3: np.ndarray
     u_m3: np.ndarray
+    kind, moves_with_zero = "deadwood", True
 
     @property
     def lowest_m(self):
         """Lowest level of an item that adds to the capacity; inf when none does."""
         return float(np.min(self.bottoms_m[self.volumes_m3 > 0], initial=np.inf))
+
+    @property
+    def breakpoints_m(self):
+        """Bottoms and tops of the items."""
+        return (*self.bottoms_m.tolist(), *self.tops_m.tolist())
 
     def volume_m3(self, levels_m):
         """(rows,) sum of what each item has below each level."""
@@ -45,7 +52,7 @@ class Deadwood:
 
     def area_m2(self, levels_m):
         """(rows,) derivative of `volume_m3` by the level; the upper side where an item begins."""
-        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))
+        levels = as_levels(levels_m)
         tall = self.tops_m > self.bottoms_m
         low, high = self.bottoms_m[tall], self.tops_m[tall]
         here = (levels >= low[:, None]) & (levels < high[:, None])
@@ -79,7 +86,7 @@ class Deadwood:
 
     def _parts(self, levels_m):
         """(rows, n) which part of each item lies below each level."""
-        above = np.atleast_1d(np.asarray(levels_m, dtype=float)) - self.bottoms_m[:, None]
+        above = as_levels(levels_m) - self.bottoms_m[:, None]
         heights = (self.tops_m - self.bottoms_m)[:, None]
         step = heights == 0
         linear = np.clip(above / np.where(step, 1.0, heights), 0.0, 1.0)
@@ -125,7 +132,7 @@ def deadwood(names, bottoms_m, tops_m, volumes_m3, u_m3=None):
 
 
 @dataclass(frozen=True)
-class FloatingRoof:
+class FloatingRoof(Part):
     """What a floating roof displaces: nothing below its critical zone, all of it above.
 
     Between the critical levels the roof rests partly on its legs: what is given there, linear in
@@ -143,10 +150,11 @@ class FloatingRoof:
     critical_top_m: float
     reference_density_kg_m3: float
     weighing: str
+    kind, moves_with_zero = "roof", True
 
     @property
-    def not_for_use(self):
-        """(low, high) levels of the critical zone, m."""
+    def breakpoints_m(self):
+        """(low, high) levels of the critical zone, which is not for use, m."""
         return (self.critical_bottom_m, self.critical_top_m)
 
     def displacement_m3(self, density_kg_m3=None):
@@ -177,8 +185,8 @@ class FloatingRoof:
 
     def area_m2(self, levels_m):
         """(rows,) derivative of `volume_m3` by the level; 0 outside the critical zone."""
-        low, high = self.not_for_use
-        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))
+        low, high = self.breakpoints_m
+        levels = as_levels(levels_m)
         return np.where(
             (levels >= low) & (levels < high), -self.displacement_m3() / (high - low), 0
         )
@@ -188,13 +196,9 @@ class FloatingRoof:
         by_mass = -self._per_kg(self.reference_density_kg_m3) * self._afloat(levels_m)
         return {"roof_mass": by_mass}
 
-    def sources(self, levels_m):
-        """None of its own: the mass is a declared input."""
-        return ()
-
     def _afloat(self, levels_m):
-        low, high = self.not_for_use
-        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))
+        low, high = self.breakpoints_m
+        levels = as_levels(levels_m)
         return np.clip((levels - low) / (high - low), 0.0, 1.0)
 
     def _per_kg(self, density):

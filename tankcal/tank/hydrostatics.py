@@ -25,6 +25,7 @@ import numpy as np
 from tankcal.errors import HeightError, SolutionError
 from tankcal.messages import message
 from tankcal.tank.courses import CourseShape
+from tankcal.tank.parts import Part, as_levels
 from tankcal.tank.volumes import ShellVolume
 
 STANDARD_GRAVITY = 9.80665  # m/s2
@@ -58,7 +59,7 @@ class Hoop:
 
 
 @dataclass(frozen=True)
-class LiquidHead:
+class LiquidHead(Part):
     """The part of a tank that the head of the liquid adds to the shell as it was surveyed.
 
     volume   the shell as surveyed
@@ -73,6 +74,11 @@ class LiquidHead:
     density_kg_m3: float
     survey_density_kg_m3: float
     survey_level_m: float
+
+    @property
+    def breakpoints_m(self):
+        """Bottoms of the courses."""
+        return tuple(hoop.course.bottom_m for hoop in self.hoops)
 
     def with_density(self, density_kg_m3):
         """The same shell and survey, for a table of another density of the liquid."""
@@ -100,10 +106,6 @@ class LiquidHead:
         """
         return dict(zip(INPUTS, self._sums(levels_m)[1:], strict=True))
 
-    def sources(self, levels_m):
-        """None: all its inputs are shared with other parts."""
-        return ()
-
     def widening_m(self, heights_m, level_m):
         """(len(heights),) change of the surveyed radius with the table's liquid up to level_m.
 
@@ -118,7 +120,7 @@ class LiquidHead:
 
     def _sums(self, levels_m):
         """(1 + inputs, rows) volume and its derivatives."""
-        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))
+        levels = as_levels(levels_m)
         top = self.volume.height_m
         inside = levels <= top * (1 + 1e-12)
         if not np.all(inside):

@@ -7,11 +7,12 @@ from scipy.interpolate import PchipInterpolator
 
 from tankcal.errors import HeightError, SolutionError
 from tankcal.messages import message
+from tankcal.tank.parts import Part, as_levels
 from tankcal.uncertainty import Source
 
 
 @dataclass(frozen=True)
-class MeasuredBottom:
+class MeasuredBottom(Part):
     """The lowest zone of a tank, measured by liquid; it stands for all that is in that zone.
 
     All other parts count from `highest_m` up only (`Above`): the measured volumes hold shell,
@@ -27,6 +28,7 @@ class MeasuredBottom:
     volumes_m3: np.ndarray
     errors_m3: np.ndarray
     curve: PchipInterpolator
+    kind, moves_with_zero = "bottom", True
 
     @property
     def lowest_m(self):
@@ -39,6 +41,11 @@ class MeasuredBottom:
         """Level above which the other parts count."""
         return float(self.levels_m[-1])
 
+    @property
+    def breakpoints_m(self):
+        """Both ends of the zone."""
+        return (self.lowest_m, self.highest_m)
+
     def volume_m3(self, levels_m):
         """(rows,) the measured capacity, above `highest_m` that of `highest_m`.
 
@@ -49,7 +56,7 @@ class MeasuredBottom:
 
     def area_m2(self, levels_m):
         """(rows,) derivative of `volume_m3` by the level; 0 from `highest_m` up."""
-        inside = (_rows(levels_m) >= self.levels_m[0]) & (_rows(levels_m) < self.highest_m)
+        inside = (as_levels(levels_m) >= self.levels_m[0]) & (as_levels(levels_m) < self.highest_m)
         return np.where(inside, self.curve(self._measured(levels_m), 1), 0.0)
 
     def derivatives(self, levels_m):
@@ -73,7 +80,7 @@ class MeasuredBottom:
         )
 
     def _measured(self, levels_m):
-        levels, lowest = _rows(levels_m), self.levels_m[0]
+        levels, lowest = as_levels(levels_m), self.levels_m[0]
         if self.volumes_m3[0] > 0 and not np.all(levels >= lowest):
             raise HeightError(
                 message(
@@ -133,14 +140,29 @@ def measured_bottom(levels_m, volumes_m3, u_m3=None):
 
 
 @dataclass(frozen=True)
-class Above:
+class Above(Part):
     """Another part of the tank, counted from a level up: P(L) - P(level) for L above it, else 0.
 
     Its derivatives and sources likewise, so that what a measured zone replaced cancels.
     """
 
-    part: object
+    part: Part
     level_m: float
+
+    @property
+    def kind(self):
+        """That of the part."""
+        return self.part.kind
+
+    @property
+    def moves_with_zero(self):
+        """That of the part."""
+        return self.part.moves_with_zero
+
+    @property
+    def breakpoints_m(self):
+        """Those of the part."""
+        return self.part.breakpoints_m
 
     def volume_m3(self, levels_m):
         """(rows,) contribution above the level."""
@@ -149,7 +171,7 @@ class Above:
 
     def area_m2(self, levels_m):
         """(rows,) derivative of `volume_m3` by the level."""
-        levels = _rows(levels_m)
+        levels = as_levels(levels_m)
         area = self.part.area_m2(np.maximum(levels, self.level_m))
         return np.where(levels >= self.level_m, area, 0.0)
 
@@ -166,9 +188,20 @@ class Above:
             for source in self.part.sources(self._and_own(levels_m))
         )
 
+    def area_by(self, derivatives, levels_m):
+        """`area_m2`: the derivative by "datum" is not it, for the level goes with the zero."""
+        return self.area_m2(levels_m)
+
+    def moved_m3(self, levels_m, step_m, lowest_m, highest_m):
+        """Those of the part, less the same at `level_m`, which goes with the zero."""
+        if self.moves_with_zero:
+            return self.volume_m3(levels_m)
+        upper = np.maximum(levels_m, self.level_m)
+        lower = np.full(len(levels_m), self.level_m)
+        above, below = (
+            self.part.moved_m3(ends, step_m, lowest_m, highest_m) for ends in (upper, lower)
+        )
+        return above - below
+
     def _and_own(self, levels_m):
-        return np.append(np.maximum(_rows(levels_m), self.level_m), self.level_m)
-
-
-def _rows(levels_m):
-    return np.atleast_1d(np.asarray(levels_m, dtype=float))
+        return np.append(np.maximum(as_levels(levels_m), self.level_m), self.level_m)

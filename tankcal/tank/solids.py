@@ -12,13 +12,14 @@ import numpy as np
 from tankcal.errors import HeightError, SolutionError
 from tankcal.messages import message
 from tankcal.tank.heads import Bow, Cut, End, Line, depth_of, integrate, meridian
+from tankcal.tank.parts import Part
 
 ROUNDING = 1e-9  # of the highest dip: a dip so little outside is the top or the bottom itself
 FLAT = End("flat")
 
 
 @dataclass(frozen=True)
-class LyingTank:
+class LyingTank(Part):
     """A lying cylinder, round or elliptical, between two ends, tilted and rolled: exact.
 
     width_m, height_m  inside axes of the section, square to the axis; equal when it is round
@@ -155,10 +156,6 @@ class LyingTank:
             "scale": 3 * volume - levels * datum,
         }
 
-    def sources(self, levels_m):
-        """No sources of its own: everything that is uncertain is a named input."""
-        return ()
-
     @cached_property
     def _pieces(self):
         """Arcs of the meridian with their place along the axis, s = origin + way x."""
@@ -239,7 +236,7 @@ class _Piece:
 
 
 @dataclass(frozen=True)
-class Sphere:
+class Sphere(Part):
     """A spherical tank; dips count from its lowest inside point: V = pi d^2 (3 R - d) / 3.
 
     Source: API MPMS 2.2D; closed form. Raises SolutionError for a diameter that is not above zero.
@@ -286,10 +283,6 @@ class Sphere:
             "datum": self.area_m2(levels_m),
             "scale": self.diameter_m * by_diameter,
         }
-
-    def sources(self, levels_m):
-        """No sources of its own: everything that is uncertain is a named input."""
-        return ()
 
 
 def _inside(levels_m, top_m):

@@ -9,6 +9,7 @@ from shapes import azimuths, ring, section_of
 
 from tankcal.tank.body import Body, Factor, ShellPart, SolidPart
 from tankcal.tank.courses import course_shape
+from tankcal.tank.parts import Part
 from tankcal.tank.solids import Sphere
 from tankcal.tank.volumes import ShellVolume
 from tankcal.uncertainty import Source
@@ -23,7 +24,7 @@ class Declared:
 
 
 @dataclass(frozen=True)
-class Slab:
+class Slab(Part):
     """A part of constant area whose volume grows with a shared input."""
 
     area: float

@@ -108,7 +108,7 @@ def test_a_roof_displaces_its_mass_over_the_density():
     volume = roof().volume_m3([0.0, 1.2, 1.4, 1.6, 9.0])
     full = 25_000 / 850  # closed form
     assert volume == pytest.approx([0, 0, -full / 2, -full, -full], rel=1e-12, abs=1e-12)
-    assert roof().not_for_use == (1.2, 1.6)
+    assert roof().breakpoints_m == (1.2, 1.6)
     assert roof().sources([1.0]) == ()
 
 

@@ -8,13 +8,14 @@ from tankcal.errors import HeightError, SolutionError
 from tankcal.tank.bottoms import shaped_bottom
 from tankcal.tank.fittings import deadwood
 from tankcal.tank.liquid_zone import Above, measured_bottom
+from tankcal.tank.parts import Part
 
 AREA = np.pi * 6.5**2
 LEVELS = np.array([-0.15, -0.10, -0.05, 0.0, 0.05, 0.12, 0.20, 0.30])
 U = np.array([0.0, 0.01, 0.02, 0.03, 0.03, 0.025, 0.05, 0.08])
 
 
-class Cylinder:
+class Cylinder(Part):
     """A shell of one radius, as a part (closed form)."""
 
     def volume_m3(self, levels_m):

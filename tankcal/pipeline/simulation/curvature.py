@@ -14,7 +14,7 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.pipeline.tanks import body_of
-from tankcal.tank.body import summed
+from tankcal.tank.parts import sum_derivatives
 
 # A job with one of its inputs moved: what the volume does then is its own answer, not a slope.
 
@@ -174,8 +174,8 @@ def _of_level(body, levels_m, declared):
     u = declared["datum"]
     up = np.minimum(levels_m + u, body.highest_m)
     down = np.maximum(levels_m - u, body.lowest_m)
-    moving = [part for part in body.parts if "datum" in part.derivatives(levels_m[:1])]
-    ends = [summed(part.derivatives(levels) for part in moving) for levels in (up, down)]
+    moving = [part for part in body.parts if not part.moves_with_zero]
+    ends = [sum_derivatives(part.derivatives(levels) for part in moving) for levels in (up, down)]
     span = np.where(up > down, (up - down) / u, 1.0)
     return {
         other: (ends[0][other] - ends[1][other]) / span * u_other

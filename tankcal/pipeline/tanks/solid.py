@@ -40,15 +40,13 @@ def solid_body(job, survey, switches):
     zero = solid_zero(job)
     if switches.deadwood and job.deadwood:
         parts.append(deadwood_part(job.deadwood, zero))
-    edges = {zero + edge for item in job.deadwood for edge in (item.bottom_m, item.top_m)}
     return Body(
         tuple(parts),
         job.inputs,
-        0.0,
-        solid.top_m,
-        tuple(sorted(edges)),
-        job.correlations,
-        estimates_of(job),
+        lowest_m=0.0,
+        highest_m=solid.top_m,
+        correlations=job.correlations,
+        estimates=estimates_of(job),
     )
 
 

@@ -15,6 +15,7 @@ from tankcal.tank.courses import course_shape
 from tankcal.tank.fittings import floating_roof
 from tankcal.tank.hydrostatics import liquid_head
 from tankcal.tank.liquid_zone import Above, measured_bottom
+from tankcal.tank.parts import Part
 from tankcal.tank.terrain import Footprint
 from tankcal.tank.volumes import ShellVolume
 from tankcal.uncertainty import factor_of
@@ -23,20 +24,26 @@ from tankcal.uncertainty import factor_of
 
 
 @dataclass(frozen=True)
-class Widened:
+class Widened(Part):
     """Another part with derivatives by what widens the shell.
 
     part   with a derivative by "scale"
     rates  {input: relative growth of the shell's lengths by SI unit of the input}
     """
 
-    part: object
+    part: Part
     rates: dict
+    kind = "bottom"
 
     @property
     def lowest_m(self):
         """Level at which the tank is empty."""
         return self.part.lowest_m
+
+    @property
+    def breakpoints_m(self):
+        """Those of the part."""
+        return self.part.breakpoints_m
 
     def volume_m3(self, levels_m):
         """(rows,) that of the part."""
@@ -146,24 +153,12 @@ def vertical_body(job, wall, switches, uncertain):
     return Body(
         tuple(parts),
         job.inputs,
-        lowest_m=min(getattr(part, "lowest_m", 0.0) for part in parts),
+        lowest_m=min(part.lowest_m for part in parts),
         highest_m=shell.volume.height_m,
-        breakpoints_m=_breakpoints(shell, parts, job, zero),
         correlations=job.correlations,
         estimates=estimates_of(job),
+        shell=shell,
     )
-
-
-def _breakpoints(shell, parts, job, zero):
-    """Levels at which the area jumps: bottom and joints, edges of bottom, deadwood and roof."""
-    breakpoints = {course.bottom_m for course in shell.volume.courses}
-    breakpoints |= {zero + edge for item in job.deadwood for edge in (item.bottom_m, item.top_m)}
-    breakpoints |= {zero + edge for edge in critical_zone(job) or ()}
-    for part in parts:
-        breakpoints |= {
-            getattr(part, name) for name in ("lowest_m", "highest_m") if hasattr(part, name)
-        }
-    return tuple(sorted(edge for edge in breakpoints if np.isfinite(edge)))
 
 
 def _on_its_bottom(job, wall, shell, zero, parts):

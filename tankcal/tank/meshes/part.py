@@ -16,6 +16,7 @@ import numpy as np
 
 from tankcal.errors import HeightError
 from tankcal.messages import message
+from tankcal.tank.parts import Part, as_levels
 
 BLOCK = 1 << 16  # faces worked on at a time
 
@@ -37,7 +38,7 @@ class Mesh:
 
 
 @dataclass(frozen=True)
-class MeshPart:
+class MeshPart(Part):
     """A mesh as a part of a tank. Make one with `mesh_part`.
 
     zero_m      height of level 0 above the lowest vertex, m
@@ -92,7 +93,7 @@ class MeshPart:
         surface  an outward offset of the surface along its normal, m: the wetted area
         datum    lifts level 0, m: the free surface
         """
-        levels = np.atleast_1d(np.asarray(levels_m, dtype=float))
+        levels = as_levels(levels_m)
         area = self.area_m2(levels)
         return {
             "scale": 3 * self.volume_m3(levels) - levels * area,
@@ -100,12 +101,8 @@ class MeshPart:
             "datum": area,
         }
 
-    def sources(self, levels_m):
-        """No source of uncertainty belongs to a mesh alone."""
-        return ()
-
     def _heights(self, levels_m):
-        heights = np.atleast_1d(np.asarray(levels_m, dtype=float)) + self.zero_m
+        heights = as_levels(levels_m) + self.zero_m
         outside = ~(np.isfinite(heights) & (heights <= self.height_m * (1 + 1e-12)))
         if outside.any():
             raise HeightError(
