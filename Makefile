@@ -6,10 +6,10 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test study check format notebooks bench peer picture wheel clean
+.PHONY: help demo test test-all study check format notebooks bench peer picture wheel clean
 
 help: ## what can be made
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 demo: $(VENV)/base ## run the example, or any job: make demo JOB=path/to/job
 ifdef JOB
@@ -18,8 +18,11 @@ else
 	$(BIN)/tankcal demo --out demo-results
 endif
 
-test: $(VENV)/full ## the tests, studies at a twentieth of their size
+test: $(VENV)/full ## the tests that take no more than a second each (two minutes)
 	$(BIN)/pytest
+
+test-all: $(VENV)/full ## every test, papers of all kinds too, studies at a twentieth of their size
+	$(BIN)/pytest -m 'not study' --dist worksteal
 
 study: $(VENV)/full ## the studies at full size (minutes)
 	$(BIN)/pytest -m study --dist load --durations 25

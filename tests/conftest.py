@@ -1,6 +1,7 @@
 """Fixtures shared by the tests: where data lies, and the shipped example computed once."""
 
 import os
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -54,6 +55,19 @@ def records_of_kinds(tmp_path_factory):
 def figure(record_property):
     """Call figure("what", value) to show a measured figure in the summary of the test run."""
     return lambda what, value: record_property("figure", f"{what}: {value}")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Of a test that is `slow(after=n)`, the first n cases are not: `make test` runs them."""
+    seen = Counter()
+    for item in items:
+        mark = next((one for one in item.own_markers if one.name == "slow"), None)
+        if mark is not None and mark.kwargs:
+            case = (item.path, item.originalname)
+            seen[case] += 1
+            if seen[case] <= mark.kwargs["after"]:
+                item.own_markers.remove(mark)
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -215,6 +215,7 @@ def test_free_is_the_same_from_every_start():
         assert one.start != other.start or one.parameter not in ("c", "K1", "x0")
 
 
+@pytest.mark.slow
 def test_weighted_lies_between_fixed_and_free():
     # property: the tighter the sds the nearer to fixed, the looser the nearer to free
     wrong = changed("wrong", c=0.02)
@@ -411,6 +412,7 @@ def test_pairs_add_up(of_tank):
     assert moved.rms_xyz_m == pytest.approx(np.sqrt(np.mean(size**2)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("datum", ["inner", "minimal", "fixed_photo"])
 def test_a_block_that_floats_is_brought_back_first(tank, datum):
     # the datum is free and starts differ; shapes are the same, and so must be what is compared
@@ -492,6 +494,7 @@ def with_blunders():
     )
 
 
+@pytest.mark.slow
 def test_blunders_are_searched_once(with_blunders):
     job = with_blunders
     own = job.measurements.cameras[0]

@@ -88,6 +88,7 @@ def names_in(result):
     return letters_in([*data, *map(short, data)])
 
 
+@pytest.mark.slow
 def test_every_text_is_of_the_words(result, tmp_path, monkeypatch):
     english = load_words()
     monkeypatch.setattr(
@@ -108,6 +109,7 @@ def test_no_word_of_english_is_left(result, language, tmp_path):
     assert len(letters_in(texts_of_paper(result, tmp_path)) & english) > 30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", OTHERS)
 def test_numbers_have_the_marks_of_the_language(result, language, tmp_path):
     found = set(texts_of_paper(result, tmp_path, language)) - set(data_in(result))
@@ -166,6 +168,7 @@ def test_a_language_without_words_is_refused(product, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", OTHERS)
 def test_papers_are_written_in_the_language(language, product, tmp_path):
     camera_papers.write(product, tmp_path / "papers", language=language)

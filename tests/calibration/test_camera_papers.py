@@ -44,11 +44,13 @@ def text_of(lines):
     return " ".join(" ".join(lines).split())
 
 
+@pytest.mark.slow
 def test_the_json_is_the_result(folder):
     out, result = folder
     assert load(out / "camera.json") == json.loads(json.dumps(result, allow_nan=False))
 
 
+@pytest.mark.slow
 def test_csv_tables_have_no_formula_and_one_width(folder):
     out, _ = folder
     found = sorted(out.glob("*.csv"))
@@ -63,6 +65,7 @@ def test_csv_tables_have_no_formula_and_one_width(folder):
             assert not cell.startswith(("+", "-")) or float(cell) < 0
 
 
+@pytest.mark.slow
 def test_the_pages_show_every_text_literally(folder):
     out, result = folder
     page = (out / "report.html").read_text(encoding="utf-8")
@@ -86,6 +89,7 @@ def test_the_pages_show_every_text_literally(folder):
     assert "Page 1 of" in text
 
 
+@pytest.mark.slow
 def test_a_folder_of_somebody_else_is_left_alone(tmp_path, product):
     (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(InputError, match=r"mine\.txt"):
@@ -93,6 +97,7 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path, product):
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
+@pytest.mark.slow
 def test_a_failure_leaves_the_earlier_papers(folder):
     out, result = folder
     before = {path.name: path.read_bytes() for path in out.iterdir()}
@@ -102,6 +107,7 @@ def test_a_failure_leaves_the_earlier_papers(folder):
     assert [path.name for path in out.parent.iterdir()] == [out.name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("result", [{}, [], {"format": "tankcal-camera/1", "kind": "weather"}])
 def test_another_format_is_refused(result):
     with pytest.raises(InputError, match=r"camera\.json"):
@@ -185,6 +191,7 @@ def test_lines_of_influence(run):
     assert f"{moved:.3f}" in text
 
 
+@pytest.mark.slow
 def test_lines_of_a_product(product):
     text = text_of(camera_papers.lines(product))
     best = next(one for one in product["best"] if (one["part"], one["scale"]) == ("plan", "1000"))

@@ -146,6 +146,7 @@ def test_f_of_a_group_is_that_of_the_inverse_in_any_units():
     assert f_of_group(unit * values, np.outer(unit, unit) * covariance) == pytest.approx(expected)
 
 
+@pytest.mark.slow
 def test_f_of_groups_rejects_as_often_as_alpha_says(figure):
     """Simulation: 4000 groups of three that are zero, with sigma0 of 12 degrees of freedom."""
     rng, dof, alpha = np.random.default_rng(4), 12, 0.05
@@ -359,6 +360,7 @@ def test_k1_stays_where_k3_does():
 # --- dropped for real ---------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_prediction_agrees_with_the_survey_adjusted_again(silva_parameters, figure):
     """Second method: each parameter of the shipped simulation dropped and adjusted again."""
     worst = np.zeros(3)
@@ -383,6 +385,7 @@ def test_the_prediction_agrees_with_the_survey_adjusted_again(silva_parameters, 
     assert worst[2] < 0.01
 
 
+@pytest.mark.slow
 def test_volume_and_points_of_a_job(silva_parameters, silva_result):
     """Second method: tankcal.run of the whole job gives the volume that the others differ from."""
     volume, why = silva_parameters.base
@@ -397,6 +400,7 @@ def test_volume_and_points_of_a_job(silva_parameters, silva_result):
         assert trial.outcome.adjustment.redundancy == 496 + len(trial.names)
 
 
+@pytest.mark.slow
 def test_dropping_is_the_adjustment_of_the_survey_with_the_parameter_off(a_tank, figure):
     """Second method: adjust_survey of measurements whose camera lacks the parameters."""
     measured, _ = by_photographs(1, settings=QUIET)
@@ -423,6 +427,7 @@ def test_dropping_is_the_adjustment_of_the_survey_with_the_parameter_off(a_tank,
     assert outcome.volume.value_m3 == pytest.approx(volume, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_readings_that_were_set_aside_stay_aside_and_no_others_go(a_tank):
     """Property: a blunder does not come back; what missing terms bend shows in sigma0."""
     strong = np.array([100.02, 0.03, -0.04, 2e-6, -1e-12, 0, 0, 3e-7, -2e-7, 0, 0, 1e-4, -8e-5])
@@ -471,6 +476,7 @@ def two_cameras(scope_of_k1):
     return replace(both, photos=photos)
 
 
+@pytest.mark.slow
 def test_each_camera_has_its_own_analysis(a_tank):
     measured = two_cameras("camera")
     one, two = analyse_job(job_of(a_tank, measured))
@@ -523,12 +529,14 @@ def test_a_weighted_parameter_is_judged_and_dropped(a_tank):
     np.testing.assert_allclose(sds, predicted.sds, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_c_cannot_be_dropped(silva_job, silva_result):
     again = Dropping(replace(silva_job, tank=None), silva_result.adjustment)
     with pytest.raises(ValueError, match="c cannot be dropped"):
         again.without("UMK", ("c",))
 
 
+@pytest.mark.slow
 def test_the_misfit_grows_by_what_the_f_test_says(silva_parameters, figure):
     """Second method: v'Pv without p parameters is v'Pv + p F sigma0^2, group by group."""
     base = silva_parameters
@@ -542,6 +550,7 @@ def test_the_misfit_grows_by_what_the_f_test_says(silva_parameters, figure):
     assert worst < 0.05
 
 
+@pytest.mark.slow
 def test_what_may_go_is_dropped_together_at_last(silva_parameters):
     goes = tuple(one.name for one in silva_parameters.recommendation if not one.keep)
     trial = next(t for t in silva_parameters.trials if "advised" in t.because)
@@ -555,6 +564,7 @@ def test_what_may_go_is_dropped_together_at_last(silva_parameters):
 # --- from a record, and as plain data -----------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_record_says_the_same_but_for_what_was_dropped(silva_result, silva_job):
     """Second method: the record as JSON against the job, nothing adjusted again."""
     record = json.loads(json.dumps(record_of(silva_result)))
@@ -567,6 +577,7 @@ def test_a_record_says_the_same_but_for_what_was_dropped(silva_result, silva_job
     assert left["without"][0]["points"] is None
 
 
+@pytest.mark.slow
 def test_all_of_it_is_plain_data(silva_parameters):
     found = as_json(silva_parameters)
     assert list(found)[:3] == ["format", "kind", "camera"]
@@ -583,6 +594,7 @@ def test_all_of_it_is_plain_data(silva_parameters):
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_record_without_photographs_or_with_a_spoilt_camera_is_refused(silva_result):
     record = json.loads(json.dumps(record_of(silva_result)))
     for spoilt in ({}, {"adjustment": None}, {"adjustment": {"cameras": []}}, []):
@@ -619,6 +631,7 @@ def test_a_survey_without_photographs_or_free_parameters_is_refused(a_tank):
         analyse_job(job_of(a_tank, measured), Choices(groups=(("K4",),)), dropping=False)
 
 
+@pytest.mark.slow
 def test_an_older_record_that_does_not_know_the_pixel_will_do(silva_result, silva_job):
     record = json.loads(json.dumps(record_of_adjustment(silva_job, silva_result.adjustment)))
     for key in ("format_mm", "pixel_mm", "reach_mm"):
@@ -642,6 +655,7 @@ def test_effects_in_pixels_follow_the_declared_pixel(a_tank):
     assert interiors[0].frame.pixel_mm.tolist() == [0.01, 0.01]
 
 
+@pytest.mark.slow
 def test_values_after_are_those_of_the_photos_of_the_set(silva_parameters):
     trial = next(t for t in silva_parameters.trials if t.names == ("K3",))
     values, names, _ = interior_after(trial.outcome, silva_parameters.interior)

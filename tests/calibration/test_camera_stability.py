@@ -105,6 +105,7 @@ def test_the_truth_of_the_seven_calibrations_is_that_of_the_shared_facts(shared,
     }
 
 
+@pytest.mark.slow
 def test_what_is_given_away_makes_the_figure_smaller(seven, figure):
     of = {
         name: np.array([one.figure_px for one in compare(seven, method, terrain=terrain).pairs])
@@ -137,6 +138,7 @@ def test_which_focal_length_both_bundles_get_hardly_matters(seven, figure):
     assert figures[0] == figure_of(seven[0], seven[4], "rot", as_published=True)
 
 
+@pytest.mark.slow
 def test_the_seed_of_the_terrain_hardly_matters(seven, figure):
     pair = [seven[0], seven[4]]
     figures = [figure_of(*pair, "spr", seed=seed) for seed in range(8)]
@@ -145,6 +147,7 @@ def test_the_seed_of_the_terrain_hardly_matters(seven, figure):
     assert figure_of(*pair, "spr", seed=3) == figures[3]
 
 
+@pytest.mark.slow
 def test_the_scatter_of_spr_says_what_one_terrain_is_worth(seven):
     """Simulation: means of other terrains lie as far apart as the scatter over ten says."""
     pair = [seven[0], seven[4]]
@@ -287,6 +290,7 @@ def test_a_displaced_camera_is_the_same_to_a_resection():
     assert angles_of(fit.rotation) == pytest.approx([0.05, -0.1, 0.4], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_order_of_a_pair(seven):
     """Property: mis is the same for both orders; the others, to first order, but for their image.
 
@@ -380,6 +384,7 @@ def test_derivatives_of_the_ideal_points(form):
 SD = [2e-3, 4e-4, 4e-4, 7e-5, 2e-5, 1e-6, 1e-8, 7e-6, 7e-6, 1e-3, 1e-4, 2e-5, 2e-5]
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("form", [FORMS[0], FORMS[5], FORMS[7], FORMS[10]])
 @pytest.mark.parametrize(
     ("method", "as_published"),
@@ -583,6 +588,7 @@ def test_everything_of_a_result_is_plain(seven):
     assert as_json(compare([setup("a"), setup("b")], "mis"))["cameras"][0]["sd"]["c_mm"] is None
 
 
+@pytest.mark.slow
 def test_the_summary_of_a_result(seven):
     given = summary(compare(seven[:3], "spr", threshold_px=0.33))
     assert [(one["a"], one["b"], one["similar"]) for one in given] == [
@@ -591,6 +597,7 @@ def test_the_summary_of_a_result(seven):
     assert list(given[0]) == ["a", "b", "method", "figure_px", "scatter_px", "similar"]
 
 
+@pytest.mark.slow
 def test_each_convention_is_named(seven):
     def codes(method, as_published):
         result = compare(seven[:2], method, as_published=as_published)

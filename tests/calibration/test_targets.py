@@ -81,6 +81,7 @@ def test_the_middle_of_the_first_pixel_is_0_0():
     assert np.abs(marker.centre_px - [87.5, 97.5]).max() < 0.01
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("name", [ARUCO, APRILTAG])
 @pytest.mark.parametrize("blur", [0.7, 1.0, 1.5])
 def test_corners_to_a_tenth_of_a_pixel(name, blur, figure):
@@ -95,6 +96,7 @@ def test_corners_to_a_tenth_of_a_pixel(name, blur, figure):
     figure(f"targets, {name}, 60 px, blur {blur} px: corners, rms px", f"{rms(errors):.3f}")
 
 
+@pytest.mark.slow
 def test_corners_are_better_than_those_of_opencv(figure):
     """Second method: cornerSubPix of OpenCV in the same photo, and its AprilTag refinement."""
     image, truth = scene(ARUCO, blur=1.5, seed=2)
@@ -296,6 +298,7 @@ def discs(diameter=16, incidence=30.0, blur=1.0, noise=2.0, seed=0, count=6):
     return image, np.array(ellipses), np.array(circles)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("blur", [0.7, 1.0, 1.5])
 def test_centres_of_circles(blur, figure):
     """Truth: rendered, 16 px across, 30 degrees."""

@@ -89,6 +89,7 @@ def write_survey(folder, names):
     (folder / "control.csv").write_text("\n".join(rows) + "\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("photos", "oversampling"), [(4, 4), pytest.param(6, 6, marks=pytest.mark.study)]
 )

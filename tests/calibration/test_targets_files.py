@@ -38,6 +38,7 @@ def told(paths, out, wanted=None, **more):
     return [str(problem) for problem in raised.value.problems]
 
 
+@pytest.mark.slow
 def test_corners_get_their_names(photos, tmp_path):
     names = tmp_path / "names.csv"
     names.write_text("id,point\n7,T7\n9,tank 9\n12,T12\n")
@@ -147,6 +148,7 @@ def test_orientation_is_told_and_not_applied(tmp_path):
     assert any("orientation 6" in str(one) for one in reading.warnings)
 
 
+@pytest.mark.slow
 def test_sixteen_bits_and_sizes(photos, tmp_path):
     """Second method: the same photo in eight bits."""
     image = cv2.imread(str(photos[0]), 0)

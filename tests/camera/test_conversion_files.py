@@ -167,6 +167,7 @@ def test_ros_and_json_lists_are_read():
 POWERS = np.array([-1, -1, 2, 4, 6, 8, 1, 1, 2, 4, 0, 0])  # of 1/mm, of all but c
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(
     st.lists(st.floats(-1e-3, 1e-3), min_size=12, max_size=12),
@@ -273,6 +274,7 @@ BROKEN = {
 }  # fmt: skip
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("what", BROKEN)
 def test_broken_files_are_told(what):
     """Hostile and damaged files: one line with the key, never anything but InputError."""
@@ -334,6 +336,7 @@ def test_files_that_are_none(tmp_path):
         assert len(caught.value.problems) == 1
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(
     st.sampled_from(list(GOOD)),

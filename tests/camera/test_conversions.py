@@ -49,6 +49,7 @@ def off_px(u, v, size):
     return np.hypot(*(np.column_stack([u, v]) - frame_points(size)).T).max()
 
 
+@pytest.mark.slow
 @QUICK
 @given(documented(), st.floats(0.9, 1.1))
 def test_opencv_as_documented(camera, ratio):
@@ -94,6 +95,7 @@ def test_opencv_projects_the_same(count, figure):
     assert (own.error_px < SAME_PX) == (count <= 5)
 
 
+@pytest.mark.slow
 @QUICK
 @given(documented(), st.sampled_from(list(colmap.MODELS)))
 def test_colmap_as_documented(camera, model):

@@ -58,6 +58,7 @@ FORMS = [Form(*both) for both in itertools.product(CONVENTIONS, AFFINITIES)]
 FORMS += [Form(one, "b1_b2", 2.0) for one in CONVENTIONS]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to_form", FORMS, ids=str)
 def test_every_form_into_every_other(to_form):
     """Published equations, written out: exact within 1e-9 px, else the error is the one stated."""
@@ -130,6 +131,7 @@ def seven(shared):
     return sets
 
 
+@pytest.mark.slow
 def test_the_published_calibrations_as_the_plain_form(shared, figure):
     """Published: P tables 6-9; what the inverse of a polynomial leaves, and what a turn takes."""
     for name, q in seven(shared).items():
@@ -200,6 +202,7 @@ def test_covariance_of_a_change_of_sign_and_of_balance():
     )
 
 
+@pytest.mark.slow
 def test_covariance_of_a_fit_is_that_of_drawn_cameras():
     """Simulation: 100 drawn cameras, each converted; sds within four of their own."""
     rng = np.random.default_rng(5)

@@ -136,6 +136,7 @@ def rms_mm(adjustment, truth):
     return 1000 * np.sqrt(np.mean(places(adjustment, truth) ** 2))
 
 
+@pytest.mark.slow
 def test_the_outer_iteration_finds_the_truth_without_noise(figure):
     """Simulation, exact: without the correction the points are biased, with it they are not."""
     measurements, truth = simulated(noise=0.0)
@@ -177,6 +178,7 @@ def weighed(seeds, figure):
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_the_outer_iteration_with_noise(figure):
     """Simulation: the bias is gone, whatever the noise."""
     found = weighed(range(2), figure)
@@ -191,6 +193,7 @@ def test_the_outer_iteration_with_noise_in_full(figure):
     assert abs(found[:, 0].std(ddof=1) - 1) < 4 / np.sqrt(2 * 39)
 
 
+@pytest.mark.slow
 def test_a_lens_that_hardly_changes_gains_nothing(figure):
     """Published (S, conclusions): no significant gain; so it is where K changes by 3 % only."""
     same = replace(FOCUS, radial=np.array([[5.0e-8, -2e-12, 0], [5.15e-8, -2e-12, 0]]))

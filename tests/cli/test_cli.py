@@ -42,6 +42,7 @@ def test_help_loads_nothing_heavy():
     assert subprocess.run([sys.executable, "-c", code], stdout=subprocess.DEVNULL).returncode == 0
 
 
+@pytest.mark.slow
 def test_adjusting_without_papers_loads_nothing_that_only_papers_or_simulations_need():
     code = (
         "import sys, tankcal.cli.running, tankcal.pipeline.chain, tankcal.report.outputs\n"
@@ -114,6 +115,7 @@ def test_earlier_results_stay_when_the_input_breaks(done, capsys):
     assert (done / "results" / "record.json").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_earlier_results_are_replaced_by_a_good_run(done, capsys):
     assert main(["run", str(done), "--quiet"]) == 0
     told = capsys.readouterr().out
@@ -138,6 +140,7 @@ def test_a_folder_with_foreign_files_is_refused(done, tmp_path, capsys):
     assert (tmp_path / "thesis.docx").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_a_failing_report_leaves_the_earlier_results(done, monkeypatch, capsys):
     from tankcal import report
     from tankcal.errors import TankcalError
@@ -171,6 +174,7 @@ def test_new_writes_a_job_and_refuses_a_full_folder(tmp_path, capsys):
 coordinates = st.floats(-1e4, 1e4, allow_nan=False).map(lambda value: f"{value:.3f}")
 
 
+@pytest.mark.slow
 @settings(max_examples=40, suppress_health_check=list(HealthCheck))
 @given(
     spoilt=st.lists(st.tuples(st.integers(1, 60), st.integers(1, 3), coordinates), max_size=40),
@@ -207,6 +211,7 @@ def test_a_link_is_followed(done, tmp_path, capsys):
     assert (tmp_path / "disk" / "record.json").is_file()
 
 
+@pytest.mark.slow
 def test_an_interruption_in_disguise_is_no_traceback(done, monkeypatch, capsys):
     """nbclient turns Ctrl-C at the start of a kernel into an AssertionError."""
     from tankcal import report

@@ -108,6 +108,7 @@ def test_what_cannot_be_compared_is_told(arguments, words, capsys):
     assert told.out == ""
 
 
+@pytest.mark.slow
 def test_compare_writes_its_papers_and_refuses_foreign_folders(tmp_path, capsys):
     out = tmp_path / "papers"
     assert run("compare", SEVEN, "set1", "set2", "--grid", "6x5,300,300,700", "--out", out) == 0
@@ -139,6 +140,7 @@ def in_spanish(folder):
     return job
 
 
+@pytest.mark.slow
 def test_tables_are_in_the_language_that_the_job_asks_for(tmp_path, capsys):
     job = in_spanish(tmp_path)
     assert run("parameters", job, "--no-trials") == 0
@@ -147,6 +149,7 @@ def test_tables_are_in_the_language_that_the_job_asks_for(tmp_path, capsys):
     assert "Graus de liberdade" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_tables_are_in_the_language_that_the_record_asks_for(record, tmp_path, capsys):
     found = json.loads(record.read_text(encoding="utf-8"))
     found["job"]["table"]["language"] = "pt-BR"
@@ -183,6 +186,7 @@ def test_parameters_of_what_is_not_there(record, option, name, words, capsys):
         assert told.out == ""
 
 
+@pytest.mark.slow
 def test_parameters_of_a_photo_with_parameters_of_its_own(tmp_path, capsys):
     job = shutil.copytree(PHOTOS, tmp_path / "job")
     text = (job / "job.toml").read_text(encoding="utf-8")
@@ -221,6 +225,7 @@ def test_parameters_of_a_job_without_trials(capsys):
     assert len(json.loads(capsys.readouterr().out)["without"]) > 10
 
 
+@pytest.mark.slow
 def test_influence_of_a_film_camera(tmp_path, capsys):
     (tmp_path / "cameras.toml").write_text(FILM, encoding="utf-8")
     arguments = ("--cameras", tmp_path / "cameras.toml", "--states", "fixed", "--json")
@@ -233,6 +238,7 @@ def test_influence_of_a_film_camera(tmp_path, capsys):
     assert found["runs"][1]["volume"]["volume_m3"] == pytest.approx(1249.6, abs=0.5)
 
 
+@pytest.mark.slow
 def test_influence_counts_all_runs_of_film_in_the_pixels_of_a_calibration(tmp_path, capsys):
     fine = FILM.replace("longer", "fine").replace("c_mm", "pixel_um = 10\nc_mm")
     (tmp_path / "cameras.toml").write_text(FILM + fine, encoding="utf-8")
@@ -244,6 +250,7 @@ def test_influence_counts_all_runs_of_film_in_the_pixels_of_a_calibration(tmp_pa
         assert one["largest_px"] == pytest.approx(one["largest_um"] / 10, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_influence_prints_calibrations_against_each_other(tmp_path, capsys):
     other = FILM.replace("longer", "shorter").replace("100.3", "99.8")
     (tmp_path / "cameras.toml").write_text(FILM + other, encoding="utf-8")
@@ -325,6 +332,7 @@ def test_convert_from_what_is_said_whatever_the_name_of_the_file(tmp_path, capsy
     assert "Ck: missing" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_convert_a_record_of_film(record, capsys):
     assert main(["camera", "convert", str(record), "--to", "opencv"]) == 2
     assert "UMK.pixel_um: missing; opencv counts in pixels" in capsys.readouterr().err
@@ -359,6 +367,7 @@ def test_film_needs_pixels_where_the_other_form_counts_in_them(form, tmp_path, c
     assert main([*command, "--pixel-um", "10"]) == 0
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("form", ["silva", "pessoa", "dbat", "plain"])
 def test_film_in_the_forms_of_publications(form, tmp_path, capsys):
     """Second method: the same film with pixels of 5 um; what is left is told as a length."""
@@ -412,6 +421,7 @@ def converted_set(capsys, *arguments):
     return tomllib.loads(capsys.readouterr().out)["cameras"]["set1"]
 
 
+@pytest.mark.slow
 def test_convert_carries_standard_deviations_into_other_forms(capsys):
     """Published sds, which the form that has them keeps; in another, that of c is nearly the same,
     for what differs is below a pixel.
@@ -447,6 +457,7 @@ def test_convert_keeps_held_parameters_and_those_without_standard_deviation(tmp_
     assert found["K1_mm-2"] == -1e-5
 
 
+@pytest.mark.slow
 def test_convert_a_record_with_its_correlations(record, capsys):
     """Second method: the covariance of the record through the derivatives of the library."""
     command = ["camera", "convert", str(record), "--to", "cameras.toml", "--pixel-um", "10"]
@@ -499,6 +510,7 @@ def test_targets_of_a_photograph(tmp_path, capsys):
     assert "taken as sRGB" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_papers_say_what_they_were_made_from(tmp_path):
     out = tmp_path / "papers"
     assert run("compare", SEVEN, "set1", "set2", "--grid", "6x5,300,300,700", "--out", out) == 0

@@ -60,6 +60,7 @@ TABLE = """height_m,volume_m3
 """
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", OTHERS)
 def test_findings_are_told_in_the_language(tmp_path, capsys, monkeypatch, language):
     path = tmp_path / "t.csv"
@@ -73,6 +74,7 @@ def test_findings_are_told_in_the_language(tmp_path, capsys, monkeypatch, langua
     assert told(capsys) == lines
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", OTHERS)
 @pytest.mark.parametrize("text", ["", "a\n", "height_m,volume_m3\n0,0\n1,1\n", "1;2\n3;4\n"])
 def test_what_is_no_table_is_told_in_the_language(tmp_path, capsys, language, text):
@@ -98,6 +100,7 @@ def test_a_plan_is_told_in_its_language(tmp_path, capsys, language):
     assert english(lines) == []
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", OTHERS)
 @pytest.mark.parametrize(
     ("name", "text"),
@@ -128,6 +131,7 @@ TOLD_BY = {"Problem", "InputError", "SolutionError", "problem", "warning", "warn
            "complain", "step", "part", "tell", "progress"}  # fmt: skip
 
 
+@pytest.mark.slow
 def test_no_plain_text_is_told_in_these_rooms():
     """A text of several words that is handed to a teller of the user's is a `message`."""
     plain = []

@@ -78,6 +78,7 @@ def test_no_english_is_left_in_any_help(language):
     assert [text for text in texts if ENGLISH.search(text)] == []
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     ("command", "portuguese", "spanish"),
     [

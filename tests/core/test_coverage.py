@@ -98,6 +98,7 @@ FORMS = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.slow
 @FORMS
 def test_intervals_cover_tanks_with_form_between_the_targets(common, share, figure):
     check(round(50 * share), common, figure)
@@ -187,6 +188,7 @@ def check_scans(tanks, heights, figure):
     assert np.all(rms < constant)
 
 
+@pytest.mark.slow
 @HEIGHTS
 def test_scanned_courses_that_taper_and_bulge(heights, figure):
     check_scans(10, heights, figure)

@@ -8,6 +8,8 @@ import pytest
 from tankcal.errors import SolutionError
 from tankcal.solver import Group, Model, solve
 
+pytestmark = pytest.mark.slow
+
 FOLDER = Path(__file__).parents[1] / "truth" / "nist_strd"
 STEP = 1e-30  # complex step: the derivative has no rounding of differences
 

@@ -115,6 +115,7 @@ def test_area_of_exact_shapes_closed_form(radius, centre, area):
     assert section.outline.area_m2() == pytest.approx(area, rel=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("jitter", "limit_ppm"), [(0.0, 1.0), (0.2, 5.0)])
 def test_area_of_300_random_shapes_closed_form(jitter, limit_ppm, figure):
     """R 6.5 m, modes 2 to 5 with coefficients of sd 5 mm, 24 points."""
@@ -133,6 +134,7 @@ def test_area_of_300_random_shapes_closed_form(jitter, limit_ppm, figure):
     assert rms < limit_ppm
 
 
+@pytest.mark.slow
 def test_area_of_a_spoilt_point_moves_by_the_gradient():
     """The gradient by every coordinate against differences of the whole fit."""
     rng = np.random.default_rng(3)

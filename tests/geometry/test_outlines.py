@@ -158,6 +158,7 @@ def coverage(tanks):
     return inside / tanks
 
 
+@pytest.mark.slow
 def test_a_smoothed_area_is_covered_by_its_uncertainty(figure):
     """Simulation, 95 % within 3 binomial standard errors of 200 tanks."""
     part = coverage(200)
@@ -190,6 +191,7 @@ def bridged(sections, noise):
     return np.array(errors)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("noise", [0.001, 0.014])
 def test_a_missing_generatrix_is_bridged_better_by_the_spectrum(noise, figure):
     """Simulation, 400 sections with form of 20 mm rms: the reason for the limit of 1.5 spacings."""

@@ -63,6 +63,7 @@ def test_points_of_an_exact_ellipse(a, b, azimuth, span_deg):
     assert np.abs(found.residuals_m).max() < 1e-9
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("span_deg", [360, 90, 30])
 @pytest.mark.parametrize("direction", [(0, 0, 1), (1, 0, 0), (0.3, -0.8, 0.02), (-2, 1, 1)])
 @pytest.mark.parametrize("length", [0.3, 3.0, 30.0])
@@ -291,6 +292,7 @@ def test_turned_points_give_the_turned_cylinder():
 # the start, and what is refused
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("span_deg", [30, 45, 90, 180, 360])
 def test_cylinders_of_any_direction_and_coverage_are_found(span_deg, figure):
     """A third to 16 radii long, 12 to 1500 points, noise to 0.3 % of the radius."""
@@ -377,6 +379,7 @@ def lying(azimuth_deg, slope, rng, count=400, noise=0.002, span_deg=200):
     return 1.2 * section + z[:, None] * axis + rng.normal(0, noise, (count, 3)) + (30, 40, 5)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("azimuth_deg", [0, 37, 180, 301])
 @pytest.mark.parametrize("slope", [0.0, 0.013, -0.17])
 def test_diameter_and_tilt_of_a_lying_tank(azimuth_deg, slope):
@@ -469,6 +472,7 @@ def check_coverage(simulate, count, figure):
     assert low < form < high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("simulate", SIMULATIONS[:3])
 def test_coverage_of_the_sds_a_twentieth(simulate, figure):
     check_coverage(simulate, 100, figure)
@@ -480,6 +484,7 @@ def test_coverage_of_the_sds(simulate, figure):
     check_coverage(simulate, 2000, figure)
 
 
+@pytest.mark.slow
 def test_a_scan_drives_the_table_with_its_covariance(figure):
     """Rows from simulated scans scatter as the 2 x 2 covariance says."""
     dip = np.array([0.3, 1.2, 2.1])
@@ -499,6 +504,7 @@ def test_a_scan_drives_the_table_with_its_covariance(figure):
     assert np.all((ratio > low) & (ratio < high))
 
 
+@pytest.mark.slow
 def test_a_dense_scan_is_fitted_in_seconds(figure):
     rng = np.random.default_rng(1)
     points = lying(40.0, 0.02, rng, 100_000, 0.003)

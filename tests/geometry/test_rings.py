@@ -166,6 +166,7 @@ def _assert_same(found, expected):
         )
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(
     edges=st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=12, unique=True),

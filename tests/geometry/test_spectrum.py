@@ -27,6 +27,7 @@ def simulated(rng, common, own=0.0, rising=0.0, *, courses=8, n=150, noise=0.003
 TOTAL = 0.030**2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("common", "own", "rising"),
     [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.5, 0.5, 0.0), (0.5, 0.3, 0.2)],
@@ -42,6 +43,7 @@ def test_the_parts_of_the_form_are_told_apart(common, own, rising):
     assert mean == pytest.approx(truth, rel=0.25, abs=0.05 * TOTAL)
 
 
+@pytest.mark.slow
 def test_targets_at_the_same_azimuths_give_the_common_form_without_bias(figure):
     """Simulation, 24 targets a course, modes to 200 aliased: mean of 60 shells of about 21 dof."""
     rng = np.random.default_rng(3)
@@ -54,6 +56,7 @@ def test_targets_at_the_same_azimuths_give_the_common_form_without_bias(figure):
     assert np.mean([form.common_dof for form in found]) == pytest.approx(21.0, abs=1.5)
 
 
+@pytest.mark.slow
 def test_the_degrees_of_freedom_are_those_of_the_scatter(figure):
     """2 A^2 / var(A) of the amplitude, over 60 shells of independent courses."""
     rng = np.random.default_rng(4)
@@ -68,6 +71,7 @@ def test_the_degrees_of_freedom_are_those_of_the_scatter(figure):
     assert scatter / stated == pytest.approx(1.0, abs=3 * np.sqrt(2 / 60))
 
 
+@pytest.mark.slow
 def test_a_round_tank_has_no_form():
     """Simulation: the amplitude is far below what 3 mm of noise could hide in a mode."""
     form = estimate_form(simulated(np.random.default_rng(4), 0.0))

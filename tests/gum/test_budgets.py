@@ -114,6 +114,7 @@ def test_a_course_height_moves_the_joints_above_it(tmp_path):
     assert np.sum(own.columns_m3[-1] ** 2) == pytest.approx(np.sum((found[-1] * 0.003) ** 2))
 
 
+@pytest.mark.slow
 def test_an_offset_widens_every_radius(tmp_path):
     settings = {"table.step_m": 0.5, "survey.side": "inside"}
     volumes = [

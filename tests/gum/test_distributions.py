@@ -115,6 +115,7 @@ def test_the_characteristic_function_is_the_mean_cosine(one):
     assert one.characteristic(-4.0) == one.characteristic(4.0)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("dof", [1, 2.4, 5, 40, 1e4])
 def test_the_characteristic_function_of_students_t(dof):
     """Second method: Fourier integral of the density by quadrature; exp(-|t|) for one dof."""
@@ -159,6 +160,7 @@ def test_u_of_a_t_is_what_was_declared():
     assert (by_scale.u_dof, by_sd.u_dof) == (4, np.inf)
 
 
+@pytest.mark.slow
 def test_thermal_expansion_of_nist():
     """Published: NIST TN 1900, example E13, by the NIST Uncertainty Machine.
 

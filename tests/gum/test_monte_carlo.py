@@ -87,6 +87,7 @@ def test_gum_is_validated_for_four_normals():
     assert judged.high[0] == pytest.approx(2 * 1.959964, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_mass_calibration(figure):
     """JCGM 101 9.3, table 5: 1.2340 mg, u 0.0754, [1.0834, 1.3825]; u 0.0539 of first order."""
     inputs = [
@@ -115,6 +116,7 @@ def block(x):
     return (length / (1 + (expansion + other) * warm) - 50_000_000.0)[:, None]
 
 
+@pytest.mark.slow
 def test_gauge_block(figure):
     """JCGM 101 9.5: u 36 nm. Other program (a paper's 1e6 draws of it): 838, 36, [745, 932] nm.
 
@@ -185,6 +187,7 @@ def test_law_of_two_arc_sines_and_a_normal_against_plain_draws():
     assert np.all(np.abs(law.quantile[0] - np.quantile(draws, [0.025, 0.975])) < 4 * error)
 
 
+@pytest.mark.slow
 def test_linear_rows_of_heavy_tails_are_exact_in_u_and_close_in_the_ends(figure):
     """Purely linear, t of 3 to 5 degrees of freedom: u closed form, ends by the law without draws.
 
@@ -273,6 +276,7 @@ def products(strengths):
     return QuadraticRows(np.full(len(strengths), 5.0), slopes, hessians, weights, np.zeros(3))
 
 
+@pytest.mark.slow
 def test_a_row_that_more_points_show_to_be_unsteady_is_drawn_for():
     """Property: a row steady with 16 points and not with 64 got an interval of zeros."""
     inputs = [rectangular(1.0), Normal(1.0), Normal(1.0)]

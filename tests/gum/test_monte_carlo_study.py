@@ -65,6 +65,7 @@ def test_ends_of_quadratic_rows_are_those_of_the_exact_law(factor, figure):
     figure(f"quadratic rows, u x {factor:g}, largest error of an end by u", np.abs(off).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kinds", [ORDINARY, MIXED], ids=["normal", "mixed"])
 def test_a_table_agrees_with_plain_draws(kinds):
     """Simulation: every end within 4.5 standard errors of both; 1e5 plain draws, 25 rows."""
@@ -81,6 +82,7 @@ def test_a_table_agrees_with_plain_draws(kinds):
         assert np.all(np.abs(end - value) < 4.5 * np.hypot(error, se))
 
 
+@pytest.mark.slow
 def test_shortest_interval_of_quadratic_rows_against_batches_of_draws(figure):
     """Second method: the same rows as a model of which nothing is known but its values.
 
@@ -97,6 +99,7 @@ def test_shortest_interval_of_quadratic_rows_against_batches_of_draws(figure):
     assert np.all(length < found.high - found.low)
 
 
+@pytest.mark.slow
 def test_standard_errors_said_are_those_over_seeds(figure):
     """Property: over 8 seeds the scatter is what one run says, within a factor of 2.5."""
     model, inputs = tank(20, MIXED)
@@ -124,6 +127,7 @@ def ratios_over_seeds(rows, seeds, kinds, figure):
     return ratios
 
 
+@pytest.mark.slow
 def test_a_table_is_no_worse_than_a_million_plain_draws(figure):
     """u and both ends of every row, over seeds; a twentieth of the rows."""
     assert np.all(ratios_over_seeds(475, 6, MIXED, figure) <= 1)

@@ -90,6 +90,7 @@ def test_what_is_invented_is_listed():
         assert word in text
 
 
+@pytest.mark.slow
 def test_the_linter_finds_nothing_in_the_tables_that_are_handed_out(example_record, tmp_path):
     """Rows in steps up to the top: the last one, too, is what the others make expected."""
     record = json.loads(example_record.read_text(encoding="utf-8"))

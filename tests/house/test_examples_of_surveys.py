@@ -170,6 +170,7 @@ def test_it_is_the_tank_of_the_reconstruction(results, example_result):
         assert abs(one.value_m3 - two.value_m3) < np.hypot(one.U_m3, two.U_m3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["without the nominal tank", "1 m and 20 deg off"])
 def test_start_values_do_not_matter(results, start):
     """Property: nothing but image points and control, or photos far off, give the same points."""
@@ -190,6 +191,7 @@ def test_start_values_do_not_matter(results, start):
     assert np.abs(again.xyz_m - adjustment.xyz_m).max() < 1e-7
 
 
+@pytest.mark.slow
 def test_which_photo_is_held_does_not_matter(results, figure):
     """Property: distances between points and their sds are the same whichever photo is held."""
     job, first = tankcal.load(PHOTOS), results["photos"].adjustment
@@ -244,6 +246,7 @@ def test_all_pages_say_that_it_is_a_simulation(one):
     assert result.job.certificate["laboratory"].startswith("None")  # nobody's is invented
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("folder", EXAMPLES.values(), ids=EXAMPLES)
 def test_the_script_writes_the_same_tables_again(folder, tmp_path):
     shutil.copytree(folder, tmp_path / folder.name, ignore=shutil.ignore_patterns("results"))
@@ -257,6 +260,7 @@ def test_the_script_writes_the_same_tables_again(folder, tmp_path):
     assert {path: path.read_bytes() for path in before} == before
 
 
+@pytest.mark.slow
 def test_the_linter_finds_nothing_in_the_tables_that_are_handed_out(one, tmp_path):
     record = record_of(one[1])
     write_tables(record, tmp_path)

@@ -19,6 +19,8 @@ from tankcal.linter import lint
 from tankcal.pipeline.chain import run
 from tankcal.planning.reading import load_plan
 
+pytestmark = pytest.mark.slow
+
 FEW, MANY = 60, 3000  # of each kind: in every run of the tests, in the study
 FULL = {
     "uncertainty": [("datum", 1.0, "mm", "B", "normal", 50), ("scale", 20, "ppm")],

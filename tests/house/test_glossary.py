@@ -81,6 +81,7 @@ def texts():
     return {language: dict(texts_of(load_words(language))) for language in LANGUAGES}
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", OTHERS)
 def test_one_word_for_one_thing(texts, language):
     found = [

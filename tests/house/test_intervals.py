@@ -51,6 +51,7 @@ def holds(low, volume, high, u):
     return (low <= volume) & (volume <= high) & (~varies | (low < high))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_interval_holds_its_volume(kind, tmp_path):
     parts = dict(KINDS[kind])
@@ -90,6 +91,7 @@ def random_job(rng):
     return parts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "seed", [1, *(pytest.param(n, marks=pytest.mark.study) for n in range(2, 40))]
 )
@@ -128,6 +130,7 @@ def cells_of(book, name):
     return [cell.value for (cell,) in book[sheet][cells]]
 
 
+@pytest.mark.slow
 def test_nothing_below_a_raised_bottom_is_nothing(tmp_path):
     """A difference of volumes: -9e-16 m3 with u = 3e-20 m3, and Monte Carlo's interval beside it.
 
@@ -158,6 +161,7 @@ def sphere(tmp_path_factory):
     return tankcal.run(replace(job, stated=asked), simulated=True)
 
 
+@pytest.mark.slow
 def test_one_u_in_record_table_files_and_result(sphere, tmp_path):
     """`result.capacity` and `at` had the law's U where the papers have Monte Carlo's."""
     save(record_of(sphere), tmp_path / "record.json")

@@ -10,6 +10,8 @@ import tankcal
 from tankcal.job.plausibility import CODES
 from tankcal.record import record_of
 
+pytestmark = pytest.mark.slow
+
 # an independent robust fit: radii 7.582 to 7.589 m, 2152.1 m3, 11.906 m (the data's NOTE)
 GROSS_M3, HEIGHT_M = 2152.1, 11.906
 

@@ -32,6 +32,7 @@ def plain_terminal(monkeypatch):
     speak("en")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", OTHERS)
 @pytest.mark.parametrize("kind", ["vertical", "horizontal", "sphere", "mesh"])
 def test_an_empty_form_is_refused_in_its_language(tmp_path, capsys, language, kind):

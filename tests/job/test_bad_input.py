@@ -236,6 +236,7 @@ def full_parts(**changes):
     return parts
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("table", "row", "column", "cell", "words"), BAD_CELLS)
 def test_bad_cell_is_told_with_its_row_and_column(tmp_path, form, table, row, column, cell, words):
@@ -570,6 +571,7 @@ def spoilt_parts(draw):
     return parts
 
 
+@pytest.mark.slow
 @QUICK
 @given(spoilt_parts())
 def test_any_cell_in_a_folder(parts):
@@ -577,6 +579,7 @@ def test_any_cell_in_a_folder(parts):
         assert_job_or_problems(write_folder(Path(place) / "job", parts))
 
 
+@pytest.mark.slow
 @settings(QUICK, max_examples=60)
 @given(spoilt_parts(), st.booleans())
 def test_any_cell_in_a_workbook(parts, with_date):
@@ -608,6 +611,7 @@ BITS = [b"\0", b'"', b"\n", b"\r", b"\xff", b",", b";", b"[", b"]", b"=", b"nan"
 BITS += [b"<", b">", b"<c/>", b' r="-1"', b"&#0;", b"<f/>", b"{", b"'''", b"#", b"\xe2\x80\xa8"]
 
 
+@pytest.mark.slow
 @QUICK
 @given(
     st.sampled_from(["job.toml", *(f"{table}.csv" for table in TANK_TABLES), "points_cov.npz"]),
@@ -640,6 +644,7 @@ def load_bytes(data):
         assert_job_or_problems(path)
 
 
+@pytest.mark.slow
 @settings(QUICK, max_examples=60)
 @given(byte_changes())
 def test_any_bytes_of_a_workbook(change):
@@ -651,6 +656,7 @@ MEMBERS += ["xl/worksheets/sheet1.xml", "xl/worksheets/sheet2.xml", "xl/styles.x
 MEMBERS += ["xl/sharedStrings.xml"]
 
 
+@pytest.mark.slow
 @settings(QUICK, max_examples=120)
 @given(st.sampled_from(MEMBERS), byte_changes())
 def test_any_bytes_inside_a_workbook(name, change):

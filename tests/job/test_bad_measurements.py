@@ -88,6 +88,7 @@ BAD_CELLS = [
 ]
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("table", "row", "column", "bad", "words"), BAD_CELLS)
 def test_bad_cell_is_told_with_its_row_and_column(tmp_path, form, table, row, column, bad, words):
@@ -140,6 +141,7 @@ BAD_KEYS = [
 ]
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("register", "owner", "key", "bad", "words"), BAD_KEYS)
 def test_bad_key_of_a_camera_or_an_instrument(tmp_path, form, register, owner, key, bad, words):
@@ -203,6 +205,7 @@ BAD_SETTINGS = [
 ]
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("given_settings", "key", "words"), BAD_SETTINGS)
 def test_bad_setting_of_the_adjustment(tmp_path, form, given_settings, key, words):
@@ -708,6 +711,7 @@ CELLS = st.one_of(
 PLACE = st.tuples(st.sampled_from(SURVEY_TABLES), st.integers(1, 40), st.integers(0, 12), CELLS)
 
 
+@pytest.mark.slow
 @QUICK
 @given(st.lists(PLACE, min_size=1, max_size=4), st.booleans())
 def test_any_cells_in_a_survey(changes, tank):
@@ -721,6 +725,7 @@ def test_any_cells_in_a_survey(changes, tank):
         assert_job_or_problems(folder, None if tank else "adjustment")
 
 
+@pytest.mark.slow
 @QUICK
 @given(
     st.sampled_from(["cameras.toml", "instruments.toml", "image_points.csv", "photos.csv"]),

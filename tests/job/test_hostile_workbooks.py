@@ -75,6 +75,7 @@ LONG_TEXT = b"<si><t>" + b"x" * 3_000_000 + b"</t></si>"
 ATTRIBUTES = b'<row r="999" ' + b" ".join(b'a%d=""' % i for i in range(400_000)) + b"/>"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -190,6 +191,7 @@ def test_a_cell_that_no_sheet_has(book, place):
 # ---- and what is sound is read as openpyxl reads it
 
 
+@pytest.mark.slow
 def test_a_sheet_formatted_to_its_end_is_read(book):
     blank = rows(400_000, lambda r: b'<c r="A%d" s="0"/><c r="B%d" s="0"/>' % (r, r))
     data = packed(book, sheet=blank)

@@ -135,6 +135,7 @@ def test_the_unit_of_a_name(name, stem, unit):
 # ---- the sheets
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("kind", "survey", "language"), FORMS_IN_LANGUAGES)
 def test_an_empty_form_says_what_is_missing_and_nothing_else(tmp_path, kind, survey, language):
     """Property: explanations and examples, in any language, are not read."""
@@ -158,6 +159,7 @@ def test_an_empty_form_says_what_is_missing_and_nothing_else(tmp_path, kind, sur
     assert others == {f"sheet {name}": empty[name] for name in REQUIRED_TABLES.get(kind, ())}
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("kind", "survey"), FORMS)
 def test_every_column_has_its_heading_unit_note_example_and_rule(tmp_path, kind, survey):
     path = write_input_workbook(tmp_path / "tank.xlsx", kind, survey)
@@ -213,6 +215,7 @@ def test_the_language_of_the_form_is_that_of_the_papers(tmp_path):
     assert "fundo" in [cell.value.lower() for cell in book["bottom"][1] if cell.value]
 
 
+@pytest.mark.slow
 def test_the_same_form_has_the_same_bytes(tmp_path):
     one = write_input_workbook(tmp_path / "a.xlsx", survey="photos").read_bytes()
     assert write_input_workbook(tmp_path / "b.xlsx", survey="photos").read_bytes() == one
@@ -248,6 +251,7 @@ def test_another_language_is_refused(tmp_path):
 # ---- filled in
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by_way_of", [pytest.param((), marks=pytest.mark.study), ("ods",)])
 def test_saved_by_libreoffice_it_is_the_same_job_and_record(form, tmp_path, by_way_of):
     """Second method: the same values in text files."""
@@ -374,6 +378,7 @@ MISTAKES = [
 ]
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("change", "place", "words"), MISTAKES)
 def test_each_mistake_names_its_sheet_and_cell(form, change, place, words):
     told = [str(problem) for problem in spoilt(form, change)]

@@ -52,6 +52,7 @@ def test_what_is_written(starter):
     assert_written(starter, "vertical")
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_kind_has_what_it_can_use(tmp_path, kind):
     write_starter(tmp_path / "starter", kind)
@@ -83,6 +84,7 @@ def test_another_kind_is_refused(tmp_path):
         write_starter(tmp_path / "starter", "cube")
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("survey", SURVEYS)
 def test_a_starter_for_a_survey(tmp_path, survey):
     write_starter(tmp_path / "starter", survey=survey)
@@ -110,6 +112,7 @@ def test_a_starter_for_a_survey(tmp_path, survey):
     assert book.sheetnames == ["read me", "job", *registers, *tables, "# inputs"]
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("name", ["", "job.xlsx"])
 @pytest.mark.parametrize("survey", SURVEYS)
 def test_an_empty_survey_is_told_like_missing_points(tmp_path, survey, name):
@@ -322,6 +325,7 @@ def test_the_example_of_the_documentation_is_a_job(tmp_path):
 # ---- in other languages
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", OTHERS)
 @pytest.mark.parametrize("survey", [None, "photos", "total-station"])
 def test_every_comment_of_the_text_files_is_in_the_language(tmp_path, language, survey):
@@ -333,6 +337,7 @@ def test_every_comment_of_the_text_files_is_in_the_language(tmp_path, language, 
     assert shared == ["tankcal run ."]
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_form_asks_for_the_sizes_of_the_drawing(tmp_path, language, kind):

@@ -307,6 +307,7 @@ def test_cells_without_a_value_are_not_blank(book):
     assert paint[2:] == [0.3, None, None]
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -154,6 +154,7 @@ def assert_clean(folder, shape, step, decimals):
     assert len(report.summaries) == 1
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("shape", SHAPES)
 def test_an_exact_table_has_no_faults(shape, tmp_path):
     """Truth: closed forms, rounded once; whatever is found in them is a false alarm."""
@@ -205,6 +206,7 @@ def test_joints_are_recognised():
         assert np.abs(joints - joint).min() <= 2
 
 
+@pytest.mark.slow
 @given(
     coefficients=st.lists(st.floats(-5, 5), min_size=4, max_size=4),
     seed=st.integers(0, 10**6),
@@ -343,6 +345,7 @@ def show(figure, counts, title):
         figure(f"{title}, {spoil.__name__.replace('_', ' ')}", text)
 
 
+@pytest.mark.slow
 def test_what_is_found_in_spoilt_tables(tmp_path, figure):
     """One twentieth of the study, of its own seed: nearly everything must be found and located."""
     counts = study(tmp_path, 60, seed=2, steps=("cm", "dm"))
@@ -363,6 +366,7 @@ def test_the_study_of_spoilt_tables(tmp_path, figure):
             assert named >= 0.93 * total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "tables", [50, pytest.param(1000, marks=pytest.mark.study)], ids=["50", "1000"]
 )
@@ -404,6 +408,7 @@ def changed(row, volume=None, height=None, rows=None):
     return rows
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     ("written", "words"),
     [
@@ -539,6 +544,7 @@ def comma(value):
     return str(value).replace(".", ",")
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     "text",
     [
@@ -586,6 +592,7 @@ def test_pairs_of_columns_across_printed_pages(by_row, tmp_path):
     assert "litros (column " in finding.problem.column
 
 
+@pytest.mark.slow
 def test_feet_and_inches(tmp_path):
     heights = table_heights(0.003175, 9.5)
     rows = [f"{dip_label(h, 'ft-in-8')};{131.8 * h / 0.158987294928:.2f}" for h in heights]
@@ -858,6 +865,7 @@ TOKENS = st.sampled_from(
 HEADINGS = st.sampled_from(["height_m,volume_m3", "cm;L;cm;L", "a,b", "", "Ullage (m)\tVolume (L)"])
 
 
+@pytest.mark.slow
 @settings(max_examples=150, suppress_health_check=list(HealthCheck))
 @given(
     heading=HEADINGS,

@@ -35,6 +35,7 @@ def test_an_inside_survey_keeps_its_radius(tmp_path):
     assert found.capacity.volume_m3.iloc[-1] == pytest.approx(np.pi * 6.5**2 * 9.5, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_two_rings_in_a_course_make_two_sections_and_a_frustum_is_exact(tmp_path):
     found = result_of(tmp_path, radius=lambda theta, z: 6.5 + 0.004 * z, rings=2)
     assert len(found.wall.sections) == 10
@@ -74,6 +75,7 @@ def test_tilt_enters_once(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_temperature_is_the_square_of_the_length(tmp_path):
     cold = result_of(tmp_path / "a", settings={"survey.shell_temperature_c": 30.0})
     plain = result_of(tmp_path / "b")
@@ -82,6 +84,7 @@ def test_temperature_is_the_square_of_the_length(tmp_path):
     assert ratio == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_dip_plate_moves_the_zero(tmp_path):
     found = result_of(tmp_path, settings={"datum.dip_plate_z_m": 0.05})
     table = found.capacity
@@ -92,6 +95,7 @@ def test_a_dip_plate_moves_the_zero(tmp_path):
     assert below.capacity.volume_m3.iloc[-1] == pytest.approx(inside(6.5) * 9.5, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_rows_do_not_depend_on_the_order_of_points(tmp_path):
     write_job(tmp_path / "job", noise_mm=3.0, sd_mm=3.0)
     job = tankcal.load(tmp_path / "job")
@@ -111,6 +115,7 @@ def test_rows_do_not_depend_on_the_order_of_points(tmp_path):
     assert other.table.u_m3 == pytest.approx(one.table.u_m3, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_frame_changes_nothing(tmp_path):
     far = {"centre": (500_000.0, 7_500_000.0), "settings": {"datum.bottom_z_m": 850.0}}
     near = result_of(tmp_path / "a", noise_mm=2.0, sd_mm=2.0)
@@ -118,6 +123,7 @@ def test_the_frame_changes_nothing(tmp_path):
     assert moved.table.volume_m3 == pytest.approx(near.table.volume_m3, rel=2e-7, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_given_covariance_equal_to_the_sds_gives_the_same_table(tmp_path):
     by_sd = result_of(tmp_path / "a", noise_mm=2.0, sd_mm=2.0)
     full = result_of(tmp_path / "b", noise_mm=2.0, covariance_m2=4e-6 * np.eye(360))
@@ -137,6 +143,7 @@ def test_fully_correlated_sections_add_linearly(tmp_path):
     assert found.table.u_m3[-1] == pytest.approx(2 * np.pi * 6.5 * 9.5 * 0.001, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_the_noise_is_estimated_when_no_covariance_is_given(tmp_path):
     """Simulation: 360 points with 3 mm in every coordinate."""
     found = result_of(tmp_path, noise_mm=3.0, points_per_ring=72)
@@ -145,6 +152,7 @@ def test_the_noise_is_estimated_when_no_covariance_is_given(tmp_path):
     assert found.table.sources[0].dof == found.wall.shell.noise_dof
 
 
+@pytest.mark.slow
 def test_a_posteriori_scaling_mends_wrong_sds(tmp_path):
     options = {"noise_mm": 3.0, "sd_mm": 1.0, "points_per_ring": 72}
     prior = result_of(tmp_path / "a", **options)
@@ -202,6 +210,7 @@ def scatter_over_prediction(result, surveys):
     return simulate(result, surveys).std(ddof=1) / predicted
 
 
+@pytest.mark.slow
 def test_the_propagated_sd_is_the_scatter_of_simulated_surveys(example_result, figure):
     """100 surveys of the example: the ratio of sds has a standard error of 7 %."""
     ratio = scatter_over_prediction(example_result, 100)
@@ -225,6 +234,7 @@ def test_a_result_shows_itself_in_a_line_and_a_path_is_no_job(example_result):
         run("examples/silva-1995")
 
 
+@pytest.mark.slow
 def test_a_fixed_point_in_a_full_covariance_is_no_stumbling_block(tmp_path):
     """A network with a fixed point has a singular covariance.
 

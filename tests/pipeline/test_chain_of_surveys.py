@@ -70,6 +70,7 @@ def test_a_wall_seen_from_the_other_side_than_was_said_is_refused(job, survey):
     assert told.value.problems[0].expected.code == "stations_on_other_side"
 
 
+@pytest.mark.slow
 def test_a_survey_is_adjusted_first_and_its_points_go_on(job, survey):
     job = replace(job, measurements=with_control(survey))
     steps = []
@@ -98,6 +99,7 @@ def _exact(result):
     return replace(points, xyz_m=xyz, covariance_m2=1e-8 * np.eye(144), causes=())
 
 
+@pytest.mark.slow
 def test_what_is_no_job_and_what_has_nothing_to_adjust(job, survey):
     with pytest.raises(TypeError, match="expected a Job: adjust"):
         adjust_job("examples/silva-1995")
@@ -137,6 +139,7 @@ def test_heights_of_a_free_frame_are_warned_of(job, survey):
     assert "held by all" in told[0]
 
 
+@pytest.mark.slow
 def test_the_variances_of_the_causes_add_up_to_the_unsplit_one(job, survey):
     """Property: one covariance, whether its causes are named or not; row by row to rounding."""
     whole = run(replace(job, measurements=with_control(survey)))
@@ -156,6 +159,7 @@ def test_the_variances_of_the_causes_add_up_to_the_unsplit_one(job, survey):
     assert "scale" in unsplit.body.undeclared()
 
 
+@pytest.mark.slow
 def test_the_scale_of_the_only_tape_is_the_scale_of_the_survey(job, survey):
     """Second method: the derivative by the declared input `scale`, times the tape's u."""
     job = replace(job, inputs=(DeclaredInput("scale", 1e-5, "ppm", 10.0),))
@@ -166,6 +170,7 @@ def test_the_scale_of_the_only_tape_is_the_scale_of_the_survey(job, survey):
     assert any("both count" in str(one) for one in result.warnings)
 
 
+@pytest.mark.slow
 def test_a_posteriori_scales_once(job, survey):
     before = run(replace(job, measurements=with_control(survey)))
     settings = AdjustmentSettings(snooping=False, scale="a_posteriori")
@@ -181,6 +186,7 @@ def test_a_posteriori_scales_once(job, survey):
     assert points.dof == before.adjustment.redundancy
 
 
+@pytest.mark.slow
 def test_the_volume_does_not_know_which_photo_is_held(job, survey, figure):
     """Property (Silva's tests 13 and 18): place and heading of each photo in turn, and inner.
 
@@ -200,6 +206,7 @@ def test_the_volume_does_not_know_which_photo_is_held(job, survey, figure):
     assert max(sds) > 2 * min(sds)
 
 
+@pytest.mark.slow
 def test_the_common_motion_of_points_is_taken_out(job, survey):
     """Closed form: a covariance of nothing but shifts and turns leaves nothing but its own size."""
     points = run(replace(job, measurements=with_control(survey))).job.points
@@ -215,6 +222,7 @@ def test_the_common_motion_of_points_is_taken_out(job, survey):
     assert left.causes[0].column_m == pytest.approx(np.zeros(144), abs=1e-15)
 
 
+@pytest.mark.slow
 def test_points_that_are_not_on_the_wall_are_no_clutter(job, survey):
     """Pillars of the control stand far off: set aside, and no warning about outliers."""
     away = survey.points + ("A", "B", "C")
@@ -232,6 +240,7 @@ def test_points_that_are_not_on_the_wall_are_no_clutter(job, survey):
     assert not any("outliers" in str(one) for one in result.warnings)
 
 
+@pytest.mark.slow
 def test_a_vague_point_and_a_vague_wall_are_named(job, survey):
     result = run(replace(job, measurements=with_control(survey)))
     points = result.job.points
@@ -244,6 +253,7 @@ def test_a_vague_point_and_a_vague_wall_are_named(job, survey):
     assert any("not told from noise" in str(one) for one in told.warnings)
 
 
+@pytest.mark.slow
 def test_a_vertical_that_is_hardly_known_is_told(job, survey):
     points = run(replace(job, measurements=with_control(survey))).job.points
     x, _, z = (points.xyz_m - points.xyz_m.mean(axis=0)).T
@@ -363,6 +373,7 @@ def check_surveys(job, count, figure):
     assert together > 1.5  # photos and tape move all courses at once
 
 
+@pytest.mark.slow
 def test_surveys_scatter_as_one_of_them_says(job, figure):
     check_surveys(job, 20, figure)
 

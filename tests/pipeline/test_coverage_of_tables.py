@@ -30,6 +30,8 @@ from tankcal.gum.monte_carlo import QuadraticRows, simulate, verdict
 from tankcal.pipeline.simulation.model import coordinates
 from tankcal.tank.deliveries import deliveries
 
+pytestmark = pytest.mark.slow
+
 TANKS = 10_000
 NARROW, WIDE, NOT_SHORT = (0.945, 0.955), (0.93, 0.97), (0.945, 1.0)
 

@@ -30,6 +30,7 @@ def written(count, radius=1.0, text="1-{0:02d}, 2-{0:02d}, 3-{0:02d}, 4-{0:02d},
         return boxes, ax.transData.transform(xy), left_out, ax.get_window_extent()
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("count", [12, 24, 60])
 def test_no_name_covers_another_or_a_mark(count):
     boxes, marks, left_out, frame = written(count)
@@ -40,6 +41,7 @@ def test_no_name_covers_another_or_a_mark(count):
         assert frame.x0 <= box.x0 < box.x1 <= frame.x1
 
 
+@pytest.mark.slow
 def test_few_names_all_find_room_and_many_are_thinned():
     assert written(24)[2] == 0
     assert written(400, radius=0.5)[2] > 0

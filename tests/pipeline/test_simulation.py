@@ -113,6 +113,7 @@ def _differences(low, high, u):
     return cap(high + points) - cap(low + points)
 
 
+@pytest.mark.slow
 def test_student_and_rectangular_inputs_have_their_exact_law(tmp_path, figure):
     rows = [
         ("scale", 300, "ppm", "A", "normal", 3),
@@ -173,6 +174,7 @@ def test_one_input_of_three_degrees_of_freedom_gives_a_student_interval(tmp_path
     assert np.isfinite(found.found.low[-1])
 
 
+@pytest.mark.slow
 def test_a_seed_gives_the_same_numbers_and_another_seed_others(sphere):
     result, first = sphere
     pairs = [*zip(first.delivered.low_m, first.delivered.high_m, strict=True)]
@@ -219,6 +221,7 @@ STEPS = {"shell_temperature": 0.5, "expansion": 1e-7, "youngs_modulus": 1e9}
 STEPS |= {"liquid_density": 5.0, "survey_density": 5.0, "tilt": 1e-4}
 
 
+@pytest.mark.slow
 def test_slopes_are_those_of_the_tank_with_its_inputs_moved(tank, figure):
     """Every analytic derivative that has a moved tank, by differences of its volumes."""
     tank, allowed = tank
@@ -300,6 +303,7 @@ def test_an_error_that_no_tank_can_have_takes_a_smaller_step(tmp_path):
     assert np.all(np.isfinite(found.found.low))
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("r", [0.0, 1e-6, 1.0])
 def test_a_correlation_does_not_change_what_it_leaves_alone(tmp_path, r):
     """Two rectangular sizes: with r = 0 a trapezoid, nearly the same with hardly any r."""
@@ -334,6 +338,7 @@ def test_u_of_a_cauchy_input_is_infinite_in_every_row(tmp_path):
     assert half == pytest.approx(student.ppf(0.975, 1) * result.table.u_m3[4], rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_tilt_nobody_saw_adds_its_square(tmp_path):
     """An upright tank: the slope by the tilt is 0, yet m^2/2 of the volume is never lost."""
     rows = [("tilt", 20.0, "mm/m"), ("plate_thickness", 0, "mm")]
@@ -344,6 +349,7 @@ def test_a_tilt_nobody_saw_adds_its_square(tmp_path):
     assert added == pytest.approx(result.table.volume_m3[-1] * 0.02**2 / 2, rel=0.05)
 
 
+@pytest.mark.slow
 def test_rows_between_those_that_are_drawn_for_follow_their_neighbours(monkeypatch, tmp_path):
     """The same table with every row drawn for: ends within a thousandth of u."""
     rows = [("scale", 100, "ppm"), ("datum", 2.0, "mm"), ("offset", 0.5, "mm", "A", "normal", 4)]

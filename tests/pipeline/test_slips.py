@@ -313,6 +313,7 @@ OF_KIND = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_plausible_job_is_told_nothing(tmp_path, kind):
     assert implausible(told(tmp_path / "job", sound(kind))) == {}
@@ -322,6 +323,7 @@ def test_a_plausible_cone_is_told_nothing(tmp_path):
     assert implausible(told(tmp_path / "job", sound("vertical", settings=CONE))) == {}
 
 
+@pytest.mark.slow
 def test_random_jobs_as_they_are_built_are_told_nothing(tmp_path):
     """200 of all kinds and sizes, of three metals, at any temperature that tanks are kept at."""
     alarms = []
@@ -331,17 +333,20 @@ def test_random_jobs_as_they_are_built_are_told_nothing(tmp_path):
     assert alarms == []
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("slip", "code", "key"), OF_ALL)
 @pytest.mark.parametrize("kind", STEEL)
 def test_a_slip_that_any_kind_knows(tmp_path, kind, slip, code, key):
     assert_told(tmp_path, sound(kind, **slip), code, key)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("kind", "slip", "code", "key"), OF_KIND)
 def test_a_slip_of_a_kind(tmp_path, kind, slip, code, key):
     assert_told(tmp_path, sound(kind, **slip), code, key)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("miss_m", [-0.6, 0.8])
 def test_a_bottom_that_leaves_a_ring_beyond_the_shell(tmp_path, miss_m):
     """The rings lie 0.55 m above the bottom and 0.4 m below the top; nothing else tells."""

@@ -38,6 +38,7 @@ def computed(folder, stated="", settings=None, inputs=INPUTS, rule=RULE, **shape
     return tankcal.run(tankcal.load(write_folder(folder / "job", parts)))
 
 
+@pytest.mark.slow
 def test_a_stated_delivery_changes_no_verdict_on_others(tmp_path):
     """One down to the empty tank has many times the U of the law of propagation."""
     (alone,) = computed(tmp_path / "a").rule.uncertainty
@@ -51,6 +52,7 @@ def test_a_stated_delivery_changes_no_verdict_on_others(tmp_path):
     assert beside == alone
 
 
+@pytest.mark.slow
 def test_the_delivery_that_decides_is_simulated(tmp_path, figure):
     """Second method: draws of the closed form, pi (R + o)^2 (1 + s)^2 times the depth, >= 0."""
     result = computed(tmp_path)
@@ -66,6 +68,7 @@ def test_the_delivery_that_decides_is_simulated(tmp_path, figure):
     assert found.worst_U_m3 == pytest.approx(U, rel=0.02)
 
 
+@pytest.mark.slow
 def test_deliveries_hold_a_limit_from_where_those_to_the_empty_tank_do(tmp_path):
     (found,) = computed(tmp_path).rule.uncertainty
     assert found.code == "holds_from"
@@ -94,6 +97,7 @@ READING = [*INPUTS, ["interpolation", 0.3, "m3"], ["rounding", 0.4, "m3"]]
 READING[-2:] = [[*row, None, "B", "normal", None, None] for row in READING[-2:]]
 
 
+@pytest.mark.slow
 def test_what_reading_adds_is_in_u_whichever_method_counts(tmp_path):
     """Two readings between rows: 0.3 and 0.4 m3 twice each, 0.707 m3 in squares."""
     result = computed(tmp_path, "1.13,0,,\n5.13,4.02,,\n1,,,\n0.13,,,\n", inputs=READING, rule="")
@@ -111,6 +115,7 @@ def test_what_reading_adds_is_in_u_whichever_method_counts(tmp_path):
     assert (low["interval"] == "gum") == (low["stated_U_m3"] == low["U_m3"])
 
 
+@pytest.mark.slow
 def test_with_its_reading_no_tank_holds_less_than_nothing(tmp_path):
     """At a dip of 5 mm with a zero known to 5 mm: 0.66 m3, u of 0.66 and 0.4 m3 of reading."""
     result = computed(tmp_path, "0.005,,,\n", {"table.step_m": 0.005}, inputs=READING, rule="")
@@ -122,6 +127,7 @@ def test_with_its_reading_no_tank_holds_less_than_nothing(tmp_path):
 LEANING = {"tilt": (0.003, 0.0)}  # its top is 0.04 mm lower than its courses are long
 
 
+@pytest.mark.slow
 def test_a_delivery_from_the_nominal_top_is_one_from_the_top(tmp_path):
     settings = {"table.minimum_delivery_m": [1.5, 9.5]}
     result = computed(tmp_path, "9.5,0.5,,\n", settings, rule="", **LEANING)

@@ -37,6 +37,7 @@ def sizes(result):
 # ---- head
 
 
+@pytest.mark.slow
 def test_liquid_head_is_that_of_the_published_example(tmp_path):
     """Closed form: 0.46334 m3 first order, 0.46340 m3 with the square of the widening."""
     found = inside_cylinder(tmp_path / "job", {"table.liquid_density_kg_m3": 1000.0})
@@ -44,6 +45,7 @@ def test_liquid_head_is_that_of_the_published_example(tmp_path):
     assert found.table.volume_m3[-1] == pytest.approx(PLAN * HEIGHT + 0.46340, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_survey_of_the_full_tank_needs_no_load_for_the_same_liquid(tmp_path):
     settings = {
         "survey.liquid_level_m": HEIGHT,
@@ -56,6 +58,7 @@ def test_a_survey_of_the_full_tank_needs_no_load_for_the_same_liquid(tmp_path):
     assert half < PLAN * HEIGHT / 2 - 0.05  # half full it is narrower than on the survey day
 
 
+@pytest.mark.slow
 def test_the_table_of_another_density_is_that_of_a_job_of_that_density(tmp_path):
     both = inside_cylinder(
         tmp_path / "a",
@@ -65,6 +68,7 @@ def test_the_table_of_another_density_is_that_of_a_job_of_that_density(tmp_path)
     assert both.by_density[1000.0] == pytest.approx(alone.table.volume_m3, rel=1e-14)
 
 
+@pytest.mark.slow
 def test_a_floating_roof_floats_in_the_liquid_of_each_table(tmp_path):
     """In the other liquid it takes M/rho of that liquid, as in a job of that density."""
     roof = {"mass_kg": 9000.0, "reference_density_kg_m3": 700.0}
@@ -84,6 +88,7 @@ def test_a_floating_roof_floats_in_the_liquid_of_each_table(tmp_path):
 # ---- bottom, deadwood, roof
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     ("form", "centre", "volume"),
     [
@@ -100,6 +105,7 @@ def test_a_shaped_bottom_adds_its_volume(tmp_path, form, centre, volume):
     assert found.table.volume_m3[-1] == pytest.approx(PLAN * HEIGHT + volume, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_dips_from_a_plate_in_the_middle_of_a_cone_begin_with_an_empty_tank(tmp_path):
     settings = {
         "bottom.form": "cone",
@@ -113,6 +119,7 @@ def test_dips_from_a_plate_in_the_middle_of_a_cone_begin_with_an_empty_tank(tmp_
     assert found.table.height_m[-1] == pytest.approx(HEIGHT + 0.15)
 
 
+@pytest.mark.slow
 def test_a_bottom_measured_by_liquid_carries_the_shell_above_it(tmp_path):
     volumes = [(0.0, 0.0, 0.0), (0.1, 10.0, 0.0), (0.2, 23.0, 0.05)]
     found = inside_cylinder(tmp_path / "job", bottom_volumes=volumes)
@@ -126,6 +133,7 @@ def test_a_bottom_measured_by_liquid_carries_the_shell_above_it(tmp_path):
     assert found.at(5.0).u_m3 == pytest.approx(0.05, abs=0.01)
 
 
+@pytest.mark.slow
 def test_a_leaning_bottom_moves_the_zero_with_the_dip_point(tmp_path):
     """The bottom square to an axis that leans 2 % to +x lies 60 mm lower 3 m to that side."""
     settings = {
@@ -147,6 +155,7 @@ def _leaning_cut(slope):
     return lambda theta, z: RADIUS * longer / np.hypot(np.sin(theta), longer * np.cos(theta))
 
 
+@pytest.mark.slow
 def test_deadwood_counts_between_its_bottom_and_its_top(tmp_path):
     plate = {"datum.dip_plate_z_m": 0.1}
     items = [("coil", 0.5, 1.0, -0.4, 0.01), ("manhole", 0.8, 1.4, 0.3)]
@@ -159,6 +168,7 @@ def test_deadwood_counts_between_its_bottom_and_its_top(tmp_path):
     assert sizes(found)["deadwood"] == pytest.approx(-0.1)
 
 
+@pytest.mark.slow
 def test_a_floating_roof_is_deducted_above_its_critical_zone(tmp_path):
     found = inside_cylinder(tmp_path / "a", roof={})
     bare = inside_cylinder(tmp_path / "b")
@@ -177,6 +187,7 @@ def test_a_floating_roof_is_deducted_above_its_critical_zone(tmp_path):
     assert sizes(vacuum)["roof"] == pytest.approx(-9000 / 850)
 
 
+@pytest.mark.slow
 def test_a_correction_that_is_switched_off_is_shown_and_not_made(tmp_path):
     settings = {
         "bottom.form": "cone",
@@ -201,6 +212,7 @@ def test_a_correction_that_is_switched_off_is_shown_and_not_made(tmp_path):
 # ---- tilt
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("slope", [0.03, 1 / 70])
 def test_sections_square_to_the_axis_times_the_factor_give_the_same_table(tmp_path, slope):
     """Both routes of methods for a leaning shell: cut level, or square to the axis and stretched.
@@ -253,6 +265,7 @@ def test_heights_expand_only_where_it_is_asked_for(tmp_path):
 # ---- the table
 
 
+@pytest.mark.slow
 def test_rows_of_a_table_in_feet_and_inches(tmp_path):
     settings = {"table.step_m": None, "table.height_unit": "ft-in-8"}
     found = inside_cylinder(tmp_path / "job", settings)
@@ -260,6 +273,7 @@ def test_rows_of_a_table_in_feet_and_inches(tmp_path):
     assert steps == pytest.approx(np.arange(len(steps)), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_step_is_chosen_by_the_bound_on_interpolation(tmp_path):
     settings = {"table.step_m": None, "table.max_interpolation_error_l": 1.0, **INSIDE}
     found = result_of(tmp_path / "job", kind="horizontal", settings=settings)
@@ -280,6 +294,7 @@ def test_proportional_parts_go_from_joint_to_joint(tmp_path):
     assert found.proportional_parts[0].part_m3[4] == pytest.approx(0.005 * PLAN, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_parts_over_a_cone_keep_to_a_small_part_of_u(tmp_path):
     """Closed form of the cone: no mean of a zone is off by more than U / 20, or half a litre."""
     settings = {
@@ -302,6 +317,7 @@ def test_parts_over_a_cone_keep_to_a_small_part_of_u(tmp_path):
         assert np.all(np.abs(rows + part - exact) <= allowed + 1e-4)
 
 
+@pytest.mark.slow
 def test_a_top_that_leans_is_the_nominal_one(tmp_path):
     """9.5 m that lean by 3 mm/m reach 9.49996 m: 9.5 m to whoever measures it.
 
@@ -451,6 +467,7 @@ def test_a_scan_gives_diameter_and_tilt_of_a_lying_tank(tmp_path):
     assert {"diameter", "tilt"}.isdisjoint(found.body.undeclared())
 
 
+@pytest.mark.slow
 def test_the_intervals_of_a_scanned_lying_tank_hold_the_truth(tmp_path, figure):
     """15 scans: at least 10 intervals of 95 % hold it (binomial, 6e-5 to be below)."""
     truth = np.pi * 1.2**2 * 10
@@ -471,6 +488,7 @@ def test_the_intervals_of_a_scanned_lying_tank_hold_the_truth(tmp_path, figure):
     assert inside >= 10
 
 
+@pytest.mark.slow
 def test_ullage_volume_to_dip_and_the_shell_in_service(tmp_path):
     found = inside_cylinder(tmp_path / "job", {"datum.reference_height_m": 10.0}, sd_mm=2.0)
     assert found.at_ullage(3.0).value_m3 == found.at(7.0).value_m3

@@ -62,6 +62,7 @@ def test_the_filled_job_adjusts_to_what_was_predicted(prediction, filled):
     )
 
 
+@pytest.mark.slow
 def test_the_table_is_that_of_the_chain(prediction, filled, figure):
     """Second method: points with their full covariance, wall and table, as a job goes."""
     plan = prediction.plan
@@ -88,6 +89,7 @@ def test_a_wall_whose_covariance_is_not_written_out(plan, prediction, monkeypatc
     assert again.made.table.U_m3 == pytest.approx(prediction.table.U_m3, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_free_network(plan, figure):
     """Second method: inner constraints over the control, whose covariance is singular; products
     with it against the matrix as it is written out."""
@@ -173,6 +175,7 @@ def test_sections_against_the_written_covariance(prediction):
     assert section.radius_sd_m == pytest.approx(sd, rel=1e-2)  # targets moved away from welds
 
 
+@pytest.mark.slow
 def test_what_a_blunder_does_to_the_volume(prediction, filled, figure):
     """Second method: the tape that is told to be worst misread by its undetectable blunder, and the
     survey adjusted without a search."""
@@ -236,6 +239,7 @@ def test_more_precise_images_make_the_points_more_precise(plan, prediction):
         assert one.sd_m == pytest.approx(other.sd_m / 2, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_total_station_plan(tmp_path):
     """Simulation: set-ups that sight one another; the job filled with errors adjusts to what was
     predicted, but for what the errors move."""

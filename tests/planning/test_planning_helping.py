@@ -25,6 +25,7 @@ def effects(plan):
     return what_helps(plan)
 
 
+@pytest.mark.slow
 def test_each_effect_is_that_of_the_changed_plan(plan, effects):
     """Second method: the plan after the change, predicted from nothing."""
     for item in ("photo_station", "tape", "control_point", "reading"):
@@ -34,6 +35,7 @@ def test_each_effect_is_that_of_the_changed_plan(plan, effects):
         assert one.U_m3 == pytest.approx(found.table.U_m3[-1], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_more_never_harms_and_less_never_helps(effects):
     """Property: an observation more cannot make the table worse, one less cannot improve it.
 
@@ -48,6 +50,7 @@ def test_more_never_harms_and_less_never_helps(effects):
             assert one.difference < 1e-9
 
 
+@pytest.mark.slow
 def test_the_best_come_first_and_cost_what_they_cost(plan, effects):
     assert [one.relative_u for one in effects] == sorted(one.relative_u for one in effects)
     for one in effects:
@@ -57,6 +60,7 @@ def test_the_best_come_first_and_cost_what_they_cost(plan, effects):
     assert cost_of(plan) == pytest.approx(11 * 35 + 8 * 20 + 11 * 60 + 120 * 2)
 
 
+@pytest.mark.slow
 def test_what_is_added_into_an_obstacle_cannot_stand_there(plan):
     """A station half-way between two others, where something is in the way."""
     added = next(one for one in changes_of(plan, ("add",), ("photo_station",)))
@@ -122,6 +126,7 @@ def test_names_of_what_is_added_may_stand_in_a_job(plan):
         assert all(is_name(name) for name in names)
 
 
+@pytest.mark.slow
 def test_greedy_goes_on_until_the_limit_is_met(plan):
     start = predict(plan).relative_u
     limited = replace(plan, limits=replace(plan.limits, relative_u=0.99 * start))
@@ -141,6 +146,7 @@ def test_greedy_goes_on_until_the_limit_is_met(plan):
     assert told[-1][1] == told[-1][2]
 
 
+@pytest.mark.slow
 def test_the_smallest_design_meets_the_limit_and_nothing_more_can_go(plan):
     limit = 1.02 * predict(plan).relative_u
     limited = replace(plan, limits=replace(plan.limits, relative_u=limit))
@@ -162,6 +168,7 @@ def test_nothing_is_read_more_than_a_hundred_times(plan):
     assert names == {one.name for one in plan.ties[1:]}
 
 
+@pytest.mark.slow
 def test_a_search_ends_where_nothing_helps_any_more(plan):
     """A limit that plates and datum forbid: a step gains a thousandth at least, or is not made."""
     hopeless = replace(plan, limits=replace(plan.limits, relative_u=1e-6))
@@ -171,6 +178,7 @@ def test_a_search_ends_where_nothing_helps_any_more(plan):
     assert all(one.difference < -9e-4 * one.relative_u for one in path.steps)
 
 
+@pytest.mark.slow
 def test_the_unit_of_money_does_not_matter(plan):
     """What is free comes first, then the most for its cost, in whatever currency."""
     chosen = []

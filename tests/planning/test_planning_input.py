@@ -258,6 +258,7 @@ def control_without_sds():
     return "\n".join([lines[0], lines[-1]]) + "\n"
 
 
+@pytest.mark.slow
 def test_the_command_line(changed, tmp_path, capsys):
     assert main(["plan", str(PLAN), "--quiet", "--out", str(tmp_path / "out")]) == 0
     shown = capsys.readouterr().out
@@ -304,6 +305,7 @@ def test_the_command_line_with_a_limit_that_nothing_meets(changed, capsys, monke
     assert "no plan that was tried meets the limit" in told
 
 
+@pytest.mark.slow
 def test_the_command_line_with_simulated_surveys(tmp_path, capsys):
     """One image point of nearly a thousand is off now and then; the same seed, the same surveys."""
     out = tmp_path / "out"

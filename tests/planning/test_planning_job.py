@@ -89,6 +89,7 @@ def test_what_is_known_beforehand_is_there(planned):
     assert rows_of(folder / "image_points.csv") == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fill", ["folder", "workbook"])
 def test_the_filled_job_is_the_survey_that_was_planned(empty, fill):
     """Second method: read, adjusted and computed as a job, from readings without errors."""
@@ -115,6 +116,7 @@ def test_the_filled_job_is_the_survey_that_was_planned(empty, fill):
     assert result.table.volume_m3 == pytest.approx(prediction.table.volume_m3, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_both_forms_filled_in_are_the_same_job(empty):
     prediction, folder = empty
     fill_workbook(folder / "job.xlsx", exact(prediction))
@@ -136,6 +138,7 @@ def test_a_filled_job_with_errors_runs(empty, figure):
     assert off < 2 * prediction.table.U_m3[-1]
 
 
+@pytest.mark.slow
 def test_a_total_station_job_filled_in(tmp_path):
     """Two sets of everything: twice as many rows, and the sds that were predicted."""
     prediction = predict(load_plan(with_setups(tmp_path)))
@@ -157,6 +160,7 @@ def test_a_total_station_job_filled_in(tmp_path):
         assert one.sd_m == pytest.approx(np.sqrt(np.diag(known[one.name])), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_other_names_of_keys_and_marks_come_along(tmp_path):
     """K1 for K1_mm-2, a name with a space, fiducial marks: the job has the camera of the plan."""
     changed_plan(tmp_path, ('camera = "UMK"', 'camera = "UMK 10"'))
@@ -189,6 +193,7 @@ def test_a_fixed_photo_keeps_its_place(tmp_path):
     assert from_angles(*angles) == pytest.approx(prediction.plan.photos[0].rotation, abs=2e-4)
 
 
+@pytest.mark.slow
 def test_a_filled_job_is_never_replaced(tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["plan", str(PLAN), "--quiet", "--out", str(out)]) == 0
@@ -202,6 +207,7 @@ def test_a_filled_job_is_never_replaced(tmp_path, capsys):
     assert set(planning_papers.FILES) >= {one.name for one in out.iterdir()} - {"job"}
 
 
+@pytest.mark.slow
 def test_the_design_of_a_search_has_papers_of_its_own(tmp_path):
     """Its empty job, filled without errors, is the survey that the search ended with."""
     prediction = predict(load_plan(PLAN))

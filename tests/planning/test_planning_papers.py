@@ -159,6 +159,7 @@ def test_weak_and_lost_points_are_told(poor):
     assert " ".join(texts_of(sheets(PlanPaper(poor)))).count("pattern.form_mm") == 1
 
 
+@pytest.mark.slow
 def test_limits_are_judged_in_words(prediction):
     def told(**limits):
         plan = replace(prediction.plan, limits=replace(prediction.plan.limits, **limits))
@@ -227,6 +228,7 @@ def book_of(found, path, language=None):
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_every_text_is_of_the_words(prediction, tried, poor, tmp_path, monkeypatch):
     english = load_words()
     words = bracketed(english) | {"language": english["language"]}
@@ -239,6 +241,7 @@ def test_every_text_is_of_the_words(prediction, tried, poor, tmp_path, monkeypat
         assert not outside - data_of(found) - of_codes - months
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "language", [OTHERS[0], *(pytest.param(one, marks=pytest.mark.study) for one in OTHERS[1:])]
 )
@@ -250,6 +253,7 @@ def test_no_word_of_english_is_left(prediction, tried, poor, language, tmp_path)
         assert not letters_in(shown) & english
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_the_papers_are_set(poor, language, tmp_path):
     """The page is set in each language, and the same plan gives the same bytes."""
@@ -260,6 +264,7 @@ def test_the_papers_are_set(poor, language, tmp_path):
     assert pdf([block.data for block in sheets(PlanPaper(poor, language))], tmp_path) == first
 
 
+@pytest.mark.slow
 def test_the_same_plan_gives_the_same_files(prediction, tmp_path):
     found = [tmp_path / name for name in ("one", "two")]
     for folder in found:
@@ -269,6 +274,7 @@ def test_the_same_plan_gives_the_same_files(prediction, tmp_path):
         assert path.read_bytes() == (found[1] / path.relative_to(found[0])).read_bytes(), path
 
 
+@pytest.mark.slow
 def test_the_workbook_has_the_targets_and_a_sketch(prediction, tmp_path):
     texts = book_of(prediction, tmp_path / "x.xlsx")
     assert {"24-5", "R1-11", "V4b", "Targets"} <= set(texts)

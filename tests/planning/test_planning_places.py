@@ -31,6 +31,7 @@ def from_within(folder, *pairs):
     return load_plan(folder)
 
 
+@pytest.mark.slow
 def test_the_volume_is_that_of_the_nominal_tank_from_either_side(plan, tmp_path):
     """Second method: plates are 8.0 to 6.3 mm, so the courses differ outside and not inside."""
     inside = from_within(tmp_path)

@@ -52,6 +52,7 @@ def assert_told(prediction, adjustment, *kinds):
         assert group.blunder == pytest.approx(largest, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_sets_control_one_another(tmp_path, figure):
     """Second method: the filled job, where each set has its own readings and orientation."""
     alone, twice = (with_sets(tmp_path, sets) for sets in (1, 2))
@@ -65,6 +66,7 @@ def test_sets_control_one_another(tmp_path, figure):
     assert_told(twice, adjust_survey(filled(twice, tmp_path / "job")), "direction")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sets", [2, 3])
 def test_every_reading_of_a_total_station(tmp_path, monkeypatch, sets):
     """Second method: the filled job, with no reading averaged before the adjustment."""
@@ -75,6 +77,7 @@ def test_every_reading_of_a_total_station(tmp_path, monkeypatch, sets):
     assert_told(found, adjust_survey(filled(found, tmp_path / "job")), *kinds)
 
 
+@pytest.mark.slow
 def test_lines_that_are_taped_again(tmp_path, monkeypatch):
     """Second method; the readings of one line differ in their sds, and go either way."""
     changed_plan(tmp_path, ('name = "V1"\n', 'name = "V1"\nreadings = 2\n'))
@@ -100,6 +103,7 @@ def test_images_that_are_read_again(tmp_path):
     assert images.blunder == pytest.approx(sizes.max(), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_what_a_blunder_in_one_set_does(tmp_path, figure):
     """Second method: the worst direction of one set misread by a hundredth of its undetectable
     blunder, which leaves the outlines as they are, and the filled job adjusted."""

@@ -66,6 +66,7 @@ def names_in(figure):
 # ---- where things are
 
 
+@pytest.mark.slow
 def test_what_stands_on_the_reference_weld_has_no_arc(prediction):
     """Rounding just short of a full turn is none: 0.000 m, not once around."""
     assert float(full_turn(-1e-17)) == 0.0
@@ -76,6 +77,7 @@ def test_what_stands_on_the_reference_weld_has_no_arc(prediction):
     assert place_of(plan, north).arc_m == 0.0
 
 
+@pytest.mark.slow
 def test_what_is_not_seen_is_marked(hidden):
     """In lists, sheets, sketch and counts: a target that the prediction does not determine."""
     lost = {one.name for one in hidden.undetermined}
@@ -91,6 +93,7 @@ def test_what_is_not_seen_is_marked(hidden):
     assert "not seen" in labels_of(sketches.wall(paper))
 
 
+@pytest.mark.slow
 def test_where_all_is_seen_nothing_is_said_of_it(prediction):
     assert "not seen" not in texts_of(sheets(PlanPaper(prediction)))
 
@@ -103,6 +106,7 @@ def test_only_set_ups_that_can_be_seen_are_to_be_sighted(stationed):
     assert found[0]["sights"] == ["T1-6"]
 
 
+@pytest.mark.slow
 def test_one_ray_is_enough_from_a_set_up(stationed, prediction):
     """Bars are red for want of rays where photographs are taken, not where set-ups measure."""
 
@@ -119,6 +123,7 @@ def test_one_ray_is_enough_from_a_set_up(stationed, prediction):
 # ---- tapes, plumb lines, photographs
 
 
+@pytest.mark.slow
 def test_a_plumb_line_is_no_tape(hidden):
     (line,) = (one for one in rows.ties(hidden) if one["what"] == "plumb_lines")
     assert line["value"] in ("on_one_line", "unseen_end")
@@ -140,6 +145,7 @@ def _changes(plan, item):
     return [Effect(one, 0.0, 0.0, 0.0, 0) for one in changes_of(plan, items=(item,))]
 
 
+@pytest.mark.slow
 def test_what_is_written_down_on_site_has_its_column(prediction):
     text = texts_of(sheets(PlanPaper(prediction)))
     assert "Temp. °C" in text
@@ -147,11 +153,13 @@ def test_what_is_written_down_on_site_has_its_column(prediction):
     assert "with these names they go into image_points.csv" in text
 
 
+@pytest.mark.slow
 def test_an_accuracy_that_is_not_given_is_not_zero(prediction):
     (tape,) = rows.instruments(prediction.plan)
     assert tape["u_scale"] is None
 
 
+@pytest.mark.slow
 def test_headings_stand_on_the_page_of_their_tables(prediction):
     data = [block.data for block in sheets(PlanPaper(prediction))]
     for number, one in enumerate(data):
@@ -162,6 +170,7 @@ def test_headings_stand_on_the_page_of_their_tables(prediction):
 # ---- sketches
 
 
+@pytest.mark.slow
 def test_the_sketch_of_the_stations_shows_all_of_a_neighbour(prediction):
     east = prediction.plan.shell.axis_m + [24.0, 0.0]
     plan = replace(prediction.plan, obstacles=(Pillar(east, 6.5, 10.0, 20.0, "TQ-2"),))
@@ -175,6 +184,7 @@ def test_the_sketch_of_the_stations_shows_all_of_a_neighbour(prediction):
     assert ax.get_aspect() == 1.0
 
 
+@pytest.mark.slow
 def test_the_unrolled_wall_shows_welds_and_the_names_of_tapes(prediction):
     figure = sketches.wall(PlanPaper(prediction))
     assert {"V1", "H1", "M1"} <= names_in(figure)
@@ -184,6 +194,7 @@ def test_the_unrolled_wall_shows_welds_and_the_names_of_tapes(prediction):
 # ---- the prediction
 
 
+@pytest.mark.slow
 def test_what_is_added_has_a_place(prediction, effects, tmp_path):
     placed = {"photo_station", "tape", "control_point"}
     for one in effects:
@@ -202,6 +213,7 @@ def test_what_is_added_has_a_place(prediction, effects, tmp_path):
     assert float(listed["N-V1"]["arc_m"]) == pytest.approx(east_of_weld, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_what_can_be_spared_is_listed_beside_what_would_help(prediction, effects):
     drop, add = (
         next(one for one in effects if one.change.action == action) for action in ("drop", "add")
@@ -219,6 +231,7 @@ def test_what_can_be_spared_is_listed_beside_what_would_help(prediction, effects
     assert "Weak or lost" in text
 
 
+@pytest.mark.slow
 def test_what_an_error_does_that_nothing_controls(tmp_path):
     """Closed form: a scale that hangs on one tape of length L turns dL into 2 V dL / L."""
     rolled = ("rolls_deg = [0]", "rolls_deg = [0, 90]")
@@ -239,6 +252,7 @@ def test_what_an_error_does_that_nothing_controls(tmp_path):
 # ---- the workbook
 
 
+@pytest.mark.slow
 def test_every_printed_page_has_its_headings(hidden, tmp_path):
     workbook.write(PlanPaper(hidden), tmp_path / "x.xlsx")
     book = openpyxl.load_workbook(tmp_path / "x.xlsx")

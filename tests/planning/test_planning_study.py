@@ -29,6 +29,7 @@ def test_five_hundred_surveys_scatter_as_predicted(prediction, figure):
     assert found.volume_ratio == pytest.approx(1.0, abs=4 / np.sqrt(2 * 499))
 
 
+@pytest.mark.slow
 def test_some_surveys_scatter_as_predicted(prediction, figure):
     """The study at a twentieth. Of 25 surveys the sd of one coordinate is known to 14 %; of 411
     that hang together the rms to a few per cent."""
@@ -40,6 +41,7 @@ def test_some_surveys_scatter_as_predicted(prediction, figure):
     assert found.scatter_m.shape == (137, 3)
 
 
+@pytest.mark.slow
 def test_blunders_are_set_aside(prediction, figure):
     """One reading in a hundred off by 20 of its sds: found, and the coordinates stay good."""
     found = simulate(prediction, 6, seed=4, blunders=0.01)

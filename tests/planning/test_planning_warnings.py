@@ -43,6 +43,7 @@ def test_a_sound_plan_says_what_its_run_will_say(prediction):
     assert codes(prediction) == ["undeclared"]
 
 
+@pytest.mark.slow
 def test_on_the_terminal_on_paper_and_in_plan_json(prediction, tmp_path, capsys):
     assert main(["plan", str(PLAN), "--quiet", "--out", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().err.splitlines()

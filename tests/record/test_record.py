@@ -104,6 +104,7 @@ def test_what_was_not_declared_is_said(tmp_path):
     assert choices["covariance_sd_mm"] > 0
 
 
+@pytest.mark.slow
 def test_rejected_points_have_row_reason_and_residual(tmp_path):
     write_job(tmp_path / "job", extra_points=[("stair", 7.4, 0.0, 3.0), ("roof", 1.0, 0.0, 10.2)])
     record = record_of(tankcal.run(tankcal.load(tmp_path / "job")))

@@ -39,12 +39,14 @@ def kept(path):
     return json.loads(gzip.decompress(path.read_bytes()))
 
 
+@pytest.mark.slow
 def test_no_key_comes_or_goes_without_the_version(made):
     found, listed = set(layout_made(made)), keys_of_schema(RECORD.schema())
     came, went = sorted(found - listed), sorted(listed - found)
     assert (came, went) == ([], []), WHAT_TO_DO
 
 
+@pytest.mark.slow
 def test_a_record_has_every_key_of_its_version(made):
     for record in made.values():
         assert record["format"] == FORMAT
@@ -80,6 +82,7 @@ def test_a_kept_record_is_read_as_one_of_this_version(path):
     assert missing_keys(read, RECORD.schema()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "path",
     [path if path.name in QUICK else pytest.param(path, marks=pytest.mark.study) for path in ALL],

@@ -402,6 +402,7 @@ def test_the_workbook_of_a_survey_alone(only):
     assert {HARD_NAME, HARD_TEXT} <= {cell.value for cell in cells}
 
 
+@pytest.mark.slow
 def test_the_workbook_of_a_tank_has_the_sheets_beside_its_own(whole):
     book = openpyxl.load_workbook(whole[1] / "capacity.xlsx")
     assert {"Adjustment", "Observations", "Cameras and photos", "Capacity"} <= {*book.sheetnames}
@@ -433,6 +434,7 @@ def test_of_very_many_points_the_sheet_has_the_weakest(only, tmp_path, monkeypat
     assert names == [row["point"] for row in record["points"] if row["point"] in names]
 
 
+@pytest.mark.slow
 def test_without_papers_there_is_what_they_are_made_of(job, only, tmp_path, capsys):
     out = tmp_path / "out"
     command = ["run", str(job), "--only", "adjustment", "--out", str(out), "--quiet"]
@@ -543,6 +545,7 @@ def test_a_plan_asks_for_its_extent_twice_however_many_points_it_has(only, monke
     assert len(asked) == 2
 
 
+@pytest.mark.slow
 def test_figures_are_drawn_of_every_kind_of_survey(only, station):
     for path in (only[1] / "record.json", station[2]):
         paper = Paper(path)
@@ -628,6 +631,7 @@ def test_every_kind_of_observation_has_words():
 # the command line
 
 
+@pytest.mark.slow
 def test_the_summary_says_how_good_it_is(job, only, capsys, monkeypatch):
     monkeypatch.setattr(outputs, "write_adjustment", lambda *rest: [Path("record.json")])
     assert main(["run", str(job), "--only", "adjustment", "--strict"]) == 0
@@ -643,6 +647,7 @@ def doubtful(tmp_path_factory):
     return write_photos(tmp_path_factory.mktemp("doubtful") / "job", image_sd_um=50)
 
 
+@pytest.mark.slow
 def test_strict_writes_nothing_when_the_global_test_fails(doubtful, capsys):
     assert main(["run", str(doubtful), "--strict", "--quiet", "--only", "adjustment"]) == 3
     error = capsys.readouterr().err
@@ -651,6 +656,7 @@ def test_strict_writes_nothing_when_the_global_test_fails(doubtful, capsys):
     assert not (doubtful / "results").exists()
 
 
+@pytest.mark.slow
 def test_strict_holds_for_the_whole_run(doubtful, monkeypatch, capsys):
     adjustment = adjust_job(tankcal.load(doubtful))
     monkeypatch.setattr(tankcal, "run", lambda *job, **told: SimpleNamespace(adjustment=adjustment))
@@ -665,6 +671,7 @@ def test_a_job_without_a_survey_has_nothing_to_adjust(tmp_path, capsys):
     assert "job.toml" in capsys.readouterr().err
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("survey", ["photos", "total-station"])
 def test_new_writes_the_files_of_a_survey(survey, tmp_path):
     assert main(["new", str(tmp_path / "mine"), "--survey", survey]) == 0

@@ -7,7 +7,10 @@ from recalculation import calculators
 from tankcal.text.words import load_words
 
 # openpyxl does not know our data bars, and says so each time
-pytestmark = pytest.mark.filterwarnings("ignore:.*extension is not supported:UserWarning")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore:.*extension is not supported:UserWarning"),
+]
 NONE = "–"
 RELATIVE = 1e-12  # LibreOffice stores 15 digits
 WORDS = load_words("en")

@@ -112,6 +112,7 @@ def calculated(example, roofed, tables, tmp_path_factory):
     return calculators(groups, WORDS, tmp_path_factory.mktemp("calculated"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OF_INPUTS)
 def test_k_of_few_degrees_of_freedom(calculated, tables, name, figure):
     """By the beta distribution, and just above."""
@@ -142,6 +143,7 @@ def test_columns_belong_to_the_sources_of_the_budget():
 # a floating roof, other densities, rows that cannot be told apart
 
 
+@pytest.mark.slow
 def test_head_and_roof_follow_the_density_of_the_liquid(roofed, calculated):
     """Head: the record's own tables at its densities, less their roof; half-way the mean of two."""
     result, record = roofed
@@ -166,6 +168,7 @@ def test_head_and_roof_follow_the_density_of_the_liquid(roofed, calculated):
     assert floats.line("in_service")[7] == pytest.approx(table, rel=RELATIVE)
 
 
+@pytest.mark.slow
 def test_the_critical_zone_of_a_roof_is_refused(calculated):
     critical = calculated["critical"]
     said = "Refused: critical zone of the roof, 1.000 m to 1.300 m."
@@ -178,12 +181,14 @@ def test_the_critical_zone_of_a_roof_is_refused(calculated):
         assert all(isinstance(found[end], float | int) for end in (0, 4)), line
 
 
+@pytest.mark.slow
 def test_deliveries_of_a_tank_whose_inputs_are_all_sure(roofed, calculated):
     """Degrees of freedom are those of points and form here; every pair as tankcal has it."""
     pairs = [one for one in pairs_of_dips() if one["delivery_low_dip"] > 1.4]
     held_against_deliveries(calculated["above the roof"], roofed[0].table, pairs, None)
 
 
+@pytest.mark.slow
 def test_a_volume_of_more_than_one_dip_is_refused(example, calculated):
     """As tankcal.tank.dips.dips_of refuses it: below a raised bottom the table stands still."""
     found, heights = calculated["flat"], example[1]["capacity"]["height_m"]
@@ -193,6 +198,7 @@ def test_a_volume_of_more_than_one_dip_is_refused(example, calculated):
     assert found.line("dip_of_volume")[2:] == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_table_that_falls_gives_no_dip(calculated):
     (said,) = calculated["falling"].sentences("wanted_state")
     assert said == "Refused: volumes of this table fall somewhere: no single dip."

@@ -37,6 +37,7 @@ def path(record, tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_each_open_cell_has_a_name_and_says_what_it_takes(record, language, tmp_path):
     """XlsxWriter leaves a validation out whose texts are too long for Excel."""
@@ -87,6 +88,7 @@ WITHOUT_READING = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_volume_and_delivery_say_that_their_U_is_without_reading(record, language, tmp_path):
     write(record, tmp_path / "words.xlsx", language)
@@ -96,6 +98,7 @@ def test_volume_and_delivery_say_that_their_U_is_without_reading(record, languag
     assert sum(WITHOUT_READING[language] in text for text in cells) == 2
 
 
+@pytest.mark.slow
 def test_formulas_use_only_functions_of_excel_2007(roofed):
     book = openpyxl.load_workbook(roofed[1])
     formulas = [
@@ -107,6 +110,7 @@ def test_formulas_use_only_functions_of_excel_2007(roofed):
     assert max(map(len, formulas)) < 8192
 
 
+@pytest.mark.slow
 def test_capacity_mm_is_the_table_at_every_millimetre(record, path):
     table = pd.read_excel(path, sheet_name="Capacity mm")
     capacity = record["capacity"]
@@ -118,6 +122,7 @@ def test_capacity_mm_is_the_table_at_every_millimetre(record, path):
     assert table["Volume (L)"].iloc[-1] == pytest.approx(1000 * volumes[-1], rel=1e-15)
 
 
+@pytest.mark.slow
 def test_capacity_mm_is_blank_in_a_critical_zone(roofed):
     table = pd.read_excel(roofed[1], sheet_name="Capacity mm").set_index("Dip (mm)")["Volume (L)"]
     assert list(table.index[table.isna()]) == list(range(1001, 1300))

@@ -199,6 +199,7 @@ def headed(example_record, tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_name_and_address_are_printed_literally(headed):
     for name in ("certificate.pdf", "working-papers.pdf"):
         first = pages(headed / name)[0]
@@ -217,6 +218,7 @@ def test_the_notebook_alone_gives_the_same_paper(headed, tmp_path):
     assert (tmp_path / "report.pdf").read_bytes() == (headed / "report.pdf").read_bytes()
 
 
+@pytest.mark.slow
 def test_the_colours_are_those_of_the_letterhead(headed):
     notebook = nbformat.read(headed / "report.ipynb", as_version=4)
     found = blocks_of(notebook, "certificate")

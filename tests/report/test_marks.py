@@ -79,6 +79,7 @@ def test_the_axes_of_a_figure_bear_the_mark_but_names_stay(paper):
     assert not [text for text in texts if re.fullmatch(r"\d\.\d+", text)]
 
 
+@pytest.mark.slow
 def test_texts_of_the_workbook_with_portuguese_marks(example_record, words, monkeypatch, tmp_path):
     """Its number formats know no language: a spreadsheet shows them with its own marks."""
     monkeypatch.setattr(workbook, "load_words", lambda language: words)
@@ -121,6 +122,7 @@ def as_shown(tmp_path_factory):
         return dict(zip(cells, (row[0] for row in csv.reader(shown)), strict=True))
 
 
+@pytest.mark.slow
 def test_a_spreadsheet_rounds_as_the_paper_does(as_shown):
     """Other program: number formats of LibreOffice against `fixed`, halves included."""
     assert len(as_shown) > 600

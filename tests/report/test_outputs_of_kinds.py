@@ -15,6 +15,8 @@ from tankcal.report import outputs
 from tankcal.report.paper import Paper
 from tankcal.report.uncertainty.table import NOT_FOR_USE, density_blocks
 
+pytestmark = pytest.mark.slow
+
 SETTINGS = {
     "table.step_m": 0.5,
     "table.liquid_density_kg_m3": 850.0,

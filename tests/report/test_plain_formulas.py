@@ -85,6 +85,7 @@ def test_only_columns_of_formulas_are_set():
     assert html.count("<math") == 1
 
 
+@pytest.mark.slow
 def test_every_formula_is_set_on_paper(tmp_path):
     """typst sets a PDF/UA-1 only where each formula has its words; markup is never read."""
     texts = [text for language in LANGUAGES for text in sentences(language)]

@@ -9,7 +9,10 @@ from tankcal.text.languages import LANGUAGES
 from tankcal.text.words import load_words
 
 # openpyxl does not know our data bars, and says so each time
-pytestmark = pytest.mark.filterwarnings("ignore:.*extension is not supported:UserWarning")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore:.*extension is not supported:UserWarning"),
+]
 WORKBOOKS = (*LANGUAGES, "afloat")  # the last: with a roof, other densities, a reference height
 
 

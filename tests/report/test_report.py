@@ -68,6 +68,7 @@ def test_all_files_are_there(example):
     assert {path.name for path in example.iterdir()} == {*FILES, "record.json"}
 
 
+@pytest.mark.slow
 def test_every_page_has_notice_and_number(example):
     for name in ("certificate.pdf", "working-papers.pdf", "report.pdf"):
         texts = pages(example / name)
@@ -130,6 +131,7 @@ def test_headings_of_the_capacity_table_repeat_on_its_pages(example):
         assert re.search(r"Height Volume U", text)
 
 
+@pytest.mark.slow
 def test_text_is_never_markup_in_the_pdf(hard):
     certificate = " ".join(pages(hard / "certificate.pdf"))
     papers = " ".join(pages(hard / "working-papers.pdf"))
@@ -140,6 +142,7 @@ def test_text_is_never_markup_in_the_pdf(hard):
     assert papers.count("$stair$") == 2
 
 
+@pytest.mark.slow
 def test_text_is_never_markup_in_the_html(hard):
     text = (hard / "report.html").read_text(encoding="utf-8")
     assert text.count("</script>") == text.count("<script") == 4  # words, data, and their script
@@ -147,6 +150,7 @@ def test_text_is_never_markup_in_the_html(hard):
     assert "&lt;b&gt;&amp;amp; &lt;/script&gt;" in text
 
 
+@pytest.mark.slow
 def test_html_asks_the_network_for_nothing(hard):
     text = (hard / "report.html").read_text(encoding="utf-8")
     assert re.findall(r'(?:src|href|action)="(?!data:|#)', text) == []
@@ -155,6 +159,7 @@ def test_html_asks_the_network_for_nothing(hard):
     assert "default-src 'none'" in text
 
 
+@pytest.mark.slow
 def test_certificate_without_number_has_none(hard):
     first = pages(hard / "certificate.pdf")[0]
     assert first.startswith("Certificate No. ____________________ DRAFT")
@@ -163,6 +168,7 @@ def test_certificate_without_number_has_none(hard):
     assert "Lab & Söhne #1" in first
 
 
+@pytest.mark.slow
 def test_k_by_rows_is_a_column(hard, example):
     assert "m m³ m³ k" in " ".join(pages(hard / "certificate.pdf"))
     assert "0.010 1.315 1.0 4.30" in " ".join(pages(hard / "certificate.pdf"))
@@ -171,6 +177,7 @@ def test_k_by_rows_is_a_column(hard, example):
     )
 
 
+@pytest.mark.slow
 def test_document_properties(hard):
     if not shutil.which("pdfinfo"):
         pytest.skip("pdfinfo (poppler) is not on this machine")
@@ -202,6 +209,7 @@ def test_nbconvert_makes_the_same_file(example, tmp_path, target):
     assert made.read_bytes() == (example / made.name).read_bytes()
 
 
+@pytest.mark.slow
 def test_nbconvert_takes_one_part(example, tmp_path):
     from tankcal.report.exporter import PdfExporter
 
@@ -236,12 +244,14 @@ def test_an_untagged_cell_belongs_with_the_cell_before_it():
     assert len(blocks_of(notebook, "working-papers")) == 2
 
 
+@pytest.mark.slow
 def test_failing_cell_stops_the_report_by_name(tmp_path):
     notebook = new_notebook(cells=[new_code_cell("x = 1"), new_code_cell("1 / 0")])
     with pytest.raises(TankcalError, match=r"cell 2 \(1 / 0\): ZeroDivisionError"):
         execute(notebook, tmp_path)
 
 
+@pytest.mark.slow
 def test_broken_record_writes_nothing(example_record, tmp_path):
     record = json.loads(example_record.read_text(encoding="utf-8"))
     del record["shell"]["tilt"]
@@ -252,6 +262,7 @@ def test_broken_record_writes_nothing(example_record, tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["record.json"]
 
 
+@pytest.mark.slow
 def test_executed_by_this_interpreter_without_a_home(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", "/dev/null/nowhere")
     monkeypatch.setenv("JUPYTER_PATH", str(tmp_path))
@@ -330,6 +341,7 @@ def test_importing_the_report_loads_nothing_heavy():
     assert loaded.isdisjoint({"numpy", "matplotlib", "nbformat", "nbclient", "nbconvert", "typst"})
 
 
+@pytest.mark.slow
 def test_a_report_can_be_made_inside_a_running_event_loop(tmp_path):
     """As in Jupyter, where the main job may be run from a notebook."""
 

@@ -52,12 +52,14 @@ def test_what_cannot_be_written_in_by_hand_is_named_as_missing(paper):
     assert len(certificate.statements(paper(**given)).data["items"]) == 2
 
 
+@pytest.mark.slow
 def test_results_relate_to_the_tank_alone_and_copies_are_whole(paper):
     said = certificate.statements(paper()).data["items"]
     assert said[0].startswith("The results relate only to the tank named here")
     assert said[1] == "This certificate may be reproduced only in full."
 
 
+@pytest.mark.slow
 def test_every_field_of_the_contract_is_printed(example_record, tmp_path):
     """A key that a job may give stands somewhere on the certificate."""
     record = json.loads(example_record.read_text(encoding="utf-8"))
@@ -99,6 +101,7 @@ def test_instruments_of_the_survey_are_named_with_their_certificates(paper):
     assert found["Instruments, as declared"] == "tape 1: C-1; edm: no certificate named"
 
 
+@pytest.mark.slow
 def test_no_uncertainty_is_said_never_zero(example_record, tmp_path):
     record = json.loads(example_record.read_text(encoding="utf-8"))
     nothing = [0.0] * len(record["capacity"]["U_m3"])
@@ -137,6 +140,7 @@ def test_a_date_is_written_in_the_language(form, month, written, example_record)
     assert Paper(example_record, words).day("2026-11-21") == written
 
 
+@pytest.mark.slow
 def test_user_text_is_printed_literally_wherever_it_reaches_paper(example_record, tmp_path):
     """typst, LaTeX, HTML and spreadsheet markup in every text field of the job."""
     record = json.loads(example_record.read_text(encoding="utf-8"))
@@ -200,6 +204,7 @@ def tank_facts(record, tmp_path):
     }
 
 
+@pytest.mark.slow
 def test_nominal_values_are_printed_as_they_were_chosen(example_record, tmp_path):
     record = json.loads(example_record.read_text(encoding="utf-8"))
     record["job"]["tank"]["nominal_volume_m3"] = 60.0

@@ -34,6 +34,7 @@ def names_of(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
+@pytest.mark.slow
 def test_every_file_is_the_same_to_the_byte(results, again):
     assert names_of(again) == names_of(results)
     for name in names_of(again):
@@ -61,6 +62,7 @@ def test_the_covariance_that_no_record_holds_is_taken_over(again, tmp_path):
     assert (tmp_path / "other" / "points_cov.npz").read_bytes() == b"as it was"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "options", "message"),
     [
@@ -94,6 +96,7 @@ def test_what_cannot_be_used_is_one_line(again, tmp_path, capsys, change, option
     assert names_of(tmp_path) == ["record.json"]
 
 
+@pytest.mark.slow
 def test_a_code_that_has_no_words_is_one_line(again, tmp_path, capsys):
     record = json.loads((again / "record.json").read_text(encoding="utf-8"))
     record["capacity"]["zero"] = "elsewhere"
@@ -104,6 +107,7 @@ def test_a_code_that_has_no_words_is_one_line(again, tmp_path, capsys):
     assert names_of(tmp_path) == ["record.json"]
 
 
+@pytest.mark.slow
 def test_a_folder_of_somebody_else_is_refused(again, tmp_path, capsys):
     shutil.copyfile(again / "record.json", tmp_path / "record.json")
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
@@ -119,6 +123,7 @@ def test_a_letterhead_that_is_bad_stops_a_run_before_it_begins(tmp_path, capsys)
     assert capsys.readouterr().err.startswith("tankcal: lab.toml, row 1, laboratory.name: missing")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["certificate.pdf", "report.pdf"])
 def test_record_and_workbook_are_inside_byte_for_byte(results, tmp_path, name):
     if not shutil.which("pdfdetach"):
@@ -130,6 +135,7 @@ def test_record_and_workbook_are_inside_byte_for_byte(results, tmp_path, name):
         assert (tmp_path / held).read_bytes() == (results / held).read_bytes()
 
 
+@pytest.mark.slow
 def test_what_is_inside_is_named_and_described(results):
     content = (results / "certificate.pdf").read_bytes()
     for entry in (b"/AFRelationship/Source", b"/AFRelationship/Data", b"(record.json)"):
@@ -137,6 +143,7 @@ def test_what_is_inside_is_named_and_described(results):
     assert b"/AFRelationship" not in (results / "working-papers.pdf").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_workbook_changed_since_is_not_held_inside(results, tmp_path):
     (tmp_path / "capacity.xlsx").write_bytes(b"as made")
     (held,) = attachments.beside(tmp_path, {"capacity.xlsx": "The table"})

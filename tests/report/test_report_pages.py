@@ -75,6 +75,7 @@ AFTER_A_HEADING = {
 }
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("what", AFTER_A_HEADING)
 def test_no_heading_ends_a_page(tmp_path, what):
     """Each document of one PDF has one line more above the heading than the one before."""
@@ -90,6 +91,7 @@ def test_no_heading_ends_a_page(tmp_path, what):
     assert lone_headings(pages, {"Alone"}) == []
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("above", "count"), [(31, 200), (38, 905)])
 def test_a_heading_goes_with_its_long_table(tmp_path, above, count):
     table = blocks.columns_table(["a"], numbered(count), "c", across=4)
@@ -103,6 +105,7 @@ def test_a_heading_goes_with_its_long_table(tmp_path, above, count):
     assert min(map(filled, pages)) > 0.25
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("count", range(230, 400, 10))
 def test_the_end_mark_stands_below_rows(printed, count):
     rows = [[f"row {n}"] for n in range(count)]

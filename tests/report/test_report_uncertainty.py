@@ -90,6 +90,7 @@ def changed(record, **capacity):
 # ---- the table
 
 
+@pytest.mark.slow
 def test_the_table_prints_the_U_that_counts_and_marks_the_rows_of_monte_carlo(found, record):
     capacity = record["capacity"]
     stated = capacity["stated_U_m3"]
@@ -125,6 +126,7 @@ def test_the_sentence_counts_the_rows(found, of_example, record, example):
         assert any(said in text for text in texts(blocks))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "said", "caption"),
     [

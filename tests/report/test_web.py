@@ -83,6 +83,7 @@ def contrast(*colours):
     return max(light) / min(light)
 
 
+@pytest.mark.slow
 def test_the_same_record_gives_the_same_page(example_record, text):
     assert page(paper_blocks(example_record)) == text
 

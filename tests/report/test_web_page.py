@@ -25,6 +25,8 @@ from tankcal.text.digits import (
 )
 from tankcal.text.words import load_words
 
+pytestmark = pytest.mark.slow
+
 NUMBERS = Path(digits.__file__).parents[2] / "report_templates" / "web" / "numbers.js"
 HOSTILE = "</script><script>hit=1</script>\"'><img src=x onerror=hit=1>\u2028<!--"
 HUES = 100  # how far apart red and blue are of a pixel that is plainly of one of them

@@ -110,6 +110,7 @@ def test_each_row_shows_two_digits_of_its_U_and_keeps_its_litres(book, record):
             assert _decimals(volume) == max(decimals_of(U), 3)
 
 
+@pytest.mark.slow
 def test_litres_have_a_U_of_two_digits(record, tmp_path):
     """417 L are printed 420 L, as in the papers; no number format makes that of 417."""
     spec = record["job"]["table"] | {"volume_unit": "L"}
@@ -153,6 +154,7 @@ def test_the_certificate_lists_tank_and_choices_and_leaves_the_authorisation_emp
         assert all(cell.value is None for cell in line[1:])
 
 
+@pytest.mark.slow
 def test_the_notice_is_on_every_sheet_and_every_page(book, record, tmp_path):
     noticed = copy.deepcopy(record)
     noticed["job"]["certificate"]["notice"] = "DRAFT & TRIAL"
@@ -178,6 +180,7 @@ def with_a_rejected_point(record):
     return rejecting
 
 
+@pytest.mark.slow
 def test_every_point_is_listed_and_a_rejected_one_with_its_reason(record, tmp_path):
     words = load_words("en")
     record = with_a_rejected_point(record)
@@ -224,6 +227,7 @@ def test_provenance_names_every_file_by_its_hash(book, record):
     assert record["tankcal"] in said
 
 
+@pytest.mark.slow
 def test_a_record_with_nothing_rejected_corrected_or_warned_is_written(record, tmp_path):
     bare = copy.deepcopy(record)
     bare |= {"rejected": [], "warnings": [], "corrections": []}
@@ -272,6 +276,7 @@ def test_tables_have_headings_and_names_that_excel_takes(path, book):
 HOSTILE = ["=cmd|' /C calc'!A0", "@SUM(1)", "http://x", "+1+1", "{=1}", "&P&N &9 9", "mailto:a@b"]
 
 
+@pytest.mark.slow
 def test_user_text_stays_text(record, tmp_path):
     hostile = copy.deepcopy(record)
     hostile["job"]["tank"]["id"] = HOSTILE[0]
@@ -293,6 +298,7 @@ def test_user_text_stays_text(record, tmp_path):
     assert book["Capacity"].oddFooter.center.text == f"Certificate No. {HOSTILE[1]}"
 
 
+@pytest.mark.slow
 def test_the_same_record_gives_the_same_bytes(record, path, tmp_path):
     write(record, tmp_path / "again.xlsx")
     assert (tmp_path / "again.xlsx").read_bytes() == path.read_bytes()
@@ -303,6 +309,7 @@ def test_the_same_record_gives_the_same_bytes(record, path, tmp_path):
         assert {info.date_time[0] for info in archive.infolist()} == {1980}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("issued", "year"),
     [
@@ -318,6 +325,7 @@ def test_a_date_of_issue_that_is_none_gives_way_to_the_survey(record, tmp_path, 
     assert written(undated, tmp_path).properties.created.year == year
 
 
+@pytest.mark.slow
 def test_a_path_that_cannot_be_written_is_said(record, tmp_path):
     with pytest.raises(OSError, match="cannot be written"):
         write(record, tmp_path / "missing" / "capacity.xlsx")

@@ -38,6 +38,7 @@ def tables_of(sheet):
     return [range_boundaries(table.ref) for table in sheet.tables.values()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_sheet_is_one_page_wide_on_A4(books, kind):
     for sheet in books[kind]:
@@ -48,6 +49,7 @@ def test_every_sheet_is_one_page_wide_on_A4(books, kind):
         assert sheet.sheet_properties.tabColor is not None
 
 
+@pytest.mark.slow
 def test_headings_of_long_tables_stay_and_are_printed_again(books):
     found = set()
     for sheet in (sheet for book in books.values() for sheet in book):
@@ -61,6 +63,7 @@ def test_headings_of_long_tables_stay_and_are_printed_again(books):
     assert {"Capacity", "Points and residuals", "Observations"} <= found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_cell_of_a_table_is_merged(books, kind):
     merged = 0
@@ -73,6 +76,7 @@ def test_no_cell_of_a_table_is_merged(books, kind):
     assert merged
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_word_of_a_heading_and_no_number_is_wider_than_its_column(books, kind):
     for sheet in books[kind]:
@@ -83,6 +87,7 @@ def test_no_word_of_a_heading_and_no_number_is_wider_than_its_column(books, kind
                     assert lines_of(word, width, bold=True) == 1, (sheet.title, word, width)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_pandas_reads_every_table_as_it_stands(books, kind, tmp_path):
     """Headings over columns of numbers or of texts; "–" is what does not exist."""
@@ -102,6 +107,7 @@ def test_pandas_reads_every_table_as_it_stands(books, kind, tmp_path):
         assert not any(str(name).startswith("Unnamed") for name in table.columns)
 
 
+@pytest.mark.slow
 def test_the_capacity_table_read_by_pandas_is_the_record(books, records, tmp_path):
     books["uncertain"].save(tmp_path / "read.xlsx")
     table = pd.read_excel(tmp_path / "read.xlsx", sheet_name="Capacity", header=3)
@@ -110,6 +116,7 @@ def test_the_capacity_table_read_by_pandas_is_the_record(books, records, tmp_pat
         assert table.iloc[:, column].to_numpy() == pytest.approx(capacity[key], rel=1e-15)
 
 
+@pytest.mark.slow
 def test_dates_are_dates_in_the_order_of_the_reader(records, tmp_path):
     dated = dict(records["uncertain"])
     job = dated["job"]
@@ -141,6 +148,7 @@ def test_lines_that_a_text_takes(text, width, lines):
     assert lines_of(text, width) == lines
 
 
+@pytest.mark.slow
 def test_deviations_are_drawn_from_the_residuals_of_the_record(books, records):
     record, book = records["photographed"], books["photographed"]
     sheet = book["Deviations"]
@@ -157,6 +165,7 @@ def test_deviations_are_drawn_from_the_residuals_of_the_record(books, records):
     assert len(charts) == 2 + len({section["course"] for section in record["sections"]})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_the_capacity_table_is_printed_in_a_size_that_is_read(records, language, tmp_path):
     """At 80 % of 10 point or more, on A4 in portrait."""
@@ -171,6 +180,7 @@ def test_the_capacity_table_is_printed_in_a_size_that_is_read(records, language,
     assert (210 / 25.4 - margins) / (pixels / 96) >= 0.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_all_rows_of_the_capacity_table_have_one_height(records, language, tmp_path):
     """Also where the interval of some rows is Monte Carlo's, and where some are not for use."""
@@ -190,6 +200,7 @@ def test_a_line_may_break_after_a_hyphen():
     assert pieces_of("Incerteza-padrão u (m³) -1") == ["Incerteza-", "padrão", "u", "(m³)", "-1"]
 
 
+@pytest.mark.slow
 def test_the_calculator_says_its_units_where_the_table_has_others(books):
     said = {kind: books[kind]["Dip calculator"]["A2"].value for kind in ("lying", "uncertain")}
     assert "metres and cubic metres" in said["lying"]  # a table in feet and barrels

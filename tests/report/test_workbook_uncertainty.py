@@ -159,6 +159,7 @@ def test_no_text_of_the_job_becomes_a_formula(book):
                 assert HOSTILE not in cell.value
 
 
+@pytest.mark.slow
 def test_an_earlier_record_has_no_such_sheets(record, tmp_path):
     old = as_before(record)
     book = written(old, tmp_path)

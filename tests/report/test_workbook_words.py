@@ -80,6 +80,7 @@ def texts_of_cells(book):
             yield from ((sheet.title, cell.coordinate, text) for text in texts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_cell_has_a_text_that_is_not_of_the_words(opened, records, kind):
     """In a language of brackets no word stands outside of them but what the record says."""
@@ -90,6 +91,7 @@ def test_no_cell_has_a_text_that_is_not_of_the_words(opened, records, kind):
     assert any("⟦" in text for _, _, text in texts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_headings_charts_and_messages_are_of_the_words(invented, records, kind):
     parts = {}
@@ -122,6 +124,7 @@ def test_headings_charts_and_messages_are_of_the_words(invented, records, kind):
         assert parts["xl/worksheets/"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_page_headers_and_footers_are_of_the_words(opened, kind):
     for sheet in opened[kind]:
@@ -165,6 +168,7 @@ def english(records, tmp_path_factory):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error:Duplicate header name")
 @pytest.mark.parametrize("language", [code for code in SHIPPED if code != "en"])
 @pytest.mark.parametrize("kind", KINDS)

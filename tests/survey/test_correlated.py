@@ -210,6 +210,7 @@ def test_a_vector_that_is_alone_in_its_block_is_tested_when_set_aside(network):
     np.testing.assert_allclose(table.residual[0], -biases, rtol=1e-5)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("single", [False, True], ids=["all correlated", "levels are not"])
 @pytest.mark.parametrize(("wrong", "size"), [((0, 4), 0.04), ((1, 2), 0.08), ((2, 1), 0.02)])
 def test_what_may_be_wrong_instead(network, single, wrong, size):

@@ -55,6 +55,7 @@ def test_without_errors_both_give_the_truth(convention, weights, affinity):
     assert_allclose(values, truth.interior, rtol=1e-5, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_the_ideal_form_is_that_of_scipy():
     """Second method: scipy's least squares on corrected minus ideal coordinates, no Jacobian."""
     form = Form("correction_added", "both_y", weights="ideal")

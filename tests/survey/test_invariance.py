@@ -62,6 +62,7 @@ def test_coordinates_as_large_as_utm(surveyed, figure):
     assert covariance < 1e-6
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("degrees", [37.0, 180.0])
 def test_a_frame_turned_about_the_vertical(surveyed, degrees, figure):
     measurements, before = surveyed
@@ -141,6 +142,7 @@ def test_the_names_of_points(surveyed):
     assert np.abs(after.xyz_m[place] - before.xyz_m).max() < 1e-7
 
 
+@pytest.mark.slow
 def test_the_scale_of_a_survey_without_lengths(figure):
     """Photographs and control alone: control twice as large, everything is twice as large."""
     measurements, _ = by_photographs(seed=3)

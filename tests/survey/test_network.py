@@ -95,6 +95,7 @@ def photographed_as_dbat():
     return photographed(form=Form("correction_added", "before_distortion"))
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("make", [photographed, photographed_as_dbat, by_total_station])
 def test_compiled_loops_and_arrays_agree(make, monkeypatch):
     survey = make()[0]
@@ -202,6 +203,7 @@ def circle(xyz):
     return radius(flat), np.array([(radius(flat + s) - radius(flat - s)) / 2e-4 for s in step])
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("tapes_used", [8, 1])
 def test_the_shape_does_not_depend_on_the_fixed_photo(survey, tapes_used, figure):
     """Property: distances, radii and their sds are the same whichever photo is held; not places.

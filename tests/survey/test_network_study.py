@@ -173,6 +173,7 @@ def test_intervals_cover_at_full_size(name, figure):
     assert min(likely) > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_intervals_cover(name, figure):
     done = study(name, 50)

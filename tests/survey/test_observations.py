@@ -136,6 +136,7 @@ KINDS = {
 }
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_derivatives(kind):
     """Second method: central differences over all unknowns, through the layout's own steps."""

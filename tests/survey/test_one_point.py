@@ -63,6 +63,7 @@ def assert_sound(shots, **options):
     return "found"
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     "text",
     [

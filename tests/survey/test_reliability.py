@@ -16,6 +16,8 @@ from tankcal.survey.network.quality import balanced, components
 from tankcal.survey.network.reliability import tau_limit
 from tankcal.survey.observations import Directions, Distances, VerticalAngles
 
+pytestmark = pytest.mark.slow
+
 CRITICAL = scipy.stats.norm.isf(0.0005)
 SUSPECTS = {  # kind of survey and of observation, values of it
     "image coordinate": ("photographs", "image points", 2),

@@ -234,6 +234,7 @@ def _motions(xyz, unknowns):
     return moves
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "form",
     [

@@ -40,6 +40,7 @@ def test_three_points_give_the_true_pose_among_at_most_four():
         assert rotations[away.argmin()] == pytest.approx(truth.rotation[photo], abs=1e-5)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("blunders", [0, 0.1])
 def test_nominal_geometry_alone_leads_to_the_same_answer(blunders):
     """Property: same adjusted points as from good start values, with 10 % of wild image points."""
@@ -57,6 +58,7 @@ def test_nominal_geometry_alone_leads_to_the_same_answer(blunders):
     assert adjusted.xyz_m == pytest.approx(adjust(survey).xyz_m, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_control_alone_carries_from_photo_to_photo():
     """Points without any coordinates come from photos, photos without control from points."""
     survey, truth = photographed(seed=1, photos=16)
@@ -68,6 +70,7 @@ def test_control_alone_carries_from_photo_to_photo():
     assert adjust(found).xyz_m == pytest.approx(adjust(survey).xyz_m, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_a_photo_with_three_known_points_is_decided_by_tie_points():
     survey, truth = photographed(seed=2)
     known = np.full_like(truth.xyz_m, np.nan)

@@ -291,6 +291,7 @@ def test_a_few_known_points_place_the_whole_network(known):
     assert adjust(found).xyz_m == pytest.approx(adjust(survey).xyz_m, abs=1e-8)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("kind", [Directions, Distances])
 @pytest.mark.parametrize("seed", range(3))
 def test_one_reading_in_ten_is_a_blunder(kind, seed):
@@ -326,6 +327,7 @@ def test_given_places_stay_to_the_last_bit():
     assert found.xyz_m - [5e5, 7.5e6, 100] == pytest.approx(truth.xyz_m, abs=0.02)
 
 
+@pytest.mark.slow
 def test_thousands_of_wall_points_take_no_time(figure):
     """Time grows with the number of sights, not faster."""
     xyz, pairs = ring(6, tank_points(60, 25), 20.0)

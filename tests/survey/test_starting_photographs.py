@@ -102,6 +102,7 @@ def test_photographs_alone_give_the_shape():
     assert sides(ours.xyz_m) == pytest.approx(sides(theirs.xyz_m), abs=1e-7)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("share", [0.0, 0.1])
 def test_control_observations_and_images_are_enough(share):
     survey, truth = photographed(photos=12, seed=5)
@@ -171,6 +172,7 @@ def test_three_photos_of_a_plane():
     assert found.xyz_m == pytest.approx(xyz, abs=0.01)
 
 
+@pytest.mark.slow
 def test_two_groups_of_photos_that_share_nothing():
     survey, _ = seen_from(
         np.vstack([cloud(5), cloud(6) + 100]), np.vstack([THREE, THREE + 100]), np.zeros(3)
@@ -184,6 +186,7 @@ def test_two_groups_of_photos_that_share_nothing():
         approximate(survey)
 
 
+@pytest.mark.slow
 def test_bad_start_values_of_all_photos_are_replaced():
     """1 m and 20 deg of error in every photo, and decimetres in the points: the same answer."""
     survey, truth = photographed(photos=12)

@@ -29,6 +29,7 @@ def adjustment(photos):
     return adjust_survey(photos[0])
 
 
+@pytest.mark.slow
 def test_finds_the_truth_without_noise():
     """Property: measurements without error, and nothing known of photos, give the truth back."""
     measurements, truth = by_photographs(noise=0.0)
@@ -183,6 +184,7 @@ def test_averaging_is_adjusting_all_readings(photos):
     assert not any("scatter" in problem.expected for problem in means.warnings)
 
 
+@pytest.mark.slow
 def test_scatter_that_contradicts_its_sds_is_told(photos):
     rng = np.random.default_rng(6)
     measurements = repeated(photos[0], 3, 1.0, rng)
@@ -244,6 +246,7 @@ def test_check_rows_change_nothing(photos, adjustment):
     assert (points.largest_m, points.mean_m) == pytest.approx((size.max(), size.mean()))
 
 
+@pytest.mark.slow
 def test_blunders_are_set_aside_and_listed(photos):
     """Simulation: blunders of 30 sds and more are removed, named with their rows, worst first."""
     measurements, truth = photos
@@ -394,6 +397,7 @@ def test_a_photo_with_too_few_points_is_refused(photos):
         adjust_survey(replace(photos[0], image_points=replace(images, check=check)))
 
 
+@pytest.mark.slow
 def test_image_points_need_an_sd(photos):
     images = replace(
         photos[0].image_points, sd_mm=np.full_like(photos[0].image_points.sd_mm, np.nan)
@@ -424,6 +428,7 @@ def test_a_levelled_line_alone():
                for one in found.warnings)  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_bend_of_the_earth_less_refraction():
     """Simulation: over 2 km targets seem (1 - k) s2 / 2R = 0.27 m lower; k = 0.13 helps."""
     rng = np.random.default_rng(1)
@@ -515,6 +520,7 @@ def test_nothing_to_adjust_is_refused():
         adjust_survey(Measurements())
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("seed", range(3))
 def test_statistics_of_simulated_surveys(seed):
     """Simulation: points within their sds, chi-square of 144 coordinates in its 99.9 % bounds."""

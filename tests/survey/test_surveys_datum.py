@@ -38,6 +38,7 @@ def shape(adjustment):
     return np.array(rows)
 
 
+@pytest.mark.slow
 def test_the_shape_is_the_same_in_every_datum(photos, figure):
     """Property: distances and their sds to 1e-8, whatever holds the frame; places differ."""
     free = chosen(photos, "inner")
@@ -58,6 +59,7 @@ def test_the_shape_is_the_same_in_every_datum(photos, figure):
     assert max(traces) / min(traces) > 1.5
 
 
+@pytest.mark.slow
 def test_what_depends_on_the_datum_and_what_does_not(photos):
     """Property: coordinates depend on it; lengths do when no tape gives the scale."""
     found = chosen(photos, "inner").adjusted
@@ -88,6 +90,7 @@ def test_minimal_takes_control_that_is_far_apart(photos):
     assert not any(one.kind == "control coordinate" for one in found.readings)
 
 
+@pytest.mark.slow
 def test_too_little_and_too_much_are_told(photos):
     with pytest.raises(SolutionError, match=r"datum defect 6: three translations .* fix 3 of 6"):
         chosen(photos, "minimal", datum_points=(("P1", "xyz"),))
@@ -104,6 +107,7 @@ def test_too_little_and_too_much_are_told(photos):
         chosen(bare, "fixed_photo", fixed_photo="S0")
 
 
+@pytest.mark.slow
 def test_a_frame_that_is_known_leaves_nothing_to_choose(photos):
     """Photos whose places are known fix everything: inner and minimal have nothing to do."""
     _, truth = by_photographs()
@@ -119,6 +123,7 @@ def test_a_frame_that_is_known_leaves_nothing_to_choose(photos):
         assert any("nothing is left for datum" in str(one) for one in found.warnings)
 
 
+@pytest.mark.slow
 def test_without_control_the_defect_is_told_in_words(photos):
     message = (
         "datum defect 6: three translations and three rotations are not determined by any "
@@ -131,6 +136,7 @@ def test_without_control_the_defect_is_told_in_words(photos):
         adjust_survey(replace(stations, control=None))
 
 
+@pytest.mark.slow
 def test_vertical_and_scale_are_judged_by_what_is_known(photos):
     """Plumb lines, zenith angles and declared control know the vertical; a photo does not."""
     bare = replace(photos, control=None)
@@ -187,6 +193,7 @@ def partly_held(measurements):
     return replace(measurements, control=replace(control, sd_m=sd))
 
 
+@pytest.mark.slow
 def test_inner_constraints_are_over_what_held_coordinates_leave_free(photos, figure):
     """Invariance: held coordinates stay, their sds are 0, the shape is that of any other datum."""
     measurements = partly_held(photos)
@@ -208,6 +215,7 @@ def test_inner_constraints_are_over_what_held_coordinates_leave_free(photos, fig
     assert not set(SOME) & set(found.check_points.names) - {"P7"}
 
 
+@pytest.mark.slow
 def test_the_trace_is_the_smallest_of_all_datums_that_hold_the_same(photos):
     """Property: over the points of the constraints, among minimal datums with the same held."""
     measurements = partly_held(photos)
@@ -223,6 +231,7 @@ def test_the_trace_is_the_smallest_of_all_datums_that_hold_the_same(photos):
     assert np.trace(plain.full_covariance_m2(names)) < least  # nothing held: smaller still
 
 
+@pytest.mark.slow
 def test_held_control_that_fixes_all_leaves_nothing_for_inner_constraints(photos):
     _, truth = by_photographs()
     names = [int(name[1:]) for name in photos.control.point]

@@ -24,6 +24,7 @@ def stations():
     return by_instruments()[0]
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("make", [by_photographs, by_instruments])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_sound_survey_is_not_doubted(make, seed):
@@ -32,6 +33,7 @@ def test_a_sound_survey_is_not_doubted(make, seed):
     assert text == "" or text.startswith("job.toml, adjustment: the global test fails")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sd", [0.002, pytest.param(0.0, marks=pytest.mark.study)])
 def test_swapped_x_and_y_of_a_control_point(photos, sd):
     xyz = photos.control.xyz_m.copy()
@@ -55,6 +57,7 @@ def test_distances_in_other_units(photos):
         assert line.endswith(f"was expected: it looks like {what}")
 
 
+@pytest.mark.slow
 def test_gon_read_as_degrees_from_one_station(stations):
     table = stations.readings[0]
     mine = np.array([name == "set-up 1" for name in table.setup])
@@ -63,6 +66,7 @@ def test_gon_read_as_degrees_from_one_station(stations):
     assert "the angles from set-up 1 fit once they are taken for gon read as degrees" in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["swapped", "x turned", "y turned"])
 def test_a_mirrored_photo(photos, how):
     images = photos.image_points
@@ -91,6 +95,7 @@ def test_a_photo_upside_down_is_a_photo_like_any_other(photos):
     assert one.xyz_m == pytest.approx(two.xyz_m, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_one_point_under_two_names(photos):
     """A point of four rays, two of them under another name: two points at the same place."""
     measurements, _ = by_photographs(photos=16)
@@ -119,6 +124,7 @@ def test_a_name_spelt_in_another_way(photos):
     assert alike("70") != alike("7")
 
 
+@pytest.mark.slow
 def test_a_failed_global_test_names_the_group(photos):
     images = photos.image_points
     kept = replace(photos, settings=AdjustmentSettings(snooping=False))

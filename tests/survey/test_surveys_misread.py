@@ -10,6 +10,8 @@ from tankcal.errors import SolutionError
 from tankcal.survey import adjust_survey
 from tankcal.survey.measurements import AdjustmentSettings, Instrument, Measurements
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def photos():

@@ -41,6 +41,7 @@ def held(measurements, number=0, error_m=0.0, sd_m=0.0):
     return replace(measurements, control=replace(control, xyz_m=xyz, sd_m=sd))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error_m", [0.1, pytest.param(2.0, marks=pytest.mark.study)])
 def test_a_station_held_at_a_wrong_place_is_named(stations, error_m):
     """Good readings are set aside until the rest agrees with it: sigma0 alone would pass."""
@@ -52,6 +53,7 @@ def test_a_station_held_at_a_wrong_place_is_named(stations, error_m):
     assert there == pytest.approx(given, abs=0.02)  # the station then hangs on few readings
 
 
+@pytest.mark.slow
 def test_held_stations_two_centimetres_apart_from_the_readings(stations):
     """Too little to say which of the three it is: it is said that one of them may be wrong."""
     text = told(held(stations, error_m=0.02))
@@ -59,6 +61,7 @@ def test_held_stations_two_centimetres_apart_from_the_readings(stations):
     assert "it may be wrong, or another value that is held" in text
 
 
+@pytest.mark.slow
 def test_a_control_point_of_photographs_held_at_a_wrong_place(photos):
     """Fixed control 50 mm off: its rays are set aside, and it is said whose they are."""
     name = photos.control.point[0]
@@ -84,6 +87,7 @@ def test_blunders_alone_do_not_bring_control_into_doubt(stations):
     assert not [str(one) for one in found.warnings if "held" in str(one)]
 
 
+@pytest.mark.slow
 def test_weighted_control_that_gives_way_to_a_tape_is_told(stations):
     """The only scale is that of a tape 0.2 % long: coordinates of control go; both are named."""
     plan = next(one for one in stations.readings if one.table == "directions")
@@ -104,6 +108,7 @@ def test_weighted_control_that_gives_way_to_a_tape_is_told(stations):
     assert scale == pytest.approx(2000, abs=150)
 
 
+@pytest.mark.slow
 def test_held_heights_that_contradict_a_line_of_levels():
     """Closed form: 0 and 1.05 m are held, 1.000 m was levelled between them."""
     start, end = ["A", "A", "A", "M"], ["B", "B", "M", "B"]
@@ -215,6 +220,7 @@ def test_of_three_rays_nobody_can_tell_the_wrong_one():
     assert f"{named} was set aside, but it may as well be azimuth" in text
 
 
+@pytest.mark.slow
 def test_whatever_may_be_wrong_instead_explains_it_as_well():
     """Second method: each reading in turn is left out in place of the one that was."""
     for stations in ("ABCD", "ABCDEF"):
@@ -250,6 +256,7 @@ def test_strict_refuses_what_is_in_doubt(tmp_path, capsys):
     assert not (tmp_path / "results").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.97, pytest.param(1.4, marks=pytest.mark.study)])
 def test_a_fixed_principal_distance_that_is_wrong_is_named(photos, factor):
     """A dense net of control on the wall: c follows from the images."""
@@ -296,6 +303,7 @@ def test_two_sets_of_one_station_are_one_ray(stations):
     assert f"point {lone[0]} has too few observations" in text
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("seed", range(12))
 def test_what_agrees_with_the_rest_does_not_stay_set_aside(seed):
     """Property: six rays to one point, two of them wrong; whatever is out disagrees in the end."""
@@ -335,6 +343,7 @@ def test_every_held_coordinate_has_a_row_with_its_test(stations):
     assert not [one for one in found.groups if one.kind == "control coordinate"]
 
 
+@pytest.mark.slow
 def test_sound_readings_are_not_given_up_for_a_held_coordinate_that_is_wrong():
     """A point of many rays held 20 mm off: all its rays would go; it is asked, not gone on."""
     measurements, truth = by_photographs(photos=16)
@@ -373,6 +382,7 @@ def corners(error_m, seed=6):
     return Measurements(control=control, readings=(tapes,))
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("error_m", [0.015, 0.025, 0.06])
 def test_every_held_coordinate_that_explains_as_much_is_named(error_m):
     """Second method: each of the eight is released by hand, and what fits within 10.8 is named."""

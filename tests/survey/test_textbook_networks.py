@@ -40,6 +40,7 @@ def differences(adjustment, published):
     return np.abs(coordinates).max(), np.abs(sds).max()
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("name", [name for name in PUBLISHED if name not in (CAMERA, BLUNDERS)])
 def test_printed_coordinates_and_sds(name, figure):
     """Published: every printed digit of the coordinates and their sds a posteriori."""

@@ -127,6 +127,7 @@ def test_a_table_without_an_input_has_no_uncertainty():
     assert (found.absolute.U_m3, found.relative.relative) == (0, 0)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("minimum", MINIMA)
 @pytest.mark.parametrize(
     "critical", [None, (1.23, 2.1), (-1, 0.52), (9.0, 12.0), (3.0, 8.0), (4.75, 4.75)]
@@ -144,6 +145,7 @@ def test_the_worst_is_that_of_brute_force(minimum, critical, few_dof):
         assert found.relative.relative == pytest.approx(relative, rel=TOLERANCE)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("minimum", MINIMA)
 def test_no_dip_between_rows_is_worse(minimum):
     """The proof at work: seven dips in each step find nothing that rows and the cut do not have."""
@@ -155,6 +157,7 @@ def test_no_dip_between_rows_is_worse(minimum):
         assert relative <= found.relative.relative * (1 + TOLERANCE)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("minimum", MINIMA)
 def test_the_bound_holds_between_rows_where_k_changes(minimum, figure):
     excess = []
@@ -264,6 +267,7 @@ def test_where_nothing_is_delivered_no_relative_limit_can_be_kept():
     assert worst_deliveries(table, 4.0).relative.relative == pytest.approx(K95 * 0.1 / 200)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("few_dof", [False, True])
 def test_the_least_delivery_height_is_where_the_limit_begins_to_hold(few_dof):
     table = tank(70, 1, few_dof)

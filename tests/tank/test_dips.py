@@ -148,6 +148,7 @@ def test_labels_in_feet_and_inches_have_reduced_fractions(sixteenths, label):
     assert parse_dip(label, "ft-in-16") == height
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("unit", ["ft-in-8", "ft-in-16"])
 def test_every_label_of_a_table_reads_back_as_its_row(unit):
     heights = table_heights(float(HEIGHT_STEPS_M[unit]), 12.0)[:-1]
@@ -254,6 +255,7 @@ def test_two_breakpoints_in_one_interval_are_both_looked_at():
     assert found.at_m == pytest.approx((0.502, 0.504)[int(np.argmax(np.abs(line)))], abs=1e-8)
 
 
+@pytest.mark.slow
 @given(st.floats(0.05, 5.0), st.floats(0.01, 0.3), st.integers(0, 7))
 def test_no_height_between_rows_is_worse_than_what_is_stated(radius, part, seed):
     """Property, for spheres: a dense random sample stays within the stated deviation."""

@@ -76,6 +76,7 @@ def below(mesh, z):
     return trimesh.Trimesh(*cut[:2], process=False)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("shape", [star, hull, torus])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_volumes_below_levels_are_those_of_the_cut_mesh_trimesh(shape, seed):
@@ -152,6 +153,7 @@ def test_a_cube_in_closed_form():
     assert part.sources(levels) == ()
 
 
+@pytest.mark.slow
 def test_a_cone_and_a_ball_in_closed_form(figure):
     """A cone of 720 facets is a pyramid: exact; a ball of 81 920 faces falls a little short."""
     n = 720
@@ -182,6 +184,7 @@ def test_steps_of_the_free_surface_are_told_apart():
     assert part.area_m2([0.999, 1.0, 1.25, 1.5, 2.0]) == pytest.approx([2.25, 3.25, 3.25, 1.0, 1.0])
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(
     seed=st.integers(0, 2**31),
@@ -222,6 +225,7 @@ def plain(corners, weights, height, power):
     return total
 
 
+@pytest.mark.slow
 @settings(max_examples=100)
 @given(
     seed=st.integers(0, 2**31),
@@ -241,6 +245,7 @@ def test_the_tree_sums_what_a_plain_loop_sums(seed, rows, bits, noise):
         assert found == pytest.approx(expected, abs=1e-13 * 50)
 
 
+@pytest.mark.slow
 def test_ten_thousand_levels_of_a_hundred_thousand_tall_faces(figure):
     """Every face runs up the whole wall; the frustum's volume is a closed form."""
     n = 25_000
@@ -513,6 +518,7 @@ def dented_shell(seed=3, inset=0.008, scale=1.0004):
     return ShellVolume(tuple(shapes)), (levels, outlines), {"insets_m": insets, "scale": scale}
 
 
+@pytest.mark.slow
 def test_the_loft_of_a_shell_agrees_with_the_quadrature_second_method(figure):
     """Every row; the error falls with the square of the spacing, to the quadrature."""
     volume, sections, options = dented_shell()

@@ -132,6 +132,7 @@ def test_rows_in_the_critical_zone_are_not_judged():
     assert (nothing.code, nothing.passed) == ("nothing_to_judge", None)
 
 
+@pytest.mark.slow
 def test_between_rows_the_limit_holds_where_it_holds_at_rows():
     """The convexity of U at work: 2 000 dips of a table of many columns."""
     rng = np.random.default_rng(5)

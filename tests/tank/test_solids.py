@@ -317,6 +317,7 @@ def test_rolled_and_tilted_elliptical_tanks_second_method(a, b, tilt, roll, dip,
 # properties
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("kind", KINDS[1:])
 def test_more_nodes_change_nothing(kind, figure):
     """24 nodes a panel against 150, surfaces near and far from tangent: volumes and surfaces."""

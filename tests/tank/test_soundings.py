@@ -101,6 +101,7 @@ def judge(figure, count, declared, tolerance):
     assert ratio > 2
 
 
+@pytest.mark.slow
 def test_the_uncertainty_of_simulated_bottoms_holds(figure):
     judge(figure, 72, declared=True, tolerance=7)
 
@@ -119,6 +120,7 @@ def points(height, count=40, seed=1):
     return np.column_stack([plan + (3.0, 1.0), height(plan)])
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     "height",
     [

@@ -262,6 +262,7 @@ def test_area_is_the_derivative_of_volume():
     assert_derivative(stack.volume_m3, heights, np.diag(stack.area_m2(heights)), tolerance=1e-8)
 
 
+@pytest.mark.slow
 def test_many_sections_of_a_course_make_few_features():
     """A course of 100 rings is a polynomial in height: six products, exact for a frustum."""
     stack = shell([0, 9.5], [np.linspace(0.05, 9.45, 100)], lambda z: 6.5 + 0.004 * z)

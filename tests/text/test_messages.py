@@ -69,12 +69,14 @@ def in_portuguese(text):
 # ---- in every language
 
 
+@pytest.mark.slow
 def test_each_code_is_made_in_one_place():
     places = made()
     assert len(places) > 150
     assert [code for code, calls in places.items() if len(calls) > 1] == []
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", OTHERS)
 def test_a_language_says_every_message_with_its_values(language):
     words, places = load_words(language), made()

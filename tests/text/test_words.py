@@ -37,6 +37,7 @@ def test_the_format_promises_what_this_test_looks_for():
     assert promised_codes("Correction codes:") == codes.split()
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("code", "value"), promised_choices())
 def test_every_choice_has_a_sentence(code, value):
     text = sentence(load_words("en"), "choices", code, value)
