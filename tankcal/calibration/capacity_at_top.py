@@ -39,7 +39,7 @@ class TopOfTank:
         self.job, self._wall = job, None
 
     def of(self, adjustment):
-        """The TopVolume by a surveys.Adjustment; the first one finds the points of the wall.
+        """The TopVolume by a survey.Adjustment; the first one finds the points of the wall.
 
         Raises SolutionError or InputError where there is no capacity.
         """

@@ -48,7 +48,7 @@ class Interior:
 
 
 def interiors_of(adjustment, measurements=None):
-    """A tuple of Interior of a surveys.Adjustment, covariances scaled like its own.
+    """A tuple of Interior of a survey.Adjustment, covariances scaled like its own.
 
     measurements  job.Measurements that it was made from: formats of the images
     """

@@ -72,7 +72,7 @@ class Result:
     simulation   the table by Monte Carlo (`simulation.TableSimulation`); None where it is off
     intervals    of the rows, as they are printed (`simulation.Intervals`)
     rule         verdict of the job's decision rule on them (`rules.RuleVerdict`); None without one
-    adjustment   the adjusted survey (`surveys.Adjustment`); None where points were handed in
+    adjustment   the adjusted survey (`survey.Adjustment`); None where points were handed in
     """
 
     job: Job
@@ -325,7 +325,7 @@ def _telling(job):
 
 
 def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjustment:
-    """Adjust the survey of a job, whether it has a tank or not: a `surveys.Adjustment`.
+    """Adjust the survey of a job, whether it has a tank or not: a `survey.Adjustment`.
 
     progress  called with a line of text as each step begins
     Raises InputError when nothing was measured, SolutionError when the measurements do not

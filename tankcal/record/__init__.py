@@ -22,7 +22,7 @@ def record_of(result):
 
 
 def record_of_adjustment(job, adjustment):
-    """The record of a job whose survey was only adjusted (`surveys.Adjustment`)."""
+    """The record of a job whose survey was only adjusted (`survey.Adjustment`)."""
     from tankcal.record.making import record_of_adjustment
 
     return record_of_adjustment(job, adjustment)

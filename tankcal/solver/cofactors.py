@@ -1,5 +1,6 @@
 """The factored normal equations, and the cofactors of anything that is asked for."""
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,18 +13,25 @@ from tankcal.solver.threads import threads_for
 DENSE = 4e6  # numbers
 
 
+@dataclass(frozen=True)
 class Factor:
-    """The factored reduced system: scale and Cholesky factor; eliminated parts in `normals`.
+    """The factored reduced system, at a state.
 
-    tangent, reaction_part  where conditions hold exactly: their Tangent, and Q1' S Q, see there
+    normals        Normals, the blocks eliminated
+    scale          (nr,) of the columns             lower  Cholesky factor of the scaled system
+    untouched      reduced unknowns in no row       null_space, datum_basis  (unknowns, d) or None
+    tangent        Tangent of the exact conditions, None where there are none
+    reaction_part  Q1' S Q of these conditions, see Tangent.square
     """
 
-    def __init__(
-        self, normals, scale, lower, untouched, null_space, datum_basis, tangent, reaction_part
-    ):
-        self.normals, self.scale, self.lower = normals, scale, lower
-        self.untouched, self.null_space, self.datum_basis = untouched, null_space, datum_basis
-        self.tangent, self.reaction_part = tangent, reaction_part
+    normals: object
+    scale: np.ndarray
+    lower: np.ndarray
+    untouched: np.ndarray
+    null_space: np.ndarray | None
+    datum_basis: np.ndarray | None
+    tangent: object
+    reaction_part: np.ndarray | None
 
     def inverse(self):
         """(nr, nr) inverse of the reduced system; in the null space, where conditions hold."""

@@ -12,6 +12,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
+from tankcal.solver.model import s_transform
 from tankcal.solver.threads import threads_for
 
 UNTESTED = 1e-10  # share of a pull that others cannot take: below it is rounding
@@ -170,9 +171,7 @@ def constraint_reactions(cofactors):
     reduced = factor.scale[:, None] * tangent.from_null_space(-follow @ y, y)
     changes[:, which] = cofactors.back_substitute_covariance(reduced)
     if cofactors.datum is not None:
-        changes -= factor.null_space @ np.linalg.solve(
-            factor.datum_basis.T @ factor.null_space, factor.datum_basis.T @ changes
-        )
+        changes = s_transform(changes, factor.null_space, factor.datum_basis)
     return k, sd, changes
 
 

@@ -10,8 +10,16 @@ from tankcal.solver import loops
 from tankcal.solver.compiled import compiled, worthwhile
 
 
-def add_rows(batch, w, jac, normals):
-    """Add a batch's rows (w, jac already the batch's own) to the Normals."""
+def build(plan, normals, misclosures, jacobians):
+    """Fill the Normals with the rows of all groups: w (n, m) and jac (n, m, K), one a group."""
+    normals.clear()
+    for batch in plan.batches:
+        _add_rows(
+            batch, batch.of(misclosures[batch.group]), batch.of(jacobians[batch.group]), normals
+        )
+
+
+def _add_rows(batch, w, jac, normals):
     if worthwhile():
         run = compiled(loops, loops.COMPILED)
         if batch.block is None:

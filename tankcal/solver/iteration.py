@@ -7,10 +7,9 @@ from tankcal.adjust import SMALLEST_PIVOT, Adjustment, determined
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver.cofactors import Cofactors, Factor
-from tankcal.solver.elimination import add_rows, back_substitute, eliminate
+from tankcal.solver.elimination import back_substitute, build, eliminate
 from tankcal.solver.exact import Conditions
-from tankcal.solver.model import Normals
-from tankcal.solver.plan import plan
+from tankcal.solver.model import Normals, plan, s_transform
 from tankcal.solver.rank import diagnosis, weakness
 from tankcal.solver.threads import threads_for
 
@@ -181,9 +180,7 @@ class _Work:
     def factor(self, state, damping):
         """Normal equations at the evaluated state, eliminated and factored; None: damp more."""
         normals, nr = self.normals, self.plan.reduced
-        normals.clear()
-        for batch in self.plan.batches:
-            add_rows(batch, batch.of(self.w[batch.group]), batch.of(self.jac[batch.group]), normals)
+        build(self.plan, normals, self.w, self.jac)
         diagonal = normals.t.diagonal()[:nr].copy()
         if not np.isfinite(diagonal).all():
             return None  # no derivative exists at this state
@@ -274,8 +271,6 @@ class _Work:
         blocks = -back_substitute(self.plan, n, reduced)
         step = np.concatenate([reduced, blocks.ravel()])
         if factor.null_space is not None:
-            step -= factor.null_space @ np.linalg.solve(
-                factor.datum_basis.T @ factor.null_space, factor.datum_basis.T @ step
-            )
+            step = s_transform(step, factor.null_space, factor.datum_basis)
         decrement = -float(n.g[:-1] @ reduced) + float(np.vdot(n.b, n.b))
         return step, decrement

@@ -1,4 +1,10 @@
-"""What a problem hands to the solver, and what the solver keeps of it."""
+"""What a problem hands to the solver, and what stays the same in all iterations of it.
+
+The unknowns are numbered so that the reduced ones come first and the eliminated blocks, three
+unknowns each, come last. No row touches two blocks. For each block the plan keeps the sorted list
+of reduced columns that occur together with it: its part of the normal matrix is stored for these
+columns only, one after the other ("wide").
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -56,13 +62,17 @@ class Model:
         if self.null_space is None:
             return step
         null_space = self.null_space(state)
-        datum_basis = null_space * self.inner[:, None]
-        return step - null_space @ np.linalg.solve(datum_basis.T @ null_space, datum_basis.T @ step)
+        return s_transform(step, null_space, null_space * self.inner[:, None])
 
     @property
     def unknowns(self):
         """Number of unknowns."""
         return self.reduced + 3 * self.blocks
+
+
+def s_transform(change, null_space, datum_basis):
+    """A change (unknowns,) or (unknowns, k) brought into the datum: datum_basis' change = 0."""
+    return change - null_space @ np.linalg.solve(datum_basis.T @ null_space, datum_basis.T @ change)
 
 
 @dataclass
@@ -93,3 +103,123 @@ class Normals:
         """Start again without asking for memory."""
         for array in (self.v, self.b, self.wide, self.t, self.g):
             array.fill(0.0)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Rows of one group that are treated alike.
+
+    group    number of the group
+    rows     which observations of the group: a slice, or (n,)
+    order    (n, K) place in the group's derivatives of each of this batch's, or None (as they are)
+    block    (n,) block whose derivatives come first, or None
+    columns  (n, k) reduced column of each further derivative; a fixed unknown has the spare column
+    cuts     where runs of neighbouring columns, common to all these rows, begin; and k at the end
+    places   (n, k) where column and block meet in the wide part; a spare place for the fixed ones
+    """
+
+    group: int
+    rows: object
+    order: object
+    block: object
+    columns: np.ndarray
+    cuts: np.ndarray
+    places: object
+
+    def of(self, array):
+        """This batch's part of an array (n, m) of misclosures or (n, m, K) of derivatives."""
+        part = array[self.rows]
+        if self.order is not None and part.ndim == 3:
+            part = np.take_along_axis(part, self.order[:, None, :], axis=2)
+        return part
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Structure of the normal equations: nr reduced unknowns, nb blocks of three.
+
+    reduced, blocks   nr, nb
+    batches           tuple of Batch
+    starts            (nb + 1,) where each block's reduced columns start in `columns`
+    columns           (t,) reduced columns of all blocks, ascending in each
+    ends              (s + 1,) where in `columns` runs of neighbouring columns begin, t at the end
+    runs              (nb + 1,) where in `ends` each block begins
+    alike             where series of neighbouring blocks with the same columns begin; nb at the end
+    """
+
+    reduced: int
+    blocks: int
+    batches: tuple
+    starts: np.ndarray
+    columns: np.ndarray
+    ends: np.ndarray
+    runs: np.ndarray
+    alike: np.ndarray
+
+
+def plan(reduced, blocks, groups):
+    """The Plan of groups of observations (see tankcal.solver.Group)."""
+    raw = [
+        part for g, group in enumerate(groups) for part in _split(g, group.columns, reduced, blocks)
+    ]
+    together = np.zeros((blocks, reduced + 1), dtype=bool)
+    for _, _, _, block, columns in raw:
+        if block is not None:
+            together[block[:, None], columns] = True
+    together[:, reduced] = False
+    owner, columns = np.nonzero(together)
+    place = np.full((blocks, reduced + 1), len(columns), dtype=np.int32)
+    place[owner, columns] = np.arange(len(columns), dtype=np.int32)
+    starts = np.zeros(blocks + 1, dtype=np.int64)
+    np.cumsum(np.bincount(owner, minlength=blocks), out=starts[1:])
+    batches = tuple(
+        Batch(
+            g, rows, order, block, cols, _cuts(cols, reduced),
+            None if block is None else place[block[:, None], cols],
+        )
+        for g, rows, order, block, cols in raw
+    )  # fmt: skip
+    begins = np.ones(len(columns), dtype=bool)
+    begins[1:] = (np.diff(columns) != 1) | (np.diff(owner) != 0)
+    ends = np.append(np.flatnonzero(begins), len(columns))
+    changes = np.flatnonzero((together[1:] != together[:-1]).any(axis=1)) + 1
+    alike = np.concatenate([[0], changes, [blocks]]) if blocks else np.zeros(1, dtype=int)
+    runs = np.searchsorted(ends, starts)
+    return Plan(reduced, blocks, batches, starts, columns, ends, runs, alike)
+
+
+def _cuts(columns, spare):
+    """Where runs begin: places at which some row's column is not the one after its neighbour."""
+    k = columns.shape[1]
+    if k == 0 or len(columns) == 0:
+        return np.arange(k + 1)
+    follows = (columns[:, 1:] == columns[:, :-1] + 1) & (columns[:, 1:] != spare)
+    return np.append(np.flatnonzero(np.append(True, ~follows.all(axis=0))), k)
+
+
+def _split(number, columns, reduced, blocks):
+    """The rows of a group with a block and those without, the block's derivatives first."""
+    spare = np.where(columns < 0, reduced, columns)
+    if blocks == 0 or columns.size == 0:
+        return [(number, slice(None), None, None, spare)]
+    eliminated = columns >= reduced
+    if eliminated.shape[1] >= 3 and not eliminated[:, 3:].any():
+        with_block = np.count_nonzero(eliminated[:, 0])
+        if eliminated[:with_block, :3].all():  # rows with a block come first, block first
+            first, rest = slice(0, with_block), slice(with_block, None)
+            parts = [(number, rest, None, None, spare[rest])] if with_block < len(spare) else []
+            if with_block:
+                block = (columns[first, 0] - reduced) // 3
+                parts.append((number, first, None, block, spare[first, 3:]))
+            return parts
+    order = np.argsort(~eliminated, axis=1, kind="stable")
+    has = eliminated.any(axis=1)
+    parts = [(number, np.flatnonzero(~has), None, None, spare[~has])] if not has.all() else []
+    if not has.any():
+        return parts
+    order = order[has]
+    moved = np.take_along_axis(spare[has], order, axis=1)
+    block = (moved[:, 0] - reduced) // 3
+    if (eliminated.sum(axis=1)[has] != 3).any() or (np.diff(moved[:, :3], axis=1) != 1).any():
+        raise ValueError("a row touches two eliminated blocks, or a part of one")
+    return [*parts, (number, np.flatnonzero(has), order, block, moved[:, 3:])]

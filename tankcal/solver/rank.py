@@ -8,7 +8,7 @@ different units or nearly equal parameters stays far above it.
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.solver.elimination import add_rows, back_substitute, eliminate
+from tankcal.solver.elimination import back_substitute, build, eliminate
 
 NOTHING = 1e-7
 FAINT = 1e-9  # eigenvalue of the scaled reduced system that makes a direction a candidate
@@ -69,9 +69,7 @@ def undetermined(work, state, faint=FAINT, nothing=NOTHING):
     faint  eigenvalue, see FAINT      nothing  see NOTHING
     """
     normals, nr = work.normals, work.plan.reduced
-    normals.clear()
-    for batch in work.plan.batches:
-        add_rows(batch, batch.of(work.w[batch.group]), batch.of(work.jac[batch.group]), normals)
+    build(work.plan, normals, work.w, work.jac)
     diagonal = normals.t.diagonal()[:nr].copy(), normals.v[:, [0, 2, 5]].ravel()
     lengths = np.sqrt(np.concatenate(diagonal))
     scale = 1.0 / np.where(lengths > 0, lengths, 1.0)

@@ -11,12 +11,11 @@ from tankcal.messages import message
 from tankcal.survey.causes import causes_of
 from tankcal.survey.datum import framed
 from tankcal.survey.depth import in_depth
-from tankcal.survey.diagnosis.blunders import searched
+from tankcal.survey.diagnosis.blunders import gross_readings, searched, swapped_at_start
 from tankcal.survey.diagnosis.checks import check_points, check_readings, disagreeing
 from tankcal.survey.diagnosis.diagnoses import MIRROR, diagnosed
 from tankcal.survey.diagnosis.double_names import names_alike, same_place
 from tankcal.survey.diagnosis.fixed_datum_check import strained, wrong_control, wrongly_held
-from tankcal.survey.diagnosis.gross_errors import gross_readings, swapped_at_start
 from tankcal.survey.diagnosis.misread_files import likely_mistake, photos_that_do_not_fit
 from tankcal.survey.diagnosis.outlier_attribution import SOME, one_sided, set_aside, undecided
 from tankcal.survey.diagnosis.scales import check_readings_off, scale_of_control

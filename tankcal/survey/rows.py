@@ -46,7 +46,7 @@ def readings_of(adjusted, traces, held):
 def gone_with_their_points(adjusted, removed, traces):
     """Reading rows of what was set aside, and whose points are no longer adjusted.
 
-    removed  network.cleaning.Removed
+    removed  network.snooping.Removed
     """
     survey = adjusted.survey
     listed = {(table.source, row) for table in adjusted.residuals for row in table.rows.tolist()}

@@ -11,8 +11,8 @@ from tankcal.camera.model import Form, measured
 from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import looking
 from tankcal.survey.network import Camera, ImagePoints, Photos, Survey, adjust
-from tankcal.survey.network.naming import in_words
 from tankcal.survey.network.soundness import hardly_determined
+from tankcal.survey.network.unknowns import in_words
 from tankcal.survey.observations import ControlCoordinates, Distances
 
 SQUARE = np.column_stack(

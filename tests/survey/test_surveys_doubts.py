@@ -9,9 +9,9 @@ from surveyed import by_instruments, by_photographs, changed, told
 from tankcal.geometry.rotations import from_angles
 from tankcal.survey import adjust_survey
 from tankcal.survey.diagnosis.double_names import alike
-from tankcal.survey.fits import plan_fit
 from tankcal.survey.measurements import AdjustmentSettings
 from tankcal.survey.start.pieces import similarity
+from tankcal.survey.start_values import plan_fit
 
 
 @pytest.fixture(scope="module")

@@ -73,7 +73,7 @@ class Block:
 
 
 def block_of(adjustment, setup, alpha=ALPHA):
-    """The Block of a surveys.Adjustment with the job.CameraSetup that it was made with."""
+    """The Block of a survey.Adjustment with the job.CameraSetup that it was made with."""
     adjusted = adjustment.adjusted
     photos = adjusted.survey.photos
     place, _, _ = adjusted.photos

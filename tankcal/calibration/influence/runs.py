@@ -183,7 +183,7 @@ def _run(job, common, setup, calibration, state, free, alpha, top):
 
 
 def _adjusted(job, setup, alpha, begun, top):
-    """A Run with what came out of a job, and its surveys.Adjustment; None where it failed.
+    """A Run with what came out of a job, and its survey.Adjustment; None where it failed.
 
     top  capacity_at_top.TopOfTank, or None: no volumes
     """

@@ -82,7 +82,7 @@ def analyse_job(
     """A tuple of CameraParameters of a job, one for each set of interior parameters.
 
     camera, photo  names, to have the sets of these only
-    adjustment  surveys.Adjustment of job.measurements, where it is at hand
+    adjustment  survey.Adjustment of job.measurements, where it is at hand
     dropping    whether the survey is adjusted again without each candidate
     progress    progress(text, done, total) is called as the work goes on
 

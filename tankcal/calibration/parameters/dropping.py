@@ -52,7 +52,7 @@ class Outcome:
     """The survey without some parameters.
 
     camera, names  which                     failed  why it cannot be adjusted, or None
-    adjustment     surveys.Adjustment: points, covariances and statistics, no readings; None: failed
+    adjustment     survey.Adjustment: points, covariances and statistics, no readings; None: failed
     moved          Moved, against the survey with them; None: failed
     volume         TopVolume, or None: no tank, or no capacity
     """
@@ -68,7 +68,7 @@ class Outcome:
 class Dropping:
     """A survey that is adjusted again and again, each time without some parameters.
 
-    job         job.Job with measurements     adjustment  surveys.Adjustment of them
+    job         job.Job with measurements     adjustment  survey.Adjustment of them
     volume      TopVolume with all parameters; None: no tank, or none can be computed
     no_volume   why there is none, or None
     """
@@ -105,7 +105,7 @@ class Dropping:
         return Outcome(camera, tuple(names), None, found, moved, volume)
 
     def adjusted(self, cameras):
-        """The surveys.Adjustment with other cameras (network.Camera), in the order of the survey.
+        """The survey.Adjustment with other cameras (network.Camera), in the order of the survey.
 
         It holds points, covariances and statistics; readings, groups and warnings are empty.
         """

@@ -42,7 +42,7 @@ class Differences:
 
 
 def differences_of(adjustment):
-    """The Differences at the check points of a surveys.Adjustment or of a record (dict).
+    """The Differences at the check points of a survey.Adjustment or of a record (dict).
 
     A record may be whole or its part "adjustment". Raises InputError when there are none.
     """

@@ -53,7 +53,7 @@ def write(
 
 
 def write_adjustment(job, adjustment, directory, progress=None, letterhead=None, papers=True):
-    """The same for a survey that was only adjusted (`surveys.Adjustment` of a `Job`)."""
+    """The same for a survey that was only adjusted (`survey.Adjustment` of a `Job`)."""
 
     def prepare(folder):
         record = records.record_of_adjustment(job, adjustment)

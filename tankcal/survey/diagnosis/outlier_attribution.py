@@ -125,7 +125,7 @@ def _many(gone, total):
 def undecided(adjusted, removed, traces, held):
     """Problem rows of readings set aside in whose place others might have been.
 
-    removed  tuple of network.cleaning.Removed, the worst first        traces  {source: Trace}
+    removed  tuple of network.snooping.Removed, the worst first        traces  {source: Trace}
     held     network.reactions.Reactions of held coordinates
     """
     found = []

@@ -8,9 +8,15 @@ from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver import Group, Model
 from tankcal.survey.network.blocks import CORRELATED, correlated_groups, in_blocks, relative
-from tankcal.survey.network.columns import eliminated_points, layout_of
-from tankcal.survey.network.naming import in_words, name_of, name_of_exact, told
 from tankcal.survey.network.survey import FEWEST, SCOPES
+from tankcal.survey.network.unknowns import (
+    eliminated_points,
+    in_words,
+    layout_of,
+    name_of,
+    name_of_exact,
+    told,
+)
 from tankcal.survey.observations import (
     ImageCoordinates,
     KnownUnknowns,
