@@ -8,9 +8,9 @@ import numpy as np
 from tankcal.job.contract import COLUMNS, KEYS, KINDS, OPEN_SECTIONS, REGISTER_KEYS
 from tankcal.job.contract.registers import FAMILIES, SHORT_KEYS
 from tankcal.job.fields import IN_TOML, MAX_NAME, NEXT_TO_ZERO, Field, Refused, is_blank, read_value
-from tankcal.job.form_words import NO, YES, meant
 from tankcal.job.tables import nearest, shown
 from tankcal.messages import message
+from tankcal.text.form_words import NO, YES, meant
 from tankcal.text.numerals import NUMBER
 
 

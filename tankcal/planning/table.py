@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from tankcal.errors import SolutionError
-from tankcal.job.model import Job, Points
+from tankcal.job.model import Job
 from tankcal.messages import message
 from tankcal.pipeline.plausibility import refuse_undetermined
 from tankcal.pipeline.statements import statements
@@ -15,6 +15,7 @@ from tankcal.pipeline.tanks.vertical import volume_by_points
 from tankcal.pipeline.wall import Wall, find_wall
 from tankcal.planning.covariance import PredictedCovariance
 from tankcal.survey.causes import causes_of
+from tankcal.survey.points import Points
 from tankcal.survey.wall import off_the_wall
 
 MANY = 400  # points of a wall whose covariance is written out for its outlines

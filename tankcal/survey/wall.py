@@ -4,15 +4,15 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.geometry.circles import taubin_circle
-from tankcal.job.model import Points
 from tankcal.messages import message
+from tankcal.survey.points import Points
 from tankcal.survey.results import Cause
 
 LARGEST = 2500  # points whose full covariance is kept: 7500 x 7500 numbers, 450 MB
 
 
 def wall_points(adjustment, measurements, side):
-    """The job.Points of the wall: adjusted targets less their offsets, covariance, causes.
+    """The Points of the wall: adjusted targets less their offsets, covariance, causes.
 
         wall = target - (+ inside) offset * horizontal normal of the wall, outwards
 

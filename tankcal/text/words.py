@@ -4,9 +4,9 @@ from numbers import Integral, Number
 
 from tankcal.errors import SHEET
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
-from tankcal.job.form_words import word_of
 from tankcal.messages import as_plain, filled
 from tankcal.text.digits import NOTHING, Marks, fixed, shortest
+from tankcal.text.form_words import word_of
 from tankcal.text.languages import DEFAULT
 from tankcal.text.word_files import load_words as load_words  # the door to words of every kind
 

@@ -12,11 +12,11 @@ from tankcal.cli.showing import said, speak
 from tankcal.errors import Problem
 from tankcal.job.contract import KEYS
 from tankcal.job.fields import Field, Refused, read_value
-from tankcal.job.form_words import meant, word_of
 from tankcal.job.starter import write_starter
 from tankcal.job.tables import in_book
 from tankcal.messages import Message
 from tankcal.record import record_of
+from tankcal.text.form_words import meant, word_of
 from tankcal.text.languages import nearest_language
 from tankcal.text.words import in_language, load_words
 

@@ -10,12 +10,12 @@ from tankcal.job.model.parts import (
     End,
     Horizontal,
     Mesh,
-    Points,
     Roof,
     Sphere,
 )
 from tankcal.job.model.settings import Datum, Material, Survey, Switches, TableSpec, Tank
 from tankcal.survey.measurements import Measurements
+from tankcal.survey.points import Points
 from tankcal.tank.rules.model import Rule
 
 __all__ = [

@@ -16,31 +16,6 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Points:
-    """Surveyed points, in the order of the file.
-
-    names       (n,) text            rows        (n,) row of each in its file, for messages
-    xyz_m       (n, 3) coordinates   covariance_m2  (3n, 3n), or None: not given
-    sd_m        (n, 3) standard deviations, or None: not given (estimated from residuals)
-    section     (n,) text or None: given section name
-    generatrix  (n,) text or None
-    causes      named causes that the covariance contains (`surveys.Cause`): covariance = the rest
-                + sum of column column', their columns over the coordinates of these points
-    from_adjustment  True: adjusted from a survey; the covariance has the scale that it should have
-    """
-
-    names: tuple
-    xyz_m: np.ndarray
-    sd_m: np.ndarray | None
-    covariance_m2: np.ndarray | None
-    section: tuple
-    generatrix: tuple
-    rows: tuple
-    causes: tuple = ()
-    from_adjustment: bool = False
-
-
-@dataclass(frozen=True)
 class Bottom:
     """The bottom of a vertical tank, below or above the bottom of its first course.
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
 from tankcal.job.fields import MAX_NAME, MAX_TEXT
-from tankcal.job.form_words import word_of
 from tankcal.job.starter.notes import REGISTER_NOTES, SECTION_NOTES, TABLE_NOTES
 from tankcal.job.starter.units import parted
 from tankcal.text.digits import shortest
+from tankcal.text.form_words import word_of
 from tankcal.text.languages import DEFAULT
 from tankcal.text.words import load_words, marks_of
 
