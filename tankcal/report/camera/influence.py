@@ -2,8 +2,8 @@
 
 from tankcal.report import blocks
 from tankcal.report.camera.naming import short
-from tankcal.report.camera.product import decimals_of_axes, unit_of
-from tankcal.report.plain import Column
+from tankcal.report.camera.product import axes_table, decimals_of_axes, unit_of
+from tankcal.report.tables import Column, Table
 from tankcal.text.words import listed, observation_name
 
 MOST_PAIRS, MOST_PAIRS_ON_TERMINAL = 40, 15
@@ -119,20 +119,27 @@ def shifts(paper):
     rows = [_shift(label(paper, run), run["shifts"]) for run in adjusted(paper) if run["shifts"]]
     if not rows:
         return [paper.paragraph("no_shifts")]
-    found = [paper.table("shifts", rows, [Column("run"), *_columns_of_shifts()])]
+    found = [paper.show(SHIFTS, rows)]
     if any(run["shifts"] and run["shifts"]["aligned"] for run in adjusted(paper)):
         found.append(paper.paragraph("aligned"))
     return found
 
 
-def _columns_of_shifts():
-    return [
-        *(Column(f"points_{axis}_mm", "image mm", decimals=3) for axis in "xyz"),
+SHIFTS = Table(
+    "shifts",
+    (
+        Column("run", on="shifts"),
+        Column("one", on="pairs_of_runs"),
+        Column("other", on="pairs_of_runs"),
+        *(Column(f"points_{axis}_mm", "image mm", decimals=3, on="shifts") for axis in "xyz"),
         Column("points_largest_mm", "image mm", decimals=3),
         Column("largest_point"),
         Column("photos_mm", "image mm", decimals=2),
         Column("photos_arcsec", "arcsec", decimals=1),
-    ]
+        Column("change_m3", "m3", decimals=4, heading="volume_change_m3", on="pairs_of_runs",
+               optional=True),
+    ),
+)  # fmt: skip
 
 
 def _shift(name, shift):
@@ -155,28 +162,12 @@ def checks(paper):
     unit = "m" if "m" in {unit_of(run["product"]) for run in done} else "mm"
     decimals = max(decimals_of_axes(run["product"], unit) for run in done)
     rows = [
-        row
-        | {
-            "run": label(paper, run) if number == 0 else "",
-            "axis": paper.word(f"axis_names.{row['axis']}"),
-            "biased": {True: "yes", False: "no", None: None}[row["biased"]],
-        }
+        row | {"run": label(paper, run) if number == 0 else ""}
         for run in done
         for number, row in enumerate(run["product"]["axes"])
     ]
-    columns = [
-        Column("run"),
-        Column("axis"),
-        Column("n", decimals=0),
-        Column("mean_m", unit, decimals=decimals),
-        Column("t", decimals=2),
-        Column("t_limit", decimals=2),
-        Column("biased", words="yes_no"),
-        Column("rmse_m", unit, decimals=decimals),
-        Column("rmse_unbiased_m", unit, decimals=decimals),
-    ]
     level = paper.percent(done[0]["product"]["alpha"])
-    return [paper.table("checks_of_runs", rows, columns, level=level)]
+    return [paper.show(axes_table(unit, decimals), rows, on="checks_of_runs", level=level)]
 
 
 def volumes(paper):
@@ -222,18 +213,10 @@ def pairs(paper, most=MOST_PAIRS):
     if not rows:
         return []
     rows.sort(key=lambda row: -(row["points_largest_mm"] or 0.0))
+    if all(row["change_m3"] is None for row in rows):
+        rows = [{key: row[key] for key in row if key != "change_m3"} for row in rows]
     shown = rows[:most]
-    columns = [
-        Column("one"),
-        Column("other"),
-        Column("points_largest_mm", "image mm", decimals=3),
-        Column("largest_point"),
-        Column("photos_mm", "image mm", decimals=2),
-        Column("photos_arcsec", "arcsec", decimals=1),
-    ]
-    if any(row["change_m3"] is not None for row in rows):
-        columns.append(Column("change_m3", "m3", decimals=4, heading="volume_change_m3"))
-    found = [paper.table("pairs_of_runs", shown, columns)]
+    found = [paper.show(SHIFTS, shown, on="pairs_of_runs")]
     if len(rows) > len(shown):
         found.append(paper.paragraph("only_largest", shown=len(shown), all=len(rows)))
     return found

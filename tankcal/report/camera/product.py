@@ -1,7 +1,7 @@
 """Quality of a product by its check points: sentences, tables and rows for CSV files."""
 
 from tankcal.report import blocks, numbers
-from tankcal.report.plain import Column
+from tankcal.report.tables import Column, Table
 from tankcal.text.digits import decimals_of
 
 MOST_POINTS = 60  # rows of differences in the paper
@@ -51,46 +51,47 @@ def _of_limits(paper, what):
     return table and paper.words[f"limits_{what}s"].get(table.get("code"), table[what])
 
 
+def axes_table(unit, decimals):
+    """The Table of the axes of check points, of a product or of several runs."""
+    sized = {"unit": unit, "decimals": decimals}
+    return Table(
+        "axes",
+        (
+            Column("run", on="checks_of_runs"),
+            Column("axis", text=lambda paper, row: paper.word(f"axis_names.{row['axis']}")),
+            Column("n", decimals=0),
+            Column("mean_m", **sized),
+            Column("sd_m", **sized, on="axes"),
+            Column("t", decimals=2),
+            Column("t_limit", decimals=2),
+            Column("biased"),
+            Column("rmse_m", **sized),
+            Column("rmse_unbiased_m", **sized),
+            Column("largest_m", **sized, on="axes"),
+            Column("largest_point", on="axes"),
+        ),
+    )
+
+
 def axes(paper, found):
     """One row an axis: mean, its test, scatter, RMSE before and after the bias."""
     unit = unit_of(found)
-    decimals = decimals_of_axes(found, unit)
-    rows = [_axis(paper, row) for row in found["axes"]]
-    columns = [
-        Column("axis"),
-        Column("n", decimals=0),
-        Column("mean_m", unit, decimals=decimals),
-        Column("sd_m", unit, decimals=decimals),
-        Column("t", decimals=2),
-        Column("t_limit", decimals=2),
-        Column("biased", words="yes_no"),
-        Column("rmse_m", unit, decimals=decimals),
-        Column("rmse_unbiased_m", unit, decimals=decimals),
-        Column("largest_m", unit, decimals=decimals),
-        Column("largest_point"),
-    ]
-    tables = [paper.table("axes", rows, columns)]
+    tables = [paper.show(axes_table(unit, decimals_of_axes(found, unit)), found["axes"])]
     tested = [row["precision"] for row in found["axes"] if row["precision"]]
     if tested:
         tables.append(_precision(paper, tested, unit))
     return tables
 
 
-def _axis(paper, row):
-    biased = {True: "yes", False: "no", None: None}[row["biased"]]
-    return row | {"axis": paper.word(f"axis_names.{row['axis']}"), "biased": biased}
-
-
 def _precision(paper, tested, unit):
-    rows = [row | {"axis": paper.word(f"axis_names.{row['axis']}")} for row in tested]
     columns = [
-        Column("axis"),
+        Column("axis", text=lambda paper, row: paper.word(f"axis_names.{row['axis']}")),
         Column("sigma_m", unit, digits=3),
         Column("chi2", decimals=2),
         Column("limit", decimals=2),
         Column("passed", words="passed"),
     ]
-    return paper.table("precision", rows, columns)
+    return paper.table("precision", tested, columns)
 
 
 def classes(paper):

@@ -10,6 +10,8 @@ from tankcal.text.digits import NOTHING, decimals_of_height, decimals_of_rows
 class Column:
     """A column of a table: where its values are, how they are written, and who shows them.
 
+    Of the rules for numbers (decimals, u, digits, height) one is given; none: text.
+
     Parameters
     ----------
     key : str
@@ -17,45 +19,36 @@ class Column:
     unit : str
         Unit in which it is shown, one of numbers.UNITS; "" for text and bare numbers.
     decimals : int or callable, optional
-        So many decimals, or what gives them from a row (in the workbook maybe a number format);
-        beside `u`: where no row has an uncertainty.
+        So many, or what gives them from a row (in the workbook maybe a number format); beside
+        `u`: where no row has an uncertainty.
     u : str, optional
-        Key of the standard or expanded uncertainty that sets the decimals (two digits of it);
-        whole digits are rounded off in the column of that uncertainty alone, and on paper only.
+        Key of the uncertainty that sets the decimals (two digits of it); whole digits are rounded
+        off in the column of that uncertainty alone, and on paper only.
     least, most : int, optional
-        Never fewer decimals than `least`, nor more than `most`, where an uncertainty may be the
-        rounding of what is exact.
+        Never fewer decimals, nor more, where an uncertainty may be the rounding of what is exact.
     digits : int, optional
         So many significant digits.
     height : bool
-        A height, in millimetres or finer where it must be. None of these rules: text.
+        A height, in millimetres or finer where it must be.
     words : str, optional
         Group of words that a code is looked up in.
     text : callable, optional
-        Gives the text of a cell from (paper, row); it has the paper's record, words and marks.
+        Gives the text of a cell from (paper, row).
     heading : str, optional
         Key of another heading on paper.
-    nothing : str
-        What is printed for a value that does not exist.
-    align : str, optional
-        One of blocks.ALIGNMENTS; None: text to the left, numbers by their decimal marks.
-    formulas : bool
-        Formulas of the record in this text are set as such.
+    nothing, align, formulas
+        What is printed for no value; one of blocks.ALIGNMENTS (None: text to the left, numbers by
+        their decimal marks); whether formulas of the record in this text are set as such.
     on : str, optional
         Names of the papers' tables that show it, with blanks between; None: all, "": none.
-    sheet : str, optional
+    sheet : str or True, optional
         Its heading in the workbook, a key of [workbook.columns]; True: that of the paper with its
         unit; None: the workbook does not show it.
-    named : Mapping
-        Values for the places in that heading.
-    width : float
-        Width in the workbook in letters, at least.
-    in_sheet : Mapping
-        Fields of this column that are others in the workbook.
-    csv : str, optional
-        Its heading in the CSV file; None: the file does not have it.
-    csv_unit : str
-        Unit in which the file has it; "": that of the record.
+    named, width, in_sheet
+        Values for the places in that heading; least width in letters; fields of this column that
+        are others in the workbook.
+    csv, csv_unit : str, optional
+        Its heading in the CSV file, None: it is not there; its unit there, "": that of the record.
     optional : bool
         It is left out where no row has the key.
     """
