@@ -1,7 +1,5 @@
 """The part of the record that lists what was adjusted: points, photos, cameras, instruments."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.special import fdtri, gammaincinv
 
@@ -9,7 +7,7 @@ from tankcal.calibration.edges import Frame, own_shift
 from tankcal.calibration.interiors import interiors_of
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.geometry.rotations import angle_derivatives, angles_of
-from tankcal.record.schema import filled_from, key
+from tankcal.record.schema import Saved, filled_from, key
 from tankcal.survey.network import correlations
 from tankcal.survey.network.quality import ellipsoid_factor, ellipsoids, precision
 
@@ -17,8 +15,7 @@ ELLIPSE = 0.95  # probability of the ellipses and ellipsoids that are drawn and 
 PROBABILITIES = (0.20, 0.90, 0.95, 0.99)
 
 
-@dataclass(frozen=True)
-class AdjustedPoint:
+class AdjustedPoint(Saved):
     """A point after the adjustment, with its error ellipsoid and its ellipse in plan of 95 %."""
 
     point: str = key("name")
@@ -34,16 +31,14 @@ class AdjustedPoint:
     ellipse_azimuth_deg: float = key("of the first")
 
 
-@dataclass(frozen=True)
-class EllipsoidFactor:
+class EllipsoidFactor(Saved):
     """Semi-axes of an ellipsoid in those of the standard one."""
 
     probability: float = key("that it holds the point")
     factor: float = key("times the standard ellipsoid")
 
 
-@dataclass(frozen=True)
-class PointPrecision:
+class PointPrecision(Saved):
     """Precision of all points that are not fixed."""
 
     points: int = key("that are not fixed")
@@ -60,8 +55,7 @@ class PointPrecision:
     ellipse_probability: float = key("of the ellipses and ellipsoids that are listed")
 
 
-@dataclass(frozen=True)
-class AdjustedPhoto:
+class AdjustedPhoto(Saved):
     """A photo: where it was taken, its angles, their sds, and how well its points fit."""
 
     photo: str = key("name")
@@ -82,25 +76,18 @@ class AdjustedPhoto:
     rms_mm: float = key("root mean square residual of an image coordinate")
 
 
-@dataclass(frozen=True)
-class AdjustedCamera:
+class AdjustedCamera(Saved):
     """A set of interior parameters: photos with the same parameters share one."""
 
     camera: str = key("name")
     photos: list[str] | None = key("those of a set that is not of the whole camera")
-    convention: str = key(
-        "sign of the distortion's terms, as in cameras.toml", of="form.convention"
-    )
+    convention: str = key("sign of the distortion's terms", of="form.convention")
     affinity: str = key("form of the affinity terms", of="form.affinity")
-    radial_balance_mm: float = key(
-        "radius at which radial distortion is 0; 0: not balanced", of="form.radial_balance_mm"
-    )
+    radial_balance_mm: float = key("0: not balanced", of="form.radial_balance_mm")
     format_mm: list[float] | None = key("width and height of the image")
     pixel_mm: list[float] | None = key("sides of a pixel", of="frame.pixel_mm")
     edge_mm: list[float] = key("half width and half height that edge_um is of", of="frame.half_mm")
-    edge_known: bool = key(
-        "whether the format was declared, or only seen by the points", of="frame_known"
-    )
+    edge_known: bool = key("false: only seen by the points", of="frame_known")
     reach_mm: float = key("of the farthest image point from the middle", of="frame.reach_mm")
     parameters: list[str] = key("names of those of the model; the lists below are in their order")
     units: list[str] = key("of the values")
@@ -114,8 +101,7 @@ class AdjustedCamera:
     correlation: list[list[float]] = key("of the free ones")
 
 
-@dataclass(frozen=True)
-class AdjustedInstrument:
+class AdjustedInstrument(Saved):
     """Scale and offset of an instrument: reading = true (1 + scale) + offset."""
 
     instrument: str = key("name")
@@ -131,8 +117,7 @@ class AdjustedInstrument:
     declared_offset_sd_mm: float = key("before")
 
 
-@dataclass(frozen=True)
-class ControlSystem:
+class ControlSystem(Saved):
     """A further system of control: X_system = (1 + scale) R X + shift."""
 
     system: str = key("name")

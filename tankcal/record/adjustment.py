@@ -29,7 +29,7 @@ from tankcal.record.images import (
     fiducials_of,
     image_readings_of,
 )
-from tankcal.record.schema import Columns, filled_from, key
+from tankcal.record.schema import Columns, Saved, filled_from, key
 from tankcal.record.texts import Text, text_of
 from tankcal.survey.network.reliability import UNCONTROLLED, noncentrality, tau_limit
 from tankcal.survey.results import DatumReport, GroupOfReadings, Reading
@@ -55,8 +55,7 @@ class AdjustedGroup(GroupOfReadings):
     verdict: str = key("a code: as_declared, worse, better, hardly_controlled, not_controlled")
 
 
-@dataclass(frozen=True)
-class HeldValue:
+class HeldValue(Saved):
     """A value that holds exactly, and what its release would say of it."""
 
     kind: str = key("of observation")
@@ -75,8 +74,7 @@ class HeldValue:
     controlled: bool = key("whether others would show an error of it")
 
 
-@dataclass(frozen=True)
-class CheckPoint:
+class CheckPoint(Saved):
     """A check point: adjusted minus known."""
 
     point: str = key("name")
@@ -90,8 +88,7 @@ class CheckPoint:
     largest_w: float | None = key("largest difference over its sd")
 
 
-@dataclass(frozen=True)
-class CheckedPoints:
+class CheckedPoints(Saved):
     """Check points against the adjustment."""
 
     points: list[CheckPoint] = key("each of them")
@@ -100,8 +97,7 @@ class CheckedPoints:
     mean_m: float = key("magnitude")
 
 
-@dataclass(frozen=True)
-class SharedCause:
+class SharedCause(Saved):
     """A shared cause of uncertainty that the budget names."""
 
     name: str = key("of the instrument")
@@ -110,8 +106,7 @@ class SharedCause:
     unit: str = key("ppm or mm")
 
 
-@dataclass(frozen=True)
-class AdjustedSetup:
+class AdjustedSetup(Saved):
     """A set-up of an instrument on a station."""
 
     setup: str = key("name", of="name")
@@ -120,8 +115,7 @@ class AdjustedSetup:
     height_m: float | None = key("of the instrument")
 
 
-@dataclass(frozen=True)
-class AdjustmentRecord:
+class AdjustmentRecord(Saved):
     """How the survey was adjusted, and how good that is."""
 
     sigma0: float = key("a posteriori; null: nothing is redundant")

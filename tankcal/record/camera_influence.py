@@ -1,6 +1,5 @@
 """What calibrations do to a block as it is saved: kind "influence" of camera.json."""
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -9,14 +8,13 @@ from tankcal.calibration.influence.blocks import InteriorValue
 from tankcal.record.camera_product import ProductFile, product_of
 from tankcal.record.camera_versions import CameraFile
 from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import filled_from, key
+from tankcal.record.schema import Saved, filled_from, key
 
 MM, UM = 1e3, 1e3
 ARCSEC = np.degrees(1.0) * 3600
 
 
-@dataclass(frozen=True)
-class ReadingSetAside:
+class ReadingSetAside(Saved):
     """A reading that was set aside in the reference, and is left out of all runs."""
 
     kind: str = key("of observation")
@@ -27,23 +25,20 @@ class ReadingSetAside:
     w: float = key("test quantity")
 
 
-@dataclass(frozen=True)
-class BlunderSearch:
+class BlunderSearch(Saved):
     """The search in the reference; no run searches again, so that all have the same readings."""
 
     searched: bool = key("whether blunders were searched for")
     removed: list[ReadingSetAside] = key("readings set aside")
 
 
-@dataclass(frozen=True)
-class Skipped:
+class Skipped(Saved):
     """Why a run was left out."""
 
     code: str = key('"no_sds": a calibration without sds cannot be weighted')
 
 
-@dataclass(frozen=True)
-class RunQuality:
+class RunQuality(Saved):
     """Global test of a run; null: nothing is redundant."""
 
     sigma0: float | None = key("a posteriori")
@@ -55,8 +50,7 @@ class RunQuality:
     confidence: float = key("of the bounds", of="test.confidence")
 
 
-@dataclass(frozen=True)
-class RunImages:
+class RunImages(Saved):
     """Residuals of the camera's photos."""
 
     n: int = key("images")
@@ -68,8 +62,7 @@ class RunImages:
     largest_px: float | None = key("of a single coordinate")
 
 
-@dataclass(frozen=True)
-class RunVolume:
+class RunVolume(Saved):
     """Volume of the tank at the top of its table."""
 
     volume_m3: float = key("at the top", of="value_m3")
@@ -80,8 +73,7 @@ class RunVolume:
     points: int | None = key("of the wall; null: not surveyed")
 
 
-@dataclass(frozen=True)
-class PointShifts:
+class PointShifts(Saved):
     """Differences of the points; null where there are none."""
 
     n: int = key("points")
@@ -92,8 +84,7 @@ class PointShifts:
     largest_point: str | None = key("that differs most", of="largest_name")
 
 
-@dataclass(frozen=True)
-class PhotoShifts:
+class PhotoShifts(Saved):
     """Differences of the photos' places and turns about the axes of the image."""
 
     n: int = key("photos")
@@ -107,16 +98,14 @@ class PhotoShifts:
     largest_turn_photo: str | None = key("that turns most", of="largest_turn_name")
 
 
-@dataclass(frozen=True)
-class VolumeShift:
+class VolumeShift(Saved):
     """Difference of the capacities at the top."""
 
     difference_m3: float = key("other minus one", of="volume_m3")
     percent: float = key("of that of one", of="volume_percent")
 
 
-@dataclass(frozen=True)
-class Shifts:
+class Shifts(Saved):
     """What a run changes against another."""
 
     points: PointShifts = key("of the points")
@@ -125,21 +114,18 @@ class Shifts:
     volume: VolumeShift | None = key("of the tank")
 
 
-@dataclass(frozen=True)
-class RunNumbers:
+class RunNumbers(Saved):
     """Two runs, by their numbers in `runs`."""
 
     one: int = key("the reference is 0")
     other: int = key("that is compared with it")
 
 
-@dataclass(frozen=True)
 class PairOfRuns(Shifts, RunNumbers):
     """Two runs that could be adjusted: other minus one. Those with the reference come first."""
 
 
-@dataclass(frozen=True)
-class AdjustedRun:
+class AdjustedRun(Saved):
     """One adjustment of the block; what a run that was not adjusted does not have is null."""
 
     label: str = key('"reference", or "NAME, fixed"')
@@ -160,8 +146,7 @@ class AdjustedRun:
     shifts: Shifts | None = key("against the reference; null for it")
 
 
-@dataclass(frozen=True, kw_only=True)
-class InfluenceFile(CameraFile):
+class InfluenceFile(CameraFile, kw_only=True):
     """What calibrations do to a block."""
 
     kind: Literal["influence"] = key("influence", default="influence")

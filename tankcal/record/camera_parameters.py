@@ -27,7 +27,6 @@ Codes of `recommendation[].reasons`:
 """
 
 import math
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -37,13 +36,12 @@ from tankcal.calibration.parameters.recommendation import Advice
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.record.camera_versions import CameraFile
 from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import filled_from, key
+from tankcal.record.schema import Saved, filled_from, key
 
 MM = 1e3
 
 
-@dataclass(frozen=True)
-class ImageAccuracy:
+class ImageAccuracy(Saved):
     """Image accuracy that effects are compared with."""
 
     um: float = key("micrometres")
@@ -51,8 +49,7 @@ class ImageAccuracy:
     source: str = key('"given" or "residuals"', named="from")
 
 
-@dataclass(frozen=True)
-class EdgeShifts:
+class EdgeShifts(Saved):
     """Shifts over the frame: largest and rms; seen: largest within reach of the image points."""
 
     own: Shift | None = key("of the value itself (null for c)")
@@ -60,8 +57,7 @@ class EdgeShifts:
     left_turned: Shift | None = key("the same after the camera has been turned to fit, too")
 
 
-@dataclass(frozen=True)
-class ParameterJudged:
+class ParameterJudged(Saved):
     """A parameter of the model; F to significant are null for a fixed one, whose sd is 0."""
 
     name: str = key("of the parameter")
@@ -80,8 +76,7 @@ class ParameterJudged:
     edge: EdgeShifts = key("over the frame")
 
 
-@dataclass(frozen=True)
-class GroupTest:
+class GroupTest(Saved):
     """Parameters against zero, together."""
 
     names: list[str] = key("of the parameters")
@@ -92,8 +87,7 @@ class GroupTest:
     positive_definite: bool = key("false: no test is possible")
 
 
-@dataclass(frozen=True)
-class PrincipalComponents:
+class PrincipalComponents(Saved):
     """Principal components of the parameters, the largest first."""
 
     of: str = key('"correlation" or "covariance"')
@@ -109,8 +103,7 @@ class PrincipalComponents:
     values_of: str = key('"standardised" parameters or their "values"')
 
 
-@dataclass(frozen=True)
-class PointsMoved:
+class PointsMoved(Saved):
     """How far adjusted points moved."""
 
     count: int = key("points compared")
@@ -124,8 +117,7 @@ class PointsMoved:
     largest_sds_point: str = key("its point")
 
 
-@dataclass(frozen=True)
-class TopOfTable:
+class TopOfTable(Saved):
     """The volume at the top of the table; null: no tank, or no capacity."""
 
     volume_m3: float | None = key("at the top", of="value_m3")
@@ -135,8 +127,7 @@ class TopOfTable:
     wall_points: int | None = key("of the wall", of="points")
 
 
-@dataclass(frozen=True)
-class TrialWithout:
+class TrialWithout(Saved):
     """The survey without some parameters; sigma0 and what follows null: not adjusted again."""
 
     names: list[str] = key("of those let go")
@@ -156,33 +147,28 @@ class TrialWithout:
     volume_change_m3: float | None = key("at the top of the table")
 
 
-@dataclass(frozen=True)
 class TrialWithVolume(TopOfTable, TrialWithout):
     """A trial, and the volume at the top of the table without these parameters."""
 
 
-@dataclass(frozen=True)
-class WhyNoVolume:
+class WhyNoVolume(Saved):
     """The first key of what the survey with all parameters gives."""
 
     no_volume: str | None = key("why there is no volume")
 
 
-@dataclass(frozen=True)
 class WithAll(TopOfTable, WhyNoVolume):
     """The volume at the top of the table with all parameters."""
 
 
-@dataclass(frozen=True)
-class Loading:
+class Loading(Saved):
     """How a parameter loads on a component."""
 
     name: str = key("of the parameter")
     loading: float = key("on the component")
 
 
-@dataclass(frozen=True)
-class HighComponent:
+class HighComponent(Saved):
     """A component on which two or more parameters load high."""
 
     component: int = key("number, from 1")
@@ -190,8 +176,7 @@ class HighComponent:
     high: list[Loading] = key("of those that load high")
 
 
-@dataclass(frozen=True)
-class SilvasRule:
+class SilvasRule(Saved):
     """What Silva's rule says."""
 
     may_go: int = key("number of components with a negligible share")
@@ -202,16 +187,14 @@ class SilvasRule:
     components: list[HighComponent] = key("on which two or more load high")
 
 
-@dataclass(frozen=True)
-class KeptBecause:
+class KeptBecause(Saved):
     """A parameter that Pessoa's rule keeps."""
 
     name: str = key("of the parameter")
     because: str = key('"significant", "edge", "both" or "not_known"')
 
 
-@dataclass(frozen=True)
-class PessoasRule:
+class PessoasRule(Saved):
     """What Pessoa's rule says."""
 
     limit_px: float | None = key("that the shift of a corner is compared with")
@@ -220,16 +203,14 @@ class PessoasRule:
     keep: list[KeptBecause] = key("the others")
 
 
-@dataclass(frozen=True)
-class PublishedRules:
+class PublishedRules(Saved):
     """What published rules say."""
 
     silva: SilvasRule = key("Silva 1995")
     pessoa: PessoasRule = key("Pessoa")
 
 
-@dataclass(frozen=True, kw_only=True)
-class ParametersFile(CameraFile):
+class ParametersFile(CameraFile, kw_only=True):
     """What the parameters of one set are worth."""
 
     kind: Literal["parameters"] = key("parameters", default="parameters")

@@ -1,16 +1,14 @@
 """A product check as it is saved: kind "product" of camera.json."""
 
-from dataclasses import dataclass
 from typing import Literal
 
 from tankcal.calibration.product.check import ADVISED, AxisCheck, Precision, Reached
 from tankcal.record.camera_versions import CameraFile
 from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import filled_from, key
+from tankcal.record.schema import Saved, filled_from, key
 
 
-@dataclass(frozen=True)
-class PartJudged:
+class PartJudged(Saved):
     """Differences of a part."""
 
     part: str = key('"plan" (x and y together) or "height"')
@@ -20,16 +18,14 @@ class PartJudged:
     largest_m: float = key("largest magnitude")
 
 
-@dataclass(frozen=True)
-class ProductNote:
+class ProductNote(Saved):
     """What should be read: few_points, no_tests, share_means_all, axis_without_points, ..."""
 
     code: str = key("fewer than `advised`; than 2; than 10: 90 % of them are all of them; ...")
     n: float = key("points, or the number of the axis")
 
 
-@dataclass(frozen=True)
-class LimitsUsed:
+class LimitsUsed(Saved):
     """The limit table."""
 
     name: str = key("of the table")
@@ -40,8 +36,7 @@ class LimitsUsed:
     code: str | None = key("of a shipped table")
 
 
-@dataclass(frozen=True)
-class ClassJudged:
+class ClassJudged(Saved):
     """A class of a scale: reached with `share` of the points within tolerance_m, rmse_m in sd_m."""
 
     part: str = key('"plan" or "height"')
@@ -56,8 +51,7 @@ class ClassJudged:
     precise: bool | None = key("whether all of them passed; null: cannot be said")
 
 
-@dataclass(frozen=True)
-class BestClass:
+class BestClass(Saved):
     """The best class of a scale; null: none is reached."""
 
     part: str = key('"plan" or "height"')
@@ -66,8 +60,7 @@ class BestClass:
     grade_unbiased: str | None = key("less the significant means")
 
 
-@dataclass(frozen=True)
-class Difference:
+class Difference(Saved):
     """Product minus truth at a point; only the axes that there are; null: not known."""
 
     point: str = key("name")
@@ -76,8 +69,7 @@ class Difference:
     dz_m: float | None = key("along z", optional=True)
 
 
-@dataclass(frozen=True, kw_only=True)
-class ProductFile(CameraFile):
+class ProductFile(CameraFile, kw_only=True):
     """What differences at check points say of a product."""
 
     kind: Literal["product"] = key("product", default="product")

@@ -15,7 +15,7 @@ Codes of `conventions`, each choice that a figure depends on, in the order of re
     sds_uncorrelated | covariance_known {cameras}       (where expected_px is there)
 """
 
-from dataclasses import dataclass, make_dataclass
+from dataclasses import make_dataclass
 from typing import Literal
 
 import numpy as np
@@ -23,7 +23,7 @@ import numpy as np
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.record.camera_versions import CameraFile
 from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import filled_from, key
+from tankcal.record.schema import Saved, filled_from, key
 
 DECIMALS = 4  # of a difference in pixels
 _KEYS = [f"{name}_{UNITS[name]}" if UNITS[name] else name for name in PARAMETERS]
@@ -38,8 +38,7 @@ Interior = make_dataclass(
 )
 
 
-@dataclass(frozen=True)
-class ComparisonGrid:
+class ComparisonGrid(Saved):
     """Grid of image points that are compared."""
 
     columns: int = key("number")
@@ -48,8 +47,7 @@ class ComparisonGrid:
     step_px: float = key("between neighbours")
 
 
-@dataclass(frozen=True)
-class ComparisonTerrain:
+class ComparisonTerrain(Saved):
     """Object points that the bundles are brought together by."""
 
     position_m: list[float] = key("x, y, z of the projection centre")
@@ -59,14 +57,12 @@ class ComparisonTerrain:
     terrains: int = key("drawn", of="drawn")
 
 
-@dataclass(frozen=True)
-class NameOfCamera:
+class NameOfCamera(Saved):
     """The first key of a camera."""
 
     name: str = key("as in the file")
 
 
-@dataclass(frozen=True)
 class ComparedCamera(Interior, NameOfCamera):
     """A calibration, as it was read."""
 
@@ -78,8 +74,7 @@ class ComparedCamera(Interior, NameOfCamera):
     pixel_um: list[float] = key("sides, x and y")
 
 
-@dataclass(frozen=True)
-class ComparedPair:
+class ComparedPair(Saved):
     """Two calibrations: second set minus first."""
 
     a: str = key("name of the first, which stands before b in the file")
@@ -100,8 +95,7 @@ class ComparedPair:
     difference_y_px: list[list[float]] = key("rows x columns, y up")
 
 
-@dataclass(frozen=True, kw_only=True)
-class StabilityFile(CameraFile):
+class StabilityFile(CameraFile, kw_only=True):
     """A comparison of calibrations."""
 
     kind: Literal["stability"] = key("stability", default="stability")

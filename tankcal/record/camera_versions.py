@@ -1,9 +1,7 @@
 """The versions of camera.json, and what is added to an older one so that it is of the last."""
 
-from dataclasses import dataclass
-
 from tankcal.record.saved_formats import SavedFormat
-from tankcal.record.schema import key
+from tankcal.record.schema import Saved, key
 
 VERSION = 2
 KINDS = ("stability", "parameters", "influence", "product")
@@ -25,8 +23,7 @@ CAMERA = SavedFormat("tankcal-camera", VERSION, "camera.json", {1: _from_1}, KIN
 FORMAT = CAMERA.format  # of the plain data that every analysis gives
 
 
-@dataclass(frozen=True, kw_only=True)
-class CameraFile:
+class CameraFile(Saved, kw_only=True):
     """What all kinds of camera.json have."""
 
     format: str = key("see Versions", default=FORMAT)

@@ -1,16 +1,13 @@
 """The part of the record that says how image coordinates came about: readings, marks, depth."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from tankcal.record.schema import filled_from, key
+from tankcal.record.schema import Saved, filled_from, key
 
-MICROMETRES = 1000.0
+UM = 1000.0  # in a millimetre
 
 
-@dataclass(frozen=True)
-class RejectedPointReading:
+class RejectedPointReading(Saved):
     """Readings of a point that scatter beyond the limit."""
 
     photo: str = key("name")
@@ -21,8 +18,7 @@ class RejectedPointReading:
     row: int | None = key("of the first, in the file")
 
 
-@dataclass(frozen=True)
-class RejectedMarkReading:
+class RejectedMarkReading(Saved):
     """Readings of a mark that scatter beyond the limit."""
 
     photo: str = key("name")
@@ -33,8 +29,7 @@ class RejectedMarkReading:
     row: int | None = key("of the first, in the file")
 
 
-@dataclass(frozen=True)
-class MeanOfReadings:
+class MeanOfReadings(Saved):
     """An image point that was read more than once."""
 
     photo: str = key("name")
@@ -46,8 +41,7 @@ class MeanOfReadings:
     sd_y_um: float = key("of one reading")
 
 
-@dataclass(frozen=True)
-class ImageReadings:
+class ImageReadings(Saved):
     """Repeated readings of image points."""
 
     points: int = key("read more than once")
@@ -56,15 +50,12 @@ class ImageReadings:
     mean_sd_y_um: float = key("mean of the sds")
     pooled_sd_x_um: float = key("of one reading of any point")
     pooled_sd_y_um: float = key("of one reading of any point")
-    limit_um: float | None = key(
-        "sd beyond which readings are rejected", of="limit_mm", times=MICROMETRES
-    )
+    limit_um: float | None = key("sd beyond which they are rejected", of="limit_mm", times=UM)
     rejected: list[RejectedPointReading] = key("beyond the limit")
     means: list[MeanOfReadings] = key("each point in each photo")
 
 
-@dataclass(frozen=True)
-class MarkFit:
+class MarkFit(Saved):
     """A fiducial mark: its readings, and how they fit its calibrated coordinates."""
 
     mark: str = key("name")
@@ -79,8 +70,7 @@ class MarkFit:
     residual_y_um: float = key("transformed minus calibrated")
 
 
-@dataclass(frozen=True)
-class FiducialTransformation:
+class FiducialTransformation(Saved):
     """A photo that was read on a comparator: its transformation, and how its marks fit."""
 
     photo: str = key("name")
@@ -98,16 +88,13 @@ class FiducialTransformation:
     rejected: list[RejectedMarkReading] = key("beyond the limit")
 
 
-@dataclass(frozen=True)
-class DepthCorrection:
+class DepthCorrection(Saved):
     """The outer iteration that corrects image points for the depth of field."""
 
     rounds: int = key("adjustments made")
-    last_change_um: float = key(
-        "largest change of the last correction", of="last_change_mm", times=MICROMETRES
-    )
-    largest_um: float = key("largest correction, x or y", of="largest_mm", times=MICROMETRES)
-    rms_um: float = key("of all corrections", of="rms_mm", times=MICROMETRES)
+    last_change_um: float = key("of the last correction", of="last_change_mm", times=UM)
+    largest_um: float = key("largest correction, x or y", of="largest_mm", times=UM)
+    rms_um: float = key("of all corrections", of="rms_mm", times=UM)
     left: int = key("readings left uncorrected: nothing in front of the lens")
 
 
@@ -150,7 +137,7 @@ def _fit(fit):
         parameters=list(found.parameters),
         values=list(found.parameters.values()),
         sds=list(found.parameter_sds.values()),
-        largest_um=MICROMETRES * float(np.abs(fit.residual_mm).max()),
+        largest_um=UM * float(np.abs(fit.residual_mm).max()),
         marks=[
             MarkFit(mark, int(count), *mean, *_um(sd), *place, *_um(residual))
             for mark, count, mean, sd, place, residual in zip(
@@ -177,7 +164,7 @@ def _rejected(cls, one):
 
 
 def _um(values_mm):
-    return [MICROMETRES * float(value) for value in values_mm]
+    return [UM * float(value) for value in values_mm]
 
 
 def _pair(name, values_mm):

@@ -1,7 +1,6 @@
 """The whole record: its keys, and how it is made of a result."""
 
 import platform
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -11,53 +10,15 @@ from tankcal.job.model import InputFile
 from tankcal.job.model.parts import Course, Deadwood
 from tankcal.job.model.settings import Datum, Material, Survey, Switches, TableSpec, Tank
 from tankcal.pipeline.corrections import Correction
+from tankcal.record import parts, rules, statements, survey, table, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
-from tankcal.record.parts import Detail, bottom_of, roof_of, solid_of
 from tankcal.record.plain_data import to_plain
-from tankcal.record.rules import TableJudged, rule_of
-from tankcal.record.schema import filled_from, key
-from tankcal.record.statements import (
-    BudgetLine,
-    MonteCarlo,
-    StatedBudget,
-    budget_of,
-    budgets_of,
-    monte_carlo_of,
-)
-from tankcal.record.survey import (
-    CourseOfShell,
-    RejectedPoint,
-    SectionCircle,
-    SurveyedPoint,
-    Wall,
-    courses_of,
-    points_of,
-    points_of_adjustment,
-    rejected_of,
-    sections_of,
-    shell_of,
-)
-from tankcal.record.table import (
-    CapacityTable,
-    Choice,
-    GrossShell,
-    InterpolationError,
-    PartsOfRows,
-    VolumesOfDensity,
-    adjustment_choices,
-    capacity_of,
-    choices_of,
-    densities_of,
-    gross_of,
-    proportional_parts_of,
-)
-from tankcal.record.texts import WarningRecord, warnings_of
+from tankcal.record.schema import Saved, filled_from, key
 from tankcal.record.versions import FORMAT
 from tankcal.tank.deliveries import WorstDeliveries
 
 
-@dataclass(frozen=True)
-class Versions:
+class Versions(Saved):
     """Of the programs that computed."""
 
     python: str = key("such as 3.11.7")
@@ -65,8 +26,7 @@ class Versions:
     scipy: str = key("such as 1.17.1")
 
 
-@dataclass(frozen=True)
-class JobAsRead:
+class JobAsRead(Saved):
     """The job as read, in SI; null is what a job that was only adjusted did not give of a tank."""
 
     tank: Tank | None = key("kind, nominal sizes, details")
@@ -80,8 +40,7 @@ class JobAsRead:
     source: str = key("name of the folder or workbook")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Record:
+class Record(Saved, kw_only=True):
     """All that workbook and report need."""
 
     format: str = key("see Versions", default=FORMAT)
@@ -89,31 +48,29 @@ class Record:
     versions: Versions = key("of python, numpy, scipy")
     files: list[InputFile] = key("everything that the job was read from")
     job: JobAsRead = key("the job as read, in SI")
-    shell: Wall | None = key("the wall as one body", default=None)
-    points: list[SurveyedPoint] = key("of an adjusted survey every adjusted point first")
-    rejected: list[RejectedPoint] = key("points that are not on the wall", default=())
-    sections: list[SectionCircle] = key("from the bottom up", default=())
-    courses: list[CourseOfShell] = key("from the bottom up", default=())
-    capacity: CapacityTable | None = key("the table", default=None)
-    interpolation: InterpolationError | None = key(
-        "error of interpolating between rows", default=None
-    )
-    proportional_parts: PartsOfRows | None = key("millimetres of a centimetre table", default=None)
-    densities: list[VolumesOfDensity] = key("further densities of the liquid", default=())
-    gross: GrossShell | None = key("null for a tank without courses", default=None)
+    shell: survey.Wall | None = key("the wall as one body", default=None)
+    points: list[survey.SurveyedPoint] = key("of an adjusted survey every adjusted point first")
+    rejected: list[survey.RejectedPoint] = key("points that are not on the wall", default=())
+    sections: list[survey.SectionCircle] = key("from the bottom up", default=())
+    courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
+    capacity: table.CapacityTable | None = key("the table", default=None)
+    interpolation: table.InterpolationError | None = key("between rows", default=None)
+    proportional_parts: table.PartsOfRows | None = key("of millimetres", default=None)
+    densities: list[table.VolumesOfDensity] = key("further densities of the liquid", default=())
+    gross: table.GrossShell | None = key("null for a tank without courses", default=None)
     corrections: list[Correction] = key("that bear on the job, in their order", default=())
-    solid: list[Detail] | None = key("sizes of a tank without courses", default=None)
-    bottom: list[Detail] | None = key("how it was taken; null: it is flat", default=None)
+    solid: list[parts.Detail] | None = key("sizes of a tank without courses", default=None)
+    bottom: list[parts.Detail] | None = key("how it was taken; null: it is flat", default=None)
     deadwood: list[Deadwood] = key("as declared, whether or not it is on", default=())
-    roof: list[Detail] | None = key("the floating roof", default=None)
-    budget: list[BudgetLine] = key("of the top row, by the table alone", default=())
-    choices: list[Choice] = key("everything that was assumed")
-    warnings: list[WarningRecord] = key("what should be read")
-    adjustment: AdjustmentRecord | None = key("null: the points were handed in", default=None)
-    budgets: list[StatedBudget] = key("stated volumes, then deliveries", default=())
+    roof: list[parts.Detail] | None = key("the floating roof", default=None)
+    budget: list[statements.BudgetLine] = key("of the top row, by the table alone", default=())
+    choices: list[table.Choice] = key("everything that was assumed")
+    warnings: list[texts.WarningRecord] = key("what should be read")
+    adjustment: AdjustmentRecord | None = key("null: points were handed in", default=None)
+    budgets: list[statements.StatedBudget] = key("stated volumes, then deliveries", default=())
     deliveries: list[WorstDeliveries] = key("the worst of each minimum height", default=())
-    rule: TableJudged | None = key("null: the job has no decision rule", default=None)
-    monte_carlo: MonteCarlo | None = key("null: it is off", default=None)
+    rule: rules.TableJudged | None = key("null: the job has no decision rule", default=None)
+    monte_carlo: statements.MonteCarlo | None = key("null: it is off", default=None)
 
 
 _HEAD = ("format", "tankcal", "versions", "files", "job")
@@ -126,29 +83,29 @@ def record_of(result):
     return to_plain(
         Record(
             **_beginning(job),
-            shell=shell_of(result),
-            points=points_of(result),
-            rejected=rejected_of(result),
-            sections=sections_of(result),
-            courses=courses_of(result),
-            capacity=capacity_of(result),
-            interpolation=filled_from(InterpolationError, result.straightness),
-            proportional_parts=proportional_parts_of(result),
-            densities=densities_of(result),
-            gross=gross_of(result),
+            shell=survey.shell_of(result),
+            points=survey.points_of(result),
+            rejected=survey.rejected_of(result),
+            sections=survey.sections_of(result),
+            courses=survey.courses_of(result),
+            capacity=table.capacity_of(result),
+            interpolation=filled_from(table.InterpolationError, result.straightness),
+            proportional_parts=table.proportional_parts_of(result),
+            densities=table.densities_of(result),
+            gross=table.gross_of(result),
             corrections=result.corrections,
-            solid=solid_of(result),
-            bottom=bottom_of(result),
+            solid=parts.solid_of(result),
+            bottom=parts.bottom_of(result),
             deadwood=job.deadwood,
-            roof=roof_of(result),
-            budget=budget_of(result),
-            choices=choices_of(result),
-            warnings=warnings_of(result.warnings),
+            roof=parts.roof_of(result),
+            budget=statements.budget_of(result),
+            choices=table.choices_of(result),
+            warnings=texts.warnings_of(result.warnings),
             adjustment=adjustment and adjustment_of(adjustment, job.measurements),
-            budgets=budgets_of(result),
+            budgets=statements.budgets_of(result),
             deliveries=result.stated.worst,
-            rule=rule_of(result.rule),
-            monte_carlo=monte_carlo_of(result),
+            rule=rules.rule_of(result.rule),
+            monte_carlo=statements.monte_carlo_of(result),
         )
     )
 
@@ -159,9 +116,9 @@ def record_of_adjustment(job, adjustment):
     found = to_plain(
         Record(
             **_beginning(job),
-            points=points_of_adjustment(adjustment),
-            choices=adjustment_choices(adjustment, measurements),
-            warnings=warnings_of(dict.fromkeys((*job.warnings, *adjustment.warnings))),
+            points=survey.points_of_adjustment(adjustment),
+            choices=table.adjustment_choices(adjustment, measurements),
+            warnings=texts.warnings_of(dict.fromkeys((*job.warnings, *adjustment.warnings))),
             adjustment=adjustment_of(adjustment, measurements),
         )
     )

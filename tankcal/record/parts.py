@@ -1,13 +1,11 @@
 """The part of the record that says what the tank is beside its shell."""
 
-from dataclasses import dataclass
 from math import degrees
 
-from tankcal.record.schema import key
+from tankcal.record.schema import Saved, key
 
 
-@dataclass(frozen=True)
-class Detail:
+class Detail(Saved):
     """What a part is made of."""
 
     code: str = key("what it is")

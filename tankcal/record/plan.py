@@ -1,6 +1,6 @@
 """A prediction as it is saved: plan.json."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,12 +8,11 @@ from tankcal.planning.doubtful import GroupReliability
 from tankcal.planning.prediction import PointOutlook, SectionOutlook
 from tankcal.record.plain_data import to_plain
 from tankcal.record.plan_versions import PLAN
-from tankcal.record.schema import filled_from, key
+from tankcal.record.schema import Saved, filled_from, key
 from tankcal.record.texts import WarningRecord, warnings_of
 
 
-@dataclass(frozen=True)
-class PlannedDatum:
+class PlannedDatum(Saved):
     """What holds the frame."""
 
     choice: str = key("as asked for")
@@ -24,8 +23,7 @@ class PlannedDatum:
     scale: bool = key("whether observations determine the scale")
 
 
-@dataclass(frozen=True)
-class PlannedSurvey:
+class PlannedSurvey(Saved):
     """How large the survey is."""
 
     photo_stations: int = key("number")
@@ -40,8 +38,7 @@ class PlannedSurvey:
     datum: PlannedDatum = key("what holds the frame")
 
 
-@dataclass(frozen=True)
-class PlanLimit:
+class PlanLimit(Saved):
     """The limit that the plan is to keep."""
 
     relative_u: float | None = key("U over volume; null: no limit")
@@ -50,8 +47,7 @@ class PlanLimit:
     met: bool | None = key("whether it is kept")
 
 
-@dataclass(frozen=True)
-class PlannedTable:
+class PlannedTable(Saved):
     """The capacity table with its uncertainty."""
 
     height_m: list[float] = key("dips")
@@ -61,16 +57,14 @@ class PlannedTable:
     U_m3: list[float] = key("expanded uncertainty")
 
 
-@dataclass(frozen=True)
-class PlannedSource:
+class PlannedSource(Saved):
     """What an input contributes."""
 
     input: str = key("kind of input")
     u_top_m3: float = key("to the top row")
 
 
-@dataclass(frozen=True)
-class PlannedDelivery:
+class PlannedDelivery(Saved):
     """The worst delivery of a minimum height, by U over its volume."""
 
     minimum_m: float = key("least height")
@@ -84,8 +78,7 @@ class PlannedDelivery:
     relative: float = key("U over volume", of="relative.relative")
 
 
-@dataclass(frozen=True)
-class PlannedPrecision:
+class PlannedPrecision(Saved):
     """Precision of all points together."""
 
     mean_sd_m: float = key("sqrt(trace / 3n)")
@@ -94,8 +87,7 @@ class PlannedPrecision:
     proportional: float = key("precision is 1 : this")
 
 
-@dataclass(frozen=True)
-class SimulatedPlan:
+class SimulatedPlan(Saved):
     """What many simulated surveys of the plan gave."""
 
     seed: int = key("of the draws")
@@ -109,16 +101,14 @@ class SimulatedPlan:
     volumes_m3: list[float] = key("of the full tank, of each run")
 
 
-@dataclass(frozen=True)
-class Fingerprint:
+class Fingerprint(Saved):
     """A file of the empty job, by which a filled one is told from it."""
 
     file: str = key("name")
     sha256: str = key("of its bytes")
 
 
-@dataclass(frozen=True, kw_only=True)
-class PlanFile:
+class PlanFile(Saved, kw_only=True):
     """What a survey would give, before it is made."""
 
     format: str = key("see Versions", default=PLAN.format)

@@ -1,12 +1,9 @@
 """The part of the record that says what the decision rule says of the table."""
 
-from dataclasses import dataclass
-
-from tankcal.record.schema import filled_from, key
+from tankcal.record.schema import Saved, filled_from, key
 
 
-@dataclass(frozen=True)
-class RuleOfTable:
+class RuleOfTable(Saved):
     """The decision rule."""
 
     name: str = key("as shipped or written")
@@ -16,8 +13,7 @@ class RuleOfTable:
     largest_capacity_m3: float | None = key("tanks up to which it is for; null: all")
 
 
-@dataclass(frozen=True)
-class UncertaintyJudged:
+class UncertaintyJudged(Saved):
     """A limit of the expanded uncertainty U, and what became of it."""
 
     name: str = key("of the limit", of="limit.name")
@@ -38,8 +34,7 @@ class UncertaintyJudged:
     worst_ratio: float | None = key("U over what it is relative to; null: also infinite")
 
 
-@dataclass(frozen=True)
-class DeviationJudged:
+class DeviationJudged(Saved):
     """A limit of the deviation from a stated volume, and what became of it."""
 
     name: str = key("of the limit", of="limit.name")
@@ -67,8 +62,7 @@ class DeviationJudged:
     probability: float = key("of conformity")
 
 
-@dataclass(frozen=True)
-class TableJudged:
+class TableJudged(Saved):
     """The verdict of the job's decision rule on the table."""
 
     rule: RuleOfTable = key("the rule")

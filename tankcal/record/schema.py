@@ -12,7 +12,7 @@ from inspect import getdoc
 from itertools import islice
 from math import isfinite
 from operator import attrgetter
-from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Union, dataclass_transform, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -34,6 +34,14 @@ class Columns:
     """Marks a dict of columns, {key: values}, whose keys are the fields of a dataclass."""
 
     of: type
+
+
+@dataclass_transform(frozen_default=True)
+class Saved:
+    """An object of what is saved: each class below it is a frozen dataclass."""
+
+    def __init_subclass__(cls, kw_only=False):
+        dataclass(frozen=True, kw_only=kw_only)(cls)
 
 
 def key(doc, *, of=None, times=None, named=None, optional=False, **options):

@@ -1,15 +1,14 @@
 """The part of the record that says what is stated: budgets, deliveries, rule, Monte Carlo."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from tankcal.gum.volume_budgets import budget
-from tankcal.record.schema import Finite, filled_from, key
+from tankcal.record.schema import Finite, Saved, filled_from, key
 
 
-@dataclass(frozen=True)
-class BudgetLine:
+class BudgetLine(Saved):
     """What an input contributes to the uncertainty of a volume; null: it does not have that."""
 
     input: str = key("name", of="name")
@@ -30,8 +29,7 @@ class BudgetLine:
     note: str = key("as declared")
 
 
-@dataclass(frozen=True)
-class VolumeJudged:
+class VolumeJudged(Saved):
     """The comparison of the intervals of one volume, GUM and Monte Carlo."""
 
     d_low: float = key("distance of the lower ends, m3")
@@ -43,8 +41,7 @@ class VolumeJudged:
     high: float = key("interval that counts, m3")
 
 
-@dataclass(frozen=True)
-class StatedBudget:
+class StatedBudget(Saved):
     """A volume or a delivery that the report states, with its budget and its interval."""
 
     low_m: float | None = key("lower dip of a delivery; null: the volume below high_m")
@@ -66,16 +63,14 @@ class StatedBudget:
     lines: list[BudgetLine] = key("of its budget")
 
 
-@dataclass(frozen=True)
-class DipColumns:
+class DipColumns(Saved):
     """Dips of deliveries."""
 
     low_m: list[float] = key("lower dips")
     high_m: list[float] = key("upper dips")
 
 
-@dataclass(frozen=True)
-class SimulatedVolumes:
+class SimulatedVolumes(Saved):
     """Monte Carlo by volume, m3: estimates, their standard errors, the comparison with the GUM."""
 
     value: list[float] = key("mean")
@@ -100,20 +95,17 @@ class SimulatedVolumes:
     sure: list[bool] = key("whether two standard errors would not change that")
 
 
-@dataclass(frozen=True)
 class SimulatedRows(SimulatedVolumes):
     """Monte Carlo of the rows."""
 
     bent: list[bool] = key("whether the tank's own volumes were drawn, not a parabola")
 
 
-@dataclass(frozen=True)
 class SimulatedDeliveries(SimulatedVolumes, DipColumns):
     """Monte Carlo of the deliveries."""
 
 
-@dataclass(frozen=True)
-class MonteCarlo:
+class MonteCarlo(Saved):
     """The simulation of every row, and whether the GUM interval stands."""
 
     seed: int = key("of all draws")

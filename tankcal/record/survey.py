@@ -1,16 +1,15 @@
 """The part of the record that says what was measured: wall, points, sections, courses."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
-from tankcal.record.schema import filled_from, key
+from tankcal.record.schema import Saved, filled_from, key
 from tankcal.tank.courses import FORM_GRID
 
 
-@dataclass(frozen=True)
-class Wall:
+class Wall(Saved):
     """The wall as one body."""
 
     x_m: float = key("a point of the axis, at half height")
@@ -29,8 +28,7 @@ class Wall:
     height_m: float = key("of the shell, along the vertical")
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(Saved):
     """A point and its coordinates."""
 
     point: str = key("name")
@@ -39,7 +37,6 @@ class Place:
     z_m: float = key("in the survey's frame")
 
 
-@dataclass(frozen=True)
 class SurveyedPoint(Place):
     """A surveyed point; of an adjusted survey the target itself, with its covariance."""
 
@@ -51,7 +48,6 @@ class SurveyedPoint(Place):
     used: bool = key("whether the wall was taken from it")
 
 
-@dataclass(frozen=True)
 class RejectedPoint(Place):
     """A point that is not on the wall."""
 
@@ -61,16 +57,14 @@ class RejectedPoint(Place):
     row: int | None = key("of the file")
 
 
-@dataclass(frozen=True)
-class SectionOutline:
+class SectionOutline(Saved):
     """The irregular section r(theta) about the circle's centre."""
 
     azimuth_deg: list[float] = key("each degree")
     radius_m: list[float] = key("there")
 
 
-@dataclass(frozen=True)
-class FormMode:
+class FormMode(Saved):
     """A harmonic of the section's form."""
 
     k: int = key("waves around")
@@ -78,8 +72,7 @@ class FormMode:
     azimuth_deg: float = key("of its first crest")
 
 
-@dataclass(frozen=True)
-class SectionCircle:
+class SectionCircle(Saved):
     """A horizontal section of the surface as surveyed (outside for an outside survey)."""
 
     section: str = key("name", of="group.name")
@@ -103,8 +96,7 @@ class SectionCircle:
     modes: list[FormMode] = key("of its form, from k = 2 on")
 
 
-@dataclass(frozen=True)
-class CourseOfShell:
+class CourseOfShell(Saved):
     """A course: those of the shell, without head, bottom, deadwood or roof."""
 
     course: str = key("name", of="name")

@@ -1,12 +1,10 @@
 """The part of the record that says what follows: the table, its densities, choices."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from tankcal.adjust import CRITICAL
 from tankcal.pipeline.chain import PARTS
-from tankcal.record.schema import Finite, filled_from, key
+from tankcal.record.schema import Finite, Saved, filled_from, key
 from tankcal.record.statements import intervals_of
 from tankcal.tank.dips import ProportionalParts, dip_label
 
@@ -18,8 +16,7 @@ SIGHTS = {  # of a total station, a theodolite or a level: a tape beside photogr
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class CapacityTable:
+class CapacityTable(Saved):
     """The capacity table and its covariance: factor_m3 times its transpose."""
 
     zero: str = key("what heights count from, a code")
@@ -42,16 +39,14 @@ class CapacityTable:
     factor_m3: list[list[Finite]] = key("rows x inputs")
 
 
-@dataclass(frozen=True)
-class InterpolationError:
+class InterpolationError(Saved):
     """The largest error of linear interpolation between two rows."""
 
     largest_m3: float = key("of a volume")
     at_m: float = key("dip where it is")
 
 
-@dataclass(frozen=True)
-class PartsOfRows:
+class PartsOfRows(Saved):
     """What 1 to 9 millimetres add to a row of a centimetre table."""
 
     parts: int = key("of a row")
@@ -59,24 +54,21 @@ class PartsOfRows:
     largest_m3: float | None = key("largest error, at least the last place that is printed")
 
 
-@dataclass(frozen=True)
-class VolumesOfDensity:
+class VolumesOfDensity(Saved):
     """The volumes of the same rows for a further density of the liquid."""
 
     density_kg_m3: float = key("of the liquid")
     volume_m3: list[Finite] = key("of each row")
 
 
-@dataclass(frozen=True)
-class GrossShell:
+class GrossShell(Saved):
     """The shell as surveyed, without any correction, over its full height."""
 
     volume_m3: float = key("of the shell")
     area_m2: float = key("mean")
 
 
-@dataclass(frozen=True)
-class Choice:
+class Choice(Saved):
     """Something that was assumed; the sentence is the template's, in its language."""
 
     code: str = key("see below")

@@ -1,13 +1,10 @@
 """Texts with the code and the values that say them in another language, and problems."""
 
-from dataclasses import dataclass
-
 from tankcal.messages import as_plain
-from tankcal.record.schema import filled_from, key
+from tankcal.record.schema import Saved, filled_from, key
 
 
-@dataclass(frozen=True)
-class Text:
+class Text(Saved):
     """A text in English, with its code and the values in it."""
 
     text: str = key("in English")
@@ -15,8 +12,7 @@ class Text:
     values: dict = key("numbers, texts, lists of these, and texts within the text")
 
 
-@dataclass(frozen=True)
-class WarningRecord:
+class WarningRecord(Saved):
     """What did not stop the job but should be read."""
 
     file: str = key("name")
