@@ -5,6 +5,7 @@ A form may hold them in place of the English ones. The first word is the one tha
 
 import unicodedata
 
+NOTES = {}  # {English note of a key or column: (group, name)}; the contract of the job fills it
 YES, NO = "true", "false"
 FORM_WORDS = {
     "pt-BR": {

@@ -3,10 +3,9 @@
 from numbers import Integral, Number
 
 from tankcal.errors import SHEET
-from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
 from tankcal.messages import as_plain, filled
 from tankcal.text.digits import NOTHING, Marks, fixed, shortest
-from tankcal.text.form_words import word_of
+from tankcal.text.form_words import NOTES, word_of
 from tankcal.text.languages import DEFAULT
 from tankcal.text.word_files import load_words as load_words  # the door to words of every kind
 
@@ -160,13 +159,10 @@ def _named(words, key, value):
 def _notes(words):
     """{English note of a key or column of a job: the same in this language}."""
     translated = words.get("input", {}).get("notes", {})
-    of_fields = {"keys": KEYS, "columns": COLUMNS, "entries": REGISTER_KEYS}
     return {
-        field.note: translated[group][f"{owner}.{field.name}"]
-        for group, owners in of_fields.items()
-        for owner, fields in owners.items()
-        for field in fields
-        if f"{owner}.{field.name}" in translated.get(group, ())
+        note: translated[group][key]
+        for note, (group, key) in NOTES.items()
+        if key in translated.get(group, ())
     }
 
 

@@ -11,6 +11,7 @@ from tankcal.job.contract.observations import COLUMNS as SURVEY_COLUMNS
 from tankcal.job.contract.observations import SURVEYS
 from tankcal.job.contract.parts import KEYS as PART_KEYS
 from tankcal.job.contract.registers import OF_PHOTOS, REGISTER_KEYS, REGISTERS_OF_SURVEY
+from tankcal.text.form_words import NOTES
 
 SECTIONS = (
     *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "bottom", "roof"),
@@ -28,6 +29,10 @@ TABLES_OF_KIND = {
     "sphere": ("points", "deadwood", *_OF_ALL),
     "mesh": ("deadwood", *_OF_ALL),
 }
+
+for _group, _owners in {"keys": KEYS, "columns": COLUMNS, "entries": REGISTER_KEYS}.items():
+    for _owner, _fields in _owners.items():  # so that a message says a note in its language
+        NOTES.update({field.note: (_group, f"{_owner}.{field.name}") for field in _fields})
 
 OPEN_SECTIONS = ("certificate",)  # hold text fields of the user's own, too
 
