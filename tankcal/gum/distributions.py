@@ -1,6 +1,6 @@
 """The named distributions of an input of a measurement, all of them symmetric about their mean.
 
-Each has `mean`, `sd`, `u`, `dof`, `quantile(p)` and `characteristic(t)`; make one from what a
+Each has `name`, `mean`, `sd`, `u`, `dof`, `quantile(p)` and `characteristic(t)`; make one of what a
 certificate says with `standard`, `within` or `expanded`.
 
     u    what the law of propagation uses, with the degrees of freedom `dof` (JCGM 100:2008 G.4)
@@ -30,7 +30,7 @@ from scipy.special import (
     stdtrit,
 )
 
-from tankcal.uncertainty import coverage_factor
+from tankcal.uncertainty import Input, coverage_factor
 
 
 @dataclass(frozen=True)
@@ -88,6 +88,8 @@ class Distribution:
 class Normal(Distribution):
     """Gaussian with standard deviation sd (JCGM 101 6.4.7)."""
 
+    name = "normal"
+
     sd: float
 
     @property
@@ -107,6 +109,8 @@ class StudentT(Distribution):
 
     by_sd  declared by its standard deviation: that is u then, and dof is the shape alone
     """
+
+    name = "t"
 
     scale: float
     by_sd: bool = field(default=False, kw_only=True)
@@ -160,6 +164,8 @@ class UnsureNormal(Distribution):
     by Gauss quadrature in the cube root of its probability, dense where it is small and v large.
     Source: JCGM 101:2008 6.4.9 for the t that it becomes.
     """
+
+    name = "normal"
 
     scale: float
     contrasts: float
@@ -229,6 +235,8 @@ class _Bounded(Distribution):
 class Rectangular(_Bounded):
     """Anywhere within mean +- half_width, equally likely (JCGM 101 6.4.2): sd = a/sqrt(3)."""
 
+    name = "rectangular"
+
     squared_ratio = 3.0
 
     def _distance(self, tail):
@@ -242,6 +250,8 @@ class Rectangular(_Bounded):
 class Triangular(_Bounded):
     """Within mean +- half_width, most likely the mean (JCGM 101 6.4.5): sd = a/sqrt(6)."""
 
+    name = "triangular"
+
     squared_ratio = 6.0
 
     def _distance(self, tail):
@@ -254,6 +264,8 @@ class Triangular(_Bounded):
 @dataclass(frozen=True)
 class UShaped(_Bounded):
     """Arc sine: a sine of unknown phase, mean +- half_width (JCGM 101 6.4.6): sd = a/sqrt(2)."""
+
+    name = "u-shaped"
 
     squared_ratio = 2.0
 
@@ -271,6 +283,8 @@ class CurvilinearTrapezoid(Distribution):
     middle_half_width  w, (b - a)/2 there; inexactness  d, above 0 and below w
     sd = sqrt(w^2/3 + d^2/9);  density ln((w + d)/max(|x|, w - d))/(4 d) within |x| < w + d
     """
+
+    name = "curvilinear trapezoid"
 
     middle_half_width: float
     inexactness: float
@@ -319,12 +333,6 @@ class CurvilinearTrapezoid(Distribution):
 NODES = 40  # of chi-square, in `UnsureNormal`
 FAMILIES = {"rectangular": Rectangular, "triangular": Triangular, "u-shaped": UShaped}
 NAMES = ("normal", *FAMILIES, "t", "curvilinear trapezoid")
-
-
-def name_of(distribution):
-    """The name of a distribution, one of NAMES."""
-    kinds = (Normal, *FAMILIES.values(), StudentT, CurvilinearTrapezoid)
-    return NAMES[kinds.index(type(distribution))]
 
 
 def standard(u, name="normal", *, dof=np.inf, mean=0.0, u_is="scale"):
@@ -384,6 +392,18 @@ def expanded(U, *, k=None, probability=None, dof=np.inf, mean=0.0):
     if not 0 < k < np.inf:
         raise ValueError(f"coverage factor {k}: expected above 0")
     return standard(U / k, dof=dof, mean=mean)
+
+
+def vector(name, estimates, u, unit="", *, dof=np.inf, type="A", note=""):
+    """Inputs "name 1", "name 2", ... of one family: coordinates of points, say.
+
+    estimates, u  (p,) in `unit`, normal, or t when dof is finite
+    """
+    pairs = enumerate(zip(estimates, u, strict=True), 1)
+    return [
+        Input(f"{name} {i}", standard(s, dof=dof, mean=x), unit, type, family=name, note=note)
+        for i, (x, s) in pairs
+    ]
 
 
 def _bessel_of_large_order(order, x):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.gum.distributions import name_of, within
+from tankcal.gum.distributions import within
 from tankcal.job.checks import spreads, standard_u, useless_inputs
 from tankcal.job.contract import INPUTS
 from tankcal.job.model import DeclaredInput, StatedVolume
@@ -59,9 +59,7 @@ def _assumed(values, tables, declared):
     for name, known in INPUTS.items():
         if known.assumption and name not in declared and name not in useless:
             assumed = within(known.assumed_half_width(own_values.get(name)))
-            yield _input(
-                name, assumed.u, known.unit, distribution=name_of(assumed), is_default=True
-            )
+            yield _input(name, assumed.u, known.unit, distribution=assumed.name, is_default=True)
 
 
 def _input(name, u, unit, **more):

@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 
 from tankcal.errors import HeightError, InputError, Problem, SolutionError
-from tankcal.gum.volume_budgets import Budget, budget, reading_sources
 from tankcal.job import Job
 from tankcal.job.tables import in_book
 from tankcal.messages import message
@@ -36,6 +35,7 @@ from tankcal.pipeline.wall import Wall, find_wall, s_transform
 from tankcal.survey import Adjustment, adjust_survey, wall_points
 from tankcal.tank import dips
 from tankcal.tank.body import Body
+from tankcal.tank.budgets import Budget, budget, reading_sources
 from tankcal.tank.capacity import Capacity, Quantity
 from tankcal.tank.dips import Dips, ProportionalParts, Straightness, proportional_parts
 from tankcal.tank.falling_capacity import refuse_falling

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import InputError, Problem
-from tankcal.gum.volume_budgets import Budget, budget, reading_sources
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
+from tankcal.tank.budgets import Budget, budget, reading_sources
 from tankcal.tank.capacity import SAME_M
 from tankcal.tank.deliveries import WorstDeliveries, worst_deliveries
 from tankcal.tank.rules import Printed, StatedVolume, deliveries_judged, judge

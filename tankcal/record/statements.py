@@ -4,8 +4,8 @@ from dataclasses import fields
 
 import numpy as np
 
-from tankcal.gum.volume_budgets import budget
 from tankcal.record.schema import Finite, Saved, filled_from, key
+from tankcal.tank.budgets import budget
 
 
 class BudgetLine(Saved):

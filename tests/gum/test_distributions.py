@@ -7,7 +7,6 @@ import pytest
 from scipy import stats
 from scipy.integrate import quad
 
-from tankcal.gum import Input, Inputs, propagate
 from tankcal.gum.distributions import (
     FAMILIES,
     CurvilinearTrapezoid,
@@ -18,11 +17,11 @@ from tankcal.gum.distributions import (
     UnsureNormal,
     UShaped,
     expanded,
-    name_of,
     standard,
     within,
 )
 from tankcal.gum.monte_carlo import Goal, simulate
+from tankcal.uncertainty import Input, Inputs, propagate
 
 P = np.array([1e-12, 1e-6, 0.025, 0.3, 0.5, 0.501, 0.7, 0.975, 1 - 1e-6])
 ALL = [
@@ -35,7 +34,7 @@ ALL = [
     CurvilinearTrapezoid(0.7, 0.07, mean=3.0),
     CurvilinearTrapezoid(0.7, 0.69, mean=3.0),
 ]
-named = pytest.mark.parametrize("one", ALL, ids=lambda one: f"{name_of(one)}-{one.dof:g}")
+named = pytest.mark.parametrize("one", ALL, ids=lambda one: f"{one.name}-{one.dof:g}")
 OTHER_PROGRAM = {
     Normal: lambda one: stats.norm(3.0, 0.7),
     StudentT: lambda one: stats.t(one.dof, 3.0, 0.7),
@@ -45,7 +44,7 @@ OTHER_PROGRAM = {
 }
 
 
-@pytest.mark.parametrize("one", ALL[:6], ids=lambda one: f"{name_of(one)}-{one.dof:g}")
+@pytest.mark.parametrize("one", ALL[:6], ids=lambda one: f"{one.name}-{one.dof:g}")
 def test_quantiles_and_sd_are_those_of_scipy(one):
     """Truth: another program, on the lower half, where its quantiles keep their digits."""
     other = OTHER_PROGRAM[type(one)](one)
@@ -139,7 +138,7 @@ def test_standard_uncertainties_of_half_widths():
 def test_a_standard_uncertainty_is_kept(name):
     one = standard(0.2, name, mean=7.0)
     assert (one.u, one.sd, one.mean) == pytest.approx((0.2, 0.2, 7.0))
-    assert name_of(one) == name
+    assert one.name == name
 
 
 def test_a_normal_whose_u_was_estimated_is_a_t():

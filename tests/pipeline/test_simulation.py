@@ -12,11 +12,11 @@ import tankcal
 from tankcal.gum import Combination
 from tankcal.gum.distributions import standard
 from tankcal.gum.monte_carlo import Goal
-from tankcal.gum.volume_budgets import budget
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.simulation import simulate_table
 from tankcal.pipeline.simulation.curvature import VARIED, curvature, varied
 from tankcal.pipeline.tanks import body_of
+from tankcal.tank.budgets import budget
 from tankcal.uncertainty import declared_source
 
 Z = ndtri(0.975)

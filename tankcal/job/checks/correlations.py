@@ -1,8 +1,8 @@
 """correlations.csv: pairs of declared inputs, each once, and all of them possible together."""
 
-from tankcal.gum import Input, Inputs
 from tankcal.gum.distributions import Normal
 from tankcal.messages import message
+from tankcal.uncertainty import Input, Inputs
 
 
 def check_correlations(table, inputs, raw, log):

@@ -4,7 +4,7 @@
 
 Nothing of rows x rows is formed unless `covariance` is asked for.
 
-Degrees of freedom: inputs that are correlated are one component (`uncertainty.together_dof`).
+Inputs that are correlated are one `Source`, and one component of u (`components.together_dof`).
 """
 
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
-from tankcal.gum.inputs import Inputs
-from tankcal.gum.sensitivities import check_sensitivities, outputs_of, sensitivities_of
-from tankcal.uncertainty import Combined, together_dof
+from tankcal.uncertainty.components import Source, combined, together_dof
+from tankcal.uncertainty.inputs import Inputs
+from tankcal.uncertainty.sensitivities import check_sensitivities, outputs_of, sensitivities_of
 
 
 @dataclass(frozen=True)
@@ -31,16 +31,28 @@ class Propagation:
     sensitivities: np.ndarray
 
     @cached_property
+    def sources(self):
+        """One `Source` for each group of correlated inputs, with the columns J L of the group."""
+        names = self.inputs.names
+        return tuple(
+            Source(
+                " & ".join(names[i] for i in group),
+                self.sensitivities[:, group] @ block,
+                together_dof(self.inputs.dof[group]),
+            )
+            for group, block in zip(self.inputs.groups, self.inputs.blocks, strict=True)
+        )
+
+    @cached_property
     def combination(self):
-        """`uncertainty.Combined` of the outputs; each group of correlated inputs is a component."""
-        groups = self.inputs.groups
-        dof = np.array([together_dof(self.inputs.dof[group]) for group in groups])
-        return Combined(self._group_variances, dof)
+        """`Combined` of the sources."""
+        return combined(self.sources, len(self.values))
 
     @property
     def factor(self):
         """(rows, c) J L: the covariance of the outputs is factor factor'."""
-        return np.hstack([np.empty((len(self.values), 0)), *self._columns()])
+        columns = [source.columns_m3 for source in self.sources]
+        return np.hstack([np.empty((len(self.values), 0)), *columns])
 
     @property
     def u(self):
@@ -79,8 +91,11 @@ class Propagation:
         c_i u_i sum_j r_ij c_j u_j / u^2: they add up to 1, and can be negative where inputs are
         correlated; 0 in a row without uncertainty.
         """
-        parts = self._parts()
-        variance = np.sum(self._group_variances, axis=1, keepdims=True)
+        parts = np.empty_like(self.sensitivities)
+        of_groups = zip(self.inputs.groups, self.inputs.blocks, self.sources, strict=True)
+        for group, block, source in of_groups:
+            parts[:, group] = self.sensitivities[:, group] * (source.columns_m3 @ block.T)
+        variance = np.sum(self.combination.variances, axis=1, keepdims=True)
         return np.divide(parts, variance, out=np.zeros_like(parts), where=variance > 0)
 
     def combined(self, weights):
@@ -100,30 +115,6 @@ class Propagation:
         of_line = [one.line == name for one in self.inputs.inputs]
         by_input = np.where(of_line, factor, 1.0)
         return Propagation(self.inputs, self.values, self.sensitivities * by_input)
-
-    def _columns(self):
-        pairs = zip(self.inputs.groups, self.inputs.blocks, strict=True)
-        return [self.sensitivities[:, group] @ block for group, block in pairs]
-
-    @cached_property
-    def _group_variances(self):
-        """(rows, groups) variance that each group of correlated inputs brings."""
-        alone = [len(group) == 1 for group in self.inputs.groups]
-        found = np.empty((len(self.values), len(alone)))
-        single = [group[0] for group in self.inputs.groups if len(group) == 1]
-        found[:, alone] = (self.sensitivities[:, single] * self.inputs.u[single]) ** 2
-        for i in np.flatnonzero(~np.array(alone)):
-            columns = self.sensitivities[:, self.inputs.groups[i]] @ self.inputs.blocks[i]
-            found[:, i] = np.einsum("ij,ij->i", columns, columns)
-        return found
-
-    def _parts(self):
-        """(rows, n) c_i u_i sum_j r_ij c_j u_j."""
-        parts = np.empty_like(self.sensitivities)
-        columns = zip(self.inputs.groups, self.inputs.blocks, self._columns(), strict=True)
-        for group, block, own in columns:
-            parts[:, group] = self.sensitivities[:, group] * (own @ block.T)
-        return parts
 
 
 def propagate(model, inputs, sensitivities=None):

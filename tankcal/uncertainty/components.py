@@ -1,6 +1,6 @@
-"""The one engine of uncertainty: components, effective degrees of freedom, coverage factor.
+"""Components of uncertainty, effective degrees of freedom and coverage factor.
 
-Table, budget and `gum.propagate` all state u, degrees of freedom, k and U by `Combined`; deliveries
+Table, budget and `propagate` all state u, degrees of freedom, k and U by `Combined`; deliveries
 and the calculator, which work on sums kept for speed, by the same `sum_of_fourths` and `dof_of`.
 
 Inputs that are correlated are one component: its variance has their covariances in it, and its

@@ -5,12 +5,11 @@ import pytest
 from job_builder import write_job
 
 import tankcal
-from tankcal.gum import Input, Inputs, propagate
-from tankcal.gum import budget as budget_of_model
 from tankcal.gum.distributions import standard
-from tankcal.gum.volume_budgets import budget, reading_sources
+from tankcal.tank.budgets import budget, reading_sources
 from tankcal.tank.capacity import Capacity
-from tankcal.uncertainty import Source, grouped, triangular
+from tankcal.uncertainty import Input, Inputs, Source, grouped, propagate, triangular
+from tankcal.uncertainty import budget as budget_of_model
 
 
 def source(kind, *column, u=1.0, **more):

@@ -11,8 +11,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from tankcal.gum.distributions import Distribution, standard
-from tankcal.uncertainty import factor_of
+from tankcal.uncertainty.components import factor_of
 
 _ROUNDING = 1e-9  # of a correlation: what two programs may differ by
 
@@ -21,14 +20,15 @@ _ROUNDING = 1e-9  # of a correlation: what two programs may differ by
 class Input:
     """One quantity that the model asks for.
 
-    distribution  of its value; its mean is the estimate, in `unit`
+    distribution  of its value, with `mean`, `u`, `u_dof` and `name` as those of
+                  `gum.distributions`; its mean is the estimate, in `unit`
     type          "A" of readings, "B" of other knowledge
     family        name of the line of the budget that it is part of; "" for a line of its own
     is_default    True when nobody declared it: the program's own assumption
     """
 
     name: str
-    distribution: Distribution
+    distribution: object
     unit: str = ""
     type: str = "B"
     family: str = ""
@@ -43,18 +43,6 @@ class Input:
     def line(self):
         """The line of the budget that it is part of."""
         return self.family or self.name
-
-
-def vector(name, estimates, u, unit="", *, dof=np.inf, type="A", note=""):
-    """Inputs "name 1", "name 2", ... of one family: coordinates of points, say.
-
-    estimates, u  (p,) in `unit`, normal, or t when dof is finite
-    """
-    pairs = enumerate(zip(estimates, u, strict=True), 1)
-    return [
-        Input(f"{name} {i}", standard(s, dof=dof, mean=x), unit, type, family=name, note=note)
-        for i, (x, s) in pairs
-    ]
 
 
 class Inputs:

@@ -6,15 +6,14 @@ are no part of the covariance of the rows; of a delivery they count twice.
 Source: JCGM 100:2008 5.1.3, 5.2.2, 7.2.7.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isnan
 
 import numpy as np
 
-from tankcal.gum import BudgetRow
 from tankcal.gum.distributions import within
 from tankcal.text.display import table_html, volume_text
-from tankcal.uncertainty import Combined, Source, combined, declared_source
+from tankcal.uncertainty import BudgetRow, Shares, Source, declared_source
 
 HALF_A_LITRE_M3 = 5e-4
 
@@ -107,7 +106,7 @@ def budget(table, high_m, low_m=None, reading=()):
     weights = table.weights(dips[-1:]) - (0 if low_m is None else table.weights(dips[:1]))
     sources = [source.weighted(weights) for source in table.sources]
     sources += [_read(source, table, dips) for source in reading]
-    total = _Total(sources, table.probability)
+    total = Shares(sources, table.probability)
     return Budget(
         low_m=low_m,
         high_m=high_m,
@@ -116,9 +115,9 @@ def budget(table, high_m, low_m=None, reading=()):
         u_m3=total.u,
         dof=total.dof,
         k=total.k,
-        U_m3=total.expanded,
+        U_m3=total.U,
         for_use=found.for_use,
-        lines=tuple(line for index in range(len(sources)) for line in total.lines(index)),
+        lines=tuple(line for index in range(len(sources)) for line in _lines(total, index)),
     )
 
 
@@ -129,61 +128,34 @@ def _read(source, table, dips):
     return source.mapped(lambda columns: columns * np.sqrt(times))
 
 
-class _Total:
-    """The variances of the sources of one value, and the lines that they make."""
+def _lines(total, index):
+    """The `BudgetRow`s of a source: one, or one for each of its correlated parts."""
+    source = total.sources[index]
+    if not source.parts:
+        return [_line(source, total.of_line({index: None}))]
+    found = []
+    for i, part in enumerate(source.parts):
+        others = zip(source.parts, source.correlation[i], strict=True)
+        pairs = tuple((one.kind, float(r)) for one, r in others if one is not part and r)
+        found.append(_line(part, total.of_line({index: [i]}), pairs))
+    return found
 
-    def __init__(self, sources, probability):
-        self.sources, self.probability = sources, probability
-        self.found = combined(sources, 1)
-        self.variances = self.found.variances[0]
-        self.variance = float(self.variances.sum())
-        self.u, self.dof = float(self.found.u[0]), float(self.found.effective_dof[0])
-        self.k = float(self.found.k(probability)[0])
-        self.expanded = self.k * self.u
 
-    def lines(self, index):
-        """The `BudgetRow`s of a source: one, or one for each of its correlated parts."""
-        source = self.sources[index]
-        if not source.parts:
-            variance = self.variances[index]
-            return [self._line(source, variance**0.5, variance, index, variance / 4)]
-        own = np.array([part.columns_m3[0, 0] for part in source.parts])
-        together = own * (source.correlation @ own)
-        found = []
-        for i, part in enumerate(source.parts):
-            half = np.where(np.arange(len(own)) == i, own / 2, own)
-            halved = half @ source.correlation @ half
-            line = self._line(part, abs(own[i]), together[i], index, halved)
-            others = zip(source.parts, source.correlation[i], strict=True)
-            pairs = tuple((one.kind, float(r)) for one, r in others if one is not part and r)
-            found.append(replace(line, correlations=pairs))
-        return found
-
-    def _line(self, source, contribution, variance, index, halved):
-        known = source.u is not None
-        column = float(source.columns_m3[0, 0]) if source.columns_m3.shape[1] == 1 else None
-        is_slope = known and source.u > 0 and column is not None
-        return BudgetRow(
-            name=source.kind,
-            unit=source.unit or "",
-            type=source.type,
-            distribution=source.distribution,
-            dof=source.u_dof,
-            note=source.note,
-            is_default=source.is_default,
-            estimate=np.nan if source.estimate is None else source.estimate,
-            u=source.u if known else np.nan,
-            sensitivity=column / source.u if is_slope else np.nan,
-            contribution=float(contribution),
-            share=float(variance / self.variance) if self.variance > 0 else 0.0,
-            halved=self._if(index, halved),
-        )
-
-    def _if(self, index, variance):
-        """Expanded uncertainty with another variance of one source, over what it is."""
-        if not self.expanded > 0:
-            return 1.0
-        changed = self.variances.copy()
-        changed[index] = variance
-        halved = Combined(changed[None, :], self.found.dof)
-        return float(halved.expanded(self.probability)[0] / self.expanded)
+def _line(source, shares, correlations=()):
+    known = source.u is not None
+    column = float(source.columns_m3[0, 0]) if source.columns_m3.shape[1] == 1 else None
+    is_slope = known and source.u > 0 and column is not None
+    return BudgetRow(
+        name=source.kind,
+        unit=source.unit or "",
+        type=source.type,
+        distribution=source.distribution,
+        dof=source.u_dof,
+        note=source.note,
+        is_default=source.is_default,
+        estimate=np.nan if source.estimate is None else source.estimate,
+        u=source.u if known else np.nan,
+        sensitivity=column / source.u if is_slope else np.nan,
+        correlations=correlations,
+        **shares,
+    )

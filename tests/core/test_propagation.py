@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from tankcal.errors import SolutionError
-from tankcal.gum import Combination, Input, Inputs, budget, propagate, sensitivities_of, vector
+from tankcal.gum import Combination, vector
 from tankcal.gum.distributions import (
     Normal,
     Rectangular,
@@ -16,9 +16,20 @@ from tankcal.gum.distributions import (
     standard,
     within,
 )
-from tankcal.gum.volume_budgets import budget as of_dip
+from tankcal.tank.budgets import budget as of_dip
 from tankcal.tank.capacity import Capacity
-from tankcal.uncertainty import Source, coverage_factor, effective_dof, grouped, together_dof
+from tankcal.uncertainty import (
+    Input,
+    Inputs,
+    Source,
+    budget,
+    coverage_factor,
+    effective_dof,
+    grouped,
+    propagate,
+    sensitivities_of,
+    together_dof,
+)
 
 # ---- published budgets
 
