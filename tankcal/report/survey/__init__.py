@@ -2,7 +2,3 @@
 
 Every function takes a Paper and gives blocks, texts or a figure; nothing here computes a number.
 """
-
-from tankcal.report.survey.common import chapter
-
-__all__ = ["chapter"]

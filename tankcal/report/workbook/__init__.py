@@ -9,9 +9,13 @@ from tankcal.report.workbook.calculator import calculator_sheets, factor_sheet
 from tankcal.report.workbook.capacity import capacity_sheet
 from tankcal.report.workbook.certificate import certificate_sheet
 from tankcal.report.workbook.charts import charts_sheets
-from tankcal.report.workbook.millimetres import millimetres_sheet
 from tankcal.report.workbook.papers import corrections_sheet, courses_sheet, provenance_sheet
-from tankcal.report.workbook.parts import densities_sheet, inside_sheet, proportional_parts_sheet
+from tankcal.report.workbook.parts import (
+    densities_sheet,
+    inside_sheet,
+    millimetres_sheet,
+    proportional_parts_sheet,
+)
 from tankcal.report.workbook.survey import (
     adjustment_sheet,
     cameras_sheet,

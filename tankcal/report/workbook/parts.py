@@ -1,9 +1,13 @@
-"""Sheets beside the capacity table: proportional parts, other densities, what is in the tank."""
+"""Sheets beside the capacity table: parts, densities, every millimetre, what is in the tank."""
+
+from bisect import bisect_right
+from math import ceil, floor
 
 from tankcal.report.numbers import unit
 from tankcal.report.paper import DECIMALS_OF_PARTS
 from tankcal.report.tables.capacity import capacity_table, parts_table
 from tankcal.report.tables.tank import DEADWOOD
+from tankcal.report.uncertainty.sources import critical_zone
 from tankcal.report.uncertainty.stated import stated_U_m3
 from tankcal.report.workbook.look import Column, number_format
 from tankcal.report.workbook.tables import columns_of, set_widths
@@ -11,6 +15,7 @@ from tankcal.text.digits import LITRE_DECIMALS, decimals_of_rows, shortest, with
 from tankcal.text.words import marks_of
 
 _HEAD_ROW = 3
+_SAME_MM = 1e-6  # a row this near to a whole millimetre is that millimetre
 _WIDTHS = (50, 16, 16, 16, 16)
 
 
@@ -102,3 +107,47 @@ def _described(book, sheet, row, title, lines):
         book.put(sheet, row, 1, shown.factor * value, **look)
         book.put(sheet, row, 2, shown.symbol, indent=1)
     return row + 2
+
+
+# ---- every millimetre, for gauging systems
+
+
+def millimetres_sheet(book, record):
+    """Every whole millimetre of the table by its own straight lines; blank in a critical zone."""
+    capacity = record["capacity"]
+    dips, litres, digits = _millimetres(capacity, critical_zone(record))
+    columns = [
+        Column(book.word("columns.dip_mm", of="calculator"), dips, 0, 14),
+        Column(book.word("columns.volume_l", of="calculator"), litres, digits, 18),
+    ]
+    book.plain_sheet("capacity_mm", columns, tab="result")
+
+
+def _millimetres(capacity, critical):
+    """(dips mm, volumes L or None, decimals) of the rows.
+
+    The last row of the table, which is the shell's top, stands at its rounded millimetre, as the
+    calculator takes it.
+    """
+    heights, volumes = capacity["height_m"], capacity["volume_m3"]
+    first = ceil(1000 * heights[0] - _SAME_MM)
+    last = max(floor(1000 * heights[-1] + _SAME_MM), round(1000 * heights[-1]))
+    of_rows = decimals_of_rows(stated_U_m3(capacity), least=LITRE_DECIMALS)
+    dips = list(range(first, last + 1))
+    litres, digits = [], []
+    for dip in dips:
+        height = min(dip / 1000, heights[-1])
+        row = min(bisect_right(heights, height + _SAME_MM / 1000) - 1, len(heights) - 1)
+        after = min(row + 1, len(heights) - 1)
+        part = 0.0
+        if after > row and height - heights[row] > _SAME_MM / 1000:
+            part = (height - heights[row]) / (heights[after] - heights[row])
+        volume = volumes[row] + part * (volumes[after] - volumes[row])
+        litres.append(None if _is_critical(height, critical) else 1000 * volume)
+        digits.append(max(of_rows[row] - LITRE_DECIMALS, 0))
+    return dips, litres, digits
+
+
+def _is_critical(height_m, critical):
+    same = _SAME_MM / 1000
+    return critical is not None and critical[0] + same < height_m < critical[1] - same
