@@ -75,12 +75,6 @@ def depth_factor(depth_mm, focus_mm, focal_length_mm):
     return (1 - f / focus_mm) / (1 - f / np.asarray(depth_mm, dtype=float))
 
 
-def decentring_factor(depth_mm, focus_mm, focal_length_mm):
-    """Decentring (...) in depths (...) over that of the lens at infinity (S 58, s mended to s')."""
-    f, depth = focal_length_mm, np.asarray(depth_mm, dtype=float)
-    return depth_factor(depth, focus_mm, f) * (1 - f / depth)
-
-
 def as_in_focus(xy_mm, depth_mm, interior, form, lens):
     """Image points (n, 2) as they would be if every object lay at the distance of the focus.
 

@@ -167,21 +167,6 @@ def interpolate_outline(xy_m, x_m, y_m, form, zeta=0.0):
     )
 
 
-def smooth_outline(xy_m, x_m, y_m, noise_m2, form, zeta=0.0):
-    """Harmonics r = c0 + sum a_k cos k a + b_k sin k a, k <= 36, weighted by a prior on the form.
-
-    Mode k >= 2 has the prior variance form.level_m2 k^-3, so a gap between points is bridged by
-    what the shell's own spectrum allows, and the form that was not seen stays in the covariance.
-    Modes 0 and 1 (radius, centre) are free.
-
-    noise_m2  covariance of the measured radii, (n, n) or (n,)
-    form      `Form` of the shell (`estimate_form`); zeta  height of the section within its course
-    Raises SolutionError when the points do not determine radius and centre.
-    """
-    zetas = np.full(len(xy_m), zeta)
-    return smooth_outlines(xy_m, x_m, y_m, noise_m2, form, zetas, [zeta], degree=0)[0]
-
-
 def smooth_outlines(xy_m, x_m, y_m, noise_m2, form, zeta, levels_zeta, degree):
     """Outlines at some heights of a course, fitted together to points that are not level.
 

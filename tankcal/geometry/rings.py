@@ -3,6 +3,7 @@
 One pass over the points, a chunk at a time, keeps sums only; memory does not grow with the points.
 With u, v the offsets from an approximate axis at the point's own height over an approximate radius,
 and w = u^2 + v^2 - 1, the circle of a ring follows from the means and covariances of u, v and w.
+No job reads a cloud yet; benchmarks/rings.py holds the time and the memory.
 """
 
 from dataclasses import dataclass

@@ -127,27 +127,3 @@ def angle_derivatives(rotation):
         [tp * ck, -tp * sk, -one],
     ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def turned_frame(rotation, covariance, turn):
-    """Photos in a frame that is turned against theirs, X' = T X, and what their covariances become.
-
-        R' = R T'        S' = J S J',   J = [D(R') B(R)  0; 0  T]
-
-    with B the small rotation of the camera that a change of its angles is, and D the change of the
-    angles that a small rotation is. D grows without bound towards phi = +-90 deg in the new frame,
-    and with it the variances of omega and kappa; the covariance of the small rotation, B S B',
-    stays what it was: the rotation is as well known as before.
-
-    rotation    (n, 3, 3) R
-    covariance  (n, 6, 6) of omega, phi, kappa, x, y, z
-    turn        (3, 3) T, a rotation matrix
-
-    Returns (n, 3, 3) and (n, 6, 6), of the angles as angles_of gives them (|phi| <= 90 deg); units
-    as they came. Silva 1995, table 1, shows the effect.
-    """
-    after = np.asarray(rotation, dtype=float) @ np.asarray(turn, dtype=float).T
-    jacobian = np.zeros((len(after), 6, 6))
-    jacobian[:, :3, :3] = angle_derivatives(after) @ angle_axes(rotation)
-    jacobian[:, 3:, 3:] = turn
-    return after, jacobian @ np.asarray(covariance, dtype=float) @ jacobian.transpose(0, 2, 1)

@@ -7,7 +7,7 @@ import pytest
 from networks import INTERIOR
 from surveyed import by_photographs, places
 
-from tankcal.camera.focus import Lens, as_in_focus, decentring_factor, depth_factor, radial_at
+from tankcal.camera.focus import Lens, as_in_focus, depth_factor, radial_at
 from tankcal.camera.model import CONVENTIONS, Form, corrected, measured
 from tankcal.survey import adjust_survey
 
@@ -65,8 +65,9 @@ def test_depth_factor():
 
 
 def test_decentring_does_not_change_within_the_depth_of_field():
-    """Closed form: gamma (1 - f/s') = 1 - f/s for every s'."""
-    found = decentring_factor(np.array([3000.0, 8000.0, 90000.0]), 8000.0, F)
+    """Closed form: gamma (1 - f/s') = 1 - f/s for every s' (S 58, s mended to s')."""
+    depth = np.array([3000.0, 8000.0, 90000.0])
+    found = depth_factor(depth, 8000.0, F) * (1 - F / depth)
     np.testing.assert_allclose(found, 1 - F / 8000.0, rtol=1e-14)
 
 

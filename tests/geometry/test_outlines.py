@@ -13,9 +13,13 @@ from tankcal.geometry.outlines import (
     evenly_spread,
     interpolate_outline,
     polar,
-    smooth_outline,
     smooth_outlines,
 )
+
+
+def smooth_outline(xy_m, x_m, y_m, noise_m2, form):
+    """The outline of one section whose points are level."""
+    return smooth_outlines(xy_m, x_m, y_m, noise_m2, form, np.zeros(len(xy_m)), [0.0], 0)[0]
 
 
 def outlines(seed=1):

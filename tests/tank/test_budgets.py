@@ -23,7 +23,7 @@ def table(*sources):
 
 @pytest.mark.parametrize("r", [-0.9, 0.0, 0.5, 1.0])
 def test_correlated_inputs_are_those_of_the_law_of_propagation(r):
-    """The same two inputs through gum.propagate: u, shares and what halving one is worth."""
+    """The same two inputs through propagate: u, shares and what halving one is worth."""
     alone = {"a": source("a", 0, 3, 5, dof=9.0), "b": source("b", 0, 2, -4, dof=9.0)}
     found = budget(table(*grouped(alone, [("a", "b", r)] if r else ())), 2.0)
     inputs = Inputs([Input(n, standard(1.0, dof=9.0), "mm", "A") for n in "ab"], {("a", "b"): r})
