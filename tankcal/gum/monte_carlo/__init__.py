@@ -4,10 +4,9 @@
 """
 
 from tankcal.gum.monte_carlo.goal import NAMES as ESTIMATES
-from tankcal.gum.monte_carlo.goal import Goal, Simulation, numerical_tolerance
+from tankcal.gum.monte_carlo.goal import Goal, Simulation, Verdict, numerical_tolerance, verdict
 from tankcal.gum.monte_carlo.quadratic import QuadraticRows
 from tankcal.gum.monte_carlo.simulation import simulate
-from tankcal.gum.monte_carlo.validation import Verdict, verdict
 
 __all__ = [
     "ESTIMATES",

@@ -1,7 +1,7 @@
 """From a checked job to the body of its tank: every part, with the corrections that are on."""
 
+from tankcal.pipeline.tanks.common import thermal_scale
 from tankcal.pipeline.tanks.solid import solid_body, solid_zero
-from tankcal.pipeline.tanks.thermal import thermal_scale
 from tankcal.pipeline.tanks.vertical import (
     critical_zone,
     insets_of,

@@ -6,9 +6,7 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.pipeline.tanks.estimates import estimates_of
-from tankcal.pipeline.tanks.furniture import deadwood_part
-from tankcal.pipeline.tanks.thermal import is_warmed, thermal_scale
+from tankcal.pipeline.tanks.common import deadwood_part, estimates_of, is_warmed, thermal_scale
 from tankcal.tank.body import Body, SolidPart
 from tankcal.tank.heads import End
 from tankcal.tank.meshes import mesh_part

@@ -5,9 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
-from tankcal.pipeline.tanks.estimates import estimates_of
-from tankcal.pipeline.tanks.furniture import deadwood_part
-from tankcal.pipeline.tanks.thermal import is_warmed, thermal_scale
+from tankcal.pipeline.tanks.common import deadwood_part, estimates_of, is_warmed, thermal_scale
 from tankcal.sections import coordinates_of
 from tankcal.tank.body import Body, Factor, ShellPart, survey_factors
 from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom

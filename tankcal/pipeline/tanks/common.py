@@ -1,8 +1,10 @@
-"""The values that the declared inputs of a job have, in the units in which they are declared."""
+"""What tanks of every kind have: estimates of their inputs, deadwood, and a temperature."""
+
+from tankcal.tank.fittings import deadwood
 
 
 def estimates_of(job):
-    """{name of an input: its value}; 0 for what corrects nothing, such as a scale or an offset.
+    """{name of an input: its value as declared}; 0 of a scale, an offset and the like.
 
     The temperature is that of the shell, deg C. Without a value: plates or paint that differ from
     course to course, and what the job does not give.
@@ -52,3 +54,26 @@ def _only(values):
 
 def _thousand(value):
     return None if value is None else 1000 * value
+
+
+def deadwood_part(items, zero_m):
+    """The declared deadwood as a part; its heights are dips, zero_m the level of dip 0."""
+    return deadwood(
+        [item.name for item in items],
+        [item.bottom_m + zero_m for item in items],
+        [item.top_m + zero_m for item in items],
+        [item.volume_m3 for item in items],
+        [item.u_m3 for item in items],
+    )
+
+
+def thermal_scale(job, switches):
+    """Lengths at reference temperature over those of the survey; 1 if not known or not on."""
+    if not is_warmed(job, switches):
+        return 1.0
+    warmer = job.table.reference_temperature_c - job.survey.shell_temperature_c
+    return 1.0 + job.material.expansion_per_k * warmer
+
+
+def is_warmed(job, switches):
+    return switches.temperature and job.survey.shell_temperature_c is not None
