@@ -1,17 +1,19 @@
 """From checked values to a `Job`: SI units, defaults, one dataclass for each part."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.job.checks import bottom_form
+from tankcal.gum.distributions import within
+from tankcal.job.checks import bottom_form, spreads, standard_u, useless_inputs
+from tankcal.job.contract import INPUTS
 from tankcal.job.contract.parts import MESH_UNITS_M
-from tankcal.job.declaring import correlations_of, inputs_of, stated_of
 from tankcal.job.model import (
     Bottom,
     Course,
     Datum,
     Deadwood,
+    DeclaredInput,
     End,
     Horizontal,
     InputFile,
@@ -21,11 +23,127 @@ from tankcal.job.model import (
     Points,
     Roof,
     Sphere,
+    StatedVolume,
     Survey,
     Switches,
     TableSpec,
     Tank,
 )
+from tankcal.job.tables import fingerprint, read_bytes
+from tankcal.messages import message
+from tankcal.tank.rules.model import Rule
+
+# What lies beside job.toml or the workbook; the file of a mesh is not parsed here.
+
+MAX_MESH_BYTES = 200_000_000
+
+
+@dataclass(frozen=True)
+class Attached:
+    """What a job has beside its settings and tables; None: not there.
+
+    covariance_m2  (3n, 3n) of its points
+    mesh           ((name, SHA-256, size), bytes)
+    rule           (Rule, (name, SHA-256, size) of its file, or None: it ships with tankcal)
+    """
+
+    covariance_m2: np.ndarray | None
+    mesh: tuple | None
+    rule: tuple[Rule, tuple | None] | None
+
+    @property
+    def files(self):
+        """(name, SHA-256, size) of each file that was read for it."""
+        given = (self.mesh and self.mesh[0], self.rule and self.rule[1])
+        return tuple(file for file in given if file)
+
+
+def read_mesh_file(folder, name, log):
+    """((name, SHA-256, size), bytes) of the file, or None after telling `log` what is wrong.
+
+    folder  Path that the job lies in; name  as checked by the field mesh.file: no path
+    """
+    path = folder / name
+    try:
+        exists = path.exists()
+    except (OSError, ValueError):
+        exists = False
+    if not exists:
+        log.problem(
+            name,
+            message(
+                "missing_mesh_file", "missing file; expected the mesh of mesh.file beside the job"
+            ),
+        )
+        return None
+    data = read_bytes(path, log, MAX_MESH_BYTES)
+    if data is None:
+        return None
+    if not data.strip():
+        log.problem(name, message("empty_mesh_file", "empty; expected a closed mesh"))
+        return None
+    return fingerprint(name, data), data
+
+
+# From checked rows to what a job declares about uncertainty, and what is assumed beside it.
+
+
+def inputs_of(values, tables):
+    """`DeclaredInput`s: the rows of uncertainty.csv, then the defaults in the order of INPUTS."""
+    declared = _declared(tables["uncertainty"])
+    return (*declared, *_assumed(values, tables, {one.name for one in declared}))
+
+
+def correlations_of(table):
+    """(name, name, r) of the rows of correlations.csv."""
+    if table is None:
+        return ()
+    return tuple(zip(*map(table.of, ("input", "with", "r")), strict=True))
+
+
+def stated_of(table):
+    """`StatedVolume`s of the rows of stated.csv."""
+    if table is None:
+        return ()
+    columns = map(table.of, ("high_m", "low_m", "volume_m3", "note"))
+    return tuple(
+        StatedVolume(high, low, volume, note or "", row, table.file)
+        for high, low, volume, note, row in zip(*columns, table.rows, strict=True)
+    )
+
+
+def _declared(table):
+    if table is None:
+        return ()
+    columns = map(table.of, ("input", "unit", "type", "distribution", "dof", "note"))
+    rows = zip(*columns, spreads(table), strict=True)
+    return tuple(
+        _input(
+            name,
+            standard_u(*spread),
+            unit,
+            type=type or "B",
+            distribution=distribution or "normal",
+            dof=np.inf if dof is None else dof,
+            note=note or "",
+            u_is="sd" if spread[1] == "sd" else "scale",
+        )
+        for name, unit, type, distribution, dof, note, spread in rows
+    )
+
+
+def _assumed(values, tables, declared):
+    """What is assumed of the inputs that bear on the job and are not declared."""
+    useless = useless_inputs(values, tables, values["tank"]["kind"])
+    own_values = {"roof_mass": values["roof"]["mass_kg"]}
+    for name, known in INPUTS.items():
+        if known.assumption and name not in declared and name not in useless:
+            assumed = within(known.assumed_half_width(own_values.get(name)))
+            yield _input(name, assumed.u, known.unit, distribution=assumed.name, is_default=True)
+
+
+def _input(name, u, unit, **more):
+    return DeclaredInput(name, float(u / INPUTS[name].per_si), unit, float(u), **more)
 
 
 def make_job(raw, values, tables, attached, measurements, warnings):

@@ -3,8 +3,7 @@
 from os import PathLike
 from pathlib import Path
 
-from tankcal.job.assembly import make_frame, make_job
-from tankcal.job.attached import Attached, read_mesh_file
+from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
 from tankcal.job.checks import check_all
 from tankcal.job.checks.common import has_survey
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND

@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from tankcal.job.cameras import make_camera
+from tankcal.job.cameras import AXES, datum_point, make_camera
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.contract.registers import FREE, INSTRUMENT_KINDS
-from tankcal.job.datum import AXES, datum_point
 from tankcal.job.imagery import imagery_of
 from tankcal.survey.measurements import (
     AdjustmentSettings,

@@ -4,8 +4,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from tankcal.job.assembly import make_job
-from tankcal.job.attached import Attached
+from tankcal.job.assembly import Attached, make_job
 from tankcal.job.checks import check_tank
 from tankcal.job.checks.survey.cameras import check_cameras
 from tankcal.job.checks.survey.files import SurveyFiles

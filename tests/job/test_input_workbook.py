@@ -26,9 +26,7 @@ from tankcal.job.sheets import is_read
 from tankcal.job.starter import write_input_workbook
 from tankcal.job.starter.examples import EXAMPLES_OF_KEYS, EXAMPLES_OF_TABLES
 from tankcal.job.starter.form import Form
-from tankcal.job.starter.notes import TABLE_NOTES
-from tankcal.job.starter.texts import english_notes, texts_in
-from tankcal.job.starter.units import parted
+from tankcal.job.starter.texts import TABLE_NOTES, english_notes, parted, texts_in
 from tankcal.job.starter.validation import LONGEST_LIST, LONGEST_MESSAGE, LONGEST_TITLE, rule_of
 from tankcal.record import record_of
 from tankcal.text.languages import LANGUAGES

@@ -22,8 +22,7 @@ from tankcal.job.contract import (
     SURVEYS,
     TABLES_OF_KIND,
 )
-from tankcal.job.contract.rules import LIMITS, RULE
-from tankcal.job.rule_files import parse_rule, shipped_names
+from tankcal.job.rule_files import LIMITS, RULE, parse_rule, shipped_names
 from tankcal.job.starter import write_starter
 from tankcal.job.tables import Log
 from tankcal.tank.rules import TANKS

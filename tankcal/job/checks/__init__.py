@@ -7,18 +7,18 @@ missing or bad stays silent: what is wrong with them has been told already.
 from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.bottom import bottom_form, check_bottom
 from tankcal.job.checks.common import Extent, extent_of, has_rows, has_survey, has_wall_points
-from tankcal.job.checks.correlations import check_correlations
-from tankcal.job.checks.courses import check_courses
-from tankcal.job.checks.deadwood import check_deadwood
-from tankcal.job.checks.geometry import check_cylinder, check_scan
-from tankcal.job.checks.inputs import check_inputs, spreads, standard_u
+from tankcal.job.checks.deadwood import check_deadwood, check_roof
+from tankcal.job.checks.geometry import check_courses, check_cylinder, check_points, check_scan
+from tankcal.job.checks.inputs import (
+    check_correlations,
+    check_inputs,
+    check_stated,
+    spreads,
+    standard_u,
+)
 from tankcal.job.checks.kinds import check_horizontal, check_sphere
 from tankcal.job.checks.plausible import check_plausible
-from tankcal.job.checks.points import check_points
-from tankcal.job.checks.roof import check_roof
-from tankcal.job.checks.settings import check_settings
-from tankcal.job.checks.stated import check_stated
-from tankcal.job.checks.steps import check_steps
+from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.survey import check_survey
 from tankcal.job.entries import kind_of
 

@@ -2,8 +2,153 @@
 
 import numpy as np
 
-from tankcal.job.checks.common import course_heights, tell
+from tankcal.job.checks.common import (
+    course_heights,
+    loads_the_shell,
+    refuse_repeated,
+    tell,
+    tiny_sd,
+    zero_z,
+)
 from tankcal.messages import message
+
+# points.csv by itself: names and places once, standard deviations and sections complete.
+
+MAX_POINTS = 50_000
+TINY_SD_MM = 0.01
+
+
+def check_points(points, log):
+    """Point names once, places once (a warning), credible and complete standard deviations."""
+    if not points.rows and not points.skipped:
+        log.problem(
+            points.file,
+            message("no_points_at_all", "no rows; expected one row for each surveyed point"),
+        )
+        return
+    if len(points.rows) > MAX_POINTS:
+        expected = message(
+            "points_too_many",
+            "{count} points; expected at most {most}: thin the scan first",
+            count=len(points.rows),
+            most=MAX_POINTS,
+        )
+        log.problem(points.file, expected)
+    refuse_repeated(points, "point", log)
+    _warn_same_places(points, log)
+    _refuse_some_sections(points, log)
+    sds = ("sx_mm", "sy_mm", "sz_mm")
+    given = [name for name in sds if points.columns[name] is not None]
+    for name in sds:
+        if given and name not in given:
+            expected = message(
+                "sd_of_some_axes",
+                "not given; expected beside {given}, for all points or for none",
+                given=given[0],
+            )
+            log.problem(points.file, expected, None, name)
+    for name in given:
+        found = [sd for sd in points.of(name) if sd is not None]
+        if found and max(found) < TINY_SD_MM:
+            log.warning(points.file, tiny_sd("mm", max(found)), None, name)
+
+
+def _warn_same_places(points, log):
+    first_row = {}
+    places = zip(points.of("x_m"), points.of("y_m"), points.of("z_m"), strict=True)
+    for row, place in zip(points.rows, places, strict=True):
+        if None in place:
+            continue
+        if place in first_row:
+            expected = message(
+                "same_coordinates",
+                "the same coordinates as row {row}; counted once",
+                row=first_row[place],
+            )
+            log.warning(points.file, expected, row, "x_m")
+        else:
+            first_row[place] = row
+
+
+def _refuse_some_sections(points, log):
+    """A section for every point or for none: else some would be placed by height, some by name."""
+    sections = points.of("section")
+    if not any(sections):
+        return
+    for row, section in zip(points.rows, sections, strict=True):
+        if not section:
+            expected = message(
+                "section_of_some_points",
+                "blank; expected a section for every point or for none (placed by height)",
+            )
+            log.problem(points.file, expected, row, "section")
+
+
+# courses.csv: names, plates, and heights that add up to the shell's.
+
+HEIGHT_MISS_M, HEIGHT_MISS_RELATIVE = 0.020, 0.002
+SMALLEST_THICKNESS_MM = 1.0
+
+
+def check_courses(courses, values, log):
+    """Course names once; plates of a credible thickness; heights that add up to the shell's."""
+    if courses.is_empty:
+        log.problem(
+            courses.file,
+            message("no_courses", "no rows; expected one row for each course, from the bottom up"),
+        )
+        return
+    refuse_repeated(courses, "course", log)
+    for row, thickness in zip(courses.rows, courses.of("thickness_mm"), strict=True):
+        if thickness is not None and 0 < thickness < SMALLEST_THICKNESS_MM:
+            expected = message(
+                "thin_plate",
+                "found {thickness:g}; expected millimetres, 0 or at least 1: in metres?",
+                thickness=thickness,
+            )
+            log.problem(courses.file, expected, row, "thickness_mm")
+    heights, nominal = courses.of("height_m"), values["tank"]["nominal_height_m"]
+    if None in heights or courses.skipped:
+        return  # a course that cannot be read is told already
+    _refuse_weightless_plates(courses, heights, values, log)
+    if nominal is None:
+        return
+    miss = sum(heights) - nominal
+    allowed = max(HEIGHT_MISS_M, HEIGHT_MISS_RELATIVE * nominal)
+    if abs(miss) > allowed * (1 + 1e-9):
+        expected = message(
+            "courses_do_not_add_up",
+            "the courses add up to {sum:.4g} m, expected tank.nominal_height_m = {nominal:g} m "
+            "within {allowed:.0f} mm; they miss it by {miss:.0f} mm",
+            sum=sum(heights),
+            nominal=nominal,
+            allowed=1000 * allowed,
+            miss=1000 * miss,
+        )
+        log.problem(courses.file, expected, None, "height_m")
+
+
+def _refuse_weightless_plates(courses, heights, values, log):
+    """A shell that liquid stretches needs its plates: all of them, or those below that liquid."""
+    level, zero = values["survey"]["liquid_level_m"], zero_z(values)
+    loaded_to, why = -np.inf, ""
+    if level and zero is not None and values["corrections"]["head"] is not False:
+        loaded_to = level + zero - (values["datum"]["bottom_z_m"] or 0.0)
+        why = message("because_of_level", "survey.liquid_level_m = {level:g}", level=level)
+    if loads_the_shell(values):
+        loaded_to = np.inf
+        why = message("because_of_density", "the density in [table]")
+    bottoms = np.concatenate([[0.0], np.cumsum(heights)[:-1]])
+    plates = zip(courses.rows, courses.of("thickness_mm"), bottoms, strict=True)
+    for row, thickness, bottom in plates:
+        if thickness == 0 and bottom < loaded_to:
+            expected = message(
+                "plate_of_nothing",
+                "found 0; expected the plate's thickness: the liquid head ({why}) needs it",
+                why=why,
+            )
+            log.problem(courses.file, expected, row, "thickness_mm")
+
 
 MIN_POINTS_PER_COURSE = 5
 FEW_POINTS_PER_COURSE = 10

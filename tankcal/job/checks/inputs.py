@@ -1,10 +1,151 @@
 """uncertainty.csv: each input once, in its own unit, of a credible size, and of use here."""
 
-from tankcal.gum.distributions import FAMILIES, expanded, within
+from tankcal.gum.distributions import FAMILIES, Normal, expanded, within
 from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.common import refuse_repeated
+from tankcal.job.checks.geometry import UNIT_FACTOR
 from tankcal.job.contract import INPUTS
 from tankcal.messages import message
+from tankcal.uncertainty import Input, Inputs
+
+# stated.csv: dips within the tank, the upper one first, and volumes that it can hold.
+
+_ROUNDING_M = 1e-9
+
+
+def check_stated(table, extent, log):
+    """Dips within the tank, high above low, each pair once; volumes in cubic metres."""
+    first_row = {}
+    columns = (table.of(name) for name in ("high_m", "low_m", "volume_m3"))
+    for row, high, low, volume in zip(table.rows, *columns, strict=True):
+        _check_within(table, row, high, low, extent, log)
+        if high is None:
+            continue
+        if low is not None and low >= high:
+            expected = message(
+                "stated_upside_down",
+                "found {low:g}; expected a dip below high_m = {high:g}",
+                low=low,
+                high=high,
+            )
+            log.problem(table.file, expected, row, "low_m")
+        elif (high, low) in first_row:
+            expected = message(
+                "stated_twice",
+                "this dip is there already, in row {first_row}; expected once",
+                first_row=first_row[high, low],
+            )
+            log.problem(table.file, expected, row, "high_m")
+        elif volume is not None:
+            _check_volume(table, row, high, low, volume, extent, log)
+        first_row.setdefault((high, low), row)
+
+
+def _check_within(table, row, high, low, extent, log):
+    top = extent.height_m if extent.top_m is None else extent.top_m
+    for column, dip in (("high_m", high), ("low_m", low)):
+        if None not in (dip, top) and dip > top + _ROUNDING_M:
+            expected = message(
+                "stated_above_top",
+                "found {dip:g}; expected at most {top:.5g}, the top of the tank, in metres",
+                dip=dip,
+                top=top,
+            )
+            log.problem(table.file, expected, row, column)
+
+
+def _check_volume(table, row, high, low, volume, extent, log):
+    """Far more than the whole tank holds, or the slice of a delivery, is another unit."""
+    height = extent.height_m if low is None else high - low
+    if None in (height, extent.area_m2):
+        return
+    full = extent.area_m2 * height
+    if volume > UNIT_FACTOR * full:
+        expected = message(
+            "stated_too_much",
+            "found {volume:g}; the whole tank holds about {full:.4g} m3, expected m3: in litres?",
+            volume=volume,
+            full=full,
+        )
+        if low is not None:
+            expected = message(
+                "delivered_too_much",
+                "found {volume:g}; the tank between low_m and high_m holds about {full:.4g} m3, "
+                "expected m3: in litres?",
+                volume=volume,
+                full=full,
+            )
+        log.problem(table.file, expected, row, "volume_m3")
+
+
+# correlations.csv: pairs of declared inputs, each once, and all of them possible together.
+
+
+def check_correlations(table, inputs, raw, log):
+    """Pairs of inputs of uncertainty.csv, each once, whose coefficients can hold together.
+
+    inputs  uncertainty.csv, or None: not there or unreadable
+    """
+    before = len(log.problems)
+    known = _declared(inputs, raw)
+    pairs, first_row = {}, {}
+    for row, one, other, r in zip(table.rows, *map(table.of, ("input", "with", "r")), strict=True):
+        for column, name in (("input", one), ("with", other)):
+            if None not in (known, name) and name not in known:
+                expected = message(
+                    "correlation_unknown",
+                    "found {name}; expected an input of {of}",
+                    name=name,
+                    of=raw.file_of("uncertainty"),
+                )
+                log.problem(table.file, expected, row, column)
+        if one is not None and one == other:
+            expected = message(
+                "correlation_with_itself", "found {one} again; expected another input", one=one
+            )
+            log.problem(table.file, expected, row, "with")
+        pair = frozenset((one, other))
+        if None not in pair and pair in first_row:
+            expected = message(
+                "correlation_twice",
+                "{one} and {other} are there already, in row {first_row}; expected once",
+                one=one,
+                other=other,
+                first_row=first_row[pair],
+            )
+            log.problem(table.file, expected, row, "with")
+        first_row.setdefault(pair, row)
+        pairs[one, other] = r
+    if len(log.problems) == before and not (table.skipped or None in _flat(pairs)):
+        _check_together(table, pairs, log)
+
+
+def _declared(inputs, raw):
+    """Names of the declared inputs; None where some of them could not be read."""
+    if inputs is None:
+        is_there = "uncertainty" in raw.tables
+        return None if is_there else ()
+    names = inputs.of("input")
+    return None if inputs.skipped or None in names else names
+
+
+def _flat(pairs):
+    return [*(name for pair in pairs for name in pair), *pairs.values()]
+
+
+def _check_together(table, pairs, log):
+    """Is the matrix of all coefficients positive semidefinite?"""
+    names = dict.fromkeys(name for pair in pairs for name in pair)
+    try:
+        Inputs([Input(name, Normal(1.0)) for name in names], pairs)
+    except ValueError as error:
+        expected = message(
+            "correlations_impossible",
+            "{error}; expected coefficients that can hold together",
+            error=str(error),
+        )
+        log.problem(table.file, expected, None, "r")
+
 
 OF_T = ("scale", "sd")
 NORMAL = "normal"

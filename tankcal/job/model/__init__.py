@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 
-from tankcal.job.model.declared import DeclaredInput, StatedVolume
 from tankcal.job.model.parts import (
     Bottom,
     Course,
@@ -13,7 +12,16 @@ from tankcal.job.model.parts import (
     Roof,
     Sphere,
 )
-from tankcal.job.model.settings import Datum, Material, Survey, Switches, TableSpec, Tank
+from tankcal.job.model.settings import (
+    Datum,
+    DeclaredInput,
+    Material,
+    StatedVolume,
+    Survey,
+    Switches,
+    TableSpec,
+    Tank,
+)
 from tankcal.survey.measurements import Measurements
 from tankcal.survey.points import Points
 from tankcal.tank.rules.model import Rule

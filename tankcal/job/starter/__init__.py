@@ -3,7 +3,6 @@
 Both are written from the lists of `tankcal.job.contract`, so that they name every key and column.
 """
 
-from tankcal.job.starter.filled import FilledForm
-from tankcal.job.starter.writing import write_form, write_input_workbook, write_starter
+from tankcal.job.starter.writing import FilledForm, write_form, write_input_workbook, write_starter
 
 __all__ = ["FilledForm", "write_form", "write_input_workbook", "write_starter"]

@@ -9,7 +9,7 @@ from tankcal.job.fields import Field
 from tankcal.job.sheets import KEY, VALUE
 from tankcal.job.starter.look import LINE_PT, lines_of, print_on_a4, type_of_cell
 from tankcal.job.starter.table_sheet import MARK
-from tankcal.job.starter.units import is_number, parted
+from tankcal.job.starter.texts import is_number, parted
 from tankcal.job.starter.validation import rule_of
 
 TITLE, NOTE, RULE, LABELS, CODES = range(5)

@@ -5,7 +5,7 @@ from xlsxwriter.utility import xl_rowcol_to_cell
 from tankcal.job.contract import COLUMNS
 from tankcal.job.starter.examples import EXAMPLES_OF_TABLES
 from tankcal.job.starter.look import LINE_PT, YELLOW, lines_of, opened, print_on_a4, type_of_cell
-from tankcal.job.starter.units import is_number, parted
+from tankcal.job.starter.texts import is_number, parted
 from tankcal.job.starter.validation import rule_of
 
 MARK = "#"  # in the first cell of a row: it is not read

@@ -1,11 +1,9 @@
 """Is each number plausible? The ranges and cross-checks of `tankcal.job.plausibility`."""
 
-from tankcal.job.checks.plausible.calendar import check_dates
-from tankcal.job.checks.plausible.levels import check_levels
+from tankcal.job.checks.plausible.levels import check_dates, check_levels
 from tankcal.job.checks.plausible.material import check_material
 from tankcal.job.checks.plausible.plates import check_plates
-from tankcal.job.checks.plausible.rings import check_rings
-from tankcal.job.checks.plausible.sizes import check_sizes
+from tankcal.job.checks.plausible.sizes import check_rings, check_sizes
 
 __all__ = ["check_plausible"]
 

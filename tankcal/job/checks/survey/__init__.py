@@ -6,17 +6,14 @@ in excess) is told after it.
 
 from tankcal.job.checks.common import has_rows, has_survey, tell
 from tankcal.job.checks.survey.cameras import check_cameras
-from tankcal.job.checks.survey.correlated import check_correlated
-from tankcal.job.checks.survey.datum import check_datum
+from tankcal.job.checks.survey.datum import check_datum, check_held, check_known
 from tankcal.job.checks.survey.doubtful import check_doubtful
 from tankcal.job.checks.survey.files import SurveyFiles
 from tankcal.job.checks.survey.focus import check_depth_of_field
-from tankcal.job.checks.survey.held import check_held
 from tankcal.job.checks.survey.images import check_images
 from tankcal.job.checks.survey.instruments import check_instruments
-from tankcal.job.checks.survey.known import check_known
 from tankcal.job.checks.survey.names import check_names
-from tankcal.job.checks.survey.readings import check_readings
+from tankcal.job.checks.survey.readings import check_correlated, check_readings
 from tankcal.job.contract import KEYS
 from tankcal.job.tables import SURVEY_TABLES
 from tankcal.messages import message

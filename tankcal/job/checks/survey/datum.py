@@ -2,11 +2,212 @@
 
 import numpy as np
 
-from tankcal.job.checks.common import has_rows, is_not_given, tell
-from tankcal.job.checks.survey.names import all_points
-from tankcal.job.datum import datum_point
+from tankcal.job.cameras import datum_point
+from tankcal.job.checks.common import has_rows, is_not_given, refuse_repeated, tell
+from tankcal.job.checks.survey.files import tell_rows
+from tankcal.job.checks.survey.names import all_points, observed_names
+from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.tables import nearest
-from tankcal.messages import joined, message
+from tankcal.messages import joined, listed, message
+
+# control.csv, check.csv and targets.csv: each point once, sds of what is given.
+
+MOST_NAMED = 5
+
+
+def check_known(files):
+    """Points known beforehand, and where targets sit."""
+    seen = observed_names(files)
+    for name in ("control", "check"):
+        table = files.tables[name]
+        if has_rows(table):
+            _refuse_point_twice(files, table)
+            _check_coordinates(files, table)
+            _warn_unobserved(files, table, seen, _bear_on_nothing)
+    targets = files.tables["targets"]
+    if has_rows(targets):
+        refuse_repeated(targets, "point", files.log)
+        _warn_unobserved(files, targets, seen, _left_out)
+    _warn_control_that_checks(files)
+
+
+def _refuse_point_twice(files, table):
+    first = {}
+    for row, point, system in zip(table.rows, table.of("point"), table.of("system"), strict=True):
+        before = first.setdefault((point, system), row)
+        if point is not None and before != row:
+            within = (
+                ""
+                if system is None
+                else message("within_system", " in system {system!r}", system=system)
+            )
+            expected = message(
+                "known_twice",
+                "{point!r} is there already{within}, in row {row}; expected once",
+                point=point,
+                within=within,
+                row=before,
+            )
+            files.log.problem(table.file, expected, row, "point")
+
+
+def _check_coordinates(files, table):
+    sound, known = files.sound(table), np.zeros(len(table.rows), dtype=bool)
+    for axis in "xyz":
+        value, sd = (~np.isnan(table.numbers(name)) for name in (f"{axis}_m", f"s{axis}_mm"))
+        known |= value
+        expected = message(
+            "known_sd_without_value",
+            "given without {axis}_m; expected both, or no standard deviation",
+            axis=axis,
+        )
+        tell_rows(files.log.problem, table, sound & sd & ~value, f"s{axis}_mm", expected)
+    expected = message("no_coordinate", "no coordinate; expected one at least")
+    tell_rows(files.log.problem, table, sound & ~known, "x_m", expected)
+
+
+def _bear_on_nothing(names):
+    return message(
+        "known_unobserved", "observed nowhere, so that they bear on nothing: {points}", points=names
+    )
+
+
+def _left_out(names):
+    return message("targets_unobserved", "observed nowhere and left out: {points}", points=names)
+
+
+def _warn_unobserved(files, table, seen, told):
+    """told: told(names) -> the Message of points that nothing observes"""
+    if any(files.is_unreadable(name) for name in ("image_points", "setups", "directions")):
+        return
+    lacking = [
+        (row, point)
+        for row, point in zip(table.rows, table.of("point"), strict=True)
+        if point is not None and point not in seen
+    ]
+    if lacking:
+        names = listed([point for _, point in lacking], MOST_NAMED)
+        files.log.warning(table.file, told(names), lacking[0][0], "point")
+
+
+def _warn_control_that_checks(files):
+    """A control point that is a check point, too, is compared with itself."""
+    control, check = files.tables["control"], files.tables["check"]
+    if not has_rows(control) or not has_rows(check):
+        return
+    used = {
+        (point, system)
+        for point, system, use in zip(
+            control.of("point"), control.of("system"), control.of("use"), strict=True
+        )
+        if use != "check"
+    }
+    for row, point, system in zip(check.rows, check.of("point"), check.of("system"), strict=True):
+        if (point, system) in used:
+            expected = message(
+                "check_is_control",
+                "{point!r} is a control point, too; it is no independent check",
+                point=point,
+            )
+            files.log.warning(check.file, expected, row, "point")
+
+
+# What is held (sd 0) twice: values that contradict each other, or that leave nothing to adjust.
+
+SAME_M, SAME_DEG = 1e-9, 1e-9
+# table: axes that must be held at all its points before its value is held already
+AXES_OF = {
+    "distances": "xyz",
+    "azimuths": "xy",
+    "horizontal_angles": "xy",
+    "vertical_angles": "xyz",
+    "height_differences": "z",
+    "plumb_lines": "xy",
+}
+
+
+def check_held(files):
+    """Observations held exactly between points that are held, and held twice at two values."""
+    held = _held_axes(files)
+    for name in READINGS:
+        table = files.tables[name]
+        if not has_rows(table) or "setup" in table.columns or name == "vectors":
+            continue
+        sd = table.numbers("s_arcsec" if name in ANGLES else "s_mm")
+        exact = (sd == 0) & np.array([use != "check" for use in table.of("use")], dtype=bool)
+        if exact.any():
+            places = np.flatnonzero(exact)
+            _refuse_between_held(files, name, table, places, held)
+            _refuse_two_values(files, name, table, places)
+
+
+def _held_axes(files):
+    """{point: text of its axes that control.csv holds}."""
+    control = files.tables["control"]
+    if not has_rows(control):
+        return {}
+    sds = [control.numbers(f"s{axis}_mm") == 0 for axis in "xyz"]
+    rows = zip(control.of("point"), control.of("system"), control.of("use"), *sds, strict=True)
+    return {
+        point: "".join(axis for axis, is_held in zip("xyz", axes, strict=True) if is_held)
+        for point, system, use, *axes in rows
+        if system is None and use != "check"
+    }
+
+
+def _ends(name, table):
+    columns = ("at", "from", "to") if name == "horizontal_angles" else ("from", "to")
+    return [table.of(column) for column in columns]
+
+
+def _refuse_between_held(files, name, table, places, held):
+    sd = "s_arcsec" if name in ANGLES else "s_mm"
+    is_horizontal = (
+        [kind == "horizontal" for kind in table.of("kind")] if name == "distances" else None
+    )
+    ends = _ends(name, table)
+    for place in places:
+        points = [column[place] for column in ends]
+        axes = "xy" if is_horizontal and is_horizontal[place] else AXES_OF[name]
+        if all(set(axes) <= set(held.get(point, "")) for point in points):
+            named = joined([repr(point) for point in points])
+            expected = message(
+                "held_already",
+                "found 0, but {named} are held already ({axes} in control.csv); expected a "
+                "standard deviation above 0, or no such row",
+                named=named,
+                axes=axes,
+            )
+            files.log.problem(table.file, expected, table.rows[place], sd)
+
+
+def _refuse_two_values(files, name, table, places):
+    """One quantity held at two values; of distances either direction is the same quantity."""
+    if name == "plumb_lines":
+        return
+    if name in ANGLES:
+        columns = [f"{ANGLES[name]}_{unit}" for unit in ("deg", "gon", "dms")]
+        same = SAME_DEG
+    else:
+        columns, same = ["dz_m" if name == "height_differences" else "distance_m"], SAME_M
+    values = np.column_stack([table.numbers(column) for column in columns])
+    kinds = table.of("kind") if name == "distances" else [None] * len(values)
+    ends, first = _ends(name, table), {}
+    for place in places:
+        points = tuple(column[place] for column in ends)
+        if None in points:
+            continue
+        key = (kinds[place] or "spatial", *(sorted(points) if name == "distances" else points))
+        before = first.setdefault(key, place)
+        if not np.allclose(values[before], values[place], rtol=0, atol=same, equal_nan=True):
+            expected = message(
+                "held_at_two",
+                "held at another value than in row {row}; expected one value, or a standard "
+                "deviation above 0",
+                row=table.rows[before],
+            )
+            files.log.problem(table.file, expected, table.rows[place], "to")
+
 
 WITH_POINTS = ("minimal", "inner")
 
