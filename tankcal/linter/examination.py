@@ -166,16 +166,16 @@ def examine(height, volume, rounding):
                 break
             _reopen(rows, doubtful.pop())
             continue
-        hypothesis = _beyond_joint(rows, explain(rows, row), moved)
-        if hypothesis.kind == "joint" and hypothesis.rows[0] not in rows.joints:
-            rows.joints = sorted([*rows.joints, hypothesis.rows[0]])
-            if hypothesis.excess > 1 and hypothesis.rows[0] not in seen:
-                doubtful.append(hypothesis.rows[0])
-                seen.add(hypothesis.rows[0])
-        elif hypothesis.is_null:
+        best = _beyond_joint(rows, explain(rows, row), moved)
+        if best.kind == "joint" and best.rows[0] not in rows.joints:
+            rows.joints = sorted([*rows.joints, best.rows[0]])
+            if best.excess > 1 and best.rows[0] not in seen:
+                doubtful.append(best.rows[0])
+                seen.add(best.rows[0])
+        elif best.is_null:
             rows.is_settled[row] = True
         else:
-            faults += _mend(rows, hypothesis)
+            faults += _mend(rows, best)
     else:
         row = -1
     mended = np.where(rows.is_sound, rows.volume, np.nan)
@@ -189,40 +189,32 @@ def _reopen(rows, joint):
     rows.is_settled[max(joint - _SECOND_LOOK, 0) : joint + _SECOND_LOOK] = False
 
 
-def _beyond_joint(rows, hypothesis, moved):
-    """The hypothesis, or a better one: a wrong row beside a joint may be a joint elsewhere.
+def _beyond_joint(rows, best, moved):
+    """The best hypothesis, or a better one: a wrong row beside a joint may be a joint elsewhere.
 
     moved  joints that were asked about already
     """
-    beside = [
-        j for j in rows.joints if hypothesis.kind == "row" and hypothesis.rows[0] in (j, j - 1)
-    ]
+    beside = [j for j in rows.joints if best.kind == "row" and best.rows[0] in (j, j - 1)]
     if not beside or beside[0] in moved:
-        return hypothesis
+        return best
     joint = beside[0]
     moved.add(joint)
     rows.joints = [one for one in rows.joints if one != joint]
-    other = explain(rows, hypothesis.rows[0])
+    other = explain(rows, best.rows[0])
     if other.kind == "joint" and other.rows[0] != joint:
         return other
     rows.joints = sorted([*rows.joints, joint])
-    return hypothesis
+    return best
 
 
-def _mend(rows, hypothesis):
+def _mend(rows, best):
     """The faults of an alternative; its rows are mended, or left out from now on."""
-    first, last = hypothesis.rows[0], hypothesis.rows[-1]
-    if hypothesis.kind == "swap":
+    first, last = best.rows[0], best.rows[-1]
+    if best.kind == "swap":
         rows.volume[[first, last]] = rows.volume[[last, first]]
         return [Fault("swap", first, last, 0.0)]
-    if hypothesis.kind in ("row", "pair"):
-        wrong = dict(
-            zip(
-                hypothesis.rows if hypothesis.kind == "pair" else (first,),
-                hypothesis.sizes,
-                strict=True,
-            )
-        )
+    if best.kind in ("row", "pair"):
+        wrong = dict(zip(best.rows if best.kind == "pair" else (first,), best.sizes, strict=True))
         rows.is_sound[list(wrong)] = False
         return [
             Fault("row", row, row, size)
@@ -230,8 +222,8 @@ def _mend(rows, hypothesis):
             if not (rows.volume[row] == 0 and size > 0)  # an empty tank above its bottom
         ]
     end = len(rows.height) if last is None else last + 1
-    rows.volume[first:end] -= hypothesis.sizes[0]
-    return [Fault(hypothesis.kind, first, end - 1, hypothesis.sizes[0])]
+    rows.volume[first:end] -= best.sizes[0]
+    return [Fault(best.kind, first, end - 1, best.sizes[0])]
 
 
 def _merged(faults, count):

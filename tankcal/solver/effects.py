@@ -26,7 +26,7 @@ def variances(cofactors, columns, jac):
     jac      (n, m, K)
     """
     n, m, _ = jac.shape
-    rows, found = _sparse_rows(cofactors.model.unknowns, columns, jac), []
+    rows, found = sparse_rows(cofactors.model.unknowns, columns, jac), []
     with threads_for(cofactors.plan.reduced):
         for part in _parts(n * m, cofactors.plan.reduced + 3):
             found.append(_variances(cofactors, rows[part]))
@@ -58,7 +58,7 @@ def _through(cofactors, rows):
 def responses(cofactors, columns, jac):
     """Parts (slice of the n m rows, Q J' (unknowns, k)), one after the other; see variances."""
     n, m, _ = jac.shape
-    rows = _sparse_rows(cofactors.model.unknowns, columns, jac)
+    rows = sparse_rows(cofactors.model.unknowns, columns, jac)
     for part in _parts(n * m, cofactors.model.unknowns):
         found = _response(cofactors, rows[part])
         if cofactors.datum is not None:
@@ -75,7 +75,7 @@ def covariances(cofactors, columns, jac):
     Other than in `responses` the functions may be any, not only what observations can see: where a
     datum is chosen they may change with it.
     """
-    rows, found = _sparse_rows(cofactors.model.unknowns, columns[None], jac[None]), []
+    rows, found = sparse_rows(cofactors.model.unknowns, columns[None], jac[None]), []
     with threads_for(cofactors.plan.reduced):
         for part in _parts(len(jac), cofactors.model.unknowns):
             found.append(_response(cofactors, rows[part]))
@@ -184,8 +184,8 @@ def _gradient(cofactors):
     return gradient[: cofactors.plan.reduced]
 
 
-def _sparse_rows(unknowns, columns, jac):
-    """All rows (n m, unknowns) as one sparse matrix."""
+def sparse_rows(unknowns, columns, jac):
+    """All rows (n m, unknowns) as one sparse matrix; columns (n, K), -1 where fixed."""
     n, m, k = jac.shape
     place = np.broadcast_to(columns[:, None, :], jac.shape).reshape(n * m, k)
     row = np.broadcast_to(np.arange(n * m)[:, None], (n * m, k))

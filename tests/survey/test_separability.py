@@ -52,9 +52,9 @@ def test_all_unknowns_are_asked_for_once_for_each_observation_set_aside(monkeypa
     found = adjust_survey(
         replace(measurements, settings=replace(measurements.settings, explain=False))
     ).adjusted
-    asked, responses = [], separability.responses
+    asked, moves_of = [], separability.moves_of
     monkeypatch.setattr(
-        separability, "responses", lambda *given: asked.append(given) or responses(*given)
+        separability, "moves_of", lambda *given: asked.append(given) or moves_of(*given)
     )
     monkeypatch.setattr(separability, "WORTH", 0.0)
     alternatives(found, "image points", 5)

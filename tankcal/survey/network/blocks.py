@@ -182,11 +182,11 @@ def acting(problem, solution, number, members, v):
     group, a = problem.observations[number], solution.cofactor.jacobians[number][0]
     columns = problem.model.groups[number].columns
     back = group.whitened(np.eye(len(own)))
-    moves = _moves(solution, columns, a)
+    moves = moves_of(solution, columns, a)
     return Acting(own, back @ v[own], back, a, columns[0], moves, group.covariance)
 
 
-def _moves(solution, columns, jac):
+def moves_of(solution, columns, jac):
     """Change (unknowns + 1, m) of the unknowns by an error of one of rows jac (m, K)."""
     found = np.hstack([part for _, part in responses(solution.cofactor, columns, jac[None])])
     return np.vstack([found, np.zeros((1, found.shape[1]))])
@@ -240,7 +240,7 @@ def tested(problem, solution, number, members, delta0):
             statistic[mine] = test / np.sqrt(members.share[mine[0]])
         else:
             off, away, unexplained, _ = expected(members, part, mine, v, jac)
-            total = unexplained + away @ _moves(solution, columns, away)[columns[0]]
+            total = unexplained + away @ moves_of(solution, columns, away)[columns[0]]
             sds = np.sqrt(np.diag(total))
             w[mine], mdb[mine] = off / sds, delta0 * sds
             inverse = np.linalg.inv(total)

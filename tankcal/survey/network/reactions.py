@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse
 
-from tankcal.solver.effects import constraint_reactions
+from tankcal.solver.effects import constraint_reactions, sparse_rows
 from tankcal.survey.network.reliability import Residuals, noncentrality
 
 HELD = "held coordinates"  # source of their Residuals; rows are 3 point + axis
@@ -94,15 +94,8 @@ def reactions(problem, solution, fixed):
 
 def _rows_of(parts, layout, width):
     """Sparse rows (all, width) of pairs (observations, derivatives (n, m, K)) in a layout."""
-    found = [scipy.sparse.csr_array((0, width))]
-    for one, jac in parts:
-        n, m, _ = jac.shape
-        place = np.broadcast_to(one.columns(layout)[:, None, :], jac.shape)
-        row = np.broadcast_to(np.arange(n * m).reshape(n, m, 1), jac.shape)
-        kept = place >= 0
-        entries = jac[kept], (row[kept], place[kept])
-        found.append(scipy.sparse.csr_array(entries, shape=(n * m, width)))
-    return scipy.sparse.vstack(found, format="csr")
+    found = [sparse_rows(width, one.columns(layout), jac) for one, jac in parts]
+    return scipy.sparse.vstack([scipy.sparse.csr_array((0, width)), *found], format="csr")
 
 
 def _conditioned(problem, solution, layout, x):

@@ -29,8 +29,8 @@ from scipy.linalg import solve_triangular
 from scipy.special import chdtri
 
 from tankcal.adjust import CRITICAL
-from tankcal.solver.effects import cofactors_within, responses
-from tankcal.survey.network.blocks import acting, expected, observations_of
+from tankcal.solver.effects import cofactors_within
+from tankcal.survey.network.blocks import acting, expected, moves_of, observations_of
 from tankcal.survey.network.reactions import HELD
 from tankcal.survey.network.reliability import UNCONTROLLED
 
@@ -123,8 +123,7 @@ def _aside(problem, solution, source, row):
 
 
 def _made(solution, e, jac, columns, *more):
-    moves = np.hstack([part for _, part in responses(solution.cofactor, columns, jac[None])])
-    moves = np.vstack([moves, np.zeros((1, moves.shape[1]))])
+    moves = moves_of(solution, columns, jac)
     inverse = np.linalg.inv(np.eye(len(e)) + jac @ moves[columns[0]])
     return _Aside(e, jac, columns[0], moves, inverse, *more)
 

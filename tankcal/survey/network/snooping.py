@@ -66,29 +66,29 @@ def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, *
     if test not in ("w", "tau"):
         raise ValueError(f"test {test!r}: w or tau")
     adjusted, rounds = adjust(survey, **options), 1
-    suspects = _suspects(adjusted, _limit(adjusted, critical, test))
-    if robust and _worst(adjusted).max(initial=0) > _limit(adjusted, critical, test):
+    limit, candidates = _limit(adjusted, critical, test), _Candidates(survey)
+    suspects = _suspects(adjusted, limit)
+    if robust and np.nanmax(candidates.statistic(adjusted)[1], initial=0) > limit:
         try:
-            thinner, rounds = _robust(survey, adjusted, critical, options)
-            adjusted, survey = adjust(thinner, **options), thinner
+            thinner, rounds = _robust(candidates, adjusted, critical, options)
+            adjusted = adjust(thinner, **options)
         except SolutionError:
             rounds += 1  # too much went at once: one by one then
-    candidates = _Candidates(survey)
 
     def tests(now):
-        return candidates.tests(now, _limit(now, critical, test))
+        return *candidates.statistic(now), _limit(now, critical, test)
 
     def readjust(now, goes, comes):
-        changed = candidates.shares(now.survey, goes, comes)
-        return adjust(with_use(started(now.survey, now), changed), **options)
+        share = candidates.shares(now.survey)
+        share[comes], share[goes] = 1.0, 0.0
+        return adjust(candidates.with_shares(started(now.survey, now), share), **options)
 
     found = search(
         adjusted, tests, readjust, at_once=AT_ONCE, returns=RETURNS,
         choose=candidates.one_of_each_point, keep=True, rounds=max_rounds,
     )  # fmt: skip
     survey = found.adjustment.survey
-    gone = np.concatenate([np.zeros(0, dtype=bool), *(s == 0 for s in _shares(survey).values())])
-    removed = candidates.listed(gone, found.statistic)
+    removed = candidates.listed(candidates.shares(survey) == 0, found.statistic)
     needed = candidates.listed(found.needed, found.statistic)
     return Cleaned(found.adjustment, survey, removed, rounds + found.rounds, suspects, needed)
 
@@ -137,17 +137,8 @@ def with_use(survey, uses):
     return replace(survey, observations=tuple(observations), image_points=images)
 
 
-def _shares(survey):
-    """{source: (n,)} the shares that a survey has now."""
-    shares = {
-        number: np.ones(len(one)) if one.use is None else np.array(one.use, dtype=float)
-        for number, one in enumerate(survey.observations)
-    }
-    images = survey.image_points
-    if images is not None:
-        n = len(images.point)
-        shares["image points"] = np.ones(n) if images.use is None else np.array(images.use, float)
-    return shares
+def _rows_of(survey, source):
+    return survey.image_points if source == "image points" else survey.observations[source]
 
 
 def _tables(adjusted):
@@ -155,75 +146,71 @@ def _tables(adjusted):
     return [t for t in tables if t.source != "known beforehand" and not t.exact]
 
 
-def _worst(adjusted):
-    """Largest |w| of each observation, all groups one after the other."""
-    return np.concatenate([table.test_statistic for table in _tables(adjusted)])
-
-
-def _robust(survey, adjusted, critical, options):
+def _robust(candidates, adjusted, critical, options):
     """A survey in which what disagrees has a share of zero, found by weights that fall off."""
     for turn in range(ROUNDS):
-        size = max(1.0, 1.4826 * float(np.median(_worst(adjusted))) / 1.4)
-        shares, change = _shares(survey), 0.0
-        for table in _tables(adjusted):
-            away = table.test_statistic / size
-            if turn < HUBER_ROUNDS:
-                share = np.minimum(1.0, HUBER / np.maximum(away, 1e-9))
-            else:
-                share = np.exp(-0.5 * np.maximum(0.0, (away / DANISH) ** 2 - 1))
-            share = np.maximum(share, 1e-6)
-            mine = shares[table.source]
-            change = max(change, float(np.abs(share - mine[table.rows]).max(initial=0)))
-            mine[table.rows] = share
-        survey = with_use(started(survey, adjusted), shares)
+        statistic = candidates.statistic(adjusted)[1]
+        size = max(1.0, 1.4826 * float(np.nanmedian(statistic)) / 1.4)
+        away, share = statistic / size, candidates.shares(adjusted.survey)
+        if turn < HUBER_ROUNDS:
+            new = np.minimum(1.0, HUBER / np.maximum(away, 1e-9))
+        else:
+            new = np.exp(-0.5 * np.maximum(0.0, (away / DANISH) ** 2 - 1))
+        new = np.where(np.isnan(away), share, np.maximum(new, 1e-6))
+        change = np.abs(new - share).max(initial=0)
+        survey = candidates.with_shares(started(adjusted.survey, adjusted), new)
         adjusted = adjust(survey, **{**options, "tolerance": 1e-2})
         if turn > HUBER_ROUNDS and change < 0.02:
             break
-    shares = _shares(survey)
-    for table in _tables(adjusted):
-        good = table.test_statistic / size <= critical
-        shares[table.source][table.rows] = good.astype(float)
-    return with_use(survey, shares), turn + 2
+    away, share = candidates.statistic(adjusted)[1] / size, candidates.shares(survey)
+    share = np.where(np.isnan(away), share, away <= critical)
+    return candidates.with_shares(survey, share), turn + 2
 
 
 class _Candidates:
     """The observations of a Survey in one row, those of one source after those of another."""
 
     def __init__(self, survey):
+        counts = {number: len(one) for number, one in enumerate(survey.observations)}
+        if survey.image_points is not None:
+            counts["image points"] = len(survey.image_points.point)
+        ends = np.cumsum([0, *counts.values()]).tolist()
+        self.count = ends[-1]
+        self.slices = dict(zip(counts, map(slice, ends, ends[1:]), strict=False))
         self.kinds = {number: one.kind for number, one in enumerate(survey.observations)}
-        self.count, self.slices = 0, {}
-        for source, share in _shares(survey).items():
-            self.slices[source] = slice(self.count, self.count + len(share))
-            self.count += len(share)
 
     def places(self, table):
         """(n,) places of the rows of Residuals."""
         return self.slices[table.source].start + table.rows
 
-    def tests(self, adjusted, critical):
-        """Whether each is used, its test statistic (nan: it does not occur), and the limit."""
+    def statistic(self, adjusted):
+        """Whether each is used, and its test statistic; nan: it does not occur."""
         used, statistic = np.zeros(self.count, dtype=bool), np.full(self.count, np.nan)
         for table in _tables(adjusted):
             mine = self.places(table)
             used[mine], statistic[mine] = table.used, table.test_statistic
-        return used, statistic, critical
+        return used, statistic
 
-    def shares(self, survey, goes, comes):
-        """{source: (n,)} the shares of a survey when some go and others come back."""
-        shares = _shares(survey)
-        for source, share in shares.items():
-            share[comes[self.slices[source]]] = 1.0
-            share[goes[self.slices[source]]] = 0.0
-        return shares
+    def shares(self, survey):
+        """(k,) with which each takes part."""
+        share = np.ones(self.count)
+        for source, mine in self.slices.items():
+            use = _rows_of(survey, source).use
+            if use is not None:
+                share[mine] = use
+        return share
+
+    def with_shares(self, survey, share):
+        """The survey with the share (k,) of each."""
+        return with_use(survey, {source: share[mine] for source, mine in self.slices.items()})
 
     def one_of_each_point(self, adjusted, goes, off):
         """Mask of what goes, at most one of each point: the others may only follow its blunder."""
         survey = adjusted.survey
         n, tied = len(survey.points), []
         for table in _tables(adjusted):
-            images = table.source == "image points"
-            of = survey.image_points if images else survey.observations[table.source]
-            ties = ("point",) if images else of.ties
+            of = _rows_of(survey, table.source)
+            ties = ("point",) if of is survey.image_points else of.ties
             owners = [np.asarray(getattr(of, name))[table.rows] for name in ties]
             tied.append((self.places(table), owners))
         counts = sum(
