@@ -64,7 +64,7 @@ def searched(survey, options, gross=None):
             second = snoop(again, robust=False, **options)
         except SolutionError:
             second = found
-        if _lost(second.adjusted).sum() < _lost(found.adjusted).sum():
+        if second.adjusted.problem.aside.sum() < found.adjusted.problem.aside.sum():
             rounds = found.rounds + second.rounds
             return Searched(second.adjusted, second.removed, rounds, second.needed)
     return Searched(found.adjusted, found.removed, found.rounds, found.needed)
@@ -103,14 +103,9 @@ def _without(survey, options, gross):
     return replace(whole, rounds=first.rounds + whole.rounds)
 
 
-def _lost(adjusted):
-    """(points,) True for points that do not take part."""
-    return np.array([bool(why) for why in adjusted.problem.set_aside], dtype=bool)
-
-
 def _readmitted(found, gross):
     """The survey with all readings of points that the search left with too few; None: no such."""
-    lost = _lost(found.adjusted)
+    lost = found.adjusted.problem.aside
     if not lost.any():
         return None
     survey, uses = found.survey, {}

@@ -80,6 +80,11 @@ class Problem:
     ordinary: int = 0
     blocks: tuple = ()
 
+    @property
+    def aside(self):
+        """(points,) True for those that do not take part."""
+        return np.array([bool(why) for why in self.set_aside], dtype=bool)
+
     def name_of_point(self, point):
         """Name of a point."""
         return self.points[point]

@@ -122,12 +122,11 @@ def _feeling(problem):
 def _idle(problem):
     """{id of columns: mask} of the unknowns that have no column because nobody observed them."""
     layout = problem.layout
-    aside = np.array([bool(why) for why in problem.set_aside], dtype=bool)
     unused = np.ones(len(layout.scale), dtype=bool)
     for one, _ in _feeling(problem):
         instrument = getattr(one, "instrument", np.zeros(0, dtype=int))
         unused[instrument[instrument >= 0]] = False
-    return {id(layout.points): aside[:, None], id(layout.scale): unused}
+    return {id(layout.points): problem.aside[:, None], id(layout.scale): unused}
 
 
 def dependent(adjusted, quantities, fixed=False):

@@ -68,7 +68,7 @@ class Reactions:
 
 def reactions(problem, solution, fixed):
     """The Reactions of held coordinates; fixed (points, 3) True for those that are asked for."""
-    used = ~np.array([bool(why) for why in problem.set_aside], dtype=bool)
+    used = ~problem.aside
     held = np.flatnonzero(fixed & used[:, None] & (problem.layout.points < 0))
     unknowns, k = problem.model.unknowns, len(held)
     points = problem.layout.points.copy()

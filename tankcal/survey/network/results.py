@@ -109,15 +109,13 @@ class Adjusted:
     @property
     def xyz_m(self):
         """(points, 3) adjusted coordinates; nan for points that were set aside."""
-        return self.problem.centre_m + np.where(self._aside[:, None], np.nan, self._state.xyz_m)
+        return self.problem.centre_m + np.where(
+            self.problem.aside[:, None], np.nan, self._state.xyz_m
+        )
 
     @property
     def _state(self):
         return self.solution.unknowns
-
-    @property
-    def _aside(self):
-        return np.array([bool(why) for why in self.problem.set_aside], dtype=bool)
 
     def effect_of_known_m(self, of, index):
         """Change (3 points,) of all coordinates by one sd of an unknown known beforehand.
