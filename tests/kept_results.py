@@ -11,7 +11,7 @@ from pathlib import Path
 from schemas import keys_in
 
 from tankcal.record.camera_versions import CAMERA
-from tankcal.record.plan_versions import PLAN
+from tankcal.record.plan import PLAN
 
 KEPT = Path(__file__).with_name("kept")
 FREE = (

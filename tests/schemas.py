@@ -12,8 +12,7 @@ from tankcal.record.camera_product import ProductFile
 from tankcal.record.camera_stability import StabilityFile
 from tankcal.record.camera_versions import CAMERA
 from tankcal.record.making import Record
-from tankcal.record.plan import PlanFile
-from tankcal.record.plan_versions import PLAN
+from tankcal.record.plan import PLAN, PlanFile
 from tankcal.record.schema import json_schema
 from tankcal.record.versions import RECORD
 

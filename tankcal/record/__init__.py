@@ -9,7 +9,7 @@ from tankcal.record.plain_data import without_collection
 from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
 
 __all__ = [
-    "FORMAT", "VERSION", "load", "migrated", "record_of", "record_of_adjustment", "save",
+    "FORMAT", "VERSION", "load", "migrated", "read", "record_of", "record_of_adjustment", "save",
     "version_of",
 ]  # fmt: skip
 
@@ -49,3 +49,15 @@ def load(path):
         )
         raise InputError(Problem(name, expected)) from error
     return migrated(record, name)
+
+
+def read(path):
+    """The record at `path` as a `record.making.Record`, each part a dataclass.
+
+    >>> read("results/record.json").capacity.volume_m3[-1]  # doctest: +SKIP
+    1249.65
+    """
+    from tankcal.record.making import Record
+    from tankcal.record.schema import from_plain
+
+    return from_plain(Record, load(path), Path(path).name)

@@ -10,7 +10,7 @@ from tankcal.job.model import InputFile
 from tankcal.job.model.parts import Course, Deadwood
 from tankcal.job.model.settings import Datum, Material, Survey, Switches, TableSpec, Tank
 from tankcal.pipeline.corrections import Correction
-from tankcal.record import parts, rules, statements, survey, table, texts
+from tankcal.record import statements, survey, table, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.plain_data import to_plain
 from tankcal.record.schema import Saved, filled_from, key
@@ -59,17 +59,17 @@ class Record(Saved, kw_only=True):
     densities: list[table.VolumesOfDensity] = key("further densities of the liquid", default=())
     gross: table.GrossShell | None = key("null for a tank without courses", default=None)
     corrections: list[Correction] = key("that bear on the job, in their order", default=())
-    solid: list[parts.Detail] | None = key("sizes of a tank without courses", default=None)
-    bottom: list[parts.Detail] | None = key("how it was taken; null: it is flat", default=None)
+    solid: list[table.Detail] | None = key("sizes of a tank without courses", default=None)
+    bottom: list[table.Detail] | None = key("how it was taken; null: it is flat", default=None)
     deadwood: list[Deadwood] = key("as declared, whether or not it is on", default=())
-    roof: list[parts.Detail] | None = key("the floating roof", default=None)
+    roof: list[table.Detail] | None = key("the floating roof", default=None)
     budget: list[statements.BudgetLine] = key("of the top row, by the table alone", default=())
     choices: list[table.Choice] = key("everything that was assumed")
     warnings: list[texts.WarningRecord] = key("what should be read")
     adjustment: AdjustmentRecord | None = key("null: points were handed in", default=None)
     budgets: list[statements.StatedBudget] = key("stated volumes, then deliveries", default=())
     deliveries: list[WorstDeliveries] = key("the worst of each minimum height", default=())
-    rule: rules.TableJudged | None = key("null: the job has no decision rule", default=None)
+    rule: statements.TableJudged | None = key("null: the job has no decision rule", default=None)
     monte_carlo: statements.MonteCarlo | None = key("null: it is off", default=None)
 
 
@@ -94,17 +94,17 @@ def record_of(result):
             densities=table.densities_of(result),
             gross=table.gross_of(result),
             corrections=result.corrections,
-            solid=parts.solid_of(result),
-            bottom=parts.bottom_of(result),
+            solid=table.solid_of(result),
+            bottom=table.bottom_of(result),
             deadwood=job.deadwood,
-            roof=parts.roof_of(result),
+            roof=table.roof_of(result),
             budget=statements.budget_of(result),
             choices=table.choices_of(result),
             warnings=texts.warnings_of(result.warnings),
             adjustment=adjustment and adjustment_of(adjustment, job.measurements),
             budgets=statements.budgets_of(result),
             deliveries=result.stated.worst,
-            rule=rules.rule_of(result.rule),
+            rule=statements.rule_of(result.rule),
             monte_carlo=statements.monte_carlo_of(result),
         )
     )

@@ -7,9 +7,11 @@ import numpy as np
 from tankcal.planning.doubtful import GroupReliability
 from tankcal.planning.prediction import PointOutlook, SectionOutlook
 from tankcal.record.plain_data import to_plain
-from tankcal.record.plan_versions import PLAN
+from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import Saved, filled_from, key
 from tankcal.record.texts import WarningRecord, warnings_of
+
+PLAN = SavedFormat("tankcal-plan", 1, "plan.json")  # so far one version
 
 
 class PlannedDatum(Saved):

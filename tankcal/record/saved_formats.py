@@ -15,7 +15,7 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import listed, message
-from tankcal.record.schema import missing_keys, problems_in
+from tankcal.record.schema import checked
 
 MOST_NAMED = 3  # keys that are missing
 SCHEMAS = Path(__file__).with_name("schemas")
@@ -98,8 +98,7 @@ class SavedFormat:
                 found=f"{self.name}/{version}", what=str(error), file=self.file,
             )  # fmt: skip
             raise InputError(Problem(name, expected)) from error
-        schema = self.schema(kind)
-        missing = missing_keys(saved, schema)
+        missing, problems = checked(saved, self.schema(kind), name)
         if missing:
             expected = message(
                 "record_lacks_keys",
@@ -108,7 +107,6 @@ class SavedFormat:
                 found=f"{self.name}/{version}", keys=listed(missing, MOST_NAMED), file=self.file,
             )  # fmt: skip
             raise InputError(Problem(name, expected))
-        problems = problems_in(saved, schema, name)
         if problems:
             raise InputError(problems)
         return saved

@@ -5,11 +5,12 @@ name. A float may be null, for NaN and infinity are written so; anything else on
 has None. A Message `x` is written as `x`, and as `x_code` and `x_values` at the end of its object.
 """
 
+import re
 import types
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from functools import cache
 from inspect import getdoc
-from itertools import islice
+from itertools import chain
 from math import isfinite
 from operator import attrgetter
 from typing import Annotated, Any, Union, dataclass_transform, get_args, get_origin, get_type_hints
@@ -200,33 +201,33 @@ def _columns(cls, definitions):
 # ---- what is wrong with data
 
 
-def missing_keys(data, schema):
-    """Sorted paths of the keys that data lack, `[]` being any row: "sections[].modes"."""
-    return sorted({path for path, what in _faults(data, schema, schema, "", "") if what is None})
-
-
-def problems_in(data, schema, name):
-    """A Problem for each value that is not what a schema says, the first MOST_TOLD of them.
+def checked(data, schema, name):
+    """What is wrong with data: the keys that are missing, and a Problem for each wrong value.
 
     name  of the file
+
+    Returns sorted paths of the former, `[]` being any row ("sections[].modes"), and the first
+    MOST_TOLD of the latter.
     """
-    found = (one for one in _faults(data, schema, schema, "", None) if one[1] is not None)
-    told = list(islice(found, MOST_TOLD + 1))
-    problems = [Problem(name, expected, column=path) for path, expected in told[:MOST_TOLD]]
-    if len(told) > MOST_TOLD:
-        more = message("record_has_more", "further values are not what they should be, either")
-        problems.append(Problem(name, more))
-    return problems
+    missing, problems = set(), []
+    for path, expected in _faults(data, schema, schema, ""):
+        if expected is None:
+            missing.add(re.sub(r"\[\d+\]", "[]", path))
+        elif len(problems) < MOST_TOLD:
+            problems.append(Problem(name, expected, column=path))
+        else:
+            more = message("record_has_more", "further values are not what they should be, either")
+            return sorted(missing), [*problems, Problem(name, more)]
+    return sorted(missing), problems
 
 
-def _faults(value, schema, root, path, row):
+def _faults(value, schema, root, path):
     """(path, what was expected) of each fault; None in place of the latter where a key is missing.
 
-    row  how a row of a list stands in a path: its number when None
+    The keys that are missing come before values that are wrong, in each object and list.
     """
-    for one in schema.get("anyOf", ()):
-        if value is None and one.get("type") == "null":
-            return
+    if value is None and {"type": "null"} in schema.get("anyOf", ()):
+        return
     schema = _resolved(schema, root)
     names = schema.get("type", ())
     names = [names] if isinstance(names, str) else names
@@ -235,12 +236,13 @@ def _faults(value, schema, root, path, row):
             yield from ((_below(path, one), None) for one in schema["required"])
         elif names == ["array"]:
             yield path, None
-        yield path, _expected(names, value)
+        else:
+            yield path, _expected(names, value)
     elif isinstance(value, dict):
-        yield from _faults_of_object(value, schema, root, path, row)
+        yield from _faults_of_object(value, schema, root, path)
     elif isinstance(value, list):
-        yield from _faults_of_array(value, schema, root, path, row)
-    elif type(value) in (int, float) and not _is_finite(value):
+        yield from _faults_of_array(value, schema, root, path)
+    elif type(value) in (int, float) and not _are_finite([value]):
         yield path, _expected(names, value)
 
 
@@ -253,7 +255,7 @@ def _resolved(schema, root):
     return schema
 
 
-def _faults_of_object(value, schema, root, path, row):
+def _faults_of_object(value, schema, root, path):
     for one in schema.get("required", ()):
         if one not in value:
             yield _below(path, one), None
@@ -261,38 +263,37 @@ def _faults_of_object(value, schema, root, path, row):
     for one, item in value.items():
         below = properties.get(one, other)
         if below is not None:
-            yield from _faults(item, below, root, _below(path, one), row)
+            yield from _faults(item, below, root, _below(path, one))
 
 
-def _faults_of_array(value, schema, root, path, row):
+def _faults_of_array(value, schema, root, path):
     length = schema.get("minItems")
     if length is not None and len(value) != length:
         yield path, message("record_length", "found {found} values, expected {length}",
                             found=len(value), length=length)  # fmt: skip
     items = schema.get("items", {})
-    if not items or _are_scalars(value, items):
-        return
-    for number, item in enumerate(value):
-        place = f"{path}[{number if row is None else row}]"
-        yield from _faults(item, items, root, place, row)
+    if items and not _are_sound(value, items):
+        for number, item in enumerate(value):
+            yield from _faults(item, items, root, f"{path}[{number}]")
 
 
-def _are_scalars(values, items):
-    """Whether all values are of a type that needs no look at each: a column may have 200 000."""
+def _are_sound(values, items):
+    """Whether no value, or value of lists of them, needs a look: there may be 200 000 of them."""
+    found = set(map(type, values))
+    if found == {list} and items.get("type") == "array" and "minItems" not in items:
+        return not items.get("items") or _are_sound([*chain.from_iterable(values)], items["items"])
     names = items.get("type", ())
     allowed = set().union(*(_TYPES[one] for one in ([names] if isinstance(names, str) else names)))
-    found = set(map(type, values))
     if not found <= allowed - {list, dict}:
         return False
-    return not found & {int, float} or all(
-        _is_finite(one) for one in values if type(one) in (int, float)
-    )
+    return not found & {int, float} or _are_finite(values)
 
 
-def _is_finite(number):
+def _are_finite(values):
+    """Whether all numbers among values are such that a float holds."""
     try:
-        return isfinite(number)
-    except OverflowError:  # a whole number that no float holds
+        return all(map(isfinite, (one for one in values if type(one) in (int, float))))
+    except OverflowError:
         return False
 
 
@@ -303,17 +304,21 @@ def _below(path, one):
 def _expected(names, value):
     found = repr(value) if not isinstance(value, list | dict) else type(value).__name__
     found = found if len(found) <= 40 else f"{found[:37]}..."
-    name = next(one for one in names if one != "null")
-    words = {
-        "number": message("record_number", "a number"),
-        "integer": message("record_integer", "a whole number"),
-        "string": message("record_string", "a text"),
-        "boolean": message("record_boolean", "true or false"),
-        "array": message("record_array", "a list"),
-        "object": message("record_object", "an object with keys"),
-    }
+    match next(one for one in names if one != "null"):
+        case "number":
+            expected = message("record_number", "a number")
+        case "integer":
+            expected = message("record_integer", "a whole number")
+        case "string":
+            expected = message("record_string", "a text")
+        case "boolean":
+            expected = message("record_boolean", "true or false")
+        case "array":
+            expected = message("record_array", "a list")
+        case _:
+            expected = message("record_object", "an object with keys")
     return message("record_value", "found {found}, expected {expected}",
-                   found=found, expected=words[name])  # fmt: skip
+                   found=found, expected=expected)  # fmt: skip
 
 
 # ---- from plain data
@@ -336,12 +341,10 @@ def from_plain(cls, data, name="data"):
     InputError
         With one line for each problem: "record.json, capacity.volume_m3[3]: expected a number".
     """
-    schema = json_schema(cls)
-    missing = [
-        Problem(name, message("record_key_missing", "missing"), column=path)
-        for path in missing_keys(data, schema)
-    ]
-    problems = missing or problems_in(data, schema, name)
+    missing, problems = checked(data, json_schema(cls), name)
+    if missing:
+        what = message("record_key_missing", "missing")
+        problems = [Problem(name, what, column=path) for path in missing]
     if problems:
         raise InputError(problems)
     return _made(cls, data)

@@ -5,6 +5,7 @@ import pytest
 from job_builder import write_job
 
 import tankcal
+from tankcal import record as records
 from tankcal.errors import InputError
 from tankcal.record import load, record_of, save
 
@@ -19,6 +20,16 @@ def test_it_is_strict_json_and_comes_back(example_result, tmp_path):
     save(record, tmp_path / "record.json")
     assert load(tmp_path / "record.json") == record
     assert "NaN" not in (tmp_path / "record.json").read_text()
+
+
+def test_it_is_read_as_dataclasses(example_record, example_result):
+    read = records.read(example_record)
+    assert read.capacity.volume_m3 == list(example_result.table.volume_m3)
+    assert read.job.tank == example_result.job.tank
+    assert read.corrections[0].formula == example_result.corrections[0].formula
+    assert read.corrections[0].formula.code == example_result.corrections[0].formula.code
+    circles = [section.circle.radius_m for section in example_result.wall.sections]
+    assert [section.radius_m for section in read.sections] == circles
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from tankcal.errors import InputError
 from tankcal.record import FORMAT, VERSION, load, migrated, version_of
 from tankcal.record.making import Record
 from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import from_plain, missing_keys, problems_in
+from tankcal.record.schema import checked, from_plain
 from tankcal.record.versions import RECORD
 from tankcal.report import outputs
 
@@ -51,8 +51,7 @@ def test_a_record_has_every_key_of_its_version(made):
     for record in made.values():
         assert record["format"] == FORMAT
         plain = json.loads(json.dumps(record))
-        assert missing_keys(plain, RECORD.schema()) == []
-        assert problems_in(plain, RECORD.schema(), "record.json") == []
+        assert checked(plain, RECORD.schema(), "record.json") == ([], [])
 
 
 def test_a_record_goes_into_its_dataclass_and_back(made):
@@ -79,7 +78,7 @@ def test_a_kept_record_is_read_as_one_of_this_version(path):
     read = migrated(record, "record.json")
     assert json.dumps(record) == before
     assert read["format"] == FORMAT
-    assert missing_keys(read, RECORD.schema()) == []
+    assert checked(read, RECORD.schema(), "record.json") == ([], [])
 
 
 @pytest.mark.slow

@@ -10,9 +10,8 @@ from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict
 from tankcal.record.camera_versions import CAMERA
 from tankcal.record.plain_data import to_plain
-from tankcal.record.plan import plain_of
-from tankcal.record.plan_versions import PLAN
-from tankcal.record.schema import from_plain, missing_keys, problems_in
+from tankcal.record.plan import PLAN, plain_of
+from tankcal.record.schema import checked, from_plain
 from tankcal.report import camera as camera_papers
 from tankcal.report.camera.paper import load
 from tankcal.report.planning import empty_job
@@ -33,8 +32,7 @@ def listed_keys(saved_format, version, kind="plan"):
 def assert_is_of_its_schema(saved, saved_format):
     """Every key is there, none is unknown, every value is of its type."""
     schema = saved_format.schema(saved.get("kind"))
-    assert missing_keys(saved, schema) == []
-    assert problems_in(saved, schema, "kept") == []
+    assert checked(saved, schema, "kept") == ([], [])
     unknown = keys_in(saved, FREE) - keys_of_schema(schema, optional=True)
     assert unknown == set()
 

@@ -12,7 +12,7 @@ from tankcal.job.starter import FilledForm, write_form
 from tankcal.messages import message
 from tankcal.planning.measurements import targets_of
 from tankcal.planning.model import TAPED
-from tankcal.record.plan_versions import PLAN
+from tankcal.record.plan import PLAN
 from tankcal.text.languages import DEFAULT
 
 ARCSEC = 3600.0
