@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.gum.distributions import within
-from tankcal.job.checks import bottom_form, spreads, standard_u, useless_inputs
+from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.contract import INPUTS
+from tankcal.job.contract.bottom import bottom_form
 from tankcal.job.contract.parts import MESH_UNITS_M
+from tankcal.job.contract.uncertainty import spreads, standard_u
 from tankcal.job.model import (
     Bottom,
     Course,

@@ -360,9 +360,3 @@ def _plain_numbers(field, raws, decimal):
     if field.above_low:
         sound &= values > field.low
     return [value if good else None for value, good in zip(values.tolist(), sound, strict=True)]
-
-
-def settings_place(raw, section, key):
-    """(file, row, name) of a setting, for a message about it."""
-    value = raw.settings.get(section, {}).get(key)
-    return raw.settings_file, value.row if value else None, f"{section}.{key}"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
 from tankcal.job.checks import check_all
-from tankcal.job.checks.common import has_survey
+from tankcal.job.checks.extent import has_survey
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.covariance import read_covariance
 from tankcal.job.entries import kind_of, read_columns, read_register, read_settings

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.job.checks.common import tell, tiny_sd
+from tankcal.job.checking import tell, tiny_sd
 from tankcal.job.checks.survey.doubtful import TINY
 from tankcal.messages import listed, message
 from tankcal.planning.given import PLAN_FILE

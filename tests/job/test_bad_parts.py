@@ -10,7 +10,7 @@ from messages_told import lines
 from spoilt import FORMS, places, problems_of, settings_place, table_file, write
 
 from tankcal.job import load
-from tankcal.job.checks import bottom
+from tankcal.job.contract import bottom
 from tankcal.tank.soundings import FEWEST_POINTS, MOST_POINTS
 
 RINGS = [(0.0, 0.0, -0.1)] + [

@@ -18,7 +18,7 @@ from uncertain_job import HOSTILE, as_before, write_uncertain_job
 
 import tankcal
 from tankcal.gum.distributions import NAMES
-from tankcal.job.contract.inputs import INPUTS
+from tankcal.job.contract.uncertainty import INPUTS
 from tankcal.pipeline import plots
 from tankcal.record import record_of, save
 from tankcal.record.plain_data import to_plain

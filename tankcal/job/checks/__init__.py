@@ -4,25 +4,24 @@ Each check tells `log` its problems and warnings and returns nothing. A check wh
 missing or bad stays silent: what is wrong with them has been told already.
 """
 
+from tankcal.job.checking import has_rows
 from tankcal.job.checks.bearing import useless_inputs
-from tankcal.job.checks.bottom import bottom_form, check_bottom
-from tankcal.job.checks.common import Extent, extent_of, has_rows, has_survey, has_wall_points
-from tankcal.job.checks.deadwood import check_deadwood, check_roof
-from tankcal.job.checks.geometry import check_courses, check_cylinder, check_points, check_scan
-from tankcal.job.checks.inputs import (
-    check_correlations,
-    check_inputs,
-    check_stated,
-    spreads,
-    standard_u,
-)
-from tankcal.job.checks.kinds import check_horizontal, check_sphere
+from tankcal.job.checks.extent import Extent, extent_of, has_survey, has_wall_points
+from tankcal.job.checks.geometry import check_cylinder, check_scan
+from tankcal.job.checks.kinds import check_horizontal, check_roof, check_sphere
 from tankcal.job.checks.plausible import check_plausible
 from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.survey import check_survey
+from tankcal.job.contract.bottom import check_bottom
+from tankcal.job.contract.correlations import check_correlations
+from tankcal.job.contract.courses import check_courses
+from tankcal.job.contract.deadwood import check_deadwood
+from tankcal.job.contract.points import check_points
+from tankcal.job.contract.stated import check_stated
+from tankcal.job.contract.uncertainty import check_inputs
 from tankcal.job.entries import kind_of
 
-__all__ = ["bottom_form", "check_all", "check_tank", "spreads", "standard_u", "useless_inputs"]
+__all__ = ["check_all", "check_tank"]
 
 
 def check_all(values, tables, registers, raw, is_whole, log):
@@ -58,7 +57,8 @@ def check_tank(values, tables, raw, log):
 def _check_uncertainty(values, tables, extent, kind, raw, log):
     inputs, correlations, stated = (tables[t] for t in ("uncertainty", "correlations", "stated"))
     if inputs is not None:
-        check_inputs(inputs, values, tables, kind, log)
+        known = values is not None and kind is not None
+        check_inputs(inputs, useless_inputs(values, tables, kind) if known else {}, log)
     if correlations is not None:
         check_correlations(correlations, inputs, raw, log)
     if stated is not None:

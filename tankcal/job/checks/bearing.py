@@ -1,8 +1,8 @@
 """Which inputs of uncertainty.csv have an effect on a job, and why the others have none."""
 
-from tankcal.job.checks.bottom import bottom_form
-from tankcal.job.checks.common import has_wall_points
+from tankcal.job.checks.extent import has_wall_points
 from tankcal.job.contract import INPUTS
+from tankcal.job.contract.bottom import bottom_form
 from tankcal.messages import message
 
 NOT_SUBTRACTED = message(

@@ -2,13 +2,8 @@
 
 from itertools import pairwise
 
-from tankcal.job.checks.common import (
-    has_wall_points,
-    is_not_given,
-    loads_the_shell,
-    missing_beside,
-    tell,
-)
+from tankcal.job.checking import is_not_given, loads_the_shell, missing_beside, tell
+from tankcal.job.checks.extent import has_wall_points
 from tankcal.job.plausibility import DENSITIES_KG_M3
 from tankcal.messages import message
 

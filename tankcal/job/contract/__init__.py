@@ -3,14 +3,22 @@
 `docs/job-format.md` says the same for people, and the starter job is written from these lists.
 """
 
-from tankcal.job.contract.columns import COLUMNS as TANK_COLUMNS
-from tankcal.job.contract.inputs import INPUTS
+from tankcal.job.contract import (
+    bottom,
+    correlations,
+    courses,
+    deadwood,
+    points,
+    stated,
+    uncertainty,
+)
 from tankcal.job.contract.keys import KEYS as COMMON_KEYS
 from tankcal.job.contract.kinds import KINDS
 from tankcal.job.contract.observations import COLUMNS as SURVEY_COLUMNS
 from tankcal.job.contract.observations import SURVEYS
 from tankcal.job.contract.parts import KEYS as PART_KEYS
 from tankcal.job.contract.registers import OF_PHOTOS, REGISTER_KEYS, REGISTERS_OF_SURVEY
+from tankcal.job.contract.uncertainty import INPUTS
 from tankcal.text.form_words import NOTES
 
 SECTIONS = (
@@ -18,7 +26,8 @@ SECTIONS = (
     *("corrections", "material", "checks", "adjustment", "adjustment.camera", "certificate"),
     "csv",
 )
-COLUMNS = TANK_COLUMNS | SURVEY_COLUMNS
+_TABLES = (points, courses, bottom, deadwood, uncertainty, correlations, stated)
+COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES} | SURVEY_COLUMNS
 KEYS = {section: (COMMON_KEYS | PART_KEYS)[section] for section in SECTIONS}
 
 REQUIRED_TABLES = {"vertical": ("points", "courses")}

@@ -11,7 +11,7 @@ from tankcal.job.contract import (
     SURVEYS,
     TABLES_OF_KIND,
 )
-from tankcal.job.contract.inputs import UNITS
+from tankcal.job.contract.uncertainty import UNITS
 from tankcal.job.fields import Field
 from tankcal.text.languages import DEFAULT, LANGUAGES
 

@@ -1,6 +1,6 @@
 """What is given in a plan and cannot be meant: names, keys that belong together, accuracies."""
 
-from tankcal.job.checks.common import is_not_given, refuse_repeated
+from tankcal.job.checking import is_not_given, refuse_repeated
 from tankcal.job.tables import nearest
 from tankcal.messages import message
 from tankcal.pipeline.plausibility import ADVISED_POINTS, FEWEST_POINTS

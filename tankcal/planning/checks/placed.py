@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.job.checks.common import is_not_given, tell
+from tankcal.job.checking import is_not_given, tell
 from tankcal.job.tables import Log, nearest
 from tankcal.messages import joined, listed, message
 from tankcal.planning.given import PLAN_FILE

@@ -4,10 +4,9 @@ import datetime
 
 import numpy as np
 
-from tankcal.job.checks.bottom import STEEP_FACTOR
-from tankcal.job.checks.common import has_rows, tell
-from tankcal.job.checks.geometry import places_of
+from tankcal.job.checking import has_rows, places_of, tell
 from tankcal.job.checks.settings import bottoms_z
+from tankcal.job.contract.bottom import STEEP_FACTOR
 from tankcal.job.plausibility import (
     DAYS_AHEAD,
     DAYS_TO_ISSUE,

@@ -1,6 +1,6 @@
 """Temperatures, expansion and Young's modulus of the shell."""
 
-from tankcal.job.checks.common import is_not_given, loads_the_shell, tell
+from tankcal.job.checking import is_not_given, loads_the_shell, tell
 from tankcal.job.plausibility import (
     AIR_C,
     AMBIENT,

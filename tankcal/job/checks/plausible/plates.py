@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.job.checks.common import course_heights, tell
+from tankcal.job.checking import course_heights, tell
 from tankcal.job.plausibility import (
     CARBON_STEEL,
     HEAVY,

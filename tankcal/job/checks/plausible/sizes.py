@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tankcal.job.checks.common import course_heights, tell
-from tankcal.job.checks.geometry import MIN_POINTS_PER_COURSE, places_of
+from tankcal.job.checking import course_heights, places_of, tell
+from tankcal.job.checks.geometry import MIN_POINTS_PER_COURSE
 from tankcal.job.plausibility import (
     DISH_RADIUS,
     END_DEPTH,

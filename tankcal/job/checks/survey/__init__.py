@@ -4,7 +4,8 @@ What only the adjustment can tell (a swapped point, an undetermined one, a datum
 in excess) is told after it.
 """
 
-from tankcal.job.checks.common import has_rows, has_survey, tell
+from tankcal.job.checking import has_rows, tell
+from tankcal.job.checks.extent import has_survey
 from tankcal.job.checks.survey.cameras import check_cameras
 from tankcal.job.checks.survey.datum import check_datum, check_held, check_known
 from tankcal.job.checks.survey.doubtful import check_doubtful

@@ -10,7 +10,7 @@ from tankcal.job.cameras import (
     is_adjusted,
     parameters_of,
 )
-from tankcal.job.checks.common import same_parameter, tell
+from tankcal.job.checking import same_parameter, tell
 from tankcal.job.checks.survey.focus import check_focus
 from tankcal.job.contract.registers import PARAMETER_KEYS, SECOND_NAMES, sd_key
 from tankcal.messages import message

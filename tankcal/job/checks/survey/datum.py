@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.job.cameras import datum_point
-from tankcal.job.checks.common import has_rows, is_not_given, refuse_repeated, tell
+from tankcal.job.checking import has_rows, is_not_given, refuse_repeated, tell
 from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.names import all_points, observed_names
 from tankcal.job.contract.observations import ANGLES, READINGS

@@ -5,7 +5,7 @@ from scipy.special import chdtri
 
 from tankcal.camera.comparator import GROSS, KINDS, suspicion
 from tankcal.errors import SolutionError
-from tankcal.job.checks.common import has_rows, is_not_given, tell
+from tankcal.job.checking import has_rows, is_not_given, tell
 from tankcal.job.checks.survey.files import refuse_undefined, tell_rows
 from tankcal.job.contract.registers import MARKS
 from tankcal.job.imagery import cameras_of_photos, readings_of_marks

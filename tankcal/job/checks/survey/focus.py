@@ -2,7 +2,7 @@
 
 from tankcal.camera.focus import RADIAL
 from tankcal.job.cameras import focus_keys, lens_of
-from tankcal.job.checks.common import tell
+from tankcal.job.checking import tell
 from tankcal.job.contract.registers import PARAMETER_KEYS
 from tankcal.messages import message
 

@@ -6,7 +6,7 @@ angles add up to half a circle. Known points: the angle between them follows fro
 
 import numpy as np
 
-from tankcal.job.checks.common import has_rows
+from tankcal.job.checking import has_rows
 from tankcal.job.contract.observations import ANGLES
 from tankcal.messages import message
 

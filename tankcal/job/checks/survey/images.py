@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.job.cameras import image_frames
-from tankcal.job.checks.common import has_rows, is_not_given, refuse_repeated, tell
+from tankcal.job.checking import has_rows, is_not_given, refuse_repeated, tell
 from tankcal.job.checks.survey.fiducials import check_fiducials
 from tankcal.job.checks.survey.files import refuse_undefined, tell_rows
 from tankcal.job.imagery import imagery_of, is_surface, surfaces_of

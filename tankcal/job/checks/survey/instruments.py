@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.job.checks.common import has_rows, refuse_repeated
+from tankcal.job.checking import has_rows, refuse_repeated
 from tankcal.job.checks.survey.files import refuse_undefined
 from tankcal.messages import message
 

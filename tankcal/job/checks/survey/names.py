@@ -2,7 +2,7 @@
 
 import re
 
-from tankcal.job.checks.common import has_rows
+from tankcal.job.checking import has_rows
 from tankcal.job.contract.observations import READINGS
 from tankcal.messages import message
 

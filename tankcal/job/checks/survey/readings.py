@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from tankcal.job.checks.common import has_rows
+from tankcal.job.checking import has_rows
 from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.instruments import TAKEN_FROM_SETUPS
 from tankcal.job.contract.observations import ANGLE_UNITS, ANGLES, READINGS

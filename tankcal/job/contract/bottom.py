@@ -1,10 +1,26 @@
-"""[bottom] and bottom.csv: one form, complete, within the tank and in metres."""
+"""bottom.csv and the form of [bottom]: columns; one form, complete, in the tank, in metres."""
 
 import numpy as np
 
-from tankcal.job.checks.common import has_rows, is_not_given, tell, zero_z
-from tankcal.job.checks.geometry import places_of
+from tankcal.job.checking import has_rows, is_not_given, places_of, tell, zero_z
+from tankcal.job.fields import Field
 from tankcal.messages import message
+
+
+def _bottom(name, note, low, high, above_low=False):
+    """An optional column of bottom.csv, filled in for every row or for none."""
+    return Field(name, "number", note, in_full=True, low=low, high=high, above_low=above_low)
+
+
+COLUMNS = (
+    _bottom("x_m", "surveyed bottom: coordinate x, in the frame of the points, metres", -1e8, 1e8),
+    _bottom("y_m", "surveyed bottom: coordinate y, in the frame of the points, metres", -1e8, 1e8),
+    _bottom("z_m", "surveyed bottom: coordinate z, in the frame of the points, metres", -1e5, 1e5),
+    _bottom("s_mm", "surveyed bottom: standard deviation of z, millimetres", 0, 1000, True),
+    _bottom("level_m", "or measured by liquid: dip from the table's zero, metres", -100, 100),
+    _bottom("volume_m3", "measured by liquid: volume below that dip, cubic metres", 0, 1e6),
+    _bottom("u_m3", "measured by liquid: its standard uncertainty, cubic metres", 0, 1e5),
+)
 
 SURVEYED, MEASURED = ("x_m", "y_m", "z_m"), ("level_m", "volume_m3")
 MIN_POINTS, MAX_POINTS = 12, 500  # that a surface is made through

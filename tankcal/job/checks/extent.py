@@ -1,0 +1,80 @@
+"""How large a tank is before anything is computed, and where its wall comes from."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.job.checking import has_rows, zero_z
+from tankcal.job.contract.observations import READINGS
+
+
+def has_survey(tables):
+    """Are there observations to be adjusted, readable or not?"""
+    return any(has_rows(tables[name]) for name in ("image_points", *READINGS))
+
+
+def has_wall_points(tables):
+    """Does the wall come from points, handed in or to be adjusted?"""
+    return has_rows(tables["points"]) or has_survey(tables)
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What is known of a tank's size before anything is computed; None: not known.
+
+    height_m          from its lowest to its highest inside point at the dip point
+    lowest_m, top_m   dips of its lowest and highest inside points, from the table's zero
+    area_m2           the largest free surface
+    """
+
+    height_m: float | None = None
+    lowest_m: float | None = None
+    top_m: float | None = None
+    area_m2: float | None = None
+
+
+def extent_of(values, tables, kind):
+    """The Extent of a tank of the kind; nothing is known of a mesh, or of an unknown kind."""
+    if kind == "vertical":
+        return _of_vertical(values, tables["bottom"])
+    if kind == "horizontal":
+        return _of_horizontal(values["horizontal"], values, has_wall_points(tables))
+    if kind == "sphere":
+        diameter = values["sphere"]["diameter_m"] or values["tank"]["nominal_diameter_m"]
+        area = None if diameter is None else np.pi / 4 * diameter**2
+        return _lying(diameter, 0.0, area, values, has_wall_points(tables))
+    return Extent()
+
+
+def _of_vertical(values, bottom):
+    height, diameter = (values["tank"][f"nominal_{name}_m"] for name in ("height", "diameter"))
+    shell_z, zero = values["datum"]["bottom_z_m"], zero_z(values)
+    area = None if diameter is None else np.pi / 4 * diameter**2
+    if None in (shell_z, zero):
+        return Extent(height, area_m2=area)
+    centre = values["bottom"]["centre_z_m"]
+    lowest = [shell_z - zero] if centre is None else [shell_z - zero, centre - zero]
+    if bottom is not None:
+        lowest += [z - zero for z in bottom.of("z_m") if z is not None]
+        lowest += [level for level in bottom.of("level_m") if level is not None]
+    top = None if height is None else shell_z + height - zero
+    return Extent(height, min(lowest), top, area)
+
+
+def _of_horizontal(given, values, has_points):
+    height = given["height_m"] or given["diameter_m"] or values["tank"]["nominal_diameter_m"]
+    width = given["width_m"] or height
+    length = given["length_m"]
+    if None in (height, width, length):
+        return Extent(height)
+    length += sum(given[f"end_{end}_depth_m"] or height / 2 for end in "ab")
+    tilt = abs(given["tilt_mm_per_m"] or 0.0) / 1000
+    return _lying(height, tilt * length, width * length, values, has_points)
+
+
+def _lying(height, reach, area, values, has_points):
+    """reach: how much the ends may lie above or below the place of the dip point, m."""
+    if height is None or has_points:
+        return Extent(height, area_m2=area)
+    zero = values["datum"]["dip_plate_z_m"] or 0.0
+    return Extent(height, -reach - zero, height + reach - zero, area)

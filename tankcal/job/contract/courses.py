@@ -1,0 +1,85 @@
+"""courses.csv: its columns; names, plates, and heights that add up to the shell's."""
+
+import numpy as np
+
+from tankcal.job.checking import loads_the_shell, refuse_repeated, zero_z
+from tankcal.job.fields import Field
+from tankcal.messages import message
+
+COLUMNS = (
+    Field("course", "name", "name of the ring of plates, from the bottom up", required=True),
+    Field(
+        "height_m",
+        "number",
+        "height of the course, metres",
+        required=True,
+        low=0,
+        above_low=True,
+        high=50,
+    ),
+    Field("thickness_mm", "number", "plate thickness, millimetres", required=True, low=0, high=100),
+    Field("paint_mm", "number", "paint thickness, millimetres; blank: 0", low=0, high=10),
+)
+
+HEIGHT_MISS_M, HEIGHT_MISS_RELATIVE = 0.020, 0.002
+SMALLEST_THICKNESS_MM = 1.0
+
+
+def check_courses(courses, values, log):
+    """Course names once; plates of a credible thickness; heights that add up to the shell's."""
+    if courses.is_empty:
+        log.problem(
+            courses.file,
+            message("no_courses", "no rows; expected one row for each course, from the bottom up"),
+        )
+        return
+    refuse_repeated(courses, "course", log)
+    for row, thickness in zip(courses.rows, courses.of("thickness_mm"), strict=True):
+        if thickness is not None and 0 < thickness < SMALLEST_THICKNESS_MM:
+            expected = message(
+                "thin_plate",
+                "found {thickness:g}; expected millimetres, 0 or at least 1: in metres?",
+                thickness=thickness,
+            )
+            log.problem(courses.file, expected, row, "thickness_mm")
+    heights, nominal = courses.of("height_m"), values["tank"]["nominal_height_m"]
+    if None in heights or courses.skipped:
+        return  # a course that cannot be read is told already
+    _refuse_weightless_plates(courses, heights, values, log)
+    if nominal is None:
+        return
+    miss = sum(heights) - nominal
+    allowed = max(HEIGHT_MISS_M, HEIGHT_MISS_RELATIVE * nominal)
+    if abs(miss) > allowed * (1 + 1e-9):
+        expected = message(
+            "courses_do_not_add_up",
+            "the courses add up to {sum:.4g} m, expected tank.nominal_height_m = {nominal:g} m "
+            "within {allowed:.0f} mm; they miss it by {miss:.0f} mm",
+            sum=sum(heights),
+            nominal=nominal,
+            allowed=1000 * allowed,
+            miss=1000 * miss,
+        )
+        log.problem(courses.file, expected, None, "height_m")
+
+
+def _refuse_weightless_plates(courses, heights, values, log):
+    """A shell that liquid stretches needs its plates: all of them, or those below that liquid."""
+    level, zero = values["survey"]["liquid_level_m"], zero_z(values)
+    loaded_to, why = -np.inf, ""
+    if level and zero is not None and values["corrections"]["head"] is not False:
+        loaded_to = level + zero - (values["datum"]["bottom_z_m"] or 0.0)
+        why = message("because_of_level", "survey.liquid_level_m = {level:g}", level=level)
+    if loads_the_shell(values):
+        loaded_to = np.inf
+        why = message("because_of_density", "the density in [table]")
+    bottoms = np.concatenate([[0.0], np.cumsum(heights)[:-1]])
+    plates = zip(courses.rows, courses.of("thickness_mm"), bottoms, strict=True)
+    for row, thickness, bottom in plates:
+        if thickness == 0 and bottom < loaded_to:
+            expected = message(
+                "plate_of_nothing",
+                "found 0; expected the plate's thickness: the liquid head ({why}) needs it",
+                why=why,
+            )
+            log.problem(courses.file, expected, row, "thickness_mm")

@@ -1,0 +1,104 @@
+"""points.csv: its columns, and the checks of it alone: names and places once, sections complete."""
+
+from tankcal.job.checking import refuse_repeated, tiny_sd
+from tankcal.job.fields import Field
+from tankcal.messages import message
+
+
+def _sd(axis):
+    return Field(
+        f"s{axis}_mm",
+        "number",
+        f"standard deviation of {axis}, millimetres; for all points or for none",
+        in_full=True,
+        low=0,
+        above_low=True,
+        high=1000,
+    )
+
+
+def _coordinate(axis, limit):
+    note = f"coordinate {axis}, metres"
+    return Field(f"{axis}_m", "number", note, required=True, low=-limit, high=limit)
+
+
+COLUMNS = (
+    Field("point", "name", "name of the point, once in the file", required=True),
+    _coordinate("x", 1e8),
+    _coordinate("y", 1e8),
+    _coordinate("z", 1e5),
+    _sd("x"),
+    _sd("y"),
+    _sd("z"),
+    Field("section", "name", "name of the ring of points; blank: assigned by height"),
+    Field("generatrix", "name", "name of the vertical line of points"),
+)
+
+MAX_POINTS = 50_000
+TINY_SD_MM = 0.01
+
+
+def check_points(points, log):
+    """Point names once, places once (a warning), credible and complete standard deviations."""
+    if not points.rows and not points.skipped:
+        log.problem(
+            points.file,
+            message("no_points_at_all", "no rows; expected one row for each surveyed point"),
+        )
+        return
+    if len(points.rows) > MAX_POINTS:
+        expected = message(
+            "points_too_many",
+            "{count} points; expected at most {most}: thin the scan first",
+            count=len(points.rows),
+            most=MAX_POINTS,
+        )
+        log.problem(points.file, expected)
+    refuse_repeated(points, "point", log)
+    _warn_same_places(points, log)
+    _refuse_some_sections(points, log)
+    sds = ("sx_mm", "sy_mm", "sz_mm")
+    given = [name for name in sds if points.columns[name] is not None]
+    for name in sds:
+        if given and name not in given:
+            expected = message(
+                "sd_of_some_axes",
+                "not given; expected beside {given}, for all points or for none",
+                given=given[0],
+            )
+            log.problem(points.file, expected, None, name)
+    for name in given:
+        found = [sd for sd in points.of(name) if sd is not None]
+        if found and max(found) < TINY_SD_MM:
+            log.warning(points.file, tiny_sd("mm", max(found)), None, name)
+
+
+def _warn_same_places(points, log):
+    first_row = {}
+    places = zip(points.of("x_m"), points.of("y_m"), points.of("z_m"), strict=True)
+    for row, place in zip(points.rows, places, strict=True):
+        if None in place:
+            continue
+        if place in first_row:
+            expected = message(
+                "same_coordinates",
+                "the same coordinates as row {row}; counted once",
+                row=first_row[place],
+            )
+            log.warning(points.file, expected, row, "x_m")
+        else:
+            first_row[place] = row
+
+
+def _refuse_some_sections(points, log):
+    """A section for every point or for none: else some would be placed by height, some by name."""
+    sections = points.of("section")
+    if not any(sections):
+        return
+    for row, section in zip(points.rows, sections, strict=True):
+        if not section:
+            expected = message(
+                "section_of_some_points",
+                "blank; expected a section for every point or for none (placed by height)",
+            )
+            log.problem(points.file, expected, row, "section")

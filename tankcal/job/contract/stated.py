@@ -1,0 +1,101 @@
+"""stated.csv: its columns; dips within the tank, the upper one first, volumes that it can hold."""
+
+from tankcal.job.checking import UNIT_FACTOR
+from tankcal.job.fields import Field
+from tankcal.messages import message
+
+COLUMNS = (
+    Field(
+        "high_m",
+        "number",
+        "dip from the table's zero, metres: its volume is reported with uncertainty and budget",
+        required=True,
+        low=0,
+        above_low=True,
+        high=100,
+    ),
+    Field(
+        "low_m",
+        "number",
+        "of a delivery: the dip it ends at, metres; blank: the volume below high_m",
+        low=0,
+        high=100,
+    ),
+    Field(
+        "volume_m3",
+        "number",
+        "volume that an earlier table or a contract states there, cubic metres, for a decision"
+        " rule that limits deviations",
+        low=0,
+        above_low=True,
+        high=1e6,
+    ),
+    Field("note", "text", "what it is"),
+)
+
+_ROUNDING_M = 1e-9
+
+
+def check_stated(table, extent, log):
+    """Dips within the tank, high above low, each pair once; volumes in cubic metres."""
+    first_row = {}
+    columns = (table.of(name) for name in ("high_m", "low_m", "volume_m3"))
+    for row, high, low, volume in zip(table.rows, *columns, strict=True):
+        _check_within(table, row, high, low, extent, log)
+        if high is None:
+            continue
+        if low is not None and low >= high:
+            expected = message(
+                "stated_upside_down",
+                "found {low:g}; expected a dip below high_m = {high:g}",
+                low=low,
+                high=high,
+            )
+            log.problem(table.file, expected, row, "low_m")
+        elif (high, low) in first_row:
+            expected = message(
+                "stated_twice",
+                "this dip is there already, in row {first_row}; expected once",
+                first_row=first_row[high, low],
+            )
+            log.problem(table.file, expected, row, "high_m")
+        elif volume is not None:
+            _check_volume(table, row, high, low, volume, extent, log)
+        first_row.setdefault((high, low), row)
+
+
+def _check_within(table, row, high, low, extent, log):
+    top = extent.height_m if extent.top_m is None else extent.top_m
+    for column, dip in (("high_m", high), ("low_m", low)):
+        if None not in (dip, top) and dip > top + _ROUNDING_M:
+            expected = message(
+                "stated_above_top",
+                "found {dip:g}; expected at most {top:.5g}, the top of the tank, in metres",
+                dip=dip,
+                top=top,
+            )
+            log.problem(table.file, expected, row, column)
+
+
+def _check_volume(table, row, high, low, volume, extent, log):
+    """Far more than the whole tank holds, or the slice of a delivery, is another unit."""
+    height = extent.height_m if low is None else high - low
+    if None in (height, extent.area_m2):
+        return
+    full = extent.area_m2 * height
+    if volume > UNIT_FACTOR * full:
+        expected = message(
+            "stated_too_much",
+            "found {volume:g}; the whole tank holds about {full:.4g} m3, expected m3: in litres?",
+            volume=volume,
+            full=full,
+        )
+        if low is not None:
+            expected = message(
+                "delivered_too_much",
+                "found {volume:g}; the tank between low_m and high_m holds about {full:.4g} m3, "
+                "expected m3: in litres?",
+                volume=volume,
+                full=full,
+            )
+        log.problem(table.file, expected, row, "volume_m3")

@@ -1,0 +1,327 @@
+"""uncertainty.csv: what it may declare, what is assumed without it, its columns and its checks."""
+
+from dataclasses import dataclass
+
+from tankcal.gum.distributions import FAMILIES, expanded, within
+from tankcal.job.checking import refuse_repeated
+from tankcal.job.contract.kinds import KINDS, VERTICAL, WITH_POINTS
+from tankcal.job.fields import Field
+from tankcal.messages import message
+
+AS_READ = ("standard", "half_width", "expanded", "scale", "sd")  # what u may be
+
+
+@dataclass(frozen=True)
+class Declarable:
+    """One input that may be declared.
+
+    unit     as it must be written
+    per_si   how many of it make one of SI
+    largest  standard uncertainty that makes sense, in that unit
+    note     what it is
+    kinds    the kinds of tank that it bears on
+    default  half-width of the rectangular distribution that is assumed where it bears on a job and
+             is not declared, in that unit; None: nothing is assumed
+    default_share  the same as a part of the input's own value, in place of `default`
+    correlates     whether it may be correlated with others: it is one error, not many
+    """
+
+    unit: str
+    per_si: float
+    largest: float
+    note: str
+    kinds: tuple[str, ...] = KINDS
+    default: float | None = None
+    default_share: float | None = None
+    correlates: bool = True
+
+    def assumed_half_width(self, value):
+        """Half-width of the default in `unit`, None without one; value: of the input, or None."""
+        return self.default if self.default_share is None else self.default_share * value
+
+    @property
+    def assumption(self):
+        """The default as it is told: "± 2 K", "± 1 % of its value"; "" without one."""
+        if self.default_share is not None:
+            return f"± {100 * self.default_share:g} % of its value"
+        number = f"{self.default or 0:g}".replace("e-0", "e-")
+        return "" if self.default is None else f"± {number} {self.unit}"
+
+
+def _of_shell(unit, per_si, largest, note, **more):
+    return Declarable(unit, per_si, largest, note, VERTICAL, **more)
+
+
+def _of_lying(unit, per_si, largest, note):
+    return Declarable(unit, per_si, largest, note, ("horizontal",))
+
+
+INPUTS = {
+    "scale": Declarable("ppm", 1e6, 1e4, "scale of the survey"),
+    "offset": Declarable(
+        "mm",
+        1e3,
+        100,
+        "offset of instrument or target square to the wall, the same for all points",
+        WITH_POINTS,
+    ),
+    "datum": Declarable("mm", 1e3, 100, "height of the table's zero against the tank"),
+    "course_heights": _of_shell(
+        "mm", 1e3, 100, "height of each course, independent of the others", correlates=False
+    ),
+    "plate_thickness": Declarable(
+        "mm", 1e3, 10, "plate thickness, the same error everywhere", WITH_POINTS, default=0.2
+    ),
+    "paint": _of_shell(
+        "mm", 1e3, 5, "paint thickness, the same error in all courses", default=0.05
+    ),
+    "shell_temperature": Declarable("K", 1, 50, "shell temperature during the survey", default=2.0),
+    "expansion": Declarable("1/K", 1, 1e-4, "coefficient of thermal expansion", default=1e-6),
+    "youngs_modulus": _of_shell("GPa", 1e-9, 100, "Young's modulus of the shell", default=6.0),
+    "liquid_density": _of_shell("kg/m3", 1, 500, "density of the liquid that the table is for"),
+    "survey_level": _of_shell(
+        "mm", 1e3, 1000, "level of the liquid on the survey day", default=5.0
+    ),
+    "survey_density": _of_shell("kg/m3", 1, 500, "density of that liquid", default=5.0),
+    "bottom": _of_shell(
+        "mm", 1e3, 500, "height of the bottom's surface, the same error everywhere"
+    ),
+    "barrel": _of_shell("mm", 1e3, 100, "how far a course bulges between its sections"),
+    "roof_mass": _of_shell("kg", 1, 1e6, "mass of the floating roof", default_share=0.01),
+    "deadwood": Declarable(
+        "%",
+        100,
+        50,
+        "volume of the deadwood without u_m3 of its own, the same relative error",
+        default=5.0,
+    ),
+    "diameter": Declarable(
+        "mm", 1e3, 200, "diameter of the cylinder or sphere", ("horizontal", "sphere")
+    ),
+    "length": _of_lying("mm", 1e3, 500, "length of the horizontal cylinder"),
+    "end_depth": _of_lying("mm", 1e3, 500, "depth of both ends, the same error"),
+    "tilt": Declarable(
+        "mm/m",
+        1e3,
+        50,
+        "tilt of the axis; of a vertical tank such as settlement since the survey",
+        ("vertical", "horizontal"),
+    ),
+    "dip_position": _of_lying("mm", 1e3, 2000, "place of the dip point along the axis"),
+    "surface": Declarable("mm", 1e3, 200, "offset of the mesh's surface from the wall", ("mesh",)),
+    "interpolation": Declarable(
+        "m3", 1, 100, "straight line between two rows, of each reading", correlates=False
+    ),
+    "rounding": Declarable(
+        "m3", 1, 10, "last digit of a printed volume, of each reading", correlates=False
+    ),
+}
+UNITS = tuple(dict.fromkeys(one.unit for one in INPUTS.values()))
+
+COLUMNS = (
+    Field(
+        "input",
+        "choice",
+        "what is uncertain: " + ", ".join(INPUTS),
+        required=True,
+        choices=tuple(INPUTS),
+    ),
+    Field(
+        "u",
+        "number",
+        "how uncertain it is: its standard uncertainty, or what u_is says",
+        required=True,
+        low=0,
+    ),
+    Field(
+        "unit",
+        "choice",
+        "; ".join(f"{name}: {one.unit}" for name, one in INPUTS.items()),
+        required=True,
+        choices=UNITS,
+    ),
+    Field(
+        "u_is",
+        "choice",
+        "what u is: standard; half_width of a bounded distribution; expanded, with its k; scale or"
+        " sd of a t distribution; blank: standard",
+        choices=AS_READ,
+    ),
+    Field("k", "number", "coverage factor of an expanded uncertainty", low=1, high=20),
+    Field("type", "choice", "A (statistics) or B; blank: B", choices=("A", "B")),
+    Field("distribution", "choice", "blank: normal", choices=("normal", *FAMILIES, "t")),
+    Field("dof", "number", "degrees of freedom, 1 or more; blank: infinite", low=1),
+    Field("note", "text", "where the figure comes from"),
+)
+
+OF_T = ("scale", "sd")
+NORMAL = "normal"
+SPREAD_COLUMNS = ("u", "u_is", "k", "distribution", "dof")
+
+
+def check_inputs(inputs, useless, log):
+    """Each input once, in its own unit, of a credible size, and not in `useless` {name: why}."""
+    told = {problem.row for problem in log.problems if problem.file == inputs.file}
+    refuse_repeated(inputs, "input", log)
+    units = inputs.of("unit")
+    rows = zip(inputs.rows, inputs.of("input"), units, spreads(inputs), strict=True)
+    for row, name, unit, spread in rows:
+        if name in useless:
+            why = useless[name]
+            expected = message("useless_input", "found {name}; {why}", name=name, why=why)
+            log.problem(inputs.file, expected, row, "input")
+        if None in (name, unit):
+            continue
+        if unit != INPUTS[name].unit:
+            expected = message(
+                "other_unit",
+                "found {unit!r}; expected {unit_of_input!r} for {name}",
+                unit=unit,
+                unit_of_input=INPUTS[name].unit,
+                name=name,
+            )
+            log.problem(inputs.file, expected, row, "unit")
+        if row not in told and spread[0] is not None:
+            _check_spread(inputs.file, row, name, unit, spread, log)
+
+
+def spreads(inputs):
+    """(u, u_is, k, distribution, dof) of each row of uncertainty.csv, None where blank."""
+    return [*zip(*(inputs.of(column) for column in SPREAD_COLUMNS), strict=True)]
+
+
+def standard_u(u, u_is, k, distribution, dof):
+    """Standard uncertainty of a sound row, in its unit; of a t distribution what u_is says."""
+    if u_is == "half_width":
+        return within(u, distribution).u
+    if u_is == "expanded":
+        return expanded(u, k=k).u
+    return u
+
+
+def _check_spread(file, row, name, unit, spread, log):
+    """Cells of a row without other problems: do they agree, and is u of a credible size?"""
+    contradictions = _contradictions(*spread[1:])
+    for column, expected in contradictions:
+        log.problem(file, expected, row, column)
+    known = INPUTS[name]
+    if contradictions or unit != known.unit:
+        return
+    u = standard_u(*spread)
+    if u > known.largest:
+        expected = message(
+            "input_too_large",
+            "found {u:g} {unit} for {name}; expected at most {largest:g} {unit}",
+            u=u,
+            unit=unit,
+            name=name,
+            largest=known.largest,
+        )
+        if u != spread[0]:
+            expected = message(
+                "spread_too_large",
+                "found {spread:g}, a standard uncertainty of {u:g} {unit} for {name}; expected "
+                "at most {largest:g} {unit}",
+                spread=spread[0],
+                u=u,
+                unit=unit,
+                name=name,
+                largest=known.largest,
+            )
+        log.problem(file, expected, row, "u")
+
+
+def _contradictions(u_is, k, distribution, dof):
+    """[(column, what is wrong)] of what u is, its coverage factor and its distribution."""
+    name = distribution or NORMAL
+    found = [*_of_t(u_is, dof)] if name == "t" else [*_of_others(u_is, name)]
+    if u_is == "expanded" and k is None:
+        found.append(
+            (
+                "k",
+                message(
+                    "coverage_factor_missing",
+                    "blank; expected the coverage factor, beside u_is = expanded",
+                ),
+            )
+        )
+    if u_is != "expanded" and k is not None:
+        found.append(
+            (
+                "k",
+                message(
+                    "coverage_factor_unused",
+                    "found {k:g}; expected a blank, or u_is = expanded beside it",
+                    k=k,
+                ),
+            )
+        )
+    return found
+
+
+def _of_t(u_is, dof):
+    if u_is not in OF_T:
+        if u_is is None:
+            yield (
+                "u_is",
+                message(
+                    "t_blank", "blank; expected scale or sd: of a t distribution u may be either"
+                ),
+            )
+        else:
+            yield (
+                "u_is",
+                message(
+                    "t_other",
+                    "found {u_is}; expected scale or sd: of a t distribution u may be either",
+                    u_is=u_is,
+                ),
+            )
+    if dof is None:
+        yield (
+            "dof",
+            message("dof_missing", "blank; expected the degrees of freedom of the t distribution"),
+        )
+    elif u_is == "sd" and dof <= 2:
+        yield (
+            "dof",
+            message(
+                "dof_too_few",
+                "found {dof:g}; expected above 2: with fewer a t distribution has no sd",
+                dof=dof,
+            ),
+        )
+
+
+def _of_others(u_is, name):
+    if u_is in OF_T:
+        yield (
+            "u_is",
+            message(
+                "only_beside_t",
+                "found {u_is}; expected it only beside distribution = t, this one is {name}",
+                u_is=u_is,
+                name=name,
+            ),
+        )
+    if u_is == "half_width" and name not in FAMILIES:
+        bounded = ", ".join(FAMILIES)
+        yield (
+            "distribution",
+            message(
+                "no_half_width",
+                "{name} has no half-width; expected {bounded} beside it",
+                name=name,
+                bounded=bounded,
+            ),
+        )
+    if u_is == "expanded" and name != NORMAL:
+        yield (
+            "distribution",
+            message(
+                "not_normal",
+                "found {name}; expected {normal} or a blank beside u_is = expanded",
+                name=name,
+                normal=NORMAL,
+            ),
+        )
