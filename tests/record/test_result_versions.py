@@ -2,12 +2,15 @@
 
 import json
 
+import numpy as np
 import pytest
 from kept_results import FREE, KEPT, kept_files, keys_file, read
 from schemas import SAVED, keys_in, keys_of_schema
 
+from tankcal.calibration.product.check import check_product
 from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict
+from tankcal.record.camera_product import as_json
 from tankcal.record.camera_versions import CAMERA
 from tankcal.record.plain_data import to_plain
 from tankcal.record.plan import PLAN, plain_of
@@ -79,6 +82,14 @@ def test_a_kept_file_is_read_as_one_of_this_version(saved_format, version, path)
     assert_is_of_its_schema(found, saved_format)
     (cls,) = (cls for one, kind, cls in SAVED if (one, kind) == (saved_format, found.get("kind")))
     assert to_plain(from_plain(cls, found)) == found
+
+
+def test_a_check_of_the_plan_alone_is_read():
+    """Its differences have no z."""
+    found = check_product(np.array([[0.1, 0.2], [0.0, -0.1], [-0.1, 0.1]]), ("x", "y"))
+    saved = json.loads(json.dumps(as_json(found)))
+    assert set(saved["differences"][0]) == {"point", "dx_m", "dy_m"}
+    assert CAMERA.migrated(saved, "camera.json") == saved
 
 
 @pytest.mark.parametrize(
