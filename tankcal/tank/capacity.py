@@ -109,15 +109,45 @@ class Capacity:
     def at(self, height_m):
         """The volume at a dip, interpolated linearly between rows as a gauge does.
 
-        The top of the shell rounded to a millimetre counts as the top. Raises HeightError outside
-        the table.
+        Parameters
+        ----------
+        height_m : float
+            Dip, m; the top of the shell rounded to a millimetre counts as the top.
+
+        Returns
+        -------
+        Quantity
+
+        Raises
+        ------
+        HeightError
+            Outside the table.
+
+        Examples
+        --------
+        >>> form = Source("form", np.array([[0.0], [0.2]]))
+        >>> table = Capacity(np.array([0, 1.0]), np.array([0, 100.0]), np.ones(2), (form,), 0.95)
+        >>> table.at(0.5).value_m3, table.at(0.5).u_m3
+        (50.0, 0.1)
         """
         return self._combined([(height_m, 1.0)])
 
     def delivery(self, low_m, high_m):
         """The volume between two dips; what both have in common cancels.
 
-        Raises HeightError outside the table.
+        Parameters
+        ----------
+        low_m, high_m : float
+            Dips, m.
+
+        Returns
+        -------
+        Quantity
+
+        Raises
+        ------
+        HeightError
+            Outside the table.
         """
         return self._combined([(high_m, 1.0), (low_m, -1.0)])
 

@@ -94,11 +94,29 @@ class Shares:
 
 
 def budget(result, row=0, probability=0.95):
-    """The lines of output `row`, in the order of the inputs; sort by `halved` for what to improve.
+    """The budget of one output: a line for each input, or family of inputs (points, say).
 
-    One line for each input, or family of inputs (points, say).
+    Parameters
+    ----------
+    result : Propagation
+    row : int
+        Which output.
+    probability : float
+        Coverage probability of the expanded uncertainty in `halved`.
 
-    result  Propagation; probability  coverage probability of the expanded uncertainty in `halved`
+    Returns
+    -------
+    list of BudgetRow
+        In the order of the inputs; sort by `halved` for what to improve.
+
+    Examples
+    --------
+    >>> from tankcal.gum import standard
+    >>> from tankcal.uncertainty import Input, Inputs, propagate
+    >>> inputs = Inputs([Input("a", standard(3.0)), Input("b", standard(4.0))])
+    >>> lines = budget(propagate(lambda x: x[0] + x[1], inputs))
+    >>> [(line.name, round(line.share, 2)) for line in lines]
+    [('a', 0.36), ('b', 0.64)]
     """
     one = result.rows([row])
     shares = Shares(_sources(one), probability)

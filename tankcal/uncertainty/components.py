@@ -199,18 +199,53 @@ class Combined:
 
 
 def combined(sources, rows):
-    """`Combined` of `Source`s whose columns have so many rows."""
+    """Outputs made of independent causes: their u, degrees of freedom, k and U.
+
+    Parameters
+    ----------
+    sources : sequence of Source
+        Causes whose columns have one row for each output, in its unit.
+    rows : int
+        Outputs.
+
+    Returns
+    -------
+    Combined
+
+    Examples
+    --------
+    >>> found = combined([Source("tape", np.array([[3.0]]), 9.0), Source("form", [[4.0]])], 1)
+    >>> found.u.tolist(), found.expanded(0.95).round(2).tolist()
+    ([5.0], [9.97])
+    """
     squares = [np.einsum("ij,ij->i", one.columns_m3, one.columns_m3) for one in sources]
     variances = np.reshape(squares, (len(squares), rows)).T
     return Combined(variances, np.array([one.u_dof for one in sources], dtype=float))
 
 
 def effective_dof(contributions, dof):
-    """Welch-Satterthwaite: u^4 / sum(u_i^4 / dof_i) for each row (GUM G.2b).
+    """Effective degrees of freedom by Welch-Satterthwaite, u^4 / sum(u_i^4 / dof_i).
 
-    contributions  (rows, inputs) standard uncertainties by input
-    dof            (inputs,) may be inf
-    Returns (rows,); inf where no input with finite degrees of freedom contributes.
+    Parameters
+    ----------
+    contributions : (rows, inputs) array
+        Standard uncertainty that each input brings, in the unit of the output.
+    dof : (inputs,) array
+        Degrees of freedom of each; may be inf.
+
+    Returns
+    -------
+    (rows,) array
+        Inf where no input with finite degrees of freedom contributes.
+
+    Notes
+    -----
+    JCGM 100:2008 G.4.1, equation G.2b.
+
+    Examples
+    --------
+    >>> effective_dof([[3.0, 4.0]], [9.0, np.inf]).round(2).tolist()
+    [69.44]
     """
     variance = np.asarray(contributions, dtype=float) ** 2
     dof = np.asarray(dof, dtype=float)
@@ -247,7 +282,30 @@ def least_of(dof):
 
 
 def coverage_factor(probability, dof):
-    """k of a symmetric interval: Student's t for `dof` degrees of freedom, the normal for inf."""
+    """Coverage factor k of a symmetric interval: of Student's t, of the normal for infinite dof.
+
+    Parameters
+    ----------
+    probability : float
+        Of the interval, between 0 and 1.
+    dof : (...) array
+        Degrees of freedom; may be inf.
+
+    Returns
+    -------
+    (...) array
+        k, without a unit.
+
+    Raises
+    ------
+    ValueError
+        For a probability that is not between 0 and 1.
+
+    Examples
+    --------
+    >>> coverage_factor(0.95, [8, np.inf]).round(3).tolist()
+    [2.306, 1.96]
+    """
     if not 0 < probability < 1:
         raise ValueError(f"coverage probability {probability}: expected between 0 and 1")
     dof = np.asarray(dof, dtype=float)

@@ -118,14 +118,38 @@ class Propagation:
 
 
 def propagate(model, inputs, sensitivities=None):
-    """Outputs of `model` at the estimates with their uncertainty.
+    """Outputs of `model` at the estimates with their uncertainty, u^2 = J U_x J'.
 
-    model          takes (n,) inputs in the order of `inputs`, gives a number or (rows,)
-    inputs         Inputs
-    sensitivities  (rows, n), or a function of the (n,) inputs that gives it; None: found by complex
-                   step or differences. A function is held against differences, an array is not.
-    Raises SolutionError when an output is not finite, the model has a kink or a jump at the
-    estimates, or a sensitivity is wrong; ValueError for shapes that do not fit.
+    Parameters
+    ----------
+    model : callable
+        Takes the (n,) inputs in the order of `inputs`, gives a number or (rows,) outputs.
+    inputs : Inputs
+        Each quantity once, with its distribution and correlations.
+    sensitivities : (rows, n) array or callable, optional
+        dy/dx, or a function of the (n,) inputs that gives it; found by complex step or differences
+        where nothing is given. A function is held against differences, an array is not.
+
+    Returns
+    -------
+    Propagation
+
+    Raises
+    ------
+    SolutionError
+        When an output is not finite, the model has a kink or a jump at the estimates, or a
+        sensitivity is wrong.
+    ValueError
+        For shapes that do not fit.
+
+    Examples
+    --------
+    >>> from tankcal.gum import within
+    >>> from tankcal.uncertainty import Input, Inputs, propagate
+    >>> sizes = [Input("d", within(0.01, mean=4.8), "m"), Input("h", within(0.004, mean=6.0), "m")]
+    >>> volume = propagate(lambda x: np.pi / 4 * x[0] ** 2 * x[1], Inputs(sizes))
+    >>> volume.values.round(2).tolist(), volume.u.round(3).tolist()
+    ([108.57], [0.265])
     """
     if not len(inputs):
         raise ValueError("a measurement without inputs has no uncertainty to propagate")

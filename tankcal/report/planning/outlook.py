@@ -13,6 +13,7 @@ from tankcal.report.planning.improvements import changes, design
 from tankcal.report.planning.rows import lost_ties
 from tankcal.text.digits import written
 from tankcal.text.words import group_name, name_of_input
+from tankcal.uncertainty import combined
 
 DIPS = 12  # rows of the table that are shown
 MOST_POINTS = 40
@@ -127,11 +128,12 @@ def _table(paper):
 
 def _sources(paper):
     """{input: its standard uncertainty of the full tank}."""
-    found = {}
-    for one in paper.prediction.table.sources:
+    table, variances = paper.prediction.table, {}
+    of_top = combined(table.sources, len(table.height_m)).variances[-1]
+    for one, variance in zip(table.sources, of_top, strict=True):
         name = name_of_input(paper.words, one.kind)
-        found[name] = np.hypot(found.get(name, 0.0), np.linalg.norm(one.columns_m3[-1]))
-    return found
+        variances[name] = variances.get(name, 0.0) + variance
+    return {name: np.sqrt(variance) for name, variance in variances.items()}
 
 
 def _worst(paper, worst):

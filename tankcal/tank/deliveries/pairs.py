@@ -37,9 +37,20 @@ class Deliveries:
 def deliveries(table, low_m, high_m):
     """Deliveries between pairs of dips: u^2 = |f(high) - f(low)|^2, k by Welch-Satterthwaite.
 
-    table          a tankcal.tank.capacity.Capacity
-    low_m, high_m  (n,) or scalars, dips in m
-    Raises HeightError for a dip outside the table (`Capacity.inside`).
+    Parameters
+    ----------
+    table : tankcal.tank.capacity.Capacity
+    low_m, high_m : (n,) arrays or floats
+        Dips before and after, m.
+
+    Returns
+    -------
+    Deliveries
+
+    Raises
+    ------
+    HeightError
+        For a dip outside the table (`Capacity.inside`).
     """
     low_m, high_m = np.broadcast_arrays(*np.atleast_1d(low_m, high_m))
     low_m, high_m = low_m.astype(float), high_m.astype(float)
