@@ -6,7 +6,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all study check format notebooks bench peer picture wheel clean
+.PHONY: help demo test test-all study check format notebooks job-format bench peer picture wheel clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -41,6 +41,9 @@ notebooks: $(VENV)/full ## execute every notebook, top to bottom
 	mkdir -p build/notebooks/studies
 	cd notebooks && ls *.ipynb studies/*.ipynb | xargs -P 2 -I {} \
 	  sh -c '../$(BIN)/jupyter nbconvert --to notebook --execute --output-dir ../build/notebooks/$$(dirname {}) {}'
+
+job-format: $(VENV)/full ## fill the tables of docs/job-format.md from the contract of the job
+	$(BIN)/python -m tankcal.job.starter.page docs/job-format.md
 
 bench: $(VENV)/full ## time and memory of the main job, tables of 1 mm rows and their u, ten million points, plans
 	$(BIN)/python benchmarks/main_job.py

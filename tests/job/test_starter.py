@@ -22,8 +22,10 @@ from tankcal.job.contract import (
     SURVEYS,
     TABLES_OF_KIND,
 )
+from tankcal.job.fields import Field
 from tankcal.job.rule_files import LIMITS, RULE, parse_rule, shipped_names
 from tankcal.job.starter import write_starter
+from tankcal.job.starter.page import filled_page
 from tankcal.job.tables import Log
 from tankcal.tank.rules import TANKS
 from tankcal.text.languages import DEFAULT, LANGUAGES
@@ -259,6 +261,21 @@ def test_the_documentation_names_every_key_column_and_choice():
     for name, known in INPUTS.items():
         assert f"| `{name}` | `{known.unit}` |" in text
         assert (f"| `{name}` | {known.assumption} |" in text) == bool(known.assumption)
+
+
+def test_the_documentation_is_filled_in():
+    text = DOCS.read_text(encoding="utf-8")
+    assert filled_page(text) == text, "stale: make job-format"
+
+
+def test_a_new_column_gets_a_row_and_an_old_one_loses_it(monkeypatch):
+    added = Field("ladder_m", "number", "width of the ladder", required=True, low=0, high=2)
+    fields = (COLUMNS["courses"][0], added, *COLUMNS["courses"][1:-1])  # without paint_mm
+    monkeypatch.setitem(COLUMNS, "courses", fields)
+    text = filled_page(DOCS.read_text(encoding="utf-8"))
+    assert "\n| **`ladder_m`** | width of the ladder | 0 to 2 |\n| **`height_m`** |" in text
+    assert "`paint_mm`" not in text
+    assert filled_page(text) == text
 
 
 def test_the_documentation_names_the_keys_and_choices_of_a_rule():

@@ -1,6 +1,7 @@
 """The closed lists of a job: every key of job.toml and every column of its tables.
 
-`docs/job-format.md` says the same for people, and the starter job is written from these lists.
+A table of the tank has a module of its own, with its columns and its checks. The starter job and
+the tables of `docs/job-format.md` (`make job-format`) are written from these lists.
 """
 
 from tankcal.job.contract import (
