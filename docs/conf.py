@@ -1,0 +1,57 @@
+"""Settings of the site (Sphinx); `make site` stages its pages by docs/stage.py and builds them."""
+
+import re
+
+import tankcal
+
+project = "tankcal"
+author = "The tankcal authors"
+project_copyright = author
+version = release = tankcal.__version__
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+root_doc = "docs/index"
+language = "en"
+myst_enable_extensions = []
+myst_heading_anchors = 4
+suppress_warnings = ["misc.highlighting_failure"]  # a shell's session that is no program
+templates_path = []
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+
+html_theme = "furo"
+html_title = f"tankcal {version}"
+html_copy_source = False
+html_show_sourcelink = False
+html_show_sphinx = False
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+
+SECTION = re.compile(r"^\s*-{3,}\s*$")
+
+
+def set_plain_docstrings(app, what, name, obj, options, lines):
+    """A docstring without numpydoc sections keeps its columns: the text after its first paragraph
+    is set as it was typed."""
+    if any(SECTION.match(line) for line in lines) or "" not in lines:
+        return
+    first = lines.index("")
+    rest = lines[first + 1 :]
+    if any(line.startswith(" ") for line in rest) or any("  " in line.strip() for line in rest):
+        lines[first:] = ["", "::", "", *("   " + line for line in rest), ""]
+
+
+def mark_code(app, what, name, obj, options, lines):
+    """A single backtick in a docstring means code, whatever the markup of the site says."""
+    end = lines.index("::") if "::" in lines else len(lines)
+    text = re.sub(r"(?<![`:\w])`([^`]+)`(?!`)", r"``\1``\\ ", "\n".join(lines[:end]))
+    lines[:end] = text.replace("|", r"\|").split("\n")
+
+
+def setup(app):
+    """Docstrings are taken as they stand in this house."""
+    app.connect("autodoc-process-docstring", set_plain_docstrings, priority=100)
+    app.connect("autodoc-process-docstring", mark_code, priority=900)
