@@ -6,7 +6,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all study check format notebooks job-format bench peer picture wheel clean
+.PHONY: help demo test test-all study check format notebooks job-format bench peer picture site wheel clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -63,6 +63,10 @@ picture: notebooks ## the pictures in the README, of the example's report and th
 	$(BIN)/python docs/picture.py build docs/images/certificate.png
 	$(BIN)/python docs/notebook_pictures.py build/notebooks docs/images
 
+site: notebooks $(VENV)/docs ## these pages, the executed notebooks and the API as a site: build/site/index.html
+	$(BIN)/python docs/stage.py build/site-source build/notebooks
+	$(BIN)/sphinx-build -q -W --keep-going -c docs -b html build/site-source build/site
+
 wheel: $(VENV)/full ## build the wheel and run the example from it, away from this checkout
 	rm -rf build/wheel && $(BIN)/pip wheel --quiet --no-deps --wheel-dir build/wheel .
 	$(BIN)/pip install --quiet --no-deps --target build/wheel/installed build/wheel/*.whl
@@ -75,6 +79,10 @@ $(VENV)/base: pyproject.toml constraints.txt
 
 $(VENV)/full: $(VENV)/base
 	$(BIN)/pip install --quiet --editable '.[test,check,images]'
+	touch $@
+
+$(VENV)/docs: $(VENV)/full
+	$(BIN)/pip install --quiet --editable '.[docs]'
 	touch $@
 
 clean: ## remove what was made, but not results of yours

@@ -10,7 +10,7 @@ project_copyright = author
 version = release = tankcal.__version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-root_doc = "docs/index"
+root_doc = "index"
 language = "en"
 myst_enable_extensions = []
 myst_heading_anchors = 4
@@ -27,7 +27,7 @@ html_title = f"tankcal {version}"
 html_copy_source = False
 html_show_sourcelink = False
 html_show_sphinx = False
-html_static_path = ["_static"]
+html_static_path = ["_static"]  # beside this file
 html_css_files = ["site.css"]
 
 SECTION = re.compile(r"^\s*-{3,}\s*$")

@@ -29,16 +29,21 @@ DOORS = {  # rooms of the reference, in the order in which a job goes through th
         f"tankcal.geometry.{name}"
         for name in ("circles", "cylinders", "primitives", "outlines", "form", "rings", "rotations")
     ),
-    "Uncertainty of any measurement": (
-        "tankcal.gum",
-        "tankcal.gum.distributions",
-        "tankcal.gum.monte_carlo",
-    ),
+    "Distributions and Monte Carlo": ("tankcal.gum.distributions", "tankcal.gum.monte_carlo"),
     "Camera": ("tankcal.camera.model", "tankcal.camera.imaging", "tankcal.camera.comparator"),
     "Survey": ("tankcal.survey", "tankcal.survey.observations"),
     "Tank": tuple(
         f"tankcal.tank.{name}"
-        for name in ("body", "capacity", "courses", "volumes", "solids", "heads", "bottoms", "rules")
+        for name in (
+            "body",
+            "capacity",
+            "courses",
+            "volumes",
+            "solids",
+            "heads",
+            "bottoms",
+            "rules",
+        )
     ),
     "Record and papers": ("tankcal.record", "tankcal.report", "tankcal.report.tables"),
     "Calibrations of cameras": ("tankcal.calibration",),
@@ -60,7 +65,9 @@ def main(target, executed):
     for path in pages:
         text = path.read_text(encoding="utf-8")
         if path == ROOT / "docs/index.md":
-            text = with_contents(text, notebooks)
+            text = from_root(with_contents(text, notebooks))
+            put(target / "index.md", with_links(text, ROOT, staged))
+            continue
         put(target / path.relative_to(ROOT), with_links(text, path.parent, staged))
     shutil.copytree(ROOT / "docs/images", target / "docs/images")
     for path in notebooks:
@@ -70,12 +77,12 @@ def main(target, executed):
             print(f"docs/stage.py: {inside} was not executed: its page has no results")
         page = page_of(done if done.exists() else path, target / "notebooks" / inside)
         put(
-            (target / "notebooks" / inside).with_suffix(".md"), with_links(page, path.parent, staged)
+            (target / "notebooks" / inside).with_suffix(".md"),
+            with_links(page, path.parent, staged),
         )
     put(target / "gallery.md", gallery(notebooks))
     for title, rooms in DOORS.items():
         put(target / f"api/{slug(title)}.rst", api_page(title, rooms))
-    put(target / "_static/site.css", (ROOT / "docs/site.css").read_text(encoding="utf-8"))
 
 
 def put(path, text):
@@ -117,6 +124,16 @@ def with_contents(text, notebooks):
     examples = [f"../{p.relative_to(ROOT)}" for p in sorted(ROOT.glob("examples/*/README.md"))]
     parts.append(contents("Examples", examples))
     return text + "\n" + "\n".join(parts)
+
+
+def from_root(text):
+    """The first page as it stands a folder higher."""
+
+    def led(match):
+        goal = match[2]
+        return f"{match[1]}{goal[3:] if goal.startswith('../') else 'docs/' + goal}"
+
+    return re.sub(r"(\]\(|^)((?:\.\./)?[\w/.-]+\.(?:md|rst|png))", led, text, flags=re.M)
 
 
 def contents(caption, names):

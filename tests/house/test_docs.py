@@ -1,0 +1,93 @@
+"""The pages: links lead somewhere, code that they name is there, the README is short and true."""
+
+import doctest
+import re
+import tomllib
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("examples/*/*.md")])
+LINK = re.compile(r"\]\(([^()\s]+)\)")
+NAME = re.compile(r"`(tankcal(?:\.\w+)+)")
+FILE = re.compile(r"`((?:tankcal|tests|report_templates|docs)/[\w./*-]*)`")
+PAST = ("CHANGELOG.md",)  # names what was there then
+FORMATS = (".toml", ".json", ".pdf", ".xlsx", ".ipynb")
+
+
+def anchors(page):
+    """The anchors of a page's headings, as git hosts make them."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), flags=re.M)
+    kept = (re.sub(r"[^\w\s-]", "", heading.replace("`", "")) for heading in headings)
+    return {re.sub(r"\s", "-", heading.strip().lower()) for heading in kept}
+
+
+def is_there(name):
+    """Whether a dotted name is a module, or an attribute of one."""
+    parts = name.split(".")
+    for length in range(len(parts), 0, -1):
+        try:
+            found = import_module(".".join(parts[:length]))
+        except ImportError:
+            continue
+        for part in parts[length:]:
+            if not hasattr(found, part):
+                return False
+            found = getattr(found, part)
+        return True
+    return False
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page):
+    lost = []
+    for goal in LINK.findall(page.read_text(encoding="utf-8")):
+        if re.match(r"[a-z]+:", goal):
+            continue
+        file, _, anchor = goal.partition("#")
+        target = (page.parent / file).resolve() if file else page
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            lost.append(goal)
+    assert lost == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_names_of_code_are_there(page):
+    if page.name in PAST:
+        pytest.skip("names what was there then")
+    text = page.read_text(encoding="utf-8")
+    assert [n for n in NAME.findall(text) if not n.endswith(FORMATS) and not is_there(n)] == []
+    assert [path for path in FILE.findall(text) if not any(ROOT.glob(path.rstrip("/")))] == []
+
+
+def test_readme_is_short():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 90
+
+
+@pytest.mark.parametrize("page", ["README.md"])
+def test_examples_of_pages_print_what_they_say(page, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    found = doctest.testfile(str(ROOT / page), module_relative=False)
+    assert found.attempted >= 3
+    assert found.failed == 0
+
+
+def test_every_floor_is_on_the_walk():
+    """docs/house.md names each room of the contract, in its order."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    layers = settings["tool"]["importlinter"]["contracts"][0]["layers"]
+    text = (ROOT / "docs/house.md").read_text(encoding="utf-8").split("## Floors")[1]
+    rows = [line for line in text.splitlines() if line.startswith("| ") and "`" in line]
+    floors = [set(re.findall(r"`(\w+)(?:/|\.py)", line.split("|")[2])) for line in rows]
+    named = [set(re.findall(r"\w+", layer)) for layer in layers if layer != "__main__"]
+    assert [room for floor in named for room in floor if not any(room in f for f in floors)] == []
+    of = {room: index for index, floor in enumerate(floors) for room in floor}
+    order = [max(of[room] for room in floor) for floor in named]
+    assert order == sorted(order)
+
+
+def test_first_page_lists_every_page():
+    listed = set(LINK.findall((ROOT / "docs/index.md").read_text(encoding="utf-8")))
+    assert {page.name for page in ROOT.glob("docs/*.md")} - {"index.md"} <= listed
