@@ -30,7 +30,8 @@ from scipy.special import (
     stdtrit,
 )
 
-from tankcal.uncertainty import Input, coverage_factor
+from tankcal.gum.components import coverage_factor
+from tankcal.gum.inputs import Input
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from tankcal.uncertainty.components import factor_of
+from tankcal.gum.components import factor_of
 
 _ROUNDING = 1e-9  # of a correlation: what two programs may differ by
 

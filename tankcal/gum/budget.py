@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.uncertainty.components import Combined, Source, combined
+from tankcal.gum.components import Combined, Source, combined
 
 
 @dataclass(frozen=True)

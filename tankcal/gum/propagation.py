@@ -12,9 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
-from tankcal.uncertainty.components import Source, combined, together_dof
-from tankcal.uncertainty.inputs import Inputs
-from tankcal.uncertainty.sensitivities import check_sensitivities, outputs_of, sensitivities_of
+from tankcal.gum.components import Source, combined, together_dof
+from tankcal.gum.inputs import Inputs
+from tankcal.gum.sensitivities import check_sensitivities, outputs_of, sensitivities_of
 
 
 @dataclass(frozen=True)

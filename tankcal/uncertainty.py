@@ -12,8 +12,8 @@ model goes through `propagate`, which makes the same sources:
 Distributions (`within`, ...) are in `tankcal.gum`. Source: JCGM 100:2008; JCGM 102:2011.
 """
 
-from tankcal.uncertainty.budget import BudgetRow, Shares, budget
-from tankcal.uncertainty.components import (
+from tankcal.gum.budget import BudgetRow, Shares, budget
+from tankcal.gum.components import (
     ROUNDING,
     Combined,
     Source,
@@ -29,9 +29,9 @@ from tankcal.uncertainty.components import (
     together_dof,
     triangular,
 )
-from tankcal.uncertainty.inputs import Input, Inputs
-from tankcal.uncertainty.propagation import Propagation, propagate
-from tankcal.uncertainty.sensitivities import sensitivities_of
+from tankcal.gum.inputs import Input, Inputs
+from tankcal.gum.propagation import Propagation, propagate
+from tankcal.gum.sensitivities import sensitivities_of
 
 __all__ = [
     "ROUNDING",
