@@ -1,19 +1,27 @@
-"""Surveys: from what was measured on site to adjusted points with their covariance."""
+"""Surveys: from what was measured on site to adjusted points with their covariance.
 
-from tankcal.survey.adjustment import adjust_survey
-from tankcal.survey.prediction import Nominal, Predicted, predict_survey
-from tankcal.survey.results import Adjustment, Cause, Dependence, Reading, datum_dependence
-from tankcal.survey.wall import wall_points
+Names are resolved when they are first used: reading a job needs its measurements, not the solver.
+"""
 
-__all__ = [
-    "Adjustment",
-    "Cause",
-    "Dependence",
-    "Nominal",
-    "Predicted",
-    "Reading",
-    "adjust_survey",
-    "datum_dependence",
-    "predict_survey",
-    "wall_points",
-]
+from importlib import import_module
+
+_ROOM_OF = {
+    "Adjustment": "results",
+    "Cause": "results",
+    "Dependence": "results",
+    "Nominal": "prediction",
+    "Predicted": "prediction",
+    "Reading": "results",
+    "adjust_survey": "adjustment",
+    "datum_dependence": "results",
+    "predict_survey": "prediction",
+    "wall_points": "wall",
+}
+
+__all__ = [*_ROOM_OF]
+
+
+def __getattr__(name):
+    if name not in _ROOM_OF:
+        raise AttributeError(f"module 'tankcal.survey' has no attribute {name!r}")
+    return getattr(import_module(f"tankcal.survey.{_ROOM_OF[name]}"), name)
