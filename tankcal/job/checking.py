@@ -5,6 +5,7 @@ import numpy as np
 from tankcal.job.fields import is_blank
 from tankcal.messages import message
 
+RELATIVE_DENSITY = 20  # smaller numbers are no densities in kg/m3
 UNIT_FACTOR = 5  # sizes that differ by more cannot be in the same unit
 
 

@@ -8,7 +8,6 @@ from tankcal.job.checking import has_rows
 from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.extent import Extent, extent_of, has_survey, has_wall_points
 from tankcal.job.checks.geometry import check_cylinder, check_scan
-from tankcal.job.checks.kinds import check_horizontal, check_roof, check_sphere
 from tankcal.job.checks.plausible import check_plausible
 from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.survey import check_survey
@@ -16,7 +15,9 @@ from tankcal.job.contract.bottom import check_bottom
 from tankcal.job.contract.correlations import check_correlations
 from tankcal.job.contract.courses import check_courses
 from tankcal.job.contract.deadwood import check_deadwood
+from tankcal.job.contract.lying import check_horizontal, check_sphere
 from tankcal.job.contract.points import check_points
+from tankcal.job.contract.roof import check_roof
 from tankcal.job.contract.stated import check_stated
 from tankcal.job.contract.uncertainty import check_inputs
 from tankcal.job.entries import kind_of

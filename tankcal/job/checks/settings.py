@@ -2,7 +2,13 @@
 
 from itertools import pairwise
 
-from tankcal.job.checking import is_not_given, loads_the_shell, missing_beside, tell
+from tankcal.job.checking import (
+    RELATIVE_DENSITY,
+    is_not_given,
+    loads_the_shell,
+    missing_beside,
+    tell,
+)
 from tankcal.job.checks.extent import has_wall_points
 from tankcal.job.plausibility import DENSITIES_KG_M3
 from tankcal.messages import message
@@ -144,7 +150,6 @@ def _check_zones(zones, extent, raw, log):
 
 
 MAX_DIP_OFFSET_M = 1.0
-RELATIVE_DENSITY = 20  # smaller numbers are no densities in kg/m3
 DENSITIES = (
     ("survey", "liquid_density_kg_m3"),
     ("table", "liquid_density_kg_m3"),

@@ -10,11 +10,13 @@ from tankcal.job.contract import (
     courses,
     deadwood,
     points,
+    roof,
     stated,
     uncertainty,
 )
 from tankcal.job.contract.keys import KEYS as COMMON_KEYS
 from tankcal.job.contract.kinds import KINDS
+from tankcal.job.contract.lying import KEYS as LYING_KEYS
 from tankcal.job.contract.observations import COLUMNS as SURVEY_COLUMNS
 from tankcal.job.contract.observations import SURVEYS
 from tankcal.job.contract.parts import KEYS as PART_KEYS
@@ -29,7 +31,8 @@ SECTIONS = (
 )
 _TABLES = (points, courses, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES} | SURVEY_COLUMNS
-KEYS = {section: (COMMON_KEYS | PART_KEYS)[section] for section in SECTIONS}
+_KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | {"bottom": bottom.KEYS, "roof": roof.KEYS}
+KEYS = {section: _KEYS[section] for section in SECTIONS}
 
 REQUIRED_TABLES = {"vertical": ("points", "courses")}
 _OF_ALL = ("uncertainty", "correlations", "stated")

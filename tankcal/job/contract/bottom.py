@@ -1,10 +1,30 @@
-"""bottom.csv and the form of [bottom]: columns; one form, complete, in the tank, in metres."""
+"""[bottom] and bottom.csv: keys and columns; one form, complete, in the tank, in metres."""
 
 import numpy as np
 
 from tankcal.job.checking import has_rows, is_not_given, places_of, tell, zero_z
+from tankcal.job.contract.kinds import VERTICAL
 from tankcal.job.fields import Field
 from tankcal.messages import message
+
+KEYS = (
+    Field(
+        "form",
+        "choice",
+        "form of the bottom; blank: flat, or points or liquid when bottom.csv has their columns",
+        kinds=VERTICAL,
+        choices=("flat", "leaning", "cone", "dish", "points", "liquid"),
+    ),
+    Field(
+        "centre_z_m",
+        "number",
+        "cone and dish: z of the centre, in the frame of the points, metres; the edge is at"
+        " datum.bottom_z_m",
+        kinds=VERTICAL,
+        low=-1e5,
+        high=1e5,
+    ),
+)
 
 
 def _bottom(name, note, low, high, above_low=False):

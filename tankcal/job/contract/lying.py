@@ -1,10 +1,132 @@
-"""Sizes of lying cylinders and spheres, and the floating roof: complete, consistent, said once."""
+"""[horizontal] and [sphere]: their keys; sizes complete, consistent, and said once."""
 
 from tankcal.job.checking import is_not_given, missing_beside, tell
-from tankcal.job.checks.settings import RELATIVE_DENSITY
-from tankcal.job.contract import KEYS
-from tankcal.job.plausibility import ROOF_KG_M2
+from tankcal.job.fields import Field
 from tankcal.messages import message
+
+HORIZONTAL_ONLY = ("horizontal",)
+SPHERE_ONLY = ("sphere",)
+END_FORMS = ("flat", "conical", "ellipsoidal", "torispherical", "spherical")
+
+
+def _length(name, note, kinds, high=100.0, required=False):
+    return Field(
+        name, "number", note, required=required, kinds=kinds, low=0, above_low=True, high=high
+    )
+
+
+def _end(letter):
+    """The keys of one end of a horizontal cylinder."""
+    name = f"end {letter.upper()}"
+    return (
+        Field(
+            f"end_{letter}",
+            "choice",
+            f"form of {name}",
+            required=True,
+            kinds=HORIZONTAL_ONLY,
+            choices=END_FORMS,
+        ),
+        _length(
+            f"end_{letter}_depth_m",
+            f"{name}: depth along the axis, metres; conical, ellipsoidal, spherical only",
+            HORIZONTAL_ONLY,
+            20,
+        ),
+        _length(
+            f"end_{letter}_dish_radius_m",
+            f"{name}: radius of the dish, metres; torispherical only",
+            HORIZONTAL_ONLY,
+        ),
+        _length(
+            f"end_{letter}_knuckle_radius_m",
+            f"{name}: radius of the knuckle, metres; torispherical only",
+            HORIZONTAL_ONLY,
+            20,
+        ),
+    )
+
+
+def _thickness(kinds):
+    return Field(
+        "thickness_mm",
+        "number",
+        "plate and paint together, millimetres: subtracted from what was measured outside",
+        kinds=kinds,
+        low=0,
+        high=100,
+    )
+
+
+HORIZONTAL = (
+    _length(
+        "diameter_m",
+        "diameter, metres: FILL IN this, or width_m and height_m, or the points",
+        HORIZONTAL_ONLY,
+        20,
+    ),
+    _length("width_m", "width of an elliptical cylinder, metres", HORIZONTAL_ONLY, 20),
+    _length("height_m", "height of an elliptical cylinder, metres", HORIZONTAL_ONLY, 20),
+    _length(
+        "length_m",
+        "length of the cylinder, without the ends, metres; nothing is subtracted from it",
+        HORIZONTAL_ONLY,
+        200,
+        required=True,
+    ),
+    *_end("a"),
+    *_end("b"),
+    Field(
+        "tilt_mm_per_m",
+        "number",
+        "rise of end B over end A, millimetres per metre of axis; negative: A is higher; blank: 0;"
+        " not with points",
+        kinds=HORIZONTAL_ONLY,
+        low=-200,
+        high=200,
+    ),
+    Field(
+        "roll_deg",
+        "number",
+        "turn of an elliptical cross-section about the axis, degrees, clockwise seen from A;"
+        " blank: 0",
+        kinds=HORIZONTAL_ONLY,
+        low=-90,
+        high=90,
+    ),
+    Field(
+        "dip_from_a_m",
+        "number",
+        "dip point: along the axis from the start of the cylinder at A, metres; blank: half the"
+        " length, where there is no tilt",
+        kinds=HORIZONTAL_ONLY,
+        low=0,
+        high=200,
+    ),
+    Field(
+        "dip_direction",
+        "choice",
+        "dips are read plumb, or square to the axis; blank: plumb",
+        kinds=HORIZONTAL_ONLY,
+        choices=("plumb", "square"),
+    ),
+    _thickness(HORIZONTAL_ONLY),
+    Field(
+        "azimuth_deg",
+        "number",
+        "direction from A to B, degrees clockwise from +y, so that the points know which end is A;"
+        " only with points",
+        kinds=HORIZONTAL_ONLY,
+        low=0,
+        high=360,
+    ),
+)
+SPHERE = (
+    _length("diameter_m", "diameter, metres: FILL IN this, or the points", SPHERE_ONLY),
+    _thickness(SPHERE_ONLY),
+)
+
+KEYS = {"horizontal": HORIZONTAL, "sphere": SPHERE}
 
 STRONG_TILT_MM_PER_M = 50
 DEEPEST_END = 2.0  # diameters
@@ -247,86 +369,3 @@ def check_sphere(values, has_points, raw, log):
             "diameter_m",
             message("sphere_size_missing", "missing; expected it, or points.csv"),
         )
-
-
-# [roof]: complete or not at all, and of a credible size for the tank.
-
-LIGHTEST_KG_M2, HEAVIEST_KG_M2 = 1.0, 1000.0  # aluminium skins have 5, steel double decks 120
-
-
-def check_roof(roof, extent, raw, log):
-    """All keys or none; critical heights in order and within the shell; a mass that can float."""
-    names = [field.name for field in KEYS["roof"]]
-    given = [name for name in names if not is_not_given(raw, "roof", name)]
-    for name in names:
-        if given and name not in given:
-            tell(log.problem, raw, "roof", name, missing_beside(given[0]))
-    low, high = roof["critical_bottom_m"], roof["critical_top_m"]
-    if None not in (low, high) and low >= high:
-        expected = message(
-            "roof_upside_down",
-            "found {high:g}; expected above critical_bottom_m = {low:g}",
-            high=high,
-            low=low,
-        )
-        tell(log.problem, raw, "roof", "critical_top_m", expected)
-        return
-    if extent.top_m is not None:
-        for name in ("critical_bottom_m", "critical_top_m"):
-            if roof[name] is not None and roof[name] > extent.top_m:
-                expected = message(
-                    "roof_above_shell",
-                    "found {dip:g}; expected a dip within the shell, at most {top_m:.4g} m: in "
-                    "another unit?",
-                    dip=roof[name],
-                    top_m=extent.top_m,
-                )
-                tell(log.problem, raw, "roof", name, expected)
-    if roof["mass_kg"] is not None and extent.area_m2 is not None:
-        _check_mass(roof, extent.area_m2, raw, log)
-
-
-def _check_mass(roof, area, raw, log):
-    mass, density = roof["mass_kg"], roof["reference_density_kg_m3"]
-    if not LIGHTEST_KG_M2 <= mass / area <= HEAVIEST_KG_M2:
-        guess = message("in_grams", "in grams?")
-        if mass / area < LIGHTEST_KG_M2:
-            guess = message("in_tonnes", "in tonnes?")
-        expected = message(
-            "roof_mass",
-            "found {mass:g}, which is {per_m2:.3g} kg for each m2 of the tank; expected "
-            "{least:g} to {most:g}: {guess}",
-            mass=mass,
-            per_m2=mass / area,
-            least=LIGHTEST_KG_M2,
-            most=HEAVIEST_KG_M2,
-            guess=guess,
-        )
-        tell(log.problem, raw, "roof", "mass_kg", expected)
-        return
-    least, most = (each * area for each in ROOF_KG_M2)
-    if not least <= mass <= most:
-        text = message(
-            "roof_mass_strange",
-            "{found_kg:g} kg, expected {least_kg:.3g} to {most_kg:.3g} kg for a roof of"
-            " {area_m2:.4g} m2: in another unit?",
-            found_kg=mass,
-            least_kg=least,
-            most_kg=most,
-            area_m2=area,
-        )
-        tell(log.warning, raw, "roof", "mass_kg", text)
-    low, high = roof["critical_bottom_m"], roof["critical_top_m"]
-    if None in (density, low, high) or density < RELATIVE_DENSITY:
-        return
-    draught = mass / (density * area)
-    if draught > high - low:
-        expected = message(
-            "roof_cannot_float",
-            "{above:.4g} m above critical_bottom_m; expected more, for a roof of {mass:g} kg "
-            "floats only when {draught:.3g} m of it are in the liquid",
-            above=high - low,
-            mass=mass,
-            draught=draught,
-        )
-        tell(log.problem, raw, "roof", "critical_top_m", expected)

@@ -1,0 +1,131 @@
+"""[roof]: its keys; all of them or none, and a roof of a credible size for the tank."""
+
+from tankcal.job.checking import RELATIVE_DENSITY, is_not_given, missing_beside, tell
+from tankcal.job.contract.kinds import VERTICAL
+from tankcal.job.fields import Field
+from tankcal.job.plausibility import ROOF_KG_M2
+from tankcal.messages import message
+
+KEYS = (
+    Field(
+        "mass_kg",
+        "number",
+        "floating roof: its mass with all that floats with it, kilograms; blank: no floating roof",
+        kinds=VERTICAL,
+        low=0,
+        above_low=True,
+        high=1e7,
+    ),
+    Field(
+        "critical_bottom_m",
+        "number",
+        "dip at which the liquid first touches it, from the table's zero, metres",
+        kinds=VERTICAL,
+        low=0,
+        high=100,
+    ),
+    Field(
+        "critical_top_m",
+        "number",
+        "dip at which it floats freely, from the table's zero, metres",
+        kinds=VERTICAL,
+        low=0,
+        high=100,
+    ),
+    Field(
+        "reference_density_kg_m3",
+        "number",
+        "density of the liquid that the table is for, kg/m3",
+        kinds=VERTICAL,
+        low=0,
+        above_low=True,
+        high=3000,
+    ),
+    Field(
+        "weighing",
+        "choice",
+        "what the mass was weighed in, or reduced to: air or vacuum",
+        kinds=VERTICAL,
+        choices=("air", "vacuum"),
+    ),
+)
+
+LIGHTEST_KG_M2, HEAVIEST_KG_M2 = 1.0, 1000.0  # aluminium skins have 5, steel double decks 120
+
+
+def check_roof(roof, extent, raw, log):
+    """All keys or none; critical heights in order and within the shell; a mass that can float."""
+    names = [field.name for field in KEYS]
+    given = [name for name in names if not is_not_given(raw, "roof", name)]
+    for name in names:
+        if given and name not in given:
+            tell(log.problem, raw, "roof", name, missing_beside(given[0]))
+    low, high = roof["critical_bottom_m"], roof["critical_top_m"]
+    if None not in (low, high) and low >= high:
+        expected = message(
+            "roof_upside_down",
+            "found {high:g}; expected above critical_bottom_m = {low:g}",
+            high=high,
+            low=low,
+        )
+        tell(log.problem, raw, "roof", "critical_top_m", expected)
+        return
+    if extent.top_m is not None:
+        for name in ("critical_bottom_m", "critical_top_m"):
+            if roof[name] is not None and roof[name] > extent.top_m:
+                expected = message(
+                    "roof_above_shell",
+                    "found {dip:g}; expected a dip within the shell, at most {top_m:.4g} m: in "
+                    "another unit?",
+                    dip=roof[name],
+                    top_m=extent.top_m,
+                )
+                tell(log.problem, raw, "roof", name, expected)
+    if roof["mass_kg"] is not None and extent.area_m2 is not None:
+        _check_mass(roof, extent.area_m2, raw, log)
+
+
+def _check_mass(roof, area, raw, log):
+    mass, density = roof["mass_kg"], roof["reference_density_kg_m3"]
+    if not LIGHTEST_KG_M2 <= mass / area <= HEAVIEST_KG_M2:
+        guess = message("in_grams", "in grams?")
+        if mass / area < LIGHTEST_KG_M2:
+            guess = message("in_tonnes", "in tonnes?")
+        expected = message(
+            "roof_mass",
+            "found {mass:g}, which is {per_m2:.3g} kg for each m2 of the tank; expected "
+            "{least:g} to {most:g}: {guess}",
+            mass=mass,
+            per_m2=mass / area,
+            least=LIGHTEST_KG_M2,
+            most=HEAVIEST_KG_M2,
+            guess=guess,
+        )
+        tell(log.problem, raw, "roof", "mass_kg", expected)
+        return
+    least, most = (each * area for each in ROOF_KG_M2)
+    if not least <= mass <= most:
+        text = message(
+            "roof_mass_strange",
+            "{found_kg:g} kg, expected {least_kg:.3g} to {most_kg:.3g} kg for a roof of"
+            " {area_m2:.4g} m2: in another unit?",
+            found_kg=mass,
+            least_kg=least,
+            most_kg=most,
+            area_m2=area,
+        )
+        tell(log.warning, raw, "roof", "mass_kg", text)
+    low, high = roof["critical_bottom_m"], roof["critical_top_m"]
+    if None in (density, low, high) or density < RELATIVE_DENSITY:
+        return
+    draught = mass / (density * area)
+    if draught > high - low:
+        expected = message(
+            "roof_cannot_float",
+            "{above:.4g} m above critical_bottom_m; expected more, for a roof of {mass:g} kg "
+            "floats only when {draught:.3g} m of it are in the liquid",
+            above=high - low,
+            mass=mass,
+            draught=draught,
+        )
+        tell(log.problem, raw, "roof", "critical_top_m", expected)
