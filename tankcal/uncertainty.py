@@ -1,7 +1,7 @@
 """The one engine of uncertainty: u, degrees of freedom, k and U of anything, and its budget.
 
 A table, a budget, a delivery and a plan are made of `Source`s and take u, degrees of freedom, k and
-U from `combined`; searches that keep sums for speed from `sum_of_fourths` and `dof_of`. Any other
+U from `combine`; searches that keep sums for speed from `sum_of_fourths` and `dof_of`. Any other
 model goes through `propagate`, which makes the same sources:
 
     inputs = Inputs([Input("d", within(0.01, mean=4.8), "m"), ...], {("d", "h"): 0.5})
@@ -17,13 +17,13 @@ from tankcal.gum.components import (
     ROUNDING,
     Combined,
     Source,
-    combined,
+    combine,
     coverage_factor,
     declared_source,
     dof_of,
     effective_dof,
     factor_of,
-    grouped,
+    group_correlated,
     least_of,
     sum_of_fourths,
     together_dof,
@@ -43,13 +43,13 @@ __all__ = [
     "Shares",
     "Source",
     "budget",
-    "combined",
+    "combine",
     "coverage_factor",
     "declared_source",
     "dof_of",
     "effective_dof",
     "factor_of",
-    "grouped",
+    "group_correlated",
     "least_of",
     "propagate",
     "sensitivities_of",

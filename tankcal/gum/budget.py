@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.gum.components import Combined, Source, combined
+from tankcal.gum.components import Combined, Source, combine
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Shares:
 
     def __init__(self, sources, probability):
         self.sources, self.probability = sources, probability
-        self._found = combined(sources, 1)
+        self._found = combine(sources, 1)
         self._variances = self._found.variances[0]
         self._variance = float(self._variances.sum())
         self.u, self.dof = float(self._found.u[0]), float(self._found.effective_dof[0])

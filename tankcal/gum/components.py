@@ -117,7 +117,7 @@ def triangular(correlation):
     return lower
 
 
-def grouped(sources, correlations):
+def group_correlated(sources, correlations):
     """Sources with those that are correlated made one, for their columns mix.
 
     sources  {name: Source} of one column each where correlated; correlations  (name, name, r)
@@ -198,7 +198,7 @@ class Combined:
         return self.k(probability) * self.u
 
 
-def combined(sources, rows):
+def combine(sources, rows):
     """Outputs made of independent causes: their u, degrees of freedom, k and U.
 
     Parameters
@@ -214,7 +214,7 @@ def combined(sources, rows):
 
     Examples
     --------
-    >>> found = combined([Source("tape", np.array([[3.0]]), 9.0), Source("form", [[4.0]])], 1)
+    >>> found = combine([Source("tape", np.array([[3.0]]), 9.0), Source("form", [[4.0]])], 1)
     >>> found.u.tolist(), found.expanded(0.95).round(2).tolist()
     ([5.0], [9.97])
     """

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tankcal.gum.components import Source, combined, together_dof
+from tankcal.gum.components import Source, combine, together_dof
 from tankcal.gum.inputs import Inputs
 from tankcal.gum.sensitivities import check_sensitivities, outputs_of, sensitivities_of
 
@@ -46,7 +46,7 @@ class Propagation:
     @cached_property
     def combination(self):
         """`Combined` of the sources."""
-        return combined(self.sources, len(self.values))
+        return combine(self.sources, len(self.values))
 
     @property
     def factor(self):
@@ -98,7 +98,7 @@ class Propagation:
         variance = np.sum(self.combination.variances, axis=1, keepdims=True)
         return np.divide(parts, variance, out=np.zeros_like(parts), where=variance > 0)
 
-    def combined(self, weights):
+    def combine(self, weights):
         """The propagation of weights @ outputs, (new rows, rows): sums, differences, deliveries.
 
         What the outputs have in common cancels or adds up as it must.

@@ -25,7 +25,7 @@ from tankcal.tank.dips import (
     whole_top,
 )
 from tankcal.tank.falling_capacity import refuse_falling
-from tankcal.uncertainty import ROUNDING, combined
+from tankcal.uncertainty import ROUNDING, combine
 
 CLOSED = 1e-3  # of its largest free surface: one that is smaller at the top counts as none
 
@@ -118,7 +118,7 @@ def _without_rounding(volumes, areas, sources):
     Below a raised bottom the volume is a difference of volumes: it came out as -9e-16 m3 with u of
     3e-20 m3, and was written with twenty decimals. A row whose volume is 0 but unsure stays so.
     """
-    u = combined(sources, len(volumes)).u
+    u = combine(sources, len(volumes)).u
     least = ROUNDING * np.max(np.abs(volumes), initial=0.0)
     empty = (np.abs(volumes) <= least) & (u <= least)
     flat = np.abs(areas) <= ROUNDING * np.max(np.abs(areas), initial=0.0)

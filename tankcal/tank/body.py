@@ -11,7 +11,7 @@ import numpy as np
 
 from tankcal.tank.parts import Part, sum_derivatives
 from tankcal.tank.volumes import ShellVolume
-from tankcal.uncertainty import Source, declared_source, factor_of, grouped
+from tankcal.uncertainty import Source, declared_source, factor_of, group_correlated
 
 OWN_SCALE = "instrument_scale"  # kind of a cause that stands for the input "scale"
 MEASURED = ("diameter", "length", "end_depth", "dip_position", "plate_thickness")  # at its warmth
@@ -311,7 +311,7 @@ class Body:
             for one in self.declared
             if one.name in derivatives
         }
-        return (*own, *grouped(alone, self.correlations))
+        return (*own, *group_correlated(alone, self.correlations))
 
 
 def _bears(by):

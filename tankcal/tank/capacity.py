@@ -14,7 +14,7 @@ import numpy as np
 from tankcal.errors import HeightError
 from tankcal.messages import message
 from tankcal.text.display import volume_text
-from tankcal.uncertainty import Source, combined
+from tankcal.uncertainty import Source, combine
 
 SAME_ROW = 1e-9  # of a weight: a dip this near to a row is that row
 SAME_M = 1e-9  # dips nearer than this are the same
@@ -104,7 +104,7 @@ class Capacity:
     @cached_property
     def _combined_rows(self):
         """`uncertainty.Combined` of all rows."""
-        return combined(self.sources, len(self.height_m))
+        return combine(self.sources, len(self.height_m))
 
     def at(self, height_m):
         """The volume at a dip, interpolated linearly between rows as a gauge does.
@@ -161,7 +161,7 @@ class Capacity:
 
     def _combined(self, terms):
         weights = sum(sign * self.weights([height])[0] for height, sign in terms)
-        found = combined([source.weighted(weights[None, :]) for source in self.sources], 1)
+        found = combine([source.weighted(weights[None, :]) for source in self.sources], 1)
         u, dof = float(found.u[0]), float(found.effective_dof[0])
         k = float(found.k(self.probability)[0])
         for_use = bool(np.all(self.for_use([height for height, _ in terms])))

@@ -25,7 +25,7 @@ from tankcal.uncertainty import (
     budget,
     coverage_factor,
     effective_dof,
-    grouped,
+    group_correlated,
     propagate,
     sensitivities_of,
     together_dof,
@@ -177,7 +177,7 @@ def test_one_tape_for_diameter_and_height():
     rest = [Input(row.name, within(0.0)) for row in budget(tank()) if "calibration" not in row.name]
     inputs = Inputs([Input("tape", standard(1.0)), *rest])
     alone = propagate(lambda x: np.pi / 4 * (4.8 + 0.024 * x[0]) ** 2 * (5.3 + 0.05 * x[0]), inputs)
-    others = tank().combined([[1.0]]).scaled("d calibration", 0).scaled("h calibration", 0)
+    others = tank().combine([[1.0]]).scaled("d calibration", 0).scaled("h calibration", 0)
     assert np.hypot(alone.u[0], others.u[0]) == pytest.approx(correlated.u[0], rel=1e-6)
 
 
@@ -323,7 +323,7 @@ def test_many_outputs_have_few_columns():
     assert result.factor.shape == (9500, 7)
     assert len(result.inputs.groups) == 3
     assert result.u[:50] ** 2 == pytest.approx(full[:50].diagonal(), rel=1e-12)
-    delivery = result.combined([[-1.0, 1.0] + [0.0] * 9498])
+    delivery = result.combine([[-1.0, 1.0] + [0.0] * 9498])
     assert delivery.u[0] ** 2 == pytest.approx(full[0, 0] + full[1, 1] - 2 * full[0, 1], rel=1e-11)
     line = next(row for row in budget(result, 3) if row.name == "points")
     expected = jacobian[3, :5] @ covariance @ jacobian[3, :5]
@@ -448,7 +448,7 @@ def test_table_budget_and_propagation_state_the_same():
     alone = {
         name: Source(name, np.full((2, 1), u), dof, u, "m3") for name, (u, dof) in pairs.items()
     }
-    sources = grouped(alone, [("a", "b", 0.5)])
+    sources = group_correlated(alone, [("a", "b", 0.5)])
     heights = np.array([0.0, 1.0])
     table = Capacity(heights, 10.0 + heights, 1.0 + 0 * heights, sources, 0.95)
     stated = [by_gum.expanded(0.95)[0], table.U_m3[0], table.at(0.5).U_m3, of_dip(table, 1.0).U_m3]

@@ -8,7 +8,7 @@ import tankcal
 from tankcal.gum.distributions import standard
 from tankcal.tank.budgets import budget, reading_sources
 from tankcal.tank.capacity import Capacity
-from tankcal.uncertainty import Input, Inputs, Source, grouped, propagate, triangular
+from tankcal.uncertainty import Input, Inputs, Source, group_correlated, propagate, triangular
 from tankcal.uncertainty import budget as budget_of_model
 
 
@@ -25,7 +25,7 @@ def table(*sources):
 def test_correlated_inputs_are_those_of_the_law_of_propagation(r):
     """The same two inputs through propagate: u, shares and what halving one is worth."""
     alone = {"a": source("a", 0, 3, 5, dof=9.0), "b": source("b", 0, 2, -4, dof=9.0)}
-    found = budget(table(*grouped(alone, [("a", "b", r)] if r else ())), 2.0)
+    found = budget(table(*group_correlated(alone, [("a", "b", r)] if r else ())), 2.0)
     inputs = Inputs([Input(n, standard(1.0, dof=9.0), "mm", "A") for n in "ab"], {("a", "b"): r})
     model = propagate(lambda x: 5 * x[0] - 4 * x[1], inputs)
     assert found.u_m3 == pytest.approx(model.u[0], rel=1e-12)
@@ -56,7 +56,7 @@ def test_a_triangular_factor_gives_back_its_matrix(r):
 
 def test_groups_keep_their_order_and_leave_others_alone():
     alone = {name: source(name, 0, i, 2 * i) for i, name in enumerate("abcd", 1)}
-    found = grouped(alone, [("d", "b", 0.3), ("b", "c", 0.2), ("a", "elsewhere", 0.9)])
+    found = group_correlated(alone, [("d", "b", 0.3), ("b", "c", 0.2), ("a", "elsewhere", 0.9)])
     assert [one.kind for one in found] == ["a", "b & c & d"]
     assert np.array_equal(found[1].correlation, [[1, 0.2, 0.3], [0.2, 1, 0], [0.3, 0, 1]])
     contribution = np.array([4.0, 6.0, 8.0])

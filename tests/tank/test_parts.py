@@ -9,7 +9,7 @@ import pytest
 from jacobians import assert_derivative
 from shapes import azimuths, ring, section_of
 
-from tankcal.pipeline.tanks.vertical import widened
+from tankcal.pipeline.tanks.vertical import widen_bottom
 from tankcal.quadrature import panels
 from tankcal.tank.body import Factor, ShellPart, SolidPart
 from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
@@ -140,7 +140,7 @@ EXAMPLES = {
         surveyed, (-0.2, -0.02), 1, ("bottom_points", "bottom_form"), {"scale": 1e-6}, 256, 1e-4
     ),
     "widened bottom": Example(
-        lambda: widened(shaped_bottom("cone", AREA, -0.15), shell()), (-0.2, -1e-9), 1
+        lambda: widen_bottom(shaped_bottom("cone", AREA, -0.15), shell()), (-0.2, -1e-9), 1
     ),
     "deadwood": Example(items, (-1.0, 6.0), -1, ("deadwood",)),
     "floating roof": Example(roof, (0.0, 6.0), -1, (), {"roof_mass": 10.0}),

@@ -61,7 +61,7 @@ class Widened(Part):
         return self.part.sources(levels_m)
 
 
-def widened(part, shell):
+def widen_bottom(part, shell):
     """`Widened` bottom of a `body.ShellPart`, by its radius at the bottom."""
     radius = np.sqrt(shell.volume.area_m2([0.0])[0] / np.pi) / shell.scale
     rates = {
@@ -165,7 +165,7 @@ def _on_its_bottom(job, wall, shell, zero, parts):
     if bottom.form == "liquid":
         measured = measured_bottom(bottom.level_m + zero, bottom.volume_m3, bottom.u_m3)
         return [*(Above(part, measured.highest_m) for part in parts), measured]
-    return [*parts, widened(_bottom(job, wall, shell), shell)]
+    return [*parts, widen_bottom(_bottom(job, wall, shell), shell)]
 
 
 def _bottom(job, wall, shell):

@@ -13,7 +13,7 @@ from tankcal.report.planning.improvements import changes, design
 from tankcal.report.planning.rows import lost_ties
 from tankcal.text.digits import written
 from tankcal.text.words import group_name, name_of_input
-from tankcal.uncertainty import combined
+from tankcal.uncertainty import combine
 
 DIPS = 12  # rows of the table that are shown
 MOST_POINTS = 40
@@ -129,7 +129,7 @@ def _table(paper):
 def _sources(paper):
     """{input: its standard uncertainty of the full tank}."""
     table, variances = paper.prediction.table, {}
-    of_top = combined(table.sources, len(table.height_m)).variances[-1]
+    of_top = combine(table.sources, len(table.height_m)).variances[-1]
     for one, variance in zip(table.sources, of_top, strict=True):
         name = name_of_input(paper.words, one.kind)
         variances[name] = variances.get(name, 0.0) + variance
