@@ -17,7 +17,7 @@ from schemas import DOCS, SAVED, documented, keys_of_schema, schema_text
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.messages import Message, message
-from tankcal.record import load
+from tankcal.record import load, migrated
 from tankcal.record.making import Record
 from tankcal.record.plain_data import to_plain
 from tankcal.record.schema import (
@@ -166,32 +166,36 @@ def places(value, path=()):
             yield from places(item, (*path, one))
 
 
-@pytest.mark.parametrize("name", ["film.json.gz", "furnished.json.gz"])
-def test_a_record_spoilt_anywhere_is_read_or_refused_in_plain_lines(name, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "every"),
+    [
+        ("furnished.json.gz", 5),
+        pytest.param("furnished.json.gz", 1, marks=pytest.mark.study),
+        pytest.param("film.json.gz", 1, marks=pytest.mark.study),
+    ],
+)
+def test_a_record_spoilt_anywhere_is_read_or_refused_in_plain_lines(name, every):
     """Property: any value of a record replaced by any other; nothing but InputError comes out."""
     record, rng = kept(name), np.random.default_rng(len(name))
     refused = 0
-    for path in places(record):
-        if not path:
-            continue
+    for path in list(places(record))[1::every]:
         spoilt = copy.copy(record)
         parent = spoilt
         for one in path[:-1]:
             parent[one] = copy.copy(parent[one])
             parent = parent[one]
         parent[path[-1]] = HOSTILE[rng.integers(len(HOSTILE))]
-        (tmp_path / "record.json").write_text(json.dumps(spoilt), encoding="utf-8")
-        told = problems_of(tmp_path / "record.json")
+        told = problems_of(spoilt)
         assert all(str(one).startswith("record.json") for one in told), path
         assert sum(len(str(one)) for one in told) < 10_000
         refused += bool(told)
-    assert refused > 100
+    assert refused > 100 / every
 
 
-def problems_of(path):
+def problems_of(record):
     """What is wrong with a record; () when it is read. Anything but InputError is raised."""
     try:
-        load(path)
+        migrated(record, "record.json")
     except InputError as error:
         return error.problems
     return ()
