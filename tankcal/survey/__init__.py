@@ -25,3 +25,7 @@ def __getattr__(name):
     if name not in _ROOM_OF:
         raise AttributeError(f"module 'tankcal.survey' has no attribute {name!r}")
     return getattr(import_module(f"tankcal.survey.{_ROOM_OF[name]}"), name)
+
+
+def __dir__():
+    return sorted(__all__)
