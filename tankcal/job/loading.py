@@ -29,14 +29,28 @@ OTHER_WORKBOOKS = (".xls", ".xlsm", ".xlsb", ".xltx", ".ods", ".numbers")
 
 
 def load(path: str | PathLike, only: str | None = None) -> Job:
-    """The Job in a folder, in the folder of a job.toml, or in a workbook (.xlsx).
+    """Read a job and check it as a whole.
 
-    only  "adjustment": the survey alone is needed. Of the rest what is there is read and its values
-          are checked one by one; Job.tank, survey, datum and table are None where they are not
-          whole, and the parts of the tank (points, bottom, deadwood, ...) are left out
+    Parameters
+    ----------
+    path : str or PathLike
+        A folder with job.toml, that job.toml itself, or a workbook (.xlsx).
+    only : {"adjustment"}, optional
+        The survey alone is needed. Of the rest what is there is read, and its values are checked
+        one by one; tank, survey, datum and table of the job are None where they are not whole,
+        and the parts of the tank (points, bottom, deadwood, ...) are left out.
 
-    Raises InputError with every problem of the input, each with its file, row and column;
-    ValueError for another `only`.
+    Returns
+    -------
+    Job
+        In SI units. Its `warnings` are what does not stop it.
+
+    Raises
+    ------
+    InputError
+        With every problem of the input, each with its file, row and column.
+    ValueError
+        `only` is something else.
     """
     if only not in (None, "adjustment"):
         raise ValueError(f"found only = {only!r}; expected 'adjustment'")

@@ -62,20 +62,39 @@ class InputFile:
 class Job:
     """A checked job, all in SI; `load` makes it, `tankcal.run` computes it.
 
-    tank, survey, datum, table  None only in a job that is read for its adjustment alone
-    courses       vertical tanks, from the bottom up; else ()
-    points        as handed in; None where there are none: sizes or a survey stand in their place
-    bottom        of a vertical tank
-    deadwood      in the order of the file
-    roof          None: no floating roof
-    horizontal, sphere, mesh  None for the other kinds
-    measurements  the survey that the points are to be adjusted from, or None
-    inputs        declared ones in the order of the file, then the defaults of those that bear on
-                  the job and are not declared
-    correlations  (name, name, r) of declared inputs
-    rule          the decision rule that the table is judged by, or None
-    circumference_m  of the first course by tape, outside; only compared; None: not given
-    diameter_is   what the nominal diameter is: inside, middle or outside; only compared; or None
+    Attributes
+    ----------
+    tank, survey, datum, table
+        None only in a job that is read for its adjustment alone.
+    courses : tuple of Course
+        Of vertical tanks, from the bottom up; of others ().
+    points : Points or None
+        As handed in; None where sizes or a survey stand in their place.
+    bottom : Bottom
+        Of a vertical tank.
+    deadwood : tuple of Deadwood
+        In the order of the file.
+    roof : Roof or None
+        None without a floating roof.
+    horizontal, sphere, mesh
+        None for the other kinds of tank.
+    measurements : Measurements or None
+        The survey that the points are to be adjusted from.
+    inputs : tuple of DeclaredInput
+        Declared ones in the order of the file, then the defaults of those that bear on the job and
+        are not declared.
+    correlations : tuple of (name, name, r)
+        Between declared inputs.
+    certificate : dict
+        Texts that are printed when given, never invented.
+    warnings : tuple of Problem
+        Rows that do not stop the job.
+    rule : Rule or None
+        The decision rule that the table is judged by.
+    circumference_m : float or None
+        Of the first course by tape, outside; only compared.
+    diameter_is : {"inside", "middle", "outside"} or None
+        What the nominal diameter is; only compared.
     """
 
     tank: Tank | None
