@@ -198,28 +198,27 @@ def _setups(table):
 def _readings(name, table):
     """Readings of one table; what a table does not have stays as Readings has it."""
     value, sd = _values(name, table)
-    optional = {}
-    start = "from"
-    if "setup" in table.columns:
-        optional["setup"] = tuple(table.of("setup"))
-    if name == "horizontal_angles":
-        start, optional["origin"] = "at", tuple(table.of("from"))
-    if name == "directions":
-        optional["set"] = tuple(table.of("set"))
-    if name == "distances":
-        optional["instrument"] = tuple(table.of("instrument"))
+    columns, optional = table.columns, {}
+    start = "at" if "at" in columns else "from"
+    if start == "at":
+        optional["origin"] = tuple(table.of("from"))
+    for column in ("setup", "set", "instrument"):
+        if column in columns:
+            optional[column] = tuple(table.of(column))
+    if "kind" in columns:
         optional["horizontal"] = np.array([kind == "horizontal" for kind in table.of("kind")])
+    if "temperature_c" in columns:
         optional["temperature_c"] = table.numbers("temperature_c")
-    if name == "vectors":
+    if "r_xy" in columns:
         pairs = [table.numbers(f"r_{pair}") for pair in ("xy", "xz", "yz")]
         optional["correlation"] = np.nan_to_num(np.column_stack(pairs))
-    if "target_height_m" in table.columns:
+    if "target_height_m" in columns:
         optional["target_height_m"] = np.nan_to_num(table.numbers("target_height_m"))
     return Readings(
         table=name,
         value=value,
         sd=sd,
-        start=tuple(table.of(start) if start in table.columns else [None] * len(value)),
+        start=tuple(table.of(start) if start in columns else [None] * len(value)),
         end=tuple(table.of("to")),
         check=_check(table),
         rows=table.rows,
@@ -246,12 +245,11 @@ def _correlated(table):
 def _values(name, table):
     if name in ANGLES:
         return angle_in_rad(table, ANGLES[name]), table.numbers("s_arcsec") * ARCSEC
-    if name == "vectors":
+    if "dx_m" in table.columns:
         return tuple(
             np.column_stack([table.numbers(f"{kind}{axis}_{unit}") for axis in AXES]) * factor
             for kind, unit, factor in (("d", "m", 1.0), ("s", "mm", 1e-3))
         )
     sd = table.numbers("s_mm") / 1000
-    if name == "plumb_lines":
-        return np.zeros(len(sd)), sd
-    return table.numbers("dz_m" if name == "height_differences" else "distance_m"), sd
+    measured = [name for name in ("distance_m", "dz_m") if name in table.columns]
+    return table.numbers(measured[0]) if measured else np.zeros(len(sd)), sd

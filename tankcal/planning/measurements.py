@@ -13,9 +13,8 @@ from tankcal.planning.model import TAPED
 from tankcal.planning.visibility import measurable
 from tankcal.survey import Nominal
 from tankcal.survey.measurements import ImageReadings, KnownPoints, Photo, Readings, Setup, Targets
+from tankcal.survey.observations import KINDS
 from tankcal.survey.readings import true_distance_m
-
-DISTANCES = ("distances", "slope_distances")
 
 
 def nominal_of(plan):
@@ -171,7 +170,7 @@ def _computed(predicted):
         for row, value in zip(rows.tolist(), computed[:, 0].tolist(), strict=True):
             key = trace.table, bool(getattr(one, "horizontal", False))
             found[*key, *trace.ids[row]] = value
-            if trace.table == "distances":  # a tape is read either way
+            if KINDS[trace.table].either_way:  # a tape is read either way
                 found[*key, *reversed(trace.ids[row])] = value
     return found
 
@@ -183,7 +182,7 @@ def _filled(readings, values, draw, tools, setups):
     flat = np.zeros(len(starts), dtype=bool) if horizontal is None else horizontal
     keys = zip(flat.tolist(), starts, readings.end, strict=True)
     value = np.array([values.get((readings.table, *key), 0.0) for key in keys])
-    if readings.table in DISTANCES:
+    if KINDS[readings.table].has("instrument"):
         names = [setups[one].instrument for one in readings.setup] or readings.instrument
         value = np.array([_read(one, name, *tools) for one, name in zip(value, names, strict=True)])
     elif readings.table == "plumb_lines":

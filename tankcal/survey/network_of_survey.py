@@ -11,7 +11,7 @@ from tankcal.survey.diagnosis.double_names import in_photo
 from tankcal.survey.diagnosis.undetermined import left_out, not_measured, sorted_out
 from tankcal.survey.means import averaged, scatter_warnings
 from tankcal.survey.network import ImagePoints, Instrument, Survey, System
-from tankcal.survey.observations import ControlCoordinates, SystemCoordinates
+from tankcal.survey.observations import KINDS, ControlCoordinates, SystemCoordinates
 from tankcal.survey.photographs import gathered_photos, orientation_of
 from tankcal.survey.readings import Numbers, Trace, bend_per_m, compared_only, observed, table_of
 from tankcal.survey.repeated_readings import without_scattered
@@ -181,14 +181,15 @@ def _numbers(measurements, excluded):
         images = measurements.image_points
         count(name for name, check in zip(images.point, images.check, strict=True) if not check)
     for table in measurements.readings:
+        kind = KINDS[table.table]
         use = np.flatnonzero(~np.asarray(table.check, dtype=bool)).tolist()
         for i in use:
             start = setups[table.setup[i]].station if table.setup else table.start[i]
             ends = (start, table.end[i], table.origin[i]) if table.origin else (start, table.end[i])
             count(ends)
-            if table.table == "directions" and not excluded.keys() & set(ends):
+            if kind.has("set") and not excluded.keys() & set(ends):
                 sets.setdefault((table.setup[i], table.set[i] if table.set else None), len(sets))
-            if "distances" in table.table:
+            if kind.has("instrument"):
                 tool = setups[table.setup[i]].instrument if table.setup else None
                 tool = table.instrument[i] if table.instrument else tool
                 if tool is not None:

@@ -5,20 +5,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tankcal.survey.means import averaged, scatter_warnings, torn_apart
-from tankcal.survey.observations import (
-    Azimuths,
-    Directions,
-    Distances,
-    HeightDifferences,
-    HorizontalAngles,
-    PlumbLines,
-    Vectors,
-    VerticalAngles,
-)
+from tankcal.survey.observations import KINDS
 
 EARTH_RADIUS_M = 6_371_000.0
-ANGLES = ("directions", "zenith_angles", "azimuths", "horizontal_angles", "vertical_angles")
-PLAN_ONLY = ("directions", "azimuths", "horizontal_angles", "height_differences", "plumb_lines")
 
 
 @dataclass(frozen=True)
@@ -107,9 +96,9 @@ class Table:
     correlated: frozenset = frozenset()  # rows of the file that are correlated with others
 
     @property
-    def angled(self):
-        """True for angles between two lines of sight."""
-        return self.table == "horizontal_angles"
+    def kind(self):
+        """observations.Kind of its rows."""
+        return KINDS[self.table]
 
 
 def table_of(readings, numbers, correlated=frozenset()):
@@ -121,7 +110,7 @@ def table_of(readings, numbers, correlated=frozenset()):
     setups = [numbers.setups[name] for name in readings.setup]
     start = [one.station for one in setups] if setups else readings.start
     tools = [one.instrument for one in setups] if setups else readings.instrument
-    of_distances = "distances" in readings.table
+    of_distances = KINDS[readings.table].has("instrument")
     tools = tuple(tools) if of_distances and len(tools) else (None,) * n
     heights = np.array([one.height_m for one in setups]) if setups else np.zeros(n)
     target = readings.target_height_m
@@ -165,7 +154,7 @@ def observed(table, bend, warnings):
     bend      see `bend_per_m`            warnings  list that warnings of scatter are added to
     """
     use = _between_known(table) & ~table.check
-    if table.table == "vectors":
+    if table.value.ndim > 1:
         yield from _one_by_one(table, np.flatnonzero(use), bend)
         return
     alone = np.isin(table.rows, list(table.correlated)) if table.rows else use & False
@@ -174,9 +163,8 @@ def observed(table, bend, warnings):
     for horizontal in (False, True):
         rows = np.flatnonzero(use & (table.horizontal == horizontal))
         if len(rows):
-            width = 2 if table.table == "plumb_lines" else 1
-            label, angle = _labels(table, rows), table.table in ANGLES
-            value, sd = (np.tile(a[rows, None], width) for a in (table.value, table.sd))
+            label, angle = _labels(table, rows), table.kind.is_angle
+            value, sd = _values(table, rows)
             means = averaged(label, value, sd, angle=angle)
             warnings += scatter_warnings(
                 means, lambda k, r=rows: "-".join(table.ids[r[k]]), table.file,
@@ -207,18 +195,22 @@ def _one_by_one(table, rows, bend):
 def compared_only(table, bend):
     """Pairs (observations, Trace) of the readings of a Table that are only compared."""
     use = _between_known(table) & table.check
-    if table.table == "vectors":
+    if table.value.ndim > 1:
         yield from _one_by_one(table, np.flatnonzero(use), bend)
         return
-    if table.table == "directions":
+    if table.kind.has("set"):
         use &= table.set >= 0
     for horizontal in (False, True):
         rows = np.flatnonzero(use & (table.horizontal == horizontal))
         if len(rows):
-            width = 2 if table.table == "plumb_lines" else 1
-            value, sd = (np.tile(a[rows, None], width) for a in (table.value, table.sd))
+            value, sd = _values(table, rows)
             trace = _trace(table, rows, np.ones(len(rows), dtype=int))
             yield _made(table, rows, value, sd, bend), trace
+
+
+def _values(table, rows):
+    """Values and sds (k, m) of rows (k,) with one number for all m values."""
+    return (np.tile(a[rows, None], table.kind.observes.rows) for a in (table.value, table.sd))
 
 
 def _between_known(table):
@@ -229,12 +221,13 @@ def _labels(table, rows):
     """(n,) the same number for readings of the same value; taped lines go either way."""
     start, end = table.start[rows], table.end[rows]
     source = [table.ids[i][0] for i in rows]
-    if table.table == "distances":
+    if table.kind.either_way:
         start, end = np.minimum(start, end), np.maximum(start, end)
         source = [None] * len(rows)
+    back = table.origin[rows].tolist() if table.kind.has("origin") else source
     known = {}
     keys = zip(
-        start.tolist(), end.tolist(), table.origin[rows].tolist() if table.angled else source,
+        start.tolist(), end.tolist(), back,
         table.rise_m[rows].tolist(), table.set[rows].tolist(), [table.tools[i] for i in rows],
         source, strict=True,
     )  # fmt: skip
@@ -243,42 +236,29 @@ def _labels(table, rows):
 
 def _made(table, rows, value, sd, bend):
     """The observations of some rows, with values and sds (n, m)."""
-    kind, start, end = table.table, table.start[rows], table.end[rows]
-    if kind == "vectors":
-        return Vectors(value, sd, start, end)
-    if kind == "plumb_lines":
-        return PlumbLines(value, sd, start, end)
-    value, sd = value[:, 0], sd[:, 0]
-    if kind == "height_differences":
-        return HeightDifferences(value, sd, start, end)
-    rise = table.rise_m[rows]
-    rise = rise if rise.any() else None
-    if kind in ("distances", "slope_distances"):
-        return Distances(
-            value, sd, start, end, instrument=table.instrument[rows],
-            horizontal=bool(table.horizontal[rows[0]]), rise_m=rise,
-        )  # fmt: skip
-    if kind == "directions":
-        return Directions(value, sd, start, end, set=table.set[rows])
-    if kind == "azimuths":
-        return Azimuths(value, sd, start, end)
-    if kind == "horizontal_angles":
-        return HorizontalAngles(value, sd, start, end, origin=table.origin[rows])
-    return VerticalAngles(
-        value, sd, start, end, zenith=kind == "zenith_angles", bend_per_m=bend, rise_m=rise
-    )
+    kind, rise = table.kind, table.rise_m[rows]
+    known = {
+        "instrument": table.instrument[rows],
+        "set": table.set[rows],
+        "origin": table.origin[rows],
+        "horizontal": bool(table.horizontal[rows[0]]),
+        "rise_m": rise if rise.any() else None,
+        "bend_per_m": bend,
+    }
+    more = {name: given for name, given in known.items() if kind.has(name)} | kind.options
+    if kind.observes.rows == 1:
+        value, sd = value[:, 0], sd[:, 0]
+    return kind.observes(value, sd, start=table.start[rows], end=table.end[rows], **more)
 
 
 def _trace(table, rows, repeats):
-    names = {"zenith_angles": "zenith angles", "slope_distances": "slope distances"}
-    group = tuple(table.tools[i] or names.get(table.table, "") for i in rows)
-    element = {"plumb_lines": ("x", "y"), "vectors": ("x", "y", "z")}.get(table.table, ("",))
+    group = tuple(table.tools[i] or table.kind.group for i in rows)
     return Trace(
         table.file,
         tuple(table.rows[i] for i in rows) if table.rows else (None,) * len(rows),
         tuple(table.ids[i] for i in rows),
         repeats,
         group,
-        (element,) * len(rows),
+        (table.kind.elements,) * len(rows),
         table.table,
     )

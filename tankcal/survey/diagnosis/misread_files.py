@@ -14,7 +14,7 @@ from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.survey.diagnosis.diagnoses import GON, MIRROR, mirrored_fits, mirrored_photo
 from tankcal.survey.diagnosis.fixed_datum_check import ALIKE
-from tankcal.survey.readings import ANGLES
+from tankcal.survey.observations import KINDS
 
 BETTER = 0.2  # share of sigma0 that may be left by what explains a survey
 SOUND = 5.0  # sigma0 of a survey that fits, if not well: a single blunder makes more of it
@@ -90,7 +90,7 @@ def _exchanged(measurements):
 def _in_other_units(measurements):
     """The same of a file in another unit."""
     tables = measurements.readings
-    angles = [one.table for one in tables if one.table in ANGLES]
+    angles = [one.table for one in tables if KINDS[one.table].is_angle]
     for factor, what in GON:
         if len(angles) > 1:
             template = "all angles together fit once they are taken for {what}"

@@ -5,19 +5,9 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.messages import joined, listed, message
 from tankcal.survey.network.assembly import one_ray
-from tankcal.survey.observations import (
-    Azimuths,
-    ControlCoordinates,
-    Directions,
-    Distances,
-    HeightDifferences,
-    HorizontalAngles,
-    PlumbLines,
-    SystemCoordinates,
-)
+from tankcal.survey.observations import ControlCoordinates, SystemCoordinates
 
 SHOWN = 5  # points in a sentence
-IN_PLAN = (Azimuths, Directions, HorizontalAngles, PlumbLines)
 
 
 def left_out(survey):
@@ -90,24 +80,14 @@ def _counts(survey):
             continue
         if not one.ties:
             continue
-        in_plan, in_height = _speaks(one)
         _, lines = np.unique([getattr(one, name) for name in one.ties], axis=1, return_index=True)
         for name in one.ties:
             count = one.rows * np.bincount(getattr(one, name)[lines], minlength=n)
-            plan += count * in_plan
-            height += count * in_height
+            plan += count * (0 in one.axes)
+            height += count * (2 in one.axes)
             rows += count
             measured |= (count > 0) & (not isinstance(one, SystemCoordinates))
     return plan, height, rows, rays, measured
-
-
-def _speaks(one):
-    """Whether observations say something about the plan, about heights."""
-    if isinstance(one, HeightDifferences):
-        return False, True
-    if isinstance(one, IN_PLAN) or (isinstance(one, Distances) and one.horizontal):
-        return True, False
-    return True, True
 
 
 def _add_control(one, plan, height, rows):

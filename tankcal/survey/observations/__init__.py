@@ -11,6 +11,7 @@ from tankcal.survey.observations.coordinates import (
 )
 from tankcal.survey.observations.correlated import Block, Correlated
 from tankcal.survey.observations.held import HeldOrientation, as_conditions, exact_rows, lever
+from tankcal.survey.observations.kinds import KINDS, Kind
 from tankcal.survey.observations.photographs import (
     ImageCoordinates,
     PhotoOrientation,
@@ -26,6 +27,7 @@ from tankcal.survey.observations.sights import (
 )
 
 __all__ = [
+    "KINDS",
     "Azimuths",
     "Block",
     "ControlCoordinates",
@@ -36,6 +38,7 @@ __all__ = [
     "HeldOrientation",
     "HorizontalAngles",
     "ImageCoordinates",
+    "Kind",
     "KnownUnknowns",
     "Layout",
     "Observations",

@@ -96,6 +96,8 @@ class Observations:
     rows = 1
     feels_datum = True  # False: no motion or scale of the whole survey changes it
     ties = ()  # names of the fields that hold points
+    axes = (0, 1, 2)  # of the points' coordinates that enter: x, y, z
+    shared = ()  # names of the arrays that hold for the whole table; all others have n rows
 
     def __len__(self):
         return len(self.value)
@@ -111,13 +113,11 @@ class Observations:
         parts = {
             name: value[keep]
             for name, value in vars(self).items()
-            if isinstance(value, np.ndarray) and name in self._per_row
+            if isinstance(value, np.ndarray)
+            and name in self.__dataclass_fields__
+            and name not in self.shared
         }
         return replace(self, **parts)
-
-    @property
-    def _per_row(self):
-        return {"value", "sd", "use", *self.ties}
 
     def using(self, use):
         """The same observations, each with its share (n,)."""

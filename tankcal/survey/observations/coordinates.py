@@ -20,10 +20,6 @@ class ControlCoordinates(Observations):
 
     kind, ties = "control coordinate", ("point",)
 
-    @property
-    def _per_row(self):
-        return {"value", "sd", "use", "point", "axis"}
-
     def columns(self, layout):
         """Point (3)."""
         return layout.points[self.point]
@@ -49,10 +45,6 @@ class SystemCoordinates(Observations):
     system: np.ndarray
 
     kind, ties = "control coordinate of a further system", ("point",)
-
-    @property
-    def _per_row(self):
-        return {"value", "sd", "use", "point", "axis", "system"}
 
     def columns(self, layout):
         """Point (3), system (rotation 3, shift 3, scale)."""
@@ -84,7 +76,7 @@ class HeightDifferences(Observations):
     start: np.ndarray
     end: np.ndarray
 
-    kind, ties = "height difference", ("start", "end")
+    kind, ties, axes = "height difference", ("start", "end"), (2,)
 
     def columns(self, layout):
         """z of end, z of start."""
@@ -104,7 +96,7 @@ class PlumbLines(Observations):
     start: np.ndarray
     end: np.ndarray
 
-    kind, rows, ties = "plumb line", 2, ("start", "end")
+    kind, rows, ties, axes = "plumb line", 2, ("start", "end"), (0, 1)
 
     def columns(self, layout):
         """Point end (3), point start (3)."""
@@ -155,10 +147,6 @@ class KnownUnknowns(Observations):
     index: np.ndarray
 
     kind, unit = "weighted unknown", "its own"
-
-    @property
-    def _per_row(self):
-        return {"value", "sd", "use", "index"}
 
     def columns(self, layout):
         """The unknown itself."""

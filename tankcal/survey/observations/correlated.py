@@ -39,7 +39,7 @@ class Correlated(Observations):
     covariance: np.ndarray
     all_of: object = field(repr=False)
 
-    kind = "correlated observations"
+    kind, shared = "correlated observations", ("covariance",)
 
     def __post_init__(self):
         slots = [one.columns(self.all_of) for one, _ in self.parts]

@@ -33,11 +33,7 @@ class ImageCoordinates(Observations):
     interior_of: np.ndarray
 
     kind, unit, rows, ties = "image coordinate", "mm", 2, ("point",)
-    feels_datum = False
-
-    @property
-    def _per_row(self):
-        return {"value", "sd", "use", "point", "photo"}
+    feels_datum, shared = False, ("active", "interior_of")
 
     def columns(self, layout):
         """Point (3), photo (6), interior parameters (k)."""
@@ -81,10 +77,6 @@ class PhotoOrientation(Observations):
 
     kind, unit = "exterior orientation", "m or rad"
 
-    @property
-    def _per_row(self):
-        return {"value", "sd", "use", "photo", "element"}
-
     def columns(self, layout):
         """Photo (6)."""
         return layout.photos[self.photo]
@@ -127,10 +119,6 @@ class PhotoRotation(Observations):
     rotation: np.ndarray
 
     kind, unit, rows = "photo rotation", "rad", 3
-
-    @property
-    def _per_row(self):
-        return {"value", "sd", "use", "photo", "rotation"}
 
     def columns(self, layout):
         """Photo's rotation (3)."""

@@ -29,10 +29,6 @@ class Sights(Observations):
 
     ties = ("end", "start")
 
-    @property
-    def _per_row(self):
-        return {"value", "sd", "use", "start", "end", "rise_m", "instrument", "set"}
-
     def columns(self, layout):
         """Point end (3), point start (3)."""
         return np.hstack([layout.points[self.end], layout.points[self.start]])
@@ -67,6 +63,11 @@ class Distances(Sights):
     horizontal: bool = field(default=False, kw_only=True)
 
     kind = "distance"
+
+    @property
+    def axes(self):
+        """Heights do not enter horizontal distances."""
+        return (0, 1) if self.horizontal else (0, 1, 2)
 
     def columns(self, layout):
         """Point end (3), point start (3), scale, offset."""
@@ -117,7 +118,7 @@ def azimuth(x, y):
 class Azimuths(_Angles):
     """Azimuths (n,), rad."""
 
-    kind = "azimuth"
+    kind, axes = "azimuth", (0, 1)
 
     def computed(self, state, derivatives):
         """The azimuths (n, 1)."""
@@ -135,7 +136,7 @@ class Directions(_Angles):
 
     set: np.ndarray
 
-    kind = "direction"
+    kind, axes = "direction", (0, 1)
 
     def columns(self, layout):
         """Point end (3), point start (3), orientation."""
@@ -158,11 +159,7 @@ class HorizontalAngles(_Angles):
 
     origin: np.ndarray
 
-    kind, ties = "horizontal angle", ("end", "start", "origin")
-
-    @property
-    def _per_row(self):
-        return super()._per_row | {"origin"}
+    kind, ties, axes = "horizontal angle", ("end", "start", "origin"), (0, 1)
 
     def without_length(self, state):
         """(n,) True where the station is, in plan, where one of its targets is."""

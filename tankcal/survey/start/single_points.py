@@ -134,24 +134,22 @@ class _Ties:
             mine &= one.use > 0
         if isinstance(one, Directions):
             mine &= (one.start == self.point) | np.isfinite(self.zeros[one.set])
-        if in_plan and _feels_height(one):
+        if in_plan and 2 in one.axes:
             mine[:] = False
         one = one.taken(np.flatnonzero(mine))
-        axes = [2] if isinstance(one, HeightDifferences) else [0, 1]
-        axes += [2] if _feels_height(one) and axes[0] == 0 else []
         known = np.ones(len(one), dtype=bool)
         for name in one.ties:
             end = getattr(one, name)
-            known &= (end == self.point) | np.isfinite(self.xyz[end][:, axes]).all(axis=1)
+            known &= (end == self.point) | np.isfinite(self.xyz[end][:, one.axes]).all(axis=1)
         return one.taken(np.flatnonzero(known))
 
     @property
     def _flat(self):
-        return any(not isinstance(one, HeightDifferences) for one in self.groups)
+        return any(0 in one.axes for one in self.groups)
 
     @property
     def _high(self):
-        return any(_feels_height(one) for one in self.groups)
+        return any(2 in one.axes for one in self.groups)
 
     def _extent(self):
         """Size of the figure: of the known ends and of the distances to them."""
@@ -236,13 +234,6 @@ class _Ties:
             mine = np.flatnonzero(jac[0, :, column] != 0)
             both[:, column] = off[:, mine[0]] / self.extent  # the first sight agrees
         return both
-
-
-def _feels_height(one):
-    """Whether heights enter observations."""
-    if isinstance(one, HeightDifferences):
-        return True
-    return (one.unit == "m" and not one.horizontal) or one.kind == "vertical angle"
 
 
 def _solved(ties):

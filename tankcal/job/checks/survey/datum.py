@@ -9,6 +9,7 @@ from tankcal.job.checks.survey.names import all_points, observed_names
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.tables import nearest
 from tankcal.messages import joined, listed, message
+from tankcal.survey.observations import KINDS
 
 # control.csv, check.csv and targets.csv: each point once, sds of what is given.
 
@@ -115,15 +116,6 @@ def _warn_control_that_checks(files):
 # What is held (sd 0) twice: values that contradict each other, or that leave nothing to adjust.
 
 SAME_M, SAME_DEG = 1e-9, 1e-9
-# table: axes that must be held at all its points before its value is held already
-AXES_OF = {
-    "distances": "xyz",
-    "azimuths": "xy",
-    "horizontal_angles": "xy",
-    "vertical_angles": "xyz",
-    "height_differences": "z",
-    "plumb_lines": "xy",
-}
 
 
 def check_held(files):
@@ -168,7 +160,8 @@ def _refuse_between_held(files, name, table, places, held):
     ends = _ends(name, table)
     for place in places:
         points = [column[place] for column in ends]
-        axes = "xy" if is_horizontal and is_horizontal[place] else AXES_OF[name]
+        # all axes that enter must be held at all points before a value is held already
+        axes = "xy" if is_horizontal and is_horizontal[place] else KINDS[name].axes
         if all(set(axes) <= set(held.get(point, "")) for point in points):
             named = joined([repr(point) for point in points])
             expected = message(
