@@ -7,8 +7,12 @@ from jacobians import assert_derivative
 from tankcal.camera.model import AFFINITIES, CONVENTIONS, Form
 from tankcal.geometry.rotations import from_angles, turned
 from tankcal.survey.observations import (
+    KINDS as TABLES,
+)
+from tankcal.survey.observations import (
     Azimuths,
     ControlCoordinates,
+    Correlated,
     Directions,
     Distances,
     HeightDifferences,
@@ -17,11 +21,13 @@ from tankcal.survey.observations import (
     ImageCoordinates,
     KnownUnknowns,
     Layout,
+    Observations,
     PhotoOrientation,
     PhotoRotation,
     PlumbLines,
     State,
     SystemCoordinates,
+    Vectors,
     VerticalAngles,
 )
 
@@ -121,6 +127,7 @@ KINDS = {
     ),
     "height difference": HeightDifferences(*FOUR, **ENDS),
     "plumb line": PlumbLines(np.zeros((4, 2)), np.ones((4, 2)), **ENDS),
+    "vector": Vectors(np.zeros((4, 3)), np.ones((4, 3)), **ENDS),
     "distance": Distances(*FOUR, **ENDS, instrument=TOOLS),
     "horizontal distance": Distances(*FOUR, **ENDS, instrument=TOOLS, horizontal=True),
     "slope distance": Distances(*FOUR, **ENDS, instrument=TOOLS, rise_m=np.full(4, 0.3)),
@@ -134,6 +141,51 @@ KINDS = {
         for of in ("interior", "scale", "offset_m", "orientation_rad", "system_scale")
     },
 }
+KINDS["correlated"] = Correlated(
+    *(np.zeros((1, 4)), np.ones((1, 4))),
+    parts=(
+        (KINDS["vector"].taken([1]).taken([0, 0, 0]), np.arange(3)),
+        (KINDS["distance"].taken([0]), np.array([0])),
+    ),
+    covariance=np.eye(4) + 0.3 * (1 - np.eye(4)),
+    all_of=LAYOUT,
+)
+
+
+def test_all_kinds_are_compared():
+    """A further kind of observation must stand in the table of this file."""
+
+    def below(kind):
+        return {kind}.union(*(below(one) for one in kind.__subclasses__()))
+
+    kinds = {one for one in below(Observations) if "computed" in vars(one) or "fill" in vars(one)}
+    assert kinds - {Observations} == {type(one) for one in KINDS.values()}
+    assert {one.observes for one in TABLES.values()} <= kinds
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_rows_are_taken_whole(kind):
+    """Property: what some rows of a table compute is what they compute in the whole table."""
+    observed = KINDS[kind]
+    keep = np.arange(len(observed))[::-2]
+    assert observed.taken(keep).columns(LAYOUT).tolist() == observed.columns(LAYOUT)[keep].tolist()
+    w, part = np.empty((len(observed), observed.rows)), np.empty((len(keep), observed.rows))
+    none = np.empty((0, observed.rows, 0))
+    if "image" in kind:
+        none = np.empty((0, 2, observed.columns(LAYOUT).shape[1]))
+    observed.fill(STATE, w, none)
+    observed.taken(keep).fill(STATE, part, none)
+    assert part.tolist() == w[keep].tolist()
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_axes_that_enter(table):
+    """Property: `axes` names the coordinates by which an observation has derivatives."""
+    for observed in KINDS.values():
+        if type(observed) is TABLES[table].observes:
+            _, jac = observed.computed(STATE, True)
+            ends = jac[:, :, :6].reshape(-1, 2, 3)
+            assert set(np.flatnonzero(np.abs(ends).max(axis=(0, 1))).tolist()) == set(observed.axes)
 
 
 @pytest.mark.slow(after=1)
