@@ -71,7 +71,14 @@ class SystemCoordinates(Observations):
 
 @dataclass(frozen=True)
 class HeightDifferences(Observations):
-    """Height differences (n,), m: z of `end` minus z of `start`, points (n,)."""
+    """Height differences: z of `end` minus z of `start`; derivatives 1 and -1.
+
+    Parameters
+    ----------
+    value, sd : (n,) arrays, m
+    start, end : (n,) arrays of int
+        Points.
+    """
 
     start: np.ndarray
     end: np.ndarray
@@ -91,7 +98,15 @@ class HeightDifferences(Observations):
 
 @dataclass(frozen=True)
 class PlumbLines(Observations):
-    """Pairs of points (n,) on one vertical; value (n, 2) is zero, in x and in y, m."""
+    """Pairs of points on one vertical: x and y of `end` minus those of `start` are zero.
+
+    Parameters
+    ----------
+    value, sd : (n, 2) arrays, m
+        Zeros, and the sd in x and in y.
+    start, end : (n,) arrays of int
+        Points.
+    """
 
     start: np.ndarray
     end: np.ndarray
@@ -117,7 +132,14 @@ class PlumbLines(Observations):
 
 @dataclass(frozen=True)
 class Vectors(Observations):
-    """Vectors (n, 3), m, from `start` to `end` in the axes of the survey: GNSS baselines."""
+    """Vectors from `start` to `end` in the axes of the survey: GNSS baselines; derivatives +-I.
+
+    Parameters
+    ----------
+    value, sd : (n, 3) arrays, m
+    start, end : (n,) arrays of int
+        Points.
+    """
 
     start: np.ndarray
     end: np.ndarray

@@ -5,7 +5,7 @@ difference, p2 = x2 + y2 and s2 = p2 + z2:
 
     azimuth atan2(x, y)     height angle atan2(z, p)     zenith angle pi/2 - that     distance s
 
-Azimuths count clockwise from +y. A reading of a distance is (1 + scale) s + offset.
+Azimuths count clockwise from +y. Derivatives by `start` are those by `end` with the other sign.
 """
 
 from dataclasses import dataclass, field
@@ -53,10 +53,20 @@ class Sights(Observations):
 
 @dataclass(frozen=True)
 class Distances(Sights):
-    """Distances (n,), m, spatial or horizontal, by tape, EDM or total station.
+    """Distances by tape, EDM or total station: (1 + scale) s + offset.
 
-    instrument  (n,) whose scale and offset hold, -1 for none
-    horizontal  True when heights do not enter
+    The derivatives by `end` are (1 + scale) (x, y, z) / s, by the scale s, by the offset 1.
+
+    Parameters
+    ----------
+    value, sd : (n,) arrays, m
+    start, end : (n,) arrays of int
+        Points.
+    instrument : (n,) array of int
+        Whose scale (without unit) and offset (m) hold; -1 for none.
+    horizontal : bool
+        True when heights do not enter: z = 0.
+    rise_m : (n,) array, m, optional
     """
 
     instrument: np.ndarray
@@ -116,7 +126,16 @@ def azimuth(x, y):
 
 @dataclass(frozen=True)
 class Azimuths(_Angles):
-    """Azimuths (n,), rad."""
+    """Azimuths, clockwise from +y: atan2(x, y).
+
+    The derivatives by `end` are (y, -x, 0) / p2.
+
+    Parameters
+    ----------
+    value, sd : (n,) arrays, rad
+    start, end : (n,) arrays of int
+        Points.
+    """
 
     kind, axes = "azimuth", (0, 1)
 
@@ -129,9 +148,17 @@ class Azimuths(_Angles):
 
 @dataclass(frozen=True)
 class Directions(_Angles):
-    """Directions (n,), rad, read on a circle whose zero has an unknown azimuth.
+    """Directions read on a circle whose zero has an unknown azimuth: atan2(x, y) - orientation.
 
-    set  (n,) the set of directions; each has its own orientation unknown
+    The derivatives by `end` are those of an azimuth, by the orientation -1.
+
+    Parameters
+    ----------
+    value, sd : (n,) arrays, rad
+    start, end : (n,) arrays of int
+        Points.
+    set : (n,) array of int
+        The set of directions; each has its own orientation unknown (rad).
     """
 
     set: np.ndarray
@@ -155,7 +182,14 @@ class Directions(_Angles):
 
 @dataclass(frozen=True)
 class HorizontalAngles(_Angles):
-    """Horizontal angles (n,), rad, at `start`, clockwise from `origin` to `end`."""
+    """Horizontal angles at `start`, clockwise from `origin` to `end`: difference of two azimuths.
+
+    Parameters
+    ----------
+    value, sd : (n,) arrays, rad
+    start, end, origin : (n,) arrays of int
+        Points.
+    """
 
     origin: np.ndarray
 
@@ -184,11 +218,22 @@ class HorizontalAngles(_Angles):
 
 @dataclass(frozen=True)
 class VerticalAngles(_Angles):
-    """Vertical angles (n,), rad: above the horizon, or from the zenith.
+    """Vertical angles above the horizon, atan2(h, p), or from the zenith, pi/2 - atan2(h, p).
 
-    zenith        True when they count from the zenith
-    bend_per_m    (1 - k) / (2 R), for curvature of the earth and refraction; 0 leaves both out.
-                  The target then stands lower by bend times the horizontal distance squared
+    With h = z - bend p2 the target stands lower by the curvature of the earth, less refraction.
+    The derivatives by `end` are (a x / p, a y / p, p / s2), a = -h / s2 - 2 bend p2 / s2 and
+    s2 = p2 + h2; with the other sign from the zenith.
+
+    Parameters
+    ----------
+    value, sd : (n,) arrays, rad
+    start, end : (n,) arrays of int
+        Points.
+    zenith : bool
+        True when they count from the zenith.
+    bend_per_m : float, 1/m
+        (1 - k) / (2 R) with the coefficient of refraction k; 0 leaves both out.
+    rise_m : (n,) array, m, optional
     """
 
     zenith: bool = field(default=False, kw_only=True)
