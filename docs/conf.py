@@ -22,6 +22,7 @@ autodoc_typehints = "none"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 
+highlight_language = "none"  # of what says no language
 html_theme = "furo"
 html_title = f"tankcal {version}"
 html_copy_source = False
@@ -36,6 +37,8 @@ SECTION = re.compile(r"^\s*-{3,}\s*$")
 def set_plain_docstrings(app, what, name, obj, options, lines):
     """A docstring without numpydoc sections keeps its columns: the text after its first paragraph
     is set as it was typed."""
+    if what in ("property", "attribute"):  # else a colon would be read as a type
+        lines[0] = lines[0].replace(": ", "; ", 1)
     if any(SECTION.match(line) for line in lines) or "" not in lines:
         return
     first = lines.index("")

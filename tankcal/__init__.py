@@ -1,14 +1,17 @@
 """tankcal: from what was measured on a storage tank to its capacity table, with its uncertainty.
 
 >>> import tankcal
->>> job = tankcal.load("examples/silva-1995")        # a job folder or a job workbook
+>>> job = tankcal.load("examples/silva-1995")  # a job folder or a job workbook
 >>> result = tankcal.run(job)
->>> result.capacity                                   # the capacity table, one row a height
+>>> result.capacity.shape  # the capacity table, one row a height
+(951, 8)
+>>> print(result.at(4.217))  # a dip between two rows
+554.6 m3, U = 1.2 m3 (k = 1.96)
+>>> print(result.delivery(2.0, 7.5))
+723.58 m3, U = 0.77 m3 (k = 1.96)
 
->>> job = tankcal.load("survey", only="adjustment")   # measurements without a tank
->>> tankcal.adjust_job(job).xyz_m                     # adjusted points, with their covariance
-
->>> result.plot("sections")                           # a drawing; `tankcal.plot` names them all
+`result.plot("sections")` is a drawing; `tankcal.plot` names them all. Measurements without a tank:
+`tankcal.adjust_job(tankcal.load("survey", only="adjustment"))` gives points and covariance.
 
 Names are resolved when they are first used, so importing tankcal loads nothing heavy.
 """

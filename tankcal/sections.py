@@ -228,12 +228,45 @@ def sample_of(group, xyz_m, covariance_m2, slope, z_m):
 def fit_section(group, xyz_m, covariance_m2, slope, z_m, form):
     """Circle and outlines of the points of one group.
 
-    xyz_m (n, 3) of the members; covariance_m2 (3n, 3n) dense or sparse; slope of the axis; z_m
-    height of the cut (group.height_m) in the frame of the points; form: `Form` of the shell, or the
-    amplitude of one that is common to all sections.
     The outline of level points is interpolated where they are evenly spread, else smoothed. Points
     that are not level (group.degree above 0) give smoothed outlines at the Gauss levels of the
     course, fitted together.
+
+    Parameters
+    ----------
+    group : Group
+    xyz_m : (n, 3) array
+        The members of the group, in metres.
+    covariance_m2 : (3n, 3n) array or sparse matrix
+        In the order x1 y1 z1 x2 ...
+    slope : (2,) array
+        Of the axis: metres in x and y for a metre of height.
+    z_m : float
+        Height of the cut (group.height_m) in the frame of the points.
+    form : Form or float
+        Of the shell, or the amplitude (m2) of one that is common to all sections.
+
+    Returns
+    -------
+    Section
+
+    Raises
+    ------
+    SolutionError
+        For fewer than 3 points, or points on a line.
+
+    Examples
+    --------
+    Twelve points, 1 mm each, on a circle of 6.5 m radius: u of the radius is 1 mm / sqrt(12).
+
+    >>> azimuth = np.arange(12) * np.pi / 6
+    >>> xyz = 6.5 * np.column_stack([np.sin(azimuth), np.cos(azimuth), np.zeros(12)])
+    >>> group = Group("1", 0, 1.0, np.arange(12))
+    >>> section = fit_section(group, xyz, 1e-6 * np.eye(36), (0.0, 0.0), 0.0, 0.0)
+    >>> round(section.circle.radius_m, 9)
+    6.5
+    >>> round(float(np.sqrt(section.circle.cofactor_m2[2, 2])) * 1000, 4)
+    0.2887
     """
     form = form if isinstance(form, Form) else Form(common_m2=form)
     xy, by_xyz = slide(xyz_m, slope, z_m)

@@ -3,9 +3,9 @@
 A block is plain data. Jupyter shows its HTML; the exporters take the data itself from the output's
 `application/vnd.tankcal.block+json`, so that no text of a user is ever read as markup.
 
->>> blocks.table([["height", "m"], ["volume", "m³"]], [["0.010", "1.31"]], caption="Capacity")
->>> blocks.table(data_frame, caption="My own table")
->>> blocks.figure(matplotlib_figure, caption="Residuals", alt="Residuals against azimuth")
+    blocks.table([["height", "m"], ["volume", "m³"]], [["0.010", "1.31"]], caption="Capacity")
+    blocks.table(data_frame, caption="My own table")
+    blocks.figure(matplotlib_figure, caption="Residuals", alt="Residuals against azimuth")
 """
 
 import io

@@ -2,8 +2,9 @@
 
 The cells of the templates use it; nothing here computes a number.
 
->>> paper = Paper("record.json")
->>> paper.table("courses", paper.record["courses"], [Column("course"), Column("height_m", "m", 3)])
+    paper = Paper("record.json")
+    columns = [Column("course"), Column("height_m", "m", 3)]
+    paper.table("courses", paper.record["courses"], columns)
 """
 
 from functools import cached_property

@@ -15,6 +15,11 @@ NAME = re.compile(r"`(tankcal(?:\.\w+)+)")
 FILE = re.compile(r"`((?:tankcal|tests|report_templates|docs)/[\w./*-]*)`")
 PAST = ("CHANGELOG.md",)  # names what was there then
 FORMATS = (".toml", ".json", ".pdf", ".xlsx", ".ipynb")
+WITH_EXAMPLES = sorted(
+    ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+    for path in ROOT.glob("tankcal/**/*.py")
+    if ">>> " in path.read_text(encoding="utf-8")
+)
 
 
 def anchors(page):
@@ -71,6 +76,14 @@ def test_examples_of_pages_print_what_they_say(page, monkeypatch):
     monkeypatch.chdir(ROOT)
     found = doctest.testfile(str(ROOT / page), module_relative=False)
     assert found.attempted >= 3
+    assert found.failed == 0
+
+
+@pytest.mark.parametrize("module", WITH_EXAMPLES)
+def test_examples_of_docstrings_print_what_they_say(module, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    found = doctest.testmod(import_module(module))
+    assert found.attempted > 0
     assert found.failed == 0
 
 
