@@ -14,7 +14,10 @@ root_doc = "index"
 language = "en"
 myst_enable_extensions = []
 myst_heading_anchors = 4
-suppress_warnings = ["misc.highlighting_failure"]  # a shell's session that is no program
+suppress_warnings = [
+    "misc.highlighting_failure",  # a shell's session that is no program
+    "ref.python",  # a name of several rooms
+]
 templates_path = []
 
 autodoc_member_order = "bysource"
