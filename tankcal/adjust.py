@@ -229,7 +229,7 @@ def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=Fa
     raise SolutionError(
         message(
             "snooping_unsteady",
-            "data snooping did not come to rest in {rounds} rounds",
+            "data snooping did not settle within {rounds} rounds",
             rounds=rounds,
         )
     )
@@ -311,7 +311,7 @@ def _solve(a, w):
         raise SolutionError(
             message(
                 "derivative_not_finite",
-                "the adjustment left the numbers: a derivative is not finite",
+                "the adjustment diverged: a derivative is not finite",
             )
         )
     scale[scale == 0] = 1.0

@@ -95,7 +95,7 @@ def _refuse_untouched(model, factor):
     if len(factor.untouched):
         names = ", ".join(model.name_of(int(column)) for column in factor.untouched)
         raise UndeterminedError(
-            message("says_nothing", "no observation says anything about: {names}", names=names)
+            message("says_nothing", "not observed by anything: {names}", names=names)
         )
 
 

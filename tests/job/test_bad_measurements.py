@@ -598,13 +598,13 @@ def test_directions_between_known_points(tmp_path, factor):
         ),
         (
             lambda parts: parts.tables["check"].append(["Z9", 0.0, 6.5, 1.0]),
-            "observed nowhere, so that they bear on nothing: Z9",
+            "not observed by anything, so they have no effect: Z9",
         ),
         (
             lambda parts: parts.tables["targets"].extend(
                 [["Z8"] + [None] * 4, ["Z9"] + [None] * 4]
             ),
-            "observed nowhere and left out: Z8, Z9",
+            "not observed by anything, left out: Z8, Z9",
         ),
         (
             lambda parts: spoil(parts, "distances", 4, "temperature_c", 20.0),

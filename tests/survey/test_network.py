@@ -323,7 +323,7 @@ def test_an_undetermined_parameter_is_named(survey):
     """P3 multiplies P1 and P2; and a tape of unknown scale without control leaves both open."""
     scope = tuple("off" if i in (7, 8) else "block" if i == 9 else s for i, s in enumerate(SCOPE))
     camera = replace(survey.cameras[0], scope=scope)
-    with pytest.raises(SolutionError, match="no observation says anything about: P3 of camera"):
+    with pytest.raises(SolutionError, match="not observed by anything: P3 of camera"):
         adjust(replace(survey, cameras=(camera,)))
     tapes = replace(survey.observations[1], instrument=np.zeros(8, dtype=int))
     tool = Instrument("tape 1", scale_sd=np.nan)

@@ -145,7 +145,7 @@ def _check_place(table, row, bottom, top, volume, extent, log):
 
 def _check_volume(table, row, height, volume, extent, log):
     if volume == 0:
-        expected = message("deadwood_of_nothing", "found 0; a volume of nothing")
+        expected = message("deadwood_of_nothing", "found 0; it has no effect")
         log.warning(table.file, expected, row, "volume_m3")
     if extent.area_m2 is None:
         return

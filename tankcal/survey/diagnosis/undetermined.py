@@ -54,8 +54,7 @@ def sorted_out(survey):
         if names:
             text = message(
                 "untouched",
-                "no observation says anything about {axes} of {points}: what was given is kept, or"
-                " 0",
+                "{axes} of {points}: not observed by anything; the value given is kept, or 0",
                 axes=what,
                 points=listed(names, SHOWN),
             )

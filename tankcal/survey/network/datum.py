@@ -104,7 +104,7 @@ def null_space(problem, unfelt=UNFELT, fixed=True, state=None, count=None):
         if fixed and len(sharp):
             felt.append(np.linalg.qr(sharp, mode="r"))
             square += np.sum(sharp**2, axis=0)
-    moving = (square > 0) | whole.any(axis=0)  # heights at one place know no turn about Z
+    moving = (square > 0) | whole.any(axis=0)  # heights alone do not define the azimuth
     size = np.sqrt(np.where(square > 0, square, 1.0))[moving]
     _, singular, vectors = np.linalg.svd(np.vstack(felt)[:, moving] / size)
     rank = len(size) - count if count is not None else int(np.sum(singular > unfelt))

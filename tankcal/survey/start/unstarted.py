@@ -173,7 +173,7 @@ def _no_heights(survey, level):
         "no zenith angle, vertical angle or levelled height difference was observed",
     )
     if observed:
-        why = message("heights_hang_free", "they hang on no point with a known z")
+        why = message("heights_hang_free", "they are tied to no point with a known z")
     end = (
         message(
             "distances_taken_spatial",

@@ -69,12 +69,16 @@ def _check_coordinates(files, table):
 
 def _bear_on_nothing(names):
     return message(
-        "known_unobserved", "observed nowhere, so that they bear on nothing: {points}", points=names
+        "known_unobserved",
+        "not observed by anything, so they have no effect: {points}",
+        points=names,
     )
 
 
 def _left_out(names):
-    return message("targets_unobserved", "observed nowhere and left out: {points}", points=names)
+    return message(
+        "targets_unobserved", "not observed by anything, left out: {points}", points=names
+    )
 
 
 def _warn_unobserved(files, table, seen, told):
