@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tankcal.errors import HeightError
-from tankcal.tank.capacity import Capacity
+from tankcal.tank.capacity import Capacity, Quantity
 from tankcal.uncertainty import Source
 
 HEIGHTS = np.linspace(0, 9.5, 11)
@@ -103,3 +103,15 @@ def test_the_critical_zone_of_a_roof_is_flagged_and_its_edges_are_not():
     assert not found.delivery(3.0, 7.0).for_use
     assert found.delivery(0.5, 7.0).for_use
     assert table().at(2.5).for_use
+
+
+def test_ends_of_a_quantity():
+    """value -+ U, or the ends that a simulation gave."""
+    by_gum = Quantity(10.0, 0.1, 50.0, 2.0, 0.2)
+    simulated = replace(by_gum, ends_m3=(9.7, 10.4))
+    assert (by_gum.low_m3, by_gum.high_m3) == (9.8, 10.2)
+    assert (simulated.low_m3, simulated.high_m3) == (9.7, 10.4)
+
+
+def test_a_table_shows_its_rows_and_its_top():
+    assert repr(table()).startswith("<Capacity of 11 rows to 9.5 m: 1235")
