@@ -181,36 +181,27 @@ def observed(table, bend, warnings):
 
 
 def _one_by_one(table, rows, bend):
-    """Pairs (observations, Trace) of rows (k,) that are not averaged with others: correlated."""
+    """Pairs (observations, Trace) of rows (k,) that are not averaged with others."""
     for horizontal in (False, True):
         mine = rows[table.horizontal[rows] == horizontal]
         if len(mine):
-            value, sd = (a[mine].reshape(len(mine), -1) for a in (table.value, table.sd))
-            yield (
-                _made(table, mine, value, sd, bend),
-                _trace(table, mine, np.ones(len(mine), dtype=int)),
-            )
+            trace = _trace(table, mine, np.ones(len(mine), dtype=int))
+            yield _made(table, mine, *_values(table, mine), bend), trace
 
 
 def compared_only(table, bend):
     """Pairs (observations, Trace) of the readings of a Table that are only compared."""
     use = _between_known(table) & table.check
-    if table.value.ndim > 1:
-        yield from _one_by_one(table, np.flatnonzero(use), bend)
-        return
     if table.kind.has("set"):
         use &= table.set >= 0
-    for horizontal in (False, True):
-        rows = np.flatnonzero(use & (table.horizontal == horizontal))
-        if len(rows):
-            value, sd = _values(table, rows)
-            trace = _trace(table, rows, np.ones(len(rows), dtype=int))
-            yield _made(table, rows, value, sd, bend), trace
+    yield from _one_by_one(table, np.flatnonzero(use), bend)
 
 
 def _values(table, rows):
-    """Values and sds (k, m) of rows (k,) with one number for all m values."""
-    return (np.tile(a[rows, None], table.kind.observes.rows) for a in (table.value, table.sd))
+    """Values and sds (k, m) of rows (k,); a column holds for all m values where there is one."""
+    shape = len(rows), table.kind.observes.rows
+    columns = (a[rows].reshape(len(rows), -1) for a in (table.value, table.sd))
+    return (np.array(np.broadcast_to(column, shape)) for column in columns)
 
 
 def _between_known(table):
