@@ -24,6 +24,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
+napoleon_use_ivar = True  # fields of a dataclass are told once
 
 highlight_language = "none"  # of what says no language
 html_theme = "furo"
