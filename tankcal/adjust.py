@@ -244,7 +244,7 @@ def _coming_back(agrees, statistic, back, returns):
     return again == again.min()
 
 
-def determined(pivots, rows, of_normals=False):
+def find_determined(pivots, rows, of_normals=False):
     """Which unknowns are determined: (k,) True for pivots of a factor that are more than rounding.
 
     The one rule about rank, here and in tankcal.solver: columns are scaled to length one
@@ -316,7 +316,7 @@ def _solve(a, w):
         )
     scale[scale == 0] = 1.0
     basis, r, order = scipy.linalg.qr(a / scale, mode="economic", pivoting=True, check_finite=False)
-    rank = int(np.sum(determined(np.diag(r), len(a))))
+    rank = int(np.sum(find_determined(np.diag(r), len(a))))
     if rank < a.shape[1]:
         raise SolutionError(
             f"rank {rank} of {a.shape[1]}: the observations do not determine unknown(s) "

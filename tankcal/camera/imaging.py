@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 
-from tankcal.solver.compiled import compiled, worthwhile
+from tankcal.solver.compiled import compile_functions, is_worth_compiling
 
 NEWTON_STEPS = 6  # quadratic: a distortion of 30 % of the radius is solved to the last digit
 
@@ -326,7 +326,7 @@ def image_rows(*arguments, in_ideal=False):
 
     The derivatives are by point (3), photo (position 3, rotation 3), interior parameters (k).
     """
-    if worthwhile(len(arguments[6])):
-        compiled(sys.modules[__name__], _COMPILED)._loop(*arguments, in_ideal)
+    if is_worth_compiling(len(arguments[6])):
+        compile_functions(sys.modules[__name__], _COMPILED)._loop(*arguments, in_ideal)
     else:
         _arrays(*arguments, in_ideal)

@@ -8,7 +8,7 @@ import tankcal
 from tankcal.cli import camera, linting, planning, reporting, running, starting
 from tankcal.cli.help_words import argparse_in, put_in_words
 from tankcal.cli.machine import failure, print_json
-from tankcal.cli.showing import complain, speak, spoken
+from tankcal.cli.showing import complain, speak, words_of_run
 from tankcal.errors import TankcalError
 from tankcal.messages import message
 
@@ -40,7 +40,7 @@ the job format: docs/job-format.md; axes, signs and units: docs/conventions.md""
 def main(arguments=None):
     """Run the command line; returns the exit status."""
     speak()
-    with argparse_in(spoken()):
+    with argparse_in(words_of_run()):
         options = _options(arguments)
         if options.command is None:
             options.shown.print_help()
@@ -98,6 +98,6 @@ def _parser():
 
     for room in (running, reporting, starting, planning, linting, camera):
         room.add(commands)
-    if spoken():
-        put_in_words(parser, spoken())
+    if words_of_run():
+        put_in_words(parser, words_of_run())
     return parser

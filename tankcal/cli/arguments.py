@@ -2,7 +2,7 @@
 
 import argparse
 
-from tankcal.cli.showing import said
+from tankcal.cli.showing import say_in_language
 from tankcal.messages import message
 from tankcal.text.languages import LANGUAGES
 from tankcal.text.numerals import NUMBER, WHOLE_NUMBER
@@ -22,7 +22,7 @@ def add_language(parser):
 def positive(text):
     value = _number(text)
     if not 0 < value < float("inf"):
-        raise refused(
+        raise refuse_argument(
             message("option_above_0", "found {text!r}; expected a number above 0", text=text)
         )
     return value
@@ -31,16 +31,16 @@ def positive(text):
 def share(text):
     value = _number(text)
     if not 0 < value < 1:
-        raise refused(
+        raise refuse_argument(
             message("option_share", "found {text!r}; expected a number between 0 and 1", text=text)
         )
     return value
 
 
-def several(text):
+def parse_list(text):
     value = _number(text)
     if not (2 <= value <= 1e6 and value == int(value)):
-        raise refused(
+        raise refuse_argument(
             message(
                 "option_several",
                 "found {text!r}; expected a whole number from 2 to 1000000",
@@ -50,15 +50,17 @@ def several(text):
     return int(value)
 
 
-def whole(text):
+def parse_count(text):
     if not WHOLE_NUMBER.fullmatch(text):
-        raise refused(message("option_whole", "found {text!r}; expected a whole number", text=text))
+        raise refuse_argument(
+            message("option_whole", "found {text!r}; expected a whole number", text=text)
+        )
     return int(text)
 
 
-def refused(text):
+def refuse_argument(text):
     """The error of an argument, in the language that is spoken."""
-    return argparse.ArgumentTypeError(said(text))
+    return argparse.ArgumentTypeError(say_in_language(text))
 
 
 def _number(text):

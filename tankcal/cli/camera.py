@@ -1,7 +1,7 @@
 """`tankcal camera`: which parameters belong, comparison and influence of calibrations, and more."""
 
 from tankcal.cli import camera_runs as runs
-from tankcal.cli.arguments import add_language, positive, refused, share, whole
+from tankcal.cli.arguments import add_language, parse_count, positive, refuse_argument, share
 from tankcal.messages import message
 
 
@@ -81,7 +81,7 @@ def _compare(kinds):
     one.add_argument(
         "--pixel-um", type=positive, help="of film: pixels that the figures are counted in"
     )
-    one.add_argument("--seed", type=whole, default=1, help="of the terrain (default 1)")
+    one.add_argument("--seed", type=parse_count, default=1, help="of the terrain (default 1)")
     one.add_argument(
         "--threshold", metavar="PX", type=positive, default=0.5, help="default 0.5; 0.33 is usual"
     )
@@ -164,7 +164,7 @@ def _convert(kinds):
     )
     one.add_argument(
         "--size-px",
-        type=whole,
+        type=parse_count,
         nargs=2,
         metavar=("COLUMNS", "LINES"),
         help="where the file has none",
@@ -215,7 +215,10 @@ def _read(kinds):
     ):
         one.add_argument(f"--{name}", metavar="PX", type=positive, default=value, help=text)
     one.add_argument(
-        "--bit-errors", type=whole, default=0, help="cells of a code that may be wrong (default 0)"
+        "--bit-errors",
+        type=parse_count,
+        default=0,
+        help="cells of a code that may be wrong (default 0)",
     )
     one.add_argument(
         "--encoding",
@@ -239,7 +242,7 @@ def _add_outputs(parser):
 def _states(text):
     states = tuple(part.strip() for part in text.split(","))
     if not set(states) <= {"fixed", "weighted", "free"}:
-        raise refused(
+        raise refuse_argument(
             message(
                 "option_states", "found {text!r}; expected some of fixed,weighted,free", text=text
             )

@@ -7,11 +7,11 @@ from pathlib import Path
 import tankcal
 from tankcal.cli.showing import (
     Progress,
-    listed,
+    language_of_run,
     prepare_for_small_work,
+    print_paths,
     say,
     speak,
-    spoken_language,
     warn,
 )
 from tankcal.errors import InputError, Problem
@@ -350,7 +350,7 @@ def _finish(results, options, show, paths, job=None, record=None, printed=None):
     """Print tables or JSON; write the papers where they are asked for."""
     from tankcal.report import camera as camera_papers
 
-    language = options.language or _language_of(job, record) or spoken_language()
+    language = options.language or _language_of(job, record) or language_of_run()
     speak(language)
     _refuse_several(options, len(results))
     made_from = camera_papers.made_from(paths, job)
@@ -367,7 +367,7 @@ def _finish(results, options, show, paths, job=None, record=None, printed=None):
         for line in camera_papers.lines(result, language):
             print(line)
     if written:
-        listed(options.out, written)
+        print_paths(options.out, written)
 
 
 def _language_of(job, record):

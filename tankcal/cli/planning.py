@@ -2,8 +2,16 @@
 
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, several, share, whole
-from tankcal.cli.showing import Progress, listed, marks, prepare_for_small_work, say, speak, warn
+from tankcal.cli.arguments import add_language, parse_count, parse_list, share
+from tankcal.cli.showing import (
+    Progress,
+    marks,
+    prepare_for_small_work,
+    print_paths,
+    say,
+    speak,
+    warn,
+)
 from tankcal.messages import message
 from tankcal.text.digits import fixed, with_digits, written
 
@@ -40,7 +48,7 @@ def add(commands):
     plan.add_argument(
         "--simulate",
         metavar="N",
-        type=several,
+        type=parse_list,
         help="draw the readings of N surveys, compute each: do they scatter as predicted?",
     )
     plan.add_argument(
@@ -50,7 +58,7 @@ def add(commands):
         default=0.0,
         help="share of the simulated readings that are off by 20 sds, such as 0.01 (default: none)",
     )
-    plan.add_argument("--seed", type=whole, default=1, help="of the simulation (default 1)")
+    plan.add_argument("--seed", type=parse_count, default=1, help="of the simulation (default 1)")
     add_language(plan)
     plan.add_argument("--quiet", action="store_true", help="no progress, only problems")
     plan.set_defaults(command=_plan)
@@ -92,7 +100,7 @@ def _plan(options):
     for line in found:
         say(line)
     if written:
-        listed(Path(options.out), written)
+        print_paths(Path(options.out), written)
 
 
 def _refuse_idle(options):
@@ -225,7 +233,7 @@ def _changes(effects):
             yield message(
                 "plan_effect",
                 "  {change}: U/V {relative} ({difference:+.1f} ppm, cost {cost:+g})",
-                change=called(one.change),
+                change=describe_change(one.change),
                 relative=_percent(one.relative_u),
                 difference=1e6 * one.difference,
                 cost=one.change.cost,
@@ -234,7 +242,7 @@ def _changes(effects):
         yield message("plan_more_changes", "  and {more} more changes", more=len(effects) - SHOWN)
 
 
-def called(change):
+def describe_change(change):
     """What is done to which item of a plan."""
     item = _item(change.item, change.name)
     if change.action == "add":
@@ -269,7 +277,7 @@ def _item(item, name):
 def _design(path):
     if path is None:
         return
-    steps = [called(one.change) for one in path.steps]
+    steps = [describe_change(one.change) for one in path.steps]
     yield message(
         "plan_smallest",
         "smallest design: {steps}",

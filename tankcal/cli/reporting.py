@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tankcal.cli.showing import Progress, listed, speak
+from tankcal.cli.showing import Progress, print_paths, speak
 from tankcal.text.languages import LANGUAGES
 
 
@@ -61,4 +61,4 @@ def _report(options):
         speak(options.language)
     paths = outputs.rebuild(source, out, show.part, options.language, letterhead)
     show.end()
-    listed(out, paths)
+    print_paths(out, paths)

@@ -7,10 +7,10 @@ from tankcal.cli.machine import add_json, print_json, problem_of
 from tankcal.cli.reporting import add_letterhead, letterhead_of
 from tankcal.cli.showing import (
     Progress,
-    doubt,
-    listed,
     marks,
     prepare_for_small_work,
+    print_doubts,
+    print_paths,
     read_job,
     say,
     warn,
@@ -110,8 +110,8 @@ def _tell(out, paths, warnings, result, adjustment):
         say(_summary(adjustment))
     if result is not None:
         say(_capacity(result))
-    listed(out, paths)
-    doubt(doubts)
+    print_paths(out, paths)
+    print_doubts(doubts)
 
 
 def _tell_machine(out, paths, warnings, result, adjustment):

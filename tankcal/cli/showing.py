@@ -22,17 +22,17 @@ def speak(language=None):
         _spoken.update(load_words(language))
 
 
-def spoken():
+def words_of_run():
     """The words of the language that is spoken; {}: English."""
     return _spoken
 
 
-def spoken_language():
+def language_of_run():
     """The code of the language that is spoken."""
     return _spoken["language"]["code"] if _spoken else DEFAULT
 
 
-def said(text):
+def say_in_language(text):
     """A text in the language that is spoken; one without a code is as it is."""
     if not (_spoken and isinstance(text, Message)):
         return str(text)
@@ -50,12 +50,12 @@ def marks():
 
 def say(text):
     """Print a line of the terminal."""
-    print(said(text))
+    print(say_in_language(text))
 
 
 def complain(text):
     """Lines on standard error."""
-    for line in said(text).splitlines():
+    for line in say_in_language(text).splitlines():
         print(f"tankcal: {line}", file=sys.stderr)
 
 
@@ -84,7 +84,7 @@ def warn(warnings):
         complain(message("warning", "warning: {text}", text=text))
 
 
-def doubt(warnings):
+def print_doubts(warnings):
     """What is implausible of the numbers handed in, on standard error, under a line of its own."""
     if warnings:
         complain(
@@ -96,7 +96,7 @@ def doubt(warnings):
     warn(warnings)
 
 
-def listed(out, paths):
+def print_paths(out, paths):
     """Print what was written."""
     say(message("results_in", "results in {folder}:", folder=str(out)))
     for path in paths:
@@ -117,7 +117,7 @@ class Progress:
     def part(self, text, done, total):
         if self.quiet:
             return
-        line = f"tankcal: {said(text)}"
+        line = f"tankcal: {say_in_language(text)}"
         if text != self.now:
             self.end()
             print(line, end="" if self.live else "\n", file=sys.stderr, flush=True)

@@ -44,7 +44,7 @@ class Axis:
 class Rings:
     """The rings from the bottom up, n of them with c azimuth cells each.
 
-    What no point determines is nan: circles of `undetermined` rings, cells without points, the sd
+    What no point determines is nan: circles of `null_space` rings, cells without points, the sd
     of a cell with one point.
 
     axis              the approximate axis that azimuths and radii of cells are about

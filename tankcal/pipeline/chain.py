@@ -16,8 +16,12 @@ from tankcal.job.tables import in_book
 from tankcal.messages import message
 from tankcal.pipeline.corrections import Correction, corrections_of
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
-from tankcal.pipeline.plausibility import incomplete_certificate, of_adjustment, refuse_undetermined
-from tankcal.pipeline.scan import Scan, scanned
+from tankcal.pipeline.plausibility import (
+    incomplete_certificate,
+    open_questions,
+    refuse_undetermined,
+)
+from tankcal.pipeline.scan import Scan, fit_scan
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
 from tankcal.pipeline.statements import (
@@ -28,7 +32,7 @@ from tankcal.pipeline.statements import (
     statements,
     verdict_of,
 )
-from tankcal.pipeline.table import doubts_of_table, tabled
+from tankcal.pipeline.table import check_table, compute_table
 from tankcal.pipeline.tanks import body_of, shell_volume
 from tankcal.pipeline.views import plot
 from tankcal.pipeline.wall import Wall, find_wall, s_transform
@@ -263,7 +267,7 @@ def _run(job, progress, part_progress, simulated):
         refuse_other_side(job, partial(is_within_wall, wall), adjustment)
     elif adjustment is not None and isinstance(survey, Scan):
         refuse_other_side(job, survey.is_within, adjustment)
-    made = tabled(job, survey, progress)
+    made = compute_table(job, survey, progress)
     body, zero, table = made.body, made.zero_m, made.table
     progress(message("stating", "stating volumes and deliveries"))
     stated = statements(job, table, made.straightness.largest_m3)
@@ -298,12 +302,12 @@ def _run(job, progress, part_progress, simulated):
 def _warnings(job, adjustment, survey, made):
     of_survey = ()
     if adjustment is not None:
-        left_open = of_adjustment(job, adjustment.datum, adjustment.causes)
+        left_open = open_questions(job, adjustment.datum, adjustment.causes)
         of_survey = (*adjustment.warnings, *left_open)
     warnings = (
         *job.warnings,
         *of_survey,
-        *doubts_of_table(job, survey, made),
+        *check_table(job, survey, made),
         *incomplete_certificate(job),
     )
     return _placed(job, warnings)
@@ -376,7 +380,7 @@ def _survey(job, progress, dof):
                 "fitting_wall", "fitting the wall to {count} points", count=len(job.points.names)
             )
         )
-        return scanned(job, dof)
+        return fit_scan(job, dof)
     return None
 
 

@@ -43,7 +43,7 @@ def refuse_misfit(points, noise_m, diameter_m):
     raise InputError(Problem(origin_of(points), text))
 
 
-def doubts_of_scan(job, scan, top_m):
+def check_scan(job, scan, top_m):
     """Warnings of the points of a lying cylinder or a sphere."""
     diameter = float(dict(zip(scan.names, scan.values, strict=True))["diameter"])
     given = job.horizontal or job.sphere
@@ -82,12 +82,12 @@ def given_sd_m(points):
     return None if points.sd_m is None else float(np.median(points.sd_m))
 
 
-def doubts_of_mesh(job, top_m):
+def check_mesh(job, top_m):
     """Warnings of a tank that is given as a mesh."""
     return _of_reference(job, top_m)
 
 
-def doubts_of_wall(job, wall):
+def check_wall(job, wall):
     """Warnings of a vertical wall: its diameter against drawing and tape, its bottom's slope."""
     radius = float(np.mean([section.circle.radius_m for section in wall.sections]))
     return [

@@ -66,7 +66,7 @@ def refuse_undetermined(datum):
         raise SolutionError(*missing)
 
 
-def of_adjustment(job, datum, causes):
+def open_questions(job, datum, causes):
     """What an adjusted survey leaves open: heights of the frame, a scale twice.
 
     datum  `surveys.DatumReport`         causes  `surveys.Cause` of its points
@@ -107,7 +107,7 @@ def _held(names):
     return listed(names, SHOWN)
 
 
-def vague_vertical(points):
+def warn_of_vague_vertical(points):
     """A vertical that adjusted points have, but hardly know: the sd of their common lean."""
     if not points.from_adjustment:
         return []
@@ -128,7 +128,7 @@ def vague_vertical(points):
     return _problems(points, [text])
 
 
-def vague_points(points, accepted, sds_m, noise_m):
+def warn_of_vague_points(points, accepted, sds_m, noise_m):
     """Points of the wall that the survey hardly determines, and a wall of such points.
 
     accepted (m,) indices of the points of the wall; sds_m (n,) in plan, or None; noise_m scatter
@@ -201,7 +201,7 @@ def weak_sections(job, groups, azimuth_rad):
     return _problems(job.points, texts)
 
 
-def doubts(job, shell, sections, given_sd_m):
+def check_shell(job, shell, sections, given_sd_m):
     """A tilt that is not determined, large scatter, many outliers, radii that jump.
 
     given_sd_m (n,) standard deviations of the points in plan, or None. Those of an adjustment are
@@ -243,7 +243,7 @@ def doubts(job, shell, sections, given_sd_m):
     return _problems(job.points, texts)
 
 
-def not_in_u(undeclared):
+def warn_of_undeclared(undeclared):
     """A warning that names what U does not contain.
 
     undeclared  names of the inputs that bear on the tank and have no declared uncertainty

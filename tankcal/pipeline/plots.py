@@ -72,7 +72,7 @@ class Drawing(Figure):
         return image.getvalue()
 
 
-def english(key, **values):
+def english_label(key, **values):
     """The word of WORDS at an axis, its places filled."""
     return WORDS[key].format(**values)
 
@@ -110,7 +110,7 @@ class Ring:
         ]
 
 
-def residual_panels(rings, words=english, most=8):
+def residual_panels(rings, words=english_label, most=8):
     """Residuals in mm against azimuth, one panel a section, up to `most` panels a figure."""
     largest_m = max((np.max(np.abs(ring.residual_m), initial=0.0) for ring in rings), default=0.0)
     return [
@@ -128,7 +128,7 @@ def _residual_panels(rings, limit_mm, words):
         azimuth = ring.azimuth_deg
         if len(azimuth) <= 72:
             ax.vlines(azimuth, 0, residual_mm, color=INK, linewidth=0.8)
-        ax.plot(azimuth, residual_mm, "o", color=INK, markersize=2.2, **light(azimuth))
+        ax.plot(azimuth, residual_mm, "o", color=INK, markersize=2.2, **rasterize_many(azimuth))
         ax.axhline(0, color=GREY, linewidth=0.5)
         ax.set(xlim=_TURN, ylim=(-limit_mm, limit_mm), xticks=range(0, 361, 45))
         ax.grid(True)
@@ -155,7 +155,7 @@ def round_factor(wanted):
     return max(1, round(power * max(step for step in (1, 2, 5) if step * power <= wanted)))
 
 
-def polar(rings, words=english, most=12):
+def polar(rings, words=english_label, most=12):
     """The sections about their circles, deviations enlarged by `polar_factor`."""
     factor = polar_factor(rings)
     return [_polar_panels(group, factor, words) for group in even_groups(rings, most)]
@@ -177,7 +177,7 @@ def _polar_panels(rings, factor, words):
         points = _enlarged(ring.azimuth_deg, residual, factor)
         few = points.shape[1] <= 200  # many would hide the outline: smaller, and below it
         style = {"markersize": 2.2, "zorder": 3} if few else {"markersize": 1.0, "zorder": 1}
-        ax.plot(*points, ".", color=RED, **style, **light(points[0]))
+        ax.plot(*points, ".", color=RED, **style, **rasterize_many(points[0]))
         ax.set(aspect="equal", xlim=(-1.32, 1.32), ylim=(-1.32, 1.32))
         title = "\n".join(ring.title(words))
         ax.text(0, 0, title, ha="center", va="center", fontsize=8, parse_math=False)
@@ -194,7 +194,7 @@ def _enlarged(azimuth_deg, deviation, factor):
 
 
 @styled
-def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english):
+def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english_label):
     """The wall unrolled: azimuth by height, every point coloured by its residual."""
     residual_mm = 1e3 * np.asarray(residual_m)
     limit = np.max(np.abs(residual_mm), initial=0.0) or 1.0
@@ -207,7 +207,7 @@ def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english):
     shown = ax.scatter(
         azimuth_deg, height_m, c=residual_mm, s=size, cmap="RdBu_r", vmin=-limit, vmax=limit,
         edgecolors=GREY, linewidths=0.25 if size > 2 else 0, zorder=3,
-        **light(azimuth_deg),
+        **rasterize_many(azimuth_deg),
     )  # fmt: skip
     ax.hlines(joints_m, *_TURN, color=GREY, linewidth=0.5)
     ax.set(xlim=_TURN, xticks=range(0, 361, 45))
@@ -237,7 +237,7 @@ def bottom_rows(area_m2):
 
 
 @styled
-def capacity_curves(height_m, area_m2, U_m3, words=english):
+def capacity_curves(height_m, area_m2, U_m3, words=english_label):
     """Litres per centimetre, and U, against height; a bottom has a panel of its own."""
     height_m = np.asarray(height_m)
     litres_per_cm = 10.0 * np.array(area_m2, dtype=float)  # 1 m2 is 10 L/cm
@@ -265,7 +265,7 @@ def capacity_curves(height_m, area_m2, U_m3, words=english):
 
 
 @styled
-def budget_bars(bars, words=english):
+def budget_bars(bars, words=english_label):
     """The share of the variance of each input, in percent; defaults are pale.
 
     bars  [(name, share of the variance, whether it is a default), ...]
@@ -311,7 +311,7 @@ def network(names, xy_m, covariance_m2, most_names=60):
         facecolors="none", edgecolors=RED, linewidths=0.6,
     )  # fmt: skip
     ax.add_collection(ellipses)
-    ax.plot(*xy_m.T, ".", color=INK, markersize=2.5, **light(xy_m))
+    ax.plot(*xy_m.T, ".", color=INK, markersize=2.5, **rasterize_many(xy_m))
     if len(names) <= most_names:
         for name, place in zip(names, xy_m, strict=True):
             ax.annotate(
@@ -330,7 +330,7 @@ def even_groups(items, most):
     return [items[i : i + size] for i in range(0, len(items), size)]
 
 
-def light(points):
+def rasterize_many(points):
     """Very many points are drawn as a picture inside the figure."""
     return {"rasterized": len(points) > MANY}
 

@@ -46,7 +46,7 @@ class Scan:
         return (_offsets(self.fit, places_m) < 0) & (along > low) & (along < high)
 
 
-def scanned(job, dof=np.inf):
+def fit_scan(job, dof=np.inf):
     """`Scan` of the points of a lying cylinder or a sphere; points far off are left out.
 
     Rounds of fit and test: a point over 5 robust standard deviations off is not used, until

@@ -10,7 +10,7 @@ from tankcal.messages import message
 from tankcal.tank.budgets import Budget, budget, reading_sources
 from tankcal.tank.capacity import SAME_M
 from tankcal.tank.deliveries import WorstDeliveries, worst_deliveries
-from tankcal.tank.rules import Printed, StatedVolume, deliveries_judged, judge
+from tankcal.tank.rules import Printed, StatedVolume, deliveries_to_check, judge
 
 MINIMA_M = (1.5, 2.0, 3.0)  # of deliveries, where the job names none
 QUARTERS = (0.25, 0.5, 0.75, 1.0)  # of the table, where the job names no dips
@@ -57,7 +57,7 @@ def statements(job, table, largest_interpolation_m3):
 
 def pairs_to_simulate(stated, job, body, table):
     """((low_m, high_m), ...) of the `Statements`, then of the deliveries a rule is decided by."""
-    judged = () if job.rule is None else deliveries_judged(job.rule, table, _tank(job, body))
+    judged = () if job.rule is None else deliveries_to_check(job.rule, table, _tank(job, body))
     return tuple(dict.fromkeys((*stated.pairs, *judged)))
 
 

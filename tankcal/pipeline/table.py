@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.pipeline.cross_checks import doubts_of_mesh, doubts_of_scan, doubts_of_wall
-from tankcal.pipeline.plausibility import against_nominal, not_in_u
+from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
+from tankcal.pipeline.plausibility import against_nominal, warn_of_undeclared
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
 from tankcal.pipeline.wall import Wall, warnings_of
@@ -22,7 +22,7 @@ from tankcal.tank.dips import (
     choose_rows,
     interpolation_errors,
     table_heights,
-    whole_top,
+    top_mark,
 )
 from tankcal.tank.falling_capacity import refuse_falling
 from tankcal.uncertainty import ROUNDING, combine
@@ -31,7 +31,7 @@ CLOSED = 1e-3  # of its largest free surface: one that is smaller at the top cou
 
 
 @dataclass(frozen=True)
-class Tabled:
+class ComputedTable:
     """A tank with its capacity table.
 
     body          the tank as the sum of its parts (`body.Body`)
@@ -64,8 +64,8 @@ class Tabled:
         return _exact(self.body, self.zero_m)(dips_m)
 
 
-def tabled(job, survey, progress=lambda text: None):
-    """The `Tabled` of a job.
+def compute_table(job, survey, progress=lambda text: None):
+    """The `ComputedTable` of a job.
 
     survey  its `wall.Wall`, `scan.Scan` or mesh, None where sizes alone tell of the tank
     progress  called with a line of text as each step begins
@@ -75,7 +75,7 @@ def tabled(job, survey, progress=lambda text: None):
     zero = zero_height(job, survey)
     progress(message("propagating", "propagating the covariance to every row of the table"))
     spec = job.table
-    top = whole_top(body.highest_m - zero, spec.height_unit, closed=_is_closed(body))
+    top = top_mark(body.highest_m - zero, spec.height_unit, closed=_is_closed(body))
     breakpoints = np.unique([edge - zero for edge in body.breakpoints_m if 0 < edge - zero < top])
     exact = _exact(body, zero)
     heights = _rows(spec, exact, top, breakpoints)
@@ -92,24 +92,24 @@ def tabled(job, survey, progress=lambda text: None):
     dips = np.union1d(heights, breakpoints)
     refuse_falling(job, body, zero, dips, exact(dips))
     straightness = interpolation_errors(exact, heights, breakpoints)
-    return Tabled(body, zero, levels, breakpoints, table, straightness)
+    return ComputedTable(body, zero, levels, breakpoints, table, straightness)
 
 
-def doubts_of_table(job, survey, made):
-    """Warnings of what was surveyed, as for `tabled`, and of the `Tabled` that was made of it."""
+def check_table(job, survey, made):
+    """Warnings of what was surveyed, and of the `ComputedTable` that was made of it."""
     return (
         *_doubts_of_survey(job, survey, made.top_m),
-        *not_in_u(made.body.undeclared()),
+        *warn_of_undeclared(made.body.undeclared()),
         *against_nominal(job.tank, made.table.volume_m3[-1]),
     )
 
 
 def _doubts_of_survey(job, survey, top_m):
     if isinstance(survey, Wall):
-        return (*warnings_of(job, survey), *doubts_of_wall(job, survey))
+        return (*warnings_of(job, survey), *check_wall(job, survey))
     if isinstance(survey, Scan):
-        return doubts_of_scan(job, survey, top_m)
-    return () if survey is None else doubts_of_mesh(job, top_m)
+        return check_scan(job, survey, top_m)
+    return () if survey is None else check_mesh(job, top_m)
 
 
 def _without_rounding(volumes, areas, sources):

@@ -14,11 +14,11 @@ from tankcal.messages import message
 from tankcal.pipeline.plausibility import (
     ADVISED_POINTS,
     FEWEST_POINTS,
-    doubts,
+    check_shell,
     noise_is_estimated,
     origin_of,
-    vague_points,
-    vague_vertical,
+    warn_of_vague_points,
+    warn_of_vague_vertical,
     weak_sections,
 )
 from tankcal.sections import (
@@ -121,9 +121,9 @@ def warnings_of(job, wall):
     sds = radial_sds(job.points)
     return (
         *weak_sections(job, groups, _azimuths(job, wall.shell, wall.accepted)),
-        *doubts(job, wall.shell, wall.sections, sds),
-        *vague_points(job.points, wall.accepted, sds, wall.shell.noise_m),
-        *vague_vertical(job.points),
+        *check_shell(job, wall.shell, wall.sections, sds),
+        *warn_of_vague_points(job.points, wall.accepted, sds, wall.shell.noise_m),
+        *warn_of_vague_vertical(job.points),
     )
 
 
@@ -201,7 +201,7 @@ def s_transform(points):
     with it would depend on that choice. Columns of causes go along.
     """
     basis, given = common_motions(points.xyz_m), points.covariance_m2
-    across = taken_along(basis, given @ basis, np.trace(given))
+    across = s_transform_factors(basis, given @ basis, np.trace(given))
     change = np.hstack([basis, across]) @ np.hstack([across, basis]).T
     causes = tuple(
         replace(cause, column_m=cause.column_m - basis @ (basis.T @ cause.column_m))
@@ -219,7 +219,7 @@ def common_motions(xyz_m):
     return np.linalg.qr(motions.reshape(-1, 4))[0]
 
 
-def taken_along(basis, spread, trace):
+def s_transform_factors(basis, spread, trace):
     """A (3n, 4) of C' = C - D A' - A D', which is S C S + s2 D D' of `s_transform`.
 
     A = C D - D (D'C D + s2 I) / 2; basis D, spread C D, trace of C

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse
 
-from tankcal.pipeline.wall import common_motions, taken_along
+from tankcal.pipeline.wall import common_motions, s_transform_factors
 from tankcal.solver.effects import covariances
 
 
@@ -53,7 +53,7 @@ class PredictedCovariance:
     @cached_property
     def _across(self):
         trace = np.einsum("nii->", self.adjusted.point_covariances_m2[self.points])
-        return taken_along(self._basis, self._in_frame(self._basis), trace)
+        return s_transform_factors(self._basis, self._in_frame(self._basis), trace)
 
     def among(self, column):
         """A column (3n,) of one cause, without the common motions."""

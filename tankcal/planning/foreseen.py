@@ -7,8 +7,8 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import listed, message
-from tankcal.pipeline.plausibility import SHOWN, of_adjustment
-from tankcal.pipeline.table import doubts_of_table
+from tankcal.pipeline.plausibility import SHOWN, open_questions
+from tankcal.pipeline.table import check_table
 from tankcal.planning.covariance import PredictedCovariance
 from tankcal.planning.given import PLAN_FILE
 
@@ -18,8 +18,8 @@ def foreseen(prediction):
     tabled = prediction.tabled
     of_run = (
         *prediction.predicted.frame.warnings,
-        *of_adjustment(tabled.job, prediction.datum, tabled.job.points.causes),
-        *doubts_of_table(_correlated(tabled), tabled.wall, tabled.made),
+        *open_questions(tabled.job, prediction.datum, tabled.job.points.causes),
+        *check_table(_correlated(tabled), tabled.wall, tabled.made),
     )
     return (
         *prediction.plan.warnings,

@@ -11,7 +11,7 @@ import numpy as np
 
 from tankcal.errors import SolutionError, TankcalError
 from tankcal.messages import message
-from tankcal.pipeline.table import tabled
+from tankcal.pipeline.table import compute_table
 from tankcal.pipeline.wall import find_wall, s_transform
 from tankcal.planning.measurements import measured
 from tankcal.planning.prediction import Prediction
@@ -117,7 +117,7 @@ def _made(plan, measurements):
     points = wall_points(adjustment, measurements, plan.job.survey.side)
     job = replace(plan.job, points=s_transform(points), measurements=None)
     wall = find_wall(job, lambda text: None, adjustment.dof, plan.form)
-    body = tabled(job, wall).body
+    body = compute_table(job, wall).body
     return adjustment, float(body.volume_m3(np.array([body.highest_m]))[0])
 
 

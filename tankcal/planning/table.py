@@ -10,7 +10,7 @@ from tankcal.job.model import Job
 from tankcal.messages import message
 from tankcal.pipeline.plausibility import refuse_undetermined
 from tankcal.pipeline.statements import statements
-from tankcal.pipeline.table import Tabled, tabled
+from tankcal.pipeline.table import ComputedTable, compute_table
 from tankcal.pipeline.tanks.vertical import volume_by_points
 from tankcal.pipeline.wall import Wall, find_wall
 from tankcal.planning.covariance import PredictedCovariance
@@ -31,7 +31,7 @@ class PredictedTable:
 
     job: Job
     wall: Wall
-    made: Tabled
+    made: ComputedTable
     covariance: PredictedCovariance
 
     @cached_property
@@ -57,7 +57,7 @@ def predicted_table(plan, predicted):
     if len(wall.accepted) < len(there):
         covariance = PredictedCovariance(covariance.adjusted, covariance.points[wall.accepted])
     wall = replace(wall, covariance_m2=covariance)
-    return PredictedTable(job, wall, tabled(job, wall), covariance)
+    return PredictedTable(job, wall, compute_table(job, wall), covariance)
 
 
 def recomputed(plan, predicted, before):
@@ -75,7 +75,7 @@ def recomputed(plan, predicted, before):
     points = replace(known, causes=_causes(covariance))
     job = replace(before.job, points=points)
     wall = replace(before.wall, covariance_m2=covariance)
-    return PredictedTable(job, wall, tabled(job, wall), covariance)
+    return PredictedTable(job, wall, compute_table(job, wall), covariance)
 
 
 def _covered(plan, predicted):

@@ -39,7 +39,7 @@ def _asked_for():
 _worked = 0  # rows that arrays have worked through in this process
 
 
-def worthwhile(rows=0):
+def is_worth_compiling(rows=0):
     """True when compiled loops are to be used, for so many rows after those that came before.
 
     The first call about a problem names its rows; what follows from them names none.
@@ -52,7 +52,7 @@ def worthwhile(rows=0):
 
 
 @cache
-def compiled(module, names):
+def compile_functions(module, names):
     """The functions `names` of a module, compiled; callees before their callers.
 
     module  a module object

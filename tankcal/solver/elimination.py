@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse
 
 from tankcal.solver import loops
-from tankcal.solver.compiled import compiled, worthwhile
+from tankcal.solver.compiled import compile_functions, is_worth_compiling
 
 
 def build(plan, normals, misclosures, jacobians):
@@ -20,8 +20,8 @@ def build(plan, normals, misclosures, jacobians):
 
 
 def _add_rows(batch, w, jac, normals):
-    if worthwhile():
-        run = compiled(loops, loops.COMPILED)
+    if is_worth_compiling():
+        run = compile_functions(loops, loops.COMPILED)
         if batch.block is None:
             run._add_plain_rows(w, jac, batch.columns, normals.t, normals.g)
         else:
@@ -44,8 +44,8 @@ def _add_rows(batch, w, jac, normals):
 
 def eliminate(plan, normals, damping, smallest):
     """Eliminate the blocks in place; the first block that is not determined, or -1."""
-    if worthwhile():
-        return compiled(loops, loops.COMPILED)._eliminate(
+    if is_worth_compiling():
+        return compile_functions(loops, loops.COMPILED)._eliminate(
             normals.v, normals.wide, normals.b, plan.starts, plan.columns, plan.runs, plan.ends,
             plan.alike, normals.t, normals.g, damping, smallest,
         )  # fmt: skip
@@ -83,9 +83,9 @@ def block_rows(plan, wide):
 
 def back_substitute(plan, normals, reduced):
     """L^-T (y + Y' reduced) of each block (nb, 3); the blocks' step is this with the other sign."""
-    if worthwhile():
+    if is_worth_compiling():
         out = np.empty((plan.blocks, 3))
-        compiled(loops, loops.COMPILED)._back(
+        compile_functions(loops, loops.COMPILED)._back(
             normals.v, normals.wide, normals.b, plan.starts, plan.columns, reduced, out
         )
         return out
@@ -107,8 +107,8 @@ def block_cofactors(plan, normals, inverse):
     """
     cross, out = np.empty((len(plan.columns) + 1, 3)), np.empty((plan.blocks, 3, 3))
     cross[-1] = 0.0
-    if worthwhile():
-        compiled(loops, loops.COMPILED)._cofactors(
+    if is_worth_compiling():
+        compile_functions(loops, loops.COMPILED)._cofactors(
             normals.v, normals.wide, plan.starts, plan.columns, plan.runs, plan.ends,
             inverse, cross, out,
         )  # fmt: skip
@@ -129,9 +129,9 @@ def leverage(plan, batch, jac, inverse, cross, cofactors):
     inverse, cross, cofactors  of the reduced unknowns, and as block_cofactors gives them
     """
     spare = plan.reduced
-    if batch.block is not None and worthwhile():
+    if batch.block is not None and is_worth_compiling():
         out = np.empty(jac.shape[:2])
-        compiled(loops, loops.COMPILED)._leverage(
+        compile_functions(loops, loops.COMPILED)._leverage(
             jac, batch.block, batch.columns, batch.places, inverse, cross, cofactors, spare, out
         )
         return out

@@ -3,7 +3,7 @@
 import numpy as np
 import scipy.linalg
 
-from tankcal.adjust import SMALLEST_PIVOT, Adjustment, determined
+from tankcal.adjust import SMALLEST_PIVOT, Adjustment, find_determined
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver.cofactors import Cofactors, Factor
@@ -234,7 +234,7 @@ class _Work:
         if tangent is not None:
             s, reaction_part = tangent.square(s)
         lower, info = scipy.linalg.lapack.dpotrf(s.T, lower=1, clean=0, overwrite_a=1)
-        sound = not info and determined(lower.diagonal(), self.rows, of_normals=True).all()
+        sound = not info and find_determined(lower.diagonal(), self.rows, of_normals=True).all()
         return lower, sound, reaction_part
 
     def _dense_root(self, scale, untouched, damping, held, tangent):
@@ -256,7 +256,7 @@ class _Work:
             reaction_part, rows = outer @ np.vstack([outer, rows]).T, rows.T
         r = np.linalg.qr(rows, mode="r")
         lower = np.asfortranarray((r * np.sign(r.diagonal())[:, None]).T)
-        return lower, determined(lower.diagonal(), self.rows).all(), reaction_part
+        return lower, find_determined(lower.diagonal(), self.rows).all(), reaction_part
 
     def _look(self, state, damping, bad_block):
         """A factor that could not be had: raise when it is the survey's fault."""

@@ -23,7 +23,7 @@ def diagnosis(work, state, bad_block):
         first = model.reduced + 3 * bad_block
         names = ", ".join(model.name_of(column) for column in range(first, first + 3))
         return message("undetermined", "not determined by the observations: {names}", names=names)
-    directions, lengths = undetermined(work, state)
+    directions, lengths = null_space(work, state)
     if model.null_space is not None:
         directions = _without(directions, model.null_space(state) * lengths[:, None])
     if not directions.shape[1]:
@@ -40,7 +40,7 @@ def diagnosis(work, state, bad_block):
 def weakness(work, state):
     """Words on the direction that the rows feel least, or "" when they feel all."""
     model = work.model
-    directions, lengths = undetermined(work, state, WEAK, np.inf)
+    directions, lengths = null_space(work, state, WEAK, np.inf)
     if model.null_space is not None:
         directions = _without(directions, model.null_space(state) * lengths[:, None])
     if not directions.shape[1]:
@@ -62,7 +62,7 @@ def _in_words(model, directions):
     return ", ".join(model.name_of(int(column)) for column in worst)
 
 
-def undetermined(work, state, faint=FAINT, nothing=NOTHING):
+def null_space(work, state, faint=FAINT, nothing=NOTHING):
     """Directions (unknowns, d) that the rows do not feel, and the columns' lengths (unknowns,).
 
     The directions are in units of columns of length one, and obey the exact conditions.

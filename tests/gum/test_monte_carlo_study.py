@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from tankcal.gum.distributions import Normal
 from tankcal.gum.monte_carlo import Goal, QuadraticRows, simulate
 from tankcal.gum.monte_carlo.inputs import inputs_of
-from tankcal.gum.monte_carlo.simulation import in_batches
+from tankcal.gum.monte_carlo.simulation import simulate_in_batches
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
 
@@ -153,7 +153,7 @@ def test_a_control_that_says_nothing_does_no_harm(figure):
     inputs = [Normal(0.005, mean=0.0025), Normal(0.005)]
     goal = Goal(plain_draws=600_000, fraction=1.0)
     helped = simulate(loss, inputs, goal=goal)
-    _, errors, _, _ = in_batches(loss, inputs_of(inputs), None, goal, lambda *step: None)
+    _, errors, _, _ = simulate_in_batches(loss, inputs_of(inputs), None, goal, lambda *step: None)
     for name, plain in (("u", errors[1, 0]), ("low", errors[2, 0]), ("high", errors[3, 0])):
         ratio = getattr(helped, "se_" + name)[0] / plain
         figure(f"a control that says little, se of {name} by that without", ratio)

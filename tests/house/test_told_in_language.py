@@ -8,7 +8,7 @@ from job_builder import write_workbook
 import tankcal
 from tankcal.cli import main
 from tankcal.cli.asked_language import asked_language
-from tankcal.cli.showing import said, speak
+from tankcal.cli.showing import say_in_language, speak
 from tankcal.errors import Problem
 from tankcal.job.contract import KEYS
 from tankcal.job.fields import Field, Refused, read_value
@@ -51,10 +51,10 @@ def test_an_empty_form_is_refused_in_its_language(tmp_path, capsys, language, ki
 def test_the_terminal_of_a_job_in_no_language_is_the_environments(monkeypatch):
     problem = Problem("points.csv", "x", 12)
     speak()
-    assert said(problem.text) == "points.csv, row 12: x"
+    assert say_in_language(problem.text) == "points.csv, row 12: x"
     monkeypatch.setenv("LANG", "pt_BR.UTF-8")
     speak()
-    assert said(problem.text) == "points.csv, linha 12: x"
+    assert say_in_language(problem.text) == "points.csv, linha 12: x"
     assert nearest_language("es_MX") == "es"
     assert nearest_language("tlh") is None
 
@@ -89,7 +89,9 @@ def test_warnings_of_a_workbook_name_it_and_its_words_are_read(tmp_path):
     record = in_language(load_words("pt-BR"), record_of(result))
     assert {one["file"] for one in record["warnings"]} <= {"planilha job", "planilha uncertainty"}
     speak("pt-BR")
-    assert said(told.text).startswith("tanque.xlsx, planilha job, tank.nominal_volume_m3: a capac")
+    assert say_in_language(told.text).startswith(
+        "tanque.xlsx, planilha job, tank.nominal_volume_m3: a capac"
+    )
 
 
 CHOICES = [field.choices for fields in KEYS.values() for field in fields if field.kind == "choice"]
@@ -124,4 +126,4 @@ def test_another_word_is_refused_with_what_is_expected():
         read_value(Field("x", "choice", "", choices=("outside", "inside")), "talvez")
     assert isinstance(told.value.text, Message)
     speak("pt-BR")
-    assert said(told.value.text) == "encontrado 'talvez'; esperado 'fora' ou 'dentro'"
+    assert say_in_language(told.value.text) == "encontrado 'talvez'; esperado 'fora' ou 'dentro'"

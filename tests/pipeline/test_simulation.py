@@ -14,7 +14,7 @@ from tankcal.gum.distributions import standard
 from tankcal.gum.monte_carlo import Goal
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.simulation import simulate_table
-from tankcal.pipeline.simulation.curvature import VARIED, curvature, varied
+from tankcal.pipeline.simulation.curvature import VARIED, curvature, vary_input
 from tankcal.pipeline.tanks import body_of
 from tankcal.tank.budgets import budget
 from tankcal.uncertainty import declared_source
@@ -230,7 +230,7 @@ def test_slopes_are_those_of_the_tank_with_its_inputs_moved(tank, figure):
     slopes, tried = tank.body.derivatives(levels), []
     for name in VARIED:
         step = STEPS.get(name, 1e-4)
-        moved = [varied(tank.job, name, sign * step) for sign in (1, -1)]
+        moved = [vary_input(tank.job, name, sign * step) for sign in (1, -1)]
         if name not in slopes or None in moved:
             continue
         volumes = [body_of(job, survey, uncertain=False).volume_m3(levels) for job in moved]

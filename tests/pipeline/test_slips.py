@@ -23,7 +23,7 @@ from tankcal.errors import InputError
 from tankcal.job.contract import COLUMNS, KEYS
 from tankcal.job.plausibility import CODES, TABLE
 from tankcal.pipeline import cross_checks as plausibility
-from tankcal.pipeline.scan import scanned
+from tankcal.pipeline.scan import fit_scan
 from tankcal.record import record_of
 from tankcal.report import certificate
 from tankcal.report.paper import Paper
@@ -405,7 +405,7 @@ def test_a_certificate_without_doubts_says_nothing_of_them(tmp_path):
 )
 def test_places_within_the_wall_of_points(tmp_path, kind, within, without):
     """Off the end of a lying tank is outside of it, on its axis, too."""
-    scan = scanned(tankcal.load(write_folder(tmp_path / "job", sound(kind))))
+    scan = fit_scan(tankcal.load(write_folder(tmp_path / "job", sound(kind))))
     assert scan.is_within(np.array([within, *without])).tolist() == [True, *[False] * len(without)]
 
 

@@ -10,7 +10,7 @@ from plan_folders import with_setups
 
 import tankcal
 from tankcal.geometry.rotations import from_angles
-from tankcal.pipeline.table import tabled
+from tankcal.pipeline.table import compute_table
 from tankcal.pipeline.wall import find_wall, s_transform
 from tankcal.planning import load_plan, predict
 from tankcal.planning.measurements import measured
@@ -69,7 +69,7 @@ def test_the_table_is_that_of_the_chain(prediction, filled, figure):
     adjustment = adjust_survey(filled)
     points = s_transform(wall_points(adjustment, filled, "outside"))
     job = replace(plan.job, points=points, measurements=None)
-    table = tabled(job, find_wall(job, lambda text: None, form=plan.form)).table
+    table = compute_table(job, find_wall(job, lambda text: None, form=plan.form)).table
     off = np.abs(prediction.table.U_m3 / table.U_m3 - 1).max()
     figure("largest relative difference of a row's U to the chain", off)
     assert prediction.table.U_m3 == pytest.approx(table.U_m3, rel=1e-8)
@@ -208,7 +208,7 @@ def volume_of(plan, measurements):
     adjustment = adjust_survey(measurements)
     points = s_transform(wall_points(adjustment, measurements, "outside"))
     job = replace(plan.job, points=points, measurements=None)
-    return tabled(job, find_wall(job, lambda text: None, form=plan.form)).table.volume_m3[-1]
+    return compute_table(job, find_wall(job, lambda text: None, form=plan.form)).table.volume_m3[-1]
 
 
 def test_a_bad_point_is_weak_and_a_hidden_one_is_not_determined(plan):

@@ -8,7 +8,7 @@ from plan_folders import changed_plan, fill_folder, with_setups
 
 import tankcal.survey.readings
 from tankcal.job import load
-from tankcal.pipeline.table import tabled
+from tankcal.pipeline.table import compute_table
 from tankcal.pipeline.wall import find_wall, s_transform
 from tankcal.planning import load_plan, predict
 from tankcal.planning.measurements import measured
@@ -134,4 +134,4 @@ def volume_of(plan, measurements):
     adjustment = adjust_survey(measurements)
     points = s_transform(wall_points(adjustment, measurements, "outside"))
     job = replace(plan.job, points=points, measurements=None)
-    return tabled(job, find_wall(job, lambda text: None, form=plan.form)).table.volume_m3[-1]
+    return compute_table(job, find_wall(job, lambda text: None, form=plan.form)).table.volume_m3[-1]

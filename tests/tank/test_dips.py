@@ -19,12 +19,12 @@ from tankcal.tank.dips import (
     interpolation_errors,
     parse_dip,
     proportional_parts,
-    rounded,
+    round_each,
     table_heights,
+    top_mark,
     ullage_m,
     volume_from_m3,
     volume_to_m3,
-    whole_top,
 )
 from tankcal.tank.dips.straightness import INCH_STEPS_M, LADDERS_M, METRIC_STEPS_M
 
@@ -407,12 +407,12 @@ def test_a_stretch_is_cut_into_the_longest_zones_that_keep_the_bound():
 
 
 def test_the_top_of_a_table_is_a_mark_of_the_tape():
-    assert whole_top(9.49996) == 9.5
-    assert whole_top(9.4994) == 9.499
-    assert whole_top(2.9994, closed=True) == whole_top(3.0, closed=True) == 3.0
-    assert whole_top(2.9991, "m", closed=True) == 3.0  # full from there on
-    assert whole_top(9.14396, "ft-in-8") == pytest.approx(9.144, abs=1e-12)  # 30 ft
-    assert whole_top(9.5004, "ft-in-16") == 9.5004  # no mark within half a millimetre
+    assert top_mark(9.49996) == 9.5
+    assert top_mark(9.4994) == 9.499
+    assert top_mark(2.9994, closed=True) == top_mark(3.0, closed=True) == 3.0
+    assert top_mark(2.9991, "m", closed=True) == 3.0  # full from there on
+    assert top_mark(9.14396, "ft-in-8") == pytest.approx(9.144, abs=1e-12)  # 30 ft
+    assert top_mark(9.5004, "ft-in-16") == 9.5004  # no mark within half a millimetre
 
 
 # ullage and the dip of a volume
@@ -496,9 +496,9 @@ def test_flat_places_elsewhere_do_no_harm():
 
 def test_rows_are_rounded_from_the_exact_value_and_never_added_up(figure):
     exact = volume_from_m3(lying(HEIGHTS), "L")
-    once = rounded(exact, 0)
+    once = round_each(exact, 0)
     assert np.abs(once - exact).max() <= 0.5  # property of rounding
-    added = np.concatenate([[0], np.cumsum(rounded(np.diff(exact), 0))])
+    added = np.concatenate([[0], np.cumsum(round_each(np.diff(exact), 0))])
     assert np.abs(added - exact).max() > 2
     figure(
         "rounding of 241 rows to the litre, largest error",
@@ -509,4 +509,4 @@ def test_rows_are_rounded_from_the_exact_value_and_never_added_up(figure):
 
 def test_rounding_is_that_of_the_stored_number():
     # closed form: 2.675 is stored as 2.67499999999999982236431605997495353221893310546875
-    assert rounded([2.675, 0.125, 0.375, -1.5], 2).tolist() == [2.67, 0.12, 0.38, -1.5]
+    assert round_each([2.675, 0.125, 0.375, -1.5], 2).tolist() == [2.67, 0.12, 0.38, -1.5]

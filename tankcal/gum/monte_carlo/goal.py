@@ -98,23 +98,23 @@ class Simulation:
         return {name: values for name, values in named if name != "probability"}
 
 
-def allowed(goal, estimates):
+def allowed_errors(goal, estimates):
     """(6, rows) standard errors that meet the numerical tolerance; inf where nothing varies."""
     limit = np.tile(goal.fraction * _tolerance(goal, estimates) / 2, (6, 1))
     limit[4:] /= goal.fraction  # where the shortest interval lies is ill determined by nature
     return np.where(np.isfinite(limit), limit, np.inf)
 
 
-def enough(goal, estimates, errors, plain):
+def may_stop(goal, estimates, errors, plain):
     """(rows,) whether draws may stop: errors meet the tolerance and those of plain draws.
 
     plain  (3, rows) standard errors that a single plain draw would have, of u and both ends
     """
-    met = (SAFETY * errors <= allowed(goal, estimates)) | ~np.isfinite(estimates)
-    return np.all(met, axis=0) & no_worse(goal, estimates, errors, plain)
+    met = (SAFETY * errors <= allowed_errors(goal, estimates)) | ~np.isfinite(estimates)
+    return np.all(met, axis=0) & as_good_as_plain(goal, estimates, errors, plain)
 
 
-def no_worse(goal, estimates, errors, plain):
+def as_good_as_plain(goal, estimates, errors, plain):
     """(rows,) whether u and both ends are as well known as from the plain draws of the goal."""
     limit = plain / np.sqrt(goal.plain_draws)
     return np.all((SAFETY * errors[1:4] <= limit) | ~np.isfinite(estimates[1:4]), axis=0)
@@ -133,7 +133,7 @@ def simulation(goal, estimates, errors, draws, controlled):
             f"Monte Carlo gives row {row + 1} the intervals {low[0, row]:g} to {high[0, row]:g} "
             f"and {low[1, row]:g} to {high[1, row]:g}"
         )
-    met = (errors <= allowed(goal, estimates)) | ~np.isfinite(estimates)
+    met = (errors <= allowed_errors(goal, estimates)) | ~np.isfinite(estimates)
     values = dict(zip(NAMES, estimates, strict=True))
     deviations = {f"se_{name}": se for name, se in zip(NAMES, errors, strict=True)}
     return Simulation(

@@ -13,7 +13,7 @@ from tankcal.gum.monte_carlo.batches import (
     estimates_of,
     nodes_of,
 )
-from tankcal.gum.monte_carlo.goal import Goal, enough, simulation
+from tankcal.gum.monte_carlo.goal import Goal, may_stop, simulation
 from tankcal.gum.monte_carlo.inputs import inputs_of, uniforms
 from tankcal.gum.monte_carlo.linear import linear_law, shapes_of
 from tankcal.gum.monte_carlo.quadratic import QuadraticRows
@@ -43,19 +43,19 @@ def simulate(model, inputs, correlation=None, *, goal=None, sensitivities=None, 
         if ready.transform is not None:
             slopes = differences(model, ready) if sensitivities is None else sensitivities
             control = control_of(np.asarray(slopes, dtype=float), ready, goal)
-        return simulation(goal, *in_batches(model, ready, control, goal, progress))
+        return simulation(goal, *simulate_in_batches(model, ready, control, goal, progress))
     if model.jacobian.shape[1] != len(ready.mean):
         raise ValueError(
             f"{len(ready.mean)} inputs, {model.jacobian.shape[1]} columns of the model"
         )
     if ready.transform is None or not _symmetric(ready):
-        return simulation(goal, *in_batches(model, ready, None, goal, progress))
+        return simulation(goal, *simulate_in_batches(model, ready, None, goal, progress))
     estimates, errors, draws, controlled, sound = table_estimates(model, ready, goal, progress)
     hard = np.flatnonzero(~sound)
     if len(hard):
         part = model.subset(hard)
         control = control_of(part.jacobian, ready, goal)
-        found = in_batches(part, ready, control, goal, progress)
+        found = simulate_in_batches(part, ready, control, goal, progress)
         estimates[:, hard], errors[:, hard], draws[hard], controlled[hard] = found
     return simulation(goal, estimates, errors, draws, controlled)
 
@@ -86,7 +86,7 @@ def _symmetric(ready):
     return all(normal or hasattr(one, "characteristic") for one, normal in pairs)
 
 
-def in_batches(model, ready, control, goal, progress):
+def simulate_in_batches(model, ready, control, goal, progress):
     """Estimates, errors (6, rows), draws and use of the control (rows,), by batches of draws."""
     rows = np.asarray(model(ready.mean[None, :])).shape[1]
     size = batch_size(rows, len(ready.mean), goal)
@@ -98,7 +98,7 @@ def in_batches(model, ready, control, goal, progress):
         batches.add(*estimates_of(values, coordinates, control, goal.probability))
         progress("Monte Carlo", number + 1, total)
         done = batches.count >= FEWEST
-        if done and np.all(enough(goal, batches.mean, batches.errors, batches.plain)):
+        if done and np.all(may_stop(goal, batches.mean, batches.errors, batches.plain)):
             break
     used = np.zeros(rows, dtype=bool) if control is None else control.known.copy()
     return batches.estimates, batches.errors, np.full(rows, batches.count * size), used

@@ -8,7 +8,7 @@ Sources: JCGM 101:2008 7.6, 7.7; randomised point sets: Owen 1998.
 import numpy as np
 from scipy.special import ndtri
 
-from tankcal.gum.monte_carlo.goal import enough, no_worse
+from tankcal.gum.monte_carlo.goal import as_good_as_plain, may_stop
 from tankcal.gum.monte_carlo.inputs import uniforms
 from tankcal.gum.monte_carlo.linear import linear_law, shapes_of
 from tankcal.gum.monte_carlo.quadratic import RARE, Lines
@@ -49,9 +49,9 @@ def table_estimates(model, ready, goal, progress):
         estimates[2:, pending], errors[2:, pending] = _mean_and_error(ends)
         part = estimates[:, pending], errors[:, pending], plain[:, pending]
         # more points may show what fewer hid: a row that was sound with 16 need not stay so
-        sound[pending] = steady & no_worse(goal, *part)
+        sound[pending] = steady & as_good_as_plain(goal, *part)
         part[1][:2] = 0.0  # mean and u come from all points already
-        done = enough(goal, *part)
+        done = may_stop(goal, *part)
         pending, count = pending[~done & steady], 4 * count
         progress("Monte Carlo", len(law.known) - len(pending), len(law.known))
     return estimates, errors, draws, law.known.copy(), sound

@@ -35,7 +35,7 @@ VARIED = (
 )
 
 
-def varied(job, name, change):
+def vary_input(job, name, change):
     """The job with `change` (SI) added to the input `name`, one of VARIED; None: it has none."""
     if name in _OF_VALUES:
         part, key = _OF_VALUES[name]
@@ -162,7 +162,7 @@ def _of_input(job, survey, body, levels_m, picked, name, declared):
 
 def _slopes_of_moved(job, survey, levels_m, name, step):
     """Derivatives of the tank with the input a step up, and a step down; None: it has no such."""
-    jobs = [varied(job, name, sign * step) for sign in (1, -1)]
+    jobs = [vary_input(job, name, sign * step) for sign in (1, -1)]
     if None in jobs:
         return None
     tanks = [body_of(moved, survey, uncertain=False) for moved in jobs]

@@ -36,7 +36,7 @@ def gum_intervals(volume_m3, u_m3, U_m3):
     Raises ProgramError for an interval that contradicts itself.
     """
     found = Intervals(volume_m3 - U_m3, volume_m3 + U_m3, np.full(len(U_m3), True), U_m3)
-    return checked(found, volume_m3, u_m3)
+    return check_intervals(found, volume_m3, u_m3)
 
 
 def judged_intervals(judged, volume_m3, u_m3, U_m3, least_m3=-np.inf):
@@ -55,10 +55,10 @@ def judged_intervals(judged, volume_m3, u_m3, U_m3, least_m3=-np.inf):
     found = Intervals(low, judged.high, by_gum, judged.stated(volume_m3, U_m3))
     _refuse_without_width(found, volume_m3, u_m3)  # before an end is moved to where it belongs
     low, high = np.minimum(low, volume_m3), np.maximum(judged.high, volume_m3)
-    return checked(Intervals(low, high, by_gum, found.U_m3), volume_m3, u_m3)
+    return check_intervals(Intervals(low, high, by_gum, found.U_m3), volume_m3, u_m3)
 
 
-def checked(intervals, volume_m3, u_m3):
+def check_intervals(intervals, volume_m3, u_m3):
     """The same `Intervals`; raises ProgramError for one that does not hold its volume."""
     low, high = intervals.low_m3, intervals.high_m3
     outside = ~((low <= volume_m3) & (volume_m3 <= high))

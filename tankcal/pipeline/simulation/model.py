@@ -111,7 +111,7 @@ class Model:
             found = _merged(found, even, self._of_bent(bent, goal), bent)
         places = np.sort(np.concatenate([even, bent]))
         u = np.linalg.norm(self.inputs.slopes, axis=1)
-        full = spread(found, places, self.quadratic.value, u, goal.digits)
+        full = spread_to_all(found, places, self.quadratic.value, u, goal.digits)
         endless = [not np.isfinite(one.sd) for one in self.inputs.distributions]
         without_u = np.any(self.inputs.slopes[:, endless] != 0, axis=1)
         return replace(full, u=np.where(without_u, np.inf, full.u))
@@ -189,7 +189,7 @@ def _merged(found, even, others, bent):
     return replace(found, **{name: np.concatenate([a, b])[order] for (name, a), b in both})
 
 
-def spread(found, places, value_m3, u_m3, digits):
+def spread_to_all(found, places, value_m3, u_m3, digits):
     """A Simulation of all volumes from one of some, at `places` among them.
 
     In between, everything is linear in parts of the u of the law of propagation: the volumes of

@@ -57,11 +57,11 @@ def deliveries(table, low_m, high_m):
     low, high = table.inside(low_m), table.inside(high_m)
     rows = Rows(table.height_m, table.volume_m3, table.factor_m3, Groups(table.sources))
     for_use = table.for_use(low) & table.for_use(high)
-    found = between(rows, table.probability, low, high, for_use)
+    found = deliveries_between(rows, table.probability, low, high, for_use)
     return replace(found, low_m=low_m, high_m=high_m)
 
 
-def between(rows, probability, low, high, for_use):
+def deliveries_between(rows, probability, low, high, for_use):
     """Deliveries between dips inside the table, some thousands of pairs at a time."""
     volume, u, w = np.empty((3, len(low)))
     for start in range(0, len(low), CHUNK):

@@ -13,7 +13,7 @@ import numpy as np
 
 from tankcal.tank.capacity import SAME_M
 from tankcal.tank.deliveries.blocks import Search, bounds_of, kids_of, levels_of
-from tankcal.tank.deliveries.pairs import CHUNK, Groups, Rows, between
+from tankcal.tank.deliveries.pairs import CHUNK, Groups, Rows, deliveries_between
 from tankcal.text.display import volume_text
 
 TOLERANCE = 1e-6  # relative: the worst delivery is found to this part of itself
@@ -141,7 +141,7 @@ def _search(prepared, minimum_m, is_relative):
 
 def _delivery(prepared, dips):
     pair = np.array(dips)[:, None]
-    found = between(prepared.rows, prepared.probability, *pair, np.array([True]))
+    found = deliveries_between(prepared.rows, prepared.probability, *pair, np.array([True]))
     values = (found.low_m, found.high_m, found.volume_m3, found.u_m3, found.dof, found.k)
     return Delivery(*(float(value[0]) for value in (*values, found.U_m3, found.relative)))
 
@@ -199,7 +199,7 @@ def _best_at_minimum(search):
     if not np.any(keep):
         return -1.0, None
     low, high = np.clip([low[keep], high[keep]], rows.height_m[0], rows.height_m[-1])
-    found = between(rows, search.probability, low, high, np.full(len(low), True))
+    found = deliveries_between(rows, search.probability, low, high, np.full(len(low), True))
     sizes = search.size(found.U_m3, found.volume_m3)
     place = int(np.argmax(sizes))
     return sizes[place], (low[place], high[place])

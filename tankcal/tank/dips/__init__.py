@@ -9,7 +9,7 @@ reading       ullage, and the dip of a volume
 
 from tankcal.tank.dips.parts import ProportionalParts, proportional_parts
 from tankcal.tank.dips.reading import Dips, dips_of, ullage_m
-from tankcal.tank.dips.rows import MOST_ROWS, rounded, table_heights, whole_top
+from tankcal.tank.dips.rows import MOST_ROWS, round_each, table_heights, top_mark
 from tankcal.tank.dips.straightness import (
     LADDERS_M,
     Rows,
@@ -45,10 +45,10 @@ __all__ = [
     "interpolation_errors",
     "parse_dip",
     "proportional_parts",
-    "rounded",
+    "round_each",
     "table_heights",
+    "top_mark",
     "ullage_m",
     "volume_from_m3",
     "volume_to_m3",
-    "whole_top",
 ]

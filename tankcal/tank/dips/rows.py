@@ -41,7 +41,7 @@ def table_heights(step_m, top_m, fine_step_m=None, fine_zones=()):
     return heights
 
 
-def whole_top(top_m, height_unit="m", *, closed=False):
+def top_mark(top_m, height_unit="m", *, closed=False):
     """Dip of the last row of a table, m: a mark of the tape that stands for the top of the tank.
 
     An open shell ends at the nearest whole millimetre, for 9.49996 m (9.5 m that lean) is 9.5 m
@@ -126,7 +126,7 @@ def _check_steps(step_m, top_m, fine_step_m, fine_zones):
         )
 
 
-def rounded(values, decimals):
+def round_each(values, decimals):
     """(rows,) each value rounded by itself, once, to the nearest decimal (a tie to the even one).
 
     Correct for the number as stored: 2.675, which is stored a little below, gives 2.67.

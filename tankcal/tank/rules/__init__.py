@@ -4,7 +4,7 @@ from tankcal.tank.rules.deviation import DeviationVerdict, StatedVolume, conform
 from tankcal.tank.rules.expanded import UncertaintyVerdict
 from tankcal.tank.rules.model import TANKS, DeviationLimit, Rule, UncertaintyLimit
 from tankcal.tank.rules.printed import Printed
-from tankcal.tank.rules.verdict import RuleVerdict, deliveries_judged, judge
+from tankcal.tank.rules.verdict import RuleVerdict, deliveries_to_check, judge
 
 __all__ = [
     "TANKS",
@@ -17,6 +17,6 @@ __all__ = [
     "UncertaintyLimit",
     "UncertaintyVerdict",
     "conformity_probability",
-    "deliveries_judged",
+    "deliveries_to_check",
     "judge",
 ]

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import ndtr, stdtr
 
 from tankcal.tank.rules.model import DeviationLimit
-from tankcal.tank.rules.printed import of_table
+from tankcal.tank.rules.printed import printed_of_table
 
 AT_TOP_M = 1e-3  # a dip within a millimetre of the last row is the top
 
@@ -102,7 +102,7 @@ def judge_deviation(limit, table, stated, printed=None):
         found = table.at(stated.high_m)
     else:
         found = table.delivery(stated.low_m, stated.high_m)
-    U = (printed or of_table(table)).of(table, stated.low_m, stated.high_m, found.U_m3)
+    U = (printed or printed_of_table(table)).of(table, stated.low_m, stated.high_m, found.U_m3)
     u = found.u_m3 * U / found.U_m3 if found.U_m3 else 0.0
     room = limit.limit * abs(stated.volume_m3) if limit.limit_m3 is None else limit.limit_m3
     lower = -math.inf if limit.side == "upper" else stated.volume_m3 - room

@@ -22,7 +22,7 @@ from tankcal.tank.deliveries import (
     worst_deliveries,
 )
 from tankcal.tank.rules.model import UncertaintyLimit
-from tankcal.tank.rules.printed import of_table
+from tankcal.tank.rules.printed import printed_of_table
 
 _ROUNDING = 1e-12  # relative: U equal to the limit keeps it
 _SAME_M = 1e-6  # heights of deliveries nearer than this are the same
@@ -79,7 +79,7 @@ def judge_uncertainty(limit, table, lowest_m=None, printed=None):
     judged = table.for_use(table.height_m)
     if not np.any(judged):
         return UncertaintyVerdict(limit, "nothing_to_judge", None)
-    printed = printed or of_table(table)
+    printed = printed or printed_of_table(table)
     capacity = float(table.volume_m3[judged][-1])
     if lowest_m is not None:
         judged &= table.height_m >= lowest_m

@@ -35,6 +35,6 @@ class Printed:
         return largest if len(rows) == 1 else max(U_m3, largest)
 
 
-def of_table(table):
+def printed_of_table(table):
     """`Printed` of a table by itself."""
     return Printed(table.U_m3)

@@ -7,7 +7,7 @@ import numpy as np
 from tankcal.tank.rules.deviation import DeviationVerdict, judge_deviation
 from tankcal.tank.rules.expanded import UncertaintyVerdict, deliveries_to_judge, judge_uncertainty
 from tankcal.tank.rules.model import TANKS, Rule
-from tankcal.tank.rules.printed import of_table
+from tankcal.tank.rules.printed import printed_of_table
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
     """
     if tank not in TANKS:
         raise ValueError(f"kind of tank {tank!r}: expected one of {', '.join(TANKS)}")
-    printed = printed or of_table(table)
+    printed = printed or printed_of_table(table)
     rows = np.flatnonzero(table.for_use(table.height_m))
     capacity = float(table.volume_m3[rows[-1]]) if len(rows) else np.nan
     is_too_large = rule.largest_capacity_m3 is not None and capacity > rule.largest_capacity_m3
@@ -72,7 +72,7 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
     )
 
 
-def deliveries_judged(rule, table, tank):
+def deliveries_to_check(rule, table, tank):
     """((low_m, high_m), ...) of the deliveries that a rule's limits are decided by, each once."""
     limits = [one for one in rule.uncertainty if one.of == "deliveries" and _is_for(one, tank)]
     pairs = [pair for limit in limits for pair in deliveries_to_judge(limit, table)]
