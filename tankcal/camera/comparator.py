@@ -33,9 +33,16 @@ SCALES = (0.8, 1.25)  # a comparator reads the photo itself, in millimetres
 class Repeats:
     """Repeated readings of n different things, in the order of their first readings.
 
-    group  (readings,) number of the thing      first  (n,) number of its first reading
-    count  (n,) readings                        mean   (n, 2) without weights
-    sd     (n, 2) standard deviation of one reading, from the sample; nan for a single reading
+    Attributes
+    ----------
+    group : ndarray of int, shape (readings,)
+        Number of the thing.
+    first, count : ndarray of int, shape (n,)
+        Number of its first reading, and how many there are.
+    mean : ndarray, shape (n, 2)
+        Mean without weights.
+    sd : ndarray, shape (n, 2)
+        Standard deviation of one reading, from the sample; nan for a single reading.
     """
 
     group: np.ndarray
@@ -51,7 +58,26 @@ class Repeats:
 
 
 def repeats(names, values):
-    """The Repeats of readings (m, 2) of things by name (m hashable names)."""
+    """Gather the repeated readings of things by their names.
+
+    Parameters
+    ----------
+    names : sequence of m hashables
+        What each reading is of.
+    values : array_like, shape (m, 2)
+        The readings.
+
+    Returns
+    -------
+    Repeats
+        In the unit of the readings.
+
+    Examples
+    --------
+    >>> found = repeats(["A", "B", "A"], [[0, 0], [5, 5], [0.002, 0]])
+    >>> found.count, found.mean[:, 0].tolist()
+    (array([2, 1]), [0.001, 5.0])
+    """
     numbers = {}
     group = np.array([numbers.setdefault(name, len(numbers)) for name in names], dtype=int)
     values = np.asarray(values, dtype=float).reshape(len(group), 2)
@@ -70,12 +96,22 @@ def repeats(names, values):
 class Transformation:
     """A plane transformation from readings to the photo system, with its covariance.
 
-    kind          one of KINDS
-    matrix        (2, 2) M               shift_mm  (2,) a3, a6
-    centre_mm     (2,) of the readings: `covariance` is that of M's elements and of the image of
-    covariance    this centre: (6, 6) of a1, a2, x', a4, a5, y'; of variance factor 1
-    residuals_mm  (n, 2) of the readings in the photo system: transformed minus calibrated
-    chi2, dof     of the residuals, in the declared standard deviations of the readings
+    Attributes
+    ----------
+    kind : str
+        One of KINDS.
+    matrix : ndarray, shape (2, 2)
+        M.
+    shift_mm : ndarray, shape (2,)
+        a3, a6, mm.
+    centre_mm : ndarray, shape (2,)
+        Centre of the readings, mm.
+    covariance : ndarray, shape (6, 6)
+        Of a1, a2, x', a4, a5, y': M's elements and the image of this centre; of variance factor 1.
+    residuals_mm : ndarray, shape (n, 2)
+        Of the readings in the photo system, transformed minus calibrated, mm.
+    chi2, dof : float, int
+        Of the residuals, in the declared standard deviations of the readings.
     """
 
     kind: str
@@ -142,14 +178,34 @@ _SIX = {  # a1, a2, x', a4, a5, y' by the parameters of each kind
 
 
 def transformation(readings_mm, marks_mm, sd_mm, kind="affine"):
-    """The Transformation that takes readings of marks to their calibrated coordinates.
+    """The transformation that takes readings of marks to their calibrated coordinates.
 
-    readings_mm  (n, 2); a mark may be there several times
-    marks_mm     (n, 2) calibrated, exact
-    sd_mm        (n, 2) or a number: of the readings
-    kind         one of KINDS
+    Parameters
+    ----------
+    readings_mm : array_like, shape (n, 2)
+        Readings, mm; a mark may be there several times.
+    marks_mm : array_like, shape (n, 2)
+        Calibrated coordinates, mm, exact.
+    sd_mm : float or array_like, shape (n, 2)
+        Standard deviations of the readings, mm.
+    kind : str, optional
+        One of KINDS.
 
-    Raises SolutionError when the marks are too few, or lie on one line (affine).
+    Returns
+    -------
+    Transformation
+
+    Raises
+    ------
+    SolutionError
+        When the marks are too few, or lie on one line (affine).
+
+    Examples
+    --------
+    >>> readings = [[1, 1], [11, 1], [1, 11], [11, 11]]
+    >>> found = transformation(readings, [[0, 0], [10, 0], [0, 10], [10, 10]], 0.005)
+    >>> found.of([[6.0, 6.0]]).round(9), found.dof
+    (array([[5., 5.]]), 2)
     """
     readings = np.asarray(readings_mm, dtype=float)
     marks = np.asarray(marks_mm, dtype=float)
@@ -213,11 +269,16 @@ def _linear(readings, marks, kind):
 class Suspicion:
     """What is wrong with the marks of a photo, as far as they tell.
 
-    what   "mirrored" (the whole plate), "exchanged" (two marks), "wrong" (one mark),
-           "misfit" (nobody knows which), "unit" (of another scale than 1), "sheared"
-    marks  tuple of tuples of numbers of marks, one for each way that would mend it; of "misfit" the
-           mark of the largest residual; else ()
-    size   largest residual over the extent of the marks; of "unit" and "sheared" the scale
+    Attributes
+    ----------
+    what : str
+        "mirrored" (the whole plate), "exchanged" (two marks), "wrong" (one mark), "misfit" (nobody
+        knows which), "unit" (of another scale than 1), "sheared".
+    marks : tuple of tuples of int
+        Numbers of marks, a tuple for each way that would mend it; of "misfit" the mark of the
+        largest residual; else ().
+    size : float
+        Largest residual over the extent of the marks; of "unit" and "sheared" the scale.
     """
 
     what: str
@@ -226,10 +287,28 @@ class Suspicion:
 
 
 def suspicion(readings_mm, marks_mm, kind="affine"):
-    """The Suspicion about the marks of a photo, each read once (n, 2), or None.
+    """What is wrong with the marks of a photo, each read once, if anything is.
 
     A fit that is worse than film can be, or a transformation that no comparator makes. Which mark
     it is, is found by trial: the plate turned over, two marks exchanged, one mark left out.
+
+    Parameters
+    ----------
+    readings_mm, marks_mm : array_like, shape (n, 2)
+        Readings and calibrated coordinates, mm.
+    kind : str, optional
+        One of KINDS.
+
+    Returns
+    -------
+    Suspicion or None
+
+    Examples
+    --------
+    >>> readings = [[0, 0], [10, 0], [0, 10], [10, 10], [5, 0]]
+    >>> found = suspicion(readings, [[10, 0], [0, 0], [0, 10], [10, 10], [5, 0]])
+    >>> found.what, found.marks
+    ('exchanged', ((0, 1),))
     """
     readings, marks = np.asarray(readings_mm, dtype=float), np.asarray(marks_mm, dtype=float)
     fit = _Fit.of(readings, marks, kind)

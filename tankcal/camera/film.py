@@ -18,17 +18,44 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Surface:
-    """Heights of a film or plate: places (n, 2) in the photo system and heights (n,), mm."""
+    """Measured heights of a film or plate.
+
+    Attributes
+    ----------
+    xy_mm : ndarray, shape (n, 2)
+        Places in the photo system, mm.
+    height_mm : ndarray, shape (n,)
+        Heights there, mm, positive towards the lens.
+    """
 
     xy_mm: np.ndarray
     height_mm: np.ndarray
 
 
 def heights_at(surface, xy_mm):
-    """Heights (m,) at places (m, 2), linear within triangles, and (m,) True for those outside.
+    """Heights of a film at places, linear within triangles.
 
-    Outside the hull of what was measured the height of the nearest place is taken. Places of
-    `xy_mm` that are nan stay nan, and are not outside. Needs three places, not on one line.
+    Outside the hull of what was measured the height of the nearest place is taken.
+
+    Parameters
+    ----------
+    surface : Surface
+        At least three places, not on one line.
+    xy_mm : array_like, shape (m, 2)
+        Places in the photo system, mm; nan stays nan.
+
+    Returns
+    -------
+    height_mm : ndarray, shape (m,)
+        Heights, mm.
+    outside : ndarray of bool, shape (m,)
+        True outside the hull of what was measured; places that are nan are not outside.
+
+    Examples
+    --------
+    >>> surface = Surface(np.array([[0, 0], [10, 0], [0, 10]]), np.array([0, 0.1, 0]))
+    >>> heights_at(surface, [[5, 0], [20, 0]])
+    (array([0.05, 0.1 ]), array([False,  True]))
     """
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import cKDTree
@@ -46,9 +73,28 @@ def heights_at(surface, xy_mm):
 
 
 def flattened(xy_mm, height_mm, interior):
-    """Image points (n, 2) on the plane, of points read on a film (n,) mm above it.
+    """Move image points read on a film that is not flat to the plane of the photo system.
 
-    interior  c, x0, y0 (mm), numbers or (n,) each
+    x' = x + (x - x0) h / (c - h), y alike.
+
+    Parameters
+    ----------
+    xy_mm : array_like, shape (n, 2)
+        Image points as read, mm.
+    height_mm : ndarray, shape (n,)
+        Height of the film at each point, mm.
+    interior : sequence of three
+        c, x0, y0, mm, numbers or (n,) each.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Image points on the plane, mm.
+
+    Examples
+    --------
+    >>> flattened([[50.0, 0.0]], np.array([0.1]), (100.0, 0.0, 0.0))
+    array([[50.05005005,  0.        ]])
     """
     c, x0, y0 = (np.asarray(one, dtype=float) for one in interior)
     factor = height_mm / (c - height_mm)

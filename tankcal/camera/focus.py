@@ -29,8 +29,16 @@ _ODD, _EVEN = np.array([3, 5, 7]), np.array([2, 4, 6])
 class Lens:
     """A lens whose radial distortion is known at two focus distances.
 
-    focal_length_mm  f                        focus_mm  s, from the lens; np.inf: infinity
-    distances_mm     (2,) S1, S2              radial    (2, 3) K1, K2, K3 at each of them
+    Attributes
+    ----------
+    focal_length_mm : float
+        f, mm.
+    focus_mm : float
+        s, distance of the focus from the lens, mm; np.inf: infinity.
+    distances_mm : ndarray, shape (2,)
+        S1, S2, mm.
+    radial : ndarray, shape (2, 3)
+        K1, K2, K3 at each of them.
     """
 
     focal_length_mm: float
@@ -54,9 +62,33 @@ class Lens:
 
 
 def radial_at(distance_mm, distances_mm, radial, focal_length_mm):
-    """(..., 3) K1, K2, K3 at focus distances (...) from those (2, 3) at two others (2,).
+    """Radial coefficients at focus distances from those at two others.
 
-    Distances may be infinite. Raises ValueError when the two are the same.
+    Parameters
+    ----------
+    distance_mm : array_like, shape (...)
+        Focus distances asked for, mm; they may be infinite.
+    distances_mm : array_like, shape (2,)
+        S1, S2, mm; they may be infinite.
+    radial : array_like, shape (2, 3)
+        K1 (mm^-2), K2 (mm^-4), K3 (mm^-6) at each of them.
+    focal_length_mm : float
+        f, mm.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        K1, K2, K3.
+
+    Raises
+    ------
+    ValueError
+        When the two distances are the same.
+
+    Examples
+    --------
+    >>> radial_at(2000.0, [1000.0, np.inf], [[-1e-4, 0, 0], [-2e-4, 0, 0]], 50.0)[0].round(8)
+    np.float64(-0.00014773)
     """
     f, s = focal_length_mm, np.asarray(distance_mm, dtype=float)
     near, far = np.sort(np.asarray(distances_mm, dtype=float))
@@ -70,21 +102,55 @@ def radial_at(distance_mm, distances_mm, radial, focal_length_mm):
 
 
 def depth_factor(depth_mm, focus_mm, focal_length_mm):
-    """gamma (...) of objects in depths (...): image in focus over image in that depth (S 56)."""
+    """gamma of objects in depths: image in focus over image in that depth (S 56).
+
+    gamma = (1 - f/s) / (1 - f/s')
+
+    Parameters
+    ----------
+    depth_mm : array_like, shape (...)
+        s', along the axis, mm.
+    focus_mm, focal_length_mm : float
+        s and f, mm.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        gamma.
+
+    Examples
+    --------
+    >>> round(float(depth_factor(4000.0, 2000.0, 50.0)), 6)
+    0.987342
+    """
     f = focal_length_mm
     return (1 - f / focus_mm) / (1 - f / np.asarray(depth_mm, dtype=float))
 
 
 def as_in_focus(xy_mm, depth_mm, interior, form, lens):
-    """Image points (n, 2) as they would be if every object lay at the distance of the focus.
-
-    xy_mm     (n, 2) as measured           depth_mm  (n,) along the axis; nan: left as it is
-    interior  (13,) or (n, 13), for objects in focus
-    form      camera.Form without a balance; lens  Lens
+    """Image points as they would be if every object lay at the distance of the focus.
 
     The coefficients in the depth of each point are those of `interior` plus what the two
     calibrations say of the difference; the image is freed of this distortion and given that of the
     focus, whatever the convention.
+
+    Parameters
+    ----------
+    xy_mm : array_like, shape (n, 2)
+        Image points as measured, mm.
+    depth_mm : array_like, shape (n,)
+        Depths along the axis, mm; nan: left as it is.
+    interior : array_like, shape (13,) or (n, 13)
+        Interior parameters for objects in focus.
+    form : tankcal.camera.model.Form
+        How the distortion is written, without a balance.
+    lens : Lens
+        The two calibrations.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Image points, mm.
     """
     at_focus = np.broadcast_to(np.asarray(interior, dtype=float), (len(xy_mm), len(PARAMETERS)))
     known = np.isfinite(depth_mm)

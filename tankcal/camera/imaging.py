@@ -15,18 +15,41 @@ NEWTON_STEPS = 6  # quadratic: a distortion of 30 % of the radius is solved to t
 
 
 def led(x, y, q, form):
-    """The measured point (x, y), from the principal point, after the affinity before distortion."""
+    """The measured point, from the principal point, after the affinity before the distortion.
+
+    Parameters
+    ----------
+    x, y : float or ndarray, shape (n,)
+        The point, mm.
+    q : sequence of 13
+        Interior parameters in the order of PARAMETERS, numbers or (n,).
+    form : sequence of 8
+        See Form.numbers.
+
+    Returns
+    -------
+    x, y : float or ndarray, shape (n,)
+        (1 + A) x + B y and y, mm; x and y where the form has no such affinity.
+    """
     return (1.0 + form[6] * q[11]) * x + form[6] * q[12] * y, y
 
 
 def distort(x, y, q, form):
-    """Distortion of points (x, y) from the principal point, and its derivatives by x and y.
+    """Distortion of points from the principal point, and its derivatives by x and y.
 
-    x, y  numbers or (n,) mm
-    q     13 interior parameters in the order of PARAMETERS, numbers or (n,)
-    form  8 numbers, see Form.numbers
+    Parameters
+    ----------
+    x, y : float or ndarray, shape (n,)
+        The point, mm.
+    q : sequence of 13
+        Interior parameters in the order of PARAMETERS, numbers or (n,).
+    form : sequence of 8
+        See Form.numbers.
 
-    Returns dx, dy, d dx/dx, d dx/dy, d dy/dx, d dy/dy.
+    Returns
+    -------
+    tuple of six
+        dx, dy (mm), d dx/dx, d dx/dy, d dy/dx, d dy/dy.
     """
     k1, k2, k3, k4, p1, p2, p3, p4, a, b = q[3:13]
     _, ax, ay, bxy, byx, by, _, e = form
@@ -64,7 +87,20 @@ def distortion_derivatives(x, y, q, form):
 
 
 def undistorted_by(x, y, q, form):
-    """The point whose correction gives the ideal point (x, y), by Newton's method (mm)."""
+    """The point whose correction gives an ideal point, by Newton's method.
+
+    Parameters
+    ----------
+    x, y : float or ndarray, shape (n,)
+        The ideal point, mm.
+    q, form
+        As for `distort`.
+
+    Returns
+    -------
+    x, y : float or ndarray, shape (n,)
+        The measured point, from the principal point, mm.
+    """
     side = form[0]
     px, py = x, y
     for _ in range(NEWTON_STEPS):
@@ -80,12 +116,21 @@ def undistorted_by(x, y, q, form):
 def image_point(x, y, q, form, of_ideal):
     """The measured coordinate of an ideal point, and its derivatives.
 
-    x, y      numbers or (n,) mm, ideal, from the principal point
-    of_ideal  True for "distortion_of_ideal"
+    Parameters
+    ----------
+    x, y : float or ndarray, shape (n,)
+        The ideal point, from the principal point, mm.
+    q, form
+        As for `distort`.
+    of_ideal : bool
+        True for "distortion_of_ideal".
 
-    Returns the measured x and y (frame of the image), the point at which the distortion holds, the
-    derivatives d x/d xi, d x/d eta, d y/d xi, d y/d eta, and those by the distortion there, d x/d
-    dx, d x/d dy, d y/d dx, d y/d dy.
+    Returns
+    -------
+    tuple of twelve
+        The measured x and y (frame of the image), the point (two) at which the distortion holds,
+        the derivatives d x/d xi, d x/d eta, d y/d xi, d y/d eta, and those by the distortion
+        there, d x/d dx, d x/d dy, d y/d dx, d y/d dy.
     """
     if of_ideal:
         dx, dy, dxx, dxy, dyx, dyy = distort(x, y, q, form)
@@ -315,16 +360,35 @@ def _arrays(
 def image_rows(*arguments, in_ideal=False):
     """Whitened misclosures of image coordinates, computed minus measured, and their derivatives.
 
-    xyz        (points, 3) m            photo_xyz  (photos, 3) m
-    rotation   (photos, 3, 3)           interior   (photos, 13) mm
-    form       tuple of 8, see Form     of_ideal   True for "distortion_of_ideal"
-    point      (n,)                     photo      (n,)
-    xy         (n, 2) measured, mm
-    weight     (n, 2) 1/sd, 1/mm        active     (k,) places of the parameters asked for
-    w          (n, 2) filled            jac        (n, 2, 9 + k) filled, or of length 0: left out
-    in_ideal   misclosures of the ideal image (one_ideal_point) instead of the measured one
-
-    The derivatives are by point (3), photo (position 3, rotation 3), interior parameters (k).
+    Parameters
+    ----------
+    xyz : ndarray, shape (points, 3)
+        Ground points, m.
+    photo_xyz : ndarray, shape (photos, 3)
+        Projection centres, m.
+    rotation : ndarray, shape (photos, 3, 3)
+        Rotation matrices.
+    interior : ndarray, shape (photos, 13)
+        Interior parameters, mm.
+    form : tuple of 8
+        See Form.numbers.
+    of_ideal : bool
+        True for "distortion_of_ideal".
+    point, photo : ndarray of int, shape (n,)
+        Point and photo of each image point.
+    xy : ndarray, shape (n, 2)
+        Measured image points, mm.
+    weight : ndarray, shape (n, 2)
+        1/sd, 1/mm.
+    active : ndarray of int, shape (k,)
+        Places of the interior parameters asked for.
+    w : ndarray, shape (n, 2)
+        Filled with the misclosures.
+    jac : ndarray, shape (n, 2, 9 + k)
+        Filled with the derivatives by point (3), photo (position 3, rotation 3) and interior
+        parameters (k); of length 0: left out.
+    in_ideal : bool, optional
+        Misclosures of the ideal image (`one_ideal_point`) instead of the measured one.
     """
     if is_worth_compiling(len(arguments[6])):
         compile_functions(sys.modules[__name__], _COMPILED)._loop(*arguments, in_ideal)

@@ -53,10 +53,16 @@ AFFINITIES = {
 class Form:
     """How the distortion of a camera is written.
 
-    convention         one of CONVENTIONS
-    affinity           one of AFFINITIES
-    radial_balance_mm  R0, the radius without radial distortion; 0 where none is named
-    weights            one of WEIGHTS: the image in which residuals are counted and weighed
+    Attributes
+    ----------
+    convention : str
+        One of CONVENTIONS.
+    affinity : str
+        One of AFFINITIES.
+    radial_balance_mm : float
+        R0, the radius without radial distortion, mm; 0 where none is named.
+    weights : str
+        One of WEIGHTS: the image in which residuals are counted and weighed.
     """
 
     convention: str = "distortion_of_ideal"
@@ -72,11 +78,28 @@ class Form:
 
 
 def corrected(xy_mm, interior, form):
-    """Ideal image points (n, 2), from the principal point, of measured ones.
+    """Ideal image points, from the principal point, of measured ones.
 
-    xy_mm     (n, 2) as measured
-    interior  (13,) or (n, 13) in the order of PARAMETERS
-    form      a Form
+    Parameters
+    ----------
+    xy_mm : ndarray, shape (n, 2)
+        Image points as measured, mm.
+    interior : array_like, shape (13,) or (n, 13)
+        Interior parameters in the order of PARAMETERS.
+    form : Form
+        How the distortion is written.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Ideal image points, mm.
+
+    Examples
+    --------
+    >>> interior = np.zeros(13)
+    >>> interior[[0, 3]] = 50.0, -1e-4
+    >>> corrected(np.array([[10.0, 0.0]]), interior, Form("correction_added"))
+    array([[9.9, 0. ]])
     """
     numbers = form.numbers
     q = tuple(np.asarray(interior, dtype=float).T)
@@ -89,18 +112,63 @@ def corrected(xy_mm, interior, form):
 
 
 def measured(ideal_mm, interior, form):
-    """Measured image points (n, 2) of ideal ones, counted from the principal point (mm)."""
+    """Measured image points of ideal ones: the inverse of `corrected`.
+
+    Parameters
+    ----------
+    ideal_mm : ndarray, shape (n, 2)
+        Ideal image points, counted from the principal point, mm.
+    interior : array_like, shape (13,) or (n, 13)
+        Interior parameters in the order of PARAMETERS.
+    form : Form
+        How the distortion is written.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Measured image points, mm.
+
+    Examples
+    --------
+    >>> interior = np.zeros(13)
+    >>> interior[[0, 3]] = 50.0, -1e-4
+    >>> measured(np.array([[9.9, 0.0]]), interior, Form("correction_added"))
+    array([[10.,  0.]])
+    """
     q = tuple(np.asarray(interior, dtype=float).T)
     of_ideal = form.convention == "distortion_of_ideal"
     return np.column_stack(image_point(*ideal_mm.T, q, form.numbers, of_ideal)[:2])
 
 
 def balanced_about(interior, form, radius_mm):
-    """The same camera with its radial distortion balanced about another radius R0: (13,) and Form.
+    """The same camera with its radial distortion balanced about another radius R0.
 
     What R0 takes out of the radial terms, s = 1 - (K1 R0^2 + ...), is a change of scale, which c
     takes: exact, whatever the convention (in the one that subtracts K counts with the other sign).
-    radius_mm 0 gives the plain form.
+
+    Parameters
+    ----------
+    interior : array_like, shape (13,)
+        Interior parameters in the order of PARAMETERS.
+    form : Form
+        How the distortion is written.
+    radius_mm : float
+        The new R0, mm; 0 gives the plain form.
+
+    Returns
+    -------
+    interior : ndarray, shape (13,)
+        The parameters about the new radius.
+    form : Form
+        The form with this radius.
+
+    Examples
+    --------
+    >>> interior = np.zeros(13)
+    >>> interior[[0, 3]] = 50.0, -1e-4
+    >>> found, form = balanced_about(interior, Form("correction_added"), 10.0)
+    >>> round(float(found[0]), 6), form.radial_balance_mm
+    (50.505051, 10.0)
     """
     side = CONVENTIONS[form.convention]
     plain = rescaled(
@@ -124,10 +192,24 @@ def _at_balance(interior, radius_mm):
 
 
 def rescaled(interior, form, s):
-    """Interior parameters (13,) of the same camera when a scale s goes over to c.
+    """Interior parameters of the same camera when a scale s goes over to c.
 
     distortion_of_ideal: s xi is the ideal point of the same image in place of xi; else the equation
     of the correction is divided by s. An affinity before the distortion stays what it is.
+
+    Parameters
+    ----------
+    interior : array_like, shape (13,)
+        Interior parameters in the order of PARAMETERS.
+    form : Form
+        How the distortion is written.
+    s : float
+        The scale.
+
+    Returns
+    -------
+    ndarray, shape (13,)
+        The parameters after it.
     """
     q = np.array(interior, dtype=float)
     if CONVENTIONS[form.convention]:
