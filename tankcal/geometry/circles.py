@@ -14,10 +14,18 @@ from tankcal.messages import message
 class Circle:
     """Least-squares circle through n points of a section.
 
-    x_m, y_m, radius_m   centre and radius
-    cofactor_m2          (3, 3) covariance of x, y, radius for variance factor 1
-    residuals_m          (n,) distance of each point to the circle, outwards positive
-    variance_factor      v' Q^-1 v / (n - 3)
+    Attributes
+    ----------
+    x_m, y_m, radius_m : float
+        Centre and radius, m.
+    cofactor_m2 : ndarray, shape (3, 3)
+        Covariance of x, y, radius for variance factor 1, m2.
+    residuals_m : ndarray, shape (n,)
+        Distance of each point to the circle, outwards positive, m.
+    variance_factor : float
+        v' Q^-1 v / (n - 3).
+    dof : int
+        n - 3.
     """
 
     x_m: float
@@ -32,12 +40,31 @@ class Circle:
 def fit_circle(xy_m, covariance_m2):
     """Geometric circle: the sum of squared, weighted point corrections is the minimum.
 
-    Condition for each point: hypot(x - xc, y - yc) - R = 0 (Silva 1995, program CIRCUM, linearised
-    at the adjusted points). For n even points of standard deviation s: s_centre = s sqrt(2/n),
-    s_radius = s / sqrt(n).
+    Condition for each point, linearised at the adjusted points: hypot(x - xc, y - yc) - R = 0.
+    For n even points of standard deviation s: s_centre = s sqrt(2/n), s_radius = s / sqrt(n).
+    Source: Silva 1995, program CIRCUM.
 
-    xy_m (n, 2); covariance_m2 (2n, 2n) dense or sparse, in the order x1 y1 x2 y2 ...
-    Raises SolutionError for fewer than 3 points or points on a line.
+    Parameters
+    ----------
+    xy_m : array_like, shape (n, 2)
+        Points, m.
+    covariance_m2 : ndarray or sparse array, shape (2n, 2n)
+        Their covariance, m2, in the order x1 y1 x2 y2 ...
+
+    Returns
+    -------
+    Circle
+
+    Raises
+    ------
+    SolutionError
+        For fewer than 3 points or points on a line.
+
+    Examples
+    --------
+    >>> circle = fit_circle([[1, 0], [0, 1], [-1, 0], [0, -1]], np.eye(8) * 1e-6)
+    >>> circle.radius_m, circle.cofactor_m2.diagonal()
+    (1.0, array([5.0e-07, 5.0e-07, 2.5e-07]))
     """
     xy_m = np.asarray(xy_m, dtype=float)
     n = len(xy_m)
@@ -78,7 +105,25 @@ def circle_conditions(unknowns, coordinates):
 def taubin_circle(local):
     """Centre and radius of Taubin's algebraic circle (1991), the start of the geometric fit.
 
-    local (n, 2) about a place near the centre. Raises SolutionError for points on a line.
+    Parameters
+    ----------
+    local : ndarray, shape (n, 2)
+        Points about a place near the centre, m.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        x, y, radius, m.
+
+    Raises
+    ------
+    SolutionError
+        For points on a line.
+
+    Examples
+    --------
+    >>> taubin_circle(np.array([[1, 0], [0, 1], [-1, 0]])).round(9) + 0.0
+    array([0., 0., 1.])
     """
     z = np.sum(local**2, axis=1)
     mean = z.mean()
@@ -97,9 +142,27 @@ def taubin_circle(local):
 
 
 def radial_covariance(xy_m, centre_m, covariance_m2):
-    """Covariance of the distances of points (n, 2) from a centre, by that of their coordinates.
+    """Covariance of the distances of points from a centre, by that of their coordinates.
 
-    (n, n), or (n,) variances when the points are independent of each other (sparse covariance).
+    Parameters
+    ----------
+    xy_m : array_like, shape (n, 2)
+        Points, m.
+    centre_m : array_like, shape (2,)
+        Centre, m.
+    covariance_m2 : ndarray or sparse array, shape (2n, 2n)
+        Covariance of the coordinates, m2, in the order x1 y1 x2 y2 ...
+
+    Returns
+    -------
+    ndarray, shape (n, n) or (n,)
+        m2; variances (n,) when the points are independent of each other (sparse covariance).
+
+    Examples
+    --------
+    >>> radial_covariance([[1, 0], [0, 2]], (0, 0), np.diag([1.0, 2.0, 3.0, 4.0]))
+    array([[1., 0.],
+           [0., 4.]])
     """
     d = np.asarray(xy_m) - centre_m
     unit = d / np.hypot(d[:, 0], d[:, 1])[:, None]

@@ -23,14 +23,25 @@ FIRST_STEPS = 12  # along each of them
 class FittedCylinder:
     """Least-squares cylinder, of any direction, through n points.
 
-    point_m          (3,) point of the axis that is nearest to the mean of the points
-    direction        (3,) unit vector along the axis, upwards (eastwards when level)
-    tangents         (2, 3) unit vectors square to the axis and to each other
-    radius_m         inside or outside, as the points are
-    cofactor         (5, 5) covariance of the point along both tangents (m), of the direction
-                     towards both (rad) and of the radius (m), for variance factor 1
-    residuals_m      (n,) distance of each point to the cylinder, outwards positive
-    variance_factor  v' Q^-1 v / dof, nan without redundancy
+    Attributes
+    ----------
+    point_m : ndarray, shape (3,)
+        Point of the axis that is nearest to the mean of the points, m.
+    direction : ndarray, shape (3,)
+        Unit vector along the axis, upwards (eastwards when level).
+    tangents : ndarray, shape (2, 3)
+        Unit vectors square to the axis and to each other.
+    radius_m : float
+        Inside or outside, as the points are, m.
+    cofactor : ndarray, shape (5, 5)
+        Covariance of the point along both tangents (m), of the direction towards both (rad) and
+        of the radius (m), for variance factor 1.
+    residuals_m : ndarray, shape (n,)
+        Distance of each point to the cylinder, outwards positive, m.
+    variance_factor : float
+        v' Q^-1 v / dof, nan without redundancy.
+    dof : int
+        Redundancy.
     """
 
     point_m: np.ndarray
@@ -47,11 +58,18 @@ class FittedCylinder:
 class LyingCylinder:
     """Diameter and tilt of a lying tank from points of its cylinder.
 
-    diameter_m    inside or outside, as the points are
-    tilt          tan of the angle by which the axis rises towards azimuth_rad
-    azimuth_rad   of the axis from A to B, clockwise from +y, 0 to 2 pi
-    cofactor      (2, 2) covariance of diameter (m) and tilt, for variance factor 1
-    cylinder      the fit they come from
+    Attributes
+    ----------
+    diameter_m : float
+        Inside or outside, as the points are, m.
+    tilt : float
+        tan of the angle by which the axis rises towards azimuth_rad.
+    azimuth_rad : float
+        Of the axis from A to B, clockwise from +y, 0 to 2 pi.
+    cofactor : ndarray, shape (2, 2)
+        Covariance of diameter (m) and tilt, for variance factor 1.
+    cylinder : FittedCylinder
+        The fit they come from.
     """
 
     diameter_m: float
@@ -68,10 +86,22 @@ def fit_cylinder(xyz_m, covariance_m2):
     the half sphere (Eberly 2019), the best of them by unweighted distances; parts of the
     circumference suffice.
 
-    xyz_m (n, 3); covariance_m2 (3n, 3n) dense or sparse, or (3n,) variances, x1 y1 z1 x2 ...
-    Raises SolutionError for fewer than 5 points, points in a plane (not thicker than twice their
-    scatter), and points that do not determine the direction (its sd, by their scatter, above
-    0.1 rad).
+    Parameters
+    ----------
+    xyz_m : array_like, shape (n, 3)
+        Points, m.
+    covariance_m2 : ndarray or sparse array, shape (3n, 3n) or (3n,)
+        Their covariance, or variances, m2, in the order x1 y1 z1 x2 ...
+
+    Returns
+    -------
+    FittedCylinder
+
+    Raises
+    ------
+    SolutionError
+        For fewer than 5 points, points in a plane (not thicker than twice their scatter), and
+        points that do not determine the direction (its sd, by their scatter, above 0.1 rad).
     """
     mean, local = centred(xyz_m, 5, "a cylinder")
     spread = spread_of(local, 3, "plane")
@@ -123,10 +153,32 @@ def cylinder_distances(frame):
 def lying_cylinder(xyz_m, covariance_m2, azimuth_rad):
     """Diameter and tilt of a lying tank, with their covariance, from points of its cylinder.
 
-    xyz_m, covariance_m2 as in `fit_cylinder`; azimuth_rad of the axis from A to B, clockwise from
-    +y: it tells the ends apart and may be wrong by 45 deg.
-    Raises SolutionError when the fit does, when the axis is steeper than 45 deg, or when it runs
-    elsewhere.
+    Parameters
+    ----------
+    xyz_m, covariance_m2
+        As for `fit_cylinder`.
+    azimuth_rad : float
+        Of the axis from A to B, clockwise from +y: it tells the ends apart and may be wrong by
+        45 deg.
+
+    Returns
+    -------
+    LyingCylinder
+
+    Raises
+    ------
+    SolutionError
+        When the fit does, when the axis is steeper than 45 deg, or when it runs elsewhere.
+
+    Examples
+    --------
+    >>> angle = np.arange(8) * np.pi / 4
+    >>> along = np.repeat(np.arange(4.0), 8)
+    >>> across, up = np.tile(np.cos(angle), 4), np.tile(np.sin(angle), 4) + 0.01 * along
+    >>> points = np.column_stack([along, across, up])
+    >>> tank = lying_cylinder(points, np.full(96, 1e-6), np.pi / 2)
+    >>> round(tank.diameter_m, 5), round(tank.tilt, 5)
+    (1.99995, 0.01)
     """
     cylinder = fit_cylinder(xyz_m, covariance_m2)
     east, north, up = cylinder.direction

@@ -18,12 +18,17 @@ FORM_MODES = 100  # of the form that may lie between points; the others hold 2.5
 class Form:
     """Amplitudes of the form: variance amplitude k^-3 of the cos and the sin of each mode k >= 2.
 
-    common_m2   of what runs up the whole shell
-    own_m2      of what each course has of its own
-    rising_m2   of what grows from the middle of a course, -1 at its bottom to +1 at its top
-    common_dof, own_dof   degrees of freedom of the first two
-    common_contrasts, own_contrasts  residuals that they were estimated from, noise and all: more
-                          than the degrees of freedom where much of what they show is noise
+    Attributes
+    ----------
+    common_m2, own_m2 : float
+        Of what runs up the whole shell, and of what each course has of its own, m2.
+    rising_m2 : float
+        Of what grows from the middle of a course, -1 at its bottom to +1 at its top, m2.
+    common_dof, own_dof : float
+        Degrees of freedom of the first two.
+    common_contrasts, own_contrasts : float
+        Residuals that they were estimated from, noise and all: more than the degrees of freedom
+        where much of what they show is noise.
     """
 
     common_m2: float = 0.0
@@ -44,11 +49,18 @@ class Form:
 class Sample:
     """Measured radii of one section, or of one course whose points are not level.
 
-    azimuth_rad, radius_m  (n,) about the centre of its circle
-    covariance_m2          (n, n) or (n,) of the radii
-    course                 index
-    zeta                   (n,) height within the course, -1 at its bottom to +1 at its top
-    degree                 of the polynomial in height that is fitted to them (0: level)
+    Attributes
+    ----------
+    azimuth_rad, radius_m : ndarray, shape (n,)
+        About the centre of its circle, rad and m.
+    covariance_m2 : ndarray, shape (n, n) or (n,)
+        Covariance, or variances, of the radii, m2.
+    course : int
+        Index of the course.
+    zeta : ndarray, shape (n,)
+        Height within the course, -1 at its bottom to +1 at its top.
+    degree : int
+        Of the polynomial in height that is fitted to them (0: level).
     """
 
     azimuth_rad: np.ndarray
@@ -60,7 +72,26 @@ class Sample:
 
 
 def harmonics(azimuth_rad, highest, derivative=0):
-    """(n, 2 highest + 1) columns 1, cos a, sin a, cos 2a, sin 2a, ... or their first derivative."""
+    """Columns 1, cos a, sin a, cos 2a, sin 2a, ... or their first derivative.
+
+    Parameters
+    ----------
+    azimuth_rad : array_like, shape (n,)
+        a, rad.
+    highest : int
+        The last multiple of a.
+    derivative : int, optional
+        0 or 1.
+
+    Returns
+    -------
+    ndarray, shape (n, 2 highest + 1)
+
+    Examples
+    --------
+    >>> harmonics([0.0], 2)
+    array([[1., 1., 0., 1., 0.]])
+    """
     angles = np.outer(azimuth_rad, np.arange(1, highest + 1))
     columns = np.empty((len(angles), 2 * highest + 1))
     if derivative == 0:
@@ -74,7 +105,13 @@ def harmonics(azimuth_rad, highest, derivative=0):
 
 
 def mode_variances(highest):
-    """Prior variance of the cos and sin amplitudes of modes 2..highest over the amplitude: k^-3."""
+    """Prior variance of the cos and sin amplitudes of modes 2..highest over the amplitude: k^-3.
+
+    Examples
+    --------
+    >>> mode_variances(3).round(4)
+    array([0.125, 0.125, 0.037, 0.037])
+    """
     return np.repeat(np.arange(2.0, highest + 1) ** -3, 2)
 
 
@@ -84,10 +121,26 @@ def unit_form(azimuth_rad, highest=FORM_MODES):
 
 
 def free_columns(azimuth_rad, zeta, degree):
-    """(n, 3, 6 or 7) columns of what no prior binds: radius and centre, taper and lean, barrel.
+    """Columns of what no prior binds: radius and centre, taper and lean, barrel.
 
     1, cos a, sin a; from degree 1 on the same times zeta; at degree 2 the Legendre polynomial
     (3 zeta^2 - 1) / 2 of the radius alone.
+
+    Parameters
+    ----------
+    azimuth_rad, zeta : ndarray, shape (n,)
+        a, rad, and height within the course, -1 to 1.
+    degree : int
+        0, 1 or 2.
+
+    Returns
+    -------
+    ndarray, shape (n, 3), (n, 6) or (n, 7)
+
+    Examples
+    --------
+    >>> free_columns(np.array([0.0]), np.array([1.0]), 2)
+    array([[1., 1., 0., 1., 1., 0., 1.]])
     """
     level = harmonics(azimuth_rad, 1)
     columns = [level, level * zeta[:, None], (1.5 * zeta**2 - 0.5)[:, None]]

@@ -33,14 +33,26 @@ WIDEST_GAP, NARROWEST_GAP = 1.5, 0.3  # of the median one, where an outline is i
 class Outline:
     """The irregular section: r(azimuth) = basis(azimuth) @ parameters about (x_m, y_m).
 
-    kind              "interpolated" (periodic cubic through the points) or "smoothed" (harmonics)
-    parameters        (p,) radii at the knots, or coefficients of the harmonics, m
-    from_radii        (p, n) derivative of the parameters by the n measured radii
-    azimuth_rad       (n,) azimuths of the measured radii
-    zeta              (n,) their heights within the course, -1 at its bottom to +1 at its top
-    level_zeta        height of the outline within the course
-    form              `Form` of the shell
-    knots_rad         (k,) ascending azimuths where the polynomial pieces meet
+    Attributes
+    ----------
+    x_m, y_m : float
+        Centre, m.
+    kind : str
+        "interpolated" (periodic cubic through the points) or "smoothed" (harmonics).
+    parameters : ndarray, shape (p,)
+        Radii at the knots, or coefficients of the harmonics, m.
+    from_radii : ndarray, shape (p, n)
+        Derivative of the parameters by the n measured radii.
+    azimuth_rad : ndarray, shape (n,)
+        Azimuths of the measured radii, rad.
+    zeta : ndarray, shape (n,)
+        Their heights within the course, -1 at its bottom to +1 at its top.
+    level_zeta : float
+        Height of the outline within the course.
+    form : Form
+        Form of the shell.
+    knots_rad : ndarray, shape (k,)
+        Ascending azimuths where the polynomial pieces meet, rad.
     """
 
     x_m: float
@@ -107,7 +119,25 @@ class Outline:
 
 
 def polar(xy_m, x_m, y_m):
-    """Azimuths (0 to 2 pi) and distances of points about a centre."""
+    """Azimuths and distances of points about a centre.
+
+    Parameters
+    ----------
+    xy_m : array_like, shape (n, 2)
+        Points, m.
+    x_m, y_m : float
+        Centre, m.
+
+    Returns
+    -------
+    azimuth_rad, radius_m : ndarray, shape (n,)
+        0 to 2 pi, clockwise from +y, and m.
+
+    Examples
+    --------
+    >>> polar(np.array([[1.0, 0.0], [0.0, 2.0]]), 0.0, 0.0)
+    (array([1.57079633, 0.        ]), array([1., 2.]))
+    """
     d = np.asarray(xy_m) - (x_m, y_m)
     return np.arctan2(d[:, 0], d[:, 1]) % FULL_TURN, np.hypot(d[:, 0], d[:, 1])
 
@@ -130,9 +160,34 @@ def evenly_spread(azimuth_rad):
 def interpolate_outline(xy_m, x_m, y_m, form, zeta=0.0):
     """Periodic cubic r(azimuth) through every point, about the centre (x_m, y_m).
 
-    The spline has continuous curvature and no end. form: `Form` of the shell; zeta: height of the
-    section within its course. Raises SolutionError below 5 points or when two points share an
-    azimuth.
+    The spline has continuous curvature and no end.
+
+    Parameters
+    ----------
+    xy_m : array_like, shape (n, 2)
+        Points, m.
+    x_m, y_m : float
+        Centre, m.
+    form : Form
+        Form of the shell.
+    zeta : float, optional
+        Height of the section within its course, -1 to 1.
+
+    Returns
+    -------
+    Outline
+
+    Raises
+    ------
+    SolutionError
+        Below 5 points or when two points share an azimuth.
+
+    Examples
+    --------
+    >>> angle = np.arange(8) * np.pi / 4
+    >>> xy_m = 2 * np.column_stack([np.sin(angle), np.cos(angle)])
+    >>> interpolate_outline(xy_m, 0.0, 0.0, Form()).parameters.round(9)
+    array([2., 2., 2., 2., 2., 2., 2., 2.])
     """
     azimuth, radius = polar(xy_m, x_m, y_m)
     order = np.argsort(azimuth)
@@ -175,10 +230,31 @@ def smooth_outlines(xy_m, x_m, y_m, noise_m2, form, zeta, levels_zeta, degree):
     centre of r0, from degree 1 on those of r1 (taper and lean, so that a frustum and a leaning
     cylinder are exact), and at degree 2 the barrel c. At degree 0 nothing changes with height.
 
-    noise_m2          covariance of the measured radii, (n, n) or (n,)
-    zeta (n,)         heights of the points within the course, -1 to 1; levels_zeta of the outlines
-    Returns a tuple of `Outline`. Raises SolutionError when the points do not determine what is
-    free.
+    Parameters
+    ----------
+    xy_m : array_like, shape (n, 2)
+        Points, m.
+    x_m, y_m : float
+        Centre, m.
+    noise_m2 : ndarray, shape (n, n) or (n,)
+        Covariance of the measured radii, m2.
+    form : Form
+        Form of the shell.
+    zeta : ndarray, shape (n,)
+        Heights of the points within the course, -1 to 1.
+    levels_zeta : sequence of float
+        Heights of the outlines.
+    degree : int
+        0, 1 or 2.
+
+    Returns
+    -------
+    tuple of Outline
+
+    Raises
+    ------
+    SolutionError
+        When the points do not determine what is free.
     """
     azimuth, radius = polar(xy_m, x_m, y_m)
     free = free_columns(azimuth, zeta, degree)

@@ -54,10 +54,20 @@ class FittedEllipse:
 class FittedSphere:
     """Least-squares sphere through n points.
 
-    centre_m (3,), radius_m
-    cofactor_m2      (4, 4) covariance of centre and radius for variance factor 1
-    residuals_m      (n,) distance of each point to the sphere, outwards positive
-    variance_factor  v' Q^-1 v / dof, nan without redundancy
+    Attributes
+    ----------
+    centre_m : ndarray, shape (3,)
+        Centre, m.
+    radius_m : float
+        Radius, m.
+    cofactor_m2 : ndarray, shape (4, 4)
+        Covariance of centre and radius for variance factor 1, m2.
+    residuals_m : ndarray, shape (n,)
+        Distance of each point to the sphere, outwards positive, m.
+    variance_factor : float
+        v' Q^-1 v / dof, nan without redundancy.
+    dof : int
+        Redundancy.
     """
 
     centre_m: np.ndarray
@@ -117,8 +127,27 @@ def ellipse_distances(unknowns, points):
 def fit_sphere(xyz_m, covariance_m2):
     """Geometric sphere: distance from the centre, minus R, is 0 for each adjusted point.
 
-    xyz_m (n, 3); covariance_m2 (3n, 3n) dense or sparse, or (3n,) variances, x1 y1 z1 x2 ...
-    Raises SolutionError for fewer than 4 points and points in a plane.
+    Parameters
+    ----------
+    xyz_m : array_like, shape (n, 3)
+        Points, m.
+    covariance_m2 : ndarray or sparse array, shape (3n, 3n) or (3n,)
+        Their covariance, or variances, m2, in the order x1 y1 z1 x2 ...
+
+    Returns
+    -------
+    FittedSphere
+
+    Raises
+    ------
+    SolutionError
+        For fewer than 4 points and points in a plane.
+
+    Examples
+    --------
+    >>> points = [[2, 0, 0], [-2, 0, 0], [0, 2, 0], [0, -2, 0], [0, 0, 2]]
+    >>> round(fit_sphere(points, np.full(15, 1e-6)).radius_m, 9)
+    2.0
     """
     mean, local = centred(xyz_m, 4, "a sphere")
     spread = spread_of(local, 3, "plane")

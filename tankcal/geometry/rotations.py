@@ -11,7 +11,22 @@ import numpy as np
 
 
 def from_angles(omega_rad, phi_rad, kappa_rad):
-    """Rotation matrices (..., 3, 3) R3(kappa) R2(phi) R1(omega) of angles (...,)."""
+    """Rotation matrices R3(kappa) R2(phi) R1(omega) of angles.
+
+    Parameters
+    ----------
+    omega_rad, phi_rad, kappa_rad : array_like, shape (...)
+        Angles, rad.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+
+    Examples
+    --------
+    >>> angles_of(from_angles(0.1, 0.2, 0.3)).round(9)
+    array([0.1, 0.2, 0.3])
+    """
     so, sp, sk = np.sin(omega_rad), np.sin(phi_rad), np.sin(kappa_rad)
     co, cp, ck = np.cos(omega_rad), np.cos(phi_rad), np.cos(kappa_rad)
     rows = [
@@ -23,9 +38,19 @@ def from_angles(omega_rad, phi_rad, kappa_rad):
 
 
 def angles_of(rotation):
-    """omega, phi, kappa (..., 3) in rad of rotation matrices (..., 3, 3).
+    """omega, phi, kappa of rotation matrices.
 
     phi lies in [-pi/2, pi/2]. At phi = +-pi/2 only kappa +- omega is defined: omega is then 0.
+
+    Parameters
+    ----------
+    rotation : ndarray, shape (..., 3, 3)
+        Rotation matrices.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Angles, rad.
     """
     r = np.asarray(rotation, dtype=float)
     cos_phi = np.hypot(r[..., 0, 0], r[..., 1, 0])
@@ -41,8 +66,20 @@ def angles_of(rotation):
 def looking(azimuth_rad, tilt_rad, roll_rad):
     """Rotation matrices of cameras that look along an azimuth, tilted up, rolled about the axis.
 
-    azimuth_rad, tilt_rad, roll_rad  (...,) of the viewing direction, clockwise from +y; above the
-        horizon; of the image's x axis, anticlockwise as the photographer sees it from behind
+    Parameters
+    ----------
+    azimuth_rad, tilt_rad, roll_rad : array_like, shape (...)
+        Of the viewing direction, clockwise from +y; above the horizon; of the image's x axis,
+        anticlockwise as the photographer sees it from behind; rad.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+
+    Examples
+    --------
+    >>> pointing(looking(1.0, 0.2, 0.1)).round(9)
+    array([1. , 0.2, 0.1])
     """
     sa, sv, sk = np.sin(azimuth_rad), np.sin(tilt_rad), np.sin(roll_rad)
     ca, cv, ck = np.cos(azimuth_rad), np.cos(tilt_rad), np.cos(roll_rad)
@@ -55,7 +92,18 @@ def looking(azimuth_rad, tilt_rad, roll_rad):
 
 
 def pointing(rotation):
-    """azimuth, tilt, roll (..., 3) in rad of cameras (..., 3, 3): the inverse of `looking`."""
+    """azimuth, tilt, roll of cameras: the inverse of `looking`.
+
+    Parameters
+    ----------
+    rotation : ndarray, shape (..., 3, 3)
+        Rotation matrices.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Angles, rad.
+    """
     right, ahead = rotation[..., 0, :], -rotation[..., 2, :]
     azimuth = np.arctan2(ahead[..., 0], ahead[..., 1])
     tilt = np.arcsin(np.clip(ahead[..., 2], -1.0, 1.0))

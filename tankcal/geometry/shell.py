@@ -26,16 +26,30 @@ VAGUE_TILT = 2e-3  # sd above which the tilt counts as not determined by the poi
 class Shell:
     """Axis, form and accepted points of a shell; n points in the order given.
 
-    axis_m        (x, y) of the axis at height z_m
-    slope         (dx/dz, dy/dz) of the axis; slope_cofactor (2, 2) its covariance
-    reason        (n,) "" for points of the wall, else why the point was rejected
-    residual_m    (n,) distance outwards to the smooth form of the shell; of points far from the
-                  wall to the leaning cylinder of their course
-    w             (n,) normalised residual of the snooping test, nan where none was made
-    noise_m       standard deviation of a point about the smooth form common to all courses;
-                  of a point of median standard deviation where those are given
-    noise_dof     its degrees of freedom
-    tilt_known    False: the points do not determine a tilt, and the shell is taken as upright
+    Attributes
+    ----------
+    axis_m : tuple of float
+        (x, y) of the axis at height z_m, m.
+    z_m : float
+        This height, m.
+    slope : tuple of float
+        (dx/dz, dy/dz) of the axis.
+    slope_cofactor : ndarray, shape (2, 2)
+        Covariance of the slope.
+    reason : ndarray of str, shape (n,)
+        "" for points of the wall, else why the point was rejected.
+    residual_m : ndarray, shape (n,)
+        Distance outwards to the smooth form of the shell; of points far from the wall to the
+        leaning cylinder of their course, m.
+    w : ndarray, shape (n,)
+        Normalised residual of the snooping test, nan where none was made.
+    noise_m : float
+        Standard deviation of a point about the smooth form common to all courses; of a point of
+        median standard deviation where those are given, m.
+    noise_dof : float
+        Its degrees of freedom.
+    tilt_known : bool
+        False: the points do not determine a tilt, and the shell is taken as upright.
     """
 
     axis_m: tuple[float, float]
@@ -67,17 +81,52 @@ class Shell:
 
 
 def course_of(z_m, joints_m):
-    """Index of the course of each height; the ends belong to the first and the last course."""
+    """Index of the course of each height; the ends belong to the first and the last course.
+
+    Parameters
+    ----------
+    z_m : array_like, shape (n,)
+        Heights, m.
+    joints_m : array_like, shape (courses + 1,)
+        Heights of the course joints in the same frame, m.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+
+    Examples
+    --------
+    >>> course_of([0.0, 1.0, 2.0, 4.0], [0, 2, 4])
+    array([0, 0, 1, 1])
+    """
     return np.searchsorted(np.asarray(joints_m)[1:-1], z_m, side="right")
 
 
 def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
     """Tell the wall from the clutter and find the axis of the shell.
 
-    xyz_m (n, 3); joints_m (courses + 1,) heights of the course joints in the same frame; sd_m (n,)
-    standard deviations of the radii, which are believed in relation to each other.
-    Raises SolutionError when no cylinder near the nominal radius holds half of the points between
-    the bottom and the top.
+    Parameters
+    ----------
+    xyz_m : array_like, shape (n, 3)
+        Points, m.
+    joints_m : array_like, shape (courses + 1,)
+        Heights of the course joints in the same frame, m.
+    nominal_radius_m : float
+        Radius near which the wall is looked for, m.
+    sd_m : array_like, shape (n,), optional
+        Standard deviations of the radii, m, which are believed in relation to each other.
+    snooping : bool, optional
+        Whether points are tested by data snooping.
+
+    Returns
+    -------
+    Shell
+
+    Raises
+    ------
+    SolutionError
+        When no cylinder near the nominal radius holds half of the points between the bottom and
+        the top.
     """
     xyz_m = np.asarray(xyz_m, dtype=float)
     reason = _reasons(xyz_m, joints_m)

@@ -21,15 +21,24 @@ LOG_STEP = 0.3  # of the differences that give the curvature of the likelihood
 
 
 def estimate_form(samples, noise=1.0):
-    """`Form` of a shell by restricted maximum likelihood (Patterson & Thompson 1971).
-
-    samples  `Sample` of every section; noise  factor of their covariances
+    """Amplitudes of a shell's form by restricted maximum likelihood (Patterson & Thompson 1971).
 
     The likelihood is that of radii with free radius and centre (and taper, lean, barrel where a
     sample's degree has them) and random modes k >= 2 of variance amplitude k^-3. With one course
     its own form cannot be told from the common one and is zero; without points at two heights of a
     course so is the rising form. The noise is never estimated here: in one section it cannot be
     told from the form.
+
+    Parameters
+    ----------
+    samples : sequence of Sample
+        One for every section.
+    noise : float, optional
+        Factor of their covariances.
+
+    Returns
+    -------
+    Form
     """
     names = sorted({sample.course for sample in samples})
     courses = [[sample for sample in samples if sample.course == name] for name in names]
