@@ -16,14 +16,27 @@ DECENTRING = slice(PARAMETERS.index("P1"), PARAMETERS.index("P4") + 1)
 
 
 def radial_curve(radius_mm, interior, form, covariance=None):
-    """Radial distortion (n,) mm at measured radii, and its standard deviation (n,) mm.
-
-    radius_mm   (n,) in the image as measured
-    interior    (13,) in the order of camera.PARAMETERS
-    form        a camera.Form
-    covariance  (4, 4) of K1, K2, K3, K4; None: no standard deviations, None is given for them
+    """Radial distortion at measured radii, and its standard deviation.
 
     Linear propagation; the derivatives are those of the image equations.
+
+    Parameters
+    ----------
+    radius_mm : ndarray, shape (n,)
+        Radii in the image as measured, mm.
+    interior : array_like, shape (13,)
+        Interior parameters in the order of tankcal.camera.model.PARAMETERS.
+    form : tankcal.camera.model.Form
+        How the distortion is written.
+    covariance : ndarray, shape (4, 4), optional
+        Of K1, K2, K3, K4.
+
+    Returns
+    -------
+    curve_mm : ndarray, shape (n,)
+        Radial distortion, mm.
+    sd_mm : ndarray, shape (n,), or None
+        Its standard deviation, mm; None without a covariance.
     """
     radius = np.asarray(radius_mm, dtype=float)
     radial = np.zeros(len(PARAMETERS))
@@ -42,7 +55,28 @@ def radial_curve(radius_mm, interior, form, covariance=None):
 
 
 def decentring_profile(radius_mm, interior):
-    """Decentring profile (n,) mm, without sign: a third of the largest shift along the radius."""
+    """Decentring profile, without sign: a third of the largest shift along the radius.
+
+    Parameters
+    ----------
+    radius_mm : ndarray, shape (n,)
+        Radii, mm.
+    interior : ndarray, shape (13,)
+        Interior parameters in the order of tankcal.camera.model.PARAMETERS.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The profile, mm.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> interior = np.zeros(13)
+    >>> interior[7] = 1e-5  # P1
+    >>> decentring_profile(np.array([10.0]), interior)
+    array([0.001])
+    """
     r2 = np.asarray(radius_mm, dtype=float) ** 2
     p1, p2, p3, p4 = np.asarray(interior, dtype=float)[DECENTRING]
     return np.hypot(p1, p2) * r2 * np.abs(1.0 + p3 * r2 + p4 * r2**2)

@@ -45,9 +45,14 @@ class Shift:
 class Frame:
     """The frame of an image.
 
-    half_mm   (2,) half width and height, from its middle
-    reach_mm  distance of the farthest image point from the middle; inf where it is not known
-    pixel_mm  (2,) sides of a pixel, or None
+    Attributes
+    ----------
+    half_mm : ndarray, shape (2,)
+        Half width and height, from its middle, mm.
+    reach_mm : float
+        Distance of the farthest image point from the middle, mm; inf where it is not known.
+    pixel_mm : ndarray, shape (2,), or None
+        Sides of a pixel, mm.
     """
 
     half_mm: np.ndarray
@@ -61,9 +66,23 @@ class Frame:
 
 
 def own_shift(name, interior, form, frame):
-    """The Shift that the value of a parameter makes by itself; None for c, which is scale.
+    """The shift that the value of a parameter makes by itself.
 
-    interior  (13,) values      form  camera.Form      frame  Frame
+    Parameters
+    ----------
+    name : str
+        Name of the parameter.
+    interior : array_like, shape (13,)
+        Values of the interior parameters.
+    form : tankcal.camera.model.Form
+        How the distortion is written.
+    frame : Frame
+        Frame of the image.
+
+    Returns
+    -------
+    Shift or None
+        None for c, which is scale.
     """
     if name == "c":
         return None

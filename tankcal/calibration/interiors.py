@@ -48,9 +48,18 @@ class Interior:
 
 
 def interiors_of(adjustment, measurements=None):
-    """A tuple of Interior of a survey.Adjustment, covariances scaled like its own.
+    """Interior orientations of an adjustment, covariances scaled like its own.
 
-    measurements  job.Measurements that it was made from: formats of the images
+    Parameters
+    ----------
+    adjustment : survey.Adjustment
+        The adjusted survey.
+    measurements : job.Measurements, optional
+        What it was made from: formats of the images.
+
+    Returns
+    -------
+    tuple of Interior
     """
     adjusted = adjustment.adjusted
     survey = adjusted.survey
@@ -162,13 +171,27 @@ def chosen(interiors, photos, camera=None, photo=None):
 
 
 def framed_in(record, pixel_mm=None):
-    """[(name, FramedCamera)] of a record and the covariance (13, 13) of each, nan on its diagonal
-    for what was not adjusted.
+    """Cameras of a record and their covariances.
 
-    pixel_mm  side of a pixel, for cameras of which the record knows none (film); None: they stay
-              without pixels
+    Parameters
+    ----------
+    record : dict
+        A record as read.
+    pixel_mm : float, optional
+        Side of a pixel, mm, for cameras of which the record knows none (film); None: they stay
+        without pixels.
 
-    Raises InputError for cameras without a format.
+    Returns
+    -------
+    cameras
+        [(name, FramedCamera)].
+    covariances
+        (13, 13) of each, nan on its diagonal for what was not adjusted.
+
+    Raises
+    ------
+    InputError
+        For cameras without a format.
     """
     cameras, covariances, problems = [], [], []
     for one in interiors_in(record):

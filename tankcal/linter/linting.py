@@ -129,12 +129,25 @@ class Report:
 def lint(
     path: str | PathLike, nominal: Nominal = NOTHING_NOMINAL, sheet: str | None = None
 ) -> Report:
-    """`Report` on the capacity table in a file.
+    """Examine the capacity table in a file.
 
-    path     a CSV file, an Excel workbook (.xlsx), or a record.json of tankcal
-    nominal  `Nominal` tank to compare total and last row with
-    sheet    name of the sheet; None: the one with the longest table
-    Raises InputError for a file that cannot be read or holds no table.
+    Parameters
+    ----------
+    path : path
+        A CSV file, an Excel workbook (.xlsx), or a record.json of tankcal.
+    nominal : Nominal, optional
+        Nominal tank to compare total and last row with.
+    sheet : str, optional
+        Name of the sheet; None: the one with the longest table.
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read or holds no table.
     """
     path, log = Path(path), Log()
     grids = read_grids(path, log)

@@ -80,10 +80,21 @@ class Path:
 
 
 def what_helps(plan, changes=None, progress=None, before=None):
-    """An Effect of each Change of a Plan, the one that helps most first.
+    """Effect of each change of a plan, the one that helps most first.
 
-    changes  tuple of Change; None: all of one item        progress  progress(text, done, total)
-    before   Prediction of the plan, where it is known
+    Parameters
+    ----------
+    plan : Plan
+    changes : tuple of Change, optional
+        None: all of one item.
+    progress : callable, optional
+        progress(text, done, total).
+    before : Prediction, optional
+        Of the plan, where it is known.
+
+    Returns
+    -------
+    tuple of Effect
     """
     changes = changes_of(plan) if changes is None else changes
     before = predict(plan) if before is None else before
@@ -120,10 +131,26 @@ def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, progres
 
 
 def smallest(plan, progress=None, items=ITEMS):
-    """The Path to the smallest design that meets the limit of a Plan.
+    """Path to the smallest design that meets the limit of a plan.
 
-    Items are added until the limit is met, then dropped as long as it is. Raises ValueError for a
-    plan without limits.relative_u.
+    Items are added until the limit is met, then dropped as long as it is.
+
+    Parameters
+    ----------
+    plan : Plan
+    progress : callable, optional
+        progress(text, done, total).
+    items : sequence, optional
+        What may be added and dropped.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    ValueError
+        For a plan without limits.relative_u.
     """
     if plan.limits.relative_u is None:
         raise ValueError("a search needs limits.relative_u in the plan")

@@ -23,7 +23,18 @@ class Place:
 
 
 def place_of(plan, xyz_m):
-    """The Place of coordinates (3,) in the frame of the survey."""
+    """Place of coordinates on the tank.
+
+    Parameters
+    ----------
+    plan : Plan
+    xyz_m : array_like, shape (3,)
+        In the frame of the survey, m.
+
+    Returns
+    -------
+    Place
+    """
     shell = plan.shell
     east, north = xyz_m[:2] - shell.axis_m
     azimuth = full_turn(np.arctan2(east, north))
@@ -49,5 +60,15 @@ def wall_radius_m(plan, height_m):
 
 
 def joints_m(plan):
-    """(courses + 1,) heights of the joints of the courses above the bottom."""
+    """Heights of the joints of the courses above the bottom.
+
+    Parameters
+    ----------
+    plan : Plan
+
+    Returns
+    -------
+    ndarray, shape (courses + 1,)
+        m.
+    """
     return joints_of(plan.job.courses)

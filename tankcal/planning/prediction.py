@@ -23,9 +23,18 @@ from tankcal.survey.network.quality import precision
 
 @dataclass(frozen=True)
 class PointOutlook:
-    """One point: rays that see it, sds (3,) m; why it is not determined, or weak; "" where sound.
+    """What is foreseen of one point.
 
-    sd_m is nan where the point is not determined.
+    Attributes
+    ----------
+    name : str
+        The point.
+    rays : int
+        Rays that see it.
+    sd_m : ndarray, shape (3,)
+        Standard deviations, m; nan where the point is not determined.
+    undetermined, weak : str
+        Why it is not determined, or weak; "" where sound.
     """
 
     name: str
@@ -37,7 +46,21 @@ class PointOutlook:
 
 @dataclass(frozen=True)
 class SectionOutlook:
-    """One section: its height above the bottom, its targets, sds of centre (2,) and radius, m."""
+    """What is foreseen of one section.
+
+    Attributes
+    ----------
+    name : str
+        The section.
+    height_m : float
+        Its height above the bottom, m.
+    targets : int
+        Its targets.
+    centre_sd_m : ndarray, shape (2,)
+        Standard deviations of its centre, m.
+    radius_sd_m : float
+        Standard deviation of its radius, m.
+    """
 
     name: str
     height_m: float
@@ -116,10 +139,22 @@ class Prediction:
 
 
 def predict(plan):
-    """The Prediction of a Plan.
+    """Predict the points, sections and table of a plan.
 
-    Raises InputError for a camera or set-up that sees nothing, and where a course keeps too few
-    targets; SolutionError when the survey would not determine its datum, its scale, the vertical.
+    Parameters
+    ----------
+    plan : Plan
+
+    Returns
+    -------
+    Prediction
+
+    Raises
+    ------
+    InputError
+        For a camera or set-up that sees nothing, and where a course keeps too few targets.
+    SolutionError
+        When the survey would not determine its datum, its scale, the vertical.
     """
     seen = visible(plan)
     refuse_blind(plan, seen)

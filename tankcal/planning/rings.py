@@ -16,7 +16,23 @@ STEEP = np.radians(89.9)  # steeper than this no camera of a ring looks
 
 
 def full_turn(angle_rad):
-    """Angles from 0 to 2 pi; what is a full turn but for rounding is 0."""
+    """Angles from 0 to 2 pi; what is a full turn but for rounding is 0.
+
+    Parameters
+    ----------
+    angle_rad : array_like
+        Angles, rad.
+
+    Returns
+    -------
+    ndarray
+        Angles, rad.
+
+    Examples
+    --------
+    >>> full_turn(np.array([-1.0, 2 * np.pi])).round(6)
+    array([5.283185, 0.      ])
+    """
     turned = np.asarray(angle_rad) % (2 * np.pi)
     return np.where(2 * np.pi - turned < ROUNDING_RAD, 0.0, turned)
 

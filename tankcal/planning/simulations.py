@@ -61,12 +61,26 @@ class Simulated:
 
 
 def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=None):
-    """The Simulated of a Prediction.
+    """Simulate the surveys of a prediction.
 
-    blunders  share of readings that are off by BLUNDER_SDS of their standard deviations
-    progress  progress(text, done, total)
+    Parameters
+    ----------
+    prediction : Prediction
+    runs, seed : int, optional
+        Number of surveys, and seed of their errors.
+    blunders : float, optional
+        Share of readings that are off by BLUNDER_SDS of their standard deviations.
+    progress : callable, optional
+        progress(text, done, total).
 
-    Raises SolutionError when fewer than two of the surveys have a solution.
+    Returns
+    -------
+    Simulated
+
+    Raises
+    ------
+    SolutionError
+        When fewer than two of the surveys have a solution.
     """
     rng, failed = np.random.default_rng(seed), []
     found, volumes, aside = [], [], []

@@ -109,20 +109,41 @@ def influence(
     volume=True,
     file=FILE,
 ):
-    """The Influence of calibrations on the block of a job, and on its tank if it has one.
+    """Influence of calibrations on the block of a job, and on its tank if it has one.
 
-    job           a loaded Job
-    calibrations  tuple of job.CameraSetup, as tankcal.job.calibrations.read_cameras gives them
-    states        which of "fixed", "weighted", "free"
-    camera        name of the job's camera that is replaced; None: its only one
-    progress      progress(text, done, total) is called before each run and at the end
-    alpha         of the tests at check points
-    volume        False for a job that was loaded for its adjustment only: it may have courses, but
-                  no bottom, deadwood or uncertainties, so its volume would be another one
-    file          what messages call the place where the calibrations stand
+    A run that fails is a result with its message.
 
-    A run that fails is a result with its message. Raises InputError for a job without photographs,
-    a camera that is not named, calibrations of another format or pixel; ValueError for states.
+    Parameters
+    ----------
+    job : tankcal.job.Job
+        A loaded job.
+    calibrations : tuple of job.CameraSetup
+        As tankcal.job.calibrations.read_cameras gives them.
+    states : sequence of str, optional
+        Which of "fixed", "weighted", "free".
+    camera : str, optional
+        Name of the job's camera that is replaced; None: its only one.
+    progress : callable, optional
+        progress(text, done, total) is called before each run and at the end.
+    alpha : float, optional
+        Level of the tests at check points.
+    volume : bool, optional
+        False for a job that was loaded for its adjustment only: it may have courses, but no
+        bottom, deadwood or uncertainties, so its volume would be another one.
+    file : str, optional
+        What messages call the place where the calibrations stand.
+
+    Returns
+    -------
+    Influence
+
+    Raises
+    ------
+    InputError
+        For a job without photographs, a camera that is not named, calibrations of another format
+        or pixel.
+    ValueError
+        For other states.
     """
     states = tuple(dict.fromkeys(states))
     if not states or set(states) - set(STATES):

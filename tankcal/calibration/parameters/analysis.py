@@ -32,12 +32,26 @@ from tankcal.pipeline.chain import adjust_job
 
 
 def analyse_record(record, choices=None, *, camera=None, photo=None):
-    """A tuple of CameraParameters of a record (dict as read), one for each set; without dropping.
+    """Analyse the interior parameters of a record, one result for each set; without dropping.
 
-    camera, photo  names, to have the sets of these only
+    Parameters
+    ----------
+    record : dict
+        A record as read.
+    choices : Choices, optional
+        What the user decides.
+    camera, photo : str, optional
+        Names, to have the sets of these only.
 
-    Raises InputError where it is no record of an adjustment with cameras, holds no parameter that
-    was adjusted, or no such camera or photo.
+    Returns
+    -------
+    tuple of CameraParameters
+
+    Raises
+    ------
+    InputError
+        Where it is no record of an adjustment with cameras, holds no parameter that was adjusted,
+        or no such camera or photo.
     """
     interiors = interiors_in(record)
     if camera is not None or photo is not None:
@@ -79,15 +93,34 @@ def _statistics_in(record):
 def analyse_job(
     job, choices=None, *, camera=None, photo=None, adjustment=None, dropping=True, progress=None
 ):
-    """A tuple of CameraParameters of a job, one for each set of interior parameters.
+    """Analyse the interior parameters of a job, one result for each set.
 
-    camera, photo  names, to have the sets of these only
-    adjustment  survey.Adjustment of job.measurements, where it is at hand
-    dropping    whether the survey is adjusted again without each candidate
-    progress    progress(text, done, total) is called as the work goes on
+    Parameters
+    ----------
+    job : tankcal.job.Job
+        A loaded job.
+    choices : Choices, optional
+        What the user decides.
+    camera, photo : str, optional
+        Names, to have the sets of these only.
+    adjustment : survey.Adjustment, optional
+        Of job.measurements, where it is at hand.
+    dropping : bool, optional
+        Whether the survey is adjusted again without each candidate.
+    progress : callable, optional
+        progress(text, done, total) is called as the work goes on.
 
-    Raises InputError for a job without photographs, without adjusted parameters or without such a
-    camera or photo, SolutionError when the survey cannot be adjusted.
+    Returns
+    -------
+    tuple of CameraParameters
+
+    Raises
+    ------
+    InputError
+        For a job without photographs, without adjusted parameters or without such a camera or
+        photo.
+    SolutionError
+        When the survey cannot be adjusted.
     """
     progress = progress or (lambda text, done, total: None)
     if job.measurements is None or not job.measurements.photos:

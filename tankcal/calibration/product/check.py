@@ -174,15 +174,37 @@ class ProductCheck:
 def check_product(
     difference_m, axes=AXES, *, names=None, limits=None, alpha=ALPHA, expected_sd_m=None
 ):
-    """The ProductCheck of differences (n, k), product minus truth, m; nan where not known.
+    """Check a product by its differences from the truth.
 
-    axes           k of "x", "y", "z": x and y are the plan, z is the height
-    names          (n,) of the points; None: their numbers from 1 on
-    limits         LimitTable, or None: no classes
-    alpha          significance level of the tests
-    expected_sd_m  (k,) sds that the precision of each axis is tested against, or None
+    Parameters
+    ----------
+    difference_m : array_like, shape (n, k)
+        Product minus truth, m; nan where not known.
+    axes : sequence of k str, optional
+        Of "x", "y", "z": x and y are the plan, z is the height.
+    names : sequence of n str, optional
+        Of the points; None: their numbers from 1 on.
+    limits : LimitTable, optional
+        None: no classes.
+    alpha : float, optional
+        Significance level of the tests.
+    expected_sd_m : array_like, shape (k,), optional
+        Standard deviations that the precision of each axis is tested against, m.
 
-    Raises ValueError for other axes, shapes, levels, or infinite differences.
+    Returns
+    -------
+    ProductCheck
+
+    Raises
+    ------
+    ValueError
+        For other axes, shapes, levels, or infinite differences.
+
+    Examples
+    --------
+    >>> (height,) = check_product([[0.01], [0.02], [0.03]], ["z"]).checks
+    >>> round(height.t, 3), round(height.t_limit, 3), height.biased
+    (3.464, 4.303, False)
     """
     d = np.asarray(difference_m, dtype=float).reshape(-1, len(axes))
     names = tuple(str(i + 1) for i in range(len(d))) if names is None else tuple(names)

@@ -42,9 +42,21 @@ class Differences:
 
 
 def differences_of(adjustment):
-    """The Differences at the check points of a survey.Adjustment or of a record (dict).
+    """Differences at the check points of an adjustment or of a record.
 
-    A record may be whole or its part "adjustment". Raises InputError when there are none.
+    Parameters
+    ----------
+    adjustment : survey.Adjustment or dict
+        A record may be whole or its part "adjustment".
+
+    Returns
+    -------
+    Differences
+
+    Raises
+    ------
+    InputError
+        When there are none.
     """
     if isinstance(adjustment, Mapping):
         part = adjustment.get("adjustment") or adjustment
@@ -75,11 +87,23 @@ def differences_of(adjustment):
 
 
 def read_differences(path, separator=",", decimal="."):
-    """The Differences of a CSV file, with the columns of FORMS; axes may be left out or blank.
+    """Read the differences of a CSV file, with the columns of FORMS; axes may be left out or blank.
 
-    separator, decimal  marks of the file, such as ";" and ","
+    Parameters
+    ----------
+    path : path
+        The file.
+    separator, decimal : str, optional
+        Marks of the file, such as ";" and ",".
 
-    Raises InputError with every problem of the file.
+    Returns
+    -------
+    Differences
+
+    Raises
+    ------
+    InputError
+        With every problem of the file.
     """
     path, log = Path(path), Log()
     data = read_bytes(path, log)

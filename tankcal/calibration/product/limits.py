@@ -91,9 +91,28 @@ class LimitTable:
 
 
 def of_scale(table, scale):
-    """The LimitTable with the limits of one scale only (its denominator, a number).
+    """The limits of one scale only.
 
-    Raises InputError when the table has no such scale.
+    Parameters
+    ----------
+    table : LimitTable
+        All limits.
+    scale : number
+        Denominator of the scale.
+
+    Returns
+    -------
+    LimitTable
+
+    Raises
+    ------
+    InputError
+        When the table has no such scale.
+
+    Examples
+    --------
+    >>> of_scale(shipped_limits(), 2000).limits[0]
+    Limit(part='plan', scale='2000', grade='A', tolerance_m=0.56, sd_m=0.34)
     """
     name = f"{scale:g}"
     chosen = tuple(one for one in table.limits if one.scale == name)
@@ -114,13 +133,43 @@ def of_scale(table, scale):
 
 
 def shipped_limits(name=SHIPPED):
-    """A LimitTable that ships with tankcal: "pec_pcd", the Brazilian standard of digital maps."""
+    """A table of limits that ships: "pec_pcd", the Brazilian standard of digital maps.
+
+    Parameters
+    ----------
+    name : str, optional
+        Name of the table.
+
+    Returns
+    -------
+    LimitTable
+
+    Examples
+    --------
+    >>> shipped_limits().name
+    'PEC-PCD'
+    """
     folder = shipped("calibration/product/limit_tables")
     return replace(read_limits(folder / f"{name}.toml"), code=name)
 
 
 def read_limits(path):
-    """The LimitTable of a TOML file; InputError with every problem of it."""
+    """Read the table of limits of a TOML file.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+
+    Returns
+    -------
+    LimitTable
+
+    Raises
+    ------
+    InputError
+        With every problem of the file.
+    """
     path, log = Path(path), Log()
     data = read_bytes(path, log, MAX_BYTES)
     settings = None

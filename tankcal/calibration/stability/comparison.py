@@ -121,18 +121,39 @@ def compare(
     covariances=None,
     file="cameras.toml",
 ):
-    """All pairs of calibrations by one of METHODS (see above).
+    """Compare all pairs of calibrations by one of METHODS (see above).
 
-    setups        two or more CameraSetup with pixels, of one frame
-    grid          Grid; None: Pessoa's in the proportions of the frame
-    threshold_px  similar below it
-    terrain       Terrain for spr; None: TERRAINS["I"]      seed  of its heights
-    as_published  Pessoa's conventions
-    covariances   {name: (13, 13)} of PARAMETERS where more is known than standard deviations
-    file          what messages call the place where the calibrations stand
+    Parameters
+    ----------
+    setups : sequence of CameraSetup
+        Two or more with pixels, of one frame.
+    method : str
+        One of METHODS.
+    grid : Grid, optional
+        None: Pessoa's in the proportions of the frame.
+    threshold_px : float, optional
+        Similar below it, px.
+    terrain : Terrain, optional
+        For spr; None: TERRAINS["I"].
+    as_published : bool, optional
+        Pessoa's conventions.
+    seed : int, optional
+        Of the terrain's heights.
+    covariances : dict, optional
+        {name: (13, 13)} of PARAMETERS where more is known than standard deviations.
+    file : str, optional
+        What messages call the place where the calibrations stand.
 
-    Raises InputError for calibrations that cannot be compared, SolutionError for a pair whose
-    adjustment has no solution.
+    Returns
+    -------
+    Stability
+
+    Raises
+    ------
+    InputError
+        For calibrations that cannot be compared.
+    SolutionError
+        For a pair whose adjustment has no solution.
     """
     setups = tuple(setups)
     check_options(method, METHODS, threshold_px, seed)

@@ -100,7 +100,18 @@ def default_grid(format_px):
 
 
 def parse(text):
-    """The Grid of a text such as 46x35,50,50,100; raises InputError for any other text."""
+    """The grid of a text such as 46x35,50,50,100.
+
+    Raises
+    ------
+    InputError
+        For any other text.
+
+    Examples
+    --------
+    >>> print(parse("46x35,50,50,100"))
+    46x35,50,50,100
+    """
     match = _FORM.fullmatch(text.replace(" ", "")) if len(text) <= 80 else None
     if match is None:
         expected = message(

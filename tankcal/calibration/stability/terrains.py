@@ -54,7 +54,19 @@ TERRAINS = {"I": Terrain(), "II": Terrain(range_m=20.0)}
 
 
 def parse_terrain(text):
-    """The Terrain of a text: I, II, or LOW,RANGE in metres; raises InputError for any other."""
+    """The terrain of a text: I, II, or LOW,RANGE in metres.
+
+    Raises
+    ------
+    InputError
+        For any other text.
+
+    Examples
+    --------
+    >>> terrain = parse_terrain("100,20")
+    >>> terrain.low_m, terrain.range_m
+    (100.0, 20.0)
+    """
     plain = text.strip()
     if plain.upper() in TERRAINS:
         return TERRAINS[plain.upper()]
