@@ -25,10 +25,20 @@ GRID = 21
 
 @dataclass(frozen=True)
 class Shift:
-    """Size of a shift over the frame: worst corner, largest anywhere, root mean square.
+    """Size of a shift over the frame.
 
-    seen_um is the largest within the reach of the image points; what lies beyond is extrapolated.
-    Each in um and in px; px is nan where the size of a pixel is not known.
+    In um and in px; px is nan where the size of a pixel is not known.
+
+    Attributes
+    ----------
+    corner_um, corner_px : float
+        At the worst corner.
+    largest_um, largest_px : float
+        Largest anywhere.
+    rms_um, rms_px : float
+        Root mean square.
+    seen_um, seen_px : float
+        Largest within the reach of the image points; what lies beyond is extrapolated.
     """
 
     corner_um: float

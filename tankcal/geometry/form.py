@@ -116,7 +116,24 @@ def mode_variances(highest):
 
 
 def unit_form(azimuth_rad, highest=FORM_MODES):
-    """(n, 2 (highest - 1)) one standard deviation of each mode of a form of amplitude one."""
+    """One standard deviation of each mode of a form of amplitude one.
+
+    Parameters
+    ----------
+    azimuth_rad : array_like, shape (n,)
+        Azimuths, rad.
+    highest : int, optional
+        The last mode.
+
+    Returns
+    -------
+    ndarray, shape (n, 2 (highest - 1))
+
+    Examples
+    --------
+    >>> unit_form([0.0], 3).round(4)
+    array([[0.3536, 0.    , 0.1925, 0.    ]])
+    """
     return harmonics(azimuth_rad, highest)[:, 3:] * np.sqrt(mode_variances(highest))
 
 
@@ -148,7 +165,25 @@ def free_columns(azimuth_rad, zeta, degree):
 
 
 def whitened(array, covariance, transposed=False):
-    """L^-1 array (or L^-T array) with covariance = L L', which may be (n,) variances."""
+    """L^-1 array (or L^-T array) with covariance = L L'.
+
+    Parameters
+    ----------
+    array : ndarray, shape (n, ...)
+    covariance : ndarray, shape (n, n) or (n,)
+        Covariance, or variances.
+    transposed : bool, optional
+        True: L^-T.
+
+    Returns
+    -------
+    ndarray, as `array`
+
+    Examples
+    --------
+    >>> whitened(np.array([[2.0], [6.0]]), np.array([4.0, 9.0])).ravel()
+    array([1., 2.])
+    """
     if np.ndim(covariance) == 1:
         return array / np.sqrt(covariance)[:, None]
     factor = np.linalg.cholesky(covariance)

@@ -147,6 +147,20 @@ def evenly_spread(azimuth_rad):
 
     No gap over 1.5 times or under 0.3 times the median one, 5 to 400 points: beyond, the spectrum
     of the form bridges a gap better than a spline does.
+
+    Parameters
+    ----------
+    azimuth_rad : ndarray, shape (n,)
+        Azimuths, rad.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> evenly_spread(np.arange(8) * np.pi / 4), evenly_spread(np.array([0, 1, 2, 3, 3.1]))
+    (True, False)
     """
     n = len(azimuth_rad)
     if not 5 <= n <= MOST_KNOTS:
@@ -311,10 +325,20 @@ def _at_level(solution, level, form, degree):
 
 
 def radii_by_coordinates(outline, xy_m):
-    """(n, 2n) sparse derivative of the radius at fixed azimuth by the points' x and y.
+    """Derivative of the radius at fixed azimuth by the points' x and y.
 
     A point that moves along the outline changes nothing: dr = n . dp, with n the outline's normal,
     scaled so that its radial part is one: (sin a - r'/r cos a, cos a + r'/r sin a).
+
+    Parameters
+    ----------
+    outline : Outline
+    xy_m : array_like, shape (n, 2)
+        Points, m.
+
+    Returns
+    -------
+    sparse array, shape (n, 2n)
     """
     azimuth, radius = polar(xy_m, outline.x_m, outline.y_m)
     slope = outline.radius_m(azimuth, derivative=1) / radius

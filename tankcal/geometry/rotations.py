@@ -115,7 +115,19 @@ def pointing(rotation):
 
 
 def turned(rotation, small_rad):
-    """Rotation matrices (n, 3, 3) after exp([d]x) R, d = small_rad (n, 3)."""
+    """Rotation matrices after small rotations: exp([d]x) R.
+
+    Parameters
+    ----------
+    rotation : ndarray, shape (n, 3, 3)
+        R.
+    small_rad : ndarray, shape (n, 3)
+        d, rad.
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 3)
+    """
     d = np.asarray(small_rad, dtype=float)
     cross = np.zeros((len(d), 3, 3))
     cross[:, [2, 0, 1], [1, 2, 0]] = d
@@ -128,7 +140,18 @@ def turned(rotation, small_rad):
 
 
 def rotation_vector(rotation):
-    """Rotation vectors (n, 3), shorter than pi, with exp([d]x) = R (n, 3, 3)."""
+    """Rotation vectors, shorter than pi, with exp([d]x) = R.
+
+    Parameters
+    ----------
+    rotation : ndarray, shape (n, 3, 3)
+        R.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        d, rad.
+    """
     r = np.asarray(rotation, dtype=float)
     axial = 0.5 * np.stack(
         [r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]], axis=-1
@@ -139,7 +162,17 @@ def rotation_vector(rotation):
 
 
 def vector_derivatives(vector_rad):
-    """Derivatives (n, 3, 3) of the rotation vector of exp([d]x) exp([v]x) by d, at d = 0."""
+    """Derivatives of the rotation vector of exp([d]x) exp([v]x) by d, at d = 0.
+
+    Parameters
+    ----------
+    vector_rad : ndarray, shape (n, 3)
+        v, rad.
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 3)
+    """
     v = np.asarray(vector_rad, dtype=float)
     square = np.sum(v * v, axis=1)
     half = np.sqrt(square) / 2
@@ -150,7 +183,17 @@ def vector_derivatives(vector_rad):
 
 
 def angle_axes(rotation):
-    """Small rotations (n, 3, 3) in the camera's frame, one column for each of omega, phi, kappa."""
+    """Small rotations in the camera's frame, one column for each of omega, phi, kappa.
+
+    Parameters
+    ----------
+    rotation : ndarray, shape (n, 3, 3)
+        Rotation matrices.
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 3)
+    """
     r = np.asarray(rotation, dtype=float)
     kappa = angles_of(r)[:, 2]
     axes = np.zeros_like(r)
@@ -161,9 +204,18 @@ def angle_axes(rotation):
 
 
 def angle_derivatives(rotation):
-    """Derivatives (n, 3, 3) of omega, phi, kappa (rows) by a small rotation in the camera's frame.
+    """Derivatives of omega, phi, kappa (rows) by a small rotation in the camera's frame.
 
     They grow without bound towards phi = +-90 deg: an angle by itself is not defined there.
+
+    Parameters
+    ----------
+    rotation : ndarray, shape (n, 3, 3)
+        Rotation matrices.
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 3)
     """
     r = np.asarray(rotation, dtype=float)
     _, phi, kappa = angles_of(r).T

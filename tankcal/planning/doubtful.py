@@ -115,15 +115,28 @@ def _line(table, ends, instrument, flat):
 class GroupReliability:
     """How far the readings of one kind control one another.
 
-    kind, name    such as "distance", "tape"      unit   of the blunder
-    count         values that are read            uncontrolled  of them nothing controls
-    redundancy    mean redundancy number
-    blunder       largest undetectable one of a controlled value; nan: none is controlled
-    of            names of the reading that it is of
-    volume_m3     largest effect of an undetected blunder on the volume of the full tank; nan alike
-    volume_of     names of the reading that has it
-    per_unit_m3   largest effect on it of a blunder of one unit in an uncontrolled value; nan: none
-    per_unit_of   names of the reading that has it
+    Attributes
+    ----------
+    kind, name : str
+        Such as "distance", "tape".
+    unit : str
+        Of the blunder.
+    count, uncontrolled : int
+        Values that are read, and how many of them nothing controls.
+    redundancy : float
+        Mean redundancy number.
+    blunder : float
+        Largest undetectable one of a controlled value; nan: none is controlled.
+    of : tuple
+        Names of the reading that it is of.
+    volume_m3 : float
+        Largest effect of an undetected blunder on the volume of the full tank, m3; nan alike.
+    volume_of : tuple
+        Names of the reading that has it.
+    per_unit_m3 : float
+        Largest effect on it of a blunder of one unit in an uncontrolled value, m3; nan: none.
+    per_unit_of : tuple
+        Names of the reading that has it.
     """
 
     kind: str

@@ -107,11 +107,22 @@ def what_helps(plan, changes=None, progress=None, before=None):
 
 
 def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, progress=None):
-    """The Path of the best change of each round.
+    """Path of the best change of each round.
 
-    add      True: items are added and repeated until the plan's limit is met, or `steps` are done;
-             False: items are dropped as long as the limit is met, the dearest for its loss first
-    changes  function plan -> tuple of Change; None: all of `items`
+    Parameters
+    ----------
+    plan : Plan
+    add : bool, optional
+        True: items are added and repeated until the plan's limit is met, or `steps` are done;
+        False: items are dropped as long as the limit is met, the dearest for its loss first.
+    steps, items, progress : optional
+        Most rounds, what may be changed, progress(text, done, total).
+    changes : callable, optional
+        Function plan -> tuple of Change; None: all of `items`.
+
+    Returns
+    -------
+    Path
     """
     start = now = predict(plan)
     limit, made, tried = plan.limits.relative_u, [], 0

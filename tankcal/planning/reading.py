@@ -41,9 +41,21 @@ from tankcal.text.numerals import NUMBER
 
 
 def load_plan(path):
-    """The Plan in a folder, or in the folder of a plan.toml.
+    """Read the plan in a folder, or in the folder of a plan.toml.
 
-    Raises InputError with every problem of the input, each with its file, row and column.
+    Parameters
+    ----------
+    path : path
+        The folder or the file.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError
+        With every problem of the input, each with its file, row and column.
     """
     log = Log()
     folder = _folder(Path(path), log)

@@ -18,11 +18,21 @@ from tankcal.survey.network import correlations
 class Choices:
     """What the user decides.
 
-    alpha     level of the tests            groups  of parameters, tuple of names; None: the usual
-    of        matrix that is analysed: "correlation" or "covariance"
-    unscaled  values of components as Silva's program made them
-    limit_px  image accuracy that effects are compared with; None: 0.5 px in Pessoa's rule, and that
-    limit_um  of the residuals in our recommendation
+    Attributes
+    ----------
+    alpha : float
+        Level of the tests.
+    groups : tuple of tuple of str, or None
+        Groups of parameters; None: the usual.
+    of : str
+        Matrix that is analysed: "correlation" or "covariance".
+    unscaled : bool
+        Values of components as Silva's program made them.
+    limit_px : float or None
+        Image accuracy that effects are compared with, px; None: 0.5 px in Pessoa's rule, and that
+        of the residuals in our recommendation.
+    limit_um : float or None
+        The same in um.
     """
 
     alpha: float = ALPHA

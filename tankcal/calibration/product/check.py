@@ -31,9 +31,18 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class Precision:
-    """Is the scatter along an axis within sigma_m?
+    """Whether the scatter along an axis is within an expected standard deviation.
 
-    chi2  (n-1) s^2/sigma^2; limit  its upper quantile; None and passed None with fewer than 2
+    Attributes
+    ----------
+    axis : str
+        The axis.
+    sigma_m : float
+        The expected standard deviation, m.
+    chi2, limit : float or None
+        (n-1) s^2/sigma^2 and its upper quantile; None with fewer than 2.
+    passed : bool or None
+        Is it within? None with fewer than 2.
     """
 
     axis: str
@@ -45,15 +54,27 @@ class Precision:
 
 @dataclass(frozen=True)
 class AxisCheck:
-    """Differences along one axis, m.
+    """Differences along one axis.
 
-    mean_m, sd_m     None with no point, with fewer than two
-    t, t_limit       Student's t of the mean and its two-sided limit; None with fewer than two, t
-                     None too where nothing scatters
-    biased           the mean is significant; None: cannot be said
-    rmse_m           as they are           rmse_unbiased_m  less the mean, where it is significant
-    largest_m        largest magnitude, of point `largest_point`
-    precision        against an expected sd; None: none was given
+    Attributes
+    ----------
+    axis, part : str
+        The axis, and the part it belongs to.
+    n : int
+        Number of points.
+    mean_m, sd_m : float or None
+        m; None with no point, with fewer than two.
+    t, t_limit : float or None
+        Student's t of the mean and its two-sided limit; None with fewer than two, t None too where
+        nothing scatters.
+    biased : bool or None
+        The mean is significant; None: cannot be said.
+    rmse_m, rmse_unbiased_m : float or None
+        As they are, and less the mean, where it is significant, m.
+    largest_m, largest_point
+        Largest magnitude, m, and its point.
+    precision : Precision or None
+        Against an expected sd; None: none was given.
     """
 
     axis: str
