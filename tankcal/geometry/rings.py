@@ -23,9 +23,16 @@ LEAST_SPREAD = 1e-7  # of the points of a circle, to the largest: below, they li
 class Axis:
     """Approximate axis and radius of the wall, to a few centimetres.
 
-    x_m, y_m  of the axis at height z_m of the frame of the points
-    slope     (2,) dx/dz and dy/dz of the axis: points are slid along it into a horizontal plane
-    radius_m  of the wall
+    Attributes
+    ----------
+    x_m, y_m : float
+        Of the axis at height z_m of the frame of the points, m.
+    radius_m : float
+        Of the wall, m.
+    z_m : float
+        This height, m.
+    slope : tuple of float
+        dx/dz and dy/dz of the axis: points are slid along it into a horizontal plane.
     """
 
     x_m: float
@@ -44,23 +51,36 @@ class Axis:
 class Rings:
     """The rings from the bottom up, n of them with c azimuth cells each.
 
-    What no point determines is nan: circles of `null_space` rings, cells without points, the sd
+    What no point determines is nan: circles of `undetermined` rings, cells without points, the sd
     of a cell with one point.
 
-    axis              the approximate axis that azimuths and radii of cells are about
-    edges_m           (n + 1,) heights between the rings, in the frame of the points
-    count             (n,) points of each ring
-    z_m               (n,) mean height of the points
-    x_m, y_m          (n,) centre of the circle through the points slid to height z_m
-    radius_m          (n,) its radius
-    residual_sd_m     (n,) sd of the points about the circle, n - 3 degrees of freedom; below 1e-8
-                      of the radius it is rounding
-    cell_count        (n, c) points of each cell; cell 0 begins at azimuth 0
-    cell_azimuth_rad  (n, c) mean azimuth of its points, 0 to 2 pi
-    cell_radius_m     (n, c) their mean distance from the axis
-    cell_sd_m         (n, c) sd of a single point about that mean, n - 1 degrees of freedom
-    outside           points below the first or above the last edge
-    beyond            (n,) points farther than the band from the approximate radius, left out
+    Attributes
+    ----------
+    axis : Axis
+        The approximate axis that azimuths and radii of cells are about.
+    edges_m : ndarray, shape (n + 1,)
+        Heights between the rings, in the frame of the points, m.
+    count : ndarray of int, shape (n,)
+        Points of each ring.
+    z_m : ndarray, shape (n,)
+        Mean height of the points, m.
+    x_m, y_m, radius_m : ndarray, shape (n,)
+        Centre and radius of the circle through the points slid to height z_m, m.
+    residual_sd_m : ndarray, shape (n,)
+        Sd of the points about the circle, n - 3 degrees of freedom; below 1e-8 of the radius it is
+        rounding, m.
+    cell_count : ndarray of int, shape (n, c)
+        Points of each cell; cell 0 begins at azimuth 0.
+    cell_azimuth_rad : ndarray, shape (n, c)
+        Mean azimuth of its points, 0 to 2 pi.
+    cell_radius_m : ndarray, shape (n, c)
+        Their mean distance from the axis, m.
+    cell_sd_m : ndarray, shape (n, c)
+        Sd of a single point about that mean, n - 1 degrees of freedom, m.
+    outside : int
+        Points below the first or above the last edge.
+    beyond : ndarray of int, shape (n,)
+        Points farther than the band from the approximate radius, left out.
     """
 
     axis: Axis
