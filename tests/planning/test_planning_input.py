@@ -426,10 +426,10 @@ def test_what_a_change_is_called_on_the_terminal(changed):
     """Rows of targets have theirs in their names, in changes.csv as well."""
     plan = load_plan(changed(("levels = 1 ", "levels = 2 ")))
     rows = changes_of(plan, ("add", "drop"), ("target_row",))
-    found = {cli.planning.called(one) for one in rows}
+    found = {cli.planning.describe_change(one) for one in rows}
     assert {"add target row in course 1", "drop target row 1"} <= found
     tape = next(one for one in changes_of(plan, ("drop",), ("tape",)))
-    assert cli.planning.called(tape) == "drop tape V1"
+    assert cli.planning.describe_change(tape) == "drop tape V1"
 
 
 def test_too_few_generatrices(changed):

@@ -102,7 +102,7 @@ def test_compiled_loops_and_arrays_agree(make, monkeypatch):
     found = []
     for choice in (True, False):
         for room in (tankcal.solver.elimination, tankcal.camera.imaging):
-            monkeypatch.setattr(room, "worthwhile", lambda rows=0, choice=choice: choice)
+            monkeypatch.setattr(room, "is_worth_compiling", lambda rows=0, choice=choice: choice)
         found.append(adjust(survey, datum="inner"))
         assert found[-1].residuals  # leverages too
         assert found[-1].point_covariances_m2.any()
@@ -123,12 +123,12 @@ def test_small_jobs_do_not_wait_for_a_compiler(monkeypatch):
     monkeypatch.setattr(room, "available", lambda: True)
     monkeypatch.setattr(room, "_asked_for", lambda: "patient")
     monkeypatch.setattr(room, "_worked", 0)
-    assert not any(room.worthwhile(1500) for _ in range(100))
-    assert not room.worthwhile()
-    assert any(room.worthwhile(1500) for _ in range(40))
+    assert not any(room.is_worth_compiling(1500) for _ in range(100))
+    assert not room.is_worth_compiling()
+    assert any(room.is_worth_compiling(1500) for _ in range(40))
     monkeypatch.setattr(room, "_worked", 0)
-    assert room.worthwhile(room.AT_ONCE)
-    assert room.worthwhile()
+    assert room.is_worth_compiling(room.AT_ONCE)
+    assert room.is_worth_compiling()
 
 
 @pytest.mark.parametrize("affinity", ["b1_b2", "before_distortion"])
