@@ -25,7 +25,7 @@ import tankcal
 from tankcal.gum.distributions import Normal, standard
 from tankcal.gum.monte_carlo import Goal, QuadraticRows, simulate
 from tankcal.pipeline.simulation import simulate_table
-from tankcal.text.shipped import shipped
+from tankcal.text.shipped import shipped_folder
 
 COURSES, RADIUS_M, HEIGHT_M, EXPANSION = 8, 7.1, 9.5, 1.1e-5
 ORDINARY = ("normal",) * 20
@@ -104,7 +104,7 @@ def worst_ratios(found, model, inputs, chosen):
 
 def shipped_example(seeds):
     """(3,) worst ratios of the shipped example's rows, (seeds, 2) seconds, and its rows."""
-    job = tankcal.load(shipped("examples") / "silva-1995")
+    job = tankcal.load(shipped_folder("examples") / "silva-1995")
     job = replace(job, table=replace(job.table, step_m=0.001))
     result = tankcal.run(job, simulated=False)
     parts = (job, result.wall, result.body, result.zero_m, result.table)

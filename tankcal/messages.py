@@ -19,12 +19,12 @@ class Message(str):
 
 def message(code, template, **values):
     """The Message of an English template, "known to {sd_mm:.1f} mm", and its values."""
-    text = Message(filled(template, values))
+    text = Message(fill_template(template, values))
     text.code, text.values = code, values
     return text
 
 
-def listed(names, most):
+def list_some(names, most):
     """Names as they stand in a sentence: all of them, or the first and how many more."""
     names = [one if isinstance(one, str) else str(one) for one in names]
     if len(names) <= most:
@@ -33,19 +33,19 @@ def listed(names, most):
     return message("and_more", "{names} and {more} more", names=names[:most], more=more)
 
 
-def joined(parts):
+def join_with_and(parts):
     """Parts in a row with "and" before the last; one alone is itself."""
     *first, last = parts
     return message("and", "{first} and {last}", first=first, last=last) if first else last
 
 
-def either(parts):
+def join_with_or(parts):
     """The same with "or"."""
     *first, last = parts
     return message("or", "{first} or {last}", first=first, last=last) if first else last
 
 
-def filled(template, values, number=format, said=str):
+def fill_template(template, values, number=format, said=str):
     """A template with its values; those of a list stand in a row.
 
     number  number(value, spec) -> how a number is written

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera.model import Form, measured
-from tankcal.geometry.rotations import looking, turned
+from tankcal.camera.model import Form, distort_image_points
+from tankcal.geometry.rotations import apply_small_rotation, rotation_of_view
 from tankcal.survey.network import Camera, ImagePoints, Photos, Survey
 from tankcal.survey.observations import ControlCoordinates, Directions, Distances, VerticalAngles
 
@@ -44,12 +44,12 @@ def photographed(seed=0, photos=8, form=None, interior=INTERIOR, noise=1.0, scop
         [away * np.sin(azimuth), away * np.cos(azimuth), 1.5 + 3 * (azimuth > 3)]
     )
     tilt = np.arctan2(4.7 - stations[:, 2], away)
-    rotation = looking(
+    rotation = rotation_of_view(
         azimuth + np.pi, tilt, 0.02 * rng.normal(size=photos) + np.pi / 2 * (azimuth > 4)
     )
     photo, point = (a.ravel() for a in np.mgrid[:photos, : len(xyz)])
     u, v, w = np.einsum("nij,nj->in", rotation[photo], xyz[point] - stations[photo])
-    xy = measured(interior[0] * np.column_stack([-u / w, -v / w]), interior, form)
+    xy = distort_image_points(interior[0] * np.column_stack([-u / w, -v / w]), interior, form)
     facing = np.sum((stations[photo] - xyz[point]) * xyz[point] * [1, 1, 0], axis=1)
     seen = (np.abs(xy[:, 0]) < 90) & (np.abs(xy[:, 1]) < 90) & (facing > 0)
     photo, point, xy = photo[seen], point[seen], xy[seen]
@@ -70,7 +70,7 @@ def photographed(seed=0, photos=8, form=None, interior=INTERIOR, noise=1.0, scop
             tuple(f"S{i}" for i in range(photos)),
             np.zeros(photos, dtype=int),
             stations + rng.normal(0, 0.1, stations.shape),
-            turned(rotation, rng.normal(0, 0.01, (photos, 3))),
+            apply_small_rotation(rotation, rng.normal(0, 0.01, (photos, 3))),
         ),
         cameras=(Camera(start_interior, form, scope=scope),),
         observations=(

@@ -12,7 +12,7 @@ from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.calculator import calculator_sheets, factor_sheet
 from tankcal.report.workbook.capacity import capacity_sheet
 from tankcal.report.workbook.parts import densities_sheet
-from tankcal.text.words import in_language
+from tankcal.text.words import translate_record
 
 FIRST_COLUMN = 6  # of the copies of the calculator: F and on, its own is B
 _CELL = re.compile(r"\bB(\d+)\b")
@@ -103,7 +103,7 @@ def calculators(groups, words, folder):
                 places[name] = number, slice(first, first + len(own))
                 cases += own
         path, source = folder / f"written-{number}.xlsx", folder / f"cases-{number}.xlsx"
-        _write(in_language(words, record), words, path)
+        _write(translate_record(words, record), words, path)
         _copied(path, words, cases, source)
         sources.append(source)
     books = recalculated(sources, folder)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from tankcal.camera.model import Form
-from tankcal.geometry.rotations import looking, turned
+from tankcal.geometry.rotations import apply_small_rotation, rotation_of_view
 from tankcal.survey.network import Camera, ImagePoints, Photos, Survey
 from tankcal.survey.observations import ControlCoordinates, Distances
 
@@ -28,7 +28,7 @@ def tank(p):
             tuple(f"S{i}" for i in range(photos)),
             np.zeros(photos, dtype=int),
             p["eo"][:, :3],
-            looking(*p["eo"][:, 3:].T),
+            rotation_of_view(*p["eo"][:, 3:].T),
         ),
         cameras=(Camera(values, Form(), scope=scope),),
         observations=(
@@ -57,7 +57,7 @@ def bal(path):
         rest = np.array(file.read().split(), dtype=float)
     photo = rest[: 9 * cameras].reshape(-1, 9)
     xyz = rest[9 * cameras :].reshape(points, 3)
-    rotation = turned(np.tile(np.eye(3), (cameras, 1, 1)), photo[:, :3])
+    rotation = apply_small_rotation(np.tile(np.eye(3), (cameras, 1, 1)), photo[:, :3])
     values = np.zeros((cameras, 13))
     values[:, 0] = photo[:, 6]
     values[:, 3] = photo[:, 7] / photo[:, 6] ** 2

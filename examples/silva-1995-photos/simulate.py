@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tankcal.camera.model import PARAMETERS, Form, measured
-from tankcal.geometry.rotations import angles_of, looking
+from tankcal.camera.model import PARAMETERS, Form, distort_image_points
+from tankcal.geometry.rotations import angles_of, rotation_of_view
 
 HERE = Path(__file__).parent
 SEED = 137
@@ -139,7 +139,7 @@ def stations(rng):
     )
     tilt = np.arctan2(BOTTOM_M + 4.4 - height, off) + rng.normal(0, 0.01, STATIONS)
     roll = rng.normal(0, 0.02, STATIONS) + np.where(np.arange(STATIONS) % 4 == 3, np.pi / 2, 0)
-    rotation = looking(azimuth + np.pi + rng.normal(0, 0.02, STATIONS), tilt, roll)
+    rotation = rotation_of_view(azimuth + np.pi + rng.normal(0, 0.02, STATIONS), tilt, roll)
     return np.column_stack([centre, height]), rotation
 
 
@@ -151,7 +151,7 @@ def photographed(xyz, on_wall, centre, rotation):
     ideal = -CAMERA["c"] * np.column_stack([u, v]) / np.where(ahead, w, -1.0)[:, None]
     inside = ahead & (np.abs(ideal) < np.add(FRAME_MM, 2.0)).all(axis=1)
     image = np.zeros_like(ideal)
-    image[inside] = measured(ideal[inside], interior, FORM)
+    image[inside] = distort_image_points(ideal[inside], interior, FORM)
     seen = inside & (np.abs(image) < FRAME_MM).all(axis=1)
     return image, seen & _in_view(xyz, on_wall, centre)
 

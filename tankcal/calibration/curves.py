@@ -9,7 +9,7 @@ to once that across. Source: Brown 1971.
 import numpy as np
 
 from tankcal.camera.imaging import distort, distortion_derivatives
-from tankcal.camera.model import PARAMETERS, corrected
+from tankcal.camera.model import PARAMETERS, correct_image_points
 
 RADIAL = slice(PARAMETERS.index("K1"), PARAMETERS.index("K4") + 1)
 DECENTRING = slice(PARAMETERS.index("P1"), PARAMETERS.index("P4") + 1)
@@ -41,7 +41,9 @@ def radial_curve(radius_mm, interior, form, covariance=None):
     radius = np.asarray(radius_mm, dtype=float)
     radial = np.zeros(len(PARAMETERS))
     radial[RADIAL] = np.asarray(interior, dtype=float)[RADIAL]
-    along = corrected(np.column_stack([radius, np.zeros_like(radius)]), radial, form)[:, 0]
+    along = correct_image_points(np.column_stack([radius, np.zeros_like(radius)]), radial, form)[
+        :, 0
+    ]
     if covariance is None:
         return radius - along, None
     of_ideal = form.convention == "distortion_of_ideal"

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera.imaging import distort, led
-from tankcal.camera.model import CONVENTIONS, PARAMETERS, corrected
+from tankcal.camera.imaging import apply_first_affinity, distort
+from tankcal.camera.model import CONVENTIONS, PARAMETERS, correct_image_points
 
 GRID = 21
 
@@ -108,7 +108,7 @@ def own_shift(name, interior, form, frame):
 
     def shifted(p):
         """(2, n) shift by an affinity before the distortion, and by the distortion after it."""
-        at = led(x, y, p, form.numbers)
+        at = apply_first_affinity(x, y, p, form.numbers)
         return np.array(at) - (x, y) + side * np.array(distort(*at, p, form.numbers)[:2])
 
     with_it, without_it = shifted(q), shifted(lacking)
@@ -122,8 +122,8 @@ def left_shifts(interior, others, form, frame):
     """
     q, p = np.array(interior, dtype=float), np.array(others, dtype=float)
     points = frame_points(frame.half_mm)
-    ideal = corrected(points, q, form)
-    moved = corrected(points, p, form) * (q[0] / p[0]) - ideal
+    ideal = correct_image_points(points, q, form)
+    moved = correct_image_points(points, p, form) * (q[0] / p[0]) - ideal
     turned = moved.ravel()
     ways = _rotations(ideal, q[0]).reshape(-1, 3)
     turned = turned - ways @ np.linalg.lstsq(ways, turned, rcond=None)[0]

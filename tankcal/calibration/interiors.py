@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.calibration.edges import Frame
-from tankcal.camera.formats.frame import framed, on_film
+from tankcal.camera.formats.frame import make_film_camera, make_framed_camera
 from tankcal.camera.model import AFFINITIES, CONVENTIONS, PARAMETERS, Form
 from tankcal.errors import InputError, Problem
-from tankcal.messages import Message, listed, message
+from tankcal.messages import Message, list_some, message
 
 MOST_NAMES = 20  # in a message
 
@@ -152,11 +152,11 @@ def _unknown(name, known):
         "camera_unknown_name",
         "found {found!r}; expected one of {names}",
         found=name,
-        names=listed(known, MOST_NAMES),
+        names=list_some(known, MOST_NAMES),
     )
 
 
-def chosen(interiors, photos, camera=None, photo=None):
+def select_interiors(interiors, photos, camera=None, photo=None):
     """Those of a camera, and of a photo; all of them without names. InputError: there are none.
 
     photos  {photo: its camera}
@@ -217,10 +217,10 @@ def _framed(interior, pixel_mm):
     """FramedCamera of an Interior with a format; pixel_mm: of a film, or None."""
     pixel = interior.frame.pixel_mm
     if pixel is None and pixel_mm is None:
-        return on_film(interior.values, interior.form, interior.format_mm)
+        return make_film_camera(interior.values, interior.form, interior.format_mm)
     pixel = np.full(2, pixel_mm) if pixel is None else pixel
     size_px = np.round(interior.format_mm / pixel).astype(int)
-    return framed(interior.values, interior.form, pixel, size_px)
+    return make_framed_camera(interior.values, interior.form, pixel, size_px)
 
 
 def _among_all(names, covariance):

@@ -72,7 +72,7 @@ def heights_at(surface, xy_mm):
     return found, outside
 
 
-def flattened(xy_mm, height_mm, interior):
+def flatten_film(xy_mm, height_mm, interior):
     """Move image points read on a film that is not flat to the plane of the photo system.
 
     x' = x + (x - x0) h / (c - h), y alike.

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera.model import PARAMETERS, corrected, measured
+from tankcal.camera.model import PARAMETERS, correct_image_points, distort_image_points
 
 RADIAL = ("K1", "K2", "K3")
 _FIRST = PARAMETERS.index("K1")
@@ -127,7 +127,7 @@ def depth_factor(depth_mm, focus_mm, focal_length_mm):
     return (1 - f / focus_mm) / (1 - f / np.asarray(depth_mm, dtype=float))
 
 
-def as_in_focus(xy_mm, depth_mm, interior, form, lens):
+def refer_to_focus(xy_mm, depth_mm, interior, form, lens):
     """Image points as they would be if every object lay at the distance of the focus.
 
     The coefficients in the depth of each point are those of `interior` plus what the two
@@ -157,5 +157,7 @@ def as_in_focus(xy_mm, depth_mm, interior, form, lens):
     there = at_focus[known].copy()
     there[:, _FIRST : _FIRST + 3] += lens.in_depth(np.asarray(depth_mm)[known]) - lens.focused
     found = np.array(xy_mm, dtype=float)
-    found[known] = measured(corrected(found[known], there, form), at_focus[known], form)
+    found[known] = distort_image_points(
+        correct_image_points(found[known], there, form), at_focus[known], form
+    )
     return found

@@ -14,7 +14,7 @@ from tankcal.solver.compiled import compile_functions, is_worth_compiling
 NEWTON_STEPS = 6  # quadratic: a distortion of 30 % of the radius is solved to the last digit
 
 
-def led(x, y, q, form):
+def apply_first_affinity(x, y, q, form):
     """The measured point, from the principal point, after the affinity before the distortion.
 
     Parameters
@@ -188,7 +188,7 @@ def ideal_point(u, v, w, r, c):
     )
 
 
-def one_image_point(p, r, q, form, of_ideal):
+def image_point_derivatives(p, r, q, form, of_ideal):
     """Measured coordinate of a point and all its derivatives.
 
     p         X - S, three numbers or (n,) (m)
@@ -215,7 +215,7 @@ def one_image_point(p, r, q, form, of_ideal):
     )
 
 
-def one_ideal_point(p, r, q, measured, form, of_ideal):
+def ideal_point_derivatives(p, r, q, measured, form, of_ideal):
     """Misclosure of the ideal image: the ideal point of the ground less that of the measured
     coordinate, which depends on the interior parameters, too, and all its derivatives.
 
@@ -232,7 +232,7 @@ def one_ideal_point(p, r, q, measured, form, of_ideal):
     w = r[6] * p[0] + r[7] * p[1] + r[8] * p[2]
     xi, eta, dxi, deta = ideal_point(u, v, w, r, q[0])
     from_x, from_y = measured[0] - q[1], measured[1] - q[2]
-    x, y = led(from_x, from_y, q, form)
+    x, y = apply_first_affinity(from_x, from_y, q, form)
     zero = 0.0 * x
     if of_ideal:
         x, y = undistorted_by(
@@ -296,9 +296,9 @@ def _loop(
         own = (q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8], q[9], q[10], q[11], q[12])
         if in_ideal:
             mx, my = xy[i, 0], xy[i, 1]
-            x, y, dx, dy = one_ideal_point(ground, turn, own, (mx, my), form, of_ideal)
+            x, y, dx, dy = ideal_point_derivatives(ground, turn, own, (mx, my), form, of_ideal)
         else:
-            x, y, dx, dy = one_image_point(ground, turn, own, form, of_ideal)
+            x, y, dx, dy = image_point_derivatives(ground, turn, own, form, of_ideal)
             x, y = x - xy[i, 0], y - xy[i, 1]
         wx, wy = weight[i, 0], weight[i, 1]
         w[i, 0] = x * wx
@@ -319,7 +319,7 @@ def _loop(
 
 
 _COMPILED = (
-    "led",
+    "apply_first_affinity",
     "distort",
     "distortion_derivatives",
     "undistorted_by",
@@ -327,8 +327,8 @@ _COMPILED = (
     "ideal_point",
     "seven",
     "ten",
-    "one_image_point",
-    "one_ideal_point",
+    "image_point_derivatives",
+    "ideal_point_derivatives",
     "_loop",
 )
 
@@ -342,10 +342,10 @@ def _arrays(
     r = rotation.reshape(-1, 9)[photo].T
     p, r, q = tuple(p), tuple(r), tuple(interior[photo].T)
     if in_ideal:
-        x, y, dx, dy = one_ideal_point(p, r, q, tuple(xy.T), form, of_ideal)
+        x, y, dx, dy = ideal_point_derivatives(p, r, q, tuple(xy.T), form, of_ideal)
         w[:] = np.column_stack([x, y]) * weight
     else:
-        x, y, dx, dy = one_image_point(p, r, q, form, of_ideal)
+        x, y, dx, dy = image_point_derivatives(p, r, q, form, of_ideal)
         w[:] = (np.column_stack([x, y]) - xy) * weight
     if len(jac) == 0:
         return
@@ -388,7 +388,7 @@ def image_rows(*arguments, in_ideal=False):
         Filled with the derivatives by point (3), photo (position 3, rotation 3) and interior
         parameters (k); of length 0: left out.
     in_ideal : bool, optional
-        Misclosures of the ideal image (`one_ideal_point`) instead of the measured one.
+        Misclosures of the ideal image (`ideal_point_derivatives`) instead of the measured one.
     """
     if is_worth_compiling(len(arguments[6])):
         compile_functions(sys.modules[__name__], _COMPILED)._loop(*arguments, in_ideal)

@@ -32,7 +32,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.camera.imaging import distort, image_point, led, undistorted_by
+from tankcal.camera.imaging import apply_first_affinity, distort, image_point, undistorted_by
 
 NEWTON_ROUNDS = 50
 PARAMETERS = ("c", "x0", "y0", "K1", "K2", "K3", "K4", "P1", "P2", "P3", "P4", "A", "B")
@@ -77,7 +77,7 @@ class Form:
         return np.array([side, *AFFINITIES[self.affinity], self.radial_balance_mm**2])
 
 
-def corrected(xy_mm, interior, form):
+def correct_image_points(xy_mm, interior, form):
     """Ideal image points, from the principal point, of measured ones.
 
     Parameters
@@ -103,7 +103,7 @@ def corrected(xy_mm, interior, form):
     """
     numbers = form.numbers
     q = tuple(np.asarray(interior, dtype=float).T)
-    x, y = led(xy_mm[:, 0] - q[1], xy_mm[:, 1] - q[2], q, numbers)
+    x, y = apply_first_affinity(xy_mm[:, 0] - q[1], xy_mm[:, 1] - q[2], q, numbers)
     if form.convention != "distortion_of_ideal":
         dx, dy = distort(x, y, q, numbers)[:2]
         return np.column_stack([x + numbers[0] * dx, y + numbers[0] * dy])
@@ -111,7 +111,7 @@ def corrected(xy_mm, interior, form):
     return np.column_stack(undistorted_by(x, y, q, numbers))
 
 
-def measured(ideal_mm, interior, form):
+def distort_image_points(ideal_mm, interior, form):
     """Measured image points of ideal ones: the inverse of `corrected`.
 
     Parameters
@@ -171,13 +171,13 @@ def balanced_about(interior, form, radius_mm):
     (50.505051, 10.0)
     """
     side = CONVENTIONS[form.convention]
-    plain = rescaled(
+    plain = rescale_interior(
         interior, form, 1 - (side or 1) * _at_balance(interior, form.radial_balance_mm)
     )
     target = replace(form, radial_balance_mm=float(radius_mm))
     s = 1.0
     for _ in range(NEWTON_ROUNDS):
-        found = rescaled(plain, form, 1 / s)
+        found = rescale_interior(plain, form, 1 / s)
         wanted = 1 - (side or 1) * _at_balance(found, radius_mm)
         if abs(wanted - s) < 1e-15:
             break
@@ -191,7 +191,7 @@ def _at_balance(interior, radius_mm):
     return float(np.polyval(np.append(np.asarray(interior)[6:2:-1], 0.0), e))
 
 
-def rescaled(interior, form, s):
+def rescale_interior(interior, form, s):
     """Interior parameters of the same camera when a scale s goes over to c.
 
     distortion_of_ideal: s xi is the ideal point of the same image in place of xi; else the equation

@@ -107,7 +107,7 @@ def check(options):
     show = _start(options)
     table = limits.read_limits(options.limits) if options.limits else limits.shipped_limits()
     if options.scale is not None:
-        table = limits.of_scale(table, options.scale)
+        table = limits.limits_of_scale(table, options.scale)
     job, record = None, _record_of(options.source)
     if record is not None:
         differences = differences_of(record)
@@ -157,10 +157,10 @@ def convert(options):
 
 def _in_form(form, cameras, covariances):
     """[(name, FramedCamera)] in the form of a publication, and their covariances or None."""
-    from tankcal.camera.formats.published import in_form
+    from tankcal.camera.formats.published import camera_in_form
 
     found = [
-        (name, *in_form(camera, form, covariance))
+        (name, *camera_in_form(camera, form, covariance))
         for (name, camera), covariance in zip(cameras, covariances, strict=True)
     ]
     return [(name, camera) for name, camera, _ in found], [after for *_, after in found]
@@ -197,12 +197,12 @@ def _registered(path, pixel_um):
 
 def _framed(setup):
     """FramedCamera of a CameraSetup."""
-    from tankcal.camera.formats.frame import framed, on_film
+    from tankcal.camera.formats.frame import make_film_camera, make_framed_camera
 
     values, form = setup.camera.values, setup.camera.form
     if setup.pixel_mm is None:
-        return on_film(values, form, setup.format_mm)
-    return framed(values, form, setup.pixel_mm, setup.format_px)
+        return make_film_camera(values, form, setup.format_mm)
+    return make_framed_camera(values, form, setup.pixel_mm, setup.format_px)
 
 
 def _only(options, cameras, covariances):

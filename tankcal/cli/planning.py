@@ -13,7 +13,7 @@ from tankcal.cli.showing import (
     warn,
 )
 from tankcal.messages import message
-from tankcal.text.digits import fixed, with_digits, written
+from tankcal.text.digits import fixed, format_significant, format_with_u
 
 SHOWN = 12  # changes in the terminal
 
@@ -163,7 +163,7 @@ def _summary(prediction):
         rows=solution.rows,
         unknowns=solution.estimated,
         dof=solution.dof,
-        sd=with_digits(1000 * prediction.precision.mean_sd_m, 3, marks()),
+        sd=format_significant(1000 * prediction.precision.mean_sd_m, 3, marks()),
     )
     if prediction.datum.words:
         yield message(
@@ -202,7 +202,7 @@ def _summary(prediction):
 
 
 def _top(table):
-    top = written(table.volume_m3[-1], table.U_m3[-1], marks(), least=0)
+    top = format_with_u(table.volume_m3[-1], table.U_m3[-1], marks(), least=0)
     return message(
         "plan_top",
         "table: {volume} m3 at {height} m, U = {uncertainty} m3 (k = {factor:.2f}), {relative}",
@@ -315,4 +315,4 @@ def _scatter(found):
 
 
 def _percent(share):
-    return f"{with_digits(100 * float(share), 3, marks())} %"
+    return f"{format_significant(100 * float(share), 3, marks())} %"

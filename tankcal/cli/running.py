@@ -17,7 +17,7 @@ from tankcal.cli.showing import (
 )
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.text.digits import decimals_of_height, fixed, with_digits, written
+from tankcal.text.digits import decimals_of_height, fixed, format_significant, format_with_u
 
 DECIMALS_WITHOUT_U = 3  # of a volume in m3: litres
 
@@ -95,9 +95,9 @@ def _default_out(source):
 
 
 def _demo(options):
-    from tankcal.text.shipped import shipped
+    from tankcal.text.shipped import shipped_folder
 
-    _compute(shipped("examples") / "silva-1995", Path(options.out), options.quiet)
+    _compute(shipped_folder("examples") / "silva-1995", Path(options.out), options.quiet)
 
 
 def _tell(out, paths, warnings, result, adjustment):
@@ -171,7 +171,7 @@ def _capacity(result):
     """One line: what the tank holds to the digits of U, and how many points say so."""
     top_m = result.table.height_m[-1]
     top, stated = result.at(top_m), result.intervals
-    volume = written(top.value_m3, stated.U_m3[-1], marks(), least=0)
+    volume = format_with_u(top.value_m3, stated.U_m3[-1], marks(), least=0)
     how = message("by_monte_carlo", "by Monte Carlo")
     if stated.by_gum[-1]:
         how = message("with_k", "k = {factor:.2f}", factor=top.k)
@@ -253,7 +253,7 @@ def _summary(adjustment):
     mean = ""
     if free.any():
         found = precision(adjustment.xyz_m[free], adjustment.covariance_m2[free])
-        sd = with_digits(1000 * found.mean_sd_m, 3, marks())
+        sd = format_significant(1000 * found.mean_sd_m, 3, marks())
         mean = message("mean_sd", ", mean sd {sd} mm", sd=sd)
     return message(
         "adjusted",

@@ -36,7 +36,7 @@ def say_in_language(text):
     """A text in the language that is spoken; one without a code is as it is."""
     if not (_spoken and isinstance(text, Message)):
         return str(text)
-    from tankcal.text.words import said as said_in
+    from tankcal.text.words import say as said_in
 
     return said_in(_spoken, text)
 

@@ -9,7 +9,14 @@ import numpy as np
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
-from tankcal.geometry.primitives import centred, conditions_of, refuse_flat, spread_of, units, walk
+from tankcal.geometry.primitives import (
+    center_points,
+    conditions_of,
+    descend_distances,
+    refuse_flat,
+    spread_of,
+    unit_vectors,
+)
 from tankcal.messages import message
 
 DIRECTION_SD_LIMIT = 0.1  # rad: beyond, the direction of a cylinder is not determined
@@ -103,7 +110,7 @@ def fit_cylinder(xyz_m, covariance_m2):
         For fewer than 5 points, points in a plane (not thicker than twice their scatter), and
         points that do not determine the direction (its sd, by their scatter, above 0.1 rad).
     """
-    mean, local = centred(xyz_m, 5, "a cylinder")
+    mean, local = center_points(xyz_m, 5, "a cylinder")
     spread = spread_of(local, 3, "plane")
     frame, unknowns = _start_of_cylinder(local)
     refuse_flat(unknowns[4], spread, "a cylinder with a radius")
@@ -141,7 +148,7 @@ def cylinder_distances(frame):
         axis = np.array([*slopes, 1.0]) / long
         d = points @ frame.T - (x, y, 0.0)
         along = d @ axis
-        distance, normal = units(d - along[:, None] * axis)
+        distance, normal = unit_vectors(d - along[:, None] * axis)
         moved = -normal[:, :2]
         by_slopes = moved * (along / long)[:, None]
         by_unknowns = np.column_stack([moved, by_slopes, -np.ones(len(d))])
@@ -258,7 +265,7 @@ def _start_of_cylinder(local):
             continue
         tried.append(i)
         distances = cylinder_distances(frames[i])
-        found = walk(distances, [*centres[i], 0.0, 0.0, radii[i]], some, FIRST_STEPS)
+        found = descend_distances(distances, [*centres[i], 0.0, 0.0, radii[i]], some, FIRST_STEPS)
         cost = np.sum(distances(found, some)[0] ** 2)
         if np.isfinite(cost) and found[4] > 0 and (best is None or cost < best[0]):
             best = cost, *_turned(frames[i], found)
@@ -273,7 +280,7 @@ def _start_of_cylinder(local):
             )
         )
     _, frame, found = best
-    return _turned(frame, walk(cylinder_distances(frame), found, some))
+    return _turned(frame, descend_distances(cylinder_distances(frame), found, some))
 
 
 def _algebraic_cylinders(local, frames):

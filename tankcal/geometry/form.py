@@ -164,7 +164,7 @@ def free_columns(azimuth_rad, zeta, degree):
     return np.hstack(columns[: degree + 1])
 
 
-def whitened(array, covariance, transposed=False):
+def whiten(array, covariance, transposed=False):
     """L^-1 array (or L^-T array) with covariance = L L'.
 
     Parameters
@@ -181,7 +181,7 @@ def whitened(array, covariance, transposed=False):
 
     Examples
     --------
-    >>> whitened(np.array([[2.0], [6.0]]), np.array([4.0, 9.0])).ravel()
+    >>> whiten(np.array([[2.0], [6.0]]), np.array([4.0, 9.0])).ravel()
     array([1., 2.])
     """
     if np.ndim(covariance) == 1:

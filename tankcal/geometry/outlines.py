@@ -19,7 +19,7 @@ from tankcal.geometry.form import (
     harmonics,
     mode_variances,
     unit_form,
-    whitened,
+    whiten,
 )
 from tankcal.messages import message
 from tankcal.quadrature import panels, polar_products
@@ -296,7 +296,7 @@ def smooth_outlines(xy_m, x_m, y_m, noise_m2, form, zeta, levels_zeta, degree):
 
 def _shrunk(design, free, noise_m2):
     """(p, n) estimates by the radii: the first `free` columns free, the others of unit variance."""
-    white = whitened(design, noise_m2)
+    white = whiten(design, noise_m2)
     normal = white.T @ white
     bound = np.arange(free, len(normal))
     normal[bound, bound] += 1.0
@@ -307,7 +307,7 @@ def _shrunk(design, free, noise_m2):
                 "the points of a section do not determine its centre and radius",
             )
         )
-    return np.linalg.solve(normal, whitened(white, noise_m2, transposed=True).T)
+    return np.linalg.solve(normal, whiten(white, noise_m2, transposed=True).T)
 
 
 def _at_level(solution, level, form, degree):

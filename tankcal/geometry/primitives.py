@@ -87,9 +87,9 @@ def fit_ellipse(xy_m, covariance_m2):
     xy_m (n, 2); covariance_m2 (2n, 2n) dense or sparse, or (2n,) variances, x1 y1 x2 y2 ...
     Raises SolutionError for fewer than 5 points, points on a line or on no ellipse.
     """
-    mean, local = centred(xy_m, 5, "an ellipse")
+    mean, local = center_points(xy_m, 5, "an ellipse")
     spread = spread_of(local, 2, "line")
-    start = walk(ellipse_distances, _direct_ellipse(local / spread) * spread, local)
+    start = descend_distances(ellipse_distances, _direct_ellipse(local / spread) * spread, local)
     adjusted = adjust(conditions_of(ellipse_distances, 2), start, local.ravel(), covariance_m2)
     x, y, *shape = adjusted.unknowns
     (major, minor, azimuth), by_shape = _axes(*shape)
@@ -149,12 +149,12 @@ def fit_sphere(xyz_m, covariance_m2):
     >>> round(fit_sphere(points, np.full(15, 1e-6)).radius_m, 9)
     2.0
     """
-    mean, local = centred(xyz_m, 4, "a sphere")
+    mean, local = center_points(xyz_m, 4, "a sphere")
     spread = spread_of(local, 3, "plane")
     design = np.column_stack([2 * local, np.ones(len(local))])
     *centre, rest = np.linalg.lstsq(design, np.sum(local**2, axis=1), rcond=None)[0]
     algebraic = [*centre, np.sqrt(max(rest + np.sum(np.square(centre)), 0.0))]
-    start = walk(sphere_distances, algebraic, local)
+    start = descend_distances(sphere_distances, algebraic, local)
     refuse_flat(start[3], spread, "a sphere with a radius")
     adjusted = adjust(conditions_of(sphere_distances), start, local.ravel(), covariance_m2)
     *centre, radius = adjusted.unknowns
@@ -170,12 +170,12 @@ def fit_sphere(xyz_m, covariance_m2):
 
 def sphere_distances(unknowns, points):
     """Distances (n,) of points (n, 3) to a sphere x, y, z, R; by these; normals (n, 3)."""
-    distance, normal = units(points - unknowns[:3])
+    distance, normal = unit_vectors(points - unknowns[:3])
     by_unknowns = -np.column_stack([normal, np.ones(len(normal))])
     return distance - unknowns[3], by_unknowns, normal
 
 
-def centred(points_m, needed, what):
+def center_points(points_m, needed, what):
     """Mean (k,) of points (n, k) and the points about it; too few are refused."""
     points_m = np.asarray(points_m, dtype=float)
     if len(points_m) < needed:
@@ -204,7 +204,7 @@ def refuse_flat(size_m, spread_m, what):
         )
 
 
-def units(d):
+def unit_vectors(d):
     """Lengths (n,) of vectors (n, k), and the vectors of length one."""
     distance = np.linalg.norm(d, axis=1)
     if not np.all(distance > 0):
@@ -233,7 +233,7 @@ def conditions_of(distances, dimensions=3):
     return conditions
 
 
-def walk(distances, unknowns, points, steps=100):
+def descend_distances(distances, unknowns, points, steps=100):
     """Unknowns near the least sum of squared, unweighted distances, after at most some steps."""
     latest = {}
 

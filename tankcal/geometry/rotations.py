@@ -10,7 +10,7 @@ Photogrammetric Computer Vision, ch. 8.
 import numpy as np
 
 
-def from_angles(omega_rad, phi_rad, kappa_rad):
+def rotation_of_angles(omega_rad, phi_rad, kappa_rad):
     """Rotation matrices R3(kappa) R2(phi) R1(omega) of angles.
 
     Parameters
@@ -63,7 +63,7 @@ def angles_of(rotation):
     return np.stack([omega, phi, kappa], axis=-1)
 
 
-def looking(azimuth_rad, tilt_rad, roll_rad):
+def rotation_of_view(azimuth_rad, tilt_rad, roll_rad):
     """Rotation matrices of cameras that look along an azimuth, tilted up, rolled about the axis.
 
     Parameters
@@ -91,8 +91,8 @@ def looking(azimuth_rad, tilt_rad, roll_rad):
     return np.stack([level * ck + above * sk, -level * sk + above * ck, -ahead], axis=-2)
 
 
-def pointing(rotation):
-    """azimuth, tilt, roll of cameras: the inverse of `looking`.
+def view_of_rotation(rotation):
+    """azimuth, tilt, roll of cameras: the inverse of `rotation_of_view`.
 
     Parameters
     ----------
@@ -107,14 +107,14 @@ def pointing(rotation):
     right, ahead = rotation[..., 0, :], -rotation[..., 2, :]
     azimuth = np.arctan2(ahead[..., 0], ahead[..., 1])
     tilt = np.arcsin(np.clip(ahead[..., 2], -1.0, 1.0))
-    level = looking(azimuth, tilt, np.zeros_like(azimuth))
+    level = rotation_of_view(azimuth, tilt, np.zeros_like(azimuth))
     roll = np.arctan2(
         np.sum(right * level[..., 1, :], axis=-1), np.sum(right * level[..., 0, :], axis=-1)
     )
     return np.stack([azimuth, tilt, roll], axis=-1)
 
 
-def turned(rotation, small_rad):
+def apply_small_rotation(rotation, small_rad):
     """Rotation matrices after small rotations: exp([d]x) R.
 
     Parameters

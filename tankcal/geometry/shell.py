@@ -11,7 +11,7 @@ import numpy as np
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
-from tankcal.geometry.snooping import LEAST_NOISE_M, find_form, from_axis, shell_problem
+from tankcal.geometry.snooping import LEAST_NOISE_M, distances_from_axis, find_form, shell_problem
 from tankcal.messages import message
 
 WIDE_BAND, WALL_BAND = 0.03, 0.01  # of the nominal radius: start, and largest believed deviation
@@ -159,7 +159,7 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
             )
         )
 
-    distance = from_axis(local, axis)[1]
+    distance = distances_from_axis(local, axis)[1]
     radii = _mean_radii(distance[wall], course[wall], len(joints_m) - 1, nominal_radius_m)
     return Shell(
         axis_m=(float(axis[0] + origin[0]), float(axis[1] + origin[1])),
@@ -257,13 +257,13 @@ def _circles_through(triples):
 def _leaning_cylinder(local, course, candidates, circle, nominal_radius):
     """Mask of the wall and axis (x, y, dx/dz, dy/dz), the band narrowing from 3 % to 1 % of R."""
     axis = np.array([circle[0], circle[1], 0.0, 0.0])
-    distance = from_axis(local, axis)[1]
+    distance = distances_from_axis(local, axis)[1]
     wall = candidates & (np.abs(distance - circle[2]) < WIDE_BAND * nominal_radius)
     for band in np.repeat(np.geomspace(WIDE_BAND, WALL_BAND, 5), 3) * nominal_radius:
         rough = np.full(wall.sum(), 0.01)
         fit = adjust(*shell_problem(local[wall], course[wall], axis, rough, None, WIDEST_SLOPE))
         axis = fit.unknowns[:4]
-        distance = from_axis(local, axis)[1]
+        distance = distances_from_axis(local, axis)[1]
         names, first = np.unique(course[wall], return_inverse=True)
         radii = np.array([np.median(distance[wall][first == i]) for i in range(len(names))])
         # a course without a point so far is judged by its nearest neighbour

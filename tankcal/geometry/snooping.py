@@ -147,7 +147,7 @@ def unevenness(xyz, course, zeta, axis):
     Only points that go round tell it, in the lower and the upper part of a course: with fewer, what
     stands before the wall (treads of a stair, the rim of a nozzle) would bear itself out.
     """
-    offset, _ = from_axis(xyz, axis)
+    offset, _ = distances_from_axis(xyz, axis)
     azimuth = np.arctan2(offset[:, 0], offset[:, 1])
     columns, sds = [np.zeros((len(xyz), 0))], []
     for one in np.unique(course):
@@ -206,7 +206,7 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
     priors[2 * modes + 2 :, last_mode:] = np.eye(more)
 
     def model(x, observations):
-        offset, distance = from_axis(xyz, x[:4])
+        offset, distance = distances_from_axis(xyz, x[:4])
         azimuth = np.arctan2(offset[:, 0], offset[:, 1])
         sin, cos = offset[:, 0] / distance, offset[:, 1] / distance
         form_now, turn = np.zeros(n), np.zeros(n)
@@ -225,7 +225,7 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
         modelled = np.concatenate([misclosure, x[first_mode:last_mode], x[2:4], x[last_mode:]])
         return modelled - observations, np.vstack([top, priors]), None
 
-    distance = from_axis(xyz, axis)[1]
+    distance = distances_from_axis(xyz, axis)[1]
     radii = [np.median(distance[row_of == i]) for i in range(len(courses))]
     start = np.concatenate([axis, radii, np.zeros(2 * modes + more)])
     uneven_variances = np.zeros(0) if uneven is None else uneven.sd_m**2
@@ -234,7 +234,7 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
     return model, start, np.zeros(len(variances)), variances
 
 
-def from_axis(local, axis):
+def distances_from_axis(local, axis):
     """Horizontal offsets (n, 2) and distances (n,) from the axis at each point's own height."""
     offset = local[:, :2] - axis[:2] - local[:, 2:] * axis[2:4]
     return offset, np.hypot(offset[:, 0], offset[:, 1])

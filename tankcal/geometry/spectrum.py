@@ -10,7 +10,7 @@ import scipy.linalg
 import scipy.optimize
 
 from tankcal.errors import SolutionError
-from tankcal.geometry.form import Form, free_columns, unit_form, whitened
+from tankcal.geometry.form import Form, free_columns, unit_form, whiten
 from tankcal.messages import message
 
 LEAST_FORM_M2, MOST_FORM_M2 = 1e-12, 1.0
@@ -126,8 +126,8 @@ def _whitened_course(samples, noise):
         waves = unit_form(s.azimuth_rad)
         columns = [(s.radius_m - s.radius_m.mean())[:, None], waves]
         columns.append(waves[:, :MOST_FOLLOWED] * s.zeta[:, None])
-        free.append(whitened(_determined(s), covariance))
-        rest.append(whitened(np.hstack(columns), covariance))
+        free.append(whiten(_determined(s), covariance))
+        rest.append(whiten(np.hstack(columns), covariance))
     radii, waves, rising = np.split(np.vstack(rest), [1, 1 + waves.shape[1]], axis=1)
     return radii[:, 0], scipy.linalg.block_diag(*free), waves, rising
 

@@ -14,7 +14,7 @@ from tankcal.job.entries import read_register
 from tankcal.job.folder import MAX_SETTINGS_BYTES
 from tankcal.job.folder import read_register as raw_register
 from tankcal.job.tables import Log, RawJob, nearest, read_bytes, shown
-from tankcal.messages import listed, message
+from tankcal.messages import list_some, message
 
 CAMERAS_FILE = "cameras.toml"
 NO_SETTINGS = dict.fromkeys((*PARAMETER_KEYS, *SECOND_NAMES.values(), "default"))
@@ -82,7 +82,7 @@ def choose(setups, names, file=CAMERAS_FILE):
                 "found {found}; expected a camera of it{hint}: {listed}",
                 found=shown(name),
                 hint=nearest(name, known),
-                listed=listed(known, 20),
+                listed=list_some(known, 20),
             )
             problems.append(Problem(file, expected))
         elif name in names[:place]:

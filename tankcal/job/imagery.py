@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tankcal.camera.comparator import repeats, transformation
-from tankcal.camera.film import Surface, flattened, heights_at
+from tankcal.camera.film import Surface, flatten_film, heights_at
 from tankcal.errors import SolutionError
 from tankcal.job.cameras import image_coordinates, image_frames
 from tankcal.job.contract.registers import MARKS
@@ -246,7 +246,7 @@ def _flattened(found, tables, cameras):
         mine = rows[photo]
         height, beyond = heights_at(surfaces[owner], xy[mine])
         interior = (given["c_mm"], given["x0_mm"] or 0.0, given["y0_mm"] or 0.0)
-        xy[mine] = flattened(xy[mine], height, interior)
+        xy[mine] = flatten_film(xy[mine], height, interior)
         so_far = outside.get(owner, (0, 0))
         outside[owner] = (so_far[0] + int(beyond.sum()), so_far[1] + len(mine))
     return replace(found, xy_mm=xy, outside=outside)

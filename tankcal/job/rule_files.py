@@ -20,7 +20,7 @@ from tankcal.tank.rules.model import (
     Rule,
     UncertaintyLimit,
 )
-from tankcal.text.shipped import shipped
+from tankcal.text.shipped import shipped_folder
 
 # The keys of a decision rule's file: [rule], [uncertainty.NAME] and [deviation.NAME].
 
@@ -70,14 +70,14 @@ _FOLDER, _ENDING = "job/rule_tables", ".toml"
 
 def shipped_names():
     """Names of the rules that ship with tankcal, for `shipped_rule`."""
-    return tuple(sorted(path.stem for path in shipped(_FOLDER).glob(f"*{_ENDING}")))
+    return tuple(sorted(path.stem for path in shipped_folder(_FOLDER).glob(f"*{_ENDING}")))
 
 
 def shipped_rule(name):
     """A Rule that ships with tankcal. Raises ValueError for a name that does not."""
     if name not in shipped_names():
         raise ValueError(f"no rule {name!r}; expected one of {', '.join(shipped_names())}")
-    path, log = shipped(_FOLDER) / f"{name}{_ENDING}", Log()
+    path, log = shipped_folder(_FOLDER) / f"{name}{_ENDING}", Log()
     rule = parse_rule(path.name, path.read_bytes(), log)
     log.stop_if_problems()
     return rule

@@ -7,7 +7,7 @@ import numpy as np
 from tankcal.errors import Problem, SolutionError
 from tankcal.geometry.shell import VAGUE_TILT
 from tankcal.job.plausibility import VOLUME_MISS
-from tankcal.messages import listed, message
+from tankcal.messages import list_some, message
 from tankcal.tank.body import OWN_SCALE
 
 FEWEST_POINTS, ADVISED_POINTS = 5, 10  # of a section
@@ -95,7 +95,7 @@ def open_questions(job, datum, causes):
             "scale_twice",
             "scale is declared beside that of {instruments} in instruments.toml, which the points"
             " contain: both count, which is right only for different causes",
-            instruments=listed(scales, SHOWN),
+            instruments=list_some(scales, SHOWN),
         )
         problems.append(Problem("uncertainty.csv", text, column="input"))
     return tuple(problems)
@@ -104,7 +104,7 @@ def open_questions(job, datum, causes):
 def _held(names):
     if "all" in names:
         return message("all_points", "all points")
-    return listed(names, SHOWN)
+    return list_some(names, SHOWN)
 
 
 def warn_of_vague_vertical(points):
@@ -150,7 +150,9 @@ def warn_of_vague_points(points, accepted, sds_m, noise_m):
                 count=len(vague),
                 times=VAGUE,
                 median_mm=1000 * middle,
-                points=listed([_with_sd(points.names[accepted[i]], own[i]) for i in worst], SHOWN),
+                points=list_some(
+                    [_with_sd(points.names[accepted[i]], own[i]) for i in worst], SHOWN
+                ),
             )
         )
     is_confirmed = CONFIRMED * middle < noise_m < middle / CONFIRMED

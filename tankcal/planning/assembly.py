@@ -13,7 +13,7 @@ INCIDENCE_DEG, RAYS = 70.0, 3
 HIGHEST_MODE = 1000  # of the sum that turns an rms departure into an amplitude
 
 
-def assembled(job, given, folder):
+def assemble_plan(job, given, folder):
     """The Plan of a Job and what its plan gives beside it (`given.Given`), both sound."""
     pattern = given.single["pattern"]
     shell = shell_of(job, pattern)

@@ -7,7 +7,7 @@ from tankcal.messages import message
 SHARED = 2  # points that two levelled set-ups need in common
 
 
-def apart(plan, seen):
+def find_separate_bodies(plan, seen):
     """Tuples of names of set-ups: those of each body that hangs together with no other one.
 
     seen  visibility.Visibility
@@ -35,8 +35,8 @@ def _linked(bodies):
     return None
 
 
-def in_words(found):
-    """What parts `apart` found, in a sentence."""
+def describe_separate_bodies(found):
+    """What parts `find_separate_bodies` found, in a sentence."""
     told = "; ".join(", ".join(names) for names in found)
     return message(
         "plan_apart",

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.planning.model import Known, Plan
-from tankcal.planning.rings import around, row_heights_m, tape_of
+from tankcal.planning.rings import places_around, row_heights_m, tape_of
 
 ITEMS = ("photo_station", "setup", "tape", "control_point", "target_row", "reading")
 IMAGES, SETS = "all image points", "all sets of the total station"  # what is read again
@@ -107,7 +107,7 @@ def _between(plan, places):
             here, there = places[one], places[other]
             gap = (_azimuth(plan, there) - _azimuth(plan, here)) % (2 * np.pi)
             radius = [np.hypot(*(place[:2] - plan.shell.axis_m)) for place in (here, there)]
-            at = around(plan.shell.axis_m, _azimuth(plan, here) + gap / 2, np.mean(radius))
+            at = places_around(plan.shell.axis_m, _azimuth(plan, here) + gap / 2, np.mean(radius))
             yield one, other, np.array([*at, (here[2] + there[2]) / 2])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.job.tables import SETTINGS_FILE
-from tankcal.messages import listed, message
+from tankcal.messages import list_some, message
 from tankcal.pipeline.plausibility import SHOWN, open_questions
 from tankcal.pipeline.table import check_table
 from tankcal.planning.covariance import PredictedCovariance
@@ -50,7 +50,7 @@ def _unseen(prediction):
         " {points}",
         count=len(lost),
         all=len(targets),
-        points=listed(lost, SHOWN),
+        points=list_some(lost, SHOWN),
     )
     return (Problem(PLAN_FILE, text, column="pattern"),)
 
@@ -75,7 +75,7 @@ def idle_ties(plan, points):
         " them is not determined: {ties}",
         count=len(idle),
         all=len(ties),
-        ties=listed(idle, SHOWN),
+        ties=list_some(idle, SHOWN),
     )
     return (Problem(PLAN_FILE, text),)
 

@@ -15,7 +15,7 @@ from tankcal.planning.checks.placed import refuse_misplaced
 from tankcal.planning.checks.seen import refuse_blind
 from tankcal.planning.measurements import measurements_of, nominal_of
 from tankcal.planning.prediction import Prediction, limited_u, predict
-from tankcal.planning.table import predicted_table, recomputed
+from tankcal.planning.table import predicted_table, recompute_table
 from tankcal.planning.visibility import visible
 from tankcal.survey import predict_survey
 
@@ -238,7 +238,7 @@ def _effect(change, before):
         seen = visible(plan)
         refuse_blind(plan, seen)
         predicted = predict_survey(measurements_of(plan, seen), nominal_of(plan))
-        tabled = recomputed(plan, predicted, before.tabled)
+        tabled = recompute_table(plan, predicted, before.tabled)
         tabled = tabled or predicted_table(plan, predicted)
     except TankcalError as error:
         why, inf = str(error).splitlines()[0], float("inf")

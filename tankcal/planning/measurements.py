@@ -129,7 +129,7 @@ def _readings(table, start, end, sd, **more):
     )  # fmt: skip
 
 
-def measured(plan, measurements, predicted, rng=None):
+def draw_measurements(plan, measurements, predicted, rng=None):
     """The Measurements with the values that they would have at the nominal places.
 
     predicted  surveys.Predicted of the same        rng  None: without errors; else every reading is

@@ -9,7 +9,7 @@ from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.pipeline.plausibility import VAGUE
 from tankcal.pipeline.statements import MINIMA_M
-from tankcal.planning.bodies import apart, in_words
+from tankcal.planning.bodies import describe_separate_bodies, find_separate_bodies
 from tankcal.planning.checks.seen import refuse_blind
 from tankcal.planning.doubtful import reliability
 from tankcal.planning.foreseen import foreseen, idle_ties
@@ -176,10 +176,10 @@ def _predicted(plan, seen, measurements):
     try:
         return predict_survey(measurements, nominal_of(plan))
     except SolutionError as error:
-        parts = apart(plan, seen) if plan.setups and not plan.photos else ()
+        parts = find_separate_bodies(plan, seen) if plan.setups and not plan.photos else ()
         if len(parts) < 2:
             raise
-        raise SolutionError(in_words(parts)) from error
+        raise SolutionError(describe_separate_bodies(parts)) from error
 
 
 def limited_u(tabled, limits):

@@ -32,7 +32,7 @@ from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import REGISTERS, Log, RawJob, Value, fingerprint, nearest, read_bytes
 from tankcal.job.tables import TABLES as JOB_FILES
 from tankcal.messages import message
-from tankcal.planning.assembly import assembled
+from tankcal.planning.assembly import assemble_plan
 from tankcal.planning.checks.given import check_given
 from tankcal.planning.checks.placed import check_plan
 from tankcal.planning.contract import JOB_TABLES, REPEATED, SINGLE, TABLES, Count
@@ -74,7 +74,7 @@ def load_plan(path):
     log.stop_if_problems()
     job = _job(raw, values, tables, registers, log)
     log.stop_if_problems()
-    plan = assembled(job, given, folder.resolve().name)
+    plan = assemble_plan(job, given, folder.resolve().name)
     check_plan(plan, given, raw, log)
     log.stop_if_problems()
     return replace(plan, given=_with_points(raw), warnings=tuple(log.warnings))

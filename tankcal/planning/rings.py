@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tankcal.geometry.rotations import looking
+from tankcal.geometry.rotations import rotation_of_view
 from tankcal.planning.model import Instrumented, Photograph, Shell, Targets, Tie
 from tankcal.quadrature import panels
 
@@ -37,7 +37,7 @@ def full_turn(angle_rad):
     return np.where(2 * np.pi - turned < ROUNDING_RAD, 0.0, turned)
 
 
-def around(axis_m, azimuth_rad, radius_m):
+def places_around(axis_m, azimuth_rad, radius_m):
     """(..., 2) places at azimuths, clockwise from +y, and distances from an axis."""
     azimuth, radius = np.broadcast_arrays(azimuth_rad, radius_m)
     return np.asarray(axis_m) + radius[..., None] * np.stack(
@@ -92,10 +92,10 @@ def targets_of(given, shell, courses):
     plates = np.array([plate_m(one, shell.outside) for one in courses])
     radius = shell.radius_m + (plates - plates[0])[course]
     out = np.zeros((len(row), 3))
-    out[:, :2] = side * around((0.0, 0.0), azimuth[line], 1.0)
+    out[:, :2] = side * places_around((0.0, 0.0), azimuth[line], 1.0)
     xyz = np.column_stack(
         [
-            around(shell.axis_m, azimuth[line], radius[row] + side * offset),
+            places_around(shell.axis_m, azimuth[line], radius[row] + side * offset),
             shell.low_m + rows[row],
         ]
     )
@@ -129,7 +129,7 @@ def _stands(given, shell):
     n = int(given["stations"])
     azimuth = np.radians(_or(given["start_azimuth_deg"], 0.0)) + 2 * np.pi * np.arange(n) / n
     for level, height in enumerate(given["heights_m"]):
-        plan = around(shell.axis_m, azimuth, ring_radius_m(given, shell))
+        plan = places_around(shell.axis_m, azimuth, ring_radius_m(given, shell))
         for i in range(n):
             yield azimuth[i], np.array([*plan[i], shell.low_m + height]), i, level
 
@@ -165,7 +165,9 @@ def photographs_of(given, number, shell, image_sd_mm, place):
                     station=station,
                     camera=given["camera"],
                     xyz_m=xyz,
-                    rotation=looking(ahead, np.clip(tilt, -STEEP, STEEP), np.radians(roll)),
+                    rotation=rotation_of_view(
+                        ahead, np.clip(tilt, -STEEP, STEEP), np.radians(roll)
+                    ),
                     sd_mm=sd,
                     readings=int(_or(given["readings"], 1)),
                     place=place,
@@ -214,7 +216,7 @@ def tape_of(given, shell):
     radius = shell.radius_m + side * _or(given["off_m"], 0.1)
     if given["kind"] == "horizontal" and not shell.outside:
         radius = np.sqrt(max(radius**2 - (length / 2) ** 2, 0.0))
-    middle, low = around(shell.axis_m, azimuth, radius), shell.low_m + given["low_m"]
+    middle, low = places_around(shell.axis_m, azimuth, radius), shell.low_m + given["low_m"]
     if given["kind"] == "vertical":
         ends = np.array([[*middle, low], [*middle, low + length]])
     else:

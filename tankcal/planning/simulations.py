@@ -13,7 +13,7 @@ from tankcal.errors import SolutionError, TankcalError
 from tankcal.messages import message
 from tankcal.pipeline.table import compute_table
 from tankcal.pipeline.wall import find_wall, s_transform
-from tankcal.planning.measurements import measured
+from tankcal.planning.measurements import draw_measurements
 from tankcal.planning.prediction import Prediction
 from tankcal.survey import adjust_survey, wall_points
 
@@ -87,7 +87,9 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
     for run in range(1, runs + 1):
         if progress:
             progress(message("plan_simulating", "simulating surveys"), run, runs)
-        drawn = measured(prediction.plan, prediction.measurements, prediction.predicted, rng)
+        drawn = draw_measurements(
+            prediction.plan, prediction.measurements, prediction.predicted, rng
+        )
         try:
             adjustment, volume = _made(prediction.plan, _spoilt(drawn, blunders, rng))
         except TankcalError as error:

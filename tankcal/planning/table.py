@@ -16,7 +16,7 @@ from tankcal.pipeline.wall import Wall, find_wall
 from tankcal.planning.covariance import PredictedCovariance
 from tankcal.survey.causes import causes_of
 from tankcal.survey.points import Points
-from tankcal.survey.wall import off_the_wall
+from tankcal.survey.wall import move_to_wall
 
 MANY = 400  # points of a wall whose covariance is written out for its outlines
 
@@ -60,7 +60,7 @@ def predicted_table(plan, predicted):
     return PredictedTable(job, wall, compute_table(job, wall), covariance)
 
 
-def recomputed(plan, predicted, before):
+def recompute_table(plan, predicted, before):
     """The PredictedTable of a Plan whose wall is that of another one; None where it is not.
 
     before  PredictedTable of a plan with the same targets and the same tank
@@ -112,7 +112,7 @@ def _points(plan, there, covariance):
     outwards = targets.offset_m * (1.0 if plan.shell.outside else -1.0)
     return Points(
         names=tuple(targets.names[i] for i in there),
-        xyz_m=off_the_wall(adjusted.xyz_m[covariance.points], np.full(len(there), outwards)),
+        xyz_m=move_to_wall(adjusted.xyz_m[covariance.points], np.full(len(there), outwards)),
         sd_m=None,
         covariance_m2=written,
         section=section,

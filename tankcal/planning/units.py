@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.job.checking import tell, tiny_sd
 from tankcal.job.checks.survey.doubtful import TINY
-from tankcal.messages import listed, message
+from tankcal.messages import list_some, message
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.model import Box
 
@@ -63,7 +63,7 @@ def warn_of_places(plan, given, log):
             " {obstacles}; are they in the frame of the survey, in metres?",
             bottom_m=float(shell.low_m),
             top_m=float(shell.high_m),
-            obstacles=listed(far, SHOWN),
+            obstacles=list_some(far, SHOWN),
         )
         log.warning(PLAN_FILE, text, given.repeated["obstacles"][0].row, "obstacles")
     for entry in given.repeated["tapes"]:

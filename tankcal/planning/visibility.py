@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera.model import measured
+from tankcal.camera.model import distort_image_points
 from tankcal.planning.model import Box, Pillar
 
 FEWEST_READINGS = 3
@@ -61,14 +61,14 @@ def visible(plan):
     number, seen_from = {}, []
     for k, photo in enumerate(plan.photos):
         if number.setdefault(tuple(photo.xyz_m), len(number)) == len(seen_from):
-            seen_from.append(in_sight(plan, photo.xyz_m, xyz, normals))
-        image[k], inside = in_frame(cameras[photo.camera], photo, xyz)
+            seen_from.append(find_in_sight(plan, photo.xyz_m, xyz, normals))
+        image[k], inside = find_in_frame(cameras[photo.camera], photo, xyz)
         on_photo[k] = inside & seen_from[number[tuple(photo.xyz_m)]] & ~is_setup
     place = np.array([number[tuple(one.xyz_m)] for one in plan.photos], dtype=int)
     on_setup = np.zeros((len(plan.setups), len(xyz)), dtype=bool)
     for k, setup in enumerate(plan.setups):
         sighted = ~is_setup | np.isin(names, setup.sights)
-        on_setup[k] = sighted & in_sight(plan, setup.xyz_m, xyz, normals)
+        on_setup[k] = sighted & find_in_sight(plan, setup.xyz_m, xyz, normals)
     return Visibility(tuple(points), place, on_photo, image, on_setup)
 
 
@@ -90,7 +90,7 @@ def measurable(plan, seen):
     return count >= FEWEST_READINGS
 
 
-def in_frame(setup, photo, xyz_m):
+def find_in_frame(setup, photo, xyz_m):
     """Image coordinates (n, 2), mm, of points (n, 3), and which lie in the frame of a photograph.
 
     setup  job.CameraSetup
@@ -101,11 +101,11 @@ def in_frame(setup, photo, xyz_m):
     ideal = -camera.values[0] * np.column_stack([u, v]) / np.where(ahead, w, -1.0)[:, None]
     near = ahead & (np.abs(ideal) < ROOM * half).all(axis=1)
     image = np.full((len(xyz_m), 2), np.nan)
-    image[near] = measured(ideal[near], camera.values, camera.form)
+    image[near] = distort_image_points(ideal[near], camera.values, camera.form)
     return image, near & (np.abs(np.nan_to_num(image, nan=np.inf)) < half).all(axis=1)
 
 
-def in_sight(plan, place_m, xyz_m, normals):
+def find_in_sight(plan, place_m, xyz_m, normals):
     """(n,) which points (n, 3) nothing hides from a place (3,), and that are not seen too aslant.
 
     normals  (n, 3) of the wall at each point, or of a mark that faces one way; nan: neither
@@ -119,16 +119,16 @@ def in_sight(plan, place_m, xyz_m, normals):
     if plan.shell.outside:
         shell = plan.shell
         tank = Pillar(shell.axis_m, shell.radius_m - GRAZE_M, shell.low_m, shell.high_m, "tank")
-        seen &= on_wall | ~cut(tank, place_m, xyz_m)
+        seen &= on_wall | ~find_hidden(tank, place_m, xyz_m)
     else:
         away = np.hypot(*(xyz_m[:, :2] - plan.shell.axis_m).T)
         seen &= away < plan.shell.radius_m + GRAZE_M
     for obstacle in plan.obstacles:
-        seen &= ~cut(obstacle, place_m, xyz_m)
+        seen &= ~find_hidden(obstacle, place_m, xyz_m)
     return seen
 
 
-def cut(obstacle, place_m, xyz_m):
+def find_hidden(obstacle, place_m, xyz_m):
     """(n,) True where the line from a place (3,) to a point (n, 3) meets a Box or a Pillar."""
     along = xyz_m - place_m
     if isinstance(obstacle, Box):

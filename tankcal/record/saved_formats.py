@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
-from tankcal.messages import listed, message
+from tankcal.messages import list_some, message
 from tankcal.record.schema import checked
 
 MOST_NAMED = 3  # keys that are missing
@@ -83,7 +83,7 @@ class SavedFormat:
         if self.kinds and kind not in self.kinds:
             expected = message(
                 "result_of_other_kind", "found kind {found}; expected one of: {kinds}",
-                found=repr(kind), kinds=listed(self.kinds, len(self.kinds)),
+                found=repr(kind), kinds=list_some(self.kinds, len(self.kinds)),
             )  # fmt: skip
             raise InputError(Problem(name, expected))
         try:
@@ -104,7 +104,7 @@ class SavedFormat:
                 "record_lacks_keys",
                 "found format {found} without {keys}, which every file of that version has; "
                 "expected {file} as tankcal wrote it: make it again",
-                found=f"{self.name}/{version}", keys=listed(missing, MOST_NAMED), file=self.file,
+                found=f"{self.name}/{version}", keys=list_some(missing, MOST_NAMED), file=self.file,
             )  # fmt: skip
             raise InputError(Problem(name, expected))
         if problems:

@@ -10,7 +10,7 @@ from pathlib import Path
 import nbformat
 
 from tankcal.errors import TankcalError, VocabularyError
-from tankcal.text.shipped import shipped
+from tankcal.text.shipped import shipped_folder
 
 TEMPLATES = ("certificate.ipynb", "working_papers.ipynb", "field_table.ipynb")
 CELL_TIMEOUT_S = 600
@@ -27,7 +27,7 @@ def joined(record_name, lacks=(), templates=TEMPLATES, **parameters):
 
     Raises TankcalError for a parameter that the templates do not have.
     """
-    folder = shipped("report_templates")
+    folder = shipped_folder("report_templates")
     whole, *others = (nbformat.read(folder / name, as_version=4) for name in templates)
     for other in others:
         whole.cells += [c for c in other.cells if not _tags(c) & {"parameters", "setup"}]

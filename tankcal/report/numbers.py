@@ -5,7 +5,14 @@ from math import inf, pi
 
 from tankcal.errors import VocabularyError
 from tankcal.tank.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
-from tankcal.text.digits import ENGLISH, WITHOUT_U, shortest, superscript, with_digits, written
+from tankcal.text.digits import (
+    ENGLISH,
+    WITHOUT_U,
+    format_significant,
+    format_with_u,
+    shortest,
+    superscript,
+)
 
 _SHORT = range(-2, 6)  # powers of ten written out in a narrow column
 _MOST_DEGREES = 10_000  # of freedom: from there k is that of the normal distribution, to 0.03 %
@@ -95,8 +102,8 @@ def symbol(text):
 def like_its_sd(value, sd, marks=ENGLISH):
     """`value` down to two digits of its standard deviation; four digits when it has none."""
     if not sd:
-        return with_digits(value, 4, marks)
-    found = written(value, sd, marks, least=0, written_out=WITHOUT_U)
+        return format_significant(value, 4, marks)
+    found = format_with_u(value, sd, marks, least=0, written_out=WITHOUT_U)
     return found.value + found.power
 
 
@@ -106,8 +113,8 @@ def concise(value, sd, marks=ENGLISH):
     Without a standard deviation seven digits and no bracket.
     """
     if not sd:
-        return with_digits(value, 7, marks)
-    return written(value, sd, marks, least=0, written_out=_SHORT).concise
+        return format_significant(value, 7, marks)
+    return format_with_u(value, sd, marks, least=0, written_out=_SHORT).concise
 
 
 def powers(unit):

@@ -15,7 +15,13 @@ from tankcal.record.plain_data import rows_of, without_collection
 from tankcal.report import attachments, blocks
 from tankcal.report.letterhead import read_saved
 from tankcal.report.plain import Column, PlainPaper
-from tankcal.text.words import choice_sentence, in_language, input_name, language_of, load_words
+from tankcal.text.words import (
+    choice_sentence,
+    input_name,
+    language_of,
+    load_words,
+    translate_record,
+)
 
 __all__ = ["Column", "Paper"]
 _BLANK = "_" * 20  # to be filled in by hand
@@ -35,7 +41,7 @@ class Paper(PlainPaper):
     def __init__(self, source, words=None, language=None, letterhead=None):
         record = source if isinstance(source, dict) else load(source)
         super().__init__(words or load_words(language or language_of(record)))
-        self.record = in_language(self.words, record)
+        self.record = translate_record(self.words, record)
         self._path = None if isinstance(source, dict) else Path(source)
         self.letterhead = read_saved(letterhead) if letterhead else None
 

@@ -14,7 +14,7 @@ from tankcal.errors import TankcalError
 from tankcal.report import attachments
 from tankcal.report.blocks import WEB_ONLY
 from tankcal.report.plain_formulas import formula_nodes
-from tankcal.text.shipped import shipped
+from tankcal.text.shipped import shipped_folder
 
 STANDARDS = ["a-3a", "ua-1"]  # archival, and readable by a screen reader
 PLACES = ("asked", "tables", "no")  # who asks for its place on the page (page.typ)
@@ -34,7 +34,7 @@ def pdf(blocks, folder="."):
     attached = attachments.contents(blocks, folder)
     files, blocks = _pictures_as_files(blocks)
     files |= {f"attached-{name}": content for name, content in attached.items()}
-    files["main.typ"] = (shipped("report_templates") / "page.typ").read_bytes()
+    files["main.typ"] = (shipped_folder("report_templates") / "page.typ").read_bytes()
     files["blocks.json"] = json.dumps(blocks, ensure_ascii=False).encode("utf-8")
     return _compile(files, _timestamp(blocks[0]["date"]))
 

@@ -8,7 +8,7 @@ from datetime import date
 from tankcal.errors import VocabularyError
 from tankcal.report import blocks, numbers
 from tankcal.report.tables import Column, decimals_of_cells
-from tankcal.text.digits import decimals_of, decimals_of_height, fixed, shortest, with_digits
+from tankcal.text.digits import decimals_of, decimals_of_height, fixed, format_significant, shortest
 from tankcal.text.words import marks_of, percent
 
 __all__ = ["Column", "PlainPaper"]
@@ -57,7 +57,7 @@ class PlainPaper:
         if decimals is not None:
             text = fixed(value * shown.factor, decimals, self.marks)
         else:
-            text = with_digits(value * shown.factor, digits or 6, self.marks)
+            text = format_significant(value * shown.factor, digits or 6, self.marks)
         return f"{text}{_SPACE}{shown.symbol}" if shown.symbol else text
 
     def height(self, value_m, unit="m"):
@@ -166,7 +166,7 @@ class PlainPaper:
         values = [row.get(column.key) for row in rows]
         scaled = [None if value is None else value * factor for value in values]
         if column.digits is not None:
-            return [with_digits(value, column.digits, self.marks) for value in scaled]
+            return [format_significant(value, column.digits, self.marks) for value in scaled]
         decimals = decimals_of_cells(column, rows, factor)
         return [
             fixed(value, places, self.marks) for value, places in zip(scaled, decimals, strict=True)

@@ -9,23 +9,28 @@ from tankcal.adjust import CRITICAL
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.survey.causes import causes_of
-from tankcal.survey.datum import framed
-from tankcal.survey.depth import in_depth
-from tankcal.survey.diagnosis.blunders import gross_readings, searched, swapped_at_start
-from tankcal.survey.diagnosis.checks import check_points, check_readings, disagreeing
-from tankcal.survey.diagnosis.diagnoses import MIRROR, diagnosed
+from tankcal.survey.datum import make_frame
+from tankcal.survey.depth import adjust_in_depth
+from tankcal.survey.diagnosis.blunders import gross_readings, search_blunders, swapped_at_start
+from tankcal.survey.diagnosis.checks import check_points, check_readings, find_disagreeing_checks
+from tankcal.survey.diagnosis.diagnoses import MIRROR, diagnose
 from tankcal.survey.diagnosis.double_names import names_alike, same_place
 from tankcal.survey.diagnosis.fixed_datum_check import strained, wrong_control, wrongly_held
 from tankcal.survey.diagnosis.misread_files import likely_mistake, photos_that_do_not_fit
-from tankcal.survey.diagnosis.outlier_attribution import SOME, one_sided, set_aside, undecided
+from tankcal.survey.diagnosis.outlier_attribution import (
+    SOME,
+    count_set_aside,
+    find_one_sided_losses,
+    find_undecided_outliers,
+)
 from tankcal.survey.diagnosis.scales import check_readings_off, scale_of_control
 from tankcal.survey.network.reactions import HELD, reactions
-from tankcal.survey.network.soundness import hardly_determined
+from tankcal.survey.network.soundness import find_hardly_determined
 from tankcal.survey.network_of_survey import gather, held_trace, named_in
 from tankcal.survey.results import Adjustment
 from tankcal.survey.rows import gone_with_their_points, readings_of
 from tankcal.survey.start.unstarted import SeveralPlacesError
-from tankcal.survey.start_values import mirrored_targets, started, started_like
+from tankcal.survey.start_values import add_start_values, mirrored_targets, started_like
 
 SUSPICIOUS = 4.0  # sigma0 above which whole files are doubted
 SEVERAL = 0.05  # share of the values set aside, above which they are as well
@@ -49,7 +54,7 @@ def adjust_survey(measurements, progress=None):
         return _adjusted(measured, progress, like=like)
 
     try:
-        found, measurements, depth = in_depth(measurements, adjusted, progress)
+        found, measurements, depth = adjust_in_depth(measurements, adjusted, progress)
     except SolutionError as error:
         if not measurements.settings.explain or isinstance(error, SeveralPlacesError):
             raise
@@ -76,16 +81,16 @@ def _adjusted(measurements, progress, snooping=None, most=100, like=None):
         )
     )
     survey = None if like is None else started_like(like, gathered, measurements)
-    survey = survey or started(gathered, measurements)
+    survey = survey or add_start_values(gathered, measurements)
     swapped = swapped_at_start(survey, gathered.known)
     if swapped:
         raise SolutionError("\n".join(map(str, swapped)))
-    frame = framed(survey, gathered, measurements.settings)
+    frame = make_frame(survey, gathered, measurements.settings)
     progress(message("adjusting", "adjusting {count} observations", count=_count(frame.survey)))
     wanted = measurements.settings.snooping if snooping is None else snooping
     gross = gross_readings(frame.survey) if wanted else None
     options = {**frame.options, "max_iterations": most}
-    return searched(frame.survey, options, gross), gathered, frame
+    return search_blunders(frame.survey, options, gross), gathered, frame
 
 
 def _tried(measurements, snooping=False, like=None):
@@ -134,15 +139,17 @@ def _complete(search, gathered, frame, measurements):
         others = [one for one in others if one.kind.startswith("control coordinate")]
     else:
         of_images = [one for one in search.removed if one.source == "image points"]
-        rays = undecided(adjusted, of_images, traces, held)  # one more or less: a warning
-    doubts += undecided(adjusted, others, traces, held)
+        rays = find_undecided_outliers(
+            adjusted, of_images, traces, held
+        )  # one more or less: a warning
+    doubts += find_undecided_outliers(adjusted, others, traces, held)
     warnings = [*doubts, *warnings, *diagnoses, *rays]
     known = gathered.known
     acting = frame.held
     if measurements.settings.datum == "control":
         acting = np.isfinite(known.xyz_m) & np.isfinite(known.sd_m)
     checked = check_points(adjusted, measurements, known, acting, scale)
-    warnings += disagreeing(checked, measurements.check)
+    warnings += find_disagreeing_checks(checked, measurements.check)
     warnings += check_readings_off(readings)
     warnings += scale_of_control(adjusted, readings, measurements, scale)
     return Adjustment(
@@ -185,9 +192,11 @@ def _lost(measurements, name, why):
 
 def _diagnoses(adjusted, readings, groups, gathered, measurements):
     """Problem rows: what the result says about mistakes in the input."""
-    found = diagnosed(adjusted, readings, groups, gathered.known)
+    found = diagnose(adjusted, readings, groups, gathered.known)
     found += names_alike(gathered.lost, adjusted.survey.points) + same_place(adjusted)
-    found += [Problem("job.toml", text, None, "adjustment") for text in hardly_determined(adjusted)]
+    found += [
+        Problem("job.toml", text, None, "adjustment") for text in find_hardly_determined(adjusted)
+    ]
     found += mirrored_targets(adjusted.xyz_m, adjusted.survey.points, measurements)
     return found
 
@@ -196,8 +205,8 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
     """Problem rows: what is wrong with the whole rather than with single readings."""
     if not measurements.settings.explain:
         return []
-    gone = set_aside(adjusted.survey)
-    told = one_sided(readings, gathered.known)
+    gone = count_set_aside(adjusted.survey)
+    told = find_one_sided_losses(readings, gathered.known)
     if not (told or adjusted.sigma0 > SUSPICIOUS or gone > SOME * len(readings)):
         return strained(readings, gathered.known)
     close, sigma0 = partial(_tried, like=adjusted), adjusted.sigma0

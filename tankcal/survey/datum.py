@@ -6,9 +6,14 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.errors import InputError, Problem, SolutionError
-from tankcal.messages import listed, message
+from tankcal.messages import list_some, message
 from tankcal.survey.network.assembly import assemble
-from tankcal.survey.network.datum import defect_in_words, directions, in_words, null_space
+from tankcal.survey.network.datum import (
+    datum_defect_sentence,
+    defect_in_words,
+    directions,
+    null_space,
+)
 from tankcal.survey.observations import ControlCoordinates
 from tankcal.survey.results import DatumReport
 
@@ -37,9 +42,9 @@ class Frame:
     warnings: tuple = field(default=())
 
 
-def framed(survey, gathered, settings):
+def make_frame(survey, gathered, settings):
     """The Frame of a survey with start values; raises SolutionError when the datum is missing."""
-    bare = without_control(survey, gathered)
+    bare = release_control(survey, gathered)
     problem = assemble(bare)
     free = _free(problem)
     choose = {"control": _control, "minimal": _minimal, "fixed_photo": _photo, "inner": _inner}
@@ -81,7 +86,7 @@ def _free(problem):
     return found @ turns[size > STILL * max(parts, 1e-9)].T
 
 
-def without_control(survey, gathered):
+def release_control(survey, gathered):
     """The survey without control in its own frame, weighted or fixed."""
     gone = [
         number
@@ -120,7 +125,7 @@ def _control(survey, bare, problem, free, gathered, settings):
     acting = np.isfinite(known.xyz_m) & np.isfinite(known.sd_m)
     missing = _free(assemble(survey)) if free.shape[1] else free
     if missing.shape[1]:
-        raise SolutionError(in_words(missing, assemble(survey)))
+        raise SolutionError(datum_defect_sentence(missing, assemble(survey)))
     return survey, {}, acting & (known.sd_m == 0), _named(survey, acting), []
 
 
@@ -185,7 +190,7 @@ def _photo(survey, bare, problem, free, gathered, settings):
     chosen = replace(bare, photos=replace(survey.photos, fixed=fixed))
     left = _free(assemble(chosen))
     if left.shape[1]:
-        raise SolutionError(in_words(left, problem))
+        raise SolutionError(datum_defect_sentence(left, problem))
     held = np.zeros((len(survey.points), 3), dtype=bool)
     released = _released(survey, _exact(gathered), "fixed_photo")
     if free.shape[1] < 6:  # observations determine the rest: holding that, too, would strain them
@@ -243,7 +248,7 @@ def _released(survey, held, choice):
         "held_released",
         "{points} hold exactly in control.csv (sd 0), and datum = {choice} does not hold them: they"
         " are compared only; choose datum = control or inner to hold them",
-        points=listed(_named(survey, held), SHOWN),
+        points=list_some(_named(survey, held), SHOWN),
         choice=choice,
     )
     return [Problem("job.toml", text, None, "adjustment.datum")]

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.camera.focus import as_in_focus
+from tankcal.camera.focus import refer_to_focus
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.survey.results import DepthOfField
@@ -19,7 +19,7 @@ MOST_ROUNDS = 20
 NEAREST = 2.0  # focal lengths: an object nearer than that has no image
 
 
-def in_depth(measurements, adjust, progress):
+def adjust_in_depth(measurements, adjust, progress):
     """(what `adjust` gave, the Measurements that it was given, DepthOfField or None).
 
     adjust  adjust(measurements, like) -> (Searched, ...); like: network.Adjusted close to it, None
@@ -78,7 +78,7 @@ def _corrected(images, adjusted, lenses):
         near = depth[mine] <= NEAREST * setup.lens.focal_length_mm
         left, mine = left + int(near.sum()), mine[~near]
         interior = state.interior[problem.interior_of[photo[mine]]]
-        found[mine] = as_in_focus(
+        found[mine] = refer_to_focus(
             images.xy_mm[mine], depth[mine], interior, setup.camera.form, setup.lens
         )
     return found, left

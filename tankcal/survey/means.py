@@ -37,7 +37,7 @@ class Averages:
     share: np.ndarray
 
 
-def averaged(label, value, sd, *, angle=False):
+def average_readings(label, value, sd, *, angle=False):
     """The Averages of readings that have the same label.
 
     label      (n,) whole numbers       value, sd  (n,) or (n, m)
@@ -71,7 +71,7 @@ def averaged(label, value, sd, *, angle=False):
     return Averages(value[first] + mean, mean_sd, first, repeats, chi2, group, off, share)
 
 
-def torn_apart(label, averages):
+def contradictory_labels(label, averages):
     """Labels (readings,) with which values that one reading alone contradicts are not averaged.
 
     They scatter more than they may, and not so once the worst is gone: each then goes into the

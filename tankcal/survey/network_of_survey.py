@@ -5,16 +5,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import InputError, Problem
-from tankcal.messages import listed, message
+from tankcal.messages import list_some, message
 from tankcal.survey.correlations import blocks_of, rows_of
-from tankcal.survey.diagnosis.double_names import in_photo
-from tankcal.survey.diagnosis.undetermined import left_out, not_measured, sorted_out
-from tankcal.survey.means import averaged, scatter_warnings
+from tankcal.survey.diagnosis.double_names import image_point_label
+from tankcal.survey.diagnosis.undetermined import (
+    find_left_out,
+    find_untouched_coordinates,
+    unmeasured_sentence,
+)
+from tankcal.survey.means import average_readings, scatter_warnings
 from tankcal.survey.network import ImagePoints, Instrument, Survey, System
 from tankcal.survey.observations import KINDS, ControlCoordinates, SystemCoordinates
 from tankcal.survey.photographs import gathered_photos, orientation_of
-from tankcal.survey.readings import Numbers, Trace, bend_per_m, compared_only, observed, table_of
-from tankcal.survey.repeated_readings import without_scattered
+from tankcal.survey.readings import (
+    Numbers,
+    Trace,
+    bend_per_m,
+    compared_only,
+    observations_of_table,
+    table_of,
+)
+from tankcal.survey.repeated_readings import reject_scattered
 
 AXES = "xyz"
 TOLD = 10  # points left out that are told one by one
@@ -62,17 +73,17 @@ class Known:
 
 def gather(measurements):
     """The Gathered of Measurements; raises InputError for what cannot be meant."""
-    measurements, repeated, scattered = without_scattered(measurements)
+    measurements, repeated, scattered = reject_scattered(measurements)
     excluded = {}
     while True:
         found = _gathered(measurements, excluded)
-        poor = left_out(found.survey)
+        poor = find_left_out(found.survey)
         if not poor:
             break
         excluded |= poor
     excluded = _unmeasured(measurements, found.survey.points, excluded)
     where = {name: named_in(measurements, name) for name in excluded}
-    idle, warnings = sorted_out(found.survey)
+    idle, warnings = find_untouched_coordinates(found.survey)
     warnings += _of_excluded(excluded, where)
     fixed = idle if found.survey.fixed is None else found.survey.fixed | idle
     return replace(
@@ -94,7 +105,7 @@ def _of_excluded(excluded, where):
     text = message(
         "more_left_out",
         "further points are left out for want of observations: {points}",
-        points=listed(list(excluded)[TOLD - 1 :], TOLD),
+        points=list_some(list(excluded)[TOLD - 1 :], TOLD),
     )
     return [*found[: TOLD - 1], Problem("job.toml", text, None, "adjustment")]
 
@@ -105,7 +116,7 @@ def _unmeasured(measurements, points, excluded):
     for table in (measurements.control, measurements.check):
         for name in () if table is None else table.point:
             if name not in points and name not in found:
-                found[name] = not_measured(name)
+                found[name] = unmeasured_sentence(name)
     return found
 
 
@@ -144,7 +155,7 @@ def _gathered(measurements, excluded):
     bend = bend_per_m(measurements.settings.refraction)
     for readings in measurements.readings:
         table = table_of(readings, numbers, rows_of(measurements.correlated, readings.table))
-        for one, trace in observed(table, bend, warnings):
+        for one, trace in observations_of_table(table, bend, warnings):
             add(one, trace)
         checks += compared_only(table, bend)
     photos, cameras, order = gathered_photos(measurements)
@@ -251,7 +262,7 @@ def _control(control, points, warnings, alone=frozenset()):
         if alone:  # values that are correlated with others are not averaged
             mine = np.isin([control.rows[i] for i in row], list(alone))
             label = np.where(mine, 3 * len(points) + np.arange(len(label)), label)
-        means = averaged(label, value, sd)
+        means = average_readings(label, value, sd)
         first = means.first
         trace = _control_trace(control, row[first], axis[first], means.repeats)
         trace = replace(trace, scatter=means.chi2.sum(axis=1))
@@ -325,12 +336,12 @@ def _images(measurements, points, order, warnings):
     there = (photo >= 0) & (point >= 0)
     rows = np.flatnonzero(there & ~check)
     cameras = {one.name: one.camera for one in measurements.photos}
-    means = averaged(photo[rows] * len(points) + point[rows], images.xy_mm[rows], sd[rows])
+    means = average_readings(photo[rows] * len(points) + point[rows], images.xy_mm[rows], sd[rows])
     first = rows[means.first]
     trace = _image_trace(images, first, means.repeats, cameras)
     trace = replace(trace, scatter=means.chi2.sum(axis=1))
     warnings += scatter_warnings(
-        means, lambda k: in_photo(*trace.ids[means.group[k]]), images.file,
+        means, lambda k: image_point_label(*trace.ids[means.group[k]]), images.file,
         [images.rows[i] for i in rows] if images.rows else (),
     )  # fmt: skip
     shared = np.zeros_like(sd) if images.shared_sd_mm is None else images.shared_sd_mm

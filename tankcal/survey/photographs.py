@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.errors import InputError, Problem
-from tankcal.geometry.rotations import from_angles
+from tankcal.geometry.rotations import rotation_of_angles
 from tankcal.messages import message
 from tankcal.survey.network import Photos
 from tankcal.survey.observations import PhotoOrientation, PhotoRotation
@@ -38,7 +38,7 @@ def gathered_photos(measurements):
         names=tuple(one.name for one in photos),
         camera=np.array([cameras[one.camera] for one in photos], dtype=int),
         xyz_m=values[:, :3],
-        rotation=from_angles(*values[:, 3:].T),
+        rotation=rotation_of_angles(*values[:, 3:].T),
         fixed=np.column_stack([fixed[:, :3], fixed[:, 3:].all(axis=1)]),
     )
     order = {one.name: number for number, one in enumerate(photos)}
@@ -102,7 +102,9 @@ def _whole(photos, order):
     angles = np.array([one.values[3:] for one in photos], dtype=float)
     sd = np.array([one.sd[3:] for one in photos], dtype=float)
     photo = np.array([order[one.name] for one in photos])
-    observation = PhotoRotation(np.zeros((len(photos), 3)), sd, photo, from_angles(*angles.T))
+    observation = PhotoRotation(
+        np.zeros((len(photos), 3)), sd, photo, rotation_of_angles(*angles.T)
+    )
     return observation, _trace(photos, [TURNS] * len(photos))
 
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.survey.datum import Frame, framed
+from tankcal.survey.datum import Frame, make_frame
 from tankcal.survey.network import Adjusted, predict
 from tankcal.survey.network_of_survey import Gathered, gather
-from tankcal.survey.start_values import finished
+from tankcal.survey.start_values import finish_start_values
 
 
 @dataclass(frozen=True)
@@ -52,12 +52,12 @@ def predict_survey(measurements, nominal):
                 "plan.toml", message("no_observations_planned", "the survey has no observations")
             )
         )
-    survey = finished(placed(gathered.survey, nominal), gathered, measurements)
-    frame = framed(survey, gathered, measurements.settings)
+    survey = finish_start_values(place_at_nominal(gathered.survey, nominal), gathered, measurements)
+    frame = make_frame(survey, gathered, measurements.settings)
     return Predicted(predict(frame.survey, **frame.options), gathered, frame)
 
 
-def placed(survey, nominal):
+def place_at_nominal(survey, nominal):
     """A network survey with the nominal values as its start values."""
     photos = survey.photos
     missing = [name for name in survey.points if name not in nominal.points]

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tankcal.survey.means import averaged, scatter_warnings, torn_apart
+from tankcal.survey.means import average_readings, contradictory_labels, scatter_warnings
 from tankcal.survey.observations import KINDS
 
 EARTH_RADIUS_M = 6_371_000.0
@@ -148,7 +148,7 @@ def _corrected(value, tools, temperature_c, known):
     return value
 
 
-def observed(table, bend, warnings):
+def observations_of_table(table, bend, warnings):
     """Pairs (observations, Trace) of the readings of a Table that are adjusted.
 
     bend      see `bend_per_m`            warnings  list that warnings of scatter are added to
@@ -165,14 +165,14 @@ def observed(table, bend, warnings):
         if len(rows):
             label, angle = _labels(table, rows), table.kind.is_angle
             value, sd = _values(table, rows)
-            means = averaged(label, value, sd, angle=angle)
+            means = average_readings(label, value, sd, angle=angle)
             warnings += scatter_warnings(
                 means, lambda k, r=rows: "-".join(table.ids[r[k]]), table.file,
                 [table.rows[i] for i in rows] if table.rows else (),
             )  # fmt: skip
-            apart = torn_apart(label, means)
+            apart = contradictory_labels(label, means)
             if apart is not label:
-                means = averaged(apart, value, sd, angle=angle)
+                means = average_readings(apart, value, sd, angle=angle)
             first = rows[means.first]
             yield (
                 _made(table, first, means.value, means.sd, bend),

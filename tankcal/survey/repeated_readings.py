@@ -13,7 +13,7 @@ from tankcal.survey.results import RepeatedReadings
 TOLD = 10  # points whose readings are rejected that are told one by one
 
 
-def without_scattered(measurements):
+def reject_scattered(measurements):
     """(Measurements without the rejected readings, RepeatedReadings or None, Problem rows).
 
     Readings of a point in a photo whose sample standard deviation in x or in y exceeds
@@ -44,11 +44,11 @@ def without_scattered(measurements):
         rejected=rejected,
     )
     if rejected:
-        measurements = replace(measurements, image_points=taken(images, ~bad[same.group]))
+        measurements = replace(measurements, image_points=select_readings(images, ~bad[same.group]))
     return measurements, found, _told(rejected, limit, images.file)
 
 
-def taken(images, keep):
+def select_readings(images, keep):
     """job.ImageReadings of some rows (n,) True."""
     rows = np.flatnonzero(keep)
 

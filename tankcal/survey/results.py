@@ -112,7 +112,7 @@ def datum_dependence(report):
     """The Dependence of results on the choice of a DatumReport.
 
     A quantity does not depend on the choice when no motion or scaling that the observations leave
-    open changes it (`network.datum.dependent` tests single ones). Silva (1995) blamed
+    open changes it (`network.datum.depends_on_datum` tests single ones). Silva (1995) blamed
     ill-conditioning for sds of 1.37 m with another fixed station: coordinates, and their sds, are
     of the datum; the shape, and its sds, is not.
     """

@@ -6,10 +6,10 @@ import numpy as np
 
 from tankcal.errors import Problem, SolutionError
 from tankcal.messages import message
-from tankcal.survey.network.snooping import started as started_from
+from tankcal.survey.network.snooping import start_from_adjusted as started_from
 from tankcal.survey.observations import ControlCoordinates, Distances, SystemCoordinates
 from tankcal.survey.readings import bend_per_m
-from tankcal.survey.start.approximation import approximate, on_tank
+from tankcal.survey.start.approximation import approximate, nominal_places
 from tankcal.survey.start.pieces import similarity
 
 MIRRORED_BETTER = 0.3  # a reflection is believed when it leaves less than this share
@@ -52,7 +52,7 @@ TRUST_M = 0.01  # sd of control while start values are sought
 AGREES = 0.1  # of the radius: nominal coordinates further from control are in no common frame
 
 
-def started(gathered, measurements):
+def add_start_values(gathered, measurements):
     """The network survey with start values for all its unknowns.
 
     Control decides the frame; nominal coordinates are brought into it. Photos and points without
@@ -70,7 +70,7 @@ def started(gathered, measurements):
             failure = failure or error
             continue
         found = replace(found, observations=survey.observations)
-        return finished(found, gathered, measurements)
+        return finish_start_values(found, gathered, measurements)
     raise failure
 
 
@@ -85,7 +85,7 @@ def started_like(adjusted, gathered, measurements):
     same = same and photos == (() if other.photos is None else other.photos.names)
     if not same or not np.isfinite(adjusted.xyz_m).all():
         return None
-    return finished(started_from(survey, adjusted), gathered, measurements)
+    return finish_start_values(started_from(survey, adjusted), gathered, measurements)
 
 
 def _trusted(survey, known, settings):
@@ -137,7 +137,7 @@ def nominal_points(measurements, points):
         bottom = 0.0 if tank.bottom_z_m is None else tank.bottom_z_m
         z_nominal = bottom + tank.height_m * (section - 0.5) / np.nanmax(section)
         z = np.where(np.isnan(z), z_nominal, z)
-    found = on_tank(generatrix, np.nanmax(generatrix), z, tank.radius_m)
+    found = nominal_places(generatrix, np.nanmax(generatrix), z, tank.radius_m)
     place = dict(zip(targets.point, found, strict=True))
     nowhere = np.full(3, np.nan)
     return np.array([place.get(name, nowhere) for name in points])
@@ -178,7 +178,7 @@ def _in_frame_of(known, nominal, radius_m):
     return placed if worst < AGREES * radius_m else None
 
 
-def finished(survey, gathered, measurements):
+def finish_start_values(survey, gathered, measurements):
     """A survey with starts: known coordinates as given, systems, the earth's bend."""
     known, photos = gathered.known.xyz_m, survey.photos
     acting = survey.fixed & np.isfinite(known)

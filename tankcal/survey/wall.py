@@ -40,7 +40,7 @@ def wall_points(adjustment, measurements, side):
         generatrix = tuple(targets.generatrix[i] for i in of)
         numbers = tuple(targets.rows[i] for i in of) if targets.rows else numbers
         offset = np.nan_to_num(np.asarray(targets.offset_m, dtype=float)[of])
-        xyz = off_the_wall(xyz, offset if side == "outside" else -offset)
+        xyz = move_to_wall(xyz, offset if side == "outside" else -offset)
     covariance = adjustment.full_covariance_m2(names)
     coordinates = (3 * chosen[:, None] + np.arange(3)).ravel()
     causes = tuple(
@@ -53,7 +53,7 @@ def wall_points(adjustment, measurements, side):
     )  # fmt: skip
 
 
-def off_the_wall(xyz_m, outwards_m):
+def move_to_wall(xyz_m, outwards_m):
     """Points (n, 3) moved by -outwards_m (n,) along the horizontal normal, away from the axis.
 
     The axis is that of the circle through all points in plan (Taubin 1991). It may stand a few

@@ -66,7 +66,7 @@ class Written:
     decimals: int
 
 
-def written(value, u, marks=ENGLISH, *, significant=2, least=None, written_out=WITH_U):
+def format_with_u(value, u, marks=ENGLISH, *, significant=2, least=None, written_out=WITH_U):
     """`value` with its standard or expanded uncertainty `u`, both in one unit.
 
     value        number; None, nan and inf are written as NOTHING
@@ -107,7 +107,7 @@ def decimals_of(u, *, significant=2, least=0):
     return _decimals(_exact(u if _is_number(u) else 0.0), significant, least)
 
 
-def rounded(u, *, significant=2):
+def round_u(u, *, significant=2):
     """u as it is printed: 417 is 420, which no number format makes of it; None where not known."""
     if not _is_number(u):
         return None
@@ -161,7 +161,7 @@ def fixed(value, decimals, marks=ENGLISH):
     return _text(_exact(value), decimals, marks) if _is_number(value) else NOTHING
 
 
-def with_digits(value, digits, marks=ENGLISH):
+def format_significant(value, digits, marks=ENGLISH):
     """`value` with that many significant digits, no whole digit rounded off; NOTHING for none.
 
     For what has no uncertainty beside it, or is one. Powers of ten but WITHOUT_U are set apart.
@@ -173,7 +173,7 @@ def with_digits(value, digits, marks=ENGLISH):
 
 
 def shortest(value, marks=ENGLISH, *, digits=6):
-    """`with_digits` without zeros at its end: a number that somebody chose, as it was chosen."""
+    """`format_significant` without zeros at its end: a number as somebody chose it."""
     if not _is_number(value):
         return NOTHING
     number, decimals, exponent = _mantissa(value, digits)

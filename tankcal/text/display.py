@@ -2,7 +2,7 @@
 
 from html import escape
 
-from tankcal.text.digits import ENGLISH, NOTHING, fixed, written
+from tankcal.text.digits import ENGLISH, NOTHING, fixed, format_with_u
 
 
 def volume_text(volume_m3: float, U_m3: float, k: float | None = None) -> str:
@@ -25,7 +25,7 @@ def volume_text(volume_m3: float, U_m3: float, k: float | None = None) -> str:
     how = "Monte Carlo" if k is None else f"k = {fixed(k, 2)}"
     if not U_m3 > 0:
         return f"{fixed(volume_m3, 3)} m3, no uncertainty declared"
-    shown = written(volume_m3, U_m3, ENGLISH, least=0)
+    shown = format_with_u(volume_m3, U_m3, ENGLISH, least=0)
     return f"{shown.value}{shown.power} m3, U = {shown.uncertainty}{shown.power} m3 ({how})"
 
 

@@ -10,7 +10,7 @@ from tankcal.errors import TankcalError
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
-def shipped(name):
+def shipped_folder(name):
     """Path of the shipped folder `name` ("examples", "report_templates").
 
     Raises TankcalError when the installation lacks it.

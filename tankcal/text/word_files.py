@@ -4,7 +4,7 @@ import tomllib
 
 from tankcal.errors import TankcalError
 from tankcal.text.languages import DEFAULT
-from tankcal.text.shipped import shipped
+from tankcal.text.shipped import shipped_folder
 
 
 def load_words(language=DEFAULT):
@@ -12,7 +12,7 @@ def load_words(language=DEFAULT):
 
     Raises TankcalError when no words are shipped in that language.
     """
-    folder = shipped("report_templates") / "words"
+    folder = shipped_folder("report_templates") / "words"
     known = {path.stem: path for path in sorted(folder.glob("*.toml"))}
     if language not in known:
         raise TankcalError(

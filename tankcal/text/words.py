@@ -3,7 +3,7 @@
 from numbers import Integral, Number
 
 from tankcal.errors import SHEET
-from tankcal.messages import as_plain, filled
+from tankcal.messages import as_plain, fill_template
 from tankcal.text.digits import NOTHING, Marks, fixed, shortest
 from tankcal.text.form_words import NOTES, word_of
 from tankcal.text.languages import DEFAULT
@@ -65,7 +65,7 @@ def message_sentence(words, text, code, values):
     if template is None:
         return text
     named = {key: _named(words, key, value) for key, value in values.items()}
-    return filled(
+    return fill_template(
         template,
         named,
         number=lambda value, form: _number(value, form, marks_of(words)),
@@ -73,13 +73,13 @@ def message_sentence(words, text, code, values):
     )
 
 
-def said(words, text):
+def say(words, text):
     """A text in the reader's language, if it is a Message; any other text as it is."""
     known = as_plain(text)
     return message_sentence(words, str(text), known["code"], known["values"])
 
 
-def in_language(words, record):
+def translate_record(words, record):
     """A record whose texts are in the reader's language, as far as it says them by a code."""
     adjustment, corrections = record["adjustment"], record["corrections"]
     return {
@@ -247,10 +247,13 @@ def datum_sentences(words, adjustment):
     """What holds the frame, and what depends on that choice."""
     datum, texts = adjustment["datum"], words["texts"]
     held = [name for name in datum["held"] if datum["choice"] != "inner" or ":" not in name]
-    found = [texts[f"datum_{datum['choice']}"].format(held=listed(words, held))]
+    found = [texts[f"datum_{datum['choice']}"].format(held=list_names(words, held))]
     if len(held) < len(datum["held"]):
         fixed = [name for name in datum["held"] if ":" in name]
-        found = [texts["datum_fixed"].format(held=listed(words, fixed)), *(found if held else [])]
+        found = [
+            texts["datum_fixed"].format(held=list_names(words, fixed)),
+            *(found if held else []),
+        ]
     if datum["defect"]:
         words_of_defect = datum["words"].split(";")[0].rstrip(".")
         found.append(texts["datum_defect"].format(words=words_of_defect))
@@ -280,7 +283,7 @@ def method_line(words, adjustment):
     """What was measured, how many points, sigma0: one line for a certificate."""
     parts = []
     if adjustment["photos"]:
-        cameras = listed(words, dict.fromkeys(row["camera"] for row in adjustment["photos"]))
+        cameras = list_names(words, dict.fromkeys(row["camera"] for row in adjustment["photos"]))
         photographs = words["observed"]["photographs"]
         parts.append(f"{photographs} ({cameras}): {_fixed(words, len(adjustment['photos']))}")
     groups = [row for row in adjustment["groups"] if row["kind"] != "weighted unknown"]
@@ -295,7 +298,7 @@ def method_line(words, adjustment):
     )
 
 
-def listed(words, names):
+def list_names(words, names):
     """The first names, and how many more there are; "P7:xyz" is P7."""
     names = [str(name).removesuffix(":xyz") for name in names]
     if names == ["all"]:
@@ -306,7 +309,7 @@ def listed(words, names):
     return words["texts"]["and_more"].format(names=first, more=more)
 
 
-def as_sentence(text):
+def make_sentence(text):
     """A text of the record with a capital letter and a full stop."""
     return text[:1].upper() + text[1:].rstrip(".") + "."
 

@@ -16,15 +16,15 @@ import tankcal
 from tankcal.calibration.influence.blocks import block_of, differences
 from tankcal.calibration.influence.exchange import (
     counted_in,
+    exchange_calibration,
     free_parameters,
-    with_calibration,
-    without,
+    leave_out_readings,
 )
 from tankcal.calibration.influence.runs import influence
 from tankcal.calibration.product.differences import differences_of
-from tankcal.camera.model import PARAMETERS, Form, measured
+from tankcal.camera.model import PARAMETERS, Form, distort_image_points
 from tankcal.errors import InputError
-from tankcal.geometry.rotations import from_angles, rotation_vector
+from tankcal.geometry.rotations import rotation_of_angles, rotation_vector
 from tankcal.job.model import Job, Material
 from tankcal.record.adjustment import adjustment_of
 from tankcal.record.camera_influence import as_json
@@ -41,7 +41,7 @@ from tankcal.survey.measurements import (
 )
 from tankcal.survey.network import Camera
 from tankcal.survey.results import Reading
-from tankcal.text.shipped import shipped
+from tankcal.text.shipped import shipped_folder
 
 HEIGHT_M, BASE_M, IMAGE_SD_MM = 200.0, 60.0, 0.0005
 FLIGHT = np.array([4.38, 0.01, -0.02, -4e-3, 2e-4, 0, 0, 1e-4, -5e-5, 0, 0, 1e-4, 2e-4])
@@ -67,7 +67,7 @@ def flight(noise=0.0, held=True, control=()):
         ideal = FLIGHT[0] * np.column_stack([-u / w, -v / w])
         inside = np.flatnonzero((np.abs(ideal) < HALF_FRAME_MM).all(axis=1))
         seen = np.full_like(ideal, np.nan)
-        seen[inside] = measured(ideal[inside], FLIGHT, LENS)
+        seen[inside] = distort_image_points(ideal[inside], FLIGHT, LENS)
         photos += [f"F{i}"] * len(inside)
         points += [names[k] for k in inside]
         xy.append(seen[inside])
@@ -449,7 +449,7 @@ def test_control_that_is_held_is_a_frame_not_a_choice(tank):
 def test_a_motion_that_nothing_observes_is_taken_out_exactly(of_tank):
     # closed form: a block turned by 10 degrees, shifted by 3 m and stretched is the same block
     one = of_tank[0].runs[1].block
-    turn = from_angles(0.1, -0.05, np.radians(10))
+    turn = rotation_of_angles(0.1, -0.05, np.radians(10))
     shift = np.array([3.0, -2.0, 1.0])
     other = replace(
         one,
@@ -477,7 +477,7 @@ def test_a_motion_that_nothing_observes_is_taken_out_exactly(of_tank):
 @pytest.fixture(scope="module")
 def with_blunders():
     """The shipped survey, for its adjustment, with a blunder in an image and one in a distance."""
-    job = tankcal.load(shipped("examples") / "silva-1995-photos", only="adjustment")
+    job = tankcal.load(shipped_folder("examples") / "silva-1995-photos", only="adjustment")
     images = job.measurements.image_points
     xy = images.xy_mm.copy()
     xy[100] += [0.3, -0.2]
@@ -542,7 +542,7 @@ def taped(rows=(2, 3, 4, 5)):
 )
 def test_all_readings_of_a_mean_go_together(rows, row, repeats, expected):
     one = removed(("A", "B"), "distances.csv", row, repeats)
-    found = without(Measurements(readings=(taped(rows),)), (one,))
+    found = leave_out_readings(Measurements(readings=(taped(rows),)), (one,))
     assert found.readings[0].check.tolist() == expected
     assert not found.settings.snooping
 
@@ -553,7 +553,7 @@ def test_known_coordinates_become_approximations():
         np.zeros(3, dtype=bool), (2, 3, 4),
     )  # fmt: skip
     photo = Photo("F", "own", np.zeros(6), np.ones(6))
-    found = without(
+    found = leave_out_readings(
         Measurements(control=control, photos=(photo, replace(photo, name="G"))),
         (
             removed(("A",), "control.csv", 3, element="y"),
@@ -580,11 +580,13 @@ def test_film_keeps_its_millimetres_unless_a_calibration_has_pixels():
     measured = Measurements(cameras=(film,))
     for pixel_mm in (None, np.array([0.002, 0.003])):
         other = replace(changed("a"), pixel_mm=pixel_mm)
-        found, own, _ = with_calibration(measured, film, other, "fixed", ("c",))
+        found, own, _ = exchange_calibration(measured, film, other, "fixed", ("c",))
         assert found.cameras == (own,)
         assert own.pixel_mm is pixel_mm
     digital = setup_of(FLIGHT, "job")
-    _, own, _ = with_calibration(Measurements(cameras=(digital,)), digital, other, "fixed", ("c",))
+    _, own, _ = exchange_calibration(
+        Measurements(cameras=(digital,)), digital, other, "fixed", ("c",)
+    )
     assert own.pixel_mm is digital.pixel_mm
 
 

@@ -23,7 +23,7 @@ from tankcal.report.camera.naming import short
 from tankcal.report.notebook import joined
 from tankcal.report.numbers import UNITS
 from tankcal.text.languages import DEFAULT, LANGUAGES
-from tankcal.text.shipped import shipped
+from tankcal.text.shipped import shipped_folder
 from tankcal.text.words import load_words
 
 pytest_plugins = ("camera_results",)
@@ -134,7 +134,7 @@ def test_scales_have_the_marks_of_the_language(product):
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_shipped_limits_have_words(language):
     words = load_words(language)["camera"]
-    folder = shipped("calibration/product/limit_tables")
+    folder = shipped_folder("calibration/product/limit_tables")
     codes = {path.stem for path in folder.glob("*.toml")}
     assert set(words["limits_sources"]) == set(words["limits_remarks"]) == codes
     assert {shipped_limits(code).code for code in codes} == codes

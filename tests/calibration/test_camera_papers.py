@@ -13,7 +13,7 @@ from tankcal.calibration.curves import decentring_profile, radial_curve
 from tankcal.calibration.product.check import check_product
 from tankcal.calibration.product.limits import shipped_limits
 from tankcal.calibration.stability.comparison import compare
-from tankcal.camera.model import Form, measured
+from tankcal.camera.model import Form, distort_image_points
 from tankcal.errors import InputError
 from tankcal.record import camera_product as product_json
 from tankcal.record import camera_stability as stability_json
@@ -237,7 +237,7 @@ def test_radial_curve_and_its_sd(convention):
     form = Form(convention, "both_x", 1.0)
     ideal = np.linspace(0.1, 3.0, 30)
     radial = np.where(np.isin(np.arange(13), (0, 3, 4, 5, 6)), Q, 0.0)
-    radius = measured(np.column_stack([ideal, 0 * ideal]), radial, form)[:, 0]
+    radius = distort_image_points(np.column_stack([ideal, 0 * ideal]), radial, form)[:, 0]
     covariance = np.diag(np.array([7e-5, 1e-5, 1e-6, 1e-8]) ** 2)
     covariance[0, 1] = covariance[1, 0] = -0.9 * 7e-5 * 1e-5
     curve, sd = radial_curve(radius, Q, form, covariance)
@@ -257,6 +257,6 @@ def test_decentring_profile_is_the_largest_on_the_circle():
     only = np.where(np.isin(np.arange(13), (0, 7, 8)), Q, 0.0)
     turn = np.linspace(0, 2 * np.pi, 100_001)
     circle = 2.0 * np.column_stack([np.cos(turn), np.sin(turn)])
-    shift = measured(circle, only, Form()) - circle
+    shift = distort_image_points(circle, only, Form()) - circle
     radial = np.abs(np.sum(shift * circle, axis=1)).max() / 2.0
     assert decentring_profile([2.0], Q)[0] == pytest.approx(radial / 3, rel=1e-8)

@@ -15,7 +15,7 @@ import tankcal
 from tankcal.calibration.edges import Frame, left_shifts, own_shift
 from tankcal.calibration.interiors import interiors_of
 from tankcal.calibration.parameters.analysis import analyse_job, analyse_record
-from tankcal.calibration.parameters.conditioning import without
+from tankcal.calibration.parameters.conditioning import drop_parameters
 from tankcal.calibration.parameters.dropping import Dropping, interior_after, movement
 from tankcal.calibration.parameters.findings import Choices
 from tankcal.calibration.parameters.recommendation import Evidence, Limit, advice
@@ -203,7 +203,7 @@ def test_the_schur_complement_foretells_the_adjustment_without_parameters():
     kept = [0, 2, 4]
     less = design[:, kept] * scale[kept]
     expected = scale[kept] * np.linalg.lstsq(less, observed, rcond=None)[0]
-    found = without(tuple("abcde"), covariance, ("d", "b"), x)
+    found = drop_parameters(tuple("abcde"), covariance, ("d", "b"), x)
     assert (found.dropped, found.kept) == (("b", "d"), ("a", "c", "e"))
     np.testing.assert_allclose(found.values, expected, rtol=1e-9)
     sds = scale[kept] * np.sqrt(np.diag(np.linalg.inv(less.T @ less)))
@@ -212,11 +212,11 @@ def test_the_schur_complement_foretells_the_adjustment_without_parameters():
 
 def test_dropping_parameters_that_cannot_be_told_apart_foretells_nothing():
     covariance = np.array([[1.0, 0, 0], [0, 1, 1], [0, 1, 1]])
-    found = without(("c", "A", "B"), covariance, ("A", "B"), [1.0, 2, 3])
+    found = drop_parameters(("c", "A", "B"), covariance, ("A", "B"), [1.0, 2, 3])
     assert not found.positive_definite
     assert np.isnan(found.sds).all()
     with pytest.raises(ValueError, match="K1"):
-        without(("c", "A"), np.eye(2), ("K1",))
+        drop_parameters(("c", "A"), np.eye(2), ("K1",))
 
 
 # --- effects ------------------------------------------------------------------------------------

@@ -22,9 +22,16 @@ from tankcal.calibration.stability.fits import (
 )
 from tankcal.calibration.stability.grids import Grid, default_grid, parse
 from tankcal.calibration.stability.terrains import DRAWN, TERRAINS, Terrain, parse_terrain
-from tankcal.camera.model import AFFINITIES, CONVENTIONS, Form, balanced_about, corrected, measured
+from tankcal.camera.model import (
+    AFFINITIES,
+    CONVENTIONS,
+    Form,
+    balanced_about,
+    correct_image_points,
+    distort_image_points,
+)
 from tankcal.errors import InputError, SolutionError
-from tankcal.geometry.rotations import angles_of, from_angles, turned
+from tankcal.geometry.rotations import angles_of, apply_small_rotation, rotation_of_angles
 from tankcal.job import load
 from tankcal.job.calibrations import choose, read_cameras
 from tankcal.record.camera_stability import as_json, summary
@@ -126,7 +133,7 @@ def test_which_focal_length_both_bundles_get_hardly_matters(seven, figure):
     pixel = seven[0].pixel_mm
     points = default_grid(FRAME).image_points_mm(FRAME, pixel)
     first, second = (
-        (corrected(points, one.camera.values, one.camera.form), one.camera.values[0])
+        (correct_image_points(points, one.camera.values, one.camera.form), one.camera.values[0])
         for one in (seven[0], seven[4])
     )
     figures = [
@@ -257,7 +264,7 @@ def test_a_turned_bundle_is_the_same_to_a_rotation():
     """Property: rot gives a rotation of any size away and finds it."""
     points = default_grid(FRAME).image_points_mm(FRAME, PIXEL_MM)
     for angles in [(0.01, -0.02, 0.03), (0.2, -0.1, 2.0), (0.0, 0.0, np.pi)]:
-        rotation = from_angles(*angles)
+        rotation = rotation_of_angles(*angles)
         turned_mm = image_of(rays(points, 4.4), rotation, 4.5)
         fit = rotation_between(turned_mm, 4.5, points, 4.4, PIXEL_MM)
         assert fit.sigma0_px < 1e-9
@@ -273,7 +280,7 @@ def test_a_shift_of_the_principal_point_is_nearly_a_rotation():
     turn = 0.039 / 60
     # the ray of an image point lies to the left in the second set: its camera looks to the right
     assert np.abs(pair.rotation_rad) == pytest.approx([0, turn, 0], rel=1e-3, abs=turn**2)
-    seen = from_angles(*pair.rotation_rad) @ [0.0, 0.0, -60.0]
+    seen = rotation_of_angles(*pair.rotation_rad) @ [0.0, 0.0, -60.0]
     assert -60 * seen[0] / seen[2] == pytest.approx(-0.039, rel=1e-3)
 
 
@@ -282,7 +289,7 @@ def test_a_displaced_camera_is_the_same_to_a_resection():
     points = default_grid(FRAME).image_points_mm(FRAME, PIXEL_MM)
     terrain = TERRAINS["II"]
     object_m = terrain.object_points_m(points, 4.4, terrain.depths_m(len(points), 1))
-    rotation, position = from_angles(0.05, -0.1, 0.4), np.array([310.0, 270.0, 480.0])
+    rotation, position = rotation_of_angles(0.05, -0.1, 0.4), np.array([310.0, 270.0, 480.0])
     image = image_of(object_m - position, rotation, 4.4)
     fit = resection(object_m, image, 4.4, PIXEL_MM, terrain.position_m)
     assert fit.sigma0_px < 1e-8
@@ -320,7 +327,7 @@ def by_least_squares(place, image, c, start, moves):
 
     def residuals(x):
         where = x[3:] if moves else np.zeros(3)
-        return ((image_of(place - where, from_angles(*x[:3]), c) - image) / PIXEL_MM).ravel()
+        return ((image_of(place - where, rotation_of_angles(*x[:3]), c) - image) / PIXEL_MM).ravel()
 
     found = least_squares(residuals, start, xtol=1e-15, ftol=1e-15, gtol=1e-15, x_scale="jac")
     return np.sqrt(2 * found.cost / (2 * len(place) - len(start))), found.x
@@ -330,7 +337,7 @@ def bundles():
     points = Grid(12, 9, (100, 100), 380).image_points_mm(FRAME, PIXEL_MM)
     form = Form("correction_subtracted", "both_x")
     other = Q + np.array([0.02, 5e-3, -8e-3, 2e-4, -1e-5, 0, 0, 1e-4, 5e-5, 0, 0, 1e-4, -1e-4])
-    return [(corrected(points, one, form), one[0]) for one in (Q, other)]
+    return [(correct_image_points(points, one, form), one[0]) for one in (Q, other)]
 
 
 def test_rotation_against_scipy_and_singular_values():
@@ -358,23 +365,23 @@ def test_resection_against_scipy():
 def test_derivatives_of_the_orientation(unknowns):
     (_, _), (second, c) = bundles()
     place = rays(second, c) * np.linspace(50, 60, len(second))[:, None]
-    start = from_angles(0.1, -0.2, 0.5)
+    start = rotation_of_angles(0.1, -0.2, 0.5)
     model = orientation_model(place, c, start, PIXEL_MM)
     x = np.array([0.03, -0.2, 0.1, 2.0, -3.0, 1.0])[:unknowns]
     design = model(x, np.zeros(2 * len(place)))[1]
     assert_derivative(
         lambda one: model(one, np.zeros(2 * len(place)))[0], x, design, tolerance=1e-6
     )
-    assert turned(start[None], x[None, :3]).shape == (1, 3, 3)
+    assert apply_small_rotation(start[None], x[None, :3]).shape == (1, 3, 3)
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_derivatives_of_the_ideal_points(form):
     points = Grid(5, 4, (300, 300), 900).image_points_mm(FRAME, PIXEL_MM)
-    analytic = ideal_derivatives(corrected(points, Q, form), Q, form).reshape(-1, 13)
+    analytic = ideal_derivatives(correct_image_points(points, Q, form), Q, form).reshape(-1, 13)
     scale = np.array([1, 1, 1, 1e-3, 1e-4, 1e-5, 1e-6, 1e-3, 1e-3, 1e-2, 1e-3, 1e-2, 1e-2])
     assert_derivative(
-        lambda move: corrected(points, Q + move * scale, form).ravel(),
+        lambda move: correct_image_points(points, Q + move * scale, form).ravel(),
         np.zeros(13),
         analytic * scale,
         step=1e-4,
@@ -618,8 +625,8 @@ def test_of_ideal_points_are_undone():
     """Property: points corrected and distorted again are where they were."""
     form = Form("distortion_of_ideal", "b1_b2")
     points = default_grid(FRAME).image_points_mm(FRAME, PIXEL_MM)
-    ideal = corrected(points, LENS, form)
-    assert measured(ideal, LENS, form) == pytest.approx(points, abs=1e-12)
+    ideal = correct_image_points(points, LENS, form)
+    assert distort_image_points(ideal, LENS, form) == pytest.approx(points, abs=1e-12)
 
 
 # reading calibrations

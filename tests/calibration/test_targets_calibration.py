@@ -9,8 +9,8 @@ from rendering import Pattern, code_value, eight_bit, rendered
 
 import tankcal
 from tankcal.calibration.targets import Wanted, read_photographs
-from tankcal.camera.model import Form, corrected, measured
-from tankcal.geometry.rotations import looking
+from tankcal.camera.model import Form, correct_image_points, distort_image_points
+from tankcal.geometry.rotations import rotation_of_view
 
 cv2 = pytest.importorskip("cv2", reason="no OpenCV here: pip install 'tankcal[images]'")
 from tankcal.calibration.targets.dictionaries import dictionary_of  # noqa: E402
@@ -43,13 +43,13 @@ def stations():
     aim = np.array([0, 0.5, 1.2]) - places
     tilt = np.arctan2(aim[:, 2], np.hypot(aim[:, 0], aim[:, 1]))
     roll = np.radians([0, 90, 5, -90, 180, 92])
-    return places, looking(np.arctan2(aim[:, 0], aim[:, 1]), tilt, roll)
+    return places, rotation_of_view(np.arctan2(aim[:, 0], aim[:, 1]), tilt, roll)
 
 
 def pixels_of(xyz, place, rotation):
     """Pixels (n, 2) of points (n, 3)."""
     u, v, w = rotation @ (xyz - place).T
-    xy = measured(INTERIOR[0] * np.column_stack([-u / w, -v / w]), INTERIOR, FORM)
+    xy = distort_image_points(INTERIOR[0] * np.column_stack([-u / w, -v / w]), INTERIOR, FORM)
     return xy / PIXEL_MM * [1, -1] + (SIZE - 1) / 2
 
 
@@ -60,7 +60,7 @@ def seen(target, number, place, rotation):
     corners = pixels_of(origin + SQUARE @ np.array([right, down]), place, rotation)
 
     def plane_of(pixels):
-        ideal = corrected((pixels - (SIZE - 1) / 2) * PIXEL_MM * [1, -1], INTERIOR, FORM)
+        ideal = correct_image_points((pixels - (SIZE - 1) / 2) * PIXEL_MM * [1, -1], INTERIOR, FORM)
         ray = np.column_stack([ideal, np.full(len(ideal), -INTERIOR[0])]) @ rotation
         on_plane = place + ray * (((origin - place) @ normal) / (ray @ normal))[:, None] - origin
         return np.column_stack([on_plane @ right, on_plane @ down]) / SIDE_M**2

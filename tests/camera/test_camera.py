@@ -4,16 +4,23 @@ import numpy as np
 import pytest
 from jacobians import assert_derivative
 
-from tankcal.camera.formats.frame import framed
+from tankcal.camera.formats.frame import make_framed_camera
 from tankcal.camera.formats.opencv import OpenCV, from_opencv, to_opencv
-from tankcal.camera.model import AFFINITIES, CONVENTIONS, Form, balanced_about, corrected, measured
+from tankcal.camera.model import (
+    AFFINITIES,
+    CONVENTIONS,
+    Form,
+    balanced_about,
+    correct_image_points,
+    distort_image_points,
+)
 from tankcal.geometry.rotations import (
     angle_derivatives,
     angles_of,
-    from_angles,
-    looking,
+    apply_small_rotation,
+    rotation_of_angles,
+    rotation_of_view,
     rotation_vector,
-    turned,
     vector_derivatives,
 )
 
@@ -46,7 +53,7 @@ def silva(x, y, q, affinity, balance):
 def test_each_convention_says_what_its_source_says(convention, affinity, balance):
     """Published: the equations of Silva 39, Pessoa 10 and the distortion of the ideal point."""
     form = Form(convention, affinity, balance)
-    found = measured(IDEAL, Q, form)
+    found = distort_image_points(IDEAL, Q, form)
     x, y = (found - Q[1:3]).T
     if affinity == "before_distortion":  # DBAT, res_euler_brown_1
         x = (1 + Q[11]) * x + Q[12] * y
@@ -57,7 +64,7 @@ def test_each_convention_says_what_its_source_says(convention, affinity, balance
         sign = 1 if convention == "correction_added" else -1
         ideal = np.column_stack([x, y]) + sign * silva(x, y, Q, affinity, balance)
         assert ideal == pytest.approx(IDEAL, abs=1e-11)
-    assert corrected(found, Q, form) == pytest.approx(IDEAL, abs=1e-11)
+    assert correct_image_points(found, Q, form) == pytest.approx(IDEAL, abs=1e-11)
 
 
 def test_an_affinity_before_the_distortion(figure):
@@ -69,18 +76,20 @@ def test_an_affinity_before_the_distortion(figure):
     ideal = np.column_stack([x, y]) * (1 + k1 * (x * x + y * y))[:, None]
     form = Form("correction_added", "before_distortion")
     seen = np.column_stack([u, v])
-    assert corrected(seen, q, form) == pytest.approx(ideal, abs=1e-13)
-    worst = np.abs(measured(ideal, q, form) - seen).max()
+    assert correct_image_points(seen, q, form) == pytest.approx(ideal, abs=1e-13)
+    worst = np.abs(distort_image_points(ideal, q, form) - seen).max()
     figure("affinity before the distortion, back from the ideal point", f"{worst:.1e} mm")
     assert worst < 1e-12
-    away = np.abs(measured(ideal, q, Form("correction_added", "b1_b2")) - seen).max()
+    away = np.abs(distort_image_points(ideal, q, Form("correction_added", "b1_b2")) - seen).max()
     assert away > 1e-3  # of a sum of terms A and B are not the same
 
 
 def test_added_and_subtracted_differ_by_the_sign_of_all_parameters():
     other = np.concatenate([Q[:3], -Q[3:9], Q[9:11], -Q[11:]])
-    added = measured(IDEAL, Q, Form("correction_added"))
-    assert measured(IDEAL, other, Form("correction_subtracted")) == pytest.approx(added, abs=1e-12)
+    added = distort_image_points(IDEAL, Q, Form("correction_added"))
+    assert distort_image_points(IDEAL, other, Form("correction_subtracted")) == pytest.approx(
+        added, abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1.003])
@@ -97,7 +106,7 @@ def test_opencv_camera(ratio):
     matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
     camera = from_opencv(OpenCV(matrix, np.array([k1, k2, p1, p2, k3])), pixel, size)
     q, sides = camera.interior, camera.pixel_mm
-    found = measured(q[0] * np.column_stack([x, -y]), q, Form())
+    found = distort_image_points(q[0] * np.column_stack([x, -y]), q, Form())
     expected = np.column_stack([u - (size[0] - 1) / 2, -(v - (size[1] - 1) / 2)]) * sides
     assert found == pytest.approx(expected, abs=1e-11)
     assert sides == pytest.approx([pixel * fy / fx, pixel])
@@ -113,8 +122,8 @@ def test_to_opencv_states_what_it_cannot_say(figure):
     q = np.array([15.0, 0.02, -0.01, -5e-4, 1e-6, 0, 0, 1e-5, -2e-5, 0, 0, 2e-4, 1e-4])
     for convention in CONVENTIONS:
         form = Form(convention, "b1_b2", 6.0)
-        found = to_opencv(framed(q, form, pixel, size))
-        x, y = (corrected(PLACES * pixel, q, form) / q[0] * [1, -1]).T
+        found = to_opencv(make_framed_camera(q, form, pixel, size))
+        x, y = (correct_image_points(PLACES * pixel, q, form) / q[0] * [1, -1]).T
         k1, k2, p1, p2, k3 = found.coefficients
         r2 = x * x + y * y
         radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
@@ -137,7 +146,7 @@ def test_conventions_round_trip_over_the_frame(figure):
         for affinity in AFFINITIES:
             for balance in (0.0, 12.0):
                 form = Form(convention, affinity, balance)
-                back = measured(corrected(grid, q, form), q, form)
+                back = distort_image_points(correct_image_points(grid, q, form), q, form)
                 worst = max(worst, np.abs(back - grid).max() / pixel)
     figure("round trip through all conventions", f"{worst:.1e} px")
     assert worst < 1e-9
@@ -149,11 +158,13 @@ def test_balanced_form_both_ways(convention, affinity):
     """Property: the same image points, from plain to balanced (Zeiss, AICON), to another, back."""
     points = np.column_stack([IDEAL, np.full(len(IDEAL), 100.0)]) / 100
     q, form = Q, Form(convention, affinity, 0.0)
-    expected = measured(q[0] * points[:, :2], q, form)
+    expected = distort_image_points(q[0] * points[:, :2], q, form)
     for radius in (40.0, 25.0, 0.0):
         q, form = balanced_about(q, form, radius)
         assert form.radial_balance_mm == radius
-        assert measured(q[0] * points[:, :2], q, form) == pytest.approx(expected, abs=1e-11)
+        assert distort_image_points(q[0] * points[:, :2], q, form) == pytest.approx(
+            expected, abs=1e-11
+        )
     assert q == pytest.approx(Q, rel=1e-12)
 
 
@@ -163,7 +174,7 @@ def test_pixels_that_are_not_square():
     camera = from_opencv(OpenCV(matrix, np.zeros(4)), 0.004, size)
     assert camera.interior[:3] == pytest.approx([12.12, 0, 0])
     assert camera.pixel_mm == pytest.approx([12.12 / 3000, 0.004])
-    plain = to_opencv(framed([12.12, 0, 0, *[0] * 8, 1e-3, 0], Form(), 0.004, size))
+    plain = to_opencv(make_framed_camera([12.12, 0, 0, *[0] * 8, 1e-3, 0], Form(), 0.004, size))
     assert plain.matrix[0, 0] == pytest.approx(3030 * 1.001)
     assert plain.error_px < 1e-9
 
@@ -173,31 +184,31 @@ def test_rotations_and_their_angles():
     from scipy.spatial.transform import Rotation
 
     angles = RNG.uniform(-1.5, 1.5, (20, 3))
-    r = from_angles(*angles.T)
+    r = rotation_of_angles(*angles.T)
     for one, (omega, phi, kappa) in zip(r, angles, strict=True):
         passive = Rotation.from_euler("xyz", [-omega, -phi, -kappa]).as_matrix()
         assert one == pytest.approx(passive, abs=1e-14)
     assert angles_of(r) == pytest.approx(angles, abs=1e-13)
     small = RNG.normal(0, 0.5, (20, 3))
     exponential = Rotation.from_rotvec(small).as_matrix()
-    assert turned(r, small) == pytest.approx(exponential @ r, abs=1e-14)
-    assert turned(r, 0 * small) == pytest.approx(r, abs=1e-15)
+    assert apply_small_rotation(r, small) == pytest.approx(exponential @ r, abs=1e-14)
+    assert apply_small_rotation(r, 0 * small) == pytest.approx(r, abs=1e-15)
     assert rotation_vector(exponential) == pytest.approx(small, abs=1e-13)
 
 
 def test_derivatives_of_angles_and_vectors():
-    r = from_angles(*RNG.uniform(-1.3, 1.3, (3, 4)))
+    r = rotation_of_angles(*RNG.uniform(-1.3, 1.3, (3, 4)))
     small = RNG.normal(0, 0.6, (4, 3))
-    exponential = turned(np.tile(np.eye(3), (4, 1, 1)), small)
+    exponential = apply_small_rotation(np.tile(np.eye(3), (4, 1, 1)), small)
     for i in range(4):
         one = slice(i, i + 1)
         assert_derivative(
-            lambda d, one=one: angles_of(turned(r[one], d[None]))[0],
+            lambda d, one=one: angles_of(apply_small_rotation(r[one], d[None]))[0],
             np.zeros(3),
             angle_derivatives(r[one])[0],
         )
         assert_derivative(
-            lambda d, one=one: rotation_vector(turned(exponential[one], d[None]))[0],
+            lambda d, one=one: rotation_vector(apply_small_rotation(exponential[one], d[None]))[0],
             np.zeros(3),
             vector_derivatives(small[one])[0],
         )
@@ -206,12 +217,14 @@ def test_derivatives_of_angles_and_vectors():
 def test_angles_at_the_singular_place():
     """phi = +-90 deg: omega is reported as 0, and the angles still give the same rotation."""
     for sign in (1, -1):
-        r = from_angles(np.array([0.4]), np.array([sign * np.pi / 2]), np.array([0.9]))
-        assert from_angles(*angles_of(r).T) == pytest.approx(r, abs=1e-12)
+        r = rotation_of_angles(np.array([0.4]), np.array([sign * np.pi / 2]), np.array([0.9]))
+        assert rotation_of_angles(*angles_of(r).T) == pytest.approx(r, abs=1e-12)
 
 
 def test_a_camera_that_looks_north():
     """Closed form: axis along +y, x of the image to the east, y up; roll turns the image."""
-    assert looking(0.0, 0.0, 0.0) == pytest.approx(np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]]))
-    east = looking(np.pi / 2, 0.0, np.pi / 2)
+    assert rotation_of_view(0.0, 0.0, 0.0) == pytest.approx(
+        np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+    )
+    east = rotation_of_view(np.pi / 2, 0.0, np.pi / 2)
     assert east == pytest.approx(np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]]), abs=1e-15)

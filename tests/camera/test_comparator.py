@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tankcal.camera.comparator import KINDS, repeats, suspicion, transformation
-from tankcal.camera.film import Surface, flattened, heights_at
+from tankcal.camera.film import Surface, flatten_film, heights_at
 from tankcal.errors import SolutionError
 
 CORNERS = np.array([[-83.0, -58.0], [83.1, -58.2], [82.9, 58.1], [-83.2, 58.0]])
@@ -215,7 +215,7 @@ def test_flattened_film_meets_the_rays():
     lens, foot = np.array([x0, y0, c]), np.column_stack([plane, np.zeros(50)])
     along = height / c  # part of the way from the plane to the projection centre
     on_film = (foot + along[:, None] * (lens - foot))[:, :2]
-    np.testing.assert_allclose(flattened(on_film, height, (c, x0, y0)), plane, atol=1e-12)
+    np.testing.assert_allclose(flatten_film(on_film, height, (c, x0, y0)), plane, atol=1e-12)
     first_order = on_film + (on_film - [x0, y0]) / c * height[:, None]  # Silva 60
     np.testing.assert_allclose(first_order, plane, atol=80 * (0.4 / c) ** 2 * 1.01)
 

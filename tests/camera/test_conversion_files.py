@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tankcal.camera.formats import reading, writing
-from tankcal.camera.formats.frame import frame_points, framed, image_of, rays_of
+from tankcal.camera.formats.frame import frame_points, image_of, make_framed_camera, rays_of
 from tankcal.camera.formats.reading import cameras_of, read_camera
 from tankcal.camera.formats.texts import LONGEST
-from tankcal.camera.formats.writing import as_cameras_toml, sd_key_of, value_key, write_camera
+from tankcal.camera.formats.writing import cameras_toml_entry, sd_key_of, value_key, write_camera
 from tankcal.camera.model import PARAMETERS, Form
 from tankcal.errors import InputError
 from tankcal.job.calibrations import read_cameras
@@ -20,7 +20,7 @@ from tankcal.job.contract.registers import PARAMETER_KEYS, sd_key
 SAME_PX = 1e-9
 SIZE, PIXEL = (4000, 3000), 0.005
 INTERIOR = [15.0, 0.02, -0.01, -3e-4, 1e-6, -1e-9, 0, 1e-5, -2e-5, 0, 0, 0, 0]
-CAMERA = framed(INTERIOR, Form(), PIXEL, SIZE)
+CAMERA = make_framed_camera(INTERIOR, Form(), PIXEL, SIZE)
 METASHAPE = """<?xml version="1.0" encoding="UTF-8"?>
 <calibration>
   <projection>frame</projection>
@@ -189,7 +189,7 @@ def test_cameras_toml_reads_back_the_same(
     interior = np.array([c, *np.array(lens) * corner_mm ** -POWERS.astype(float)])
     form = Form(convention, affinity, balance)
     path = tmp_path_factory.mktemp("written", numbered=True) / "cameras.toml"
-    path.write_text(as_cameras_toml(name, interior, form, size, pixel, sds), encoding="utf-8")
+    path.write_text(cameras_toml_entry(name, interior, form, size, pixel, sds), encoding="utf-8")
     (setup,) = read_cameras(path)
     assert np.array_equal(setup.camera.values, interior)
     assert setup.camera.form == form
@@ -208,12 +208,15 @@ def test_keys_are_those_of_the_job():
 def test_a_name_that_no_camera_can_have():
     for name in ("", "=A1", "a\nb", 'a"b', "x" * 65, "a "):
         with pytest.raises(InputError):
-            as_cameras_toml(name, INTERIOR, Form(), SIZE, PIXEL)
+            cameras_toml_entry(name, INTERIOR, Form(), SIZE, PIXEL)
 
 
 def test_several_cameras_in_one_cameras_toml(tmp_path):
     path = tmp_path / "cameras.toml"
-    cameras = [("one", CAMERA), ("two", framed(INTERIOR, Form("correction_added"), PIXEL, SIZE))]
+    cameras = [
+        ("one", CAMERA),
+        ("two", make_framed_camera(INTERIOR, Form("correction_added"), PIXEL, SIZE)),
+    ]
     path.write_text(write_camera("cameras.toml", cameras, sds=[None, np.full(13, 1e-6)]).text)
     assert [setup.camera.name for setup in read_cameras(path)] == ["one", "two"]
 

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tankcal.camera.formats import balanced, colmap, metashape, pix4d
-from tankcal.camera.formats.frame import frame_points, framed, image_of, rays_of
-from tankcal.camera.formats.opencv import OpenCV, distorted, from_opencv, to_opencv
+from tankcal.camera.formats.frame import frame_points, image_of, make_framed_camera, rays_of
+from tankcal.camera.formats.opencv import OpenCV, distort_rays, from_opencv, to_opencv
 from tankcal.camera.model import Form
 from tankcal.errors import SolutionError
 
@@ -86,7 +86,7 @@ def test_opencv_projects_the_same(count, figure):
     seen = cv2.projectPoints(points, np.zeros(3), np.zeros(3), matrix, k)[0][:, 0]
     full = np.zeros(14)
     full[:count] = k
-    plane = np.column_stack(distorted(x, y, full)) * [3300, 3320] + [2290, 1750]
+    plane = np.column_stack(distort_rays(x, y, full)) * [3300, 3320] + [2290, 1750]
     assert np.abs(plane - seen).max() < SAME_PX
     off = np.hypot(*(image_of(own, np.column_stack([x, -y])) - seen).T)
     inside = np.all((seen >= 0) & (seen <= np.array(SIZE) - 1), axis=1)
@@ -218,7 +218,7 @@ SET_2 += [0.0008462448, 0.0006382, 0, 0, 7.933755e-05, 2.264641e-05]
 def test_published_camera_of_pix4d_is_the_one_that_pessoa_calibrated(figure):
     """Published: P frame 1 and table 6 are one camera: only these signs of T1, T2 and y agree."""
     points, pixel = frame_points(SIZE), 6.17219 / SIZE[0]
-    own = framed(SET_2, Form("correction_subtracted", "both_x"), pixel, SIZE)
+    own = make_framed_camera(SET_2, Form("correction_subtracted", "both_x"), pixel, SIZE)
     rms = {}
     for s1 in (1, -1):
         for s2 in (1, -1):
@@ -248,7 +248,7 @@ def aicon_image(rays, values):
 def test_balanced_form_of_aicon():
     """Published: the balanced form, from plain and back, another R0, the sign of Ck."""
     plain = np.array([24.1, 0.1, -0.05, -1e-4, 1.2e-7, -3e-11, 0, 4e-6, -3e-6, 0, 0, 1e-4, -5e-5])
-    own = framed(plain, Form(), 0.006, (6000, 4000))
+    own = make_framed_camera(plain, Form(), 0.006, (6000, 4000))
     points = frame_points(own.size_px)
     rays = rays_of(own, points)
     for radius in (0.0, 12.0, 14.5):
@@ -267,11 +267,13 @@ def test_balanced_form_of_aicon():
 
 def test_balanced_form_leaves_out_k4_and_carries_sds():
     """Property: K4 is fitted by A1..A3; Ck and Xh keep sds that nothing else is in."""
-    own = framed([24.1, 0, 0, -1e-4, 0, 0, 1e-12, 0, 0, 0, 0, 0, 0], Form(), 0.006, (6000, 4000))
+    own = make_framed_camera(
+        [24.1, 0, 0, -1e-4, 0, 0, 1e-12, 0, 0, 0, 0, 0, 0], Form(), 0.006, (6000, 4000)
+    )
     assert 0.01 < balanced.to_balanced(own, 12.0).error_px < 30
     variance = np.zeros(13)
     variance[:4] = np.array([3e-3, 1e-3, 2e-3, 1e-7]) ** 2
-    simple = framed([*own.interior[:6], *np.zeros(7)], Form(), 0.006, (6000, 4000))
+    simple = make_framed_camera([*own.interior[:6], *np.zeros(7)], Form(), 0.006, (6000, 4000))
     found = balanced.to_balanced(simple, 12.0, covariance=np.diag(variance))
     s = 1 - 1e-4 * 144  # c K1 of the plain form at R0, to the first order
     assert np.sqrt(found.covariance[1, 1]) == pytest.approx(1e-3)

@@ -8,8 +8,19 @@ import pytest
 from jacobians import assert_derivative
 
 from tankcal.camera.formats.fitting import rows_of_fit
-from tankcal.camera.formats.frame import frame_points, framed, image_of, in_mm, rays_of
-from tankcal.camera.formats.published import PUBLISHED, USUAL, converted, propagated
+from tankcal.camera.formats.frame import (
+    frame_points,
+    image_of,
+    make_framed_camera,
+    pixels_to_mm,
+    rays_of,
+)
+from tankcal.camera.formats.published import (
+    PUBLISHED,
+    USUAL,
+    convert_camera,
+    propagate_by_differences,
+)
 from tankcal.camera.model import AFFINITIES, CONVENTIONS, Form
 from tankcal.errors import SolutionError
 
@@ -41,7 +52,7 @@ def written_out(xy, q, affinity, balance):
 
 def misclosure_px(seen_px, rays, q, form):
     """(n,) by how much the published equation of a camera fails, as a distance in pixels."""
-    measured = in_mm(seen_px, PIXEL, SIZE) - q[1:3]
+    measured = pixels_to_mm(seen_px, PIXEL, SIZE) - q[1:3]
     if form.affinity == "before_distortion":
         measured[:, 0] += q[11:] @ measured.T
     ideal = rays * q[0]
@@ -66,9 +77,9 @@ def test_every_form_into_every_other(to_form):
         q = np.array(GIVEN)
         if form.affinity != "both_x" and to_form.affinity != "both_x":
             q[12] = -2e-4
-        rays = rays_of(framed(q, form, PIXEL, SIZE), PLACES)
+        rays = rays_of(make_framed_camera(q, form, PIXEL, SIZE), PLACES)
         assert misclosure_px(PLACES, rays, q, form).max() < SAME_PX
-        found = converted(q, form, to_form, SIZE, PIXEL)
+        found = convert_camera(q, form, to_form, SIZE, PIXEL)
         off = misclosure_px(PLACES, rays, found.interior, to_form)
         assert found.form == to_form
         is_side = [CONVENTIONS[one.convention] != 0 for one in (form, to_form)]
@@ -78,8 +89,8 @@ def test_every_form_into_every_other(to_form):
         assert found.is_exact == (is_same and not needs_turn)
         if found.is_exact:
             assert off.max() < SAME_PX
-            back = converted(found.interior, to_form, form, SIZE, PIXEL)
-            seen = image_of(framed(back.interior, form, PIXEL, SIZE), rays)
+            back = convert_camera(found.interior, to_form, form, SIZE, PIXEL)
+            seen = image_of(make_framed_camera(back.interior, form, PIXEL, SIZE), rays)
             assert np.abs(seen - PLACES).max() < SAME_PX
         else:
             assert 0.7 * found.error_px < off.max() < 1.3 * found.error_px + SAME_PX
@@ -104,7 +115,7 @@ def test_derivatives_of_the_fit(form):
 def test_silva_and_pessoa_differ_by_a_sign_and_the_affinity():
     """Closed form: without affinity the one is the other with K and P turned round."""
     q = np.array([*GIVEN[:11], 0, 0])
-    found = converted(q, PUBLISHED["silva"], PUBLISHED["pessoa"], SIZE, PIXEL)
+    found = convert_camera(q, PUBLISHED["silva"], PUBLISHED["pessoa"], SIZE, PIXEL)
     assert found.is_exact
     assert found.interior == pytest.approx([*q[:3], *-q[3:9], *q[9:11], 0, 0], rel=1e-14)
 
@@ -114,7 +125,7 @@ def test_a_linear_camera_is_inverted_exactly():
     q = np.array([100, 0.3, -0.2, *[0] * 8, 2e-3, -1e-3])
     for one in CONVENTIONS:
         for other in CONVENTIONS:
-            found = converted(
+            found = convert_camera(
                 q, Form(one, "both_y"), Form(other, "b1_b2"), (9000, 6500), 0.02, may_turn=True
             )
             assert found.error_px < SAME_PX
@@ -136,10 +147,10 @@ def test_the_published_calibrations_as_the_plain_form(shared, figure):
     """Published: P tables 6-9; what the inverse of a polynomial leaves, and what a turn takes."""
     for name, q in seven(shared).items():
         form = PUBLISHED["pessoa"]
-        rays = rays_of(framed(q, form, PIXEL, SIZE), PLACES)
+        rays = rays_of(make_framed_camera(q, form, PIXEL, SIZE), PLACES)
         for to_name, bound in (("plain", 2.0), ("silva", 0.8)):
-            kept = converted(q, form, PUBLISHED[to_name], SIZE, PIXEL)
-            turned = converted(q, form, PUBLISHED[to_name], SIZE, PIXEL, may_turn=True)
+            kept = convert_camera(q, form, PUBLISHED[to_name], SIZE, PIXEL)
+            turned = convert_camera(q, form, PUBLISHED[to_name], SIZE, PIXEL, may_turn=True)
             figure(
                 f"P set {name} as {to_name}: largest, rms, largest after a turn",
                 f"{kept.error_px:.3f} px, {kept.rms_px:.3f} px, {turned.error_px:.3f} px",
@@ -151,8 +162,8 @@ def test_the_published_calibrations_as_the_plain_form(shared, figure):
             assert off.max() < 1.1 * kept.error_px
             assert abs(turned.turn_rad) < 5e-4
         assert turned.error_px < 0.02  # as Silva's: B turns the image, the exterior takes it
-        usual = converted(q, form, Form(), SIZE, PIXEL)
-        finer = converted(q, form, Form(), SIZE, PIXEL, used=(*USUAL, "K4", "P3", "P4"))
+        usual = convert_camera(q, form, Form(), SIZE, PIXEL)
+        finer = convert_camera(q, form, Form(), SIZE, PIXEL, used=(*USUAL, "K4", "P3", "P4"))
         assert finer.rms_px <= usual.rms_px
 
 
@@ -160,7 +171,7 @@ def test_only_what_may_be_used_is_used():
     """Property: `used` names what may differ from 0, in a formula and in a fit."""
     few = ("c", "x0", "y0", "K1", "P1", "P2")
     for convention in CONVENTIONS:
-        found = converted(
+        found = convert_camera(
             GIVEN, Form("correction_added", "both_y"), Form(convention), SIZE, PIXEL, few
         )
         assert not np.any(found.interior[[4, 5, 6, 9, 10, 11, 12]])
@@ -175,7 +186,7 @@ def test_covariance_of_a_change_of_sign_and_of_balance():
     root = rng.normal(size=(13, 13)) * sd[:, None]
     covariance = root @ root.T
     q = np.array([*GIVEN[:9], 0, 0, *GIVEN[11:]])
-    found = converted(
+    found = convert_camera(
         q, Form("correction_added"), Form("correction_subtracted"), SIZE, PIXEL, None, covariance
     )
     signs = np.array([1, 1, 1, -1, -1, -1, -1, -1, -1, 1, 1, -1, -1])
@@ -185,7 +196,9 @@ def test_covariance_of_a_change_of_sign_and_of_balance():
     simple, radius = np.array([4.38, 0, 0, -1.8e-3, *[0] * 9]), 2.0
     variance = np.zeros((13, 13))
     variance[:4, :4] = covariance[:4, :4]
-    found = converted(simple, Form(), Form(radial_balance_mm=radius), SIZE, PIXEL, None, variance)
+    found = convert_camera(
+        simple, Form(), Form(radial_balance_mm=radius), SIZE, PIXEL, None, variance
+    )
     c, k1 = simple[[0, 3]]
     e = radius**2
     # x = c X (1 + K1 c2 X2) = c' X (1 + K1' (c'2 X2 - e)): with s = 1 - K1' e, c' s = c,
@@ -210,9 +223,9 @@ def test_covariance_of_a_fit_is_that_of_drawn_cameras():
     sd = np.array([1e-3, 4e-4, 4e-4, 7e-5, 1.5e-5, 0, 0, 7e-6, 7e-6, 0, 0, 0, 0])
     used = ("c", "x0", "y0", "K1", "K2", "P1", "P2")
     form = Form("correction_subtracted")
-    found = converted(q, form, Form(), (900, 700), 0.007, used, np.diag(sd**2))
+    found = convert_camera(q, form, Form(), (900, 700), 0.007, used, np.diag(sd**2))
     drawn = [
-        converted(q + sd * rng.normal(size=13), form, Form(), (900, 700), 0.007, used).interior
+        convert_camera(q + sd * rng.normal(size=13), form, Form(), (900, 700), 0.007, used).interior
         for _ in range(100)
     ]
     ratio = np.std(drawn, axis=0)[sd > 0] / np.sqrt(np.diag(found.covariance))[sd > 0]
@@ -227,7 +240,7 @@ def test_a_covariance_that_is_none_is_told():
         np.triu(np.ones((13, 13))),
     ):
         with pytest.raises(SolutionError, match="covariance"):
-            propagated(lambda values: values, GIVEN, bad)
+            propagate_by_differences(lambda values: values, GIVEN, bad)
 
 
 AS_DBAT = {  # px, py from the corner, mm; sds; reports of 14 January 2020, see below
@@ -254,12 +267,12 @@ def test_published_affinity_before_and_after_the_distortion(figure):
     authors), data/dbat/dbatexports, camcal-dbatreport-model3.txt and -model4.txt.
     """
     after = Form("correction_added", "b1_b2")
-    found = converted(of_dbat(3), PUBLISHED["dbat"], after, DBAT_SIZE, DBAT_PIXEL)
+    found = convert_camera(of_dbat(3), PUBLISHED["dbat"], after, DBAT_SIZE, DBAT_PIXEL)
     as_after = found.interior[11]
     told = f"{as_after:.6e} for {AS_ASPECT[4]:.6e}, {found.error_px:.4f} px"
     figure("as of DBAT's model 3 after the distortion", told)
     assert abs(as_after - AS_ASPECT[4]) < SD_OF_ASPECT
-    back = converted(found.interior, after, PUBLISHED["dbat"], DBAT_SIZE, DBAT_PIXEL)
+    back = convert_camera(found.interior, after, PUBLISHED["dbat"], DBAT_SIZE, DBAT_PIXEL)
     assert back.interior[11] == pytest.approx(AS_ASPECT[3], abs=0.1 * SD_OF_ASPECT)
 
 
@@ -267,12 +280,14 @@ def test_published_affinity_before_and_after_the_distortion(figure):
 def test_as_dbat_and_back_is_the_same_camera(convention):
     """Closed form: signs turn round, A and B stay; a camera without affinity has none after it."""
     given = Form(convention, "before_distortion", 2.0)
-    there = converted(of_dbat(3), given, PUBLISHED["dbat"], DBAT_SIZE, DBAT_PIXEL)
+    there = convert_camera(of_dbat(3), given, PUBLISHED["dbat"], DBAT_SIZE, DBAT_PIXEL)
     assert there.is_exact
     assert there.interior[11] == AS_ASPECT[3]
-    back = converted(there.interior, PUBLISHED["dbat"], given, DBAT_SIZE, DBAT_PIXEL)
+    back = convert_camera(there.interior, PUBLISHED["dbat"], given, DBAT_SIZE, DBAT_PIXEL)
     assert back.interior == pytest.approx(of_dbat(3), rel=1e-12, abs=1e-20)
     plain = np.where(np.arange(13) < 11, of_dbat(3), 0.0)
-    there = converted(plain, Form(convention, "both_y"), PUBLISHED["dbat"], DBAT_SIZE, DBAT_PIXEL)
+    there = convert_camera(
+        plain, Form(convention, "both_y"), PUBLISHED["dbat"], DBAT_SIZE, DBAT_PIXEL
+    )
     assert there.is_exact
     assert not there.interior[11:].any()

@@ -7,8 +7,8 @@ import pytest
 from networks import INTERIOR
 from surveyed import by_photographs, places
 
-from tankcal.camera.focus import Lens, as_in_focus, depth_factor, radial_at
-from tankcal.camera.model import CONVENTIONS, Form, corrected, measured
+from tankcal.camera.focus import Lens, depth_factor, radial_at, refer_to_focus
+from tankcal.camera.model import CONVENTIONS, Form, correct_image_points, distort_image_points
 from tankcal.survey import adjust_survey
 
 F = 100.0
@@ -91,10 +91,10 @@ def test_images_as_in_focus(convention):
     interior[[0, 1, 2, 3, 4, 5, 7, 8, 11]] = 101, 0.1, -0.2, *LENS.focused, 1e-6, 2e-6, 1e-4
     own = np.tile(interior, (40, 1))
     own[:, 3:6] = LENS.in_depth(depth)
-    images = measured(ideal, own, form)
-    depth[7], images[7] = np.nan, measured(ideal[7:8], interior, form)[0]
-    found = as_in_focus(images, depth, interior, form, LENS)
-    np.testing.assert_allclose(corrected(found, interior, form), ideal, atol=1e-11)
+    images = distort_image_points(ideal, own, form)
+    depth[7], images[7] = np.nan, distort_image_points(ideal[7:8], interior, form)[0]
+    found = refer_to_focus(images, depth, interior, form, LENS)
+    np.testing.assert_allclose(correct_image_points(found, interior, form), ideal, atol=1e-11)
     assert np.abs(found - images).max() > 1e-3
 
 
@@ -116,14 +116,14 @@ def simulated(seed=0, noise=1.0, lens=FOCUS):
     depth = -1000 * np.sum(truth.rotation[photo, 2] * away, axis=1)
     own = np.tile(interior, (len(depth), 1))
     own[:, 3:6] = lens.in_depth(depth)
-    ideal = corrected(images.xy_mm, interior, Form())
+    ideal = correct_image_points(images.xy_mm, interior, Form())
     setup = replace(found.cameras[0], lens=lens)
     return (
         replace(
             found,
             cameras=(setup,),
             settings=replace(found.settings, snooping=False, depth_of_field=True),
-            image_points=replace(images, xy_mm=measured(ideal, own, Form())),
+            image_points=replace(images, xy_mm=distort_image_points(ideal, own, Form())),
         ),
         truth,
     )

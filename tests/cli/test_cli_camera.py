@@ -10,15 +10,15 @@ import pytest
 
 import tankcal
 from tankcal.calibration.interiors import framed_in
-from tankcal.camera.formats.published import converted
+from tankcal.camera.formats.published import convert_camera
 from tankcal.camera.model import Form
 from tankcal.cli import main
 from tankcal.record import load as load_record
 from tankcal.text.languages import LANGUAGES
-from tankcal.text.shipped import shipped
+from tankcal.text.shipped import shipped_folder
 
-SEVEN = shipped("examples") / "pessoa-2017" / "cameras.toml"
-PHOTOS = shipped("examples") / "silva-1995-photos"
+SEVEN = shipped_folder("examples") / "pessoa-2017" / "cameras.toml"
+PHOTOS = shipped_folder("examples") / "silva-1995-photos"
 FILM = """
 [cameras.longer]
 format_mm = [180, 130]
@@ -202,7 +202,7 @@ def test_parameters_of_a_photo_with_parameters_of_its_own(tmp_path, capsys):
 
 
 def test_parameters_without_photographs(capsys):
-    assert run("parameters", shipped("examples") / "total-station") == 2
+    assert run("parameters", shipped_folder("examples") / "total-station") == 2
     assert "no photographs" in capsys.readouterr().err
 
 
@@ -466,10 +466,12 @@ def test_convert_a_record_with_its_correlations(record, capsys):
     ((_, camera),), (covariance,) = framed_in(load_record(record), 0.01)
     known = np.nan_to_num(covariance)
     frame = (camera.size_px, camera.pixel_mm)
-    after = converted(camera.interior, camera.form, Form(), *frame, covariance=known).covariance
+    after = convert_camera(
+        camera.interior, camera.form, Form(), *frame, covariance=known
+    ).covariance
     sds = [found[key] for key in ("s_c_mm", "s_K1", "s_K2", "s_P1")]
     assert sds == pytest.approx(np.sqrt(np.diag(after))[[0, 3, 4, 7]].tolist(), rel=1e-9)
-    alone = converted(
+    alone = convert_camera(
         camera.interior, camera.form, Form(), *frame, covariance=np.diag(np.diag(known))
     )
     assert sds[1] != pytest.approx(np.sqrt(alone.covariance[3, 3]), rel=0.01)

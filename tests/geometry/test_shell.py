@@ -149,7 +149,7 @@ def two_rings(apart_m, seed, bars=0):
     return np.vstack(pieces)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("bars", [0, 2])
 def test_rings_of_one_course_may_differ_in_radius(bars):
     """Property: as many sound points go where the rings are 20 mm apart as where they are not.

@@ -18,7 +18,7 @@ from tankcal.messages import Message
 from tankcal.record import record_of
 from tankcal.text.form_words import meant, word_of
 from tankcal.text.languages import nearest_language
-from tankcal.text.words import in_language, load_words
+from tankcal.text.words import load_words, translate_record
 
 OTHERS = ("pt-BR", "es")
 ENGLISH = re.compile(r"\b(the|expected|found|missing|blank|row|sheet|with|number|is|of)\b")
@@ -86,7 +86,7 @@ def test_warnings_of_a_workbook_name_it_and_its_words_are_read(tmp_path):
     (told,) = (one for one in result.warnings if "nominal_volume" in str(one.column))
     assert str(told).startswith("tanque.xlsx, sheet job, tank.nominal_volume_m3: ")
     assert asked_language(path) == "pt-BR"
-    record = in_language(load_words("pt-BR"), record_of(result))
+    record = translate_record(load_words("pt-BR"), record_of(result))
     assert {one["file"] for one in record["warnings"]} <= {"planilha job", "planilha uncertainty"}
     speak("pt-BR")
     assert say_in_language(told.text).startswith(

@@ -30,7 +30,7 @@ from tankcal.report.paper import Paper
 from tankcal.survey.diagnosis.scales import check_readings_off, scale_of_control
 from tankcal.survey.measurements import Setup
 from tankcal.survey.results import Reading
-from tankcal.text.shipped import shipped
+from tankcal.text.shipped import shipped_folder
 from tankcal.text.words import load_words
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -382,7 +382,9 @@ def test_a_doubt_stands_on_the_first_page_and_last_in_the_terminal(tmp_path, cap
     assert [one["kind"] for one in kinds] == ["notice", "paragraph", "list"]
     (told,) = kinds[2]["items"]
     assert "8,9 m, e o topo do tanque" in told
-    cells = json.loads((shipped("report_templates") / "certificate.ipynb").read_text("utf-8"))
+    cells = json.loads(
+        (shipped_folder("report_templates") / "certificate.ipynb").read_text("utf-8")
+    )
     sources = ["".join(cell["source"]) for cell in cells["cells"]]
     place = next(i for i, text in enumerate(sources) if "doubtful_input" in text)
     assert "blocks.result(" in sources[place - 1]

@@ -9,12 +9,12 @@ from conftest import EXAMPLE
 from plan_folders import with_setups
 
 import tankcal
-from tankcal.geometry.rotations import from_angles
+from tankcal.geometry.rotations import rotation_of_angles
 from tankcal.pipeline.table import compute_table
 from tankcal.pipeline.wall import find_wall, s_transform
 from tankcal.planning import load_plan, predict
-from tankcal.planning.measurements import measured
-from tankcal.planning.table import predicted_table, recomputed
+from tankcal.planning.measurements import draw_measurements
+from tankcal.planning.table import predicted_table, recompute_table
 from tankcal.record.plan import plain_of
 from tankcal.survey import Nominal, adjust_survey, predict_survey, wall_points
 
@@ -34,7 +34,7 @@ def prediction(plan):
 @pytest.fixture(scope="module")
 def filled(prediction):
     """The measurements of the plan with the values that they would have, without errors."""
-    return measured(prediction.plan, prediction.measurements, prediction.predicted)
+    return draw_measurements(prediction.plan, prediction.measurements, prediction.predicted)
 
 
 def test_the_plan_is_the_network_of_the_dissertation(prediction):
@@ -85,7 +85,7 @@ def test_a_wall_whose_covariance_is_not_written_out(plan, prediction, monkeypatc
     monkeypatch.setattr(table, "MANY", 10)
     other = predicted_table(plan, prediction.predicted)
     assert other.made.table.U_m3 == pytest.approx(prediction.table.U_m3, rel=1e-7)
-    again = recomputed(plan, prediction.predicted, prediction.tabled)
+    again = recompute_table(plan, prediction.predicted, prediction.tabled)
     assert again.made.table.U_m3 == pytest.approx(prediction.table.U_m3, rel=1e-9)
 
 
@@ -135,7 +135,7 @@ def rough_places():
     photos = {}
     for row in rows("truth/photos.csv"):
         angles = [round(float(row[f"{one}_deg"])) for one in ("omega", "phi", "kappa")]
-        photos[row["photo"]] = rounded(row), from_angles(*np.radians(angles))
+        photos[row["photo"]] = rounded(row), rotation_of_angles(*np.radians(angles))
     return Nominal(points, photos)
 
 
@@ -247,7 +247,9 @@ def test_a_total_station_plan(tmp_path):
     found = predict(load_plan(folder))
     assert len(found.plan.setups) == 6
     assert not found.undetermined
-    drawn = measured(found.plan, found.measurements, found.predicted, np.random.default_rng(5))
+    drawn = draw_measurements(
+        found.plan, found.measurements, found.predicted, np.random.default_rng(5)
+    )
     adjustment = adjust_survey(drawn)
     assert not adjustment.removed
     assert 0.85 < adjustment.sigma0 < 1.15  # 195 degrees of freedom: sd 0.05

@@ -14,7 +14,7 @@ from test_planning import PHOTOS, rough_places, rows
 
 import tankcal
 from tankcal.errors import SolutionError
-from tankcal.geometry.rotations import from_angles
+from tankcal.geometry.rotations import rotation_of_angles
 from tankcal.planning import load_plan, predict
 from tankcal.survey import Nominal, predict_survey
 
@@ -31,7 +31,7 @@ def network():
     for row in rows("truth/photos.csv"):
         angles = [float(row[f"{one}_deg"]) for one in ("omega", "phi", "kappa")]
         place = np.array([float(row[f"{axis}_m"]) for axis in "xyz"])
-        stations[row["photo"]] = place, from_angles(*np.radians(angles))
+        stations[row["photo"]] = place, rotation_of_angles(*np.radians(angles))
     return job.measurements, Nominal(rough_places().points, stations)
 
 

@@ -17,11 +17,11 @@ from plan_folders import (
 import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.geometry.rotations import from_angles
+from tankcal.geometry.rotations import rotation_of_angles
 from tankcal.job import load
 from tankcal.planning import load_plan, predict
 from tankcal.planning.improvements import greedy
-from tankcal.planning.measurements import measured
+from tankcal.planning.measurements import draw_measurements
 from tankcal.report import planning as planning_papers
 from tankcal.report.planning import empty_job
 
@@ -46,7 +46,7 @@ def empty(planned, tmp_path):
 
 
 def exact(prediction):
-    return measured(prediction.plan, prediction.measurements, prediction.predicted)
+    return draw_measurements(prediction.plan, prediction.measurements, prediction.predicted)
 
 
 def rows_of(path):
@@ -127,7 +127,7 @@ def test_both_forms_filled_in_are_the_same_job(empty):
 def test_a_filled_job_with_errors_runs(empty, figure):
     """Simulation: the volume lies within what was predicted (four standard uncertainties)."""
     prediction, folder = empty
-    drawn = measured(
+    drawn = draw_measurements(
         prediction.plan, prediction.measurements, prediction.predicted, np.random.default_rng(3)
     )
     fill_folder(folder, drawn)
@@ -190,7 +190,9 @@ def test_a_fixed_photo_keeps_its_place(tmp_path):
     place = [float(row[f"{axis}_m"]) for axis in "xyz"]
     assert place == pytest.approx(prediction.plan.photos[0].xyz_m, abs=5e-4)
     angles = np.radians([float(row[f"{name}_deg"]) for name in ("omega", "phi", "kappa")])
-    assert from_angles(*angles) == pytest.approx(prediction.plan.photos[0].rotation, abs=2e-4)
+    assert rotation_of_angles(*angles) == pytest.approx(
+        prediction.plan.photos[0].rotation, abs=2e-4
+    )
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from conftest import EXAMPLE
 import tankcal
 from tankcal.errors import SolutionError
 from tankcal.survey import network
-from tankcal.survey.network.snooping import started
+from tankcal.survey.network.snooping import start_from_adjusted
 
 PHOTOS, STATIONS = EXAMPLE.parent / "silva-1995-photos", EXAMPLE.parent / "total-station"
 
@@ -17,7 +17,7 @@ PHOTOS, STATIONS = EXAMPLE.parent / "silva-1995-photos", EXAMPLE.parent / "total
 def at_adjusted(folder):
     """The adjustment of an example, and its survey with everything at the adjusted values."""
     adjusted = tankcal.adjust_job(tankcal.load(folder)).adjusted
-    survey = started(adjusted.survey, adjusted)
+    survey = start_from_adjusted(adjusted.survey, adjusted)
     cameras = tuple(
         replace(camera, values=np.array(list(adjusted.camera(int(photo))[0].values())))
         for camera, photo in zip(survey.cameras, first_photos(survey), strict=True)

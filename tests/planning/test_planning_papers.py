@@ -10,7 +10,7 @@ import pytest
 from invented_language import bracketed, without_brackets
 from plan_folders import PLAN, changed_plan, with_setups
 
-from tankcal.geometry.rotations import looking, pointing
+from tankcal.geometry.rotations import rotation_of_view, view_of_rotation
 from tankcal.planning import load_plan, predict
 from tankcal.planning.improvements import greedy, what_helps
 from tankcal.planning.places import place_of, reference_rad
@@ -104,7 +104,7 @@ def test_places_by_closed_form(prediction):
 @pytest.mark.parametrize("angles", [(0.3, 0.1, -2.0), (-3.0, -0.7, 0.0), (1.0, 0.0, np.pi / 2)])
 def test_where_a_camera_points_to(angles):
     """Property: pointing is the inverse of looking."""
-    assert pointing(looking(*angles)) == pytest.approx(np.array(angles), abs=1e-12)
+    assert view_of_rotation(rotation_of_view(*angles)) == pytest.approx(np.array(angles), abs=1e-12)
 
 
 def test_turns_and_rolls_are_those_of_the_plan(tmp_path):

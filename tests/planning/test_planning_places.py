@@ -7,7 +7,7 @@ import pytest
 from plan_folders import PLAN, changed_plan, with_setups
 
 from tankcal.errors import InputError
-from tankcal.geometry.rotations import pointing
+from tankcal.geometry.rotations import view_of_rotation
 from tankcal.planning import load_plan, predict
 from tankcal.planning.changes import changes_of
 from tankcal.planning.rings import row_heights_m
@@ -45,7 +45,7 @@ def test_the_volume_is_that_of_the_nominal_tank_from_either_side(plan, tmp_path)
 def test_a_camera_points_to_the_height_on_the_wall(plan, tmp_path):
     """Closed form: 10 m from the wall, 1.8 m higher; within, 9.5 m from the wall opposite."""
     for one, away in ((plan, 10.0), (from_within(tmp_path), 9.5)):
-        _, tilt, _ = pointing(one.photos[0].rotation)
+        _, tilt, _ = view_of_rotation(one.photos[0].rotation)
         assert np.tan(tilt) == pytest.approx(1.8 / away)
 
 

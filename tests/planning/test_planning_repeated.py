@@ -11,7 +11,7 @@ from tankcal.job import load
 from tankcal.pipeline.table import compute_table
 from tankcal.pipeline.wall import find_wall, s_transform
 from tankcal.planning import load_plan, predict
-from tankcal.planning.measurements import measured
+from tankcal.planning.measurements import draw_measurements
 from tankcal.report.planning import empty_job
 from tankcal.survey import adjust_survey, wall_points
 
@@ -36,7 +36,9 @@ def with_sets(folder, sets):
 def filled(prediction, folder):
     """The measurements of the job made from a plan, with the values that it computes."""
     empty_job.write(prediction, folder)
-    fill_folder(folder, measured(prediction.plan, prediction.measurements, prediction.predicted))
+    fill_folder(
+        folder, draw_measurements(prediction.plan, prediction.measurements, prediction.predicted)
+    )
     return load(folder).measurements
 
 

@@ -13,7 +13,7 @@ import tankcal
 from tankcal.cli import main
 from tankcal.errors import SolutionError
 from tankcal.planning import load_plan, predict
-from tankcal.planning.measurements import measured
+from tankcal.planning.measurements import draw_measurements
 from tankcal.planning.model import Box
 
 PLAN = EXAMPLE.parent / "plan-silva"
@@ -34,7 +34,7 @@ def told(folder):
 
 def test_a_sound_plan_says_what_its_run_will_say(prediction):
     """Second method: the chain itself, of the job with the values that the plan computes."""
-    measurements = measured(prediction.plan, prediction.measurements, prediction.predicted)
+    measurements = draw_measurements(prediction.plan, prediction.measurements, prediction.predicted)
     job = replace(prediction.plan.job, measurements=measurements)
     of_run = [one.expected for one in tankcal.run(job, simulated=False).warnings]
     of_values = ("certificate_incomplete", "test_and_cause")  # the second: readings without errors

@@ -54,6 +54,7 @@ def test_a_record_has_every_key_of_its_version(made):
         assert checked(plain, RECORD.schema(), "record.json") == ([], [])
 
 
+@pytest.mark.slow
 def test_a_record_goes_into_its_dataclass_and_back(made):
     """Second way: every key has its field, and the types of the fields are those of the values."""
     for record in made.values():

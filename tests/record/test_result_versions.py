@@ -45,6 +45,7 @@ def short(value):
     return getattr(value, "name", str(value))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", CAMERA.kinds)
 def test_no_key_of_a_result_comes_or_goes_without_the_version(kind, results):
     result = json.loads(json.dumps(results[kind]))

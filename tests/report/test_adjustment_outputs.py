@@ -326,6 +326,7 @@ def test_verdict_of_a_group(factor, redundancy, verdict):
         assert scipy.stats.chi2.cdf(chi2, redundancy) == pytest.approx(0.975)
 
 
+@pytest.mark.slow
 def test_a_reading_that_nothing_controls_is_named(station):
     """Closed form: a wall point seen from one set-up by three values has none to spare."""
     _, record, path = station
@@ -367,6 +368,7 @@ def test_csv_files_are_the_record_in_their_units(only):
     assert len(pd.read_csv(folder / "groups.csv")) == len(found["groups"])
 
 
+@pytest.mark.slow
 def test_angles_are_degrees_with_residuals_in_seconds(station, tmp_path):
     _, record, _ = station
     outputs.tables.write_tables(record, tmp_path)

@@ -20,7 +20,7 @@ from tankcal.report.paper import Column
 from tankcal.report.plain import PlainPaper
 from tankcal.report.web import block_html
 from tankcal.report.workbook.book import number_format
-from tankcal.text.digits import PROGRAM, fixed, written
+from tankcal.text.digits import PROGRAM, fixed, format_with_u
 from tankcal.text.words import choice_sentence, load_words, percent, sentence
 
 # openpyxl does not know our data bars, and says so
@@ -101,7 +101,9 @@ def as_shown(tmp_path_factory):
     if soffice is None:
         pytest.skip("LibreOffice (soffice) is not installed: nothing shows the cells")
     rng = np.random.default_rng(11)
-    found = [(value, written(value, u, least=0)) for value, u, *_ in CASES if value is not None]
+    found = [
+        (value, format_with_u(value, u, least=0)) for value, u, *_ in CASES if value is not None
+    ]
     cells = [(value, one.decimals) for value, one in found if 1e-9 < abs(value) < 1e9]
     cells += [(float(f"{value:.3f}5"), 3) for value in rng.uniform(0, 1000, 300)]  # halves
     cells += [(float(value), int(rng.integers(0, 9))) for value in rng.normal(0, 1e3, 300)]

@@ -8,7 +8,7 @@ from collections import defaultdict
 import pytest
 from paper_pages import pages_of
 
-from tankcal.messages import filled
+from tankcal.messages import fill_template
 from tankcal.pipeline import corrections
 from tankcal.report import blocks
 from tankcal.report.pdf import pdf
@@ -37,7 +37,7 @@ def sentences(language):
     mark = "." if language == "en" else ","
     known = defaultdict(lambda: 1.25)
     return [
-        filled(template, known, number=lambda value, form: str(value).replace(".", mark))
+        fill_template(template, known, number=lambda value, form: str(value).replace(".", mark))
         for template in templates(language)
     ]
 

@@ -10,12 +10,14 @@ from invented_language import bracketed, without_brackets
 from workbook_records import KINDS
 
 from tankcal.report import workbook
-from tankcal.text.shipped import shipped
+from tankcal.text.shipped import shipped_folder
 from tankcal.text.words import load_words
 
 # openpyxl does not know our data bars, and says so each time
 pytestmark = pytest.mark.filterwarnings("ignore:.*extension is not supported:UserWarning")
-SHIPPED = sorted(path.stem for path in (shipped("report_templates") / "words").glob("*.toml"))
+SHIPPED = sorted(
+    path.stem for path in (shipped_folder("report_templates") / "words").glob("*.toml")
+)
 WORD = re.compile(r"[^\W\d_]{4,}")  # letters: more than a unit or a symbol has
 UNITS = {"ppm", "arcsec"}
 

@@ -12,17 +12,17 @@ import tankcal.solver.compiled
 import tankcal.solver.elimination
 from tankcal.camera.model import CONVENTIONS, Form
 from tankcal.errors import SolutionError
-from tankcal.geometry.rotations import from_angles
+from tankcal.geometry.rotations import rotation_of_angles
 from tankcal.survey.network import Instrument, adjust, snoop
 from tankcal.survey.network.datum import directions
 from tankcal.survey.network.quality import (
     accuracy,
-    balanced,
-    compared,
+    compare_left_out,
     components,
     control_factor,
     ellipsoid_factor,
     ellipsoids,
+    estimate_variance_components,
     precision,
 )
 from tankcal.survey.network.reliability import noncentrality, tau_limit
@@ -179,7 +179,7 @@ def test_large_coordinates_and_a_turned_frame_change_nothing(survey, adjusted, f
     along_x = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]) @ r0  # that photo gets phi = 90 deg
     shift = np.array([5.0e5, 7.5e6, 800.0])
     order = np.random.default_rng(3).permutation(len(survey.image_points.point))
-    for rotation in (np.eye(3), from_angles(0.4, -1.1, 2.0), along_x):
+    for rotation in (np.eye(3), rotation_of_angles(0.4, -1.1, 2.0), along_x):
         found = adjust(moved(survey, rotation, shift, order))
         assert found.solution.iterations == adjusted.solution.iterations
         back = (found.xyz_m - shift) @ rotation
@@ -363,7 +363,7 @@ def test_check_observations_are_compared_not_adjusted(survey, adjusted):
     )
     truth = distance.computed(replace(adjusted.solution.unknowns), False)[0]
     distance = replace(distance, value=truth.ravel() + 0.004)
-    found = compared(adjusted, distance)
+    found = compare_left_out(adjusted, distance)
     both = adjust(replace(survey, observations=(*survey.observations, distance)))
     table = next(t for t in both.residuals if t.source == 2)
     assert found.difference == pytest.approx(np.array([[-0.004]]), abs=1e-9)
@@ -431,7 +431,7 @@ def test_balanced_weights_find_the_true_sds(figure):
     survey, _ = photographed(seed=4)
     control, tapes = survey.observations
     hopeful = replace(survey, observations=(replace(control, sd=control.sd / 5), tapes))
-    found, factors = balanced(hopeful, adjust)
+    found, factors = estimate_variance_components(hopeful, adjust)
     figure("control declared five times too good: factor found", f"{factors[0]:.2f}")
     assert factors[0] == pytest.approx(5, rel=0.35)
     assert found.sigma0 == pytest.approx(1, abs=0.03)

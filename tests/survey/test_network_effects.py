@@ -11,8 +11,8 @@ from tankcal.camera.model import PARAMETERS
 from tankcal.errors import SolutionError
 from tankcal.solver.effects import cofactors_within, responses
 from tankcal.survey.network import Instrument, adjust, correlations, snoop
-from tankcal.survey.network.datum import dependent
-from tankcal.survey.network.quality import compared
+from tankcal.survey.network.datum import depends_on_datum
+from tankcal.survey.network.quality import compare_left_out
 from tankcal.survey.observations import (
     Azimuths,
     ControlCoordinates,
@@ -139,13 +139,13 @@ def test_thousands_of_check_observations(datum):
     check = Distances(
         np.ones(3000), np.full(3000, 0.01), start, end, instrument=np.zeros(3000, dtype=int)
     )
-    table = compared(found, check)
+    table = compare_left_out(found, check)
     columns = check.columns(found.problem.layout)
     jac = check.computed(found.solution.unknowns, True)[1]
     for i in range(0, 3000, 500):
         q = found.solution.cofactor.among(columns[i])
         assert table.sd[i, 0] ** 2 == pytest.approx(1e-4 + (jac[i] @ q @ jac[i].T)[0, 0], rel=1e-9)
-    exact = compared(found, replace(check, sd=np.zeros(3000)))
+    exact = compare_left_out(found, replace(check, sd=np.zeros(3000)))
     assert exact.sd == pytest.approx(np.sqrt(np.square(table.sd) - 1e-4), rel=1e-6)
 
 
@@ -213,10 +213,10 @@ def test_which_quantities_depend_on_the_datum():
         (Azimuths(two, two, **ends), True),
         (PhotoOrientation(two, two, np.array([0, 1]), np.array([0, 4])), True),
     ):
-        assert dependent(free, one).tolist() == [depends] * 2
-        assert not dependent(adjust(SURVEY), one).any()
+        assert depends_on_datum(free, one).tolist() == [depends] * 2
+        assert not depends_on_datum(adjust(SURVEY), one).any()
     without = adjust(replace(SURVEY, observations=()), datum="inner")
-    assert dependent(without, tape).all()
+    assert depends_on_datum(without, tape).all()
 
 
 @pytest.mark.parametrize("datum", CASES)

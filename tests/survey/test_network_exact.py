@@ -9,7 +9,7 @@ from networks import by_total_station, photographed
 from test_network import whole_matrix
 
 from tankcal.errors import SolutionError
-from tankcal.geometry.rotations import angles_of, from_angles, turned
+from tankcal.geometry.rotations import angles_of, apply_small_rotation, rotation_of_angles
 from tankcal.survey.network import Instrument, System, adjust, snoop
 from tankcal.survey.observations import (
     Azimuths,
@@ -72,7 +72,7 @@ KINDS = {
     "phi": lambda: exactly(PhotoOrientation, photo=np.array([1, 4]), element=np.array([4, 4])),
     "rotation": lambda: PhotoRotation(
         np.zeros((2, 3)), np.zeros((2, 3)), np.array([1, 4]),
-        turned(TRUTH.rotation[[1, 4]], np.full((2, 3), 2e-4)),
+        apply_small_rotation(TRUTH.rotation[[1, 4]], np.full((2, 3), 2e-4)),
     ),
     "interior": lambda: KnownUnknowns(np.array([100.03]), np.zeros(1), "interior", np.array([0])),
 }  # fmt: skip
@@ -157,7 +157,7 @@ def test_covariance_is_that_of_the_null_space(survey):
 def test_a_single_angle_near_phi_90(survey, element, phi_deg):
     """Property: an angle held at its true value changes nothing in a survey without error."""
     exact, truth = photographed(noise=0.0)
-    target = from_angles(0.7, np.radians(phi_deg), -0.4)
+    target = rotation_of_angles(0.7, np.radians(phi_deg), -0.4)
     frame = target.T @ truth.rotation[2]  # X' = frame X: photo 2 then has that rotation
     control, tapes = exact.observations
     control = replace(control, value=(control.value.reshape(-1, 3) @ frame.T).ravel())
@@ -292,13 +292,15 @@ def test_total_station_with_a_held_side():
 
 def test_a_further_system_held_exactly(survey):
     """Property: control of a system that is turned and shifted gives the shape, exactly too."""
-    rotation = from_angles(0.0, 0.0, 0.8)
+    rotation = rotation_of_angles(0.0, 0.0, 0.8)
     point = np.repeat([1, 20, 40], 3)
     axis = np.tile([0, 1, 2], 3)
     there = TRUTH.xyz_m @ rotation.T + [5, -3, 1]
     known = SystemCoordinates(there[point, axis], np.zeros(9), point, axis, np.zeros(9, dtype=int))
     system = System(
-        "site", turned(rotation[None], np.array([[0.01, 0, 0.02]]))[0], np.array([5.1, -3, 1])
+        "site",
+        apply_small_rotation(rotation[None], np.array([[0.01, 0, 0.02]]))[0],
+        np.array([5.1, -3, 1]),
     )
     found = adjust(replace(survey, systems=(system,), observations=(*survey.observations, known)))
     state = found.solution.unknowns

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from networks import tank_points
 
-from tankcal.camera.model import Form, measured
+from tankcal.camera.model import Form, distort_image_points
 from tankcal.errors import SolutionError
-from tankcal.geometry.rotations import looking
+from tankcal.geometry.rotations import rotation_of_view
 from tankcal.survey.network import Camera, ImagePoints, Photos, Survey, adjust
-from tankcal.survey.network.soundness import hardly_determined
+from tankcal.survey.network.soundness import find_hardly_determined
 from tankcal.survey.network.unknowns import in_words
 from tankcal.survey.observations import ControlCoordinates, Distances
 
@@ -28,11 +28,13 @@ SPREAD = [0, 3, 7, 12, 19]
 def scene(xyz, stations, azimuth, tilt, roll, free=(), control=(), tapes=(), noise=1.0):
     """A Survey of points seen in all photos, with a camera of c = 100 mm named UMK."""
     rng, n = np.random.default_rng(1), len(stations)
-    rotation = looking(*(np.array(angle[:n], dtype=float) for angle in (azimuth, tilt, roll)))
+    rotation = rotation_of_view(
+        *(np.array(angle[:n], dtype=float) for angle in (azimuth, tilt, roll))
+    )
     photo, point = (a.ravel() for a in np.mgrid[:n, : len(xyz)])
     u, v, w = np.einsum("nij,nj->in", rotation[photo], xyz[point] - stations[photo])
     values = np.where(np.arange(13) == 0, 100.0, 0.0)
-    xy = measured(100 * np.column_stack([-u / w, -v / w]), values, Form())
+    xy = distort_image_points(100 * np.column_stack([-u / w, -v / w]), values, Form())
     xy += noise * rng.normal(0, 0.005, xy.shape)
     observations = []
     if len(control):
@@ -153,7 +155,7 @@ def test_photos_from_one_place_place_no_points():
         found = adjust(survey)
     except SolutionError:
         return
-    assert "point P1 is hardly determined" in " ".join(hardly_determined(found))
+    assert "point P1 is hardly determined" in " ".join(find_hardly_determined(found))
 
 
 def test_a_camera_without_c_is_refused():

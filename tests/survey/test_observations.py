@@ -5,7 +5,7 @@ import pytest
 from jacobians import assert_derivative
 
 from tankcal.camera.model import AFFINITIES, CONVENTIONS, Form
-from tankcal.geometry.rotations import from_angles, turned
+from tankcal.geometry.rotations import apply_small_rotation, rotation_of_angles
 from tankcal.survey.observations import (
     KINDS as TABLES,
 )
@@ -40,7 +40,7 @@ INTERIOR_STEP = [1, 1, 1, 1e-4, 1e-8, 1e-12, 1e-16, 1e-4, 1e-4, 1e-1, 1e-5, 1, 1
 def made_state():
     """Points about the origin; photos some 20 m away that look at them."""
     angles = RNG.normal(0, 0.2, (PHOTOS, 3)) + [0.4, -0.1, 1.0]
-    rotation = from_angles(*angles.T)
+    rotation = rotation_of_angles(*angles.T)
     away = 20 * rotation[:, 2, :] + RNG.normal(0, 1, (PHOTOS, 3))
     return State(
         xyz_m=RNG.uniform(-4, 4, (POINTS, 3)),
@@ -50,7 +50,7 @@ def made_state():
         orientation_rad=np.array([0.3, 2.0]),
         scale=np.array([1e-3, -2e-3]),
         offset_m=np.array([0.01, 0.02]),
-        system=from_angles(*RNG.normal(0, 1, (3, 2))),
+        system=rotation_of_angles(*RNG.normal(0, 1, (3, 2))),
         system_shift_m=RNG.normal(0, 5, (2, 3)),
         system_scale=np.array([0.01, -0.02]),
     )
@@ -113,13 +113,15 @@ KINDS = {
         np.zeros((3, 3)),
         np.full((3, 3), 0.01) * [1, 2, 3],
         np.arange(3),
-        turned(STATE.rotation, RNG.normal(0, 0.5, (3, 3))),
+        apply_small_rotation(STATE.rotation, RNG.normal(0, 0.5, (3, 3))),
     ),
     "photo held": HeldOrientation(
         *(np.linspace(-0.4, 0.5, 11), np.ones(11)),
         photo=np.arange(11) % 3,
         row=np.arange(11),
-        rotation=np.tile(turned(STATE.rotation, RNG.normal(0, 0.4, (3, 3))), (4, 1, 1))[:11],
+        rotation=np.tile(
+            apply_small_rotation(STATE.rotation, RNG.normal(0, 0.4, (3, 3))), (4, 1, 1)
+        )[:11],
     ),
     "control": ControlCoordinates(*FOUR, np.array([0, 1, 2, 5]), np.array([0, 1, 2, 0])),
     "system": SystemCoordinates(
@@ -241,7 +243,7 @@ def test_angles_are_compared_the_shorter_way_round():
 
 def test_known_rotation_holds_at_a_photo_that_looks_along_x():
     """At phi = 90 deg misclosure and derivatives stay finite, and the sds keep their size."""
-    known = from_angles(np.array([0.2]), np.array([np.pi / 2]), np.array([0.5]))
+    known = rotation_of_angles(np.array([0.2]), np.array([np.pi / 2]), np.array([0.5]))
     seen = PhotoRotation(np.zeros((1, 3)), np.full((1, 3), 1e-3), np.array([0]), known)
     state = State(xyz_m=STATE.xyz_m, photo_xyz_m=np.zeros((1, 3)), rotation=known)
     w, jac = np.empty((1, 3)), np.empty((1, 3, 3))

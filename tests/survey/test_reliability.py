@@ -12,7 +12,7 @@ from networks import photographed
 from test_network_study import NAMES, Kind, kinds, redrawn, redrawn_station
 
 from tankcal.survey.network import Survey, snoop
-from tankcal.survey.network.quality import balanced, components
+from tankcal.survey.network.quality import components, estimate_variance_components
 from tankcal.survey.network.reliability import tau_limit
 from tankcal.survey.observations import Directions, Distances, VerticalAngles
 
@@ -208,7 +208,7 @@ def test_balanced_sds_are_the_true_ones(surveys, figure):
     factors = []
     for _ in range(surveys):
         survey = kind.drawn(rng).with_sds({0: 0.5, 2: 3.0})
-        total = balanced(survey, kind.adjusted)[1]
+        total = estimate_variance_components(survey, kind.adjusted)[1]
         factors.append([total[0], total[1], total[2]])
     mean, sd = np.mean(factors, axis=0), np.std(factors, axis=0) / np.sqrt(surveys)
     figure(f"{surveys} surveys: factors of directions, zenith angles, distances", mean.round(3))

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from networks import by_total_station
 
-from tankcal.camera.model import Form, measured
-from tankcal.geometry.rotations import from_angles
+from tankcal.camera.model import Form, distort_image_points
+from tankcal.geometry.rotations import rotation_of_angles
 from tankcal.survey.network import Camera, ImagePoints, Instrument, Photos, Survey, System, adjust
 from tankcal.survey.observations import (
     Azimuths,
@@ -49,7 +49,7 @@ def reading(one, xyz, more):
     if kind == "ControlCoordinates":
         return xyz[one.point, one.axis]
     if kind == "SystemCoordinates":
-        rotation = from_angles(*more["turn"])
+        rotation = rotation_of_angles(*more["turn"])
         moved = (1 + more["stretch"][0]) * (xyz[one.point] @ rotation.T) + more["shift"]
         return moved[np.arange(len(one)), one.axis]
     if kind == "KnownUnknowns":
@@ -147,7 +147,9 @@ def everything(seed=0):
             Instrument("one", *_known(kinds, 0), 2e-5, 0.002),
             Instrument("two", float(kinds[-2].value[1]), 0.0, 2e-5, np.nan),
         ),
-        systems=(System("far", from_angles(0.0, 0.0, 0.69), np.array([100.1, 50, 7]), 0.0, True),),
+        systems=(
+            System("far", rotation_of_angles(0.0, 0.0, 0.69), np.array([100.1, 50, 7]), 0.0, True),
+        ),
     )
     return survey, kinds, more
 
@@ -257,10 +259,10 @@ def test_photographs_by_a_second_method(form, figure):
         whole = interior * (np.isin(np.arange(13), active, invert=True))
         whole[active] = camera
         seen = np.einsum(
-            "pij,pnj->pni", from_angles(*photos[:, 3:].T), points[None] - photos[:, None, :3]
+            "pij,pnj->pni", rotation_of_angles(*photos[:, 3:].T), points[None] - photos[:, None, :3]
         )
         ideal = -whole[0] * seen[..., :2] / seen[..., 2:]
-        return measured(ideal.reshape(-1, 2), whole, form)
+        return distort_image_points(ideal.reshape(-1, 2), whole, form)
 
     exterior = np.hstack([centre, angles])
     xy = images(xyz, exterior, interior[active])
@@ -275,7 +277,7 @@ def test_photographs_by_a_second_method(form, figure):
         points=tuple(f"P{i}" for i in range(PHOTOGRAPHED)),
         xyz_m=xyz + rng.normal(0, 0.01, xyz.shape),
         image_points=ImagePoints(number, photo, xy, np.full(xy.shape, 0.004)),
-        photos=Photos(tuple("abcd"), np.zeros(4, dtype=int), centre, from_angles(*angles.T)),
+        photos=Photos(tuple("abcd"), np.zeros(4, dtype=int), centre, rotation_of_angles(*angles.T)),
         cameras=(Camera(interior, form, scope=scope),),
         observations=(control,),
     )

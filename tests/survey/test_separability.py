@@ -9,12 +9,12 @@ from tankcal.adjust import CRITICAL
 from tankcal.survey import adjust_survey
 from tankcal.survey.network import adjust, separability
 from tankcal.survey.network.separability import alternatives
-from tankcal.survey.network.snooping import with_use
+from tankcal.survey.network.snooping import set_use
 
 
 def quantity(survey, uses, row):
     """Test quantity of an image point in the survey adjusted anew."""
-    tables = adjust(with_use(survey, {"image points": uses})).residuals
+    tables = adjust(set_use(survey, {"image points": uses})).residuals
     table = next(one for one in tables if one.source == "image points")
     return float(table.test_statistic[table.rows == row][0])
 

@@ -8,7 +8,7 @@ from networks import photographed
 
 from tankcal.errors import SolutionError
 from tankcal.survey.network import adjust
-from tankcal.survey.start.approximation import approximate, on_tank
+from tankcal.survey.start.approximation import approximate, nominal_places
 from tankcal.survey.start.resection import bearings, image_errors, three_point_poses
 
 
@@ -50,7 +50,9 @@ def test_nominal_geometry_alone_leads_to_the_same_answer(blunders):
     bad = rng.choice(n, int(blunders * n), replace=False)
     xy = wild.xy_mm.copy()
     xy[bad] += rng.uniform(-20, 20, (len(bad), 2))
-    nominal = on_tank(np.tile(np.arange(12), 4) + 1, 12, np.repeat(np.linspace(0.3, 9, 4), 12), 6.5)
+    nominal = nominal_places(
+        np.tile(np.arange(12), 4) + 1, 12, np.repeat(np.linspace(0.3, 9, 4), 12), 6.5
+    )
     start = replace(unknown_photos(survey), xyz_m=nominal, image_points=replace(wild, xy_mm=xy))
     found = approximate(start)
     assert np.abs(found.photos.xyz_m - survey.photos.xyz_m).max() < 1.0
@@ -98,7 +100,7 @@ def test_a_photo_with_three_known_points_is_decided_by_tie_points():
 
 def test_from_a_metre_and_twenty_degrees():
     """Property: the adjustment itself comes back from start values as bad as that."""
-    from tankcal.geometry.rotations import turned
+    from tankcal.geometry.rotations import apply_small_rotation
 
     survey, _ = photographed()
     rng = np.random.default_rng(4)
@@ -108,7 +110,7 @@ def test_from_a_metre_and_twenty_degrees():
     bad = replace(
         photos,
         xyz_m=photos.xyz_m + rng.uniform(-1, 1, (n, 3)),
-        rotation=turned(photos.rotation, np.deg2rad(20) * axis),
+        rotation=apply_small_rotation(photos.rotation, np.deg2rad(20) * axis),
     )
     found = adjust(replace(survey, photos=bad))
     assert found.xyz_m == pytest.approx(adjust(survey).xyz_m, abs=1e-7)

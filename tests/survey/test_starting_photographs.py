@@ -9,9 +9,9 @@ from networks import by_total_station, photographed, tank_points
 from test_starting import unknown_photos
 from test_starting_networks import control, sides, unknown
 
-from tankcal.camera.model import Form, measured
+from tankcal.camera.model import Form, distort_image_points
 from tankcal.errors import SolutionError
-from tankcal.geometry.rotations import from_angles, looking, turned
+from tankcal.geometry.rotations import apply_small_rotation, rotation_of_angles, rotation_of_view
 from tankcal.survey.network import Camera, ImagePoints, Photos, Survey, adjust
 from tankcal.survey.observations import State
 from tankcal.survey.start.approximation import approximate
@@ -26,14 +26,14 @@ def seen_from(xyz, stations, aim, noise_mm=0.0, seed=0):
     """A Survey of photos by an ideal camera that look at `aim`, without start values; the truth."""
     rng = np.random.default_rng(seed)
     d = np.asarray(aim) - stations
-    rotation = looking(
+    rotation = rotation_of_view(
         np.arctan2(d[:, 0], d[:, 1]),
         np.arctan2(d[:, 2], np.hypot(d[:, 0], d[:, 1])),
         rng.normal(size=len(d)),
     )
     photo, point = (a.ravel() for a in np.mgrid[: len(d), : len(xyz)])
     u, v, w = np.einsum("nij,nj->in", rotation[photo], xyz[point] - stations[photo])
-    xy = measured(100 * np.column_stack([-u / w, -v / w]), IDEAL, Form())
+    xy = distort_image_points(100 * np.column_stack([-u / w, -v / w]), IDEAL, Form())
     xy = xy + noise_mm * rng.normal(size=xy.shape)
     nothing = np.full((len(d), 3), np.nan), np.full((len(d), 3, 3), np.nan)
     survey = Survey(
@@ -197,7 +197,7 @@ def test_bad_start_values_of_all_photos_are_replaced():
     bad = replace(
         photos,
         xyz_m=photos.xyz_m + rng.uniform(-1, 1, (n, 3)),
-        rotation=turned(photos.rotation, np.deg2rad(20) * axis),
+        rotation=apply_small_rotation(photos.rotation, np.deg2rad(20) * axis),
     )
     xyz = survey.xyz_m + rng.normal(0, 0.2, survey.xyz_m.shape)
     found = approximate(replace(survey, photos=bad, xyz_m=xyz))
@@ -215,7 +215,7 @@ def test_nominal_coordinates_in_another_frame_than_control(turn_deg):
     """Nominal places are decimetres off and turned against the control, which decides."""
     survey, truth = photographed(photos=12)
     rng = np.random.default_rng(6)
-    turn = from_angles(0.0, 0.0, np.deg2rad(turn_deg))
+    turn = rotation_of_angles(0.0, 0.0, np.deg2rad(turn_deg))
     nominal = tank_points() @ turn.T + [3.0, -2, 0.5] + rng.normal(0, 0.15, truth.xyz_m.shape)
     nominal[1::6] = survey.xyz_m[1::6]  # control points start at their control coordinates
     found = approximate(replace(unknown_photos(survey), xyz_m=nominal))

@@ -12,11 +12,11 @@ from surveyed import by_instruments, by_photographs, changed, known, places, tab
 
 from tankcal.errors import InputError, SolutionError
 from tankcal.survey import adjust_survey, wall_points
-from tankcal.survey.means import averaged
+from tankcal.survey.means import average_readings
 from tankcal.survey.measurements import AdjustmentSettings, Instrument, Measurements, Targets
 from tankcal.survey.network import adjust
 from tankcal.survey.readings import EARTH_RADIUS_M, true_distance_m
-from tankcal.survey.wall import off_the_wall
+from tankcal.survey.wall import move_to_wall
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +102,7 @@ def test_groups_say_how_good_each_is(adjustment):
 def test_averages_are_those_of_each_label(rows, turn):
     """Second method: one loop over the labels; a mean of angles does not mind whole turns."""
     label, value, sd = (np.array(column) for column in zip(*rows, strict=True))
-    found = averaged(label, value, sd)
+    found = average_readings(label, value, sd)
     for i, first in enumerate(found.first):
         mine = label == label[first]
         p = 1 / sd[mine] ** 2
@@ -112,10 +112,10 @@ def test_averages_are_those_of_each_label(rows, turn):
         assert found.repeats[i] == mine.sum()
         assert found.chi2[i, 0] == pytest.approx(np.sum(p * (value[mine] - mean) ** 2), abs=1e-9)
     small = value / 10
-    turned = averaged(
+    turned = average_readings(
         label, small + 2 * np.pi * np.round(turn * np.arange(len(label))), sd, angle=True
     )
-    straight = averaged(label, small, sd)
+    straight = average_readings(label, small, sd)
     away = turned.value - straight.value
     assert away == pytest.approx(2 * np.pi * np.round(away / (2 * np.pi)), abs=1e-9)
 
@@ -329,7 +329,7 @@ def test_points_of_the_wall(photos, adjustment):
     angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     ring = np.column_stack([7 * np.sin(angle) + 3, 7 * np.cos(angle) - 2, angle])
     for side in (1.0, -1.0):
-        moved = off_the_wall(ring, np.full(12, 0.01 * side))
+        moved = move_to_wall(ring, np.full(12, 0.01 * side))
         assert np.hypot(*(moved[:, :2] - [3, -2]).T) == pytest.approx(7 - 0.01 * side, abs=1e-9)
         assert moved[:, 2] == pytest.approx(ring[:, 2])
     measurements = photos[0]
@@ -490,9 +490,9 @@ def test_fixed_and_weighted_orientation_of_photos(photos):
 def test_a_second_system_of_control(photos):
     """Simulation: control in a turned and shifted system helps, and its transformation is found."""
     measurements, truth = photos
-    from tankcal.geometry.rotations import from_angles
+    from tankcal.geometry.rotations import rotation_of_angles
 
-    rotation, shift = from_angles(0.02, -0.03, 1.1), np.array([1000.0, 2000.0, 50.0])
+    rotation, shift = rotation_of_angles(0.02, -0.03, 1.1), np.array([1000.0, 2000.0, 50.0])
     rng = np.random.default_rng(3)
     names = ["P2", "P8", "P22", "P28", "P40", "P46"]
     own = truth.xyz_m[[int(name[1:]) for name in names]]

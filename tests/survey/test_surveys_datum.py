@@ -9,7 +9,7 @@ from surveyed import by_instruments, by_photographs, known, table
 from tankcal.errors import InputError, SolutionError
 from tankcal.survey import adjust_survey
 from tankcal.survey.measurements import AdjustmentSettings
-from tankcal.survey.network.datum import dependent
+from tankcal.survey.network.datum import depends_on_datum
 from tankcal.survey.observations import ControlCoordinates, Distances
 
 PAIRS = [("P0", "P17"), ("P3", "P40"), ("P12", "P45"), ("P7", "P30"), ("P20", "P26")]
@@ -67,10 +67,10 @@ def test_what_depends_on_the_datum_and_what_does_not(photos):
         np.ones(2), np.ones(2), np.array([0, 3]), np.array([17, 40]), instrument=np.full(2, -1)
     )
     place = ControlCoordinates(np.zeros(1), np.ones(1), np.array([4]), np.array([0]))
-    assert not dependent(found, line).any()
-    assert dependent(found, place).all()
+    assert not depends_on_datum(found, line).any()
+    assert depends_on_datum(found, place).all()
     bare = chosen(replace(photos, readings=(), instruments=()), "inner").adjusted
-    assert dependent(bare, line).all()
+    assert depends_on_datum(bare, line).all()
 
 
 def test_minimal_takes_control_that_is_far_apart(photos):

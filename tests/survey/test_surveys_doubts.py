@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from surveyed import by_instruments, by_photographs, changed, told
 
-from tankcal.geometry.rotations import from_angles
+from tankcal.geometry.rotations import rotation_of_angles
 from tankcal.survey import adjust_survey
-from tankcal.survey.diagnosis.double_names import alike
+from tankcal.survey.diagnosis.double_names import normalize_name
 from tankcal.survey.measurements import AdjustmentSettings
 from tankcal.survey.start.pieces import similarity
 from tankcal.survey.start_values import plan_fit
@@ -119,9 +119,9 @@ def test_a_name_spelt_in_another_way(photos):
     row = images.rows[first]
     assert f"image_points.csv, row {row}: point p-26 has one ray" in text
     assert "image_points.csv: point p-26 could not be adjusted: is it P26?" in text
-    assert alike("P-007") == alike("p7") == "p7"
-    assert alike("lO1") == alike("101")
-    assert alike("70") != alike("7")
+    assert normalize_name("P-007") == normalize_name("p7") == "p7"
+    assert normalize_name("lO1") == normalize_name("101")
+    assert normalize_name("70") != normalize_name("7")
 
 
 @pytest.mark.slow
@@ -139,13 +139,13 @@ def test_frames_are_brought_together():
     """Property: a turned, shifted, and a mirrored copy come back."""
     rng = np.random.default_rng(0)
     xyz = rng.uniform(-5, 5, (6, 3))
-    turn = from_angles(0, 0, 0.7)
+    turn = rotation_of_angles(0, 0, 0.7)
     moved, worst = plan_fit(xyz, xyz[:3], xyz[:3] @ turn.T + [10, 20, 3])
     assert worst < 1e-12
     assert moved == pytest.approx(xyz @ turn.T + [10, 20, 3])
     mirrored, worst = plan_fit(xyz, xyz[:4], (xyz[:4] * [-1, 1, 1]) @ turn.T)
     assert worst < 1e-12
     assert mirrored == pytest.approx((xyz * [-1, 1, 1]) @ turn.T)
-    motion = similarity(xyz, 2 * xyz @ from_angles(0.3, 1, 2).T + 5)
-    assert motion.rotation == pytest.approx(from_angles(0.3, 1, 2))
+    motion = similarity(xyz, 2 * xyz @ rotation_of_angles(0.3, 1, 2).T + 5)
+    assert motion.rotation == pytest.approx(rotation_of_angles(0.3, 1, 2))
     assert motion.scale == pytest.approx(2)

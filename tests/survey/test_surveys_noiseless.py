@@ -11,7 +11,7 @@ from tankcal.record.plain_data import to_plain
 from tankcal.survey import adjust_survey
 from tankcal.survey.measurements import Instrument, Measurements
 from tankcal.survey.network import adjust
-from tankcal.survey.network.quality import balanced
+from tankcal.survey.network.quality import estimate_variance_components
 
 
 def two_tapes(scale="a_priori"):
@@ -63,4 +63,4 @@ def test_surveys_without_noise_have_a_record(make, scale):
 
 def test_variance_components_of_nothing_leave_the_declared_ones():
     survey = adjust_survey(two_tapes()).adjusted.survey
-    assert balanced(survey, adjust)[1] == {}
+    assert estimate_variance_components(survey, adjust)[1] == {}

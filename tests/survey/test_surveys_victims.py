@@ -12,12 +12,12 @@ from tankcal.errors import SolutionError
 from tankcal.record.adjustment import adjustment_of
 from tankcal.record.plain_data import to_plain
 from tankcal.survey import adjust_survey
-from tankcal.survey.means import averaged, torn_apart
+from tankcal.survey.means import average_readings, contradictory_labels
 from tankcal.survey.measurements import Measurements
 from tankcal.survey.network import adjust
 from tankcal.survey.network.reactions import HELD, reactions
 from tankcal.survey.network.separability import alternatives
-from tankcal.survey.network.snooping import with_use
+from tankcal.survey.network.snooping import set_use
 
 TRUTH = by_photographs(photos=6)[1].xyz_m, by_instruments()[1].xyz_m
 
@@ -175,8 +175,8 @@ def test_only_values_that_one_reading_contradicts_are_torn_apart():
     """Closed form: of four values one has a wild reading, one scatters, one is a pair apart."""
     value = [0, 1, -1, 0, 0, 90, 0, 30, -30, 0, 50]
     label = np.array([0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3])
-    means = averaged(label, np.array(value, dtype=float), np.ones(11))
-    torn = torn_apart(label, means)
+    means = average_readings(label, np.array(value, dtype=float), np.ones(11))
+    torn = contradictory_labels(label, means)
     assert len(set(torn[3:6].tolist())) == 3
     assert torn[9] != torn[10]
     assert np.array_equal(torn[:3], label[:3])
@@ -228,11 +228,11 @@ def test_whatever_may_be_wrong_instead_explains_it_as_well():
         assert [one.row for one in found.removed] == [2]
         likely = alternatives(found.adjusted, 0, 0)
         size = len(stations)
-        whole = adjust(with_use(found.adjusted.survey, {0: np.ones(size)}))
+        whole = adjust(set_use(found.adjusted.survey, {0: np.ones(size)}))
         for row in range(1, size):
             uses = np.ones(size)
             uses[row] = 0.0
-            again = adjust(with_use(found.adjusted.survey, {0: uses}))
+            again = adjust(set_use(found.adjusted.survey, {0: uses}))
             agrees = again.residuals[0].test_statistic[0] <= CRITICAL
             assert ((0, row) in likely) == (agrees and whole.chi2 - again.chi2 > CRITICAL**2)
     assert not any("as well be" in str(one) for one in found.warnings)
@@ -431,5 +431,5 @@ def test_a_reading_of_a_held_point_may_be_right_and_the_point_wrong():
                 fixed.flat[row] = False
             else:
                 uses[row] = 0.0
-            again = adjust(with_use(replace(survey, fixed=fixed), {0: uses})).residuals[0]
+            again = adjust(set_use(replace(survey, fixed=fixed), {0: uses})).residuals[0]
             assert again.test_statistic[again.rows == one.row - 2] < CRITICAL * 1.01

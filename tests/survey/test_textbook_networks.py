@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import tankcal
-from tankcal.geometry.rotations import from_angles
+from tankcal.geometry.rotations import rotation_of_angles
 from tankcal.survey import adjust_survey
 from tankcal.survey.network import adjust
 
@@ -134,7 +134,7 @@ class Bundle:
         photos = u[8 : self.places].reshape(-1, 6)
         xyz = self.xyz.copy()
         xyz[self.free] = u[self.places :].reshape(-1, 3)
-        rotation = from_angles(*photos[:, 3:].T)
+        rotation = rotation_of_angles(*photos[:, 3:].T)
         away = xyz[self.point] - photos[self.photo, :3]
         seen = np.einsum("nij,nj->ni", rotation[self.photo], away)
         return -u[0] * seen[:, :2] / seen[:, 2:]

@@ -16,10 +16,10 @@ from tankcal.text.digits import (
     decimals_of_mantissa,
     decimals_of_rows,
     fixed,
+    format_significant,
+    format_with_u,
     shortest,
     superscript,
-    with_digits,
-    written,
 )
 
 NAN, INF = float("nan"), float("inf")
@@ -95,7 +95,7 @@ CASES = [  # value, u, value ± U, concise
 
 @pytest.mark.parametrize(("value", "u", "both", "concise"), CASES)
 def test_a_value_and_its_uncertainty(value, u, both, concise):
-    found = written(value, u)
+    found = format_with_u(value, u)
     assert (found.both, found.concise) == (held(both), held(concise))
     if NOTHING not in (found.value, found.uncertainty):
         apart = f"{found.value} ± {found.uncertainty}"
@@ -118,7 +118,7 @@ def test_a_value_and_its_uncertainty(value, u, both, concise):
     ],
 )  # fmt: skip
 def test_separators_of_languages(value, u, marks, both, concise):
-    found = written(value, u, marks)
+    found = format_with_u(value, u, marks)
     assert (found.both, found.concise) == (both, concise)
 
 
@@ -137,14 +137,14 @@ def test_separators_of_languages(value, u, marks, both, concise):
     ],
 )
 def test_other_digits(value, u, options, both):
-    assert written(value, u, **options).both == both
+    assert format_with_u(value, u, **options).both == both
 
 
 def test_rounding_never_takes_more_than_a_twentieth_of_u():
     """Property: EA-4/02 6.3, over four decades, with one, two and three digits."""
     for significant in (1, 2, 3):
         for u in np.geomspace(0.01, 100, 4001):
-            shown = float(written(0.0, u, significant=significant).uncertainty)
+            shown = float(format_with_u(0.0, u, significant=significant).uncertainty)
             assert shown >= 0.95 * u * (1 - 1e-12)
             assert shown <= u * (1 + 1.0 / 10 ** (significant - 1))
 
@@ -153,7 +153,7 @@ def test_texts_give_the_value_back():
     """Property: within half a place of what was given, beside half its 15th digit."""
     rng = np.random.default_rng(5)
     for value, u in zip(rng.normal(0, 1e4, 2000), 10 ** rng.uniform(-9, 6, 2000), strict=True):
-        found = written(value, u, PROGRAM)
+        found = format_with_u(value, u, PROGRAM)
         half = 0.5 * 10.0**-found.decimals
         fifteenth = 0.5 * 10.0 ** (np.floor(np.log10(abs(value))) - 14)
         assert abs(float(found.value) - value) <= half + 1.1 * fifteenth
@@ -163,9 +163,9 @@ def test_texts_give_the_value_back():
 
 def test_a_negative_uncertainty_is_refused():
     with pytest.raises(ValueError, match=r"uncertainty -0\.1"):
-        written(1.0, -0.1)
+        format_with_u(1.0, -0.1)
     with pytest.raises(ValueError, match="expected 1 or more"):
-        written(1.0, 0.1, significant=0)
+        format_with_u(1.0, 0.1, significant=0)
 
 
 @pytest.mark.parametrize(
@@ -179,7 +179,7 @@ def test_a_negative_uncertainty_is_refused():
     ],
 )
 def test_powers_of_ten_in_a_narrow_column(value, u, written_out, both):
-    assert written(value, u, written_out=written_out).both == held(both)
+    assert format_with_u(value, u, written_out=written_out).both == held(both)
 
 
 @pytest.mark.parametrize(
@@ -293,7 +293,7 @@ def test_decimals_of_a_height(height, decimals):
     ],
 )
 def test_significant_digits(value, digits, marks, text):
-    assert with_digits(value, digits, marks) == held(text)
+    assert format_significant(value, digits, marks) == held(text)
 
 
 @pytest.mark.parametrize(

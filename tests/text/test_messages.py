@@ -12,11 +12,11 @@ from messages_told import lines
 
 import tankcal
 from tankcal.job.rule_files import shipped_names
-from tankcal.messages import as_plain, fields_of, joined, listed, message
+from tankcal.messages import as_plain, fields_of, join_with_and, list_some, message
 from tankcal.record import record_of
 from tankcal.record.plain_data import to_plain
 from tankcal.text.languages import DEFAULT, LANGUAGES
-from tankcal.text.words import MESSAGES, in_language, load_words, message_sentence
+from tankcal.text.words import MESSAGES, load_words, message_sentence, translate_record
 
 SOURCE = Path(tankcal.__file__).parent
 OTHERS = [one for one in LANGUAGES if one != DEFAULT]
@@ -107,11 +107,11 @@ def test_a_language_says_the_texts_of_every_shipped_rule(language):
             "conhecido com 14,1 mm, 1.234 de 0,5",
         ),
         (
-            message("of", "of {names}", names=listed(["a", "b", "c"], 2)),
+            message("of", "of {names}", names=list_some(["a", "b", "c"], 2)),
             "of a, b and 1 more",
             "de a, b e mais 1",
         ),
-        (message("of", "of {names}", names=listed(["a", "b"], 2)), "of a, b", "de a, b"),
+        (message("of", "of {names}", names=list_some(["a", "b"], 2)), "of a, b", "de a, b"),
         (
             message("of", "of {names}", names=[message("off", "{off_ppm:+.0f} ppm", off_ppm=12.0)]),
             "of +12 ppm",
@@ -150,8 +150,8 @@ def test_a_message_in_both_languages(text, english, portuguese):
 
 
 def test_parts_in_a_row():
-    assert joined(["a"]) == "a"
-    assert joined(["a", "b", "c"]) == "a, b and c"
+    assert join_with_and(["a"]) == "a"
+    assert join_with_and(["a", "b", "c"]) == "a, b and c"
 
 
 def test_a_copy_of_a_message_knows_what_it_says():
@@ -182,14 +182,14 @@ def test_every_warning_of_the_record_has_its_code(result):
 
 def test_a_record_is_told_in_the_language_of_its_reader(result):
     record = record_of(result)
-    told = in_language(WORDS, record)
+    told = translate_record(WORDS, record)
     (undeclared,) = (one for one in told["warnings"] if one["code"] == "undeclared")
     assert undeclared["text"].startswith("não declarado: ")
     (thermal,) = (one for one in told["corrections"] if one["code"] == "temperature")
     (scale,) = (one["formula_values"]["scale"] for one in record["corrections"]
                 if one["code"] == "temperature")  # fmt: skip
     assert thermal["formula"] == f"comprimentos vezes {scale:.8f}".replace(".", ",")
-    assert in_language(load_words(DEFAULT), record) == record
+    assert translate_record(load_words(DEFAULT), record) == record
 
 
 def test_a_record_without_codes_keeps_its_texts(result):
@@ -199,7 +199,7 @@ def test_a_record_without_codes_keeps_its_texts(result):
         "corrections": [{"code": "plate", "formula": "r - t"}],
         "adjustment": {"datum": {"words": ""}, "aside": ["point P1 is not measured"]},
     }
-    told = in_language(WORDS, old)
+    told = translate_record(WORDS, old)
     assert told["warnings"] == old["warnings"]
     assert told["corrections"] == old["corrections"]
     assert told["adjustment"] == old["adjustment"]
@@ -209,7 +209,7 @@ def test_a_shipped_rule_speaks_the_language_and_another_one_does_not(result):
     words = WORDS | {"rule_texts": {"oiml_r71": {"remark": "Não lido"}}}
     rule = {"code": "passed", "rule": {"name": "OIML R 71", "remark": "Not read"}}
     record = record_of(result) | {"rule": rule}
-    assert in_language(words, record)["rule"] == rule
+    assert translate_record(words, record)["rule"] == rule
     record["job"] = {"table": {"rule": "oiml_r71"}}
-    told = in_language(words, record)["rule"]
+    told = translate_record(words, record)["rule"]
     assert told["rule"] == {"name": "OIML R 71", "remark": "Não lido"}

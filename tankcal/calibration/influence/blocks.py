@@ -7,7 +7,7 @@ import numpy as np
 from tankcal.calibration.product.check import ALPHA, ProductCheck, check_product
 from tankcal.calibration.product.differences import differences_of
 from tankcal.camera.model import PARAMETERS, UNITS, Form
-from tankcal.geometry.rotations import rotation_vector, turned
+from tankcal.geometry.rotations import apply_small_rotation, rotation_vector
 from tankcal.survey.network.assembly import assemble
 from tankcal.survey.network.datum import null_space
 from tankcal.survey.network.results import GlobalTest
@@ -264,7 +264,7 @@ def _brought(one, target, xyz, place, rotation):
         moving = _derivatives(xyz) @ ways
         left = (target - centre - xyz)[there]
         step = ways @ np.linalg.lstsq(moving[there], left, rcond=None)[0]
-        turn = turned(np.eye(3)[None], step[None, 3:6])[0]
+        turn = apply_small_rotation(np.eye(3)[None], step[None, 3:6])[0]
         xyz, place = (step[:3] + (1 + step[6]) * a @ turn.T for a in (xyz, place))
         rotation = rotation @ turn.T
         if np.abs(step / scale).max() < SETTLED * size:

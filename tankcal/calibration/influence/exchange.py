@@ -14,7 +14,7 @@ SAME = 1e-5  # relative difference of formats or pixels that is rounding: 0.05 p
 FILE = "cameras.toml"
 
 
-def chosen_camera(job, camera=None):
+def select_camera(job, camera=None):
     """The job.CameraSetup that is to be replaced: the only one, or the one named.
 
     Raises InputError when the job has no photographs, no such camera, or several of them.
@@ -127,7 +127,7 @@ def free_parameters(setup, calibrations):
     )
 
 
-def with_calibration(measurements, setup, calibration, state, free):
+def exchange_calibration(measurements, setup, calibration, state, free):
     """job.Measurements with another calibration, its job.CameraSetup, names held for want of sds.
 
     setup        job.CameraSetup that is replaced
@@ -170,7 +170,7 @@ def can_be_weighted(calibration):
     return bool((np.nan_to_num(calibration.camera.sd) > 0).any())
 
 
-def without(measurements, removed):
+def leave_out_readings(measurements, removed):
     """job.Measurements in which surveys.Reading rows that were set aside take no part, unsearched.
 
     Rows of image points and readings between points are only compared, known coordinates and

@@ -19,12 +19,12 @@ from tankcal.calibration.influence.exchange import (
     FILE,
     STATES,
     can_be_weighted,
-    chosen_camera,
     counted_in,
+    exchange_calibration,
     free_parameters,
+    leave_out_readings,
     refuse_others,
-    with_calibration,
-    without,
+    select_camera,
 )
 from tankcal.calibration.product.check import ALPHA
 from tankcal.errors import TankcalError
@@ -149,7 +149,7 @@ def influence(
     if not states or set(states) - set(STATES):
         raise ValueError(f"found states {states!r}; expected some of {', '.join(STATES)}")
     calibrations = tuple(calibrations)
-    setup = chosen_camera(job, camera)
+    setup = select_camera(job, camera)
     refuse_others(setup, calibrations, file)
     calibrations = tuple(counted_in(one, calibrations) for one in calibrations)
     free = free_parameters(setup, calibrations)
@@ -158,7 +158,7 @@ def influence(
     progress(message("camera_reference_run", "reference"), 0, total)
     top = TopOfTank(job) if volume and _is_whole(job) else None
     reference, removed = _reference(job, counted_in(setup, calibrations), alpha, top)
-    common = without(job.measurements, removed)
+    common = leave_out_readings(job.measurements, removed)
     runs = [reference]
     for one in calibrations:
         for state in states:
@@ -187,7 +187,7 @@ def _reference(job, setup, alpha, top):
     found, adjustment = _adjusted(job, setup, alpha, begun, top)
     if adjustment is None or not adjustment.removed:
         return found, ()
-    again = replace(job, measurements=without(job.measurements, adjustment.removed))
+    again = replace(job, measurements=leave_out_readings(job.measurements, adjustment.removed))
     found, _ = _adjusted(again, setup, alpha, begun, top)
     return found, adjustment.removed
 
@@ -198,7 +198,7 @@ def _run(job, common, setup, calibration, state, free, alpha, top):
     label = f"{name}, {state}"
     if state == "weighted" and not can_be_weighted(calibration):
         return Run(label, name, state, "skipped", skipped="no_sds")
-    changed, own, held = with_calibration(common, setup, calibration, state, free)
+    changed, own, held = exchange_calibration(common, setup, calibration, state, free)
     begun = Run(label, name, state, "failed", held=held)
     return _adjusted(replace(job, measurements=changed), own, alpha, begun, top)[0]
 

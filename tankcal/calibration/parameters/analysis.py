@@ -9,22 +9,22 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.calibration.interiors import (
-    chosen,
     interiors_in,
     interiors_of,
     photos_in,
     refuse_unknown,
+    select_interiors,
 )
 from tankcal.calibration.parameters.dropping import Dropping, interior_after
 from tankcal.calibration.parameters.findings import Choices, Statistics
 from tankcal.calibration.parameters.judgement import (
+    add_joint_trial,
     adjusted_rows,
-    advised,
-    analysed,
-    told_together,
-    with_advised,
-    with_fewer,
-    without_advised,
+    advise,
+    advise_together,
+    hold_one_back,
+    judge_parameters,
+    remove_joint_trial,
 )
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
@@ -55,7 +55,7 @@ def analyse_record(record, choices=None, *, camera=None, photo=None):
     """
     interiors = interiors_in(record)
     if camera is not None or photo is not None:
-        interiors = chosen(interiors, photos_in(record), camera, photo)
+        interiors = select_interiors(interiors, photos_in(record), camera, photo)
     return _of_all(interiors, _statistics_in(record), choices or Choices(), "record.json")
 
 
@@ -138,7 +138,7 @@ def analyse_job(
     groups = [(g.kind, g.name, g.count, g.redundancy, g.rms) for g in adjustment.groups]
     statistics = Statistics(adjustment.sigma0, adjustment.redundancy, adjustment.cov_scale, groups)
     interiors = interiors_of(adjustment, job.measurements)
-    interiors = chosen(interiors, photos, camera, photo)
+    interiors = select_interiors(interiors, photos, camera, photo)
     found = _of_all(interiors, statistics, choices or Choices(), "cameras.toml", source="job")
     return _with_outcomes(found, job, adjustment, progress) if dropping else found
 
@@ -152,14 +152,14 @@ def _of_all(interiors, statistics, choices, file, source="record"):
         )
         raise InputError(Problem(file, text))
     try:
-        return tuple(analysed(one, statistics, choices, source) for one in judged)
+        return tuple(judge_parameters(one, statistics, choices, source) for one in judged)
     except ValueError as error:
         raise InputError(Problem(file, error.args[0])) from error
 
 
 def _with_outcomes(found, job, adjustment, progress):
     """All CameraParameters with each of their trials adjusted again, then what they advise."""
-    outcomes, total = {}, 1 + sum(len(without_advised(one).trials) for one in found)
+    outcomes, total = {}, 1 + sum(len(remove_joint_trial(one).trials) for one in found)
     progress(message("camera_volume_all", "computing the volume with all parameters"), 0, total)
     again = Dropping(job, adjustment)
 
@@ -178,15 +178,17 @@ def _with_outcomes(found, job, adjustment, progress):
                     )
                     progress(told, done, max(done, total))
                     outcomes[key] = again.without(*key)
-        return tuple(advised(_tried(one, outcomes, adjustment, again)) for one in staged)
+        return tuple(advise(_tried(one, outcomes, adjustment, again)) for one in staged)
 
-    found = tried(without_advised)
-    found = tried(with_advised)
-    while any(fewer is not one for fewer, one in zip(map(with_fewer, found), found, strict=True)):
-        found = tuple(advised(with_fewer(one)) for one in found)
-        found = tried(with_advised)
+    found = tried(remove_joint_trial)
+    found = tried(add_joint_trial)
+    while any(
+        fewer is not one for fewer, one in zip(map(hold_one_back, found), found, strict=True)
+    ):
+        found = tuple(advise(hold_one_back(one)) for one in found)
+        found = tried(add_joint_trial)
     progress("done", total, total)
-    return tuple(told_together(one) for one in found)
+    return tuple(advise_together(one) for one in found)
 
 
 def _tried(found, outcomes, adjustment, again):

@@ -46,7 +46,7 @@ class Without:
         return correlations(self.covariance)
 
 
-def without(names, covariance, dropped, values=None):
+def drop_parameters(names, covariance, dropped, values=None):
     """The Without of parameters.
 
     names       (n,)                  covariance  (n, n), in the units of the parameters

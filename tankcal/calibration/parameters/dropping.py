@@ -19,9 +19,9 @@ from tankcal.errors import SolutionError, TankcalError
 from tankcal.messages import message
 from tankcal.survey import Adjustment
 from tankcal.survey.causes import causes_of
-from tankcal.survey.datum import framed
+from tankcal.survey.datum import make_frame
 from tankcal.survey.network import adjust
-from tankcal.survey.network.snooping import started
+from tankcal.survey.network.snooping import start_from_adjusted
 from tankcal.survey.network_of_survey import gather
 
 
@@ -76,8 +76,8 @@ class Dropping:
     def __init__(self, job, adjustment):
         self.job, self.adjustment = job, adjustment
         gathered = gather(job.measurements)
-        survey = started(adjustment.adjusted.survey, adjustment.adjusted)
-        self._options = framed(survey, gathered, job.measurements.settings).options
+        survey = start_from_adjusted(adjustment.adjusted.survey, adjustment.adjusted)
+        self._options = make_frame(survey, gathered, job.measurements.settings).options
         self._survey = replace(survey, cameras=_started_cameras(adjustment.adjusted))
         self.volume, self.no_volume, self._top = None, None, TopOfTank(job)
         if job.tank is not None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from tankcal.calibration.edges import left_shifts, own_shift
 from tankcal.calibration.parameters.components import components
-from tankcal.calibration.parameters.conditioning import without
+from tankcal.calibration.parameters.conditioning import drop_parameters
 from tankcal.calibration.parameters.findings import CameraParameters, Trial
 from tankcal.calibration.parameters.recommendation import (
     CORRELATED,
@@ -14,7 +14,7 @@ from tankcal.calibration.parameters.recommendation import (
     Limit,
     advice,
     moves,
-    together,
+    reasons_together,
 )
 from tankcal.calibration.parameters.rules import LIMIT_PX, pessoa_rule, silva_rule
 from tankcal.calibration.parameters.significance import group_tests, groups_among, single_tests
@@ -29,7 +29,7 @@ def adjusted_rows(interior):
     return np.flatnonzero(np.diag(interior.covariance) > 0)
 
 
-def analysed(interior, statistics, choices, source):
+def judge_parameters(interior, statistics, choices, source):
     """The CameraParameters of one set, nothing adjusted again."""
     rows = adjusted_rows(interior)
     names = tuple(interior.free[i] for i in rows)
@@ -52,7 +52,7 @@ def analysed(interior, statistics, choices, source):
         "a_posteriori" if statistics.estimated else "a_priori", dof, statistics.sigma0,
         limit, tests, groups, parts, own, left, trials, silva, pessoa, (),
     )  # fmt: skip
-    return with_advised(advised(found))
+    return add_joint_trial(advise(found))
 
 
 def _in_model(interior):
@@ -112,12 +112,12 @@ def _trials(interior, names, values, covariance, groups, silva, pessoa):
         if key and "c" not in key and len(key) < len(names):
             because.setdefault(key, []).append(why)
     return tuple(
-        Trial(key, tuple(why), without(names, covariance, key, values), not interior.shared)
+        Trial(key, tuple(why), drop_parameters(names, covariance, key, values), not interior.shared)
         for key, why in because.items()
     )
 
 
-def without_advised(found):
+def remove_joint_trial(found):
     """The CameraParameters without that Trial."""
     trials = (
         replace(one, because=tuple(why for why in one.because if why != "advised"))
@@ -126,12 +126,12 @@ def without_advised(found):
     return replace(found, trials=tuple(one for one in trials if one.because))
 
 
-def with_advised(found):
+def add_joint_trial(found):
     """The CameraParameters with a Trial of all that its recommendation lets go, together."""
     goes = tuple(one.name for one in found.recommendation if not one.keep)
-    trials = list(without_advised(found).trials)
+    trials = list(remove_joint_trial(found).trials)
     if goes and goes not in [one.names for one in trials]:
-        predicted = without(found.names, found.covariance, goes, found.values)
+        predicted = drop_parameters(found.names, found.covariance, goes, found.values)
         trials.append(Trial(goes, (), predicted, not found.interior.shared))
     return replace(
         found,
@@ -142,7 +142,7 @@ def with_advised(found):
     )
 
 
-def with_fewer(found):
+def hold_one_back(found):
     """The CameraParameters with one parameter held back where all that may go move the product.
 
     The one whose absence alone moves most; the same object where they stay.
@@ -158,12 +158,12 @@ def with_fewer(found):
     return replace(found, held_back=(*found.held_back, worst))
 
 
-def told_together(found):
+def advise_together(found):
     """The CameraParameters whose advice says what dropping all that may go does at once."""
     trial = next((one for one in found.trials if "advised" in one.because), None)
     if trial is None or len(trial.names) < 2:
         return found
-    reason = together(trial.names, product_of(found, trial), _failed(trial))
+    reason = reasons_together(trial.names, product_of(found, trial), _failed(trial))
     return replace(
         found,
         recommendation=tuple(
@@ -173,7 +173,7 @@ def told_together(found):
     )
 
 
-def advised(found):
+def advise(found):
     """The CameraParameters with the recommendation that its trials support."""
     singles = {t.names[0]: t for t in found.trials if "single" in t.because and t.comparable}
     evidence = tuple(

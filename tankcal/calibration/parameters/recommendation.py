@@ -147,7 +147,7 @@ def _decided(one, keep, significant):
     return (keep if significant else False), ({"code": "product_stays", **one.product},)
 
 
-def together(names, product, failed):
+def reasons_together(names, product, failed):
     """Reasons (0 or 1) that say what dropping all of several parameters does at once."""
     if failed is not None:
         return ({"code": "not_determined_without", "text": failed, "names": list(names)},)

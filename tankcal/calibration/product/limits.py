@@ -29,7 +29,7 @@ from tankcal.job.fields import Field
 from tankcal.job.folder import read_toml
 from tankcal.job.tables import Log, nearest, read_bytes
 from tankcal.messages import message
-from tankcal.text.shipped import shipped
+from tankcal.text.shipped import shipped_folder
 
 PARTS = ("plan", "height")
 SHIPPED = "pec_pcd"
@@ -90,7 +90,7 @@ class LimitTable:
     code: str | None = None
 
 
-def of_scale(table, scale):
+def limits_of_scale(table, scale):
     """The limits of one scale only.
 
     Parameters
@@ -149,7 +149,7 @@ def shipped_limits(name=SHIPPED):
     >>> shipped_limits().name
     'PEC-PCD'
     """
-    folder = shipped("calibration/product/limit_tables")
+    folder = shipped_folder("calibration/product/limit_tables")
     return replace(read_limits(folder / f"{name}.toml"), code=name)
 
 

@@ -31,7 +31,7 @@ from tankcal.calibration.stability.expected import covariance_of, expected_px, i
 from tankcal.calibration.stability.fits import resection, rotation_between
 from tankcal.calibration.stability.grids import Grid, default_grid
 from tankcal.calibration.stability.terrains import SEED, TERRAINS, Terrain
-from tankcal.camera.model import corrected, measured
+from tankcal.camera.model import correct_image_points, distort_image_points
 from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import angles_of
 from tankcal.messages import message
@@ -228,10 +228,10 @@ def _corrected(setup, grid, format_px):
     camera = setup.camera
     points_mm = grid.image_points_mm(format_px, setup.pixel_mm)
     with np.errstate(all="ignore"):
-        ideal = corrected(points_mm, camera.values, camera.form)
+        ideal = correct_image_points(points_mm, camera.values, camera.form)
         is_undone = np.all(np.isfinite(ideal))
         if is_undone and camera.form.convention == "distortion_of_ideal":
-            again = measured(ideal, camera.values, camera.form)
+            again = distort_image_points(ideal, camera.values, camera.form)
             is_undone = np.abs(again - points_mm).max() < UNDONE_MM
     if not is_undone:
         raise SolutionError(

@@ -11,7 +11,7 @@ to first order. Source: JCGM 100; imaging formulas as in tankcal.camera.imaging.
 
 import numpy as np
 
-from tankcal.camera.imaging import one_image_point
+from tankcal.camera.imaging import image_point_derivatives
 
 
 def ideal_derivatives(ideal_mm, interior, form):
@@ -23,7 +23,7 @@ def ideal_derivatives(ideal_mm, interior, form):
     of_ideal = form.convention == "distortion_of_ideal"
     q = tuple(np.asarray(interior, dtype=float))
     rays = (*(ideal_mm.T / q[0]), -np.ones(len(ideal_mm)))
-    rows = one_image_point(rays, np.eye(3).ravel(), q, form.numbers, of_ideal)[2:]
+    rows = image_point_derivatives(rays, np.eye(3).ravel(), q, form.numbers, of_ideal)[2:]
     by_all = np.stack([np.column_stack(np.broadcast_arrays(*row)) for row in rows], axis=1)
     slope, measured = by_all[:, :, :2] / q[0], by_all[:, :, 6:]
     measured[:, :, 0] = 0.0

@@ -19,7 +19,7 @@ import numpy as np
 from tankcal.adjust import adjust
 from tankcal.camera.imaging import ideal_point
 from tankcal.errors import SolutionError
-from tankcal.geometry.rotations import turned, vector_derivatives
+from tankcal.geometry.rotations import apply_small_rotation, vector_derivatives
 from tankcal.messages import message
 
 
@@ -87,7 +87,7 @@ def orientation_model(place, c_mm, start, pixel_mm):
 
     def model(x, image_px):
         turn = x[None, :3]
-        rotation = turned(start[None], turn)[0]
+        rotation = apply_small_rotation(start[None], turn)[0]
         position = x[3:] if len(x) > 3 else np.zeros(3)
         seen = rotation @ (place - position).T
         if np.any(seen[2] >= 0):
@@ -125,7 +125,7 @@ def _fit(place, image_mm, c_mm, pixel_mm, start, position):
     found = adjusted.unknowns
     misclosure, design, _ = model(found, image)
     return Fit(
-        rotation=turned(start[None], found[None, :3])[0],
+        rotation=apply_small_rotation(start[None], found[None, :3])[0],
         position_m=np.zeros(3) if position is None else found[3:],
         residuals_px=misclosure.reshape(-1, 2),
         sigma0_px=float(np.sqrt(misclosure @ misclosure / adjusted.dof)),

@@ -161,7 +161,7 @@ def _rows(path, fields, log):
             yield table.file, row, values
 
 
-def by_places(circles, places, reach_px):
+def match_circles_to_places(circles, places, reach_px):
     """([(point, Circle)], [(code, Circle)], [points not found]): each circle and place once.
 
     reach_px  how far a circle may be from its approximate place; a place with two circles within

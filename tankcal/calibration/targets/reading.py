@@ -10,7 +10,7 @@ from tankcal.calibration.targets.dictionaries import dictionary_of
 from tankcal.calibration.targets.found import Refused
 from tankcal.calibration.targets.naming import (
     CORNERS,
-    by_places,
+    match_circles_to_places,
     read_names,
     read_places,
     warn_of_unused,
@@ -25,7 +25,7 @@ from tankcal.calibration.targets.writing import (
 )
 from tankcal.job.fields import Refused as BadName
 from tankcal.job.tables import Log, shown
-from tankcal.messages import either, message
+from tankcal.messages import join_with_or, message
 
 WHAT = ("corners", "centres", "circles")
 CHANCE_TOLD = 1e-4  # that random cells are a code
@@ -139,7 +139,7 @@ def _lists(wanted, log):
                 "targets_choice",
                 "found {found}; expected {known}",
                 found=shown(value),
-                known=either([*known]),
+                known=join_with_or([*known]),
             )
             log.problem(name, expected)
     for name in ("reach_px", "smallest_px", "largest_px", "bit_errors"):
@@ -251,7 +251,7 @@ def _photo(title, picture, wanted, names, places, log):
 
 def _photo_of_circles(title, picture, wanted, places, log):
     found = read_circles(picture.image, wanted.smallest_px or 6.0, wanted.largest_px)
-    named, refused, lacking = by_places(found.targets, places, wanted.reach_px)
+    named, refused, lacking = match_circles_to_places(found.targets, places, wanted.reach_px)
     if lacking:
         listed = ", ".join(repr(name) for name in lacking[:5])
         expected = message(

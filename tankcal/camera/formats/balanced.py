@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.camera.formats.fitting import USUAL
-from tankcal.camera.formats.frame import framed, on_film
-from tankcal.camera.formats.published import converted
-from tankcal.camera.formats.texts import exactly, given_twice, shown
+from tankcal.camera.formats.frame import make_film_camera, make_framed_camera
+from tankcal.camera.formats.published import convert_camera
+from tankcal.camera.formats.texts import exact_text, given_twice, short_text
 from tankcal.camera.model import Form
 from tankcal.messages import message
 
@@ -55,12 +55,12 @@ def from_balanced(camera, pixel_mm, size_px):
 
     pixel_mm  one number, or width and height        size_px  (columns, lines)
     """
-    return framed(*_interior_of(camera), pixel_mm, size_px)
+    return make_framed_camera(*_interior_of(camera), pixel_mm, size_px)
 
 
 def film_from_balanced(camera, format_mm):
     """FramedCamera of a film (2,) width and height, mm; see from_balanced."""
-    return on_film(*_interior_of(camera), format_mm)
+    return make_film_camera(*_interior_of(camera), format_mm)
 
 
 def _interior_of(camera):
@@ -79,7 +79,7 @@ def to_balanced(camera, radius_mm, convention="distortion_of_ideal", covariance=
     covariance  (13, 13) of camera.interior, or None
     """
     form = Form(convention, "b1_b2", float(radius_mm))
-    found = converted(
+    found = convert_camera(
         camera.interior, camera.form, form, camera.size_px, camera.pixel_mm, USUAL, covariance
     )
     values = {key: float(found.interior[place]) for key, place in PLACES.items()}
@@ -101,7 +101,9 @@ def parse(text, notes):
         key = words[0]
         if len(words) != 2:
             notes.tell(
-                message("convert_key_and_number", "expected a key and one number"), row, shown(key)
+                message("convert_key_and_number", "expected a key and one number"),
+                row,
+                short_text(key),
             )
         elif key in values:
             notes.tell(given_twice(), row, key)
@@ -130,7 +132,7 @@ def parse(text, notes):
                     known=", ".join((*KEYS, *FRAME_KEYS)),
                 ),
                 row,
-                shown(key),
+                short_text(key),
             )
     _check(values, notes)
     camera = Balanced({key: values.get(key, 0.0) for key in KEYS}, convention)
@@ -172,13 +174,13 @@ def _check(values, notes):
 
 
 def _written(value):
-    return str(value) if isinstance(value, int) else exactly(value)
+    return str(value) if isinstance(value, int) else exact_text(value)
 
 
 def text_of(camera, framed_camera):
     """The lines of a Balanced camera and of its frame."""
     lines = ["# camera in the balanced form: mm, x to the right, y up"]
-    lines += [f"{key} {exactly(value)}" for key, value in camera.values.items()]
+    lines += [f"{key} {exact_text(value)}" for key, value in camera.values.items()]
     lines += [f"convention {camera.convention}"]
     keys, frame = FILM_KEYS, framed_camera.film_mm
     if frame is None:

@@ -19,8 +19,8 @@ from tankcal.camera.formats.frame import (
     FramedCamera,
     differences_px,
     frame_points,
-    framed,
-    in_mm,
+    make_framed_camera,
+    pixels_to_mm,
     rays_of,
 )
 from tankcal.camera.model import CONVENTIONS, PARAMETERS, Form, balanced_about
@@ -83,22 +83,24 @@ def from_brown(brown, pixel_mm, size_px):
     """
     pixel = np.array([pixel_mm * (brown.fy / brown.fx), pixel_mm])
     points = frame_points(size_px)
-    straight = framed(_interior(brown, pixel, size_px), Form(), pixel, size_px)
+    straight = make_framed_camera(_interior(brown, pixel, size_px), Form(), pixel, size_px)
     upright = points - np.outer(points[:, 1] - brown.cy, [brown.skew / brown.fy, 0])
     rays = rays_of(straight, upright)
     interior = straight.interior
     if brown.skew:
         used = [name for name, value in zip(PARAMETERS, interior, strict=True) if value]
-        seen = in_mm(points, pixel, size_px)
+        seen = pixels_to_mm(points, pixel, size_px)
         used = ("x0", "y0", "A", "B", *used)
         interior = fit(rays, seen, pixel, Form(), interior, used).interior
-    found = framed(interior, Form(), pixel, size_px)
-    return framed(interior, Form(), pixel, size_px, differences_px(found, rays, points).max())
+    found = make_framed_camera(interior, Form(), pixel, size_px)
+    return make_framed_camera(
+        interior, Form(), pixel, size_px, differences_px(found, rays, points).max()
+    )
 
 
 def _interior(brown, pixel_mm, size_px):
     c = brown.fy * pixel_mm[1]
-    x0, y0 = in_mm([[brown.cx, brown.cy]], pixel_mm, size_px)[0]
+    x0, y0 = pixels_to_mm([[brown.cx, brown.cy]], pixel_mm, size_px)[0]
     p1, p2, p3, p4 = brown.p
     radial = [k / c ** (2 * i) for i, k in enumerate(brown.k, 1)]
     return np.array([c, x0, y0, *radial, p2 / c, -p1 / c, p3 / c**2, p4 / c**4, 0, 0])
@@ -147,7 +149,7 @@ def _fitted(camera, has, rays, points):
     ]
     extras = [name for name, there in (("scale", has.two_focals), ("skew", has.skew)) if there]
     square = np.array([side, side])
-    seen = in_mm(points, square, camera.size_px)
+    seen = pixels_to_mm(points, square, camera.size_px)
     found = fit(rays, seen, square, Form(), start, lens, extras)
     return _brown(found.interior, found.scale, found.skew, camera, square)
 

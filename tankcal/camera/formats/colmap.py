@@ -12,7 +12,7 @@ import numpy as np
 
 from tankcal.camera.formats.brown import Has, to_brown
 from tankcal.camera.formats.opencv import OpenCV, from_opencv
-from tankcal.camera.formats.texts import exactly, shown
+from tankcal.camera.formats.texts import exact_text, short_text
 from tankcal.messages import message
 
 MODELS = {
@@ -107,7 +107,7 @@ def parse(text, notes):
                 message(
                     "convert_colmap_twice",
                     "camera {name} a second time; expected each once",
-                    name=shown(name),
+                    name=short_text(name),
                 ),
                 row,
                 "CAMERA_ID",
@@ -135,7 +135,7 @@ def _parsed(words, row, notes):
         expected = message(
             "convert_colmap_model",
             "camera model {model}; those read are {models}",
-            model=shown(model),
+            model=short_text(model),
             models=", ".join(MODELS),
         )
         notes.tell(expected, row, "MODEL")
@@ -170,5 +170,5 @@ def text_of(cameras):
     ]
     for number, (name, camera) in enumerate(cameras, 1):
         head = (name if are_numbers else str(number), camera.model, *map(str, camera.size_px))
-        lines.append(" ".join((*head, *map(exactly, camera.params))))
+        lines.append(" ".join((*head, *map(exact_text, camera.params))))
     return "\n".join(lines) + "\n"

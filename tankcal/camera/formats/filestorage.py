@@ -10,7 +10,7 @@ import re
 import numpy as np
 
 from tankcal.camera.formats.opencv import COUNTS, OpenCV
-from tankcal.camera.formats.texts import exactly, given_twice, shown
+from tankcal.camera.formats.texts import exact_text, given_twice, short_text
 from tankcal.messages import message
 
 MATRIX = ("camera_matrix", "cameramatrix", "intrinsic_matrix", "k", "mtx", "camera_mtx")
@@ -172,7 +172,7 @@ def _json(text, notes):
         )
         return None
     for key in twice:
-        notes.tell(given_twice(), key=shown(key))
+        notes.tell(given_twice(), key=short_text(key))
     return found
 
 
@@ -196,14 +196,14 @@ def _yaml(text, notes):
             notes.tell(
                 message("convert_endless_list", "a list without end; is the file complete?"),
                 number,
-                shown(key),
+                short_text(key),
             )
             return None
         if value.startswith("["):
             value = [one.strip() for one in value[1:-1].split(",") if one.strip()]
         home = nodes if indent == 0 or inside is None else inside
         if key in home:
-            notes.tell(given_twice(), number, shown(key))
+            notes.tell(given_twice(), number, short_text(key))
         is_node = isinstance(value, str) and (value == "" or value.startswith("!!opencv-matrix"))
         home[key] = {} if is_node and indent == 0 else value
         if indent == 0:
@@ -218,7 +218,7 @@ def text_of(camera, size_px):
     for key, matrix in (("camera_matrix", camera.matrix), ("distortion_coefficients", k)):
         rows, columns = matrix.shape
         lines += [f"{key}: !!opencv-matrix", f"   rows: {rows}", f"   cols: {columns}", "   dt: d"]
-        lines += [f"   data: [ {', '.join(map(exactly, matrix.ravel()))} ]"]
+        lines += [f"   data: [ {', '.join(map(exact_text, matrix.ravel()))} ]"]
     return "\n".join(lines) + "\n"
 
 

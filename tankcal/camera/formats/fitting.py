@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera.imaging import one_image_point
+from tankcal.camera.imaging import image_point_derivatives
 from tankcal.camera.model import PARAMETERS
 from tankcal.errors import SolutionError
 from tankcal.messages import message
@@ -108,7 +108,7 @@ def rows_of_fit(values, rays, image_mm, pixel_mm, form):
     cos, sin = np.cos(turn), np.sin(turn)
     x, y = rays[:, 0] * cos + rays[:, 1] * sin, rays[:, 1] * cos - rays[:, 0] * sin
     of_ideal = form.convention == "distortion_of_ideal"
-    u, v, along, up = one_image_point(
+    u, v, along, up = image_point_derivatives(
         (x, y, -np.ones_like(x)), np.eye(3).ravel(), tuple(q), tuple(form.numbers), of_ideal
     )
     u, v = u - q[1], v - q[2]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.camera.model import Form, corrected, measured
+from tankcal.camera.model import Form, correct_image_points, distort_image_points
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
@@ -47,7 +47,7 @@ class FramedCamera:
         return self.error_px * float(self.pixel_mm.max()) * 1e3
 
 
-def framed(interior, form, pixel_mm, size_px, error_px=0.0):
+def make_framed_camera(interior, form, pixel_mm, size_px, error_px=0.0):
     """FramedCamera of arrays or lists.
 
     pixel_mm  one number, or width and height
@@ -61,14 +61,14 @@ def framed(interior, form, pixel_mm, size_px, error_px=0.0):
     )
 
 
-def on_film(interior, form, format_mm):
+def make_film_camera(interior, form, format_mm):
     """FramedCamera of a film, which has no pixels.
 
     format_mm  (2,) width and height
     """
     film_mm = np.array(format_mm, dtype=float)
     size_px = np.maximum(np.round(film_mm / film_mm.max() * COUNTED_ON_FILM), 2)
-    return replace(framed(interior, form, film_mm / size_px, size_px), film_mm=film_mm)
+    return replace(make_framed_camera(interior, form, film_mm / size_px, size_px), film_mm=film_mm)
 
 
 def frame_points(size_px, counts=GRID):
@@ -77,13 +77,13 @@ def frame_points(size_px, counts=GRID):
     return np.column_stack([axis.ravel() for axis in np.meshgrid(*axes)])
 
 
-def in_mm(points_px, pixel_mm, size_px):
+def pixels_to_mm(points_px, pixel_mm, size_px):
     """(n, 2) mm from the middle of the frame, y up, of columns and lines (n, 2)."""
     middle = (np.array(size_px, dtype=float) - 1) / 2
     return (np.asarray(points_px, dtype=float) - middle) * pixel_mm * [1, -1]
 
 
-def in_px(points_mm, pixel_mm, size_px):
+def mm_to_pixels(points_mm, pixel_mm, size_px):
     """(n, 2) columns and lines of points (n, 2) in mm from the middle of the frame, y up."""
     middle = (np.array(size_px, dtype=float) - 1) / 2
     return np.asarray(points_mm, dtype=float) / pixel_mm * [1, -1] + middle
@@ -91,8 +91,8 @@ def in_px(points_mm, pixel_mm, size_px):
 
 def image_of(camera, rays):
     """(n, 2) columns and lines of the image points of rays (n, 2)."""
-    seen = measured(np.asarray(rays) * camera.interior[0], camera.interior, camera.form)
-    return in_px(seen, camera.pixel_mm, camera.size_px)
+    seen = distort_image_points(np.asarray(rays) * camera.interior[0], camera.interior, camera.form)
+    return mm_to_pixels(seen, camera.pixel_mm, camera.size_px)
 
 
 def rays_of(camera, points_px):
@@ -100,9 +100,9 @@ def rays_of(camera, points_px):
 
     Raises SolutionError where the distortion folds the image: a point with no ray of its own.
     """
-    seen = in_mm(points_px, camera.pixel_mm, camera.size_px)
+    seen = pixels_to_mm(points_px, camera.pixel_mm, camera.size_px)
     with np.errstate(all="ignore"):
-        rays = corrected(seen, camera.interior, camera.form) / camera.interior[0]
+        rays = correct_image_points(seen, camera.interior, camera.form) / camera.interior[0]
         off = np.hypot(*(image_of(camera, rays) - points_px).T)
     refuse_folds(points_px, off)
     return rays

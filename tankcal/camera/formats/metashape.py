@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 from tankcal.camera.formats.brown import Brown, from_brown, to_brown
-from tankcal.camera.formats.texts import exactly, given_twice, shown
+from tankcal.camera.formats.texts import exact_text, given_twice, short_text
 from tankcal.messages import message
 
 TERMS = ("cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
@@ -94,20 +94,22 @@ def parse(text, notes):
     found = {}
     for child in root:
         if child.tag in found:
-            notes.tell(given_twice(), key=shown(child.tag))
+            notes.tell(given_twice(), key=short_text(child.tag))
         elif child.tag not in (*TERMS, *OTHERS, *OLD):
             notes.tell(
                 message(
                     "convert_metashape_unknown", "unknown; expected the keys of a frame camera"
                 ),
-                key=shown(child.tag),
+                key=short_text(child.tag),
             )
         found[child.tag] = (child.text or "").strip()
     kind = found.get("projection", "frame")
     if kind != "frame":
         notes.tell(
             message(
-                "convert_metashape_kind", "{kind}; only frame cameras are read", kind=shown(kind)
+                "convert_metashape_kind",
+                "{kind}; only frame cameras are read",
+                kind=short_text(kind),
             ),
             key="projection",
         )
@@ -166,7 +168,7 @@ def _root(text, notes):
             message(
                 "convert_outermost",
                 "{found} as the outermost element; {expected}",
-                found=shown(root.tag),
+                found=short_text(root.tag),
                 expected=expected,
             )
         )
@@ -188,8 +190,8 @@ def text_of(camera):
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<calibration>"]
     lines += ["  <projection>frame</projection>"]
     lines += [f"  <width>{camera.size_px[0]}</width>", f"  <height>{camera.size_px[1]}</height>"]
-    lines += [f"  <f>{exactly(camera.f)}</f>"]
+    lines += [f"  <f>{exact_text(camera.f)}</f>"]
     for key, value in values.items():
         if value or key not in ("k4", "p3", "p4"):
-            lines.append(f"  <{key}>{exactly(value)}</{key}>")
+            lines.append(f"  <{key}>{exact_text(value)}</{key}>")
     return "\n".join([*lines, "</calibration>"]) + "\n"

@@ -20,7 +20,13 @@ import numpy as np
 
 from tankcal.camera.formats.brown import Brown, Has, from_brown, to_brown
 from tankcal.camera.formats.fitting import fit
-from tankcal.camera.formats.frame import differences_px, frame_points, framed, in_mm, refuse_folds
+from tankcal.camera.formats.frame import (
+    differences_px,
+    frame_points,
+    make_framed_camera,
+    pixels_to_mm,
+    refuse_folds,
+)
 from tankcal.camera.model import Form
 
 COUNTS = (0, 4, 5, 8, 12, 14)
@@ -63,14 +69,14 @@ def from_opencv(camera, pixel_mm, size_px):
     pixel = np.array([pixel_mm * (fy / fx), pixel_mm])
     c = fy * pixel_mm
     start = np.zeros(13)
-    start[:3] = c, *in_mm([[cx, cy]], pixel, size_px)[0]
+    start[:3] = c, *pixels_to_mm([[cx, cy]], pixel, size_px)[0]
     start[[3, 7, 8]] = (k[0] - k[5]) / c**2, k[3] / c, -k[2] / c
     used = FITTED + (("A", "B") if np.any(k[8:]) else ())
-    seen = in_mm(points, pixel, size_px)
+    seen = pixels_to_mm(points, pixel, size_px)
     interior = fit(rays, seen, pixel, Form(), start, used).interior
-    found = framed(interior, Form(), pixel, size_px)
+    found = make_framed_camera(interior, Form(), pixel, size_px)
     error = differences_px(found, rays, points).max()
-    return framed(interior, Form(), pixel, size_px, error)
+    return make_framed_camera(interior, Form(), pixel, size_px, error)
 
 
 def to_opencv(camera):
@@ -81,7 +87,7 @@ def to_opencv(camera):
     return OpenCV(matrix, np.array([k1, k2, *brown.p[:2], k3]), error)
 
 
-def distorted(x, y, k):
+def distort_rays(x, y, k):
     """x'', y'' (n,) of rays (n,), counted to the right and down; k  (14,) coefficients."""
     k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y = k
     r2 = x * x + y * y
@@ -105,13 +111,13 @@ def _rays(k, plane, points_px, focal_px):
     tiny = 1e-30j
     with np.errstate(all="ignore"):
         for _ in range(NEWTON_ROUNDS):
-            u, v = distorted(x, y, k)
-            by_x, by_y = distorted(x + tiny, y + 0j, k), distorted(x + 0j, y + tiny, k)
+            u, v = distort_rays(x, y, k)
+            by_x, by_y = distort_rays(x + tiny, y + 0j, k), distort_rays(x + 0j, y + tiny, k)
             (a, c), (b, d) = (np.imag(by_x) / 1e-30, np.imag(by_y) / 1e-30)
             off_x, off_y = u - plane[:, 0], v - plane[:, 1]
             determinant = a * d - b * c
             x = x - (d * off_x - b * off_y) / determinant
             y = y - (a * off_y - c * off_x) / determinant
-        off = (np.column_stack(distorted(x, y, k)) - plane) * focal_px
+        off = (np.column_stack(distort_rays(x, y, k)) - plane) * focal_px
     refuse_folds(points_px, np.hypot(*off.T))
     return np.column_stack([x, y])

@@ -21,7 +21,7 @@ import re
 from dataclasses import dataclass
 
 from tankcal.camera.formats.brown import Brown, Has, from_brown, to_brown
-from tankcal.camera.formats.texts import exactly, shown
+from tankcal.camera.formats.texts import exact_text, short_text
 from tankcal.messages import message
 
 KEYS = ("F", "Px", "Py", "K1", "K2", "K3", "T1", "T2")
@@ -106,7 +106,7 @@ def parse(text, notes):
                 message(
                     "convert_pix4d_first",
                     "{found}; expected Pix4D camera calibration file 0",
-                    found=shown(line.strip()),
+                    found=short_text(line.strip()),
                 ),
                 row,
             )
@@ -138,7 +138,7 @@ def _parsed(head_row, lines, notes):
                     "convert_pix4d_unknown", "unknown; expected {known}", known=", ".join(KEYS)
                 ),
                 row,
-                shown(key),
+                short_text(key),
             )
         elif key in values:
             notes.tell(
@@ -166,7 +166,7 @@ def _parsed(head_row, lines, notes):
     return Pix4D(sensor, f, px, py, tuple(k), (t1, t2))
 
 
-def suits(camera, size_px):
+def frame_fits_sensor(camera, size_px):
     """Has a frame of size_px (columns, lines) the proportions of the sensor?"""
     width, height = camera.sensor_mm
     return abs(width * size_px[1] / (height * size_px[0]) - 1) <= SAME_SHAPE
@@ -176,13 +176,13 @@ def text_of(cameras):
     """.cam text of [(name, Pix4D)]."""
     lines = []
     for name, camera in cameras:
-        width, height = map(exactly, camera.sensor_mm)
-        f, px, py = map(exactly, (camera.f_mm, camera.px_mm, camera.py_mm))
+        width, height = map(exact_text, camera.sensor_mm)
+        f, px, py = map(exact_text, (camera.f_mm, camera.px_mm, camera.py_mm))
         lines += [f"Pix4D camera calibration file {name}"]
         lines += [f"#Focal Length mm assuming a sensor width of {width}x{height}mm", f"F {f}"]
         lines += ["#Principal Point mm", f"Px {px}", f"Py {py}"]
         lines += ["#Symmetrical Lens Distortion Coeffs"]
-        lines += [f"K{i} {exactly(k)}" for i, k in enumerate(camera.r, 1)]
+        lines += [f"K{i} {exact_text(k)}" for i, k in enumerate(camera.r, 1)]
         lines += ["#Tangential Lens Distortion Coeffs"]
-        lines += [f"T{i} {exactly(t)}" for i, t in enumerate(camera.t, 1)] + [""]
+        lines += [f"T{i} {exact_text(t)}" for i, t in enumerate(camera.t, 1)] + [""]
     return "\n".join(lines)

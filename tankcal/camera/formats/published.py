@@ -22,11 +22,11 @@ from tankcal.camera.formats.frame import (
     SAME_POINT_PX,
     differences_px,
     frame_points,
-    framed,
-    in_mm,
+    make_framed_camera,
+    pixels_to_mm,
     rays_of,
 )
-from tankcal.camera.model import CONVENTIONS, PARAMETERS, Form, balanced_about, rescaled
+from tankcal.camera.model import CONVENTIONS, PARAMETERS, Form, balanced_about, rescale_interior
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
@@ -61,7 +61,7 @@ class Converted:
     turn_rad: float = 0.0
 
 
-def converted(
+def convert_camera(
     interior, form, to_form, size_px, pixel_mm, used=None, covariance=None, may_turn=False
 ):
     """Converted: the camera in the form to_form.
@@ -77,7 +77,7 @@ def converted(
 
     Raises SolutionError where the distortion folds the image within the frame.
     """
-    given = framed(interior, form, pixel_mm, size_px)
+    given = make_framed_camera(interior, form, pixel_mm, size_px)
 
     def convert(values):
         return _converted(values, given, to_form, used, may_turn)
@@ -85,15 +85,17 @@ def converted(
     found, turn, is_exact = convert(given.interior)
     points = frame_points(size_px)
     rays = _turned(rays_of(given, points), turn)
-    off = differences_px(framed(found, to_form, given.pixel_mm, size_px), rays, points)
+    off = differences_px(make_framed_camera(found, to_form, given.pixel_mm, size_px), rays, points)
     rms = float(np.sqrt(np.mean(off**2)))
     after = None
     if covariance is not None:
-        after = propagated(lambda values: convert(values)[0], given.interior, covariance)
+        after = propagate_by_differences(
+            lambda values: convert(values)[0], given.interior, covariance
+        )
     return Converted(found, to_form, float(off.max()), rms, is_exact, after, turn)
 
 
-def in_form(camera, name, covariance=None):
+def camera_in_form(camera, name, covariance=None):
     """A FramedCamera in the form of a publication, one of PUBLISHED, and its covariance.
 
     covariance  (13, 13) of camera.interior, its diagonal nan where no sd is known, or None: then
@@ -103,7 +105,7 @@ def in_form(camera, name, covariance=None):
     """
     known = None if covariance is None else np.nan_to_num(covariance)
     to_form, frame = PUBLISHED[name], (camera.size_px, camera.pixel_mm)
-    found = converted(camera.interior, camera.form, to_form, *frame, covariance=known)
+    found = convert_camera(camera.interior, camera.form, to_form, *frame, covariance=known)
     changed = replace(camera, interior=found.interior, form=found.form, error_px=found.error_px)
     if covariance is None:
         return changed, None
@@ -139,7 +141,7 @@ def _effect_px(camera, changes):
     )
 
 
-def propagated(function, values, covariance):
+def propagate_by_differences(function, values, covariance):
     """Covariance (m, m) of function(values) (m,), by central differences of a small part of a sd.
 
     values      (n,)
@@ -187,9 +189,9 @@ def _converted(values, given, to_form, used, may_turn):
     exact = _by_formula(values, given.form, to_form)
     if exact is not None and not np.any(exact[barred]):
         return exact, 0.0, True
-    source = framed(values, given.form, given.pixel_mm, given.size_px)
+    source = make_framed_camera(values, given.form, given.pixel_mm, given.size_px)
     points = frame_points(given.size_px)
-    seen = in_mm(points, given.pixel_mm, given.size_px)
+    seen = pixels_to_mm(points, given.pixel_mm, given.size_px)
     names = tuple(used) if used is not None else _usual(values)
     start = _first_values(values, given.form, to_form)
     start[barred] = 0.0
@@ -256,11 +258,11 @@ def _with_affinity(plain, affinity, to_form):
     # with the sign of the convention: [1 a; 0 1 + b] of both_y, [1 + a b; 0 1] of b1_b2
     if affinity == "both_y":
         scale = 1 + sign * b
-        found = rescaled(plain, to_form, scale)
+        found = rescale_interior(plain, to_form, scale)
         found[11:] = sign * (1 / scale - 1), a / scale
     else:
         scale = 1 / (1 + sign * a)
-        found = rescaled(plain, to_form, 1 / scale)
+        found = rescale_interior(plain, to_form, 1 / scale)
         found[11:] = b * scale, sign * (scale - 1)
     return found
 

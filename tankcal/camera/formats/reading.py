@@ -14,7 +14,7 @@ from pathlib import Path
 
 from tankcal.camera.formats import balanced, colmap, filestorage, metashape, pix4d
 from tankcal.camera.formats.opencv import from_opencv
-from tankcal.camera.formats.texts import LONGEST, Notes, only_letters, shown
+from tankcal.camera.formats.texts import LONGEST, Notes, only_letters, short_text
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
@@ -64,7 +64,7 @@ def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
             text = message(
                 "convert_cannot",
                 "camera {camera} cannot be converted: {error}",
-                camera=shown(name),
+                camera=short_text(name),
                 error=error.texts[0],
             )
             notes.tell(text)
@@ -78,7 +78,7 @@ def _check_arguments(kind, pixel_um, size_px, notes):
             message(
                 "convert_kind",
                 "{found} as the kind of file; expected one of {known}",
-                found=shown(kind),
+                found=short_text(kind),
                 known=", ".join(KINDS),
             )
         )
@@ -90,7 +90,7 @@ def _check_arguments(kind, pixel_um, size_px, notes):
             message(
                 "convert_pixel_range",
                 "{found}; expected micrometres, 0.1 to 100",
-                found=shown(pixel_um),
+                found=short_text(pixel_um),
             ),
             key="pixel_um",
         )
@@ -200,7 +200,11 @@ def _pix4d(text, notes, _file, size_px):
     if size_px is None:
         _one_size(None, None, notes)
     for name, camera in found:
-        if size_px is not None and not notes.problems and not pix4d.suits(camera, size_px):
+        if (
+            size_px is not None
+            and not notes.problems
+            and not pix4d.frame_fits_sensor(camera, size_px)
+        ):
             width, height = camera.sensor_mm
             expected = message(
                 "convert_proportions",

@@ -47,7 +47,9 @@ class Notes:
             value = math.nan
         if not math.isfinite(value) or (isinstance(text, str) and "_" in text):
             self.tell(
-                message("convert_finite", "{found}; expected a finite number", found=shown(text)),
+                message(
+                    "convert_finite", "{found}; expected a finite number", found=short_text(text)
+                ),
                 row,
                 key,
             )
@@ -57,7 +59,7 @@ class Notes:
                 message(
                     "convert_above",
                     "{found}; expected a number above {least:g}",
-                    found=shown(text),
+                    found=short_text(text),
                     least=above,
                 ),
                 row,
@@ -77,7 +79,7 @@ class Notes:
                 message(
                     "convert_pixels",
                     "{found}; expected whole pixels, 2 to {most}",
-                    found=shown(text),
+                    found=short_text(text),
                     most=MOST_PIXELS,
                 ),
                 row,
@@ -93,7 +95,10 @@ class Notes:
             return text
         self.tell(
             message(
-                "convert_name", "{found}; expected {expected}", found=shown(text), expected=NAME_IS
+                "convert_name",
+                "{found}; expected {expected}",
+                found=short_text(text),
+                expected=NAME_IS,
             ),
             row,
             key,
@@ -106,7 +111,7 @@ def given_twice():
     return message("convert_given_twice", "given twice; expected once")
 
 
-def shown(value):
+def short_text(value):
     """What was found, short enough for a message."""
     text = repr(value) if isinstance(value, str) else str(value)
     return text if len(text) <= 40 else text[:37] + "..."
@@ -118,6 +123,6 @@ def only_letters(text, instead="camera"):
     return kept or instead
 
 
-def exactly(value):
+def exact_text(value):
     """The shortest text of a number that reads back as the same number."""
     return repr(float(value))

@@ -10,7 +10,7 @@ import numpy as np
 
 from tankcal.camera.formats import balanced, colmap, filestorage, metashape, pix4d
 from tankcal.camera.formats.opencv import to_opencv
-from tankcal.camera.formats.texts import NAME_IS, exactly, shown
+from tankcal.camera.formats.texts import NAME_IS, exact_text, short_text
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
@@ -23,7 +23,7 @@ from tankcal.text.naming import is_name
 NEIGHBOURS = 4
 
 
-def as_cameras_toml(name, interior, form, size_px, pixel_mm, sds=None, film_mm=None):
+def cameras_toml_entry(name, interior, form, size_px, pixel_mm, sds=None, film_mm=None):
     """An entry [cameras.NAME] of cameras.toml, with its final line break.
 
     name      of the camera                 interior  (13,)        form  its Form
@@ -40,11 +40,11 @@ def as_cameras_toml(name, interior, form, size_px, pixel_mm, sds=None, film_mm=N
     for place, parameter in enumerate(PARAMETERS):
         sd = np.nan if sds is None else float(sds[place])
         if place < 3 or interior[place] or np.isfinite(sd):
-            lines.append(f"{value_key(parameter)} = {exactly(interior[place])}")
+            lines.append(f"{value_key(parameter)} = {exact_text(interior[place])}")
         if np.isfinite(sd):
-            lines.append(f"{sd_key_of(parameter)} = {exactly(sd)}")
+            lines.append(f"{sd_key_of(parameter)} = {exact_text(sd)}")
     lines.append(f'affinity = "{form.affinity}"')
-    lines.append(f"radial_balance_mm = {exactly(form.radial_balance_mm)}")
+    lines.append(f"radial_balance_mm = {exact_text(form.radial_balance_mm)}")
     lines.append(f'convention = "{form.convention}"')
     return "\n".join(lines) + "\n"
 
@@ -58,7 +58,7 @@ def _pixels(size_px, pixel_mm):
 
 
 def _pair(values):
-    return f"[{', '.join(map(exactly, values))}]"
+    return f"[{', '.join(map(exact_text, values))}]"
 
 
 def value_key(parameter):
@@ -79,9 +79,9 @@ def _micrometres(pixel_mm):
     for _ in range(NEIGHBOURS):
         for one in (low, high):
             if one * 1e-3 == pixel_mm:
-                return exactly(one)
+                return exact_text(one)
         low, high = np.nextafter(low, 0), np.nextafter(high, np.inf)
-    return exactly(value)
+    return exact_text(value)
 
 
 def _quoted(name):
@@ -92,7 +92,7 @@ def _quoted(name):
                 message(
                     "convert_register_name",
                     "{found}; expected {expected}",
-                    found=shown(name),
+                    found=short_text(name),
                     expected=NAME_IS,
                 ),
             )
@@ -128,7 +128,7 @@ def write_camera(kind, cameras, sds=None, radius_mm=0.0, file="cameras"):
         expected = message(
             "convert_to_kind",
             "{found} as the kind of file; expected one of {known}",
-            found=shown(kind),
+            found=short_text(kind),
             known=", ".join(KINDS),
         )
         raise InputError(Problem("cameras", expected))
@@ -175,7 +175,7 @@ def _refuse_film(kind, cameras, file):
 def _register(cameras, sds):
     sds = [None] * len(cameras) if sds is None else sds
     entries = [
-        as_cameras_toml(name, one.interior, one.form, one.size_px, one.pixel_mm, sd, one.film_mm)
+        cameras_toml_entry(name, one.interior, one.form, one.size_px, one.pixel_mm, sd, one.film_mm)
         for (name, one), sd in zip(cameras, sds, strict=True)
     ]
     return Written("\n".join(entries), tuple(one.error_px for _, one in cameras))

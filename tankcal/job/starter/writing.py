@@ -15,7 +15,7 @@ from tankcal.job.starter.texts import is_number, texts_in
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
 from tankcal.text.languages import DEFAULT
-from tankcal.text.words import said
+from tankcal.text.words import say
 
 # A starter job that has something in it already: what a plan knows before the survey.
 
@@ -138,7 +138,7 @@ def _note(texts, field, text, is_to_fill_in):
     """A note with, where something must be filled in, that word and what may be chosen."""
     if not is_to_fill_in:
         return text
-    choices = f" ({said(texts.words, field.expectation())})" if field.kind == "choice" else ""
+    choices = f" ({say(texts.words, field.expectation())})" if field.kind == "choice" else ""
     return f"{texts.of('files', 'fill_in')}: {text}{choices}"
 
 

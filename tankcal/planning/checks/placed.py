@@ -4,13 +4,13 @@ import numpy as np
 
 from tankcal.job.checking import is_not_given, tell
 from tankcal.job.tables import Log, nearest
-from tankcal.messages import joined, listed, message
+from tankcal.messages import join_with_and, list_some, message
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.model import Pillar
 from tankcal.planning.places import joints_m
 from tankcal.planning.rings import TOUCH_M, plate_m
 from tankcal.planning.units import warn_of_places
-from tankcal.planning.visibility import GRAZE_M, cut
+from tankcal.planning.visibility import GRAZE_M, find_hidden
 
 # Ties and control: names that are there, lines that nothing cuts, control at its place.
 
@@ -65,7 +65,7 @@ def _through(plan, ends, xyz):
         plates = [plate_m(course, True) for course in plan.job.courses]
         radius = shell.radius_m + min(plates) - plates[0] - THINNER_M
         tank = Pillar(shell.axis_m, radius, shell.low_m, shell.high_m, "tank")
-        if cut(tank, xyz[0], xyz[1:])[0]:
+        if find_hidden(tank, xyz[0], xyz[1:])[0]:
             return message(
                 "plan_line_through_tank",
                 "the line from {one} to {other} runs through the tank; expected it outside",
@@ -79,7 +79,7 @@ def _through(plan, ends, xyz):
         return message(
             "plan_tape_beyond_wall",
             "{ends} beyond the wall of the tank; expected both ends within it",
-            ends=joined(beyond),
+            ends=join_with_and(beyond),
         )
     return ""
 
@@ -231,14 +231,14 @@ def _check_rows(plan, pattern, log):
             " {heights} m; are they meant there?",
             count=len(close),
             clearance_mm=1000 * clearance,
-            heights=listed([f"{height:g}" for height in close], SHOWN),
+            heights=list_some([f"{height:g}" for height in close], SHOWN),
         )
         pattern.tell(log.warning, "heights_m", text)
 
 
 def _first(names):
     """The first names in a row, and how many more there are."""
-    return message("plan_first", "{names}", names=listed(names, SHOWN))
+    return message("plan_first", "{names}", names=list_some(names, SHOWN))
 
 
 NEAR_M = 0.05  # of the wall: a station nearer than this stands in it

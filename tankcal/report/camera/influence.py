@@ -6,7 +6,7 @@ from tankcal.report.camera.product import axes_table, decimals_of_axes, unit_of
 from tankcal.report.camera.stability import DISTORTION, INTERIOR
 from tankcal.report.tables import Column, Table
 from tankcal.text.digits import NOTHING
-from tankcal.text.words import listed, observation_name
+from tankcal.text.words import list_names, observation_name
 
 MOST_PAIRS, MOST_PAIRS_ON_TERMINAL = 40, 15
 
@@ -35,7 +35,7 @@ def facts(paper):
         paper.facts(
             [
                 ("camera", found["camera"]),
-                ("calibrations", listed(paper.words, map(short, found["calibrations"]))),
+                ("calibrations", list_names(paper.words, map(short, found["calibrations"]))),
                 ("states", states),
                 ("free", paper.parameters(found["free"])),
                 ("photos", paper.number(found["photos"], decimals=0)),

@@ -5,7 +5,7 @@ from itertools import combinations
 from tankcal.report import blocks, numbers
 from tankcal.report.plain import Column
 from tankcal.text.digits import NOTHING, fixed
-from tankcal.text.words import listed
+from tankcal.text.words import list_names
 
 HIGH_CORRELATION = 0.9
 MOST_PREDICTED = 9  # sets of dropped parameters in the table of predictions
@@ -27,7 +27,7 @@ def facts(paper):
         paper.facts(
             [
                 ("camera", found["camera"]),
-                ("photos", listed(paper.words, found["photos"]) if found["photos"] else None),
+                ("photos", list_names(paper.words, found["photos"]) if found["photos"] else None),
                 ("from", words[found["from"]]),
                 ("model", "; ".join(model)),
                 ("dof", paper.number(found["dof"], decimals=0)),

@@ -11,7 +11,7 @@ from tankcal.report.planning import figures
 from tankcal.report.planning.field_sheets import SHORT, unseen_targets
 from tankcal.report.planning.improvements import changes, design
 from tankcal.report.planning.rows import lost_ties
-from tankcal.text.digits import written
+from tankcal.text.digits import format_with_u
 from tankcal.text.words import group_name, name_of_input
 from tankcal.uncertainty import combine
 
@@ -38,7 +38,7 @@ def outlook(paper):
 
 def _result(paper):
     found, table = paper.prediction, paper.prediction.table
-    value = written(table.volume_m3[-1], table.U_m3[-1], paper.marks, least=0)
+    value = format_with_u(table.volume_m3[-1], table.U_m3[-1], paper.marks, least=0)
     text = paper.word(
         "texts.top",
         volume=value.value,

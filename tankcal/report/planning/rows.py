@@ -6,7 +6,7 @@ Lengths are metres, angles radians; a text that is a code is looked up in words.
 import numpy as np
 
 from tankcal.camera.model import PARAMETERS
-from tankcal.geometry.rotations import pointing
+from tankcal.geometry.rotations import view_of_rotation
 from tankcal.planning.places import joints_m, place_of
 
 LEVEL = 0.01  # rise over run, or run over rise, of what is called level or upright
@@ -111,7 +111,7 @@ def photographs(prediction):
 
 def _angles(plan, photo):
     """Turn to the right of the axis of the tank, tilt, roll, rad."""
-    azimuth, tilt, roll = pointing(photo.rotation)
+    azimuth, tilt, roll = view_of_rotation(photo.rotation)
     east, north = plan.shell.axis_m - photo.xyz_m[:2]
     turn = np.angle(np.exp(1j * (azimuth - np.arctan2(east, north))))
     return turn, tilt, roll

@@ -15,7 +15,7 @@ from tankcal.report.tables.survey import (
     point_rows,
 )
 from tankcal.text.digits import NOTHING, fixed
-from tankcal.text.words import listed
+from tankcal.text.words import list_names
 
 STEEP_DEG = 80.0  # of phi: beyond, omega and kappa are hardly told apart
 
@@ -103,7 +103,7 @@ def cameras(paper):
 def _name_of(paper, camera):
     if camera["photos"] is None:
         return camera["camera"]
-    return f"{camera['camera']} ({listed(paper.words, camera['photos'])})"
+    return f"{camera['camera']} ({list_names(paper.words, camera['photos'])})"
 
 
 def _camera(paper, camera):

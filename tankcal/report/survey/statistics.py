@@ -40,7 +40,7 @@ def aside(paper):
     sentences = paper.record["adjustment"]["aside"]
     if not sentences:
         return []
-    shown = [words.as_sentence(one) for one in sentences[:MOST_ROWS]]
+    shown = [words.make_sentence(one) for one in sentences[:MOST_ROWS]]
     if len(sentences) > MOST_ROWS:
         shown.append(paper.word("texts.more_aside", more=len(sentences) - MOST_ROWS))
     return [blocks.listing(shown)]

@@ -4,7 +4,7 @@ from tankcal.record.plain_data import rows_of
 from tankcal.report import numbers
 from tankcal.report.tables.table import Column, Table
 from tankcal.report.uncertainty.stated import MARK, by_monte_carlo, k_of_rows, stated_U_m3
-from tankcal.text.digits import LITRE_DECIMALS, rounded
+from tankcal.text.digits import LITRE_DECIMALS, round_u
 
 PRINTED = "capacity capacity_marked capacity_k capacity_k_marked capacity_monte_carlo"
 NOT_FOR_USE = "†"
@@ -38,7 +38,7 @@ def capacity_columns(record):
         factor = numbers.unit(spec["volume_unit"]).factor
         found["in_unit"] = capacity["volume_m3"]
         found["exact_in_unit"] = [factor * U for U in U_m3]
-        found["U_in_unit"] = [rounded(U) for U in found["exact_in_unit"]]
+        found["U_in_unit"] = [round_u(U) for U in found["exact_in_unit"]]
     for other in record["densities"]:
         found[_at(other)] = other["volume_m3"]
     return found

@@ -5,7 +5,7 @@ from dataclasses import replace
 from tankcal.record.plain_data import rows_of
 from tankcal.report import numbers
 from tankcal.report.tables.table import Column, Table
-from tankcal.text.digits import decimals_of, decimals_of_mantissa, fixed, with_digits
+from tankcal.text.digits import decimals_of, decimals_of_mantissa, fixed, format_significant
 from tankcal.text.words import factor_text, group_name, observation_name, sentence
 
 ANGLES = (("ω", "omega"), ("φ", "phi"), ("κ", "kappa"))  # their signs, and keys of the record
@@ -263,7 +263,7 @@ def _small(key):
         if row[key] is None:
             return None
         if not row["small_unit"]:
-            return with_digits(row[key], 2, paper.marks)
+            return format_significant(row[key], 2, paper.marks)
         return fixed(row[key], _decimals(row), paper.marks)
 
     return text

@@ -15,7 +15,7 @@ from tankcal.report.web.packing import script_data
 from tankcal.report.web.tables import PIECE, framed_table, searchable_table
 from tankcal.report.web.widgets import calculator_html, view_html
 from tankcal.text.languages import DEFAULT, LANGUAGES
-from tankcal.text.shipped import shipped
+from tankcal.text.shipped import shipped_folder
 from tankcal.text.words import load_words
 
 _SCRIPTS = {
@@ -116,7 +116,7 @@ def _scripts_for(blocks):
 
 
 def _template(name):
-    return (shipped("report_templates") / name).read_text(encoding="utf-8")
+    return (shipped_folder("report_templates") / name).read_text(encoding="utf-8")
 
 
 def _policy(style, script):

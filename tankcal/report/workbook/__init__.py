@@ -28,7 +28,7 @@ from tankcal.report.workbook.uncertainty import (
     monte_carlo_sheet,
     rule_sheet,
 )
-from tankcal.text.words import in_language, language_of, load_words
+from tankcal.text.words import language_of, load_words, translate_record
 
 # What a gauger uses and an owner prints. The others are for reviewers and programs, and hidden:
 # printed with the whole workbook they are hundreds of pages.
@@ -51,7 +51,7 @@ def write(record, path, language=None):
     cannot be written.
     """
     words = load_words(language or language_of(record))
-    record = in_language(words, record)
+    record = translate_record(words, record)
     shown = _SHOWN_OF_TANK if record["capacity"] else _SHOWN_OF_SURVEY
     with Book(path, record, words, shown=shown) as book:
         if record["capacity"]:

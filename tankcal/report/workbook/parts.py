@@ -11,7 +11,7 @@ from tankcal.report.uncertainty.sources import critical_zone
 from tankcal.report.uncertainty.stated import stated_U_m3
 from tankcal.report.workbook.look import Column, number_format
 from tankcal.report.workbook.tables import columns_of, set_widths
-from tankcal.text.digits import LITRE_DECIMALS, decimals_of_rows, shortest, with_digits
+from tankcal.text.digits import LITRE_DECIMALS, decimals_of_rows, format_significant, shortest
 from tankcal.text.words import marks_of
 
 _HEAD_ROW = 3
@@ -24,7 +24,7 @@ def proportional_parts_sheet(book, record):
     parts = record["proportional_parts"]
     if not parts["zones"]:
         return
-    largest = with_digits(1000 * parts["largest_m3"], 2, marks_of(book.words))
+    largest = format_significant(1000 * parts["largest_m3"], 2, marks_of(book.words))
     subtitle = book.word("texts.parts_subtitle", largest=largest)
     sheet = book.sheet("proportional_parts", subtitle, landscape=True, tab="result")
     columns = columns_of(book, parts_table(record))

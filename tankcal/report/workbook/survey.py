@@ -18,9 +18,9 @@ from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import decimals_of
 from tankcal.text.words import (
-    as_sentence,
     datum_sentences,
     global_test_sentence,
+    make_sentence,
     scale_sentence,
     snooping_sentence,
     verdict_sentences,
@@ -48,7 +48,7 @@ def adjustment_sheet(book, record):
     row = _facts(book, sheet, _HEAD_ROW, _statistics(a, words), widths)
     book.heading(sheet, row, words["headings"]["adjusted_datum"], len(widths))
     row = _sentences(book, sheet, row + 1, datum_sentences(words, a), widths)
-    aside = [as_sentence(one) for one in a["aside"][:_MOST_ASIDE]]
+    aside = [make_sentence(one) for one in a["aside"][:_MOST_ASIDE]]
     row = _sentences(book, sheet, row, aside, widths)
     for title, name, columns in tables:
         if columns[0].cells:

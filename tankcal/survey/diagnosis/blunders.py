@@ -12,14 +12,14 @@ import numpy as np
 
 from tankcal.errors import Problem, SolutionError
 from tankcal.messages import message
-from tankcal.survey.diagnosis.diagnoses import mirrored_fits, mirrored_photo, swapped_points
+from tankcal.survey.diagnosis.diagnoses import find_swapped_points, mirrored_fits, mirrored_photo
 from tankcal.survey.network import adjust, snoop
 from tankcal.survey.network.assembly import assemble
 from tankcal.survey.network.blocks import CORRELATED
-from tankcal.survey.network.snooping import started, with_use
+from tankcal.survey.network.snooping import set_use, start_from_adjusted
 from tankcal.survey.observations import Directions, Distances
 from tankcal.survey.start.photographs import sights_of
-from tankcal.survey.start.resection import bearings, intersected
+from tankcal.survey.start.resection import bearings, intersect_rays
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Searched:
     warnings: tuple = ()
 
 
-def searched(survey, options, gross=None):
+def search_blunders(survey, options, gross=None):
     """The Searched of a survey; when the search finds no end, everything is adjusted and told.
 
     gross  {source: (n,) True} readings that begin set aside, or None: no search at all
@@ -99,7 +99,9 @@ def _without(survey, options, gross):
     images = first.survey.image_points
     if images is not None and images.use is not None:
         uses["image points"] = images.use
-    whole = snoop(with_use(started(survey, first.adjusted), uses), robust=False, **options)
+    whole = snoop(
+        set_use(start_from_adjusted(survey, first.adjusted), uses), robust=False, **options
+    )
     return replace(whole, rounds=first.rounds + whole.rounds)
 
 
@@ -117,7 +119,7 @@ def _readmitted(found, gross):
             back = np.any([lost[getattr(one, name)] for name in one.ties], axis=0)
             back &= ~gross.get(number, np.zeros(len(one), dtype=bool))
             uses[number] = np.where(back, 1.0, one.use)
-    return with_use(survey, uses)
+    return set_use(survey, uses)
 
 
 FAR = 0.25  # relative, of a distance
@@ -168,11 +170,11 @@ def swapped_at_start(survey, known):
     ours = np.isfinite(known.xyz_m).all(axis=1)[owner]
     rays = bearings(np.vstack([sight.ideal for sight in sights])[ours])
     rays = np.einsum("nji,nj->ni", survey.photos.rotation[photo[ours]], rays)
-    met, _ = intersected(survey.photos.xyz_m[photo[ours]], rays, owner[ours], points)
+    met, _ = intersect_rays(survey.photos.xyz_m[photo[ours]], rays, owner[ours], points)
     held = (known.sd_m[:, :2] == 0).all(axis=1)
     number = {name: i for i, name in enumerate(survey.points)}
     row = {name: row for name, row in known.row.items() if held[number[name]]}
-    return swapped_points(survey.points, met, replace(known, row=row), START_M)
+    return find_swapped_points(survey.points, met, replace(known, row=row), START_M)
 
 
 def _limit(one, state):

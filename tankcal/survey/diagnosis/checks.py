@@ -5,7 +5,7 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.survey.network import ImagePoints
-from tankcal.survey.network.quality import compared
+from tankcal.survey.network.quality import compare_left_out
 from tankcal.survey.observations import ImageCoordinates
 from tankcal.survey.results import CheckPoints, Reading
 
@@ -28,7 +28,7 @@ def check_readings(adjusted, checks, cov_scale):
     return found
 
 
-def disagreeing(found, table):
+def find_disagreeing_checks(found, table):
     """Problem rows of check points that differ more than their uncertainty allows.
 
     found  CheckPoints or None        table  job.KnownPoints of check.csv, or None
@@ -62,7 +62,7 @@ def _rows(adjusted, one, rows, trace, cov_scale):
     one, rows = (one, rows) if there.all() else (one.taken(there), rows[there])
     if not len(one):
         return []
-    result = compared(adjusted, one)
+    result = compare_left_out(adjusted, one)
     sd = np.reshape(one.sd, result.difference.shape)
     spread = np.sqrt(sd**2 + cov_scale * np.maximum(result.sd**2 - sd**2, 0.0))
     value = np.reshape(one.value, sd.shape)

@@ -12,7 +12,7 @@ from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.survey.start.photographs import sights_of
-from tankcal.survey.start.resection import resected
+from tankcal.survey.start.resection import resect
 
 MISPLACED = message("misplaced_point", "a misplaced decimal point")
 FACTORS = (
@@ -40,7 +40,7 @@ LOST = 0.2  # share of a photo's points set aside, above which the photo itself 
 MIRRORED = 0.2  # share of its error that a photo may keep when it is mirrored
 
 
-def diagnosed(adjusted, readings, groups, known):
+def diagnose(adjusted, readings, groups, known):
     """Problem rows for everything that is found.
 
     adjusted  network.Adjusted            readings  Reading rows, those set aside among them
@@ -49,7 +49,7 @@ def diagnosed(adjusted, readings, groups, known):
     doubtful = [one for one in readings if one.removed or abs(one.w) > CRITICAL]
     return [
         *failed_test(adjusted, groups),
-        *swapped_points(adjusted.survey.points, adjusted.xyz_m, known),
+        *find_swapped_points(adjusted.survey.points, adjusted.xyz_m, known),
         *wrong_distances(doubtful),
         *wrong_angles(readings, doubtful),
         *mirrored_photos(adjusted),
@@ -128,7 +128,7 @@ def _group(one):
     return message("whole_group", template, group=one.kind, factor=one.factor)
 
 
-def swapped_points(names, xyz_m, known, sd_m=0.0):
+def find_swapped_points(names, xyz_m, known, sd_m=0.0):
     """Problem rows for control points that lie where they were given with x and y exchanged.
 
     names (n,), xyz_m (n, 3) where they are, to sd_m (an addition to that of control)
@@ -232,7 +232,9 @@ def mirrored_photos(adjusted):
     lost = np.bincount(images.photo, weights=images.use == 0, minlength=n)
     doubtful = np.flatnonzero(lost > LOST * np.bincount(images.photo, minlength=n))
     return [
-        mirrored_photo(adjusted.survey.photos.names[i]) for i in doubtful if mirrored(adjusted, i)
+        mirrored_photo(adjusted.survey.photos.names[i])
+        for i in doubtful
+        if is_photo_mirrored(adjusted, i)
     ]
 
 
@@ -249,7 +251,7 @@ def mirrored_photo(name):
     return Problem("image_points.csv", text)
 
 
-def mirrored(adjusted, photo):
+def is_photo_mirrored(adjusted, photo):
     """Whether the points of a photo fit the adjusted ones better when it is mirrored."""
     whole = adjusted.survey
     images = whole.image_points
@@ -264,7 +266,7 @@ def mirrored_fits(xyz_m, ideal):
     if len(xyz_m) < 5:
         return False
     rng = np.random.default_rng(0)
-    as_is, turned = resected(xyz_m, ideal, rng), resected(xyz_m, ideal * [-1, 1], rng)
+    as_is, turned = resect(xyz_m, ideal, rng), resect(xyz_m, ideal * [-1, 1], rng)
     if turned is None:
         return False
     return as_is is None or turned.error < MIRRORED * as_is.error

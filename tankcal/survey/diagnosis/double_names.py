@@ -17,13 +17,13 @@ TRIED = 2000  # pairs, the nearest first
 TOLD = 10
 
 
-def alike(name):
+def normalize_name(name):
     """A name without case, spaces, marks and leading zeros; O as 0, I and l as 1."""
     plain = re.sub(r"[^0-9a-z]", "", str(name).lower().replace("o", "0"))
     return re.sub(r"(?<!\d)0+(?=\d)", "", plain.translate(str.maketrans("il", "11")))
 
 
-def in_photo(photo, point):
+def image_point_label(photo, point):
     """What an image point is called."""
     return message("point_in_photo", "point {point} in photo {photo}", point=point, photo=photo)
 
@@ -35,11 +35,11 @@ def names_alike(aside, names):
     """
     known = {}
     for name in names:
-        known.setdefault(alike(name), name)
+        known.setdefault(normalize_name(name), name)
     return [
-        Problem(file, _is_it(name, known[alike(name)]))
+        Problem(file, _is_it(name, known[normalize_name(name)]))
         for name, file in aside.items()
-        if known.get(alike(name), name) != name
+        if known.get(normalize_name(name), name) != name
     ][:TOLD]
 
 

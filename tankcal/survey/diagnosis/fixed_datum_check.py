@@ -12,12 +12,12 @@ from scipy.special import ndtri
 from tankcal.adjust import CRITICAL
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
-from tankcal.survey.diagnosis.diagnoses import swapped_points
-from tankcal.survey.diagnosis.outlier_attribution import LEVEL, LISTED, set_aside
+from tankcal.survey.diagnosis.diagnoses import find_swapped_points
+from tankcal.survey.diagnosis.outlier_attribution import LEVEL, LISTED, count_set_aside
 from tankcal.survey.measurements import Instrument
 from tankcal.survey.network import adjust, snoop
 from tankcal.survey.network.reliability import noncentrality
-from tankcal.survey.network.snooping import started
+from tankcal.survey.network.snooping import start_from_adjusted
 from tankcal.survey.observations import ControlCoordinates
 
 FEWER = 0.5  # share of the values set aside that may be left by what explains them
@@ -59,8 +59,8 @@ def wrong_control(measurements, gone, run):
         trial, gathered = run(replace(measurements, control=released), snooping=True)
     except (SolutionError, InputError):
         return [], np.inf
-    swapped = swapped_points(trial.survey.points, trial.xyz_m, gathered.known)
-    if swapped or set_aside(trial.survey) > FEWER * gone:
+    swapped = find_swapped_points(trial.survey.points, trial.xyz_m, gathered.known)
+    if swapped or count_set_aside(trial.survey) > FEWER * gone:
         return swapped, np.inf
     release = _Release(trial)
     found, rows = release.candidates()
@@ -80,7 +80,7 @@ class _Release:
     """
 
     def __init__(self, trial):
-        self.survey = started(trial.survey, trial)
+        self.survey = start_from_adjusted(trial.survey, trial)
         self.number, one = next(
             (i, one)
             for i, one in enumerate(trial.survey.observations)
@@ -116,7 +116,7 @@ class _Release:
                 found = snoop(self._without(rows), robust=False, max_iterations=MOST)
         except SolutionError:
             return np.inf
-        return set_aside(found.adjusted.survey)
+        return count_set_aside(found.adjusted.survey)
 
     def candidates(self):
         """What explains as much: (point, axis, here, given) of each, and the rows of the best one.

@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from tankcal.camera.model import corrected
+from tankcal.camera.model import correct_image_points
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.survey.diagnosis.diagnoses import GON, MIRROR, mirrored_fits, mirrored_photo
@@ -201,7 +201,7 @@ def _is_mirrored(measurements, name, adjusted):
     camera = next(one.camera for one in measurements.cameras if one.camera.name == of)
     xyz = adjusted.xyz_m[[number[images.point[i]] for i in rows]]
     there = np.isfinite(xyz).all(axis=1)
-    ideal = corrected(images.xy_mm[rows], camera.values, camera.form) / camera.values[0]
+    ideal = correct_image_points(images.xy_mm[rows], camera.values, camera.form) / camera.values[0]
     return mirrored_fits(xyz[there], ideal[there])
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.special import betainc
 
 from tankcal.errors import Problem
-from tankcal.messages import either, listed, message
-from tankcal.survey.diagnosis.double_names import in_photo
+from tankcal.messages import join_with_or, list_some, message
+from tankcal.survey.diagnosis.double_names import image_point_label
 from tankcal.survey.network.reactions import HELD
 from tankcal.survey.network.separability import alternatives
 
@@ -27,7 +27,7 @@ LISTED = 4
 TESTED = 60  # readings set aside of which it is asked whether others might have been
 
 
-def one_sided(readings, known):
+def find_one_sided_losses(readings, known):
     """Problem rows on things that lost many more of their values than everything else.
 
     readings  Reading rows              known  Known control
@@ -122,7 +122,7 @@ def _many(gone, total):
     return [Problem("job.toml", text, None, "adjustment.snooping")]
 
 
-def undecided(adjusted, removed, traces, held):
+def find_undecided_outliers(adjusted, removed, traces, held):
     """Problem rows of readings set aside in whose place others might have been.
 
     removed  tuple of network.snooping.Removed, the worst first        traces  {source: Trace}
@@ -155,8 +155,8 @@ def undecided(adjusted, removed, traces, held):
 def _either(names):
     """Readings of which each may be the wrong one."""
     if len(names) > LISTED:
-        return message("one_of", "one of {names}", names=listed(names, LISTED))
-    return either(names)
+        return message("one_of", "one of {names}", names=list_some(names, LISTED))
+    return join_with_or(names)
 
 
 def _named(adjusted, traces, source, row):
@@ -164,7 +164,7 @@ def _named(adjusted, traces, source, row):
     trace = traces[source]
     ids = trace.ids[row]
     if source == "image points":
-        return in_photo(*ids)
+        return image_point_label(*ids)
     kind = "control coordinate" if source == HELD else adjusted.survey.observations[source].kind
     of = trace.table.replace("_", " ") or kind.removesuffix(" of a further system")
     name, kind = (
@@ -177,7 +177,7 @@ def _named(adjusted, traces, source, row):
     return message("reading_in_row", "{kind} {name} (row {row})", kind=kind, name=name, row=row)
 
 
-def set_aside(survey):
+def count_set_aside(survey):
     """Number of values that the survey of an adjustment leaves out."""
     images = survey.image_points
     count = 0 if images is None or images.use is None else 2 * int(np.sum(images.use == 0))

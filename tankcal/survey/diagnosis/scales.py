@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 
 from tankcal.errors import Problem
-from tankcal.messages import listed, message
+from tankcal.messages import list_some, message
 from tankcal.survey.diagnosis.checks import DISAGREE, LISTED
 
 LENGTHS = ("distance", "horizontal distance", "slope distance")
@@ -62,7 +62,7 @@ def scale_of_control(adjusted, readings, measurements, cov_scale=1.0):
         "the readings make the distances between points of control {scale_ppm:+.1f} ppm longer than"
         " given ({points}): {hint}",
         scale_ppm=1e6 * float(np.median([ratio for ratio, _ in off])),
-        points=listed(pairs, SHOWN),
+        points=list_some(pairs, SHOWN),
         hint=message("look_at_scale", "look at unit, correction and scale of the lengths measured"),
     )
     return [Problem(table.file, text)]

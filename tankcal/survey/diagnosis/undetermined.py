@@ -3,14 +3,14 @@
 import numpy as np
 
 from tankcal.errors import Problem
-from tankcal.messages import joined, listed, message
-from tankcal.survey.network.assembly import one_ray
+from tankcal.messages import join_with_and, list_some, message
+from tankcal.survey.network.assembly import one_ray_sentence
 from tankcal.survey.observations import ControlCoordinates, SystemCoordinates
 
 SHOWN = 5  # points in a sentence
 
 
-def left_out(survey):
+def find_left_out(survey):
     """{point: why} of the points that have too few observations."""
     plan, height, rows, rays, measured = _counts(survey)
     held = np.zeros((len(survey.points), 3), dtype=bool) if survey.fixed is None else survey.fixed
@@ -27,9 +27,9 @@ def left_out(survey):
 
 def _why(name, rays, rows, needed, measured):
     if not measured:
-        return not_measured(name)
+        return unmeasured_sentence(name)
     if rays == 1 and rows == 2:
-        return one_ray(name)
+        return one_ray_sentence(name)
     return message(
         "too_few_observations",
         "point {point} has too few observations: {count} for {needed} coordinates",
@@ -39,24 +39,24 @@ def _why(name, rays, rows, needed, measured):
     )
 
 
-def not_measured(name):
+def unmeasured_sentence(name):
     """What is said of a point that nothing measured."""
     return message("not_measured", "point {point} is not measured", point=name)
 
 
-def sorted_out(survey):
+def find_untouched_coordinates(survey):
     """(points, 3) True where nothing touches a coordinate, and warnings that say so."""
     plan, height, _, _, _ = _counts(survey)
     idle = np.column_stack([plan == 0, plan == 0, height == 0])
     warnings = []
-    for columns, what in ((slice(0, 2), joined(["x", "y"])), (slice(2, 3), "z")):
+    for columns, what in ((slice(0, 2), join_with_and(["x", "y"])), (slice(2, 3), "z")):
         names = [survey.points[i] for i in np.flatnonzero(idle[:, columns].all(axis=1))]
         if names:
             text = message(
                 "untouched",
                 "{axes} of {points}: not observed by anything; the value given is kept, or 0",
                 axes=what,
-                points=listed(names, SHOWN),
+                points=list_some(names, SHOWN),
             )
             warnings.append(Problem("job.toml", text, None, "adjustment"))
     return idle, warnings

@@ -8,9 +8,9 @@ from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver import UndeterminedError, linearise, solve
 from tankcal.survey.network.assembly import assemble
-from tankcal.survey.network.datum import held, in_words, null_space
+from tankcal.survey.network.datum import add_inner_constraints, datum_defect_sentence, null_space
 from tankcal.survey.network.results import Adjusted
-from tankcal.survey.network.soundness import hanging_datum, refuse_worthless_cameras
+from tankcal.survey.network.soundness import refuse_worthless_cameras, weak_datum_sentence
 from tankcal.survey.observations import PlumbLines
 
 
@@ -53,7 +53,7 @@ def _in_datum(survey, datum, over, photo):
     problem = assemble(survey)
     if datum == "inner":
         free = null_space(problem)
-        return held(problem, over, free, photo) if free.shape[1] else problem
+        return add_inner_constraints(problem, over, free, photo) if free.shape[1] else problem
     if any(isinstance(one, PlumbLines) for one in survey.observations):
         _refuse_defect(problem)  # a plumb line that is not quite plumb would hide one
     return problem
@@ -72,7 +72,7 @@ def _adjusted(survey, problem, datum, solved):
             "and_hanging",
             "{error}{datum}",
             error=error.args[0],
-            datum=hanging_datum(problem),
+            datum=weak_datum_sentence(problem),
         )
         raise SolutionError(text) from error
     if survey.photos is not None:
@@ -98,4 +98,4 @@ def _refuse_defect(problem):
     """Raise when the datum is missing, in words."""
     free = null_space(problem)
     if free.shape[1]:
-        raise SolutionError(in_words(free, problem))
+        raise SolutionError(datum_defect_sentence(free, problem))

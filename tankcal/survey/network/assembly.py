@@ -7,7 +7,7 @@ import numpy as np
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver import Group, Model
-from tankcal.survey.network.blocks import CORRELATED, correlated_groups, in_blocks, relative
+from tankcal.survey.network.blocks import CORRELATED, correlated_groups, is_in_block, relative
 from tankcal.survey.network.survey import FEWEST, SCOPES
 from tankcal.survey.network.unknowns import (
     eliminated_points,
@@ -23,8 +23,8 @@ from tankcal.survey.observations import (
     Layout,
     Sights,
     State,
-    as_conditions,
     exact_rows,
+    make_conditions,
 )
 
 
@@ -181,11 +181,11 @@ def _set_aside(survey):
 
 def _poor(name, rays):
     if rays == 1:
-        return one_ray(name)
+        return one_ray_sentence(name)
     return message("hardly_observed", "point {point} has too few observations", point=name)
 
 
-def one_ray(name):
+def one_ray_sentence(name):
     """What is said of a point that one image alone shows."""
     return message("one_ray", "point {point} has one ray", point=name)
 
@@ -228,10 +228,10 @@ def _others(survey, used, centre):
         sharp = np.flatnonzero(keep & holds & (True if one.use is None else one.use > 0))
         if len(sharp):
             taken = relative(one.taken(sharp), centre)
-            exact.append(Held(taken, *as_conditions(taken), number, sharp))
+            exact.append(Held(taken, *make_conditions(taken), number, sharp))
             if holds.all():
                 continue
-        rows = np.flatnonzero(keep & ~holds & ~in_blocks(survey, number))
+        rows = np.flatnonzero(keep & ~holds & ~is_in_block(survey, number))
         groups.append(relative(one if len(rows) == len(one) else one.taken(rows), centre))
         sources.append(number)
         rows_of.append(rows)

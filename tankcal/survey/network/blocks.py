@@ -50,7 +50,7 @@ def relative(one, centre):
     return one
 
 
-def in_blocks(survey, number):
+def is_in_block(survey, number):
     """(n,) True for the observations of a table that stand in a block of correlated values."""
     found = np.zeros(len(survey.observations[number]), dtype=bool)
     for block in survey.correlated:
@@ -170,7 +170,7 @@ class Acting:
         return np.eye(len(self.t)) - self.a @ self.moves[self.columns]
 
 
-def acting(problem, solution, number, members, v):
+def observations_in_use(problem, solution, number, members, v):
     """The Acting of a block; number of its group or None, v (all,) its residuals."""
     own = np.flatnonzero(members.share > 0)
     if number is None:
@@ -192,7 +192,7 @@ def moves_of(solution, columns, jac):
     return np.vstack([found, np.zeros((1, found.shape[1]))])
 
 
-def expected(members, part, mine, v, jac):
+def conditional_expectation(members, part, mine, v, jac):
     """What the others and the correlation with them let expect of values that are set aside.
 
     mine  (q,) places in the block      v, jac  (all,), (all, K) of the block's values
@@ -208,14 +208,14 @@ def expected(members, part, mine, v, jac):
     return off, away, q[np.ix_(mine, mine)] - share @ between, share
 
 
-def tested(problem, solution, number, members, delta0):
+def test_values(problem, solution, number, members, delta0):
     """The ValueTests of the values of a block; the test statistic of a value is its observation's.
 
     number  of its group in the problem; None: all of it is set aside
     """
     v, jac = members.block.linearised(solution.unknowns)
     columns = members.block.columns(problem.layout)
-    part = acting(problem, solution, number, members, v)
+    part = observations_in_use(problem, solution, number, members, v)
     q, own, back, spread = members.covariance, part.own, part.back, part.spread
     points = np.unique(problem.layout.points)
     points = points[points >= 0]
@@ -239,7 +239,7 @@ def tested(problem, solution, number, members, delta0):
             test = _together(right[place], inner[np.ix_(place, place)], size[place])
             statistic[mine] = test / np.sqrt(members.share[mine[0]])
         else:
-            off, away, unexplained, _ = expected(members, part, mine, v, jac)
+            off, away, unexplained, _ = conditional_expectation(members, part, mine, v, jac)
             total = unexplained + away @ moves_of(solution, columns, away)[columns[0]]
             sds = np.sqrt(np.diag(total))
             w[mine], mdb[mine] = off / sds, delta0 * sds

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.messages import joined, message
+from tankcal.messages import join_with_and, message
 
 SHIFTS, TURNS = ("x", "y", "z"), ("X", "Y", "Z")
 THREE_TURNS = message("rotations", "three rotations")
@@ -129,7 +129,7 @@ def _idle(problem):
     return {id(layout.points): problem.aside[:, None], id(layout.scale): unused}
 
 
-def dependent(adjusted, quantities, fixed=False):
+def depends_on_datum(adjusted, quantities, fixed=False):
     """Which quantities depend on the choice of the datum: (n,) True for those that do.
 
     A quantity depends on it when a motion or scaling of the whole survey that no observation feels
@@ -166,7 +166,7 @@ def dependent(adjusted, quantities, fixed=False):
     return (np.abs(change) > DEPENDS * np.maximum(size, TINY)).any(axis=(1, 2))
 
 
-def in_words(combinations, problem=None):
+def datum_defect_sentence(combinations, problem=None):
     """The datum defect in words, and what helps; see `defect_in_words`."""
     defect = defect_in_words(combinations, problem)
     return message(
@@ -190,9 +190,9 @@ def defect_in_words(combinations, problem=None):
         parts.append(about or _mixture(d - len(pure), _ways(mixed)))
     if d == 1:
         one = "datum defect 1: {what} is not determined by any observation"
-        return message("datum_defect_one", one, what=joined(parts))
+        return message("datum_defect_one", one, what=join_with_and(parts))
     several = "datum defect {defect}: {what} are not determined by any observation"
-    return message("datum_defect", several, defect=d, what=joined(parts))
+    return message("datum_defect", several, defect=d, what=join_with_and(parts))
 
 
 def _ways(numbers):
@@ -236,7 +236,7 @@ def _about_what_stays(combinations, problem):
         3: [THREE_TURNS],
     }.get(turns, [])
     what += [SCALE] * stretches
-    return message("about_place", "{what} about {still}", what=joined(what), still=still)
+    return message("about_place", "{what} about {still}", what=join_with_and(what), still=still)
 
 
 def _staying(combinations, problem):
@@ -253,7 +253,7 @@ def _staying(combinations, problem):
         found.append(_points(names[:NAMED]))
     if photos:
         found.append(message("photos", "photos {photos}", photos=photos[:NAMED]))
-    return joined(found) if found else None, len(still)
+    return join_with_and(found) if found else None, len(still)
 
 
 def _points(names):
@@ -262,7 +262,7 @@ def _points(names):
     return message("points", "points {points}", points=names)
 
 
-def held(problem, over, combinations, photo=None):
+def add_inner_constraints(problem, over, combinations, photo=None):
     """The Problem with a datum by inner constraints over chosen points, or over one photo.
 
     over          (k,) points that take part, or None: all

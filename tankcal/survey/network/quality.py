@@ -117,7 +117,7 @@ class Compared:
     w: np.ndarray
 
 
-def compared(adjusted, observations):
+def compare_left_out(adjusted, observations):
     """Compare observations (coordinates relative to the survey's frame) that were left out.
 
     observations  of tankcal.survey.observations, between points of the adjusted survey
@@ -170,7 +170,7 @@ def components(residuals):
     return tuple(found)
 
 
-def balanced(survey, adjust, *, rounds=20, tolerance=0.01):
+def estimate_variance_components(survey, adjust, *, rounds=20, tolerance=0.01):
     """Variance components, iterated: each group's sds times its factor until all factors are 1.
 
     survey  Survey                    adjust  function Survey -> Adjusted

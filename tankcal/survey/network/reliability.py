@@ -20,7 +20,7 @@ import numpy as np
 from scipy.special import chdtri, ndtri, stdtrit
 
 from tankcal.solver.effects import constraint_reactions, own_leverage, own_responses, responses
-from tankcal.survey.network.blocks import tested
+from tankcal.survey.network.blocks import test_values
 from tankcal.survey.observations import lever
 
 EXACTLY = 1e9  # products: up to here effects are worked out for all points, in about 0.2 s
@@ -129,7 +129,7 @@ def _of_block(problem, solution, number, members, delta0):
 
     A value of an observation that is not in the block, though another one is, does not occur.
     """
-    found = tested(problem, solution, number, members, delta0)
+    found = test_values(problem, solution, number, members, delta0)
     parts = dict(zip(np.unique(members.source), _first_parts(members), strict=True))
     for source, one in parts.items():
         mine = np.flatnonzero(members.source == source)

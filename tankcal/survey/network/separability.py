@@ -30,7 +30,12 @@ from scipy.special import chdtri
 
 from tankcal.adjust import CRITICAL
 from tankcal.solver.effects import cofactors_within
-from tankcal.survey.network.blocks import acting, expected, moves_of, observations_of
+from tankcal.survey.network.blocks import (
+    conditional_expectation,
+    moves_of,
+    observations_in_use,
+    observations_of,
+)
 from tankcal.survey.network.reactions import HELD
 from tankcal.survey.network.reliability import UNCONTROLLED
 
@@ -113,8 +118,8 @@ def _aside(problem, solution, source, row):
         if not len(mine):
             continue
         v, jac = members.block.linearised(solution.unknowns)
-        part = acting(problem, solution, number, members, v)
-        off, away, unexplained, share = expected(members, part, mine, v, jac)
+        part = observations_in_use(problem, solution, number, members, v)
+        off, away, unexplained, share = conditional_expectation(members, part, mine, v, jac)
         root = np.linalg.cholesky(unexplained)
         e, jac, share = (solve_triangular(root, one, lower=True) for one in (off, away, share))
         columns = members.block.columns(problem.layout)
@@ -133,7 +138,7 @@ def _correlated(problem, solution, number, members, aside):
     if number is None:
         return
     v, _ = members.block.linearised(solution.unknowns)
-    part = acting(problem, solution, number, members, v)
+    part = observations_in_use(problem, solution, number, members, v)
     b = part.a @ aside.moves[part.columns]
     t = part.t - b @ aside.back
     spread = part.spread + b @ aside.inverse @ b.T

@@ -81,7 +81,9 @@ def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, *
     def readjust(now, goes, comes):
         share = candidates.shares(now.survey)
         share[comes], share[goes] = 1.0, 0.0
-        return adjust(candidates.with_shares(started(now.survey, now), share), **options)
+        return adjust(
+            candidates.with_shares(start_from_adjusted(now.survey, now), share), **options
+        )
 
     found = search(
         adjusted, tests, readjust, at_once=AT_ONCE, returns=RETURNS,
@@ -112,7 +114,7 @@ def _limit(adjusted, critical, test):
     return adjusted.sigma0 * tau_limit(alpha, adjusted.dof)
 
 
-def started(survey, adjusted):
+def start_from_adjusted(survey, adjusted):
     """The survey with the adjusted values as its start values, where there are any."""
     state, centre = adjusted.solution.unknowns, adjusted.problem.centre_m
     found = np.isfinite(adjusted.xyz_m)
@@ -125,7 +127,7 @@ def started(survey, adjusted):
     return replace(survey, **changes)
 
 
-def with_use(survey, uses):
+def set_use(survey, uses):
     """The survey with the share of each observation; uses {source: (n,)}."""
     observations = [
         one.using(uses[number]) if number in uses else one
@@ -158,7 +160,7 @@ def _robust(candidates, adjusted, critical, options):
             new = np.exp(-0.5 * np.maximum(0.0, (away / DANISH) ** 2 - 1))
         new = np.where(np.isnan(away), share, np.maximum(new, 1e-6))
         change = np.abs(new - share).max(initial=0)
-        survey = candidates.with_shares(started(adjusted.survey, adjusted), new)
+        survey = candidates.with_shares(start_from_adjusted(adjusted.survey, adjusted), new)
         adjusted = adjust(survey, **{**options, "tolerance": 1e-2})
         if turn > HUBER_ROUNDS and change < 0.02:
             break
@@ -202,7 +204,7 @@ class _Candidates:
 
     def with_shares(self, survey, share):
         """The survey with the share (k,) of each."""
-        return with_use(survey, {source: share[mine] for source, mine in self.slices.items()})
+        return set_use(survey, {source: share[mine] for source, mine in self.slices.items()})
 
     def one_of_each_point(self, adjusted, goes, off):
         """Mask of what goes, at most one of each point: the others may only follow its blunder."""

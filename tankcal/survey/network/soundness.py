@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.survey.network.datum import in_words, null_space
+from tankcal.survey.network.datum import datum_defect_sentence, null_space
 
 WORTHLESS = 0.1  # sd over the principal distance, or over the extent of the survey
 HANGING = 0.03  # see datum.UNFELT: what holds the survey so weakly, noise alone can hold
@@ -35,7 +35,7 @@ def refuse_worthless_cameras(survey, problem, solution):
         )
 
 
-def hardly_determined(adjusted):
+def find_hardly_determined(adjusted):
     """Sentences on points whose sd is above a tenth of the survey's extent.
 
     The extent is four times the median distance of the points from their median place: a point that
@@ -55,7 +55,7 @@ def hardly_determined(adjusted):
     )
 
 
-def hanging_datum(problem):
+def weak_datum_sentence(problem):
     """Words on a datum that hangs on next to nothing, "" when it does not."""
     free = null_space(problem, HANGING)
-    return f"; {in_words(free, problem)}" if free.shape[1] else ""
+    return f"; {datum_defect_sentence(free, problem)}" if free.shape[1] else ""

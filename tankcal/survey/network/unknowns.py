@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.camera.model import PARAMETERS
-from tankcal.messages import filled, listed
+from tankcal.messages import fill_template, list_some
 from tankcal.survey.observations import Layout
 
 
@@ -159,5 +159,7 @@ def _many(names, who, one):
     """Some of the photos or points, `who` their numbers: all of them, or how many and which."""
     if len(who) == len(names):
         return f"all {one}s"
-    which = listed([names[i] for i in who], NAMED)
-    return filled("{count} {what}s ({which})", {"count": len(who), "what": one, "which": which})
+    which = list_some([names[i] for i in who], NAMED)
+    return fill_template(
+        "{count} {what}s ({which})", {"count": len(who), "what": one, "which": which}
+    )

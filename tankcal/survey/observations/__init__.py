@@ -10,7 +10,7 @@ from tankcal.survey.observations.coordinates import (
     Vectors,
 )
 from tankcal.survey.observations.correlated import Block, Correlated
-from tankcal.survey.observations.held import HeldOrientation, as_conditions, exact_rows, lever
+from tankcal.survey.observations.held import HeldOrientation, exact_rows, lever, make_conditions
 from tankcal.survey.observations.kinds import KINDS, Kind
 from tankcal.survey.observations.photographs import (
     ImageCoordinates,
@@ -50,7 +50,7 @@ __all__ = [
     "SystemCoordinates",
     "Vectors",
     "VerticalAngles",
-    "as_conditions",
     "exact_rows",
     "lever",
+    "make_conditions",
 ]

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tankcal.geometry.rotations import turned
+from tankcal.geometry.rotations import apply_small_rotation
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Layout:
         changes = {"xyz_m": state.xyz_m + step[self.points]}
         if len(photos):
             changes["photo_xyz_m"] = state.photo_xyz_m + photos[:, :3]
-            changes["rotation"] = turned(state.rotation, photos[:, 3:])
+            changes["rotation"] = apply_small_rotation(state.rotation, photos[:, 3:])
             changes["interior"] = state.interior + step[self.interior]
         if len(state.orientation_rad):
             changes["orientation_rad"] = state.orientation_rad + step[self.orientation]
@@ -72,7 +72,7 @@ class Layout:
             changes["scale"] = state.scale + step[self.scale]
             changes["offset_m"] = state.offset_m + step[self.offset]
         if len(system):
-            changes["system"] = turned(state.system, system[:, :3])
+            changes["system"] = apply_small_rotation(state.system, system[:, :3])
             changes["system_shift_m"] = state.system_shift_m + system[:, 3:6]
             changes["system_scale"] = state.system_scale + system[:, 6]
         return replace(state, **changes)

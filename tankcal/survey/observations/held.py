@@ -17,7 +17,7 @@ from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import (
     angle_derivatives,
     angles_of,
-    from_angles,
+    rotation_of_angles,
     rotation_vector,
     vector_derivatives,
 )
@@ -113,7 +113,7 @@ def exact_rows(one):
     return zero.all(axis=1)
 
 
-def as_conditions(one):
+def make_conditions(one):
     """Observations that hold exactly, to be filled without an sd, and their rows' numbers (k,).
 
     one  observations with sd 0
@@ -140,7 +140,7 @@ def _held_elements(one):
     for photo in np.unique(one.photo):
         mine = np.flatnonzero((one.photo == photo) & (row > 2))
         if len(mine) == 3 and len(np.unique(row[mine])) == 3:
-            rotation[mine] = from_angles(*value[mine[np.argsort(row[mine])]])
+            rotation[mine] = rotation_of_angles(*value[mine[np.argsort(row[mine])]])
             row[mine], value[mine] = row[mine] + VECTOR - OMEGA, 0.0
     numbers = np.arange(len(one))
     upright = np.flatnonzero((row == PHI) & (np.abs(np.abs(value) - np.pi / 2) < UPRIGHT))

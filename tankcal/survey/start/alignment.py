@@ -10,7 +10,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from tankcal.geometry.rotations import turned
+from tankcal.geometry.rotations import apply_small_rotation
 from tankcal.survey.observations import Azimuths, HeightDifferences, PlumbLines
 from tankcal.survey.start.pieces import Motion
 
@@ -19,7 +19,7 @@ FAR = 5.0  # largest step of the logarithm of the scale
 KNOWS = (PlumbLines, HeightDifferences, Azimuths)
 
 
-def aligned(survey, piece, known, place_m):
+def align_piece(survey, piece, known, place_m):
     """The Motion that brings a piece onto known coordinates and observed verticals and azimuths.
 
     known    (points, 3) coordinates of the frame, nan where not known
@@ -117,5 +117,5 @@ def _settled(clues, rotation, shift):
 
 
 def _stepped(rotation, shift, scale, step, size):
-    turn = turned(rotation[None], step[None, :3])[0]
+    turn = apply_small_rotation(rotation[None], step[None, :3])[0]
     return turn, shift + size * step[3:6], scale * np.exp(np.clip(step[6], -FAR, FAR))

@@ -10,17 +10,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.survey.start.clues import Clues, grown
-from tankcal.survey.start.known import certain, hinted
-from tankcal.survey.start.loose_frames import with_locals
-from tankcal.survey.start.photographs import SURE, sights_of, with_points
+from tankcal.survey.start.clues import Clues, grow_piece
+from tankcal.survey.start.known import certain_places, hinted_places
+from tankcal.survey.start.loose_frames import join_local_frames
+from tankcal.survey.start.photographs import SURE, add_points, sights_of
 from tankcal.survey.start.pieces import BAD_JOINT, joint
 from tankcal.survey.start.plan import plan_of
-from tankcal.survey.start.plan_frames import in_plan
-from tankcal.survey.start.polar import oriented
-from tankcal.survey.start.repair import contradictions, guessed, mended, photo_error
+from tankcal.survey.start.plan_frames import find_plan_positions
+from tankcal.survey.start.polar import orient_circles
+from tankcal.survey.start.repair import contradictions, guess_places, photo_error, repair_photos
 from tankcal.survey.start.single_points import sought_point
-from tankcal.survey.start.unstarted import LISTED, hanging, not_fixed, refuse_missing
+from tankcal.survey.start.unstarted import (
+    LISTED,
+    loose_frame_sentence,
+    refuse_missing,
+    unfixed_point_error,
+)
 
 TRIALS = 3  # with other samples, while the images contradict what was found
 ODDS = 0.05  # share of photos and known points that may be at odds with the images
@@ -30,7 +35,7 @@ KEPT_SHARE = 0.05  # of the extent: given values farther from what was found are
 ENOUGH = 3  # places common to two frames
 
 
-def on_tank(generatrix, generatrices, z_m, radius_m, offset_m=0.0):
+def nominal_places(generatrix, generatrices, z_m, radius_m, offset_m=0.0):
     """Nominal coordinates (n, 3) of targets: generatrices counted clockwise from +y, from 1."""
     azimuth = 2 * np.pi * (np.asarray(generatrix) - 1) / generatrices
     r = radius_m + np.asarray(offset_m)
@@ -46,7 +51,7 @@ def approximate(survey, seed=0, wall=None):
     Given values that contradict the image points are replaced as well, unless they are fixed or
     observed. Raises SolutionError naming everything that is left, and why.
     """
-    sure, hints = certain(survey), hinted(survey)
+    sure, hints = certain_places(survey), hinted_places(survey)
     if _complete(survey, hints.piece):
         return survey
     centre = _centre(sure, hints)
@@ -78,13 +83,13 @@ def _found(clues, sure, hints):
     """A Piece with all that could be found, and sentences about what did not join."""
     piece, reasons = sure.piece, []
     for least in (SURE, 3):  # photos that see few known points are better placed by other photos
-        piece = grown(clues, piece, least)
+        piece = grow_piece(clues, piece, least)
         piece = _with_hints(clues, piece, sure, hints, least)
-        piece, reasons = with_locals(clues, piece, hints.piece.place_m, least)
+        piece, reasons = join_local_frames(clues, piece, hints.piece.place_m, least)
     soft = hints.piece.known & ~np.isfinite(sure.piece.xyz_m).any(axis=1)
-    piece = with_points(clues.sights, replace(piece, by_photos=piece.by_photos | soft))
-    piece = mended(clues.sights, piece, sure.piece.oriented, clues.rng, clues.wall)
-    return guessed(clues.sights, piece), reasons
+    piece = add_points(clues.sights, replace(piece, by_photos=piece.by_photos | soft))
+    piece = repair_photos(clues.sights, piece, sure.piece.oriented, clues.rng, clues.wall)
+    return guess_places(clues.sights, piece), reasons
 
 
 def _complete(survey, given):
@@ -112,14 +117,14 @@ def _with_hints(clues, piece, sure, hints, least):
     if _all_found(piece) or hints.nothing:
         return piece
     if (piece.known.sum() + piece.oriented.sum()) >= ENOUGH:
-        own = grown(clues, _credible(clues, hints.without(sure).piece), least)
+        own = grow_piece(clues, _credible(clues, hints.without(sure).piece), least)
         common = (own.known & piece.known).sum() + (own.oriented & piece.oriented).sum()
         motion = joint(own, piece, clues.rng) if common >= ENOUGH else None
         if motion is not None and motion.misfit_m < BAD_JOINT * piece.extent:
             joined = piece.filled_from(own.moved(motion))
-            return grown(clues, with_points(clues.sights, joined), least)
+            return grow_piece(clues, add_points(clues.sights, joined), least)
     merged = _credible(clues, piece.filled_from(hints.piece), piece.oriented)
-    return grown(clues, merged, least)
+    return grow_piece(clues, merged, least)
 
 
 def _credible(clues, piece, held=False):
@@ -133,7 +138,7 @@ def _credible(clues, piece, held=False):
     left = given.copy()
     while left.any():
         piece = _without(piece, given & ~left)
-        trial, photos = with_points(clues.sights, piece), np.flatnonzero(left)
+        trial, photos = add_points(clues.sights, piece), np.flatnonzero(left)
         errors = np.array([photo_error(clues.sights[i], trial, i) for i in photos])
         bad = errors > KEPT_ERROR
         if not bad.any():
@@ -166,15 +171,15 @@ def _filled(clues, piece, sure, hints, centre, reasons):
     keep = np.isfinite(given.xyz_m) & ~(off > KEPT_SHARE * piece.extent)[:, None]
     untouched = keep | (np.isfinite(survey.xyz_m) & np.isnan(given.xyz_m))
     xyz = np.where(untouched, survey.xyz_m - centre, xyz)
-    zeros = oriented(clues.plan, xyz[:, :2])[: len(survey.sets)]
+    zeros = orient_circles(clues.plan, xyz[:, :2])[: len(survey.sets)]
     zeros = np.where(clues.plan.at[: len(zeros)] < 0, 0.0, zeros)  # nothing was read on these
     sets = np.where(np.isfinite(survey.sets), survey.sets, zeros)
     told = {}
     if np.isnan(xyz[:, :2]).any():
         told = _told(clues, xyz, centre)
-        _, apart = in_plan(clues.plan, xyz[:, :2], xyz[:, 2], clues.rng)
+        _, apart = find_plan_positions(clues.plan, xyz[:, :2], xyz[:, 2], clues.rng)
         reasons = reasons + [
-            hanging(survey, local.known, np.isfinite(xyz[:, 0]))
+            loose_frame_sentence(survey, local.known, np.isfinite(xyz[:, 0]))
             for local in apart
             if not (local.known & np.isnan(xyz[:, 0]))[list(told)].any()
         ]
@@ -191,7 +196,7 @@ def _told(clues, xyz_m, centre):
     for point in np.flatnonzero(np.isnan(xyz_m[:, :2]).any(axis=1))[:LISTED]:
         found = sought_point(clues.survey, clues.plan, xyz_m, point, clues.sought)
         if found.rows:
-            told[int(point)] = not_fixed(clues.survey, found, point, centre)
+            told[int(point)] = unfixed_point_error(clues.survey, found, point, centre)
     return told
 
 

@@ -6,14 +6,14 @@ from itertools import combinations
 import numpy as np
 
 from tankcal.survey.observations import HeightDifferences, Sights, Vectors
-from tankcal.survey.start.heights import with_heights
-from tankcal.survey.start.lateration import laid_out
-from tankcal.survey.start.photographs import Wall, grown_by_photos, wall_of
+from tankcal.survey.start.heights import add_heights
+from tankcal.survey.start.lateration import lay_out_networks
+from tankcal.survey.start.photographs import Wall, grow_by_photos, wall_of
 from tankcal.survey.start.pieces import empty, joint
 from tankcal.survey.start.plan import Plan
-from tankcal.survey.start.plan_frames import in_plan
+from tankcal.survey.start.plan_frames import find_plan_positions
 from tankcal.survey.start.polar import improved_in_plan
-from tankcal.survey.start.single_points import misfit_of_places, positioned
+from tankcal.survey.start.single_points import misfit_of_places, position_single_points
 
 AS_WELL = 1e-6  # of the extent: misfits this near to one another decide nothing
 
@@ -45,7 +45,7 @@ class Clues:
         return not any(isinstance(one, kinds) for one in self.survey.observations)
 
 
-def grown(clues, piece, least, free=False):
+def grow_piece(clues, piece, least, free=False):
     """The Piece with all that follows from it, by photos and by set-ups, in turn.
 
     least  known points that a photo must see
@@ -56,7 +56,7 @@ def grown(clues, piece, least, free=False):
         piece = _by_vectors(clues, piece, free)
         piece = _by_tapes(clues, _surveyed(clues, piece, free), free)
         wall = clues.wall or wall_of(piece.xyz_m)
-        piece = grown_by_photos(clues.sights, piece, clues.rng, wall, least)
+        piece = grow_by_photos(clues.sights, piece, clues.rng, wall, least)
         if np.isfinite(piece.xyz_m).sum() + piece.oriented.sum() == before:
             piece = _by_mixtures(clues, piece)
         if np.isfinite(piece.xyz_m).sum() + piece.oriented.sum() == before:
@@ -92,7 +92,7 @@ def _by_mixtures(clues, piece):
     """The Piece with points that only a mixture of readings to known ones fixes."""
     if clues.silent or not np.isfinite(piece.xyz_m).any():
         return piece
-    xyz = positioned(clues.survey, clues.plan, piece.xyz_m, clues.sought)
+    xyz = position_single_points(clues.survey, clues.plan, piece.xyz_m, clues.sought)
     new = np.isfinite(xyz).all(axis=1) & ~piece.known
     return replace(piece, xyz_m=xyz, by_photos=piece.by_photos & ~new)
 
@@ -110,7 +110,7 @@ def _surveyed(clues, piece, free):
         first = np.where(new[:, 2], np.nan, xyz[:, 2])
         if not np.isfinite(first).any():
             first[np.flatnonzero(new[:, 2])[0]] = xyz[np.flatnonzero(new[:, 2])[0], 2]
-        better = with_heights(clues.survey, clues.plan, np.column_stack([xy, first]), False)
+        better = add_heights(clues.survey, clues.plan, np.column_stack([xy, first]), False)
         xyz = np.where(np.isfinite(better), better, xyz)
     return replace(piece, xyz_m=xyz, by_photos=piece.by_photos & ~new.any(axis=1))
 
@@ -120,9 +120,9 @@ def _by_readings(clues, xyz, free):
     for _ in range(3):
         before = np.isfinite(xyz).sum()
         if free or np.isfinite(xyz[:, 0]).any():
-            xy, _ = in_plan(clues.plan, xyz[:, :2], xyz[:, 2], clues.rng)
+            xy, _ = find_plan_positions(clues.plan, xyz[:, :2], xyz[:, 2], clues.rng)
             xyz = np.column_stack([xy, xyz[:, 2]])
-        xyz = with_heights(clues.survey, clues.plan, xyz, free)
+        xyz = add_heights(clues.survey, clues.plan, xyz, free)
         if np.isfinite(xyz).sum() == before:
             break
     return xyz
@@ -140,7 +140,7 @@ def _by_tapes(clues, piece, free):
     sides = np.array(list(combinations(firm, 2)), dtype=int).reshape(-1, 2)
     between = np.linalg.norm(piece.xyz_m[sides[:, 0]] - piece.xyz_m[sides[:, 1]], axis=1)
     ties = np.concatenate([start, sides[:, 0]]), np.concatenate([end, sides[:, 1]])
-    for points, places in laid_out(*ties, np.concatenate([length, between]), 3, clues.rng):
+    for points, places in lay_out_networks(*ties, np.concatenate([length, between]), 3, clues.rng):
         either = [_told(clues, points, places * mirror) for mirror in ([1, 1, 1], [1, 1, -1])]
         if free and not known.any():
             return piece.filled_from(either[0])

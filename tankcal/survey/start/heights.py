@@ -11,13 +11,13 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import spsolve
 
 from tankcal.survey.observations import HeightDifferences
-from tankcal.survey.start.plan import looked_up
+from tankcal.survey.start.plan import look_up
 
 ROUNDS = 25
 NOISE_M = 1e-4  # misfits below are all alike
 
 
-def with_heights(survey, plan, xyz_m, free):
+def add_heights(survey, plan, xyz_m, free):
     """Coordinates (points, 3) with all z that follow from height differences and slopes.
 
     free  whether a part in which no z is known may start with its first point at z = 0
@@ -46,7 +46,7 @@ def with_heights(survey, plan, xyz_m, free):
 def _differences(survey, plan, xyz_m):
     """Points start, end (n,) and z of end minus z of start (n,)."""
     pair = plan.pairs(plan.low, plan.high)
-    flat = looked_up(*plan.lengths(xyz_m[:, 2]), pair)
+    flat = look_up(*plan.lengths(xyz_m[:, 2]), pair)
     known = np.linalg.norm(xyz_m[plan.high, :2] - xyz_m[plan.low, :2], axis=1)
     flat = np.where(np.isfinite(known), known, flat)
     by_slope = flat * np.tan(plan.slope) + plan.lift + plan.bend * flat**2

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.geometry.rotations import from_angles
+from tankcal.geometry.rotations import rotation_of_angles
 from tankcal.survey.observations import ControlCoordinates, PhotoOrientation, PhotoRotation
 from tankcal.survey.start.pieces import Piece
 
@@ -40,7 +40,7 @@ class Known:
         return Known(replace(piece, xyz_m=piece.xyz_m + shift_m, place_m=piece.place_m + shift_m))
 
 
-def certain(survey):
+def certain_places(survey):
     """Known places that are fixed or observed, of points that something was measured to."""
     xyz = np.full((len(survey.points), 3), np.nan)
     if survey.fixed is not None:
@@ -58,7 +58,7 @@ def certain(survey):
         rotation = np.where(photos.fixed[:, 3, None, None], photos.rotation, rotation)
     told = np.isfinite(angles).all(axis=1) & np.isnan(rotation).any(axis=(1, 2))
     if told.any():
-        rotation[told] = from_angles(*angles[told].T)
+        rotation[told] = rotation_of_angles(*angles[told].T)
     return Known(_piece(xyz, place, rotation))
 
 
@@ -74,7 +74,7 @@ def _photos_observed(survey):
     return six[:, :3], six[:, 3:], rotation
 
 
-def hinted(survey):
+def hinted_places(survey):
     """All start values that were given, whatever they are worth, of points measured to."""
     photos, xyz = survey.photos, np.where(_measured(survey)[:, None], survey.xyz_m, np.nan)
     if photos is None:

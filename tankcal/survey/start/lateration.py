@@ -17,7 +17,7 @@ LOOSE = 1e-5  # singular value, over the largest, of a motion that no distance f
 FLAT = 1e-2  # neighbours thinner than that share of their extent lie on a line or in a plane
 
 
-def laid_out(low, high, length, dims, rng):
+def lay_out_networks(low, high, length, dims, rng):
     """Networks by distances: yields points (k,) and places (k, dims) of each rigid one.
 
     low, high, length  (n,) points and m        dims  2 or 3

@@ -6,22 +6,22 @@ from itertools import combinations
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.survey.start.alignment import aligned
-from tankcal.survey.start.clues import grown
-from tankcal.survey.start.known import certain
+from tankcal.survey.start.alignment import align_piece
+from tankcal.survey.start.clues import grow_piece
+from tankcal.survey.start.known import certain_places
 from tankcal.survey.start.pairs import blind_piece
-from tankcal.survey.start.photographs import grown_by_photos, with_points
+from tankcal.survey.start.photographs import add_points, grow_by_photos
 from tankcal.survey.start.pieces import BAD_JOINT, Motion, joint
 
 
-def with_locals(clues, piece, places, least):
+def join_local_frames(clues, piece, places, least):
     """The Piece with local frames of what is left, and sentences about those that do not join.
 
     places  (photos, 3) projection centres that were given, nan where none was
     """
     given = piece
     if not np.isfinite(piece.xyz_m[:, 0]).any() or not np.isfinite(piece.xyz_m[:, 2]).any():
-        piece = grown(clues, piece, least, free=not piece.oriented.any())
+        piece = grow_piece(clues, piece, least, free=not piece.oriented.any())
     tried, loose, reasons = piece.oriented.copy(), [], []
     while not tried.all():
         own, why = blind_piece(clues.sights, ~tried, clues.points, clues.rng, clues.trial)
@@ -32,12 +32,12 @@ def with_locals(clues, piece, places, least):
         tried |= own.oriented | piece.oriented
     if loose and not (piece.oriented.any() or (piece.known & ~_held(clues.survey)).any()):
         own = max(loose, key=lambda one: one.oriented.sum())
-        motion = aligned(clues.survey, own, piece.xyz_m, places)
-        piece = grown(clues, piece.filled_from(own.moved(motion)), least)
+        motion = align_piece(clues.survey, own, piece.xyz_m, places)
+        piece = grow_piece(clues, piece.filled_from(own.moved(motion)), least)
         piece, loose = _attached(clues, piece, [one for one in loose if one is not own], least)
     reasons += [_apart(clues.survey, own, piece) for own in loose]
     piece = _to_scale(clues, piece, given, places)
-    return grown(clues, piece, least, free=not np.isfinite(piece.xyz_m[:, 0]).any()), reasons
+    return grow_piece(clues, piece, least, free=not np.isfinite(piece.xyz_m[:, 0]).any()), reasons
 
 
 def _attached(clues, piece, loose, least):
@@ -47,7 +47,7 @@ def _attached(clues, piece, loose, least):
         for own in loose:
             joined = _joined(clues, own, piece)
             if joined is not None:
-                piece = grown(clues, joined, least)
+                piece = grow_piece(clues, joined, least)
                 loose = [one for one in loose if one is not own]
                 break
         else:
@@ -55,7 +55,7 @@ def _attached(clues, piece, loose, least):
             first, second, joined = next((one for one in pairs if one[2]), (None,) * 3)
             if joined is None:
                 return piece, loose
-            joined = grown_by_photos(clues.sights, joined, clues.rng, least=least)
+            joined = grow_by_photos(clues.sights, joined, clues.rng, least=least)
             rest = [one for one in loose if one is not first and one is not second]
             loose = [*rest, _stretched(clues, joined)]
 
@@ -71,7 +71,7 @@ def _joined(clues, own, onto):
 def _to_scale(clues, piece, given, places):
     """The Piece stretched about the only photo that was given whole, to what else is known.
 
-    given   Piece of what was known at first         places  see `with_locals`
+    given   Piece of what was known at first         places  see `join_local_frames`
 
     Single coordinates of other photos and of points say how large it is: by relative orientation
     alone its base has the length one.
@@ -85,7 +85,7 @@ def _to_scale(clues, piece, given, places):
         xyz_m=np.full_like(piece.xyz_m, np.nan),
         by_photos=np.ones_like(piece.by_photos),
     )
-    bare, hinge = with_points(clues.sights, bare), given.place_m[one][0]
+    bare, hinge = add_points(clues.sights, bare), given.place_m[one][0]
     told = np.vstack([given.xyz_m, np.where(np.isfinite(given.place_m), given.place_m, places)])
     away, wanted = np.vstack([bare.xyz_m, bare.place_m]) - hinge, told - hinge
     both = np.isfinite(away) & np.isfinite(wanted)
@@ -97,7 +97,7 @@ def _to_scale(clues, piece, given, places):
 
 
 def _held(survey):
-    return np.isfinite(certain(survey).piece.xyz_m).any(axis=1)
+    return np.isfinite(certain_places(survey).piece.xyz_m).any(axis=1)
 
 
 def _stretched(clues, piece):

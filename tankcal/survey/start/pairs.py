@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from tankcal.survey.start.photographs import ENOUGH, WORST_ERROR, grown_by_photos, with_points
+from tankcal.survey.start.photographs import ENOUGH, WORST_ERROR, add_points, grow_by_photos
 from tankcal.survey.start.pieces import empty
 from tankcal.survey.start.relative import relative_poses
-from tankcal.survey.start.resection import resected
+from tankcal.survey.start.resection import resect
 
 COMMON = 7  # points that two photos must share
 PAIRS = 12  # pairs that are tried
@@ -44,7 +44,7 @@ def blind_piece(sights, waiting, points, rng, seed=0):
             )
     elif misfit > WORST_ERROR:
         return None, "no third photo fits to any two of these photos"
-    return grown_by_photos(sights, piece, rng, least=ENOUGH), ""
+    return grow_by_photos(sights, piece, rng, least=ENOUGH), ""
 
 
 def _hypotheses(sights, waiting, points, seed):
@@ -83,7 +83,7 @@ def _of_two(sights, pair, pose, points):
     place, rotation = piece.place_m.copy(), piece.rotation.copy()
     place[list(pair)] = [np.zeros(3), pose.base]
     rotation[list(pair)] = [np.eye(3), pose.rotation]
-    return with_points(sights, replace(piece, place_m=place, rotation=rotation))
+    return add_points(sights, replace(piece, place_m=place, rotation=rotation))
 
 
 def _judged(sights, piece, rng):
@@ -96,7 +96,7 @@ def _judged(sights, piece, rng):
             continue
         sight = sights[photo]
         seen = known[sight.point]
-        pose = resected(piece.xyz_m[sight.point[seen]], sight.ideal[seen], rng)
+        pose = resect(piece.xyz_m[sight.point[seen]], sight.ideal[seen], rng)
         error = np.inf if pose is None else pose.error
         best = (True, min(best[1], error))
     return best

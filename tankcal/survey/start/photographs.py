@@ -4,8 +4,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.camera.model import corrected
-from tankcal.survey.start.resection import Pose, bearings, candidates, intersected, poses, refined
+from tankcal.camera.model import correct_image_points
+from tankcal.survey.start.resection import (
+    Pose,
+    bearings,
+    candidates,
+    find_poses,
+    intersect_rays,
+    refine_pose,
+)
 
 ENOUGH = 4  # points from which a photo's place is unambiguous
 SURE = 6  # points from which it withstands a blunder
@@ -45,12 +52,12 @@ def sights_of(survey):
     found = []
     for number, camera in enumerate(photos.camera):
         mine, setup = used[cuts[number] : cuts[number + 1]], survey.cameras[camera]
-        ideal = corrected(images.xy_mm[mine], setup.values, setup.form) / setup.values[0]
+        ideal = correct_image_points(images.xy_mm[mine], setup.values, setup.form) / setup.values[0]
         found.append(Sight(images.point[mine], ideal))
     return tuple(found)
 
 
-def grown_by_photos(sights, piece, rng, wall=None, least=3):
+def grow_by_photos(sights, piece, rng, wall=None, least=3):
     """The Piece with all photos and points that its points and photos give.
 
     least  known points that a photo must see: SURE, ENOUGH or 3
@@ -60,7 +67,7 @@ def grown_by_photos(sights, piece, rng, wall=None, least=3):
     """
     if not sights:
         return piece
-    piece = with_points(sights, piece)
+    piece = add_points(sights, piece)
     tried = np.zeros(len(sights), dtype=int)
     for needed in [number for number in (SURE, ENOUGH, 3) if number >= least]:
         while True:
@@ -68,9 +75,9 @@ def grown_by_photos(sights, piece, rng, wall=None, least=3):
             piece = _with_photos(sights, piece, needed, rng, wall, tried)
             if piece.oriented.sum() == before:
                 break
-            piece = with_points(sights, piece)
+            piece = add_points(sights, piece)
             if needed < SURE:  # those that it brought may suffice for more of the better ones
-                return grown_by_photos(sights, piece, rng, wall, least)
+                return grow_by_photos(sights, piece, rng, wall, least)
     return piece
 
 
@@ -102,7 +109,7 @@ def _pose(piece, sights, photo, rng, wall):
     points, ideal = piece.xyz_m[sight.point[known]], sight.ideal[known]
     if len(np.unique(sight.point[known])) < 3:
         return None
-    found = _three(points, ideal) if len(points) == 3 else poses(points, ideal, rng)
+    found = _three(points, ideal) if len(points) == 3 else find_poses(points, ideal, rng)
     found = [pose for pose in found if pose.error < WORST_ERROR]
     if len(points) > 3 and len(found) < 2:
         return found[0] if found else None
@@ -112,7 +119,7 @@ def _pose(piece, sights, photo, rng, wall):
 def _three(points, ideal):
     """The Poses for exactly three points."""
     both = zip(*candidates(points, ideal), strict=True)
-    return [refined(points, ideal, Pose(*one, 0.0)) for one in both]
+    return [refine_pose(points, ideal, Pose(*one, 0.0)) for one in both]
 
 
 def _decided(points, found, piece, sights, photo, wall):
@@ -171,7 +178,7 @@ def _miss(piece, sights, photo, pose):
     return float(np.median(np.concatenate(found))) if found else np.inf
 
 
-def with_points(sights, piece):
+def add_points(sights, piece):
     """The Piece with what its photos say about points that are not known, or only by photos."""
     photos = np.flatnonzero(piece.oriented)
     if not len(photos):
@@ -185,7 +192,7 @@ def with_points(sights, piece):
         few = _spread(owner)
         owner, photo, ideal = owner[few], photo[few], ideal[few]
     rays = np.einsum("ni,nij->nj", bearings(ideal), piece.rotation[photo])
-    found, count = intersected(piece.place_m[photo], rays, owner, len(piece.xyz_m))
+    found, count = intersect_rays(piece.place_m[photo], rays, owner, len(piece.xyz_m))
     better = np.isfinite(found).all(axis=1) & (count > 1)
     improved = (better & piece.by_photos)[:, None]
     missing = better[:, None] & ~np.isfinite(piece.xyz_m)

@@ -63,7 +63,7 @@ class Plan:
         pair = self.pairs(self.start, self.end)
         slopes = medians(self.pairs(self.low, self.high), np.abs(self.slope))
         flat = np.where(self.flat, self.length, np.nan)
-        by_angle = self.length * np.cos(looked_up(*slopes, pair))
+        by_angle = self.length * np.cos(look_up(*slopes, pair))
         drop = z_m[self.end] - z_m[self.start] - self.rise
         square = self.length**2 - drop**2
         by_height = np.sqrt(np.where(square > (STEEP * self.length) ** 2, square, np.nan))
@@ -82,7 +82,7 @@ def medians(groups, values):
     return found, 0.5 * (values[first + (count - 1) // 2] + values[first + count // 2])
 
 
-def looked_up(groups, values, wanted):
+def look_up(groups, values, wanted):
     """Values (n,) of wanted groups (n,), nan where a group has none."""
     if not len(groups):
         return np.full(len(wanted), np.nan)

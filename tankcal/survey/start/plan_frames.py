@@ -10,9 +10,9 @@ from itertools import combinations
 
 import numpy as np
 
-from tankcal.survey.start.lateration import laid_out
-from tankcal.survey.start.plan import looked_up
-from tankcal.survey.start.polar import grown_in_plan, oriented
+from tankcal.survey.start.lateration import lay_out_networks
+from tankcal.survey.start.plan import look_up
+from tankcal.survey.start.polar import grow_in_plan, orient_circles
 
 MISFIT = 0.05  # of a joint, as a share of the distance between its points
 PAIRS = 60  # pairs of common points that are tried
@@ -33,7 +33,7 @@ class Local:
         return np.isfinite(self.xy_m[:, 0])
 
 
-def in_plan(plan, xy_m, z_m, rng):
+def find_plan_positions(plan, xy_m, z_m, rng):
     """Positions (points, 2) in plan, and the Locals that could not be joined to them.
 
     xy_m  (points, 2) nan where not known; without any known point the largest Local is the frame
@@ -43,7 +43,7 @@ def in_plan(plan, xy_m, z_m, rng):
     while True:
         if main.known.any():
             plain = plan if main.scaled else _without_lengths(plan)
-            main = replace(main, xy_m=grown_in_plan(plain, main.xy_m, z_m, main.north))
+            main = replace(main, xy_m=grow_in_plan(plain, main.xy_m, z_m, main.north))
         pieces = _locals(plan, main, z_m, rng)
         if not main.known.any() and pieces:
             pieces.sort(key=_size)
@@ -72,14 +72,14 @@ def _without_lengths(plan):
 def _locals(plan, main, z_m, rng):
     """Locals of what the main frame does not know."""
     lengths = plan.lengths(z_m)
-    zeros = oriented(plan, main.xy_m, main.north)
+    zeros = orient_circles(plan, main.xy_m, main.north)
     waiting = np.isnan(zeros) | ~main.known[np.maximum(plan.at, 0)]
     taken, found = np.zeros(len(plan.north), dtype=bool), []
     for circle, first, second, base in _seeds(plan, lengths, waiting & (plan.at >= 0)):
         if taken[circle]:
             continue
         local = _grown(plan, z_m, plan.at[circle], second, base)
-        turned = np.isfinite(oriented(plan, local.xy_m, False)) & local.known[plan.at]
+        turned = np.isfinite(orient_circles(plan, local.xy_m, False)) & local.known[plan.at]
         taken |= turned
         if local.known.sum() > 2 or not found:
             found.append(local)
@@ -92,7 +92,7 @@ def _seeds(plan, lengths, waiting):
 
     Without a length the target must look back.
     """
-    length = looked_up(*lengths, plan.pairs(plan.station, plan.target))
+    length = look_up(*lengths, plan.pairs(plan.station, plan.target))
     sights = set(zip(plan.station.tolist(), plan.target.tolist(), strict=True))
     taped = np.bincount(plan.circle, weights=np.isfinite(length) + 1e-3, minlength=len(plan.north))
     for circle in np.argsort(-taped, kind="stable"):
@@ -114,20 +114,20 @@ def _grown(plan, z_m, first, second, base):
     xy = np.full((plan.points, 2), np.nan)
     xy[first], xy[second] = 0.0, (0.0, 1.0 if np.isnan(base) else base)
     if np.isnan(base):
-        xy = grown_in_plan(_without_lengths(plan), xy, z_m, north=False)
+        xy = grow_in_plan(_without_lengths(plan), xy, z_m, north=False)
         pair, length = plan.lengths(z_m)
         low, high = np.divmod(pair, plan.points)
         ratio = length / np.linalg.norm(xy[low] - xy[high], axis=1)
         if not np.isfinite(ratio).any():
             return _north_up(plan, Local(xy, False, False))
         xy = xy * np.nanmedian(ratio)
-    xy = grown_in_plan(plan, xy, z_m, north=False)
+    xy = grow_in_plan(plan, xy, z_m, north=False)
     return _north_up(plan, Local(xy, True, False))
 
 
 def _north_up(plan, local):
     """The Local turned so that its azimuths count from +y, if there are any."""
-    zeros = oriented(plan, local.xy_m, False)[plan.north]
+    zeros = orient_circles(plan, local.xy_m, False)[plan.north]
     zeros = zeros[np.isfinite(zeros)]
     if not len(zeros):
         return local
@@ -155,7 +155,7 @@ def _by_lengths(plan, main, lengths, rng):
     end = np.concatenate([high[open_ended], sides[:, 1]])
     length = np.concatenate([lengths[1][open_ended], between])
     found = []
-    for points, places in laid_out(start, end, length, 2, rng):
+    for points, places in lay_out_networks(start, end, length, 2, rng):
         xy = np.full((plan.points, 2), np.nan)
         xy[points] = places
         found.append(Local(xy, True, False, mirrored=True))

@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from tankcal.survey.start.plan import looked_up
+from tankcal.survey.start.plan import look_up
 
 MOST = 8  # sights of a point or station that are combined; all of them judge
 IMPROVING = 4  # rounds in which all positions are found again
@@ -20,7 +20,7 @@ RIVAL = 2.0  # a second place counts when its misfit is below this multiple of t
 NOISE = 1e-3  # misfit that says nothing, as a share of the sights
 
 
-def grown_in_plan(plan, xy_m, z_m, north=True):
+def grow_in_plan(plan, xy_m, z_m, north=True):
     """Positions (points, 2) in plan with all that follow from the known ones.
 
     xy_m   (points, 2) nan where not known      z_m  (points,) nan where not known
@@ -30,7 +30,7 @@ def grown_in_plan(plan, xy_m, z_m, north=True):
     needed = 3
     while True:
         waiting = np.isnan(xy[:, 0])
-        zeros = oriented(plan, xy, north)
+        zeros = orient_circles(plan, xy, north)
         _place_points(plan, xy, zeros, lengths, needed, waiting, needed > 2)
         _place_stations(plan, xy, lengths, needed, waiting & np.isnan(xy[:, 0]), needed > 2)
         if np.isnan(xy[:, 0]).sum() < waiting.sum():
@@ -41,7 +41,7 @@ def grown_in_plan(plan, xy_m, z_m, north=True):
             return xy
 
 
-def oriented(plan, xy_m, north=True):
+def orient_circles(plan, xy_m, north=True):
     """Azimuths (circles,) of the zeros: the one that most known targets agree with, or nan."""
     d = xy_m[plan.target] - xy_m[plan.station]
     zero = np.arctan2(d[:, 0], d[:, 1]) - plan.reading
@@ -71,7 +71,7 @@ def improved_in_plan(plan, xy_m, z_m, held, north=True):
     occupied[plan.at[plan.at >= 0]] = True
     free = np.isfinite(xy[:, 0]) & ~held
     for _ in range(IMPROVING):
-        zeros, before = oriented(plan, xy, north), xy.copy()
+        zeros, before = orient_circles(plan, xy, north), xy.copy()
         doubtful = free & ~occupied & _disagreeing(plan, xy, zeros, lengths, free)
         _place_points(plan, xy, zeros, lengths, 3, doubtful, False)
         _place_stations(plan, xy, lengths, 3, free & occupied, False)
@@ -151,10 +151,10 @@ def place(origin, towards, centre, radius, controlled=False):
     of_arcs = np.linalg.norm(found[:, None] - centre[None], axis=-1)
     misfit = np.where(along > 0, across, away).sum(axis=1)
     misfit = misfit + np.abs(of_arcs - radius).sum(axis=1)
-    return chosen(found, misfit, np.median(np.hstack([away, of_arcs])), controlled)
+    return choose_place(found, misfit, np.median(np.hstack([away, of_arcs])), controlled)
 
 
-def chosen(places, misfit, size, controlled=False):
+def choose_place(places, misfit, size, controlled=False):
     """The place with the smallest misfit, or None when another one fits as well.
 
     places (k, 2 or more), misfit (k,), size of the sights; where `controlled` the best must stand
@@ -219,7 +219,7 @@ def _place_stations(plan, xy, lengths, needed, wanted, strict):
         if done[station] or len(mine) < needed:
             continue
         target = plan.target[mine]
-        length = looked_up(*lengths, plan.pairs(plan.station[mine], target))
+        length = look_up(*lengths, plan.pairs(plan.station[mine], target))
         found = free_station(xy[target], plan.reading[mine], length, strict)
         if found is not None:
             xy[station], done[station] = found, True
@@ -246,7 +246,7 @@ def free_station(targets, readings, lengths, controlled=False):
     away = np.linalg.norm(d, axis=-1)
     turn = _wrapped(np.arctan2(d[..., 0], d[..., 1]) - readings - poses[:, 2:])
     misfit = (away * np.abs(turn)).sum(axis=1) + np.nansum(np.abs(away - lengths), axis=1)
-    found = chosen(poses, misfit, np.median(away), controlled)
+    found = choose_place(poses, misfit, np.median(away), controlled)
     return None if found is None else found[:2]
 
 

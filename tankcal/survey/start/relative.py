@@ -13,7 +13,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from tankcal.geometry.rotations import turned
+from tankcal.geometry.rotations import apply_small_rotation
 from tankcal.survey.start.resection import bearings
 
 FIVES = 150  # samples of five points; nine in ten of them may hold a blunder
@@ -187,7 +187,7 @@ def _refined(rotation, base, f1, f2):
         root = 1 / np.sqrt(1 + (off / (3 * scale)) ** 2)
         step = np.linalg.lstsq(a * root[:, None], -off * root, rcond=None)[0]
         across = np.linalg.svd(base[None])[2][1:]
-        turn = turned(rotation[None], step[None, :3])[0]
+        turn = apply_small_rotation(rotation[None], step[None, :3])[0]
         moved = base + step[3:] @ across
         moved = moved / np.linalg.norm(moved)
         cross = np.cross(np.eye(3), moved)

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.survey.start.photographs import grown_by_photos
+from tankcal.survey.start.photographs import grow_by_photos
 from tankcal.survey.start.plan import medians
-from tankcal.survey.start.resection import agreed, bearings, image_errors
+from tankcal.survey.start.resection import agreed_error, bearings, image_errors
 
 MENDING = 2  # rounds in which photos that fit badly are found again
 AT_ODDS = 0.02  # error over c of a photo, or a known point, that is not where it should be
@@ -14,7 +14,7 @@ WORSE = 5.0  # times the median error of the photos, beyond which one fits badly
 SMALL_ERROR = 3e-3  # error over c that is not looked into: 0.3 mm at c = 100 mm
 
 
-def mended(sights, piece, held, rng, wall=None):
+def repair_photos(sights, piece, held, rng, wall=None):
     """The Piece, photos that fit far worse than the others found again from what these say.
 
     held  (photos,) True for those that stay
@@ -31,7 +31,7 @@ def mended(sights, piece, held, rng, wall=None):
             place_m=np.where(bad[:, None], np.nan, piece.place_m),
             rotation=np.where(bad[:, None, None], np.nan, piece.rotation),
         )
-        again = grown_by_photos(sights, less, rng, wall)
+        again = grow_by_photos(sights, less, rng, wall)
         if again.oriented.sum() < piece.oriented.sum():
             return piece
         piece = again
@@ -75,7 +75,7 @@ def _errors(sight, piece, photo):
     return sight.point[known], image_errors(points, ideal, *pose)[0]
 
 
-def guessed(sights, piece):
+def guess_places(sights, piece):
     """The Piece with places, on a ray, of points whose rays from two photos or more do not meet."""
     photos = np.flatnonzero(piece.oriented)
     rays = np.bincount(
@@ -103,4 +103,4 @@ def photo_error(sight, piece, photo, most=False):
     errors = _errors(sight, piece, photo)[1][None]
     if not errors.size:
         return np.nan
-    return float(agreed(errors)[0] if most else np.median(errors))
+    return float(agreed_error(errors)[0] if most else np.median(errors))

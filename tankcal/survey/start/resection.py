@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from tankcal.geometry.rotations import turned
+from tankcal.geometry.rotations import apply_small_rotation
 
 TRIPLES = 120
 JUDGES = 100  # points that decide between the poses
@@ -35,14 +35,14 @@ class Pose:
     error: float
 
 
-def resected(xyz_m, ideal, rng, count=TRIPLES):
+def resect(xyz_m, ideal, rng, count=TRIPLES):
     """The best Pose for points (n, 3) seen at ideal image points over c (n, 2), n at least 4."""
-    found = poses(xyz_m, ideal, rng, count)
+    found = find_poses(xyz_m, ideal, rng, count)
     return found[0] if found else None
 
 
-def poses(xyz_m, ideal, rng, count=TRIPLES):
-    """The best Pose for points as for `resected` and, of few points, others that fit them too."""
+def find_poses(xyz_m, ideal, rng, count=TRIPLES):
+    """The best Pose for points as for `resect` and, of few points, others that fit them too."""
     n = len(xyz_m)
     triples = rng.integers(0, n, (count, 3))
     triples = triples[(np.diff(np.sort(triples, axis=1), axis=1) > 0).all(axis=1)]
@@ -52,13 +52,13 @@ def poses(xyz_m, ideal, rng, count=TRIPLES):
     if not len(centres):
         return []
     judges = rng.choice(n, JUDGES, replace=False) if n > JUDGES else slice(None)
-    errors = agreed(image_errors(xyz_m[judges], ideal[judges], centres, rotations))
+    errors = agreed_error(image_errors(xyz_m[judges], ideal[judges], centres, rotations))
     many = rng.choice(n, REFINING, replace=False) if n > REFINING else slice(None)
     xyz_m, ideal = xyz_m[many], ideal[many]
     order = np.argsort(errors)[: 1 if n >= FEW else TRIED]
     found = []
     for best in order[np.isfinite(errors[order])]:
-        pose = refined(xyz_m, ideal, Pose(centres[best], rotations[best], float(errors[best])))
+        pose = refine_pose(xyz_m, ideal, Pose(centres[best], rotations[best], float(errors[best])))
         if not any(_alike(pose, other, xyz_m) for other in found):
             found.append(pose)
     found.sort(key=lambda pose: pose.error)
@@ -70,7 +70,7 @@ def _alike(one, other, xyz_m):
     return np.linalg.norm(one.xyz_m - other.xyz_m) < SAME * away
 
 
-def agreed(errors):
+def agreed_error(errors):
     """The error (k,) that more than half of the points keep, of errors (k, n), n at least 4."""
     n = errors.shape[1]
     place = min(n, n // 2 + 2) - 1
@@ -165,10 +165,10 @@ def _frame(triangle):
     return np.stack([x, np.cross(z, x), z], axis=-1)
 
 
-def refined(xyz_m, ideal, pose):
+def refine_pose(xyz_m, ideal, pose):
     """The Pose after Gauss-Newton steps with weights that fall off (Cauchy) beyond its error."""
     centre, rotation = pose.xyz_m, pose.rotation
-    error = float(agreed(image_errors(xyz_m, ideal, centre[None], rotation[None]))[0])
+    error = float(agreed_error(image_errors(xyz_m, ideal, centre[None], rotation[None]))[0])
     for _ in range(REFINING_STEPS):
         w, a = _linearised(xyz_m, ideal, centre, rotation)
         size = np.linalg.norm(w, axis=1)
@@ -177,8 +177,8 @@ def refined(xyz_m, ideal, pose):
         step = np.linalg.lstsq(
             (a * root[:, None, None]).reshape(-1, 6), -(w * root[:, None]).ravel(), rcond=None
         )[0]
-        candidate = centre + step[:3], turned(rotation[None], step[None, 3:])[0]
-        found = agreed(image_errors(xyz_m, ideal, candidate[0][None], candidate[1][None]))[0]
+        candidate = centre + step[:3], apply_small_rotation(rotation[None], step[None, 3:])[0]
+        found = agreed_error(image_errors(xyz_m, ideal, candidate[0][None], candidate[1][None]))[0]
         if not found < error * (1 + 1e-6):
             break
         (centre, rotation), error = candidate, float(found)
@@ -200,7 +200,7 @@ def _linearised(xyz_m, ideal, centre, rotation):
     return np.column_stack([x, y]) - ideal, a
 
 
-def intersected(centres, directions, owner, points, rounds=12):
+def intersect_rays(centres, directions, owner, points, rounds=12):
     """Points (points, 3) nearest to rays (n, 3) from centres (n, 3), weights falling off (Cauchy).
 
     owner  (n,) number of the point that each ray belongs to

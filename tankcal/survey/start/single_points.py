@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.survey.observations import Directions, HeightDifferences, Layout, Sights, State
-from tankcal.survey.start.polar import APART, oriented
+from tankcal.survey.start.polar import APART, orient_circles
 
 MOST = 12  # points that are looked for at a time
 STEPS = 40
@@ -40,7 +40,7 @@ class Sought:
     unknowns: int
 
 
-def positioned(survey, plan, xyz_m, sought_already):
+def position_single_points(survey, plan, xyz_m, sought_already):
     """Coordinates (points, 3) with those of single points that are tied to known ones in all.
 
     sought_already  dict that remembers what was found, for the next call with the same survey
@@ -58,7 +58,7 @@ def positioned(survey, plan, xyz_m, sought_already):
 
 def sought_point(survey, plan, xyz_m, point, sought_already):
     """The Sought of a point whose coordinates are (partly) nan."""
-    zeros = oriented(plan, xyz_m[:, :2])[: len(survey.sets)]
+    zeros = orient_circles(plan, xyz_m[:, :2])[: len(survey.sets)]
     tries = [_Ties(survey, xyz_m, zeros, point, in_plan) for in_plan in (False, True)]
     first = None
     for ties in tries:
@@ -75,7 +75,7 @@ def sought_point(survey, plan, xyz_m, point, sought_already):
 
 def misfit_of_places(survey, plan, xyz_m, points):
     """Sum of the misfits, m, of readings between points (k,), at their places, and known ones."""
-    zeros = oriented(plan, xyz_m[:, :2])[: len(survey.sets)]
+    zeros = orient_circles(plan, xyz_m[:, :2])[: len(survey.sets)]
     total = 0.0
     for point in points:
         open_m = xyz_m.copy()

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.errors import SolutionError
-from tankcal.messages import either, listed, message
+from tankcal.messages import join_with_or, list_some, message
 from tankcal.survey.network.survey import FEWEST
 from tankcal.survey.observations import Distances, HeightDifferences, VerticalAngles
 from tankcal.survey.start.single_points import SHOWN
@@ -21,7 +21,7 @@ def refuse_missing(survey, sights, xyz_m, piece, sets, reasons, why=lambda point
     Those have too few observations for an adjustment, too, which sets them aside by name. Raises
     SolutionError when a photo, a point that something determines, or a circle has no start.
 
-    why  why(point) -> what refuses a point without a place, see `not_fixed`; or None
+    why  why(point) -> what refuses a point without a place, see `unfixed_point_error`; or None
     """
     hopeless = survey.values_of_points() < FEWEST
     missing = np.isnan(xyz_m) & ~hopeless[:, None]
@@ -46,7 +46,7 @@ def refuse_missing(survey, sights, xyz_m, piece, sets, reasons, why=lambda point
             )
     whole = np.flatnonzero(missing[:, :2].any(axis=1))
     points = [message("named_point", "point {point}", point=survey.points[i]) for i in whole]
-    told += points if len(points) <= LISTED else [listed(points, LISTED)]
+    told += points if len(points) <= LISTED else [list_some(points, LISTED)]
     flat = np.isfinite(xyz_m[:, :2]).all(axis=1) & np.isnan(xyz_m[:, 2])
     level = np.flatnonzero(flat if (flat & ~hopeless).any() else flat & ~hopeless)
     if not told:
@@ -54,7 +54,7 @@ def refuse_missing(survey, sights, xyz_m, piece, sets, reasons, why=lambda point
             message("named_set", "orientation of direction set {number}", number=number)
             for number in np.flatnonzero(np.isnan(sets)) + 1
         ]
-        told += unknown if len(unknown) <= LISTED else [listed(unknown, LISTED)]
+        told += unknown if len(unknown) <= LISTED else [list_some(unknown, LISTED)]
     sentences = (
         [message("not_started", "no approximate values for {told}", told=[*told])] if told else []
     )
@@ -67,12 +67,12 @@ def refuse_missing(survey, sights, xyz_m, piece, sets, reasons, why=lambda point
         )
         kind = SeveralPlacesError if several and errors else SolutionError
         texts = [*sentences, *(one.args[0] for one in errors), *(one for one in reasons if one)]
-        raise kind(one_sentence(texts))
+        raise kind(join_with_semicolons(texts))
     middle = np.nanmean(xyz_m, axis=0) if known.any() else np.zeros(3)
     return np.where(np.isnan(xyz_m), middle, xyz_m)
 
 
-def not_fixed(survey, found, point, centre_m):
+def unfixed_point_error(survey, found, point, centre_m):
     """The SolutionError of a point that its ties to known ones do not fix, or None.
 
     found  network.positioning.Sought        centre_m  (3,) added to its coordinates
@@ -121,15 +121,15 @@ def not_fixed(survey, found, point, centre_m):
             "is needed, or approximate coordinates (in control.csv, standard "
             "deviations blank)",
             name=name,
-            places=either(places),
+            places=join_with_or(places),
         )
     )
 
 
-def hanging(survey, local, known):
+def loose_frame_sentence(survey, local, known):
     """A sentence about points (points,) of a local frame in plan that joins no known ones."""
     names = [str(survey.points[i]) for i in np.flatnonzero(local & ~known)]
-    some = listed(names, LISTED)
+    some = list_some(names, LISTED)
     common = int((local & known).sum())
     if common > 1:
         return message(
@@ -154,17 +154,17 @@ def hanging(survey, local, known):
     )
 
 
-def one_sentence(parts):
+def join_with_semicolons(parts):
     """Parts in a row, a semicolon between them."""
     *first, last = parts
     if not first:
         return last
-    before = one_sentence(first)
+    before = join_with_semicolons(first)
     return message("and_also", "{before}; {last}", before=before, last=last)
 
 
 def _no_heights(survey, level):
-    names = listed([str(survey.points[i]) for i in level], LISTED)
+    names = list_some([str(survey.points[i]) for i in level], LISTED)
     kinds = (HeightDifferences, VerticalAngles)
     observed = any(isinstance(one, kinds) and len(one) for one in survey.observations)
     spatial = any(isinstance(one, Distances) and not one.horizontal for one in survey.observations)

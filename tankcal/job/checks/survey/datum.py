@@ -8,7 +8,7 @@ from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.names import all_points, observed_names
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.tables import nearest
-from tankcal.messages import joined, listed, message
+from tankcal.messages import join_with_and, list_some, message
 from tankcal.survey.observations import KINDS
 
 # control.csv, check.csv and targets.csv: each point once, sds of what is given.
@@ -91,7 +91,7 @@ def _warn_unobserved(files, table, seen, told):
         if point is not None and point not in seen
     ]
     if lacking:
-        names = listed([point for _, point in lacking], MOST_NAMED)
+        names = list_some([point for _, point in lacking], MOST_NAMED)
         files.log.warning(table.file, told(names), lacking[0][0], "point")
 
 
@@ -167,7 +167,7 @@ def _refuse_between_held(files, name, table, places, held):
         # all axes that enter must be held at all points before a value is held already
         axes = "xy" if is_horizontal and is_horizontal[place] else KINDS[name].axes
         if all(set(axes) <= set(held.get(point, "")) for point in points):
-            named = joined([repr(point) for point in points])
+            named = join_with_and([repr(point) for point in points])
             expected = message(
                 "held_already",
                 "found 0, but {named} are held already ({axes} in control.csv); expected a "
@@ -325,7 +325,7 @@ def _check_known(files, name, axes):
         )
     lacking = [axis for axis in axes if axis not in known]
     if lacking:
-        axes = joined(lacking)
+        axes = join_with_and(lacking)
         expected = message(
             "datum_point_without",
             "{name!r} has no {axes} in control.csv; expected it there",

@@ -10,7 +10,7 @@ from tankcal.job.checks.survey.files import refuse_undefined, tell_rows
 from tankcal.job.contract.registers import MARKS
 from tankcal.job.imagery import cameras_of_photos, readings_of_marks
 from tankcal.job.tables import nearest
-from tankcal.messages import either, joined, listed, message
+from tankcal.messages import join_with_and, join_with_or, list_some, message
 
 LEVEL = 0.001  # of the tests of all photos together
 GROWTH = 2.0  # of the sd of an image coordinate: a fourfold variance (Silva)
@@ -188,7 +188,7 @@ def _is_possible(files, table, photo, read):
 
 def _suspected(photo, found, names):
     """One line about a comparator.Suspicion."""
-    named = [joined([repr(names[i]) for i in group]) for group in found.marks]
+    named = [join_with_and([repr(names[i]) for i in group]) for group in found.marks]
     if found.what == "unit":
         times = 1 / found.size
         return message(
@@ -208,7 +208,7 @@ def _suspected(photo, found, names):
             share=share,
         )
     if found.what == "exchanged" and found.size < GROSS:
-        marks = either(named)
+        marks = join_with_or(named)
         return message(
             "marks_exchanged",
             "the marks of photo {photo!r} make no comparator's transformation unless {marks} "
@@ -232,7 +232,7 @@ def _suspected(photo, found, names):
             start=start,
         )
     if found.what == "exchanged":
-        marks = either(named)
+        marks = join_with_or(named)
         return message(
             "marks_fit_exchanged",
             "{start}, and fit when {marks} are exchanged",
@@ -299,7 +299,7 @@ def _warn_of_all(files, table, bare, turned, grown):
             "marks_uncontrolled",
             "as many marks as the transformation needs in photos {photos}: nothing controls it, one"
             " misread mark shows nowhere",
-            photos=listed(bare, TOLD),
+            photos=list_some(bare, TOLD),
         )
         files.log.warning(table.file, expected)
     if turned:
@@ -307,7 +307,7 @@ def _warn_of_all(files, table, bare, turned, grown):
             "read_mirrored",
             "photos {photos} were read mirrored; the transformation turns them back (plate turned"
             " over, or marks exchanged?)",
-            photos=listed(turned, TOLD),
+            photos=list_some(turned, TOLD),
         )
         files.log.warning(table.file, expected)
     if grown:

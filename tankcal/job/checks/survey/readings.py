@@ -8,7 +8,7 @@ from tankcal.job.checking import has_rows
 from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.instruments import TAKEN_FROM_SETUPS
 from tankcal.job.contract.observations import ANGLE_UNITS, ANGLES, READINGS
-from tankcal.messages import either, listed, message
+from tankcal.messages import join_with_or, list_some, message
 
 # correlated_readings.csv: pairs of values that exist, each pair once, and none with itself.
 
@@ -134,7 +134,7 @@ def check_readings(files):
 def _check_angle(files, table, angle):
     """One of the units in each row; a column of one unit at least."""
     columns = [f"{angle}_{unit}" for unit in ANGLE_UNITS]
-    wanted = either(columns)
+    wanted = join_with_or(columns)
     headings = files.raw.tables[files_name(table)].headings
     if not any(column in headings for column in columns):
         expected = message(
@@ -211,7 +211,7 @@ def _warn_copies(files, table):
         "{count} rows are the same as another one to the last digit (rows {pairs}): copied?"
         " Each counts as a reading of its own",
         count=len(copies),
-        pairs=listed([f"{row} = {before}" for row, before in copies], MOST_REPEATED),
+        pairs=list_some([f"{row} = {before}" for row, before in copies], MOST_REPEATED),
     )
     files.log.warning(table.file, expected, copies[0][0])
 
