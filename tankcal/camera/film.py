@@ -93,7 +93,7 @@ def flatten_film(xy_mm, height_mm, interior):
 
     Examples
     --------
-    >>> flattened([[50.0, 0.0]], np.array([0.1]), (100.0, 0.0, 0.0))
+    >>> flatten_film([[50.0, 0.0]], np.array([0.1]), (100.0, 0.0, 0.0))
     array([[50.05005005,  0.        ]])
     """
     c, x0, y0 = (np.asarray(one, dtype=float) for one in interior)

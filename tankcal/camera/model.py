@@ -98,7 +98,7 @@ def correct_image_points(xy_mm, interior, form):
     --------
     >>> interior = np.zeros(13)
     >>> interior[[0, 3]] = 50.0, -1e-4
-    >>> corrected(np.array([[10.0, 0.0]]), interior, Form("correction_added"))
+    >>> correct_image_points(np.array([[10.0, 0.0]]), interior, Form("correction_added"))
     array([[9.9, 0. ]])
     """
     numbers = form.numbers
@@ -132,7 +132,7 @@ def distort_image_points(ideal_mm, interior, form):
     --------
     >>> interior = np.zeros(13)
     >>> interior[[0, 3]] = 50.0, -1e-4
-    >>> measured(np.array([[9.9, 0.0]]), interior, Form("correction_added"))
+    >>> distort_image_points(np.array([[9.9, 0.0]]), interior, Form("correction_added"))
     array([[10.,  0.]])
     """
     q = tuple(np.asarray(interior, dtype=float).T)

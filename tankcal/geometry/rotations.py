@@ -24,7 +24,7 @@ def rotation_of_angles(omega_rad, phi_rad, kappa_rad):
 
     Examples
     --------
-    >>> angles_of(from_angles(0.1, 0.2, 0.3)).round(9)
+    >>> angles_of(rotation_of_angles(0.1, 0.2, 0.3)).round(9)
     array([0.1, 0.2, 0.3])
     """
     so, sp, sk = np.sin(omega_rad), np.sin(phi_rad), np.sin(kappa_rad)
@@ -78,7 +78,7 @@ def rotation_of_view(azimuth_rad, tilt_rad, roll_rad):
 
     Examples
     --------
-    >>> pointing(looking(1.0, 0.2, 0.1)).round(9)
+    >>> view_of_rotation(rotation_of_view(1.0, 0.2, 0.1)).round(9)
     array([1. , 0.2, 0.1])
     """
     sa, sv, sk = np.sin(azimuth_rad), np.sin(tilt_rad), np.sin(roll_rad)

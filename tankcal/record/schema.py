@@ -177,12 +177,17 @@ def _reference(cls, definitions):
         definitions[cls.__name__] = {}
         properties = {one.key: _property(one, definitions) for one in keys_of(cls)}
         definitions[cls.__name__] = {
-            "description": getdoc(cls),
+            "description": _said_of(cls),
             "type": "object",
             "properties": properties,
             "required": [one.key for one in keys_of(cls) if one.required],
         }
     return {"$ref": f"#/$defs/{cls.__name__}"}
+
+
+def _said_of(cls):
+    """What a class says of itself before the sections of its docstring."""
+    return re.split(r"\n\n\w+\n---", getdoc(cls))[0]
 
 
 def _property(one, definitions):

@@ -111,7 +111,7 @@ def limits_of_scale(table, scale):
 
     Examples
     --------
-    >>> of_scale(shipped_limits(), 2000).limits[0]
+    >>> limits_of_scale(shipped_limits(), 2000).limits[0]
     Limit(part='plan', scale='2000', grade='A', tolerance_m=0.56, sd_m=0.34)
     """
     name = f"{scale:g}"
