@@ -6,7 +6,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all study check format notebooks job-format bench peer picture site wheel clean
+.PHONY: help demo test test-slow test-all study check format notebooks job-format bench peer picture site wheel clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -18,11 +18,13 @@ else
 	$(BIN)/tankcal demo --out demo-results
 endif
 
-test: $(VENV)/full ## the tests that take no more than a second each (two minutes)
+test: $(VENV)/full ## the tests that take no more than a second each (some three minutes)
 	$(BIN)/pytest
 
-test-all: $(VENV)/full ## every test, papers of all kinds too, studies at a twentieth of their size
-	$(BIN)/pytest -m 'not study' --dist worksteal
+test-slow: $(VENV)/full ## the others: papers of all kinds, many cases, studies at a twentieth of their size
+	$(BIN)/pytest -m 'slow and not study'
+
+test-all: test test-slow ## every test but the studies at full size
 
 study: $(VENV)/full ## the studies at full size (minutes)
 	$(BIN)/pytest -m study --dist load --durations 25
