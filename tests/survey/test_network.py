@@ -1,6 +1,7 @@
 """The network adjustment: right answers of other programs, second methods, invariances, datum."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import tankcal.solver.elimination
 from tankcal.camera.model import CONVENTIONS, Form
 from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import rotation_of_angles
+from tankcal.solver.compiled import compile_functions
 from tankcal.survey.network import Instrument, adjust, snoop
 from tankcal.survey.network.datum import directions
 from tankcal.survey.network.quality import (
@@ -95,14 +97,22 @@ def photographed_as_dbat():
     return photographed(form=Form("correction_added", "before_distortion"))
 
 
-@pytest.mark.slow(after=1)
+def not_compiled(module, names):
+    """The loops as they are written, run by Python: no compiler to wait for."""
+    return SimpleNamespace(**{name: vars(module)[name] for name in names})
+
+
+@pytest.mark.parametrize(
+    "compiler", [not_compiled, pytest.param(compile_functions, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("make", [photographed, photographed_as_dbat, by_total_station])
-def test_compiled_loops_and_arrays_agree(make, monkeypatch):
+def test_loops_and_arrays_agree(make, compiler, monkeypatch):
     survey = make()[0]
     found = []
     for choice in (True, False):
         for room in (tankcal.solver.elimination, tankcal.camera.imaging):
             monkeypatch.setattr(room, "is_worth_compiling", lambda rows=0, choice=choice: choice)
+            monkeypatch.setattr(room, "compile_functions", compiler)
         found.append(adjust(survey, datum="inner"))
         assert found[-1].residuals  # leverages too
         assert found[-1].point_covariances_m2.any()
