@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from shapes import azimuths, modes, ring, section_of
 
 from tankcal.errors import SolutionError
 from tankcal.geometry.circles import fit_circle
+from tankcal.geometry.form import Form
+from tankcal.geometry.outlines import interpolate_outline
 from tankcal.sections import fit_section, group_by_height, group_by_name, slide
 from tankcal.tank.courses import course_shape
 from tankcal.tank.volumes import ShellVolume
@@ -304,3 +307,38 @@ def test_the_areas_of_a_scanned_course_move_with_its_points(part, tolerance):
         )
         worst = np.abs((up - down) / 2e-4 - analytic[:, i]).max()
         assert worst < tolerance * np.abs(analytic).max()
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_what_a_scan_shows_of_a_barrel(degree):
+    """Against the mean radii of a scan whose wall has one: the whole of it only at degree 2."""
+    amplitude = 1e-4
+    shapes = []
+    for height in (0.0, amplitude):
+        xyz = scan(lambda a, zeta, b=height: 6.5 + b * (1 - zeta**2), n=40)
+        group = replace(course_group(xyz), degree=degree)
+        shapes.append(course_of_points(xyz, group=group)[1].courses[0])
+    before, after = (np.sqrt(np.diag(shape.products_m2) / np.pi) for shape in shapes)
+    assert shapes[0].barrel == pytest.approx((after - before) / amplitude, abs=1e-3)
+
+
+def test_the_form_between_points_moves_the_area():
+    """Differences of the area, as the outline is moved by what it misses of each mode."""
+    form = Form(common_m2=4e-6, own_m2=9e-6, rising_m2=1e-6)
+    spread = azimuths(9, 0.3, np.random.default_rng(2))
+    shape, _ = modes(6.5, 2, np.array([0.2, 0.1]), np.array([-0.1, 0.15]))
+    outline = interpolate_outline(ring(shape, spread)[:, :2], 0.0, 0.0, form, zeta=0.4)
+    course = course_shape(0.0, 1.5, [1.05], [outline], inset_m=0.008, scale=1.001)
+    azimuth = np.arange(3600) * 2 * np.pi / 3600
+    radius, missed = outline.radius_m(azimuth)[:, None], outline.unseen_form_m(azimuth)
+
+    def area(move):  # trapezium rule of a periodic function
+        return np.pi * np.mean((1.001 * (radius + move - 0.008)) ** 2, axis=0)
+
+    by_form = (area(missed) - area(-missed)) / 2
+    modes_of_form = len(by_form) // 2
+    level, rising = by_form[:modes_of_form], by_form[modes_of_form:]
+    assert np.abs(level).max() > 1e-3
+    assert course.by_form_m2[0, 0] == pytest.approx(level * np.sqrt(4 / 13), abs=1e-6)
+    own = np.concatenate([level * np.sqrt(9 / 13), rising])
+    assert course.by_own_form_m2[0, 0] == pytest.approx(own, abs=1e-6)
