@@ -7,7 +7,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow test-all study check format notebooks job-format bench peer picture site wheel clean
+.PHONY: help demo test test-slow test-all study check format notebooks job-format schemas bench peer picture site wheel clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -47,6 +47,9 @@ notebooks: $(VENV)/full ## execute every notebook, top to bottom
 
 job-format: $(VENV)/full ## fill the tables of docs/job-format.md from the contract of the job
 	$(BIN)/python -m tankcal.job.starter.page docs/job-format.md
+
+schemas: $(VENV)/full ## write the JSON schemas of what is saved and docs/saved-keys.md
+	PYTHONPATH=.:tests $(BIN)/python tests/schemas.py
 
 bench: $(VENV)/full ## time and memory of the main job, tables of 1 mm rows and their u, ten million points, plans
 	$(BIN)/python benchmarks/main_job.py

@@ -1,6 +1,6 @@
 """The JSON schemas of what is saved, and the list of their keys, docs/saved-keys.md.
 
-python tests/schemas.py   writes both, from the dataclasses
+make schemas   writes both, from the dataclasses
 """
 
 import json
@@ -77,7 +77,7 @@ def _keys_of_schema(schema, root, path, which):
 DOCS = Path(__file__).parents[1] / "docs" / "saved-keys.md"
 HEAD = """# Every key of `record.json`, `camera.json` and `plan.json`
 
-Made from the dataclasses that are saved (`python tests/schemas.py`), as the JSON schemas in
+Made from the dataclasses that are saved (`make schemas`), as the JSON schemas in
 `tankcal/record/schemas/` are. What belongs together is told in [the record](record-format.md). A
 number may be `null` where it does not exist, unless it says *never null*.
 """

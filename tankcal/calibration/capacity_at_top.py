@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.pipeline.chain import run
-from tankcal.pipeline.plausibility import refuse_undetermined
+from tankcal.pipeline.survey_warnings import refuse_undetermined
 from tankcal.pipeline.wall import s_transform
 from tankcal.survey import wall_points
 

@@ -16,11 +16,6 @@ from tankcal.job.tables import in_book
 from tankcal.messages import message
 from tankcal.pipeline.corrections import Correction, corrections_of
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
-from tankcal.pipeline.plausibility import (
-    incomplete_certificate,
-    open_questions,
-    refuse_undetermined,
-)
 from tankcal.pipeline.scan import Scan, fit_scan
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
@@ -31,6 +26,11 @@ from tankcal.pipeline.statements import (
     stated_volume,
     statements,
     verdict_of,
+)
+from tankcal.pipeline.survey_warnings import (
+    incomplete_certificate,
+    open_questions,
+    refuse_undetermined,
 )
 from tankcal.pipeline.table import check_table, compute_table
 from tankcal.pipeline.tanks import body_of, shell_volume

@@ -22,7 +22,7 @@ from tankcal.job.plausibility import (
     side_doubt,
 )
 from tankcal.messages import message
-from tankcal.pipeline.plausibility import origin_of
+from tankcal.pipeline.survey_warnings import origin_of
 
 
 def refuse_misfit(points, noise_m, diameter_m):

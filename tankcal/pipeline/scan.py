@@ -9,7 +9,7 @@ from tankcal.geometry.cylinders import FittedCylinder, lying_cylinder
 from tankcal.geometry.primitives import fit_sphere
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import refuse_misfit
-from tankcal.pipeline.plausibility import noise_is_estimated, origin_of
+from tankcal.pipeline.survey_warnings import noise_is_estimated, origin_of
 from tankcal.sections import covariance_of
 from tankcal.tank.body import Factor, survey_factors
 

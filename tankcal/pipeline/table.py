@@ -9,8 +9,8 @@ import numpy as np
 
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
-from tankcal.pipeline.plausibility import against_nominal, warn_of_undeclared
 from tankcal.pipeline.scan import Scan
+from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
 from tankcal.pipeline.wall import Wall, warnings_of
 from tankcal.tank.body import Body

@@ -11,7 +11,7 @@ from tankcal.geometry.outlines import polar
 from tankcal.geometry.shell import Shell, course_of, find_shell
 from tankcal.geometry.spectrum import estimate_form
 from tankcal.messages import message
-from tankcal.pipeline.plausibility import (
+from tankcal.pipeline.survey_warnings import (
     ADVISED_POINTS,
     FEWEST_POINTS,
     check_shell,

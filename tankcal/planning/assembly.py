@@ -7,7 +7,7 @@ import numpy as np
 from tankcal.geometry.form import Form, mode_variances
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.model import Box, Known, Limits, Pillar, Plan, Tie
-from tankcal.planning.rings import photographs_of, setups_of, shell_of, tape_of, targets_of
+from tankcal.planning.patterns import photographs_of, setups_of, shell_of, tape_of, targets_of
 
 INCIDENCE_DEG, RAYS = 70.0, 3
 HIGHEST_MODE = 1000  # of the sum that turns an rms departure into an amplitude

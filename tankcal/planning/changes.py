@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.planning.model import Known, Plan
-from tankcal.planning.rings import places_around, row_heights_m, tape_of
+from tankcal.planning.patterns import places_around, row_heights_m, tape_of
 
 ITEMS = ("photo_station", "setup", "tape", "control_point", "target_row", "reading")
 IMAGES, SETS = "all image points", "all sets of the total station"  # what is read again

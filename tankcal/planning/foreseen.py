@@ -7,7 +7,7 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import list_some, message
-from tankcal.pipeline.plausibility import SHOWN, open_questions
+from tankcal.pipeline.survey_warnings import SHOWN, open_questions
 from tankcal.pipeline.table import check_table
 from tankcal.planning.covariance import PredictedCovariance
 from tankcal.planning.given import PLAN_FILE

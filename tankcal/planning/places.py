@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.planning.rings import full_turn, joints_of, plate_m
+from tankcal.planning.patterns import full_turn, joints_of, plate_m
 
 
 @dataclass(frozen=True)

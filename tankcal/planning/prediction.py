@@ -7,8 +7,8 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
-from tankcal.pipeline.plausibility import VAGUE
 from tankcal.pipeline.statements import MINIMA_M
+from tankcal.pipeline.survey_warnings import VAGUE
 from tankcal.planning.bodies import describe_separate_bodies, find_separate_bodies
 from tankcal.planning.checks.seen import refuse_blind
 from tankcal.planning.doubtful import reliability

@@ -8,8 +8,8 @@ import numpy as np
 from tankcal.errors import SolutionError
 from tankcal.job.model import Job
 from tankcal.messages import message
-from tankcal.pipeline.plausibility import refuse_undetermined
 from tankcal.pipeline.statements import statements
+from tankcal.pipeline.survey_warnings import refuse_undetermined
 from tankcal.pipeline.table import ComputedTable, compute_table
 from tankcal.pipeline.tanks.vertical import volume_by_points
 from tankcal.pipeline.wall import Wall, find_wall

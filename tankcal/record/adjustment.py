@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 from scipy.special import gammaincinv
 
-from tankcal.adjust import CRITICAL
+from tankcal.adjust import ALPHA, CRITICAL, POWER
 from tankcal.record.adjusted import (
     AdjustedCamera,
     AdjustedInstrument,
@@ -35,7 +35,6 @@ from tankcal.survey.network.reliability import UNCONTROLLED, noncentrality, tau_
 from tankcal.survey.results import DatumReport, GroupOfReadings, Reading
 
 CONFIDENCE = 0.95  # of the global test and of the intervals of variance factors
-ALPHA, POWER = 0.001, 0.80  # of the tests of single readings
 CHECKABLE = 1.0  # a group with less redundancy says next to nothing about its variance
 
 

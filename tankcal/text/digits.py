@@ -17,6 +17,7 @@ UNKNOWN_DECIMALS = 6  # of a value without an uncertainty: it is not rounded to 
 WITH_U = range(-12, 15)  # powers of ten of a first digit that are written out beside an uncertainty
 WITHOUT_U = range(-4, 6)  # and in a number that has none
 _LARGEST_LOSS = Decimal("0.05")
+SIGNIFICANT = 2  # digits of u (JCGM 100:2008 7.2.6)
 _WIDE = Context(prec=400)
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -66,7 +67,9 @@ class Written:
     decimals: int
 
 
-def format_with_u(value, u, marks=ENGLISH, *, significant=2, least=None, written_out=WITH_U):
+def format_with_u(
+    value, u, marks=ENGLISH, *, significant=SIGNIFICANT, least=None, written_out=WITH_U
+):
     """`value` with its standard or expanded uncertainty `u`, both in one unit.
 
     value        number; None, nan and inf are written as NOTHING
@@ -98,7 +101,7 @@ def format_with_u(value, u, marks=ENGLISH, *, significant=2, least=None, written
     )
 
 
-def decimals_of(u, *, significant=2, least=0):
+def decimals_of(u, *, significant=SIGNIFICANT, least=0):
     """Decimals that show u with `significant` digits, at least `least` (None: may be negative).
 
     UNKNOWN_DECIMALS where u is 0, None or not finite. For what takes a number of decimals, such as
@@ -107,7 +110,7 @@ def decimals_of(u, *, significant=2, least=0):
     return _decimals(_exact(u if _is_number(u) else 0.0), significant, least)
 
 
-def round_u(u, *, significant=2):
+def round_u(u, *, significant=SIGNIFICANT):
     """u as it is printed: 417 is 420, which no number format makes of it; None where not known."""
     if not _is_number(u):
         return None
@@ -115,12 +118,12 @@ def round_u(u, *, significant=2):
     return float(_spread(exact, _decimals(exact, significant, None))) if exact else 0.0
 
 
-def bound_of_decimals(decimals, *, significant=2):
+def bound_of_decimals(decimals, *, significant=SIGNIFICANT):
     """The u below which `decimals_of` gives that many decimals or more: 0.0995 for 3."""
     return (10**significant - 0.5) / 10.0**decimals
 
 
-def decimals_of_mantissa(value, u, *, significant=2):
+def decimals_of_mantissa(value, u, *, significant=SIGNIFICANT):
     """Decimals of the mantissa of `value`, at least 0, with which it ends where its u does.
 
     For a number format with a power of ten (1.742E-03). UNKNOWN_DECIMALS where u is 0 or not known.
@@ -131,7 +134,9 @@ def decimals_of_mantissa(value, u, *, significant=2):
     return max(_rounded(_exact(value), last).adjusted() + last, 0)
 
 
-def decimals_of_rows(uncertainties, *, significant=2, least=0, most=None, unknown=UNKNOWN_DECIMALS):
+def decimals_of_rows(
+    uncertainties, *, significant=SIGNIFICANT, least=0, most=None, unknown=UNKNOWN_DECIMALS
+):
     """Decimals of each row of a column by its own uncertainty, at least `least`.
 
     most  at most so many, where an uncertainty may be the rounding of what is exact; None: any

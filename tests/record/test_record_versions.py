@@ -24,7 +24,7 @@ ALL = kept_files()
 QUICK = ("film.json.gz", "uncertain.json.gz", "photographed.json.gz")  # between them, every part
 WHAT_TO_DO = f"""The keys of the record are not those of version {VERSION} any more.
 Is tests/records/{VERSION}/keys.txt not there, it is still being made. Then:
-1. python tests/schemas.py (tests on PYTHONPATH) writes its schema and docs/record-format.md anew;
+1. make schemas writes its schema and docs/saved-keys.md anew;
 2. tankcal/record/versions.py: the last step says what an older record gets for each new key.
 Is it there, the version has been released: count VERSION up, begin a new step, and do the same."""
 

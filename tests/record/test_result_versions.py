@@ -24,7 +24,7 @@ pytest_plugins = ("camera_results",)
 ALL = kept_files()
 WHAT_TO_DO = """The keys are not those of the version any more: count VERSION up in versions.py, say
 in a step what an older file gets for each new key, write the schema of the new one
-(tests/schemas.py), and keep results of it with the list of their keys (tests/kept_results.py)."""
+(make schemas), and keep results of it with the list of their keys (tests/kept_results.py)."""
 
 
 def listed_keys(saved_format, version, kind="plan"):

@@ -30,7 +30,7 @@ from tankcal.record.schema import (
     key,
 )
 
-STALE = "python tests/schemas.py (tests on PYTHONPATH) writes schemas and docs anew"
+STALE = "make schemas writes schemas and docs anew"
 HOSTILE = (
     None, True, -1, 0.5, 1e308, float("inf"), 10**400, "", "x", [], {}, [[]], [None], [7], {"a": 1},
     "\u202e", [[[[[[1]]]]]], {"code": {}}, "9" * 5000,

@@ -3,7 +3,7 @@
 from tankcal.job.checking import is_not_given, refuse_repeated
 from tankcal.job.tables import nearest
 from tankcal.messages import message
-from tankcal.pipeline.plausibility import ADVISED_POINTS, FEWEST_POINTS
+from tankcal.pipeline.survey_warnings import ADVISED_POINTS, FEWEST_POINTS
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.units import warn_of_units
 

@@ -7,8 +7,8 @@ from tankcal.job.tables import Log, nearest
 from tankcal.messages import join_with_and, list_some, message
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.model import Pillar
+from tankcal.planning.patterns import TOUCH_M, plate_m
 from tankcal.planning.places import joints_m
-from tankcal.planning.rings import TOUCH_M, plate_m
 from tankcal.planning.units import warn_of_places
 from tankcal.planning.visibility import GRAZE_M, find_hidden
 

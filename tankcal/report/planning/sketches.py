@@ -5,8 +5,8 @@ from matplotlib.figure import Figure
 
 from tankcal.pipeline.plots import FAINT, GREY, INK, RED, WIDTH, set_margins, styled
 from tankcal.planning.model import TAPED
+from tankcal.planning.patterns import full_turn
 from tankcal.planning.places import joints_m, place_of, reference_rad
-from tankcal.planning.rings import full_turn
 from tankcal.report.planning.rows import lost_points
 
 GREEN, OCHRE = "#2e7d5b", "#b9770e"

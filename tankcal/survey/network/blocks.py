@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtri, ndtri
 
+from tankcal.adjust import ALPHA
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver.effects import responses
@@ -266,4 +267,4 @@ def _together(right, inner, size):
         return 0.0
     along = ways[:, sound].T @ (right / np.sqrt(size))
     square = float(np.sum(along**2 / values[sound]))
-    return np.sqrt(square) * -ndtri(0.0005) / np.sqrt(chdtri(int(sound.sum()), 0.001))
+    return np.sqrt(square) * -ndtri(ALPHA / 2) / np.sqrt(chdtri(int(sound.sum()), ALPHA))

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse
 
+from tankcal.adjust import ALPHA, POWER
 from tankcal.solver.effects import constraint_reactions, sparse_rows
 from tankcal.survey.network.reliability import Residuals, noncentrality
 
@@ -46,7 +47,7 @@ class Reactions:
         size = np.sqrt(np.where(self.square > 0, self.square, 1.0))
         return np.where(self.square > 0, self.reaction / size, 0.0)
 
-    def residuals(self, problem, alpha=0.001, power=0.80):
+    def residuals(self, problem, alpha=ALPHA, power=POWER):
         """Their Residuals: residual and sd 0; w, mdb and effect by the reactions.
 
         Released, a coordinate would change by w mdb / delta0 (see `noncentrality`), with an sd of

@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtri, ndtri, stdtrit
 
+from tankcal.adjust import ALPHA, POWER
 from tankcal.solver.effects import constraint_reactions, own_leverage, own_responses, responses
 from tankcal.survey.network.blocks import test_values
 from tankcal.survey.observations import lever
@@ -101,7 +102,7 @@ class Residuals:
         return self._effects[1]
 
 
-def noncentrality(alpha=0.001, power=0.80):
+def noncentrality(alpha=ALPHA, power=POWER):
     """delta0 of a two-sided test of the normal distribution; 4.13 for 0.001 and 0.80."""
     return float(ndtri(1 - alpha / 2) + ndtri(power))
 
@@ -112,7 +113,7 @@ def tau_limit(alpha, dof):
     return float(t * np.sqrt(dof) / np.sqrt(dof - 1 + t * t))
 
 
-def residuals_of(problem, solution, alpha=0.001, power=0.80):
+def residuals_of(problem, solution, alpha=ALPHA, power=POWER):
     """A tuple of Residuals, one for each group of a solved Problem, then what holds exactly."""
     delta0 = noncentrality(alpha, power)
     tables = [_table(problem, solution, number, delta0) for number in range(problem.ordinary)]
@@ -275,5 +276,5 @@ def _both(solution, group, v, jac, share, leverage, variance, single):
     square = d * v[:, 0] ** 2 + a * v[:, 1] ** 2 - 2 * between * v[:, 0] * v[:, 1]
     sound = determinant > UNCONTROLLED * np.maximum(a * d, UNCONTROLLED)
     square = np.maximum(square, 0.0) / np.where(sound, determinant, 1.0)
-    one, two = -ndtri(0.0005), np.sqrt(chdtri(2, 0.001))
+    one, two = -ndtri(ALPHA / 2), np.sqrt(chdtri(2, ALPHA))
     return np.where(sound, np.sqrt(square) * one / two, single)

@@ -28,7 +28,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import chdtri
 
-from tankcal.adjust import CRITICAL
+from tankcal.adjust import ALPHA, CRITICAL
 from tankcal.solver.effects import cofactors_within
 from tankcal.survey.network.blocks import (
     conditional_expectation,
@@ -40,7 +40,7 @@ from tankcal.survey.network.reactions import HELD
 from tankcal.survey.network.reliability import UNCONTROLLED
 
 # limits of T, by the number of values tested
-LIMITS = (0.0, CRITICAL**2, *(float(chdtri(count, 0.001)) for count in range(2, 7)))
+LIMITS = (0.0, CRITICAL**2, *(float(chdtri(count, ALPHA)) for count in range(2, 7)))
 WORTH = 0.5 * CRITICAL**2  # w^2 of a single value from which its observation is looked at
 LOOKED_AT = 200  # observations of a group, the worst
 
