@@ -1,5 +1,6 @@
 """A plugin: results of each kind of the camera's analyses, with names to be shown literally."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -22,13 +23,11 @@ from tankcal.survey.measurements import AdjustmentSettings, Instrument
 CONTROL = tuple(f"P{i}" for i in range(1, 48, 6))
 
 
-@pytest.fixture(scope="session")
-def stability():
+def compare_sets():
     return stability_json.as_json(compare(sets(HOSTILE), "spr", grid=SMALL))
 
 
-@pytest.fixture(scope="session")
-def job(tmp_path_factory):
+def photographed_tank(folder):
     """A small tank photographed from all around, its points measured by tape, too."""
     survey = photographed(3)[0]
     control = control_of(survey, CONTROL, tank_points(), CONTROL_SD_M)
@@ -37,23 +36,20 @@ def job(tmp_path_factory):
         settings=AdjustmentSettings(snooping=False),
         instruments=(Instrument("tape 1", "tape", u_scale=1e-4),),
     )  # fmt: skip
-    return replace(tank_job(tmp_path_factory.mktemp("tank")), measurements=made)
+    return replace(tank_job(folder), measurements=made)
 
 
-@pytest.fixture(scope="session")
-def parameters(job):
+def analyse_parameters(job):
     return parameters_json.as_json(analyse_job(job)[0])
 
 
-@pytest.fixture(scope="session")
-def run(job):
+def analyse_influence(job):
     own = job.measurements.cameras[0]
     other = replace(own, camera=replace(own.camera, name="=cmd", sd=np.full(13, np.nan)))
     return influence_json.as_json(influence(job, (other,), ("fixed", "weighted")))
 
 
-@pytest.fixture(scope="session")
-def product():
+def check_differences():
     rng = np.random.default_rng(3)
     names = [f"<i>{number}</i>" for number in range(25)]
     differences = rng.normal([0.2, 0.0, 0.0], 0.15, (25, 3))
@@ -63,5 +59,38 @@ def product():
 
 
 @pytest.fixture(scope="session")
-def results(stability, parameters, run, product):
-    return {one["kind"]: one for one in (stability, parameters, run, product)}
+def results(made_once):
+    """{kind: result}; nobody changes them."""
+
+    def make(folder):
+        job = photographed_tank(folder)
+        found = (
+            compare_sets(),
+            analyse_parameters(job),
+            analyse_influence(job),
+            check_differences(),
+        )
+        text = json.dumps({one["kind"]: one for one in found})
+        (folder / "results.json").write_text(text, encoding="utf-8")
+
+    return json.loads((made_once("camera", make) / "results.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="session")
+def stability(results):
+    return results["stability"]
+
+
+@pytest.fixture(scope="session")
+def parameters(results):
+    return results["parameters"]
+
+
+@pytest.fixture(scope="session")
+def run(results):
+    return results["influence"]
+
+
+@pytest.fixture(scope="session")
+def product(results):
+    return results["product"]

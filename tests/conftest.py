@@ -1,6 +1,8 @@
 """Fixtures shared by the tests: where data lies, and the shipped example computed once."""
 
+import fcntl
 import os
+import shutil
 from collections import Counter
 from pathlib import Path
 
@@ -8,11 +10,13 @@ import pytest
 from hypothesis import settings
 
 import tankcal
-from tankcal.record import record_of, save
+from tankcal.cli import main
+from tankcal.pipeline.chain import adjust_job
+from tankcal.record import record_of, record_of_adjustment, save
 
-os.environ.setdefault("TANKCAL_COMPILED", "patient")  # a run of few tests waits for no compiler
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "silva-1995"
+PHOTOS = EXAMPLE.parent / "silva-1995-photos"
 
 # the same examples on every machine, however slow; new ones by: pytest --hypothesis-profile search
 settings.register_profile("house", deadline=None, derandomize=True)
@@ -30,31 +34,85 @@ def shared():
 
 
 @pytest.fixture(scope="session")
+def made_once(tmp_path_factory):
+    """made_once(name, make): a folder that make(folder) filled; nobody changes it.
+
+    Of the workers of a run the first one makes it, the others wait for it.
+    """
+    base = tmp_path_factory.getbasetemp()
+    base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+    def folder_of(name, make):
+        folder = base / name
+        with open(base / f"{name}.lock", "w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not folder.exists():
+                making = base / f"{name}.making"
+                shutil.rmtree(making, ignore_errors=True)
+                making.mkdir()
+                make(making)
+                making.rename(folder)
+        return folder
+
+    return folder_of
+
+
+@pytest.fixture(scope="session")
 def example_result():
     """The shipped example, computed."""
     return tankcal.run(tankcal.load(EXAMPLE))
 
 
 @pytest.fixture(scope="session")
-def example_record(example_result, tmp_path_factory):
+def example_record(made_once):
     """Path of the record.json of the shipped example."""
-    path = tmp_path_factory.mktemp("example") / "record.json"
-    save(record_of(example_result), path)
-    return path
+
+    def make(folder):
+        save(record_of(tankcal.run(tankcal.load(EXAMPLE))), folder / "record.json")
+
+    return made_once("example", make) / "record.json"
 
 
 @pytest.fixture(scope="session")
-def records_of_kinds(tmp_path_factory):
-    """{kind: record} that together fill every sheet of the workbook; nobody changes them."""
-    from workbook_records import records_of_every_kind
+def example_run(made_once):
+    """The shipped example with the results that the command line wrote beside it."""
 
-    return records_of_every_kind(tmp_path_factory.mktemp("kinds"))
+    def make(folder):
+        shutil.copytree(EXAMPLE, folder / "job")
+        assert main(["run", str(folder / "job"), "--quiet"]) == 0
+
+    return made_once("run", make) / "job"
+
+
+@pytest.fixture(scope="session")
+def adjusted_record(made_once):
+    """Path of the record.json of the shipped photographs, only adjusted."""
+
+    def make(folder):
+        job = tankcal.load(PHOTOS, only="adjustment")
+        save(record_of_adjustment(job, adjust_job(job)), folder / "record.json")
+
+    return made_once("adjusted", make) / "record.json"
+
+
+@pytest.fixture(scope="session")
+def records_of_kinds(made_once):
+    """{kind: record} that together fill every sheet of the workbook; nobody changes them."""
+    from workbook_records import read_records, write_records_of_every_kind
+
+    return read_records(made_once("kinds", write_records_of_every_kind))
 
 
 @pytest.fixture
 def figure(record_property):
     """Call figure("what", value) to show a measured figure in the summary of the test run."""
     return lambda what, value: record_property("figure", f"{what}: {value}")
+
+
+def pytest_configure(config):
+    """The quick tests never wait for a compiler; the others do where there is enough to compute."""
+    quick = "not slow" in config.option.markexpr
+    os.environ.setdefault("TANKCAL_COMPILED", "0" if quick else "patient")
 
 
 @pytest.hookimpl(tryfirst=True)

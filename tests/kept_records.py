@@ -14,7 +14,7 @@ from job_builder import write_job
 from schemas import keys_in
 from test_adjustment_outputs import write_station
 from test_jobs_of_film import film_job
-from workbook_records import records_of_every_kind
+from workbook_records import read_records, write_records_of_every_kind
 
 import tankcal
 from tankcal.record import VERSION, record_of, record_of_adjustment
@@ -84,7 +84,10 @@ def _cells(lines, count):
 
 def records_with_every_key(folder, records=None):
     """{kind: record} of jobs that together have something of everything; written into `folder`."""
-    found = dict(records or records_of_every_kind(folder))
+    if records is None:
+        write_records_of_every_kind(folder)
+        records = read_records(folder)
+    found = dict(records)
     clutter = {"settings": {"table.step_m": 0.01}, "extra_points": [("stair", 7.4, 0.0, 3.0)]}
     job = tankcal.load(write_job(folder / "cluttered", **clutter))
     found["cluttered"] = record_of(tankcal.run(job))

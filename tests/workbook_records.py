@@ -1,6 +1,7 @@
 """Records that together fill every sheet of the workbook."""
 
 import json
+import shutil
 
 from job_builder import write_job
 from test_adjustment_outputs import write_photos
@@ -30,8 +31,8 @@ LYING = {
 ITEMS = [("coil #1", 0.2, 0.6, -0.35, 0.02), ("hatch", 0.5, 1.1, 0.12, 0.0)]
 
 
-def records_of_every_kind(folder):
-    """{kind: record as parsed} of every kind of KINDS; the jobs are written into `folder`."""
+def write_records_of_every_kind(folder):
+    """Write KIND.json for every kind of KINDS, and the jobs that they are of, into `folder`."""
     furnished = {"settings": FURNISHED, "deadwood": ITEMS, "roof": {"critical_top_m": 1.6}}
     diameter = [("diameter", 2.0, "mm")]
     jobs = {
@@ -47,5 +48,11 @@ def records_of_every_kind(folder):
     survey = tankcal.load(jobs["photographed"], only="adjustment")
     save(record_of_adjustment(survey, adjust_job(survey)), paths["survey"])
     (folder / "uncertain").mkdir()
-    paths["uncertain"] = write_uncertain_record(folder / "uncertain")
-    return {kind: json.loads(path.read_text(encoding="utf-8")) for kind, path in paths.items()}
+    shutil.copyfile(write_uncertain_record(folder / "uncertain"), paths["uncertain"])
+
+
+def read_records(folder):
+    """{kind: record as parsed} of what `write_records_of_every_kind` wrote."""
+    return {
+        kind: json.loads((folder / f"{kind}.json").read_text(encoding="utf-8")) for kind in KINDS
+    }

@@ -602,6 +602,7 @@ def test_what_has_no_pixel_counts_in_that_of_the_calibrations():
     assert counted_in(coarse, (fine, same)) is coarse
 
 
+@pytest.mark.slow
 def test_residuals_in_pixels_that_are_not_square(with_blunders):
     """Closed form: a residual of x counts in widths of a pixel, one of y in heights."""
     adjustment = tankcal.adjust_job(with_blunders)

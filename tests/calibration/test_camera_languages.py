@@ -99,6 +99,7 @@ def test_every_text_is_of_the_words(result, tmp_path, monkeypatch):
     assert not letters_in(outside) - names_in(result) - units
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "language", [OTHERS[0], *(pytest.param(one, marks=pytest.mark.study) for one in OTHERS[1:])]
 )

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import shutil
 import subprocess
 import sys
 
@@ -78,12 +79,9 @@ def test_all_problems_at_once_and_nothing_written(tmp_path, capsys):
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
+def done(example_run, tmp_path_factory):
     """A job that was run once, with all its outputs."""
-    job = tmp_path_factory.mktemp("cli") / "job"
-    write_job(job, settings={"table.step_m": 0.5})
-    assert main(["run", str(job), "--quiet"]) == 0
-    return job
+    return shutil.copytree(example_run, tmp_path_factory.mktemp("cli") / "job")
 
 
 def test_a_run_writes_everything(done, capsys):

@@ -30,11 +30,8 @@ s_c = 0.1
 
 
 @pytest.fixture(scope="module")
-def record(tmp_path_factory):
-    """The record of the shipped photographs, only adjusted."""
-    out = tmp_path_factory.mktemp("run") / "out"
-    assert main(["run", str(PHOTOS), "--only", "adjustment", "--out", str(out), "--quiet"]) == 0
-    return out / "record.json"
+def record(adjusted_record):
+    return adjusted_record
 
 
 def run(*arguments):

@@ -195,7 +195,7 @@ def bridged(sections, noise):
     return np.array(errors)
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.001, 0.014])
 def test_a_missing_generatrix_is_bridged_better_by_the_spectrum(noise, figure):
     """Simulation, 400 sections with form of 20 mm rms: the reason for the limit of 1.5 spacings."""

@@ -111,6 +111,7 @@ def test_one_level_of_points_leaves_the_shell_upright():
     assert shell.tilt < 1e-6
 
 
+@pytest.mark.slow
 def test_points_of_large_declared_sd_are_not_blunders():
     """15 % of the points have, rightly, five times the sd of the others."""
     rng = np.random.default_rng(14)

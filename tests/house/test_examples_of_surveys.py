@@ -246,7 +246,7 @@ def test_all_pages_say_that_it_is_a_simulation(one):
     assert result.job.certificate["laboratory"].startswith("None")  # nobody's is invented
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", EXAMPLES.values(), ids=EXAMPLES)
 def test_the_script_writes_the_same_tables_again(folder, tmp_path):
     shutil.copytree(folder, tmp_path / folder.name, ignore=shutil.ignore_patterns("results"))

@@ -97,12 +97,14 @@ def test_what_would_cost_a_minute_or_a_gigabyte(book, changes, words):
     assert words in refusal(book, packed(book, **changes))
 
 
+@pytest.mark.slow
 def test_an_archive_that_unpacks_to_more_than_a_job_needs(book):
     noise = bytes(range(256)) * 2000 + b"\0" * 20_000_000
     parts = {f"xl/media/image{i}.png": noise for i in range(6)}
     assert "unpacks to 1" in refusal(book, packed(book, parts))
 
 
+@pytest.mark.slow
 def test_very_many_parts(book):
     parts = {f"xl/media/{i}": b"" for i in range(6000)}
     assert "expected at most 5000" in refusal(book, packed(book, parts))

@@ -73,6 +73,7 @@ def film(tmp_path_factory):
     return job, tankcal.adjust_job(job)
 
 
+@pytest.mark.slow
 def test_exact_marks_give_the_same_points(tmp_path, plain):
     """Property: with marks that are read exactly nothing changes but the declared sds, a little."""
     job = load(film_job(tmp_path / "job", mark_sd_um=0.0))

@@ -85,7 +85,7 @@ def test_another_kind_is_refused(tmp_path):
         write_starter(tmp_path / "starter", "cube")
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("survey", SURVEYS)
 def test_a_starter_for_a_survey(tmp_path, survey):
     write_starter(tmp_path / "starter", survey=survey)
@@ -113,7 +113,7 @@ def test_a_starter_for_a_survey(tmp_path, survey):
     assert book.sheetnames == ["read me", "job", *registers, *tables, "# inputs"]
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["", "job.xlsx"])
 @pytest.mark.parametrize("survey", SURVEYS)
 def test_an_empty_survey_is_told_like_missing_points(tmp_path, survey, name):
@@ -126,6 +126,7 @@ def test_an_empty_survey_is_told_like_missing_points(tmp_path, survey, name):
     )
 
 
+@pytest.mark.slow
 def test_a_starter_of_a_survey_filled_in(tmp_path):
     starter = tmp_path / "starter"
     write_starter(starter, survey="photos")
@@ -220,6 +221,7 @@ def filled_tables():
     }
 
 
+@pytest.mark.slow
 def test_both_forms_filled_in_give_the_same_job(starter):
     assert fill_folder(starter) == len(BLANKS)
     fill_workbook(starter / "job.xlsx")

@@ -319,6 +319,7 @@ def test_a_plausible_job_is_told_nothing(tmp_path, kind):
     assert implausible(told(tmp_path / "job", sound(kind))) == {}
 
 
+@pytest.mark.slow
 def test_a_plausible_cone_is_told_nothing(tmp_path):
     assert implausible(told(tmp_path / "job", sound("vertical", settings=CONE))) == {}
 
@@ -370,6 +371,7 @@ def assert_told(tmp_path, parts, code, key):
 # ---- where it is told
 
 
+@pytest.mark.slow
 def test_a_doubt_stands_on_the_first_page_and_last_in_the_terminal(tmp_path, capsys):
     slip = settings(datum__reference_height_m=8.9, table__language="pt-BR")
     result = tankcal.run(tankcal.load(write_folder(tmp_path / "job", sound("vertical", **slip))))

@@ -124,6 +124,7 @@ def test_both_forms_filled_in_are_the_same_job(empty):
     assert_same_job(load(folder), load(folder / "job.xlsx"))
 
 
+@pytest.mark.slow
 def test_a_filled_job_with_errors_runs(empty, figure):
     """Simulation: the volume lies within what was predicted (four standard uncertainties)."""
     prediction, folder = empty

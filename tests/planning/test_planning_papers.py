@@ -149,6 +149,7 @@ def test_lines_side_by_side_are_read_down(prediction):
 # ---- what is said
 
 
+@pytest.mark.slow
 def test_weak_and_lost_points_are_told(poor):
     assert poor.undetermined
     assert poor.weak

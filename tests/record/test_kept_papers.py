@@ -74,6 +74,7 @@ def expected(path):
     return path.with_name(path.name.replace(".json.xz", ".sha256.json"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "path",
     [one if one.name == QUICK else pytest.param(one, marks=pytest.mark.study) for one in ALL],

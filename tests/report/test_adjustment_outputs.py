@@ -171,6 +171,7 @@ def text_of(pdf):
 # the record
 
 
+@pytest.mark.slow
 def test_the_statistics_are_those_of_the_adjustment(whole):
     """Second method: chi2 and its bounds from the readings and scipy."""
     found = records.load(whole[1] / "record.json")["adjustment"]
@@ -211,6 +212,7 @@ def assert_alike(one, other, place):
         assert one == other, place
 
 
+@pytest.mark.slow
 def test_a_survey_alone_has_the_same_format_and_nothing_of_a_tank(only, whole):
     record, full = only[0], records.load(whole[1] / "record.json")
     assert record.keys() == full.keys()
@@ -219,6 +221,7 @@ def test_a_survey_alone_has_the_same_format_and_nothing_of_a_tank(only, whole):
         assert_alike(record["adjustment"][key], full["adjustment"][key], key)
 
 
+@pytest.mark.slow
 def test_every_adjusted_point_has_its_covariance(whole):
     result, folder = whole
     record = records.load(folder / "record.json")
@@ -500,6 +503,7 @@ def test_the_papers_of_a_survey_alone(only):
     assert "Calibration certificate" not in page
 
 
+@pytest.mark.slow
 def test_the_papers_of_a_tank_begin_with_the_adjustment(whole):
     _, folder = whole
     text = (folder / "working-papers.pdf").read_text(encoding="utf-8")
@@ -673,7 +677,7 @@ def test_a_job_without_a_survey_has_nothing_to_adjust(tmp_path, capsys):
     assert "job.toml" in capsys.readouterr().err
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("survey", ["photos", "total-station"])
 def test_new_writes_the_files_of_a_survey(survey, tmp_path):
     assert main(["new", str(tmp_path / "mine"), "--survey", survey]) == 0

@@ -24,11 +24,9 @@ HARD_TEXT = '#2 [west] *A* _b_ $x$ \\ "q" <b>&amp; </script> @ref `c` //'
 
 
 @pytest.fixture(scope="module")
-def example(example_record, tmp_path_factory):
-    """The folder of the example's report."""
-    folder = tmp_path_factory.mktemp("report")
-    build(example_record, folder)
-    return folder
+def example(example_run):
+    """The folder of the example's results."""
+    return example_run / "results"
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +63,7 @@ def pages(path):
 
 
 def test_all_files_are_there(example):
-    assert {path.name for path in example.iterdir()} == {*FILES, "record.json"}
+    assert {path.name for path in example.iterdir()} > {*FILES, "record.json"}
 
 
 @pytest.mark.slow

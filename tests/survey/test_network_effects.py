@@ -149,6 +149,7 @@ def test_thousands_of_check_observations(datum):
     assert exact.sd == pytest.approx(np.sqrt(np.square(table.sd) - 1e-4), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_tau_test_does_not_need_the_true_sds(figure):
     """Property: sds declared three times too small: w sets half the survey aside, tau does not."""
     images = SURVEY.image_points

@@ -118,6 +118,7 @@ def test_two_photos_are_enough_for_points_and_not_for_a_camera():
         adjust(bare, datum="inner")
 
 
+@pytest.mark.slow
 def test_control_on_a_line():
     """The rotation about it stays open; the points that it leaves in place are named."""
     oblique = np.vstack([TANK, [[1 + z, 2 + z, z] for z in range(3)]])

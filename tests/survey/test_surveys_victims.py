@@ -77,6 +77,7 @@ def test_sound_control_is_not_doubted(stations, photos):
         assert "set aside" not in text
 
 
+@pytest.mark.slow
 def test_blunders_alone_do_not_bring_control_into_doubt(stations):
     """One reading in ten wrong by twenty sds, the control right: only the readings are listed."""
     slopes = next(one for one in stations.readings if one.table == "slope_distances")
@@ -123,6 +124,7 @@ def test_held_heights_that_contradict_a_line_of_levels():
     assert "z of B is held fixed at 1.0500" in text
 
 
+@pytest.mark.slow
 def test_a_search_keeps_what_it_found_when_a_step_fails(photos):
     """Without the only two distances nothing gives the scale: one of them stays, and is named."""
     settings = replace(photos.settings, datum="fixed_photo", fixed_photo=photos.photos[0].name)

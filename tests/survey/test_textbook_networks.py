@@ -183,6 +183,7 @@ def camera():
     return bundle, adjustment, unknowns
 
 
+@pytest.mark.slow
 def test_camera_by_a_second_method(camera):
     """Second method: the same least squares, dense and with derivatives by differences."""
     bundle, adjustment, unknowns = camera
