@@ -305,6 +305,7 @@ def many(photos, points, blunders=0.0):
     return replace(survey, image_points=images, observations=(known,)), xyz, stations
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("photos", "points"),
     [(12, 300), pytest.param(60, 3000, marks=pytest.mark.study),
