@@ -30,20 +30,32 @@ SMALLEST_PIVOT = 1e-12  # of normal equations with ones in the diagonal: below i
 class Adjustment:
     """What any adjustment found: of `adjust` here, or with blocks eliminated (tankcal.solver).
 
-    unknowns      (u,) estimates, in the model's units; of a solver.Model its state
-    cofactor      covariance of the unknowns for variance factor 1: (u, u), or the solver.Cofactors
-                  that works it out for any unknowns and any functions of them
-    normalised    (m,) whitened residual of each condition; of a solver.Model a tuple of (n, rows),
-                  computed minus observed, one array a group
-    chi2          v' Q^-1 v
-    rows          number of conditions that weigh anything
-    estimated     number of unknowns, less those that exact conditions take
-    iterations    until the last step was below the tolerance
-    rank_defect   number of directions of the unknowns that only the datum fixes
-    observations  (n,) adjusted observations l + v; None: the solver.Model keeps its own
-    residuals     (n,) v, in the units of the observations; None likewise
-    redundancy    (m,) part of each condition's error that shows in its residual, 0 to 1; None:
-                  Cofactors.redundancy works it out
+    Attributes
+    ----------
+    unknowns : ndarray, shape (u,)
+        Estimates, in the model's units; of a solver.Model its state.
+    cofactor : ndarray, shape (u, u)
+        Covariance of the unknowns for variance factor 1; of a solver.Model the solver.Cofactors
+        that works it out for any unknowns and any functions of them.
+    normalised : ndarray, shape (m,)
+        Whitened residual of each condition; of a solver.Model a tuple of (n, rows), computed minus
+        observed, one array a group.
+    chi2 : float
+        v' Q^-1 v.
+    rows : int
+        Conditions that weigh anything.
+    estimated : int
+        Unknowns, less those that exact conditions take.
+    iterations : int
+        Until the last step was below the tolerance.
+    rank_defect : int
+        Directions of the unknowns that only the datum fixes.
+    observations, residuals : ndarray, shape (n,), or None
+        Adjusted observations l + v and v, in the units of the observations; None: the solver.Model
+        keeps its own.
+    redundancy : ndarray, shape (m,), or None
+        Part of each condition's error that shows in its residual, 0 to 1; None:
+        Cofactors.redundancy works it out.
     """
 
     unknowns: object
@@ -173,9 +185,16 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
 class Snooped:
     """What data snooping left of k candidates.
 
-    adjustment  the last one                statistic  (k,) last test statistic; nan: never tested
-    needed      (k,) True: disagrees, and was kept for something would not be determined without it
-    rounds      readjustments that were made or tried
+    Attributes
+    ----------
+    adjustment : Adjustment
+        The last one.
+    statistic : ndarray, shape (k,)
+        The last test statistic of each; nan: never tested.
+    needed : ndarray of bool, shape (k,)
+        Disagrees, and was kept because something would not be determined without it.
+    rounds : int
+        Readjustments that were made or tried.
     """
 
     adjustment: object
@@ -187,18 +206,55 @@ class Snooped:
 def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=False, rounds=None):
     """Data snooping: set aside what disagrees, the worst first; take back what agrees after all.
 
-    tests     tests(adjustment) -> used (k,) bool, |test statistic| (k,) of the candidates, nan
-              where one is not tested, and the critical value
-    readjust  readjust(adjustment, goes, comes) -> the adjustment when these (k,) masks are followed
-    at_once   candidates whose statistic is above this share of the largest go together
-    returns   times that a candidate may come back: all that agree the first time, later one by one
-    choose    choose(adjustment, goes, statistic) -> (k,) bool, those of `goes` that do; None: all
-    keep      True: where a readjustment fails without a candidate, that one is kept from then on
-    rounds    at most; None: no limit
+    Parameters
+    ----------
+    adjustment : object
+        The first one, whatever `tests` and `readjust` understand.
+    tests : callable
+        tests(adjustment) -> used (k,) bool, absolute test statistic (k,) of the candidates, nan
+        where one is not tested, and the critical value.
+    readjust : callable
+        readjust(adjustment, goes, comes) -> the adjustment when these (k,) masks are followed.
+    at_once : float
+        Candidates whose statistic is above this share of the largest go together.
+    returns : int
+        Times that a candidate may come back: all that agree the first time, later one by one.
+    choose : callable, optional
+        choose(adjustment, goes, statistic) -> (k,) bool, those of `goes` that do go; None: all.
+    keep : bool, optional
+        Whether a candidate without which a readjustment fails is kept from then on.
+    rounds : int, optional
+        At most so many; None: no limit.
 
-    Returns a Snooped. Raises SolutionError when a readjustment does (unless `keep`), or when the
-    search does not come to rest. Source: Baarda 1968, A testing procedure for use in geodetic
-    networks.
+    Returns
+    -------
+    Snooped
+
+    Raises
+    ------
+    SolutionError
+        When a readjustment does (unless `keep`), or when the search does not come to rest.
+
+    References
+    ----------
+    .. [1] Baarda 1968, A testing procedure for use in geodetic networks.
+
+    Examples
+    --------
+    The mean of five readings of 1 mm, one of them wrong by 20 mm; rejected ones get no weight:
+
+    >>> readings = np.array([4.001, 4.000, 3.999, 4.020, 4.000])
+    >>> def mean(used):
+    ...     sd = np.where(used, 0.001, 1.0)
+    ...     return used, adjust(lambda x, l: (x - l, np.ones((5, 1)), None), [4.0], readings, sd**2)
+    >>> def tests(found):
+    ...     used, fit = found
+    ...     without = np.sqrt(np.maximum(fit.redundancy, 1e-9))
+    ...     return used, np.abs(fit.residuals) / (0.001 * without), CRITICAL
+    >>> def again(found, goes, comes):
+    ...     return mean(found[0] & ~goes | comes)
+    >>> snoop(mean(np.ones(5, bool)), tests, again, at_once=0.9, returns=1).adjustment[0].tolist()
+    [True, True, True, False, True]
     """
     few = False
     statistic = back = needed = None
@@ -246,14 +302,29 @@ def _coming_back(agrees, statistic, back, returns):
 
 
 def find_determined(pivots, rows, of_normals=False):
-    """Which unknowns are determined: (k,) True for pivots of a factor that are more than rounding.
+    """Which unknowns are determined, by the pivots of a factor that are more than rounding.
 
-    The one rule about rank, here and in tankcal.solver: columns are scaled to length one
-    first; then a pivot of the rows themselves (QR) must be above max(rows, k) eps of the largest,
-    a squared pivot of normal equations (Cholesky), which have lost half the digits, above 1e-12.
+    The one rule about rank, here and in tankcal.solver: columns are scaled to length one first;
+    then a pivot of the rows themselves (QR) must be above max(rows, k) eps of the largest, a
+    squared pivot of normal equations (Cholesky), which have lost half the digits, above 1e-12.
 
-    pivots      (k,) diagonal of R or of the Cholesky factor, not squared
-    rows        number of rows                of_normals  True for a Cholesky factor
+    Parameters
+    ----------
+    pivots : array_like, shape (k,)
+        Diagonal of R or of the Cholesky factor, not squared.
+    rows : int
+        Number of rows.
+    of_normals : bool, optional
+        True for a Cholesky factor.
+
+    Returns
+    -------
+    ndarray of bool, shape (k,)
+
+    Examples
+    --------
+    >>> find_determined([2.0, 0.5, 1e-17], rows=10).tolist()
+    [True, True, False]
     """
     pivots = np.abs(pivots)
     if of_normals:

@@ -28,12 +28,25 @@ class TankcalError(Exception):
 class Problem:
     """One thing that is wrong with the input, in one line.
 
-    file      name of the file or workbook sheet, as the user knows it ("points.csv")
-    expected  what was found and what was expected, in plain words
-    row       line of the file or row of the sheet, counted as an editor shows it (heading = 1)
-    column    heading of the column, or the key ("tank.nominal_height_m")
-    cell      of a sheet ("C7"), when it is known
-    book      file name of the workbook that the sheet stands in
+    Attributes
+    ----------
+    file : str
+        Name of the file or workbook sheet, as the user knows it ("points.csv").
+    expected : str
+        What was found and what was expected, in plain words.
+    row : int or None
+        Line of the file or row of the sheet, counted as an editor shows it (heading = 1).
+    column : str or None
+        Heading of the column, or the key ("tank.nominal_height_m").
+    cell : str or None
+        Of a sheet ("C7"), when it is known.
+    book : str or None
+        File name of the workbook that the sheet stands in.
+
+    Examples
+    --------
+    >>> print(Problem("points.csv", "found 'abc'; expected a number", 5, "x_m"))
+    points.csv, row 5, x_m: found 'abc'; expected a number
     """
 
     file: str

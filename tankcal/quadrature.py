@@ -68,10 +68,23 @@ def polar_products(radii_m, weights_rad):
 
 
 def height_basis(levels, z, degree):
-    """(len(z), k) functions l_i(z) of the least-squares polynomial through values at k levels.
+    """Functions l_i(z) of the least-squares polynomial through values at k levels.
 
-    The polynomial sum l_i(z) value_i of the given degree goes through all values when degree is
-    k - 1 (Lagrange). Levels and z in m.
+    The polynomial sum l_i(z) value_i of the given degree goes through all values when degree is k -
+    1 (Lagrange).
+
+    Parameters
+    ----------
+    levels : array_like, shape (k,)
+        Heights of the values, m.
+    z : array_like, shape (n,)
+        Heights at which the functions are wanted, m.
+    degree : int
+        Of the polynomial, at most k - 1.
+
+    Returns
+    -------
+    ndarray, shape (n, k)
 
     Examples
     --------
@@ -88,19 +101,54 @@ def height_basis(levels, z, degree):
 
 
 def height_polynomials(levels, degree):
-    """Coefficients c_mi of l_i(t) = sum c_mi t^m, the functions of `height_basis`: (degree + 1, k).
+    """Coefficients c_mi of l_i(t) = sum c_mi t^m, the functions of `height_basis`.
 
-    levels and t are fractions of the height of a course.
+    Parameters
+    ----------
+    levels : array_like, shape (k,)
+        Heights of the values, as fractions t of the height of a course.
+    degree : int
+
+    Returns
+    -------
+    ndarray, shape (degree + 1, k)
+
+    Examples
+    --------
+    From values at the bottom and at the top of a course, l_0 = 1 - t and l_1 = t:
+
+    >>> height_polynomials([0.0, 1.0], 1).round(12) + 0.0
+    array([[ 1.,  0.],
+           [-1.,  1.]])
     """
     t = np.linspace(0.0, 1.0, degree + 1)
     return np.linalg.solve(np.vander(t, increasing=True), height_basis(levels, t, degree))
 
 
 def height_products(levels, degree):
-    """Coefficients P_mij of l_i(t) l_j(t) = sum P_mij t^m: (2 degree + 1, k, k).
+    """Coefficients P_mij of l_i(t) l_j(t) = sum P_mij t^m, the products of `height_basis`.
 
     With G of `polar_products` the area at the part t of a course's height is sum P_mij G_ij t^m,
     and the volume below it, over that height, sum P_mij G_ij t^(m + 1) / (m + 1).
+
+    Parameters
+    ----------
+    levels : array_like, shape (k,)
+        Heights of the outlines, as fractions t of the height of a course.
+    degree : int
+
+    Returns
+    -------
+    ndarray, shape (2 degree + 1, k, k)
+
+    Examples
+    --------
+    A cone from radius 1 to 2 over a height of 1 has 7/3 of the volume of the cylinder of radius 1:
+
+    >>> products = np.pi * np.outer([1.0, 2.0], [1.0, 2.0])
+    >>> terms = np.einsum("mij,ij->m", height_products([0.0, 1.0], 1), products)
+    >>> round(float(terms @ [1, 1 / 2, 1 / 3] / np.pi), 12)
+    2.333333333333
     """
     powers = height_polynomials(levels, degree)
     products = np.zeros((2 * degree + 1, powers.shape[1], powers.shape[1]))

@@ -30,9 +30,19 @@ HIGHEST_DEGREE, MOST_AMPLIFICATION = 2, 6.0  # of the sd of a mean radius, at an
 class Group:
     """Points that make one section, or the one course that they stand on all over its height.
 
-    height_m  mean height above the bottom; members (n,) indices of the points
-    span_m    (bottom, top) of the course, or None when it is not known
-    degree    of the polynomial in height that the points are fitted by; 0 when they are level
+    Attributes
+    ----------
+    name : str
+    course : int
+        Index of the course, from the bottom up.
+    height_m : float
+        Mean height of the points above the bottom, m.
+    members : ndarray of int, shape (n,)
+        Indices of the points.
+    span_m : tuple of float, or None
+        Bottom and top of the course, m; None when they are not known.
+    degree : int
+        Of the polynomial in height that the points are fitted by; 0 when they are level.
     """
 
     name: str
@@ -54,7 +64,13 @@ class Group:
 class Level:
     """An outline at one height, of those that a course is integrated through.
 
-    by_points  (p, 3 n) derivative of the outline's parameters by x, y, z of the group's points
+    Attributes
+    ----------
+    height_m : float
+        Above the bottom, m.
+    outline : Outline
+    by_points : ndarray, shape (p, 3n)
+        Derivative of the outline's parameters by x, y, z of the group's points.
     """
 
     height_m: float
@@ -64,12 +80,20 @@ class Level:
 
 @dataclass(frozen=True)
 class Section:
-    """The group of points, its circle, its outline, and the levels that stand for it in a volume.
+    """Points of a group, their circle, their outline, and the levels that its volume is made of.
 
-    outline                at group.height_m
-    parameters_by_points   (p, 3 n) derivative of its parameters by x, y, z of the points
-    levels                 the outline itself; of points that are not level, the outlines at two or
-                           three Gauss levels of the course
+    Attributes
+    ----------
+    group : Group
+    circle : Circle
+        Least-squares circle.
+    outline : Outline
+        At group.height_m.
+    parameters_by_points : ndarray, shape (p, 3n)
+        Derivative of the outline's parameters by x, y, z of the points.
+    levels : tuple of Level
+        The outline itself; of points that are not level, the outlines at two or three Gauss levels
+        of the course.
     """
 
     group: Group
@@ -84,8 +108,32 @@ def group_by_height(height_m, azimuth_rad, course, joints_m):
 
     Points of a course form rings when each cluster of heights (apart by a tenth of the course,
     level within 15 % of it) has 5 points or more and no gap of a third of a turn.
-    height_m (n,) and joints_m (courses + 1,) above the bottom; course (n,) index. Names: "1", "2",
-    or "2.1", "2.2" for rings, from the bottom up.
+
+    Parameters
+    ----------
+    height_m : ndarray, shape (n,)
+        Above the bottom, m.
+    azimuth_rad : ndarray, shape (n,)
+        About the axis, rad.
+    course : ndarray of int, shape (n,)
+        Index of the course of each point.
+    joints_m : array_like, shape (courses + 1,)
+        Heights of the joints above the bottom, m.
+
+    Returns
+    -------
+    list of Group
+        Named "1", "2", or "2.1", "2.2" for rings, from the bottom up.
+
+    Examples
+    --------
+    Two rings of eight points in one course:
+
+    >>> azimuth = np.tile(np.arange(8) * np.pi / 4, 2)
+    >>> height = np.repeat([0.5, 1.5], 8)
+    >>> found = group_by_height(height, azimuth, np.zeros(16, dtype=int), [0.0, 2.0])
+    >>> [(one.name, one.height_m) for one in found]
+    [('1.1', 0.5), ('1.2', 1.5)]
     """
     groups = []
     for index in range(len(joints_m) - 1):
@@ -112,8 +160,28 @@ def group_by_height(height_m, azimuth_rad, course, joints_m):
 def group_by_name(names, height_m, course_of, azimuth_rad=None, joints_m=None):
     """Sections of points that carry a section name; their mean height decides the course.
 
-    azimuth_rad (n,) and joints_m (courses + 1,) above the bottom tell whether a section whose
-    points are not level carries a fit in height; without them every section counts as level.
+    Parameters
+    ----------
+    names : sequence of str, length n
+    height_m : ndarray, shape (n,)
+        Above the bottom, m.
+    course_of : callable
+        course_of(height_m) -> index of the course.
+    azimuth_rad : ndarray, shape (n,), optional
+    joints_m : array_like, shape (courses + 1,), optional
+        Azimuths (rad) and joints (m) tell whether a section whose points are not level carries a
+        fit in height; without them every section counts as level.
+
+    Returns
+    -------
+    list of Group
+        From the bottom up.
+
+    Examples
+    --------
+    >>> found = group_by_name(["b", "a", "b"], np.array([2.0, 1.0, 2.2]), lambda height: 0)
+    >>> [(one.name, one.members.tolist()) for one in found]
+    [('a', [1]), ('b', [0, 2])]
     """
     groups = []
     for name in dict.fromkeys(names):
@@ -179,12 +247,43 @@ def _is_ring(height_m, azimuth_rad, tall_m):
 
 
 def coordinates_of(points):
-    """(3k,) places of the coordinates of points (k,) among all coordinates."""
+    """Places of the coordinates of points among all coordinates x1 y1 z1 x2 ...
+
+    Parameters
+    ----------
+    points : array_like of int, shape (k,)
+
+    Returns
+    -------
+    ndarray of int, shape (3k,)
+
+    Examples
+    --------
+    >>> coordinates_of([2]).tolist()
+    [6, 7, 8]
+    """
     return (3 * np.asarray(points)[:, None] + np.arange(3)).ravel()
 
 
 def covariance_of(points, covariance_m2):
-    """(3k, 3k) covariance of points (k,) out of that of all; a dense one is positive definite."""
+    """Covariance of some points out of that of all; a dense one is made positive definite.
+
+    Parameters
+    ----------
+    points : array_like of int, shape (k,)
+    covariance_m2 : ndarray or sparse matrix, shape (3n, 3n)
+
+    Returns
+    -------
+    ndarray or sparse matrix, shape (3k, 3k)
+        In m2. To a dense block that is singular (a fixed point, a free network) the variance of a
+        micrometre is added.
+
+    Examples
+    --------
+    >>> covariance_of([1], np.diag([1.0, 1, 1, 4, 5, 6])).diagonal().tolist()
+    [4.0, 5.0, 6.0]
+    """
     index = coordinates_of(points)
     if scipy.sparse.issparse(covariance_m2):
         return covariance_m2[index][:, index]
@@ -197,11 +296,31 @@ def covariance_of(points, covariance_m2):
 
 
 def slide(xyz_m, slope, z_m):
-    """Points slid parallel to the axis to height z: xy (n, 2) and d(xy)/d(xyz), (2n, 3n) sparse.
+    """Points slid parallel to the axis to height z, and the derivative.
 
     A horizontal cut of a leaning shell is what is wanted, so the tilt is contained and never
-    corrected again. The slope itself is taken as exact: what it errs has opposite signs on
-    opposite sides of the tank, so the area hardly knows it.
+    corrected again. The slope itself is taken as exact: its error has opposite signs on opposite
+    sides of the tank, so the area hardly changes with it.
+
+    Parameters
+    ----------
+    xyz_m : array_like, shape (n, 3)
+    slope : array_like, shape (2,)
+        Of the axis: metres in x and y for a metre of height.
+    z_m : float
+        Height of the cut, m.
+
+    Returns
+    -------
+    xy_m : ndarray, shape (n, 2)
+    by_xyz : sparse array, shape (2n, 3n)
+        d(xy) / d(xyz).
+
+    Examples
+    --------
+    >>> xy, by_xyz = slide([[1.0, 0.0, 3.0]], (0.01, 0.0), 1.0)
+    >>> xy.tolist(), by_xyz.toarray()[0].tolist()
+    ([[0.98, 0.0]], [1.0, 0.0, -0.01])
     """
     xyz_m = np.asarray(xyz_m, dtype=float)
     n = len(xyz_m)
@@ -213,9 +332,18 @@ def slide(xyz_m, slope, z_m):
 
 
 def sample_of(group, xyz_m, covariance_m2, slope, z_m):
-    """`form.Sample` of a group: what it tells of the shell's form. Arguments: `fit_section`.
+    """What a group of points tells of the shell's form.
 
-    Radius and centre are free there, so an approximate centre will do.
+    Radius and centre are free in the estimation of the form, so an approximate centre will do.
+
+    Parameters
+    ----------
+    group, xyz_m, covariance_m2, slope, z_m
+        As in `fit_section`.
+
+    Returns
+    -------
+    form.Sample
     """
     xy, by_xyz = slide(xyz_m, slope, z_m)
     middle = xy.mean(axis=0)

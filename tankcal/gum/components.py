@@ -28,16 +28,34 @@ _SMOOTH_DOF, _DEGREE = 3.0, 20  # from where on, and of what degree, k is a poly
 class Source:
     """One cause of uncertainty, with one or more columns of the factor that belong together.
 
-    kind        "points", "form", ... or the name of a declared input; "a & b" of correlated ones
-    columns_m3  (rows, c) derivative of the volume times standard uncertainty
-    u, unit     as declared; None for what was not declared but computed
-    estimate    value of the input, in `unit`; None where it has none
-    is_default  True for an input that nobody declared: tankcal's own assumption
-    parts       of correlated inputs each by itself, as a Source; else ()
-    correlation (parts, parts) of these; None without parts
-    contrasts   residuals that a variance was estimated from, beside noise that was taken off it:
-                more than dof then; inf where nothing was
-    u_is        what u is of Student's t: "scale", or "sd": then dof is the shape of it alone
+    Attributes
+    ----------
+    kind : str
+        "points", "form", ... or the name of a declared input; "a & b" of correlated ones.
+    columns_m3 : ndarray, shape (rows, c)
+        Derivative of the output times standard uncertainty, in the unit of the output: m3 in a
+        table.
+    dof : float
+        Degrees of freedom.
+    u, unit : float and str, or None
+        As declared; None for what was not declared but computed.
+    type : str
+        "A" or "B".
+    distribution : str
+    note : str
+    estimate : float or None
+        Value of the input, in `unit`; None where it has none.
+    is_default : bool
+        True for an input that nobody declared: tankcal's own assumption.
+    parts : tuple of Source
+        Of correlated inputs each by itself; else ().
+    correlation : ndarray, shape (parts, parts), or None
+        Of these.
+    contrasts : float
+        Residuals that a variance was estimated from, beside noise that was taken off it: more than
+        `dof` then; inf where nothing was.
+    u_is : str
+        What u is of Student's t: "scale", or "sd": then `dof` is the shape of it alone.
     """
 
     kind: str
@@ -71,9 +89,20 @@ class Source:
 
 
 def declared_source(one, derivative, estimate=None):
-    """The `Source` of a declared input from the (rows,) or (rows, c) derivative by it, m3 per SI.
+    """The `Source` of a declared input.
 
-    one  with name, u (SI), u_as_read, unit, type, distribution, dof, note, is_default, u_is
+    Parameters
+    ----------
+    one : object
+        With name, u (SI), u_as_read, unit, type, distribution, dof, note, is_default, u_is.
+    derivative : array_like, shape (rows,) or (rows, c)
+        Of the volume by the input, m3 per SI unit.
+    estimate : float, optional
+        Value of the input, in the unit it is declared in.
+
+    Returns
+    -------
+    Source
     """
     columns = np.asarray(derivative, dtype=float).reshape(len(derivative), -1) * one.u
     return Source(
@@ -92,9 +121,27 @@ def declared_source(one, derivative, estimate=None):
 
 
 def factor_of(covariance):
-    """(n, r) factor L of a positive semidefinite covariance, covariance = L L', r its rank.
+    """Factor L of a positive semidefinite covariance, covariance = L L'.
 
-    Raises ValueError when the matrix has a negative eigenvalue beyond rounding.
+    Parameters
+    ----------
+    covariance : ndarray, shape (n, n)
+
+    Returns
+    -------
+    ndarray, shape (n, r)
+        r its rank.
+
+    Raises
+    ------
+    ValueError
+        When the matrix has a negative eigenvalue beyond rounding.
+
+    Examples
+    --------
+    >>> factor = factor_of(np.array([[2.0, 2.0], [2.0, 2.0]]))
+    >>> factor.shape, (factor @ factor.T).round(12).tolist()
+    ((2, 1), [[2.0, 2.0], [2.0, 2.0]])
     """
     values, vectors = np.linalg.eigh(covariance)
     largest = max(values.max(initial=0.0), 0.0)
@@ -105,9 +152,22 @@ def factor_of(covariance):
 
 
 def triangular(correlation):
-    """(n, n) lower triangular L of a correlation matrix R = L L' that may be singular.
+    """Lower triangular L of a correlation matrix R = L L' that may be singular.
 
-    Row i leans on the inputs before it: with R = I each input stands for itself.
+    Row i is a combination of the inputs before it and its own: with R = I each stands alone.
+
+    Parameters
+    ----------
+    correlation : ndarray, shape (n, n)
+
+    Returns
+    -------
+    ndarray, shape (n, n)
+
+    Examples
+    --------
+    >>> triangular(np.array([[1.0, 0.6], [0.6, 1.0]])).round(12).tolist()
+    [[1.0, 0.0], [0.6, 0.8]]
     """
     lower = np.zeros_like(correlation)
     for j, column in enumerate(correlation.T):
@@ -120,9 +180,26 @@ def triangular(correlation):
 def group_correlated(sources, correlations):
     """Sources with those that are correlated made one, for their columns mix.
 
-    sources  {name: Source} of one column each where correlated; correlations  (name, name, r)
-    With columns c_i u_i and R = L L', L lower triangular, the columns of the group are
-    (c_i u_i) L. Its degrees of freedom are those of `together_dof`.
+    With columns c_i u_i and R = L L', L lower triangular, the columns of the group are (c_i u_i) L.
+    Its degrees of freedom are those of `together_dof`.
+
+    Parameters
+    ----------
+    sources : dict of {str: Source}
+        Of one column each where correlated.
+    correlations : iterable of (str, str, float)
+        Names of two inputs, and r.
+
+    Returns
+    -------
+    tuple of Source
+
+    Examples
+    --------
+    >>> a, b = Source("a", np.array([[3.0]])), Source("b", np.array([[4.0]]))
+    >>> (both,) = group_correlated({"a": a, "b": b}, [("a", "b", 1.0)])
+    >>> both.kind, round(float(np.sum(both.columns_m3**2)), 12)
+    ('a & b', 49.0)
     """
     pairs = {frozenset(pair): r for *pair, r in correlations if {*pair} <= sources.keys()}
     done, found = set(), []
@@ -164,7 +241,21 @@ def _together(names, sources, pairs):
 
 
 def together_dof(dof):
-    """Degrees of freedom of inputs that are correlated with one another: the least of theirs."""
+    """Degrees of freedom of inputs that are correlated with one another: the least of theirs.
+
+    Parameters
+    ----------
+    dof : array_like, shape (n,)
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> together_dof([8.0, 3.0, np.inf])
+    3.0
+    """
     return float(np.min(dof))
 
 
@@ -172,8 +263,18 @@ def together_dof(dof):
 class Combined:
     """Outputs made of independent components; one row an output.
 
-    variances  (rows, components) that each component brings
-    dof        (components,) degrees of freedom of each, may be inf
+    Attributes
+    ----------
+    variances : ndarray, shape (rows, components)
+        That each component brings, in the unit of the output squared.
+    dof : ndarray, shape (components,)
+        Degrees of freedom of each, may be inf.
+
+    Examples
+    --------
+    >>> one = Combined(np.array([[9.0, 16.0]]), np.array([9.0, np.inf]))
+    >>> one.u.tolist(), one.effective_dof.round(2).tolist(), one.k(0.95).round(3).tolist()
+    ([5.0], [69.44], [1.995])
     """
 
     variances: np.ndarray
@@ -253,10 +354,26 @@ def effective_dof(contributions, dof):
 
 
 def sum_of_fourths(variance, dof):
-    """(...,) sum of u_i^4 / dof_i, from the variances (..., components) and their dof.
+    """Sum of u_i^4 / dof_i.
 
-    This and the variance itself are all that the rule needs: what searches or writes formulas
-    takes both from here, and `dof_of` brings them together.
+    This and the variance itself are all that the rule needs: what searches or writes formulas takes
+    both from here, and `dof_of` brings them together.
+
+    Parameters
+    ----------
+    variance : ndarray, shape (..., components)
+        u_i^2 of each component.
+    dof : array_like, shape (components,)
+        Degrees of freedom; may be inf.
+
+    Returns
+    -------
+    ndarray, shape (...,)
+
+    Examples
+    --------
+    >>> float(sum_of_fourths(np.array([9.0, 16.0]), [9.0, np.inf]))
+    9.0
     """
     dof = np.asarray(dof, dtype=float)
     finite = np.isfinite(dof)
@@ -264,10 +381,26 @@ def sum_of_fourths(variance, dof):
 
 
 def dof_of(variance, fourths, least=0.0):
-    """Effective degrees of freedom u^4 / sum of u_i^4 / dof_i, from (...,) u^2 and that sum.
+    """Effective degrees of freedom u^4 / sum of u_i^4 / dof_i.
 
-    least  of any component: the effective ones are never fewer, and rounding makes them none
-    Returns (...,); inf where no component with finite degrees of freedom contributes.
+    Parameters
+    ----------
+    variance : array_like, shape (...,)
+        u^2.
+    fourths : array_like, shape (...,)
+        The sum, of `sum_of_fourths`.
+    least : float, optional
+        Of any component: the effective ones are never fewer, and rounding makes them none.
+
+    Returns
+    -------
+    ndarray, shape (...,)
+        Inf where no component with finite degrees of freedom contributes.
+
+    Examples
+    --------
+    >>> round(float(dof_of(25.0, 9.0)), 2)
+    69.44
     """
     variance, fourths = np.asarray(variance, dtype=float), np.asarray(fourths, dtype=float)
     dof = np.full(variance.shape, np.inf)
@@ -276,7 +409,21 @@ def dof_of(variance, fourths, least=0.0):
 
 
 def least_of(dof):
-    """The least of finite degrees of freedom; 0 without any."""
+    """The least of finite degrees of freedom; 0 without any.
+
+    Parameters
+    ----------
+    dof : array_like, shape (n,)
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> least_of([np.inf, 7.0, 9.0]), least_of([np.inf])
+    (7.0, 0.0)
+    """
     dof = np.asarray(dof, dtype=float)
     return float(np.min(dof[np.isfinite(dof)], initial=np.inf)) if np.isfinite(dof).any() else 0.0
 

@@ -20,11 +20,25 @@ _ROUNDING = 1e-9  # of a correlation: what two programs may differ by
 class Input:
     """One quantity that the model asks for.
 
-    distribution  of its value, with `mean`, `u`, `u_dof` and `name` as those of
-                  `gum.distributions`; its mean is the estimate, in `unit`
-    type          "A" of readings, "B" of other knowledge
-    family        name of the line of the budget that it is part of; "" for a line of its own
-    is_default    True when nobody declared it: the program's own assumption
+    Attributes
+    ----------
+    name : str
+    distribution : object
+        Of its value, with `mean`, `u`, `u_dof` and `name` as those of `gum.distributions`; its mean
+        is the estimate, in `unit`.
+    unit : str
+    type : str
+        "A" of readings, "B" of other knowledge.
+    family : str
+        Name of the line of the budget that it is part of; "" for a line of its own.
+    is_default : bool
+        True when nobody declared it: the program's own assumption.
+    note : str
+
+    Raises
+    ------
+    ValueError
+        For another type than "A" or "B".
     """
 
     name: str
@@ -48,10 +62,25 @@ class Input:
 class Inputs:
     """Inputs in the order in which the model takes them, with their correlations.
 
-    inputs        n of Input, their names all different
-    correlation   {(name, name): r} of the pairs that are correlated, or (n, n), or None
-    Raises ValueError for names twice or unknown, |r| > 1, a matrix that is not symmetric, has no
-    ones in its diagonal, or has a negative eigenvalue (named with its size).
+    Parameters
+    ----------
+    inputs : sequence of Input, length n
+        Their names all different.
+    correlation : dict of {(str, str): float}, or ndarray of shape (n, n), optional
+        r of the pairs that are correlated, or the whole matrix.
+
+    Raises
+    ------
+    ValueError
+        For names twice or unknown, |r| > 1, a matrix that is not symmetric, has no ones in its
+        diagonal, or has a negative eigenvalue (named with its size).
+
+    Examples
+    --------
+    >>> from tankcal.gum import standard
+    >>> inputs = Inputs([Input("d", standard(0.002, mean=4.8)), Input("h", standard(0.001))])
+    >>> inputs.names, inputs.u.tolist()
+    (('d', 'h'), [0.002, 0.001])
     """
 
     def __init__(self, inputs, correlation=None):

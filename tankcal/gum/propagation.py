@@ -21,9 +21,14 @@ from tankcal.gum.sensitivities import check_sensitivities, outputs_of, sensitivi
 class Propagation:
     """Outputs with their uncertainty; one row an output.
 
-    inputs         what went in, n of them
-    values         (rows,) outputs at the estimates, in the unit of the output
-    sensitivities  (rows, n) J, unit of the output by unit of the input
+    Attributes
+    ----------
+    inputs : Inputs
+        What went in, n of them.
+    values : ndarray, shape (rows,)
+        Outputs at the estimates, in the unit of the output.
+    sensitivities : ndarray, shape (rows, n)
+        J, unit of the output by unit of the input.
     """
 
     inputs: Inputs

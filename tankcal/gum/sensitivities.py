@@ -31,13 +31,31 @@ class _Differences:
 
 
 def sensitivities_of(model, x, u, names=None):
-    """(rows, n) derivatives of `model` at x.
+    """Derivatives of a model at the estimates of its inputs.
 
-    model  takes (n,) estimates, gives a number or (rows,); a complex x too if it can
-    x, u   (n,) estimates and standard uncertainties in the units of the inputs
-    names  (n,) for the message
-    Raises SolutionError naming an input at whose estimate the model has a kink or a jump, or when
-    an output is not finite.
+    Parameters
+    ----------
+    model : callable
+        Takes (n,) estimates, gives a number or (rows,); a complex x too if it can.
+    x, u : array_like, shape (n,)
+        Estimates and standard uncertainties, in the units of the inputs.
+    names : sequence of str, length n, optional
+        Of the inputs, for the message.
+
+    Returns
+    -------
+    ndarray, shape (rows, n)
+
+    Raises
+    ------
+    SolutionError
+        Naming an input at whose estimate the model has a kink or a jump, or when an output is not
+        finite.
+
+    Examples
+    --------
+    >>> sensitivities_of(lambda x: x[0] ** 2 * x[1], [3.0, 2.0], [0.1, 0.1]).round(9).tolist()
+    [[12.0, 9.0]]
     """
     x, u = np.asarray(x, dtype=float), np.asarray(u, dtype=float)
     found = _differences(model, x, u)

@@ -63,20 +63,47 @@ TOLD = 10  # warnings of the adjustment that are told when there is no wall
 class Result:
     """Everything that a job gave; `capacity` is the table as a DataFrame.
 
-    job          as it was computed: the points are in it, too, where they came from an adjustment
-    wall         the surveyed wall of a vertical tank (`wall.Wall`); None for other kinds
-    scan         what points say of a lying cylinder or a sphere (`scan.Scan`), else None
-    body         the tank as the sum of its parts, with all corrections that are on (`body.Body`)
-    zero_m       level of the table's zero: dip 0 in the frame of the parts
-    straightness how far linear interpolation between the rows is from the exact volume
-    proportional_parts  what millimetres add to a row, zone by zone; () for no centimetre table
-    corrections  each with its size at the top row
-    by_density   {density kg/m3: (rows,) volumes}: the same table for other densities
-    stated       budgets, worst deliveries (`statements.Statements`)
-    simulation   the table by Monte Carlo (`simulation.TableSimulation`); None where it is off
-    intervals    of the rows, as they are printed (`simulation.Intervals`)
-    rule         verdict of the job's decision rule on them (`rules.RuleVerdict`); None without one
-    adjustment   the adjusted survey (`survey.Adjustment`); None where points were handed in
+    Attributes
+    ----------
+    job : Job
+        As it was computed: the points are in it, too, where they came from an adjustment.
+    wall : wall.Wall or None
+        The surveyed wall of a vertical tank; None for other kinds.
+    scan : scan.Scan or None
+        What points say of a lying cylinder or a sphere.
+    body : body.Body
+        The tank as the sum of its parts, with all corrections that are on.
+    zero_m : float
+        Level of the table's zero: dip 0 in the frame of the parts, m.
+    table : capacity.Capacity
+        Rows with the factor of their covariance.
+    straightness : Straightness
+        How far linear interpolation between the rows is from the exact volume.
+    proportional_parts : tuple of ProportionalParts
+        What millimetres add to a row, zone by zone; () for no centimetre table.
+    corrections : tuple of Correction
+        Each with its size at the top row.
+    by_density : dict of {float: ndarray}
+        {density kg/m3: (rows,) volumes m3}: the same table for other densities.
+    stated : statements.Statements
+        Budgets, worst deliveries.
+    simulation : simulation.TableSimulation or None
+        The table by Monte Carlo; None where it is off.
+    intervals : simulation.Intervals
+        Of the rows, as they are printed.
+    rule : rules.RuleVerdict or None
+        Verdict of the job's decision rule on them.
+    warnings : tuple of Problem
+        What a sound survey of a sound tank hardly has.
+    adjustment : survey.Adjustment or None
+        The adjusted survey; None where points were handed in.
+
+    Examples
+    --------
+    >>> import tankcal
+    >>> result = tankcal.run(tankcal.load("examples/silva-1995"), simulated=False)
+    >>> print(result)
+    SILVA-1995: 1249.8 m3, U = 1.5 m3 (k = 1.96) at 9.500 m; 119 of 119 points of the wall
     """
 
     job: Job
@@ -234,13 +261,31 @@ def run(
 ) -> Result:
     """Compute a job: adjusted points, wall and axis, parts of the tank, table with covariance.
 
-    progress  called with a line of text as each step begins
-    part_progress  called with (text, done, total) while a long step goes on
-    simulated whether the table is simulated, too; None: as the job says. One without any
-              uncertainty never is
-    Raises InputError when a course is left with too few points, SolutionError when the survey does
-    not determine the points, the vertical or the scale or when there is no wall, TypeError for
-    anything but a `Job`.
+    Parameters
+    ----------
+    job : Job
+        Of `tankcal.load`.
+    progress : callable, optional
+        Called with a line of text as each step begins.
+    part_progress : callable, optional
+        Called with (text, done, total) while a long step goes on.
+    simulated : bool, optional
+        Whether the table is simulated, too; None: as the job says. One without any uncertainty
+        never is.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    InputError
+        When a course is left with too few points.
+    SolutionError
+        When the survey does not determine the points, the vertical or the scale, or when there is
+        no wall.
+    TypeError
+        For anything but a `Job`.
     """
     _refuse_other(job, "run")
     with _telling(job):
@@ -329,11 +374,35 @@ def _telling(job):
 
 
 def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjustment:
-    """Adjust the survey of a job, whether it has a tank or not: a `survey.Adjustment`.
+    """Adjust the survey of a job, whether it has a tank or not.
 
-    progress  called with a line of text as each step begins
-    Raises InputError when nothing was measured, SolutionError when the measurements do not
-    determine the points, TypeError for anything but a `Job`.
+    Parameters
+    ----------
+    job : Job
+        Of `tankcal.load`; `tankcal.load(path, only="adjustment")` for one without a tank.
+    progress : callable, optional
+        Called with a line of text as each step begins.
+
+    Returns
+    -------
+    survey.Adjustment
+
+    Raises
+    ------
+    InputError
+        When nothing was measured.
+    SolutionError
+        When the measurements do not determine the points.
+    TypeError
+        For anything but a `Job`.
+
+    Examples
+    --------
+    >>> import tankcal
+    >>> survey = tankcal.load("examples/total-station", only="adjustment")
+    >>> adjusted = tankcal.adjust_job(survey)
+    >>> len(adjusted.names), adjusted.xyz_m.shape == (len(adjusted.names), 3)
+    (167, True)
     """
     _refuse_other(job, "adjust_job")
     if job.measurements is None:

@@ -213,21 +213,35 @@ class DepthOfField:
 class Adjustment:
     """The adjusted survey. Covariances are scaled as `cov_scale` says.
 
-    adjusted       network.Adjusted: numbers and covariances of everything, points by their number
-    there          (n,) numbers of the points that could be adjusted
-    aside          sentences: points that could not be adjusted, and why
-    readings       tuple of Reading, in the order of the files
-    removed        tuple of Reading: those that were set aside, the worst first
-    groups         tuple of GroupOfReadings
-    datum          DatumReport       check_points  CheckPoints or None
-    causes         tuple of Cause
-    cov_scale      variance factor that covariances were multiplied by: 1, or sigma0 squared
-    rounds         adjustments by data snooping
-    warnings       tuple of Problem
-    doubts         those of the warnings that put the whole result in doubt: what was set aside may
-                   be the victim of what was kept, or another reading may be wrong in its place
-    repeats        RepeatedReadings of image points; None: each was read once
-    depth          DepthOfField; None: not asked for
+    Attributes
+    ----------
+    adjusted : network.Adjusted
+        Numbers and covariances of everything, points by their number.
+    there : ndarray of int, shape (n,)
+        Numbers of the points that could be adjusted.
+    aside : tuple of str
+        Sentences: points that could not be adjusted, and why.
+    readings : tuple of Reading
+        In the order of the files.
+    removed : tuple of Reading
+        Those that were set aside, the worst first.
+    groups : tuple of GroupOfReadings
+    datum : DatumReport
+    check_points : CheckPoints or None
+    causes : tuple of Cause
+        Uncertainties that many points share, such as the scale of a tape.
+    cov_scale : float
+        Variance factor that covariances were multiplied by: 1, or sigma0 squared.
+    rounds : int
+        Adjustments by data snooping.
+    warnings : tuple of Problem
+    doubts : tuple of Problem
+        Those of the warnings that put the whole result in doubt: what was set aside may be the
+        victim of what was kept, or another reading may be wrong in its place.
+    repeats : RepeatedReadings or None
+        Of image points; None: each was read once.
+    depth : DepthOfField or None
+        None: not asked for.
     """
 
     adjusted: Adjusted

@@ -32,14 +32,29 @@ def write(
     letterhead: "Letterhead | None" = None,
     papers: bool = True,
 ) -> list[Path]:
-    """Write record, CSV files, workbook, notebook, PDFs and HTML of a `chain.Result`.
+    """Write record, CSV files, workbook, notebook, PDFs and HTML of a result.
 
-    directory   made when missing; earlier results there are replaced when all is written, and a
-                folder that holds anything else is refused
-    progress    called as progress(text, done, total)
-    letterhead  a report.letterhead.Letterhead, or None
-    papers      False: record and CSV files only; `rebuild` makes the others from the record
-    Returns the paths. Raises InputError for a folder that is not tankcal's to replace.
+    Parameters
+    ----------
+    result : Result
+        Of `tankcal.run`.
+    directory : path
+        Made when missing; earlier results there are replaced when all is written, and a folder that
+        holds anything else is refused.
+    progress : callable, optional
+        Called as progress(text, done, total).
+    letterhead : report.letterhead.Letterhead, optional
+    papers : bool, optional
+        False: record and CSV files only; `rebuild` makes the others from the record.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    InputError
+        For a folder that is not tankcal's to replace.
     """
 
     def prepare(folder):
