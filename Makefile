@@ -7,7 +7,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow test-all study check format notebooks job-format schemas bench peer picture site wheel clean
+.PHONY: help demo test test-slow test-all study study-full check format notebooks job-format schemas bench peer picture site wheel clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -27,8 +27,11 @@ test-slow: $(VENV)/full ## the others: papers of all kinds, many cases, studies 
 
 test-all: test test-slow ## every test but the studies at full size
 
-study: $(VENV)/full ## the studies at full size (minutes)
-	$(BIN)/pytest -m study --dist load --durations 25
+study: $(VENV)/full ## the statistical studies and what else takes long (ten minutes)
+	$(BIN)/pytest -m study --dist worksteal --durations 25
+
+study-full: export TANKCAL_STUDIES := full
+study-full: study ## the same with as many draws as the figures in docs/ were measured with (an hour)
 
 check: $(VENV)/full ## style, floors of the house, notebooks without outputs
 	$(BIN)/ruff check .

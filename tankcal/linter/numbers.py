@@ -140,19 +140,28 @@ def style_of(columns):
     sample = "".join("".join(column) for column in texts)
     possible = [style for style in STYLES if not style.thousands or style.thousands in sample]
 
-    def badness(style):
-        unreadable = falls = 0
+    columns = [[cell for cell in column if not is_blank(cell)] for column in columns]
+
+    def badness(style, least):
+        """Unreadable cells and falls; counted no further than to `least` unreadable ones."""
+        bad = 0
         for column in columns:
-            values = [read_number(cell, style).value for cell in column if not is_blank(cell)]
-            good = [value for value in values if value is not None]
-            unreadable += len(values) - len(good)
+            good = []
+            for cell in column:
+                value = read_number(cell, style).value
+                if value is not None:
+                    good.append(value)
+                    continue
+                bad += 1
+                if bad >= least:
+                    return bad
             rises = sum(b > a for a, b in pairwise(good))
-            falls += min(rises, sum(b < a for a, b in pairwise(good)))
-        return unreadable + falls
+            bad += min(rises, sum(b < a for a, b in pairwise(good)))
+        return bad
 
     best, least = PLAIN, float("inf")
     for style in possible:
-        found = badness(style)
+        found = badness(style, least)
         if found < least:
             best, least = style, found
         if least == 0:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.ndimage
 import scipy.stats
+from draws import draws
 from jacobians import assert_derivative
 from rendering import (
     code_value,
@@ -123,9 +124,12 @@ def test_corners_are_better_than_those_of_opencv(figure):
     + [(60, 30, 1, n) for n in (0, 5, 10)],
 )
 def test_study_of_corners(name, side, incidence, blur, noise, figure):
-    """Truth: rendered. Every target that is read, to a tenth of a pixel; the share that is read."""
+    """Truth: rendered. Every target that is read, to a tenth of a pixel; the share that is read.
+
+    Three scenes are 18 targets, 144 coordinates: an rms known to 6 %, where 10 scenes have 3 %.
+    """
     errors, ratios, wanted = [], [], 0
-    for seed in range(10):
+    for seed in range(draws(3, 10)):
         image, truth = scene(name, side, incidence, blur, noise, seed=100 + seed)
         part, sds = errors_of(read_coded(image, name), truth)
         wanted += len(truth)
@@ -264,7 +268,7 @@ def test_no_circles_where_none_are(kind):
 def test_study_of_random_codes(figure):
     """Truth: 4 codes / 2^16. Black frames with random cells: as many are read as chance says."""
     rng = np.random.default_rng(0)
-    known, count, read = dictionary_of("DICT_4X4_1000"), 1500, 0
+    known, count, read = dictionary_of("DICT_4X4_1000"), draws(500, 1500), 0
     for _ in range(count // 25):
         sheet = np.full((400, 400), 200.0)
         for place in range(25):
@@ -325,7 +329,7 @@ def test_centres_of_circles(blur, figure):
 def test_study_of_circles(diameter, incidence, blur, noise, figure):
     """Truth: rendered."""
     errors, wanted = [], 0
-    for seed in range(6):
+    for seed in range(draws(3, 6)):
         image, truth, _ = discs(diameter, incidence, blur, noise, seed)
         wanted += len(truth)
         for one in read_circles(image, largest_px=2 * diameter + 20).targets:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.sparse
+from draws import draws
 from shapes import azimuths, ring
 
 from tankcal.geometry.form import harmonics, unit_form
@@ -81,13 +82,17 @@ def coverage(tanks, common):
     return inside / tanks, by_noise / tanks
 
 
-def check(tanks, common, figure):
-    """93 to 97 %, three binomial standard errors allowed; and the noise alone is far from it."""
+def check(tanks, common, figure, full=None):
+    """93 to 97 %, three binomial standard errors allowed; and the noise alone is far from it.
+
+    full  tanks whose standard error counts, when fewer are drawn: 0.9 % of 600 tanks, where 3000
+          have 0.4 %, but the band stays 91.8 to 98.2 %
+    """
     inside, by_noise = coverage(tanks, common)
     where = f"rows 1 m, 5 m, total; {tanks} tanks, part of the form in common {common}"
     figure(f"coverage of 95 % intervals, {where}", np.round(inside, 4))
     figure(f"coverage by the noise of the points alone, {where}", np.round(by_noise, 4))
-    assert np.all(np.abs(inside - 0.95) < 0.02 + 3 * np.sqrt(0.95 * 0.05 / tanks))
+    assert np.all(np.abs(inside - 0.95) < 0.02 + 3 * np.sqrt(0.95 * 0.05 / (full or tanks)))
     assert np.all(by_noise < 0.80)
 
 
@@ -107,10 +112,10 @@ def test_intervals_cover_tanks_with_form_between_the_targets(common, share, figu
 @pytest.mark.study
 @FORMS
 def test_intervals_cover_tanks_with_form_between_the_targets_study(common, share, figure):
-    check(round(3000 * share), common, figure)
+    check(round(draws(600, 3000) * share), common, figure, round(3000 * share))
 
 
-BARREL_M = 0.003
+BARREL_M, COMPARED = 0.003, 50  # tanks
 
 
 def scans(rng, heights):
@@ -154,13 +159,15 @@ def _true_volume(courses, row):
 
 
 def scan_study(tanks, heights):
-    """Coverage of the rows, and rms error in ppm of the fit in height and of one constant in it."""
+    """Coverage of the rows; rms ppm of the fit in height and of a constant, of the first tanks."""
     rng = np.random.default_rng(7)
     inside, errors, constant = np.zeros(3), [], []
     for _ in range(tanks):
         arguments, rows, truth = scans(rng, heights)
         volumes, u, k = table(arguments, 0.003, rows, BARREL_M)
         inside += np.abs(volumes - truth) < k * np.linalg.norm(u, axis=1)
+        if len(errors) == COMPARED:
+            continue
         errors.append(volumes / truth - 1)
         level = [(replace(one[0], degree=0), *one[1:]) for one in arguments]
         constant.append(table(level, 0.003, rows)[0] / truth - 1)
@@ -179,12 +186,16 @@ def mostly_low(rng, n):
 HEIGHTS = pytest.mark.parametrize("heights", [everywhere, mostly_low])
 
 
-def check_scans(tanks, heights, figure):
+def check_scans(tanks, heights, figure, full=None):
+    """At least 93 % less three standard errors; of 100 tanks 2.2 %, of 300 (whose band counts) 1.3.
+
+    full  tanks whose standard error counts, when fewer are drawn
+    """
     inside, rms, constant = scan_study(tanks, heights)
     where = f"rows 0.75 m, 3 m, total; {tanks} scanned shells, points {heights.__name__}"
     figure(f"coverage of 95 % intervals, {where}", np.round(inside, 3))
     figure(f"rms ppm of the fit in height, of a constant, {where}", [rms.round(), constant.round()])
-    assert np.all(inside > 0.93 - 3 * np.sqrt(0.95 * 0.05 / tanks))
+    assert np.all(inside > 0.93 - 3 * np.sqrt(0.95 * 0.05 / (full or tanks)))
     assert np.all(rms < constant)
 
 
@@ -197,7 +208,7 @@ def test_scanned_courses_that_taper_and_bulge(heights, figure):
 @pytest.mark.study
 @HEIGHTS
 def test_scanned_courses_that_taper_and_bulge_study(heights, figure):
-    check_scans(300, heights, figure)
+    check_scans(draws(100, 300), heights, figure, 300)
 
 
 def test_the_unit_form_has_the_variance_that_is_simulated():

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import draws
 from scipy.optimize import brentq
 
 from tankcal.gum.distributions import Normal
@@ -163,6 +164,9 @@ def test_a_control_that_says_nothing_does_no_harm(figure):
 @pytest.mark.study
 @pytest.mark.parametrize("kinds", [ORDINARY, MIXED], ids=["normal", "mixed"])
 def test_a_table_is_no_worse_than_a_million_plain_draws_study(kinds, figure):
-    """9 500 rows, 50 seeds: the goal; its time is measured by benchmarks/monte_carlo.py."""
-    assert np.all(ratios_over_seeds(9500, 50, kinds, figure) <= 1)
+    """9 500 rows: the goal; its time is measured by benchmarks/monte_carlo.py.
+
+    A scatter over 8 seeds is known to 27 %, over 50 to 10 %; the worst ratio of 50 seeds was 0.20.
+    """
+    assert np.all(ratios_over_seeds(9500, draws(8, 50), kinds, figure) <= 1)
     figure("peak memory of the whole test run, MB", peak_mb())

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from draws import draws
 from networks import CONTROL_SD_M, photographed, tank_points
 from photographed_jobs import between, by_tape, control_of, measurements, tank_job
 
@@ -360,7 +361,11 @@ def without_covariance_between_courses(wall):
 
 
 def check_surveys(job, count, figure):
-    """Scatter over u within 3.3 standard errors of one; 93.5 to 96.5 %, as far as `count` tells."""
+    """Scatter over u within 3.3 standard errors of one; 93.5 to 96.5 %, as far as `count` tells.
+
+    Of 250 surveys the ratio has a standard error of 4.5 %, each part that holds 1.4 %; of 1000 2.2
+    and 0.7 %. Without the covariance between courses the ratio would be 1.5 or more.
+    """
     found, together = surveys_of_one_tank(job, count)
     (error, u), (radii, sds) = found[:, :2].T, np.split(found[:, 2:], 2, axis=1)
     ratio = np.sqrt(np.mean((error / u) ** 2))
@@ -380,4 +385,4 @@ def test_surveys_scatter_as_one_of_them_says(job, figure):
 
 @pytest.mark.study
 def test_surveys_scatter_as_one_of_them_says_study(job, figure):
-    check_surveys(job, 1000, figure)
+    check_surveys(job, draws(250, 1000), figure)
