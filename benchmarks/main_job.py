@@ -1,4 +1,4 @@
-"""Time and memory of the main job, each command in a process of its own, median of five.
+"""Time and memory of the main job, each command in a process of its own, median of five or $ROUNDS.
 
     python benchmarks/main_job.py [JOB]        (default: the shipped example)
 
@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-RUNS = 5
+RUNS = int(os.environ.get("ROUNDS", 5))
 
 
 def main(job):
