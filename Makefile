@@ -7,7 +7,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_CONSTRAINT := $(CURDIR)/constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow test-all study study-full check format notebooks job-format schemas bench peer picture site wheel clean
+.PHONY: help demo test test-slow test-rest test-all study study-full check format notebooks job-format schemas bench peer picture site wheel clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -30,6 +30,9 @@ test-all: test test-slow ## every test but the studies at full size
 study: $(VENV)/full ## the statistical studies and what else takes long (ten minutes)
 	$(BIN)/pytest -m study --dist worksteal --durations 25
 
+test-rest: $(VENV)/full ## what make test leaves out, in one run that shares its papers: test-slow and study
+	$(BIN)/pytest -m 'slow or study' --dist worksteal --durations 25
+
 study-full: export TANKCAL_STUDIES := full
 study-full: study ## the same with as many draws as the figures in docs/ were measured with (an hour)
 
@@ -45,7 +48,7 @@ format: $(VENV)/full ## bring the code to the house style
 
 notebooks: $(VENV)/full ## execute every notebook, top to bottom
 	mkdir -p build/notebooks/studies
-	cd notebooks && ls *.ipynb studies/*.ipynb | xargs -P 2 -I {} \
+	cd notebooks && printf '%s\n' studies/*.ipynb *.ipynb | xargs -P 2 -I {} \
 	  sh -c '../$(BIN)/jupyter nbconvert --to notebook --execute --output-dir ../build/notebooks/$$(dirname {}) {}'
 
 job-format: $(VENV)/full ## fill the tables of docs/job-format.md from the contract of the job

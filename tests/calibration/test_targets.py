@@ -266,7 +266,10 @@ def test_no_circles_where_none_are(kind):
 
 @pytest.mark.study
 def test_study_of_random_codes(figure):
-    """Truth: 4 codes / 2^16. Black frames with random cells: as many are read as chance says."""
+    """Truth: 4 codes / 2^16. Black frames with random cells: as many are read as chance says.
+
+    Of 500 some 30 are by chance (standard error 5), of 1500 some 92 (9).
+    """
     rng = np.random.default_rng(0)
     known, count, read = dictionary_of("DICT_4X4_1000"), draws(500, 1500), 0
     for _ in range(count // 25):

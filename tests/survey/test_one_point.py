@@ -118,7 +118,7 @@ def test_both_places_are_named_and_an_approximation_decides():
     assert off_m(adjust_survey(replace(job, control=about)), shots) < 1e-5
 
 
-PLAN_STEP, SPACE_STEP = draws(29, 13), draws(97, 43)  # of the studies
+PLAN_STEP, SPACE_STEP = draws(41, 13), draws(139, 43)  # of the studies
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])

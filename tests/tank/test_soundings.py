@@ -110,8 +110,8 @@ def test_the_uncertainty_of_simulated_bottoms_holds(figure):
 @pytest.mark.study
 @pytest.mark.parametrize("declared", [True, False])
 def test_the_uncertainty_of_many_simulated_bottoms_holds(figure, declared):
-    """Binomial standard error 1.2 % of 324 bottoms (of each sort the same number), 0.8 % of 720."""
-    judge(figure, draws(324, 720), declared, tolerance=3)
+    """Binomial standard error 1.5 % of 216 bottoms (of each sort the same number), 0.8 % of 720."""
+    judge(figure, draws(216, 720), declared, tolerance=3)
 
 
 ROUND = Footprint(3.0, 1.0, np.full(72, 6.5))
