@@ -20,6 +20,7 @@ from tankcal.survey.observations import Directions, Distances, VerticalAngles
 pytestmark = pytest.mark.slow
 
 CRITICAL = scipy.stats.norm.isf(0.0005)
+EXPECTED = CRITICAL + scipy.stats.norm.ppf(0.80)  # of w at the minimal detectable bias: 4.132
 SUSPECTS = {  # kind of survey and of observation, values of it
     "image coordinate": ("photographs", "image points", 2),
     "tape distance": ("photographs", 1, 1),
@@ -48,37 +49,44 @@ def table_of(adjusted, source):
     return next(table for table in adjusted.residuals if table.source == source)
 
 
-def power(what, blunders, seed=1):
-    """Share of blunders of the minimal detectable size that the test finds."""
+def w_of_blunders(what, blunders, seed=1):
+    """(blunders,) |w| of values that are off by their minimal detectable bias."""
     name, source, elements = SUSPECTS[what]
     kind, rng = kinds(name), np.random.default_rng(seed)
     table = table_of(kind.adjusted(kind.drawn(rng)), source)
     controlled = np.argwhere(table.redundancy[:, :elements] > 0.1)
-    found = 0
+    found = []
     for number, element in controlled[rng.integers(len(controlled), size=blunders)]:
         bias = rng.choice([-1, 1]) * table.mdb[number, element]
         bad = with_bias(kind.drawn(rng), source, table.rows[number], element, bias)
         tested = table_of(kind.adjusted(bad), source)
-        found += abs(tested.w[number, element]) > CRITICAL
-    return found / blunders
+        found.append(abs(tested.w[number, element]))
+    return np.array(found)
 
 
 @pytest.mark.study
 @pytest.mark.parametrize("what", SUSPECTS)
 def test_baarda_power_at_full_size(what, figure):
-    """Closed form: 0.80 at the minimal detectable bias (0.1 %, 80 %).
+    """Closed form at the minimal detectable bias (0.1 %, 80 %): |w| is normal about 4.13, sd one.
 
-    Binomial standard error 1.3 % of 1000 blunders, 0.8 % of 2500; the band of 2 % is the same.
+    The part that is found is known to 1.3 % by 1000 blunders, to 0.8 % by 2500 (2.5 standard errors
+    of these, 2 %, was the band of the part); the mean and the sd of w say more: 2.5 of their
+    standard errors are 0.08 and 0.056, and 0.08 is 2.2 % of what is found.
     """
     blunders = draws(1000, 2500)
-    found = power(what, blunders)
+    w = w_of_blunders(what, blunders)
+    found = np.mean(w > CRITICAL)
     figure(f"{blunders} blunders of the minimal detectable size, {what}: found", f"{found:.4f}")
-    assert found == pytest.approx(0.80, abs=0.02)
+    figure(f"mean of their |w| less 4.132, sd, {what}", f"{w.mean() - EXPECTED:.4f}, {w.std():.4f}")
+    assert found == pytest.approx(0.80, abs=2.5 * np.sqrt(0.8 * 0.2 / blunders))
+    assert w.mean() == pytest.approx(EXPECTED, abs=2.5 / np.sqrt(blunders))
+    assert w.std(ddof=1) == pytest.approx(1.0, abs=2.5 / np.sqrt(2 * blunders))
 
 
 @pytest.mark.parametrize("what", ["image coordinate", "slope distance", "direction"])
 def test_baarda_power(what):
-    assert power(what, 50) == pytest.approx(0.80, abs=0.18)
+    found = np.mean(w_of_blunders(what, 50) > CRITICAL)
+    assert found == pytest.approx(0.80, abs=0.18)
 
 
 @dataclass(frozen=True)
