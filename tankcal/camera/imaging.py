@@ -157,10 +157,16 @@ def image_point(x, y, q, form, of_ideal):
 def ideal_point(u, v, w, r, c):
     """Ideal point of (u, v, w) = R (X - S), and its derivatives.
 
-    r  the nine elements of R, row by row, numbers or (n,)
+    Parameters
+    ----------
+    r
+        The nine elements of R, row by row, numbers or (n,).
 
-    Returns xi, eta and, for each of them, the derivatives by X (3), rotation (3) and c; those by S
-    are those by X with the other sign.
+    Returns
+    -------
+    tuple of tuples
+        xi, eta and, for each of them, the derivatives by X (3), rotation (3) and c; those by S are
+        those by X with the other sign.
     """
     x, y, f = -u / w, -v / w, c / w
     xy = c * x * y
@@ -191,11 +197,19 @@ def ideal_point(u, v, w, r, c):
 def image_point_derivatives(p, r, q, form, of_ideal):
     """Measured coordinate of a point and all its derivatives.
 
-    p         X - S, three numbers or (n,) (m)
-    r         nine elements of R, row by row
-    q         13 interior parameters
+    Parameters
+    ----------
+    p
+        X - S, three numbers or (n,) (m).
+    r
+        Nine elements of R, row by row.
+    q
+        13 interior parameters.
 
-    Returns x, y (mm) and for each 3 + 3 + 13 derivatives: by X, rotation, interior parameters.
+    Returns
+    -------
+    tuple of tuples
+        x, y (mm) and for each 3 + 3 + 13 derivatives: by X, rotation, interior parameters.
     """
     u = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
     v = r[3] * p[0] + r[4] * p[1] + r[5] * p[2]
@@ -219,13 +233,17 @@ def ideal_point_derivatives(p, r, q, measured, form, of_ideal):
     """Misclosure of the ideal image: the ideal point of the ground less that of the measured
     coordinate, which depends on the interior parameters, too, and all its derivatives.
 
-    p, r, q   as for one_image_point
-    measured  x and y, two numbers or (n,) mm
-
     With y the measured coordinate from the principal point, after an affinity before the
     distortion where there is one, a correction gives p = y + side d(y),
     so that dp = -(1 + side d') d(x0, y0) + side d_K; a distortion of the ideal point p + d(p) = y,
     so that dp = (1 + d')^-1 (-d(x0, y0) - d_K).
+
+    Parameters
+    ----------
+    p, r, q
+        As for one_image_point.
+    measured
+        x and y, two numbers or (n,) mm.
     """
     u = r[0] * p[0] + r[1] * p[1] + r[2] * p[2]
     v = r[3] * p[0] + r[4] * p[1] + r[5] * p[2]

@@ -28,15 +28,22 @@ FLAT_BEYOND = 100.0  # spreads of the points: a larger radius is that of a plane
 class FittedEllipse:
     """Least-squares ellipse through n points of a plane.
 
-    x_m, y_m                      centre
-    semi_major_m, semi_minor_m    half axes
-    azimuth_rad                   of the major axis, clockwise from +y, 0 to pi; 0 of a circle
-    cofactor                      (5, 5) covariance of x, y, both half axes and azimuth (m, rad)
-                                  for variance factor 1; azimuth of a circle: inf, uncorrelated.
-                                  Half axes that differ by little more than their standard
-                                  deviations are biased apart, and the azimuth is not normal.
-    residuals_m                   (n,) distance of each point to the ellipse, outwards positive
-    variance_factor               v' Q^-1 v / dof, nan without redundancy
+    Attributes
+    ----------
+    x_m, y_m : float
+        Centre.
+    semi_major_m, semi_minor_m : float
+        Half axes.
+    azimuth_rad : float
+        Of the major axis, clockwise from +y, 0 to pi; 0 of a circle.
+    cofactor : ndarray, shape (5, 5)
+        Covariance of x, y, both half axes and azimuth (m, rad) for variance factor 1; azimuth of a
+        circle: inf, uncorrelated. Half axes that differ by little more than their standard
+        deviations are biased apart, and the azimuth is not normal.
+    residuals_m : ndarray, shape (n,)
+        Distance of each point to the ellipse, outwards positive.
+    variance_factor : float
+        v' Q^-1 v / dof, nan without redundancy.
     """
 
     x_m: float
@@ -84,8 +91,16 @@ def fit_ellipse(xy_m, covariance_m2):
     S is regular where half axes and azimuth (its eigenvalues and eigenvectors) are not: at a
     circle. Start: direct least squares (Halir & Flusser 1998).
 
-    xy_m (n, 2); covariance_m2 (2n, 2n) dense or sparse, or (2n,) variances, x1 y1 x2 y2 ...
-    Raises SolutionError for fewer than 5 points, points on a line or on no ellipse.
+    Parameters
+    ----------
+    xy_m : ndarray, shape (n, 2)
+    covariance_m2 : ndarray, shape (2n, 2n)
+        Dense or sparse, or (2n,) variances, x1 y1 x2 y2 ...
+
+    Raises
+    ------
+    SolutionError
+        For fewer than 5 points, points on a line or on no ellipse.
     """
     mean, local = center_points(xy_m, 5, "an ellipse")
     spread = spread_of(local, 2, "line")
@@ -220,7 +235,10 @@ def unit_vectors(d):
 def conditions_of(distances, dimensions=3):
     """The model for `adjust` of a function (unknowns, points) -> distances, by unknowns, normals.
 
-    dimensions  of the points, 2 or 3
+    Parameters
+    ----------
+    dimensions : optional
+        Of the points, 2 or 3.
     """
 
     def conditions(unknowns, coordinates):

@@ -136,15 +136,27 @@ def ring_sections(points_m, edges_m, axis, *, cells=72, band_m=np.inf, chunk=CHU
     c y + d. It has none of Kasa's bias on arcs; isotropic noise s makes its radius s^2 / R too long
     (Al-Sharadqah & Chernov 2009), twice as much as the geometric circle's.
 
-    points_m  (n, 3) array or memmap of float64 or float32, or an iterable of such arrays, of ten
-              thousand points each or more (smaller ones are right, but slow)
-    edges_m   (rings + 1,) ascending; a ring holds its lower edge, the last one also its upper
-    axis      `Axis`: approximate axis and radius
-    cells     of equal width in azimuth
-    band_m    points farther than this from the approximate radius are left out and counted
-    chunk     points worked on at a time
-    Raises InputError for edges that do not ascend, for points of another shape, that are not
-    finite, or whose float32 cannot tell a tenth of a millimetre.
+    Parameters
+    ----------
+    points_m : ndarray, shape (n, 3)
+        Array or memmap of float64 or float32, or an iterable of such arrays, of ten thousand points
+        each or more (smaller ones are right, but slow).
+    edges_m : ndarray, shape (rings + 1,)
+        Ascending; a ring holds its lower edge, the last one also its upper.
+    axis
+        `Axis`: approximate axis and radius.
+    cells : optional
+        Of equal width in azimuth.
+    band_m : optional
+        Points farther than this from the approximate radius are left out and counted.
+    chunk : optional
+        Points worked on at a time.
+
+    Raises
+    ------
+    InputError
+        For edges that do not ascend, for points of another shape, that are not finite, or whose
+        float32 cannot tell a tenth of a millimetre.
     """
     edges = _checked_edges(edges_m)
     _check_settings(axis, cells, band_m)

@@ -14,15 +14,26 @@ from tankcal.gum.components import Combined, Source, combine
 class BudgetRow:
     """One line of a budget.
 
-    name, unit, type, distribution, dof, note   as the input declares them; of a family, the first
-    is_default    nobody declared it
-    estimate      in `unit`; nan of a family
-    u             standard uncertainty in `unit`; nan of a family
-    sensitivity   dy/dx, unit of the output by `unit`; nan of a family
-    contribution  |dy/dx| u, of a family sqrt(c' U c), in the unit of the output
-    share         of the variance; the shares add up to 1, negative where correlations take away
-    halved        the factor of the expanded uncertainty if u were half as large: 0.9 is 10 % less
-    correlations  ((name, r), ...) of the inputs that it is correlated with
+    Attributes
+    ----------
+    name, unit, type, distribution, dof, note
+        As the input declares them; of a family, the first.
+    is_default : bool
+        Nobody declared it.
+    estimate : float
+        In `unit`; nan of a family.
+    u : float
+        Standard uncertainty in `unit`; nan of a family.
+    sensitivity : float
+        dy/dx, unit of the output by `unit`; nan of a family.
+    contribution : float
+        |dy/dx| u, of a family sqrt(c' U c), in the unit of the output.
+    share : float
+        Of the variance; the shares add up to 1, negative where correlations take away.
+    halved : float
+        The factor of the expanded uncertainty if u were half as large: 0.9 is 10 % less.
+    correlations : tuple
+        ((name, r), ...) of the inputs that it is correlated with.
     """
 
     name: str
@@ -44,8 +55,14 @@ class BudgetRow:
 class Shares:
     """The `Source`s of one output together, and what a line of its budget has of them.
 
-    sources      of one row each; probability  coverage probability of U
     u, dof, k, U  of the output
+
+    Parameters
+    ----------
+    sources
+        Of one row each.
+    probability
+        Coverage probability of U.
     """
 
     def __init__(self, sources, probability):

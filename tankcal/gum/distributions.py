@@ -38,8 +38,11 @@ from tankcal.gum.inputs import Input
 class Distribution:
     """What all have: mean (unit of the input) and quantiles from those of the centred half.
 
-    dof  degrees of freedom of u in the law of propagation; how unsure u itself is (G.3). It
-         changes no quantile, except Student's t, whose shape it is.
+    Attributes
+    ----------
+    dof : float
+        Degrees of freedom of u in the law of propagation; how unsure u itself is (G.3). It changes
+        no quantile, except Student's t, whose shape it is.
     """
 
     mean: float = field(default=0.0, kw_only=True)
@@ -108,7 +111,10 @@ class Normal(Distribution):
 class StudentT(Distribution):
     """Scaled and shifted t with `dof` degrees of freedom, finite (JCGM 101 6.4.9).
 
-    by_sd  declared by its standard deviation: that is u then, and dof is the shape alone
+    Attributes
+    ----------
+    by_sd : bool
+        Declared by its standard deviation: that is u then, and dof is the shape alone.
     """
 
     name = "t"
@@ -163,7 +169,10 @@ class UnsureNormal(Distribution):
     relative variance of what is left. Without noise m is dof and X is Student's t; where most is
     noise, a variance that is small by chance has no Cauchy tail. The mean over chi-square is taken
     by Gauss quadrature in the cube root of its probability, dense where it is small and v large.
-    Source: JCGM 101:2008 6.4.9 for the t that it becomes.
+
+    References
+    ----------
+    .. [1] JCGM 101:2008 6.4.9 for the t that it becomes.
     """
 
     name = "normal"
@@ -281,8 +290,14 @@ class UShaped(_Bounded):
 class CurvilinearTrapezoid(Distribution):
     """Rectangular whose half-width w is itself known only to +- d (JCGM 101 6.4.3).
 
-    middle_half_width  w, (b - a)/2 there; inexactness  d, above 0 and below w
     sd = sqrt(w^2/3 + d^2/9);  density ln((w + d)/max(|x|, w - d))/(4 d) within |x| < w + d
+
+    Attributes
+    ----------
+    middle_half_width : float
+        w, (b - a)/2 there.
+    inexactness : float
+        d, above 0 and below w.
     """
 
     name = "curvilinear trapezoid"
@@ -339,10 +354,18 @@ NAMES = ("normal", *FAMILIES, "t", "curvilinear trapezoid")
 def standard(u, name="normal", *, dof=np.inf, mean=0.0, u_is="scale"):
     """The distribution called `name` of standard uncertainty u, the unit of the input.
 
-    name  one of normal, rectangular, triangular, u-shaped, t. A normal with finite degrees of
-          freedom is Student's t (JCGM 101 6.4.9.7): u was estimated from the readings.
-    u_is  what u is of Student's t: its "scale", or its "sd" (more than two degrees of freedom)
-    Raises ValueError for another name, a negative or non-finite u, dof not above 0.
+    Parameters
+    ----------
+    name : optional
+        One of normal, rectangular, triangular, u-shaped, t. A normal with finite degrees of freedom
+        is Student's t (JCGM 101 6.4.9.7): u was estimated from the readings.
+    u_is : optional
+        What u is of Student's t: its "scale", or its "sd" (more than two degrees of freedom).
+
+    Raises
+    ------
+    ValueError
+        For another name, a negative or non-finite u, dof not above 0.
     """
     if u_is not in ("scale", "sd"):
         raise ValueError(f"u is its {u_is!r}: expected 'scale' or 'sd'")
@@ -363,9 +386,16 @@ def standard(u, name="normal", *, dof=np.inf, mean=0.0, u_is="scale"):
 def within(half_width, name="rectangular", *, mean=0.0, dof=np.inf, inexactness=0.0):
     """The distribution called `name` between mean - half_width and mean + half_width.
 
-    inexactness  of a rectangular one: the half-width itself is known to +- this much only, which
-                 Monte Carlo sees; dof say the same to the law of propagation (JCGM 100 G.4.2)
-    Raises ValueError for a name without limits, a negative or non-finite half-width.
+    Parameters
+    ----------
+    inexactness : optional
+        Of a rectangular one: the half-width itself is known to +- this much only, which Monte Carlo
+        sees; dof say the same to the law of propagation (JCGM 100 G.4.2).
+
+    Raises
+    ------
+    ValueError
+        For a name without limits, a negative or non-finite half-width.
     """
     if name not in FAMILIES:
         raise ValueError(f"distribution {name!r} has no limits: expected {', '.join(FAMILIES)}")
@@ -379,10 +409,19 @@ def within(half_width, name="rectangular", *, mean=0.0, dof=np.inf, inexactness=
 def expanded(U, *, k=None, probability=None, dof=np.inf, mean=0.0):
     """The distribution behind an expanded uncertainty U: u = U/k (JCGM 100 4.3.3).
 
-    k            the coverage factor that the certificate states, or
-    probability  its coverage probability: k of Student's t (JCGM 101 6.4.9.7)
-    dof          degrees of freedom that the certificate states; infinite gives a normal
-    Raises ValueError unless exactly one of k and probability is given, k above 0.
+    Parameters
+    ----------
+    k : optional
+        The coverage factor that the certificate states, or.
+    probability : optional
+        Its coverage probability: k of Student's t (JCGM 101 6.4.9.7).
+    dof : optional
+        Degrees of freedom that the certificate states; infinite gives a normal.
+
+    Raises
+    ------
+    ValueError
+        Unless exactly one of k and probability is given, k above 0.
     """
     if (k is None) == (probability is None):
         raise ValueError("an expanded uncertainty needs its k or its coverage probability")
@@ -398,7 +437,10 @@ def expanded(U, *, k=None, probability=None, dof=np.inf, mean=0.0):
 def vector(name, estimates, u, unit="", *, dof=np.inf, type="A", note=""):
     """Inputs "name 1", "name 2", ... of one family: coordinates of points, say.
 
-    estimates, u  (p,) in `unit`, normal, or t when dof is finite
+    Parameters
+    ----------
+    estimates, u : ndarray, shape (p,)
+        In `unit`, normal, or t when dof is finite.
     """
     pairs = enumerate(zip(estimates, u, strict=True), 1)
     return [

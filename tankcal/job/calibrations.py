@@ -26,11 +26,19 @@ def read_cameras(path, warn=None, in_pixels=True):
     Its keys are those of a job's (docs/job-format.md), with the size of a pixel: format_px with
     pixel_um, format_px with format_mm, or format_mm with pixel_um.
 
-    path  of the file, or of a folder with a cameras.toml
-    warn  called with a Problem for each thing that only deserves a look; None: not told
-    in_pixels  False: a format_mm alone will do, as for film
+    Parameters
+    ----------
+    path
+        Of the file, or of a folder with a cameras.toml.
+    warn : optional
+        Called with a Problem for each thing that only deserves a look; None: not told.
+    in_pixels : optional
+        False: a format_mm alone will do, as for film.
 
-    Raises InputError with every problem of the file.
+    Raises
+    ------
+    InputError
+        With every problem of the file.
     """
     path, log = Path(path), Log()
     missing = path.name or "."

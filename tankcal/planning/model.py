@@ -180,14 +180,23 @@ class Limits:
 class Plan:
     """A survey before it is made.
 
-    job       tank, courses, table, inputs, and, as its measurements, cameras, instruments, settings
-    photos, setups, ties, known, extra, obstacles  tuples of the classes above; extra are points off
-              the wall, {name: (3,) nominal place}
-    facing    {name: (3,) unit normal} of the marks among them that face one way, as tape ends do
-    form      what the wall departs from a circle, as it is expected
-    costs     {item: cost of one}: "photo_station", "photograph", "setup", "tape", "control_point",
-              "target", "reading"
-    folder    name          given  what stands in it, as it was read (`job.tables.RawJob`)
+    Attributes
+    ----------
+    job : Job
+        Tank, courses, table, inputs, and, as its measurements, cameras, instruments, settings.
+    photos, setups, ties, known, extra, obstacles
+        Tuples of the classes above; extra are points off the wall, {name: (3,) nominal place}.
+    facing : dict
+        {name: (3,) unit normal} of the marks among them that face one way, as tape ends do.
+    form : Form
+        What the wall departs from a circle, as it is expected.
+    costs : dict
+        {item: cost of one}: "photo_station", "photograph", "setup", "tape", "control_point",
+        "target", "reading".
+    folder : str
+        Its name.
+    given : RawJob or None
+        What stands in the folder, as it was read (`job.tables.RawJob`).
     """
 
     job: Job

@@ -73,8 +73,16 @@ class SectionOutlook:
 class Prediction:
     """What a survey would give, before it is made.
 
-    seen        what is seen from where           predicted  the network (`surveys.Predicted`)
-    tabled      wall, table and statements        points     of all points, targets first
+    Attributes
+    ----------
+    seen : Visibility
+        What is seen from where.
+    predicted : Predicted
+        The network (`surveys.Predicted`).
+    tabled : PredictedTable
+        Wall, table and statements.
+    points : tuple of PointOutlook
+        Of all points, targets first.
     """
 
     plan: Plan

@@ -37,7 +37,10 @@ def save(record, path):
 def load(path):
     """Read a record of this version, or of an older one, to which is added what it did not have.
 
-    Raises InputError, in one line, when it is no record or of a version that cannot be read.
+    Raises
+    ------
+    InputError
+        In one line, when it is no record or of a version that cannot be read.
     """
     name = Path(path).name
     try:

@@ -26,15 +26,26 @@ def build(record_path, directory, progress=None, language=None, letterhead=None,
     A record without a capacity, of a survey that was only adjusted, has no certificate: it gets
     working papers, notebook and web page.
 
-    record_path   path of a record.json; it is copied beside the notebook when it is not there yet
-    directory     a workbook that lies there, too, is held inside the PDFs
-    progress      called as progress(done, total) while it works
-    language      of the papers; None: that of the job
-    letterhead    a letterhead.Letterhead, or None
-    record        the record as loaded from there, when it is at hand
+    Parameters
+    ----------
+    record_path
+        Path of a record.json; it is copied beside the notebook when it is not there yet.
+    directory
+        A workbook that lies there, too, is held inside the PDFs.
+    progress : optional
+        Called as progress(done, total) while it works.
+    language : optional
+        Of the papers; None: that of the job.
+    letterhead : optional
+        A letterhead.Letterhead, or None.
+    record : optional
+        The record as loaded from there, when it is at hand.
 
-    Raises TankcalError when a cell of the notebook fails or a page cannot be set; then none of the
-    files is written.
+    Raises
+    ------
+    TankcalError
+        When a cell of the notebook fails or a page cannot be set; then none of the files is
+        written.
     """
     import shutil
 
@@ -65,12 +76,17 @@ def missing(record):
 def set_papers(notebook, directory, parts, progress=None):
     """Execute a notebook in `directory` and write it there with its PDFs and web page.
 
-    notebook   as `notebook.joined` gives it
-    parts      (name of the PDF, part of the notebook) of each PDF; part "" is all of it but the
-               field table, and so is the web page
-    progress   called as progress(done, total) while it works
-
     Gives the paths, and raises, as `build` does.
+
+    Parameters
+    ----------
+    notebook
+        As `notebook.joined` gives it.
+    parts : sequence of (str, str)
+        Name of each PDF, and the part of the notebook that it is of; part "" is all of it but the
+        field table, and so is the web page.
+    progress : optional
+        Called as progress(done, total) while it works.
     """
     import nbformat
 

@@ -27,11 +27,21 @@ class UndeterminedError(SolutionError):
 def solve(model, state, *, max_iterations=100, tolerance=1e-4):
     """Minimise the sum of squared rows of a Model, starting from `state`.
 
-    tolerance  of the last step: root of the sum of squares of what it changes in the rows, per root
-               of the number of rows; the step itself is taken, so the error left is far smaller
+    Parameters
+    ----------
+    tolerance : optional
+        Of the last step: root of the sum of squares of what it changes in the rows, per root of the
+        number of rows; the step itself is taken, so the error left is far smaller.
 
-    Returns an Adjustment. Raises SolutionError when the observations do not determine the unknowns
-    (the message names them) or when the iteration does not converge.
+    Returns
+    -------
+    Adjustment
+
+    Raises
+    ------
+    SolutionError
+        When the observations do not determine the unknowns (the message names them) or when the
+        iteration does not converge.
     """
     with threads_for(model.reduced):
         return _solved(_Work(model), state, max_iterations, tolerance)
@@ -41,8 +51,12 @@ def linearise(model, state):
     """The Adjustment of a Model with its derivatives at `state`: no step is made.
 
     Its cofactors are those of a survey whose observations are what `state` computes, so it tells
-    how well the unknowns will be known before anything is measured. Raises SolutionError when the
-    observations do not determine the unknowns (the message names them).
+    how well the unknowns will be known before anything is measured.
+
+    Raises
+    ------
+    SolutionError
+        When the observations do not determine the unknowns (the message names them).
     """
     with threads_for(model.reduced):
         work = _Work(model)

@@ -16,10 +16,15 @@ import numpy as np
 class Group:
     """Observations of one kind, n of them with m rows each; every row is one whitened equation.
 
-    columns  (n, K) unknown of each derivative, -1 where that one is fixed
-    rows     m
-    fill     fill(state, w, jac) writes misclosures (computed minus observed, over the sd) into
-             w (n, m) and derivatives into jac (n, m, K); a jac of length 0 is left out
+    Attributes
+    ----------
+    columns : ndarray, shape (n, K)
+        Unknown of each derivative, -1 where that one is fixed.
+    rows : int
+        m.
+    fill : callable
+        fill(state, w, jac) writes misclosures (computed minus observed, over the sd) into w (n, m)
+        and derivatives into jac (n, m, K); a jac of length 0 is left out.
     """
 
     columns: np.ndarray
@@ -31,19 +36,31 @@ class Group:
 class Model:
     """A least-squares problem: minimise the sum of squares of all rows.
 
-    reduced     number of unknowns of the reduced system; they come first
-    blocks      number of eliminated blocks of three unknowns; they come last
-    groups      tuple of Group; no row touches two eliminated blocks
-    moved       moved(state, step) -> state, step (reduced + 3 blocks,)
-    null_space  null_space(state) -> (unknowns, d) directions in which nothing is observed (a datum
-                to be chosen), or None when the observations give the datum
-    name_of     name_of(column) -> what the user calls that unknown
-    in_words    in_words(directions) -> the unknowns that take part in directions (unknowns, d), all
-                columns of length one, in words; None: their names
-    inner       (unknowns,) 1 where an unknown takes part in the inner constraints that choose the
-                datum of the free directions, else 0
-    exact       tuple of Group: rows that are zero exactly, between reduced unknowns only
-    name_of_exact  name_of_exact(row) -> what the user calls that row, all rows of `exact` counted
+    Attributes
+    ----------
+    reduced : int
+        Number of unknowns of the reduced system; they come first.
+    blocks : int
+        Number of eliminated blocks of three unknowns; they come last.
+    groups : tuple
+        Tuple of Group; no row touches two eliminated blocks.
+    moved : callable
+        moved(state, step) -> state, step (reduced + 3 blocks,).
+    null_space : callable
+        null_space(state) -> (unknowns, d) directions in which nothing is observed (a datum to be
+        chosen), or None when the observations give the datum.
+    name_of : callable
+        name_of(column) -> what the user calls that unknown.
+    in_words : callable
+        in_words(directions) -> the unknowns that take part in directions (unknowns, d), all columns
+        of length one, in words; None: their names.
+    inner : ndarray, shape (unknowns,)
+        1 where an unknown takes part in the inner constraints that choose the datum of the free
+        directions, else 0.
+    exact : tuple
+        Tuple of Group: rows that are zero exactly, between reduced unknowns only.
+    name_of_exact : callable
+        name_of_exact(row) -> what the user calls that row, all rows of `exact` counted.
     """
 
     reduced: int

@@ -43,10 +43,18 @@ FILES = ("image_points.csv", "photos.csv", "control.csv")  # first in the list o
 def adjust_survey(measurements, progress=None):
     """Adjust everything that was measured on site: the Adjustment of job.Measurements.
 
-    progress  progress(text) is called with what is being done
+    Parameters
+    ----------
+    progress : optional
+        progress(text) is called with what is being done.
 
-    Raises InputError for what cannot be meant, SolutionError (in words, with a likely cause where
-    one is found) when the survey does not determine what is asked for.
+    Raises
+    ------
+    InputError
+        For what cannot be meant.
+    SolutionError
+        In words, with a likely cause where one is found, when the survey does not determine what is
+        asked for.
     """
     progress = progress or (lambda text: None)
 

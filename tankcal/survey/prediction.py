@@ -16,8 +16,12 @@ from tankcal.survey.start_values import finish_start_values
 class Nominal:
     """Where things will stand.
 
-    points  {name: (3,)} m, those of set-ups among them
-    photos  {name: ((3,) projection centre, (3, 3) rotation)}
+    Attributes
+    ----------
+    points : dict
+        {name: (3,)} m, those of set-ups among them.
+    photos : dict
+        {name: ((3,) projection centre, (3, 3) rotation)}.
     """
 
     points: dict
@@ -28,9 +32,14 @@ class Nominal:
 class Predicted:
     """A survey before it is made.
 
-    adjusted  network.Adjusted at the nominal values; its residuals and sigma0 mean nothing
-    gathered  Gathered: what cannot be determined is in `aside`
-    frame     Frame: what holds the datum
+    Attributes
+    ----------
+    adjusted : Adjusted
+        network.Adjusted at the nominal values; its residuals and sigma0 mean nothing.
+    gathered : Gathered
+        What cannot be determined is in `aside`.
+    frame : Frame
+        What holds the datum.
     """
 
     adjusted: Adjusted
@@ -41,9 +50,15 @@ class Predicted:
 def predict_survey(measurements, nominal):
     """The Predicted of job.Measurements whose observed values do not matter.
 
-    nominal  Nominal; a point or photo without a place there is an InputError
+    Parameters
+    ----------
+    nominal
+        Nominal; a point or photo without a place there is an InputError.
 
-    Raises SolutionError when the survey would not determine what is asked for, in words.
+    Raises
+    ------
+    SolutionError
+        When the survey would not determine what is asked for, in words.
     """
     gathered = gather(measurements)
     if not gathered.survey.points:

@@ -18,21 +18,40 @@ _SHOWN = 20  # points that an adjustment shows of itself
 class Reading:
     """One value of one observation after the adjustment.
 
-    kind        as the observations name it: "image coordinate", "distance", "direction", ...
-    ids         names, such as ("photo 1", "215") or ("A", "B")
-    element     "x" or "y", "omega", ...; "" where there is only one
-    file, row   where it was read; of averaged readings the first row; "" and None: no file
-    repeats     readings that were averaged
-    unit        of value, residual, sd, mdb: "mm" (images), "m", "rad" or "" (weighted unknowns)
-    value       observed, as adjusted (after averaging and corrections)
-    residual    computed minus observed
-    sd          a priori            redundancy  0 to 1
-    w           Baarda's test quantity     tau  Pope's: w over sigma0 (nan: no redundancy)
-    mdb         minimal detectable bias; inf: nothing controls it
-    effect_m    largest change of a point's coordinates by an undetected bias of that size; inf as
-                well
-    removed     True: set aside by data snooping; residual and w are then those that it would have
-    check       True: it was only compared; w is then its difference over the sd of that
+    Attributes
+    ----------
+    kind : str
+        As the observations name it: "image coordinate", "distance", "direction", ...
+    ids : tuple
+        Names, such as ("photo 1", "215") or ("A", "B").
+    element : str
+        "x" or "y", "omega", ...; "" where there is only one.
+    file, row
+        Where it was read; of averaged readings the first row; "" and None: no file.
+    repeats : int
+        Readings that were averaged.
+    unit : str
+        Of value, residual, sd, mdb: "mm" (images), "m", "rad" or "" (weighted unknowns).
+    value : float
+        Observed, as adjusted (after averaging and corrections).
+    residual : float
+        Computed minus observed.
+    sd : float
+        A priori.
+    redundancy : float
+        0 to 1.
+    w : float
+        Baarda's test quantity.
+    tau : float
+        Pope's: w over sigma0 (nan: no redundancy).
+    mdb : float
+        Minimal detectable bias; inf: nothing controls it.
+    effect_m : float
+        Largest change of a point's coordinates by an undetected bias of that size; inf as well.
+    removed : bool
+        True: set aside by data snooping; residual and w are then those that it would have.
+    check : bool
+        True: it was only compared; w is then its difference over the sd of that.
     """
 
     kind: str
@@ -151,10 +170,17 @@ class CheckPoints:
 class Cause:
     """A named, shared cause of uncertainty of the coordinates: scale or offset of an instrument.
 
-    name       "tape 1"           what      "instrument_scale" or "instrument_offset"
-    u, unit    as declared: ppm or mm
-    column_m   (3 points,) change of all coordinates by one u, in the order of Adjustment.names;
-               covariance = column column' + everything else, uncorrelated
+    Attributes
+    ----------
+    name : str
+        "tape 1".
+    what : str
+        "instrument_scale" or "instrument_offset".
+    u, unit
+        As declared: ppm or mm.
+    column_m : ndarray, shape (3 points,)
+        Change of all coordinates by one u, in the order of Adjustment.names; covariance = column
+        column' + everything else, uncorrelated.
     """
 
     name: str

@@ -16,11 +16,21 @@ def wall_points(adjustment, measurements, side):
 
         wall = target - (+ inside) offset * horizontal normal of the wall, outwards
 
-    adjustment    Adjustment                 measurements  job.Measurements that it is of
-    side          "outside" or "inside": where the observer stood
-
     With targets.csv these are the points that it names, else all but the stations of set-ups.
-    Raises SolutionError when too many points, or none, are left.
+
+    Parameters
+    ----------
+    adjustment
+        Adjustment.
+    measurements
+        job.Measurements that it is of.
+    side
+        "outside" or "inside": where the observer stood.
+
+    Raises
+    ------
+    SolutionError
+        When too many points, or none, are left.
     """
     targets = measurements.targets
     place = {name: i for i, name in enumerate(adjustment.names)}

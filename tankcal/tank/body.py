@@ -24,9 +24,14 @@ LEAST_SHARE = 1e-6  # rounding of the share that a named cause has in the covari
 class Factor:
     """One cause of what a survey leaves uncertain, over what the survey gave.
 
-    kind        "points", "form", "own_form", or what a named cause is ("instrument_scale")
-    columns     (f, c) factor of the covariance of a shell's features or of a solid's inputs
-    dof, u, unit, type, note, contrasts  as in `uncertainty.Source`
+    Attributes
+    ----------
+    kind : str
+        "points", "form", "own_form", or what a named cause is ("instrument_scale").
+    columns : ndarray, shape (f, c)
+        Factor of the covariance of a shell's features or of a solid's inputs.
+    dof, u, unit, type, note, contrasts
+        As in `uncertainty.Source`.
     """
 
     kind: str
@@ -55,12 +60,21 @@ class Factor:
 def survey_factors(covariance, dof=np.inf, causes=(), effects=()):
     """`Factor`s of what a survey leaves uncertain: the points, then every named cause.
 
-    covariance  (f, f) of all causes together: the rest L L' + sum of e e' over the effects
-    dof         degrees of freedom of the covariance
-    causes      with name, what, u, unit (`surveys.Cause`); effects: (f,) of one u of each
-
     With F F' the covariance and e = F a the rest is F (I - A A') F', which is never negative.
-    Raises ValueError for effects that are larger than the covariance.
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (f, f)
+        Of all causes together: the rest L L' + sum of e e' over the effects.
+    dof : optional
+        Degrees of freedom of the covariance.
+    causes : optional
+        With name, what, u, unit (`surveys.Cause`); effects: (f,) of one u of each.
+
+    Raises
+    ------
+    ValueError
+        For effects that are larger than the covariance.
     """
     whole = factor_of(covariance)
     if len(causes) == 0:
@@ -85,15 +99,23 @@ def survey_factors(covariance, dof=np.inf, causes=(), effects=()):
 class ShellPart(Part):
     """The shell of courses as a part; it has nothing below the bottom of its first course.
 
-    volume           inside, at the table's temperature
-    factors          what the survey leaves uncertain about the shell's features: of the points, of
-                     causes that they share, and of the form between them, common to all courses
-                     ("form") or of each course ("own_form")
-    scale            of horizontal lengths, by temperature; expansion_per_k its coefficient
-    stretch          of heights, by temperature; 1 where heights are not corrected
-    bearing          which of the inputs "plate_thickness", "paint", "shell_temperature" and
-                     "expansion" were used
-    tilt             of the axis, m/m
+    Attributes
+    ----------
+    volume : ShellVolume
+        Inside, at the table's temperature.
+    factors : tuple of Factor
+        What the survey leaves uncertain about the shell's features: of the points, of causes that
+        they share, and of the form between them, common to all courses ("form") or of each course
+        ("own_form").
+    scale : float
+        Of horizontal lengths, by temperature; expansion_per_k its coefficient.
+    stretch : float
+        Of heights, by temperature; 1 where heights are not corrected.
+    bearing : tuple of str
+        Which of the inputs "plate_thickness", "paint", "shell_temperature" and "expansion" were
+        used.
+    tilt : float
+        Of the axis, m/m.
     """
 
     volume: ShellVolume
@@ -163,12 +185,19 @@ class ShellPart(Part):
 class SolidPart(Part):
     """A tank of one solid (lying cylinder, sphere, mesh) at the table's temperature.
 
-    solid            a part whose lengths are at that temperature already
-    scale            of its lengths by temperature; expansion_per_k its coefficient; warmed whether
-                     a temperature was given
-    surveyed         names of the inputs of the solid that a survey of its wall gave; () without one
-    factors          what that survey leaves uncertain about them
-    unused           names of the solid's inputs that have no meaning in this job
+    Attributes
+    ----------
+    solid : Part
+        A part whose lengths are at that temperature already.
+    scale : float
+        Of its lengths by temperature; expansion_per_k its coefficient; warmed whether a temperature
+        was given.
+    surveyed : tuple of str
+        Names of the inputs of the solid that a survey of its wall gave; () without one.
+    factors : tuple of Factor
+        What that survey leaves uncertain about them.
+    unused : tuple of str
+        Names of the solid's inputs that have no meaning in this job.
     """
 
     solid: Part
@@ -214,12 +243,18 @@ class SolidPart(Part):
 class Body:
     """The parts of a tank together.
 
-    declared            inputs with name, u (SI), u_as_read, unit, type, distribution, dof, note,
-                        is_default
     lowest_m, highest_m levels between which there is a tank, in the frame of the parts
-    correlations        (name, name, r) of declared inputs
-    estimates           {name of an input: its value, in the unit it is declared in}
-    shell               the shell of courses that is among the parts; None for a tank without
+
+    Attributes
+    ----------
+    declared : tuple
+        Inputs with name, u (SI), u_as_read, unit, type, distribution, dof, note, is_default.
+    correlations : tuple
+        (name, name, r) of declared inputs.
+    estimates : dict
+        {name of an input: its value, in the unit it is declared in}.
+    shell : ShellPart or None
+        The shell of courses that is among the parts; None for a tank without.
     """
 
     parts: tuple[Part, ...]

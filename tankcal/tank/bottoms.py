@@ -32,9 +32,14 @@ class ShapedBottom(Part):
     Over an outline that is no circle the form is that over a circle, drawn out to the outline along
     each radius, so areas and volumes depend on the plan's area alone.
 
-    form      "flat", "cone" or "dish"
-    centre_m  level of the centre: above 0 the bottom bulges up, below 0 down
-    plan_m2   inside area of the first course at its bottom
+    Attributes
+    ----------
+    form : str
+        "flat", "cone" or "dish".
+    centre_m : float
+        Level of the centre: above 0 the bottom bulges up, below 0 down.
+    plan_m2 : float
+        Inside area of the first course at its bottom.
     """
 
     form: str
@@ -115,8 +120,11 @@ class ShapedBottom(Part):
 def shaped_bottom(form, plan_m2, centre_m=0.0):
     """`ShapedBottom`; a centre at level 0 makes it flat.
 
-    Raises SolutionError for an unknown form, an area that cannot be, a flat bottom with a centre
-    off the plane, and a dish deeper than half a sphere.
+    Raises
+    ------
+    SolutionError
+        For an unknown form, an area that cannot be, a flat bottom with a centre off the plane, and
+        a dish deeper than half a sphere.
     """
     if form not in FORMS:
         raise SolutionError(f'bottom "{form}"; expected one of {", ".join(FORMS)}')
@@ -152,8 +160,12 @@ def shaped_bottom(form, plan_m2, centre_m=0.0):
 class SurfaceBottom(Part):
     """A bottom given as a surface of triangles: a leaning plate, or surveyed points.
 
-    surface   over the plan (`terrain.Surface`)
-    survey    `soundings.SurveyedSurface`, or None for a plate of a given slope
+    Attributes
+    ----------
+    surface : Surface
+        Over the plan (`terrain.Surface`).
+    survey : SurveyedSurface or None
+        `soundings.SurveyedSurface`, or None for a plate of a given slope.
     """
 
     surface: Surface

@@ -24,11 +24,17 @@ SAME_M = 1e-9  # dips nearer than this are the same
 class Quantity:
     """A volume with its uncertainty: value, standard u, effective dof, factor k, expanded U.
 
-    k         None where U is not k u but Monte Carlo's
-    for_use   False where a dip stands in a zone in which the table must not be used
-    interval  whose U is: "gum", "monte_carlo"; "gum_not_simulated" of a delivery that Monte Carlo
-              did not look at, though it looked at the table
-    ends_m3   (low, high) of Monte Carlo's interval; None: value - U and value + U
+    Attributes
+    ----------
+    k : float or None
+        None where U is not k u but Monte Carlo's.
+    for_use : bool
+        False where a dip stands in a zone in which the table must not be used.
+    interval : str
+        Whose U is: "gum", "monte_carlo"; "gum_not_simulated" of a delivery that Monte Carlo did not
+        look at, though it looked at the table.
+    ends_m3 : tuple[float, float] or None
+        (low, high) of Monte Carlo's interval; None: value - U and value + U.
     """
 
     value_m3: float
@@ -61,8 +67,11 @@ class Quantity:
 class Capacity:
     """The table: (rows,) dip heights from the table's zero, volumes, and areas of the cut.
 
-    critical_m  (low, high) dips between which the table is not for use, or None: a floating roof
-                that is partly afloat
+    Attributes
+    ----------
+    critical_m : tuple[float, float] or None
+        (low, high) dips between which the table is not for use, or None: a floating roof that is
+        partly afloat.
     """
 
     height_m: np.ndarray

@@ -22,17 +22,27 @@ HIGHEST_DEGREE, MOST_AMPLIFICATION = 2, 2.5  # of the noise of a section, at the
 class CourseShape:
     """One course: where it stands, and the area products of its outlines at its Gauss levels.
 
-    degree         of the polynomial in height: sections - 1, at most 2, less where it would carry
-                   the noise of a section more than 2.5-fold to an end of the course
-    products_m2    (q, q) G_ij of the inside outlines, q = degree + 1
-    girths_m       (q, q) derivative of -G_ij by the inset (plate, paint): mean girths
-    by_scale_m2    (q, q) derivative of G_ij by a scale of the surveyed lengths
-    by_parameters  (q, q, p) derivative of G_ij by the parameters of the course's outlines
-    by_form_m2     (q, q, modes) effect on G_ij of one sd of each mode of the form, between points,
-                   that is common to all courses
-    by_own_form_m2 (q, q, 2 modes) the same of the form of this course alone
-    barrel         (q,) what the outlines show of a barrel of one metre (1 in the middle of the
-                   course, 0 at its ends)
+    Attributes
+    ----------
+    degree : int
+        Of the polynomial in height: sections - 1, at most 2, less where it would carry the noise of
+        a section more than 2.5-fold to an end of the course.
+    products_m2 : ndarray, shape (q, q)
+        G_ij of the inside outlines, q = degree + 1.
+    girths_m : ndarray, shape (q, q)
+        Derivative of -G_ij by the inset (plate, paint): mean girths.
+    by_scale_m2 : ndarray, shape (q, q)
+        Derivative of G_ij by a scale of the surveyed lengths.
+    by_parameters : ndarray, shape (q, q, p)
+        Derivative of G_ij by the parameters of the course's outlines.
+    by_form_m2 : ndarray, shape (q, q, modes)
+        Effect on G_ij of one sd of each mode of the form, between points, that is common to all
+        courses.
+    by_own_form_m2 : ndarray, shape (q, q, 2 modes)
+        The same of the form of this course alone.
+    barrel : ndarray, shape (q,)
+        What the outlines show of a barrel of one metre (1 in the middle of the course, 0 at its
+        ends).
     """
 
     bottom_m: float
@@ -70,11 +80,16 @@ def barrel(t):
 def course_shape(bottom_m, top_m, levels_m, outlines, *, inset_m=0.0, scale=1.0):
     """One course from the outlines of its sections, as surveyed.
 
-    levels_m (k,) heights of the k outlines above the bottom of the first course
-    inset_m  plate and paint to take off the radius (0 when surveyed inside); the difference between
-             radial and normal thickness is its (r'/r)^2/2 part, 5e-4 of it at the
-             flank of a narrow dent of 30 mm
-    scale    of horizontal lengths, for the shell's temperature
+    Parameters
+    ----------
+    levels_m : ndarray, shape (k,)
+        Heights of the k outlines above the bottom of the first course.
+    inset_m : optional
+        Plate and paint to take off the radius (0 when surveyed inside); the difference between
+        radial and normal thickness is its (r'/r)^2/2 part, 5e-4 of it at the flank of a narrow dent
+        of 30 mm.
+    scale : optional
+        Of horizontal lengths, for the shell's temperature.
     """
     levels = (np.asarray(levels_m, dtype=float) - bottom_m) / (top_m - bottom_m)
     degree = _degree(levels)

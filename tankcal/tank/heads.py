@@ -28,7 +28,10 @@ KINDS = ("flat", "conical", "ellipsoidal", "torispherical", "spherical")
 class Line:
     """A straight piece of a meridian, r = radius_m + slope x; its parameter is x, m.
 
-    by_input  {input: derivative of (radius_m, slope) by it}
+    Attributes
+    ----------
+    by_input : dict
+        {input: derivative of (radius_m, slope) by it}.
     """
 
     start: float
@@ -62,7 +65,11 @@ class Bow:
     """A piece of an ellipse; its parameter is the angle u, 0 where the radius is greatest.
 
     x = centre_m + along_m sin u, r = offset_m + across_m cos u, from start to stop, rad
-    by_input  {input: derivative of (centre_m, offset_m, along_m, across_m) by it}
+
+    Attributes
+    ----------
+    by_input : dict
+        {input: derivative of (centre_m, offset_m, along_m, across_m) by it}.
     """
 
     start: float
@@ -104,11 +111,17 @@ class Bow:
 class End:
     """An end of a lying tank, as seen from its own tangent line (the edge of the cylinder).
 
-    kind             "flat", "conical", "ellipsoidal", "torispherical" or "spherical"
-    depth_m          from the tangent line to the tip, inside; of a torispherical end it follows
-                     from its radii, and a flat end has none
-    dish_radius_m    and knuckle_radius_m of a torispherical end, inside
-    inward           the end bulges into the tank (bulkheads of road tankers)
+    Attributes
+    ----------
+    kind : str
+        "flat", "conical", "ellipsoidal", "torispherical" or "spherical".
+    depth_m : float
+        From the tangent line to the tip, inside; of a torispherical end it follows from its radii,
+        and a flat end has none.
+    dish_radius_m, knuckle_radius_m : float or None
+        Of a torispherical end, inside.
+    inward : bool
+        The end bulges into the tank (bulkheads of road tankers).
     """
 
     kind: str = "flat"
@@ -129,7 +142,11 @@ def meridian(end, radius_m):
     Each arc knows its derivatives by "radius" and "end_depth" (the other stays; of a torispherical
     end its two radii stay with "radius", and "end_depth" stretches it along the axis) and
     "end_plate" (h, or f and k, are less by it; R stays).
-    Raises SolutionError, with the numbers, for sizes that make no such end.
+
+    Raises
+    ------
+    SolutionError
+        With the numbers, for sizes that make no such end.
     """
     if end.kind not in KINDS:
         raise SolutionError(f"no end is called {end.kind!r}: expected one of {', '.join(KINDS)}")
@@ -230,9 +247,14 @@ def _torispherical(end, radius_m):
 class Cut:
     """Sections of one arc and the liquid in them; arrays of one shape.
 
-    parameter           of the arc, of which the sections are
-    x_m, radius_m       place and radius of each section
-    height_m            of the liquid's surface above the axis
+    Attributes
+    ----------
+    parameter : ndarray
+        Of the arc, of which the sections are.
+    x_m, radius_m : ndarray
+        Place and radius of each section.
+    height_m : ndarray
+        Of the liquid's surface above the axis.
     """
 
     arc: Line | Bow
@@ -280,10 +302,16 @@ class Cut:
 def integrate(arc, level_m, slope, integrands, nodes=NODES):
     """Integrals over x along an arc, below the line level_m - slope x: (integrands, rows).
 
-    arc         Line or Bow
-    level_m     (rows,) height of the liquid above the axis at x = 0
-    slope       fall of that height per metre of x, any number
-    integrands  functions of a `Cut`, such as Cut.segment
+    Parameters
+    ----------
+    arc
+        Line or Bow.
+    level_m : ndarray, shape (rows,)
+        Height of the liquid above the axis at x = 0.
+    slope
+        Fall of that height per metre of x, any number.
+    integrands
+        Functions of a `Cut`, such as Cut.segment.
     """
     level_m = np.asarray(level_m, dtype=float)
     row, parameter, weight = _wet_nodes(arc, level_m, slope, nodes)

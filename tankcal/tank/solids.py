@@ -22,14 +22,6 @@ FLAT = End("flat")
 class LyingTank(Part):
     """A lying cylinder, round or elliptical, between two ends, tilted and rolled: exact.
 
-    width_m, height_m  inside axes of the section, square to the axis; equal when it is round
-    length_m           inside length of the cylinder, without its ends
-    end_a, end_b       each of its own kind and size
-    tilt               tan of the angle by which the axis rises from A to B (negative: falls)
-    roll_rad           turn of the section about the axis; of no effect when it is round
-    dip_from_a_m       place of the dip's zero, along the axis from the start of the cylinder at A
-    dip_direction      "plumb": the dip is read along the vertical; "square": square to the axis
-
     The zero is the lowest point of the section at dip_from_a_m, where the plumb line touches the
     bottom; in a tilted tank liquid may lie lower, so the volume at dip 0 may be above zero. With
     level c_p above the axis in that section, B the half height of the rolled section and a dip d,
@@ -40,8 +32,32 @@ class LyingTank(Part):
     Sections of an end are similar to that of the cylinder. An elliptical tank is computed as the
     round one of equal section area, with heights times sqrt(width height) / (2 B), which is exact;
     the radii and the spherical form of an end are those of that round tank.
-    Source: Jones 2001, Computing fluid tank volumes (untilted); the tilt by quadrature, `heads`.
-    Raises SolutionError for sizes that make no tank.
+
+    Attributes
+    ----------
+    width_m, height_m : float
+        Inside axes of the section, square to the axis; equal when it is round.
+    length_m : float
+        Inside length of the cylinder, without its ends.
+    end_a, end_b : End
+        Each of its own kind and size.
+    tilt : float
+        Tan of the angle by which the axis rises from A to B (negative: falls).
+    roll_rad : float
+        Turn of the section about the axis; of no effect when it is round.
+    dip_from_a_m : float
+        Place of the dip's zero, along the axis from the start of the cylinder at A.
+    dip_direction : str
+        "plumb": the dip is read along the vertical; "square": square to the axis.
+
+    Raises
+    ------
+    SolutionError
+        For sizes that make no tank.
+
+    References
+    ----------
+    .. [1] Jones 2001, Computing fluid tank volumes (untilted); the tilt by quadrature, `heads`.
     """
 
     width_m: float
@@ -239,7 +255,14 @@ class _Piece:
 class Sphere(Part):
     """A spherical tank; dips count from its lowest inside point: V = pi d^2 (3 R - d) / 3.
 
-    Source: API MPMS 2.2D; closed form. Raises SolutionError for a diameter that is not above zero.
+    Raises
+    ------
+    SolutionError
+        For a diameter that is not above zero.
+
+    References
+    ----------
+    .. [1] API MPMS 2.2D; closed form.
     """
 
     diameter_m: float

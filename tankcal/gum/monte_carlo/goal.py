@@ -19,14 +19,22 @@ SAFETY = 1.3  # a standard error from ten batches is itself known to a quarter
 class Goal:
     """When to stop.
 
-    probability  of the intervals
-    digits       significant digits of u that count (n_dig of JCGM 101 7.9.2)
-    fraction     of the numerical tolerance that two standard errors may take; 0.2 for a verdict
-                 on the GUM interval (8.2). The ends of the shortest interval may take all of it
-    plain_draws  no standard error of u and of the symmetric ends is to exceed that of so many
-                 plain draws; also the most that are drawn where nothing helps
-    memory       bytes that the draws and rows held at once may take
-    seed         of all draws
+    Attributes
+    ----------
+    probability : float
+        Of the intervals.
+    digits : int
+        Significant digits of u that count (n_dig of JCGM 101 7.9.2).
+    fraction : float
+        Of the numerical tolerance that two standard errors may take; 0.2 for a verdict on the GUM
+        interval (8.2). The ends of the shortest interval may take all of it.
+    plain_draws : int
+        No standard error of u and of the symmetric ends is to exceed that of so many plain draws;
+        also the most that are drawn where nothing helps.
+    memory : int
+        Bytes that the draws and rows held at once may take.
+    seed : int
+        Of all draws.
     """
 
     probability: float = 0.95
@@ -62,15 +70,26 @@ def numerical_tolerance(u, digits=2):
 class Simulation:
     """Estimates of every row, each (rows,) in the rows' unit, and the standard error of each.
 
-    value, u                     mean and standard deviation
-    low, high                    probabilistically symmetric interval (JCGM 101 7.7.2)
-    shortest_low, shortest_high  shortest interval (7.7.3, 7.7.4)
-    se_value ... se_shortest_high  standard errors, from independent batches
-    tolerance  numerical tolerance of u (7.9.2)
-    reached    (rows,) whether two standard errors are within what the goal allows
-    draws      (rows,) evaluations of the model that stand behind a row
-    controlled (rows,) whether the linear part served as control variate
-    probability  of the intervals
+    Attributes
+    ----------
+    value, u : ndarray
+        Mean and standard deviation.
+    low, high : ndarray
+        Probabilistically symmetric interval (JCGM 101 7.7.2).
+    shortest_low, shortest_high : ndarray
+        Shortest interval (7.7.3, 7.7.4).
+    se_value, se_u, se_low, se_high, se_shortest_low, se_shortest_high : ndarray
+        Standard errors, from independent batches.
+    tolerance : ndarray
+        Numerical tolerance of u (7.9.2).
+    reached : ndarray, shape (rows,)
+        Whether two standard errors are within what the goal allows.
+    draws : ndarray, shape (rows,)
+        Evaluations of the model that stand behind a row.
+    controlled : ndarray, shape (rows,)
+        Whether the linear part served as control variate.
+    probability : float
+        Of the intervals.
     """
 
     value: np.ndarray
@@ -158,11 +177,18 @@ def _tolerance(goal, estimates):
 class Verdict:
     """The comparison of both intervals, each (rows,), in the rows' unit.
 
-    d_low, d_high  |GUM end - Monte Carlo end| (8.1)
-    tolerance      numerical tolerance of the GUM's u with the digits asked for; nan where u is 0
-    validated      both differences are within the tolerance; exact rows (u = 0) are
-    sure           two standard errors of the Monte Carlo ends would not change the verdict
-    low, high      the interval that counts: the GUM's where it is validated, else Monte Carlo's
+    Attributes
+    ----------
+    d_low, d_high : ndarray
+        |GUM end - Monte Carlo end| (8.1).
+    tolerance : ndarray
+        Numerical tolerance of the GUM's u with the digits asked for; nan where u is 0.
+    validated : ndarray
+        Both differences are within the tolerance; exact rows (u = 0) are.
+    sure : ndarray
+        Two standard errors of the Monte Carlo ends would not change the verdict.
+    low, high : ndarray
+        The interval that counts: the GUM's where it is validated, else Monte Carlo's.
     """
 
     d_low: np.ndarray
@@ -186,8 +212,15 @@ def verdict(found, value, u, dof=np.inf, *, digits=2, shortest=False):
     """Judge the GUM intervals value +- k u against a Simulation.
 
     d = |value -+ k u - y|, validated where d <= tolerance at both ends; k of Student's t for dof
-    value, u, dof  (rows,) of the law of propagation; digits  of u that count (7.9.2)
-    shortest       compare with the shortest intervals instead of the symmetric ones
+
+    Parameters
+    ----------
+    value, u, dof : ndarray, shape (rows,)
+        Of the law of propagation.
+    digits : optional
+        Of u that count (7.9.2).
+    shortest : optional
+        Compare with the shortest intervals instead of the symmetric ones.
     """
     value, u = np.asarray(value, dtype=float), np.asarray(u, dtype=float)
     half = coverage_factor(found.probability, dof) * u

@@ -24,11 +24,18 @@ CELLS = 1 << 16  # draws by rows held at once
 class QuadraticRows:
     """A model of many rows that share few inputs; called with draws it gives the rows.
 
-    value     (rows,) at the means of the inputs
-    jacobian  (rows, n) derivatives by the inputs
-    hessians  (k, n, n) symmetric, H_k; half the second derivatives where a row's b_k is 1
-    weights   (rows, k) b_k
-    mean      (n,) means of the inputs
+    Attributes
+    ----------
+    value : ndarray, shape (rows,)
+        At the means of the inputs.
+    jacobian : ndarray, shape (rows, n)
+        Derivatives by the inputs.
+    hessians : ndarray, shape (k, n, n)
+        Symmetric, H_k; half the second derivatives where a row's b_k is 1.
+    weights : ndarray, shape (rows, k)
+        b_k.
+    mean : ndarray, shape (n,)
+        Means of the inputs.
     """
 
     value: np.ndarray

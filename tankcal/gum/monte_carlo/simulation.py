@@ -25,15 +25,31 @@ DIFFERENCE = 1e-3  # step of the derivatives, in scales of the input
 def simulate(model, inputs, correlation=None, *, goal=None, sensitivities=None, progress=None):
     """Mean, u and 95 % intervals of every row of a model, by Monte Carlo.
 
-    model        model(x) -> (draws, rows) for x (draws, n), or QuadraticRows: then no matrix of
-                 draws by rows is formed but in blocks
-    inputs       (n,) distributions: mean, sd, quantile(p); with characteristic(t), E cos(t (X -
-                 mean)) of a symmetric input, the linear part of the model serves as control
-    correlation  (n, n) of the inputs, of their normal scores where they are not normal
-    goal         Goal: probability, tolerance, seed, memory
-    sensitivities  (rows, n) derivatives at the means; by default by differences
-    progress     progress(text, done, total) is called after every batch
-    Returns a Simulation. Raises ValueError for what cannot be a correlation or has other shapes.
+    Parameters
+    ----------
+    model
+        model(x) -> (draws, rows) for x (draws, n), or QuadraticRows: then no matrix of draws by
+        rows is formed but in blocks.
+    inputs : ndarray, shape (n,)
+        Distributions: mean, sd, quantile(p); with characteristic(t), E cos(t (X - mean)) of a
+        symmetric input, the linear part of the model serves as control.
+    correlation : ndarray, shape (n, n), optional
+        Of the inputs, of their normal scores where they are not normal.
+    goal : optional
+        Goal: probability, tolerance, seed, memory.
+    sensitivities : ndarray, shape (rows, n), optional
+        Derivatives at the means; by default by differences.
+    progress : optional
+        progress(text, done, total) is called after every batch.
+
+    Returns
+    -------
+    Simulation
+
+    Raises
+    ------
+    ValueError
+        For what cannot be a correlation or has other shapes.
     """
     goal = goal or Goal()
     ready = inputs_of(inputs, correlation)

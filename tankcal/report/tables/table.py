@@ -147,7 +147,10 @@ def _known(columns, rows):
 def decimals_of_cells(column, rows, factor=1.0, rounds_whole=True):
     """Decimals of each cell of a column of numbers, shown as `factor` times its value.
 
-    rounds_whole  whether a column of uncertainties may round whole digits off: 417 L to 420 L
+    Parameters
+    ----------
+    rounds_whole : optional
+        Whether a column of uncertainties may round whole digits off: 417 L to 420 L.
     """
     if column.u is None:
         if column.height:

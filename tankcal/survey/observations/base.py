@@ -17,16 +17,25 @@ from tankcal.geometry.rotations import apply_small_rotation
 class State:
     """Values of all unknowns; coordinates are relative to the survey's centre.
 
-    xyz_m            (points, 3)
-    photo_xyz_m      (photos, 3) projection centres
-    rotation         (photos, 3, 3) R3(kappa) R2(phi) R1(omega)
-    interior         (q + 1,) interior parameters, mm; the last is 0, for those left out
-    orientation_rad  (sets,) of direction sets: azimuth of the circle's zero
-    scale            (instruments,) reading = true (1 + scale) + offset
-    offset_m         (instruments,)
-    system           (systems, 3, 3) rotations of further control systems
-    system_shift_m   (systems, 3)
-    system_scale     (systems,) scale minus one
+    Attributes
+    ----------
+    xyz_m : ndarray, shape (points, 3)
+    photo_xyz_m : ndarray, shape (photos, 3)
+        Projection centres.
+    rotation : ndarray, shape (photos, 3, 3)
+        R3(kappa) R2(phi) R1(omega).
+    interior : ndarray, shape (q + 1,)
+        Interior parameters, mm; the last is 0, for those left out.
+    orientation_rad : ndarray, shape (sets,)
+        Of direction sets: azimuth of the circle's zero.
+    scale : ndarray, shape (instruments,)
+        Reading = true (1 + scale) + offset.
+    offset_m : ndarray, shape (instruments,)
+    system : ndarray, shape (systems, 3, 3)
+        Rotations of further control systems.
+    system_shift_m : ndarray, shape (systems, 3)
+    system_scale : ndarray, shape (systems,)
+        Scale minus one.
     """
 
     xyz_m: np.ndarray
@@ -45,8 +54,15 @@ class State:
 class Layout:
     """Column of each unknown in the adjustment, -1 where it is fixed or left out.
 
-    points (points, 3), photos (photos, 6), interior (q + 1,), orientation (sets,),
-    scale (instruments,), offset (instruments,), system (systems, 7: rotation, shift, scale)
+    Attributes
+    ----------
+    points : ndarray of int, shape (points, 3)
+    photos : ndarray of int, shape (photos, 6)
+    interior : ndarray of int, shape (q + 1,)
+    orientation : ndarray of int, shape (sets,)
+    scale, offset : ndarray of int, shape (instruments,)
+    system : ndarray of int, shape (systems, 7)
+        Rotation, shift, scale.
     """
 
     points: np.ndarray
@@ -82,9 +98,14 @@ class Layout:
 class Observations:
     """Observations of one kind; subclasses add what they tie together.
 
-    value  (n,) or (n, m) observed
-    sd     like value, standard deviations
-    use    (n,) share with which each takes part: 1, 0 when set aside, between for robust starts
+    Attributes
+    ----------
+    value : ndarray, shape (n,)
+        Or (n, m) observed.
+    sd : ndarray
+        Like value, standard deviations.
+    use : ndarray, shape (n,)
+        Share with which each takes part: 1, 0 when set aside, between for robust starts.
     """
 
     value: np.ndarray

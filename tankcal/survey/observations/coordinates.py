@@ -11,8 +11,11 @@ from tankcal.survey.observations.base import Observations
 class ControlCoordinates(Observations):
     """Single control coordinates (n,), m, relative to the centre.
 
-    point  (n,)
-    axis   (n,) 0 x, 1 y, 2 z
+    Attributes
+    ----------
+    point : ndarray, shape (n,)
+    axis : ndarray, shape (n,)
+        0 x, 1 y, 2 z.
     """
 
     point: np.ndarray
@@ -36,8 +39,11 @@ class SystemCoordinates(Observations):
 
         X_system = (1 + scale) R_system X + shift
 
-    point, axis  (n,) as for ControlCoordinates
-    system       (n,)
+    Attributes
+    ----------
+    point, axis : ndarray, shape (n,)
+        As for ControlCoordinates.
+    system : ndarray, shape (n,)
     """
 
     point: np.ndarray
@@ -161,8 +167,12 @@ class Vectors(Observations):
 class KnownUnknowns(Observations):
     """Unknowns with a value and an sd known beforehand: interior parameters, scales, offsets.
 
-    of      "interior", "scale", "offset_m", "orientation_rad" or "system_scale": field of State
-    index   (n,) place in that field
+    Attributes
+    ----------
+    of : str
+        "interior", "scale", "offset_m", "orientation_rad" or "system_scale": field of State.
+    index : ndarray, shape (n,)
+        Place in that field.
     """
 
     of: str

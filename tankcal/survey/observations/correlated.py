@@ -16,8 +16,11 @@ from tankcal.survey.observations.base import Observations
 class Block:
     """Values of a survey that are correlated.
 
-    source, row, component  (m,) number of their table in Survey.observations, row there, value
-    covariance              (m, m)
+    Attributes
+    ----------
+    source, row, component : ndarray, shape (m,)
+        Number of their table in Survey.observations, row there, value.
+    covariance : ndarray, shape (m, m)
     """
 
     source: np.ndarray
@@ -30,9 +33,13 @@ class Block:
 class Correlated(Observations):
     """One observation of m correlated values; value and sd (1, m) are zeros and ones.
 
-    parts       tuple of (observations of one kind, (k,) component of each), m in all
-    covariance  (m, m)
-    all_of      Layout in which every unknown, also what is fixed, has a number of its own
+    Attributes
+    ----------
+    parts : tuple
+        Tuple of (observations of one kind, (k,) component of each), m in all.
+    covariance : ndarray, shape (m, m)
+    all_of
+        Layout in which every unknown, also what is fixed, has a number of its own.
     """
 
     parts: tuple

@@ -34,10 +34,14 @@ NAMES = ("x", "y", "z", "omega", "phi", "kappa", "phi", "phi", "omega", "phi", "
 class HeldOrientation(Observations):
     """Elements of the exterior orientation that hold exactly; value in m (relative) or rad.
 
-    photo     (n,)
-    row       (n,) 0 1 2 for x, y, z, 3 4 5 for omega, phi, kappa, 6 7 for phi at +-90 deg, 8 9 10
-              for the rotation vector from `rotation`
-    rotation  (n, 3, 3) known, of rows 8 to 10
+    Attributes
+    ----------
+    photo : ndarray, shape (n,)
+    row : ndarray, shape (n,)
+        0 1 2 for x, y, z, 3 4 5 for omega, phi, kappa, 6 7 for phi at +-90 deg, 8 9 10 for the
+        rotation vector from `rotation`.
+    rotation : ndarray, shape (n, 3, 3)
+        Known, of rows 8 to 10.
     """
 
     photo: np.ndarray
@@ -99,7 +103,10 @@ def _element(rotation, i, j):
 def exact_rows(one):
     """(n,) True for the observations of a table that hold exactly: sd 0, and taking part.
 
-    Raises SolutionError when only a part of an observation has the sd 0.
+    Raises
+    ------
+    SolutionError
+        When only a part of an observation has the sd 0.
     """
     zero = np.asarray(one.sd).reshape(len(one), one.rows) == 0
     if not zero.any():
@@ -116,7 +123,10 @@ def exact_rows(one):
 def make_conditions(one):
     """Observations that hold exactly, to be filled without an sd, and their rows' numbers (k,).
 
-    one  observations with sd 0
+    Parameters
+    ----------
+    one
+        Observations with sd 0.
     """
     n = len(one)
     if isinstance(one, PhotoRotation):

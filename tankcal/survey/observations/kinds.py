@@ -21,9 +21,16 @@ from tankcal.survey.observations.sights import (
 class Kind:
     """What the rows of one table are.
 
-    observes    class of the observations        options  that it is made with
-    group       under which their sds are judged together, where no instrument is named
-    either_way  True: read from one end to the other or back is the same
+    Attributes
+    ----------
+    observes : type
+        Class of the observations.
+    options : dict
+        That it is made with.
+    group : str
+        Under which their sds are judged together, where no instrument is named.
+    either_way : bool
+        True: read from one end to the other or back is the same.
     """
 
     observes: type

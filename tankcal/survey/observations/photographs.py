@@ -20,10 +20,15 @@ from tankcal.survey.observations.base import Observations
 class ImageCoordinates(Observations):
     """Measured image coordinates (n, 2) in mm, of cameras with one convention.
 
-    point, photo  (n,)
-    form          Form of the distortion (tankcal.camera.model)
-    active        (k,) places in PARAMETERS of the parameters that are not left out
-    interior_of   (photos, 13) place of each photo's parameters in State.interior
+    Attributes
+    ----------
+    point, photo : ndarray, shape (n,)
+    form
+        Form of the distortion (tankcal.camera.model).
+    active : ndarray, shape (k,)
+        Places in PARAMETERS of the parameters that are not left out.
+    interior_of : ndarray, shape (photos, 13)
+        Place of each photo's parameters in State.interior.
     """
 
     point: np.ndarray
@@ -68,8 +73,11 @@ class ImageCoordinates(Observations):
 class PhotoOrientation(Observations):
     """Single elements of the exterior orientation known beforehand.
 
-    photo    (n,)
-    element  (n,) 0 1 2 for x, y, z (m, relative to the centre), 3 4 5 for omega, phi, kappa (rad)
+    Attributes
+    ----------
+    photo : ndarray, shape (n,)
+    element : ndarray, shape (n,)
+        0 1 2 for x, y, z (m, relative to the centre), 3 4 5 for omega, phi, kappa (rad).
     """
 
     photo: np.ndarray
@@ -104,15 +112,20 @@ class PhotoOrientation(Observations):
 class PhotoRotation(Observations):
     """Whole rotations known beforehand, for photos of which all three angles are.
 
-    value     (n, 3) zeros
-    sd        (n, 3) rad, of omega, phi, kappa
-    photo     (n,)
-    rotation  (n, 3, 3) known
-
     The misclosure is the small rotation vector from the known rotation, with the covariance that
     the sds of the angles give it there: no angle of the rotation that is being adjusted is needed.
     Near phi = 90 deg omega and kappa turn about the same axis, and their sds say nothing about a
     third one: no direction is held tighter than a tenth of the smallest sd.
+
+    Attributes
+    ----------
+    value : ndarray, shape (n, 3)
+        Zeros.
+    sd : ndarray, shape (n, 3)
+        Rad, of omega, phi, kappa.
+    photo : ndarray, shape (n,)
+    rotation : ndarray, shape (n, 3, 3)
+        Known.
     """
 
     photo: np.ndarray

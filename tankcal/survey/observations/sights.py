@@ -19,8 +19,12 @@ from tankcal.survey.observations.base import Observations
 class Sights(Observations):
     """Observations from one point to another.
 
-    start, end  (n,) points
-    rise_m      (n,) height of the instrument minus height of the target; None: zero
+    Attributes
+    ----------
+    start, end : ndarray, shape (n,)
+        Points.
+    rise_m : ndarray, shape (n,)
+        Height of the instrument minus height of the target; None: zero.
     """
 
     start: np.ndarray

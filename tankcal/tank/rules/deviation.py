@@ -33,18 +33,29 @@ class StatedVolume:
 class DeviationVerdict:
     """What became of one DeviationLimit at one stated volume.
 
-    limit, stated  the DeviationLimit, the StatedVolume
-    code           "conforms": in the acceptance interval; "guard_band": in the tolerance but not
-                   accepted; "fails": outside the tolerance; "not_for_use": the dip is in the
-                   critical zone of a roof
-    passed         True for "conforms", None for "not_for_use", else False
-    volume_m3, k, dof   of the table
-    U_m3, u_m3     as printed: u is larger than the table's as U is
-    deviation_m3   table less stated
-    tolerance_m3   (T_L, T_U) of the volume; infinite on a side that is not limited
-    accepted_m3    (A_L, A_U), A_L > A_U where the guard bands leave nothing
-    guard_m3       w
-    probability    of conformity, 0 to 1
+    Attributes
+    ----------
+    limit, stated
+        The DeviationLimit, the StatedVolume.
+    code : str
+        "conforms": in the acceptance interval; "guard_band": in the tolerance but not accepted;
+        "fails": outside the tolerance; "not_for_use": the dip is in the critical zone of a roof.
+    passed : bool or None
+        True for "conforms", None for "not_for_use", else False.
+    volume_m3, k, dof : float
+        Of the table.
+    U_m3, u_m3 : float
+        As printed: u is larger than the table's as U is.
+    deviation_m3 : float
+        Table less stated.
+    tolerance_m3 : tuple[float, float]
+        (T_L, T_U) of the volume; infinite on a side that is not limited.
+    accepted_m3 : tuple[float, float]
+        (A_L, A_U), A_L > A_U where the guard bands leave nothing.
+    guard_m3 : float
+        w.
+    probability : float
+        Of conformity, 0 to 1.
     """
 
     limit: DeviationLimit
@@ -66,9 +77,14 @@ class DeviationVerdict:
 def conformity_probability(value, u, lower, upper, dof=np.inf):
     """p_c = F((upper - value)/u) - F((lower - value)/u), vectorised.
 
-    value, u       estimate and standard uncertainty; u = 0: 1 inside the limits, else 0
-    lower, upper   limits, -inf or inf where there is none
-    dof            degrees of freedom of u: Student's t; inf: normal
+    Parameters
+    ----------
+    value, u
+        Estimate and standard uncertainty; u = 0: 1 inside the limits, else 0.
+    lower, upper
+        Limits, -inf or inf where there is none.
+    dof : optional
+        Degrees of freedom of u: Student's t; inf: normal.
     """
     value, u, lower, upper, dof = np.broadcast_arrays(value, u, lower, upper, dof)
     exact = u == 0

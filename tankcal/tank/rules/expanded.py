@@ -33,17 +33,27 @@ TO_LOWEST = 12  # deliveries to the lowest dip that are simulated for a limit
 class UncertaintyVerdict:
     """What became of one UncertaintyLimit.
 
-    limit       the UncertaintyLimit
-    code        "holds": everywhere; "holds_from": only from `from_m` on; "fails": nowhere;
-                "stated": nothing is limited; "nothing_to_judge": no row or delivery is for use
-    passed      True for "holds", False for "holds_from" and "fails", else None
-    from_m      least dip from which on all rows keep the limit, or least height of deliveries that
-                do; None: none does, or nothing is limited
-    from_m3     volume at that dip; None for deliveries
-    worst_low_m, worst_m   dips of what is nearest to the limit or farthest beyond it; worst_low_m
-                is None but for deliveries; both are None where there is nothing to judge
-    worst_m3, worst_U_m3   its volume and U
-    worst_ratio U over what relative_to names (limit where it is just kept); inf for an empty tank
+    Attributes
+    ----------
+    limit : UncertaintyLimit
+        The UncertaintyLimit.
+    code : str
+        "holds": everywhere; "holds_from": only from `from_m` on; "fails": nowhere; "stated":
+        nothing is limited; "nothing_to_judge": no row or delivery is for use.
+    passed : bool or None
+        True for "holds", False for "holds_from" and "fails", else None.
+    from_m : float or None
+        Least dip from which on all rows keep the limit, or least height of deliveries that do;
+        None: none does, or nothing is limited.
+    from_m3 : float or None
+        Volume at that dip; None for deliveries.
+    worst_low_m, worst_m : float or None
+        Dips of what is nearest to the limit or farthest beyond it; worst_low_m is None but for
+        deliveries; both are None where there is nothing to judge.
+    worst_m3, worst_U_m3 : float or None
+        Its volume and U.
+    worst_ratio : float or None
+        U over what relative_to names (limit where it is just kept); inf for an empty tank.
     """
 
     limit: UncertaintyLimit

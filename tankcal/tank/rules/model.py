@@ -21,13 +21,25 @@ GUARDS = ("none", "U")
 class UncertaintyLimit:
     """A limit of the expanded uncertainty U.
 
-    name           as the file names it                tanks  kinds it is for; (): all
-    of             "volumes": of every row; "capacity": of the highest row; "deliveries": of all
-                   of at least minimum_height_m
-    limit          U over what `relative_to` names; None: U is to be stated, nothing is limited
-    relative_to    "itself": the row, the capacity, the delivered volume; "capacity"
-    minimum_height_m   of a delivery; None for the others
-    clause         where it stands                     verified  whether it was read there
+    Attributes
+    ----------
+    name : str
+        As the file names it.
+    tanks : tuple of str
+        Kinds it is for; (): all.
+    of : str
+        "volumes": of every row; "capacity": of the highest row; "deliveries": of all of at least
+        minimum_height_m.
+    limit : float or None
+        U over what `relative_to` names; None: U is to be stated, nothing is limited.
+    relative_to : str
+        "itself": the row, the capacity, the delivered volume; "capacity".
+    minimum_height_m : float or None
+        Of a delivery; None for the others.
+    clause : str
+        Where it stands.
+    verified : bool
+        Whether it was read there.
     """
 
     name: str
@@ -44,11 +56,20 @@ class UncertaintyLimit:
 class DeviationLimit:
     """A limit of the deviation of a volume from a stated one.
 
-    of       "volumes": at any dip; "capacity": of the highest row; "deliveries"
-    limit    part of the stated volume                 limit_m3  or an amount; one of them is None
-    side     "both", "upper": only larger volumes are limited, "lower": only smaller ones
-    guard    "none": accepted up to the limit; "U": up to the limit less U (JCGM 106:2012 8.3.2)
-    name, tanks, clause, verified  as of an UncertaintyLimit
+    Attributes
+    ----------
+    of : str
+        "volumes": at any dip; "capacity": of the highest row; "deliveries".
+    limit : float or None
+        Part of the stated volume.
+    limit_m3 : float or None
+        Or an amount; one of them is None.
+    side : str
+        "both", "upper": only larger volumes are limited, "lower": only smaller ones.
+    guard : str
+        "none": accepted up to the limit; "U": up to the limit less U (JCGM 106:2012 8.3.2).
+    name, tanks, clause, verified
+        As of an UncertaintyLimit.
     """
 
     name: str
@@ -66,9 +87,16 @@ class DeviationLimit:
 class Rule:
     """One jurisdiction's decision rule.
 
-    source              where the values were read     verified  all of them in the text itself
-    remark              what is to stand beside it; "": nothing
-    largest_capacity_m3 tanks up to which it is for; None: all
+    Attributes
+    ----------
+    source : str
+        Where the values were read.
+    verified : bool
+        All of them in the text itself.
+    remark : str
+        What is to stand beside it; "": nothing.
+    largest_capacity_m3 : float or None
+        Tanks up to which it is for; None: all.
     """
 
     name: str

@@ -9,11 +9,17 @@ import numpy as np
 class Printed:
     """U of rows and deliveries as papers print them: Monte Carlo's where the GUM's does not hold.
 
-    rows_m3   (rows,) U of the rows
-    by_gum    (rows,) whether it is the table's own; None: all
-    pairs_m3  {(low_m, high_m): U} of the deliveries that were simulated
-    factor    of U of every other delivery: the largest that a simulated one needed whose volumes
-              are smooth at both dips, at least 1
+    Attributes
+    ----------
+    rows_m3 : ndarray, shape (rows,)
+        U of the rows.
+    by_gum : ndarray, shape (rows,), or None
+        Whether it is the table's own; None: all.
+    pairs_m3 : dict
+        {(low_m, high_m): U} of the deliveries that were simulated.
+    factor : float
+        Of U of every other delivery: the largest that a simulated one needed whose volumes are
+        smooth at both dips, at least 1.
     """
 
     rows_m3: np.ndarray

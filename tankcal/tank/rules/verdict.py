@@ -14,16 +14,26 @@ from tankcal.tank.rules.printed import printed_of_table
 class RuleVerdict:
     """What a Rule says of a table.
 
-    rule         the Rule                    tank      kind of tank that it was asked for
-    code         "passed": every limit is kept everywhere; "passed_in_part": the uncertainty keeps
-                 its limits from some level on; "failed"; "not_accepted": nothing fails, but a
-                 deviation lies in a guard band; "stated": nothing is limited;
-                 "nothing_to_judge"; "not_all_judged": nothing failed, but `unjudged` limits had
-                 nothing to be held against; "not_for_this_tank": no limit for the kind or capacity
-    verified     whether every value that was used was read in the legal text itself
-    capacity_m3  volume of the highest row for use; nan: none is
-    uncertainty, deviation   verdicts of the limits for this kind of tank
-    unjudged    names of those of its limits that no row, delivery or stated volume is for
+    Attributes
+    ----------
+    rule : Rule
+        The Rule.
+    tank : str
+        Kind of tank that it was asked for.
+    code : str
+        "passed": every limit is kept everywhere; "passed_in_part": the uncertainty keeps its limits
+        from some level on; "failed"; "not_accepted": nothing fails, but a deviation lies in a guard
+        band; "stated": nothing is limited; "nothing_to_judge"; "not_all_judged": nothing failed,
+        but `unjudged` limits had nothing to be held against; "not_for_this_tank": no limit for the
+        kind or capacity.
+    verified : bool
+        Whether every value that was used was read in the legal text itself.
+    capacity_m3 : float
+        Volume of the highest row for use; nan: none is.
+    uncertainty, deviation
+        Verdicts of the limits for this kind of tank.
+    unjudged : tuple of str
+        Names of those of its limits that no row, delivery or stated volume is for.
     """
 
     rule: Rule
@@ -39,11 +49,23 @@ class RuleVerdict:
 def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
     """RuleVerdict of a Rule for a Capacity of a kind of tank.
 
-    tank      one of tankcal.tank.rules.TANKS
-    lowest_m  dip of the start of the calibrated zone, see `judge_uncertainty`
-    stated    StatedVolumes that the deviations are judged against
-    printed   `Printed` uncertainties, such as Monte Carlo's; None: the table's
-    Raises ValueError for an unknown kind of tank, HeightError for a dip outside the table.
+    Parameters
+    ----------
+    tank
+        One of tankcal.tank.rules.TANKS.
+    lowest_m : optional
+        Dip of the start of the calibrated zone, see `judge_uncertainty`.
+    stated : optional
+        StatedVolumes that the deviations are judged against.
+    printed : optional
+        `Printed` uncertainties, such as Monte Carlo's; None: the table's.
+
+    Raises
+    ------
+    ValueError
+        For an unknown kind of tank.
+    HeightError
+        For a dip outside the table.
     """
     if tank not in TANKS:
         raise ValueError(f"kind of tank {tank!r}: expected one of {', '.join(TANKS)}")
