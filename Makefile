@@ -54,6 +54,9 @@ notebooks: $(VENV)/full ## execute every notebook, top to bottom
 job-format: $(VENV)/full ## fill the tables of docs/job-format.md from the contract of the job
 	$(BIN)/python -m tankcal.job.starter.page docs/job-format.md
 
+schemas: $(VENV)/full ## write the JSON schemas of what is saved and docs/saved-keys.md
+	PYTHONPATH=.:tests $(BIN)/python tests/schemas.py
+
 bench: export ROUNDS ?= 5
 bench: $(VENV)/full ## time and memory of the main job, tables of 1 mm rows and their u, ten million points, plans
 	$(BIN)/python benchmarks/main_job.py
