@@ -90,7 +90,21 @@ def fit_circle(xy_m, covariance_m2):
 
 
 def circle_conditions(unknowns, coordinates):
-    """Misclosures and both Jacobians of hypot(x - xc, y - yc) - R = 0 (a model for `adjust`)."""
+    """Misclosures and Jacobians of hypot(x - xc, y - yc) - R = 0, a model for `adjust`.
+
+    Parameters
+    ----------
+    unknowns : ndarray, shape (3,)
+        xc, yc, R, m.
+    coordinates : ndarray, shape (2n,)
+        x1 y1 x2 y2 ..., m.
+
+    Returns
+    -------
+    misclosures : ndarray, shape (n,)
+    by_unknowns : ndarray, shape (n, 3)
+    by_coordinates : sparse array, shape (n, 2n)
+    """
     x, y, radius = unknowns
     d = coordinates.reshape(-1, 2) - (x, y)
     distance = np.hypot(d[:, 0], d[:, 1])

@@ -107,6 +107,15 @@ def harmonics(azimuth_rad, highest, derivative=0):
 def mode_variances(highest):
     """Prior variance of the cos and sin amplitudes of modes 2..highest over the amplitude: k^-3.
 
+    Parameters
+    ----------
+    highest : int
+        The last mode.
+
+    Returns
+    -------
+    ndarray, shape (2 (highest - 1),)
+
     Examples
     --------
     >>> mode_variances(3).round(4)

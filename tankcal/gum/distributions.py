@@ -90,7 +90,18 @@ class Distribution:
 
 @dataclass(frozen=True)
 class Normal(Distribution):
-    """Gaussian with standard deviation sd (JCGM 101 6.4.7)."""
+    """Gaussian (JCGM 101 6.4.7).
+
+    Attributes
+    ----------
+    sd : float
+        Standard deviation, in the unit of the input.
+
+    Examples
+    --------
+    >>> round(float(Normal(2.0, mean=10.0).quantile(0.975)), 2)
+    13.92
+    """
 
     name = "normal"
 
@@ -243,7 +254,18 @@ class _Bounded(Distribution):
 
 @dataclass(frozen=True)
 class Rectangular(_Bounded):
-    """Anywhere within mean +- half_width, equally likely (JCGM 101 6.4.2): sd = a/sqrt(3)."""
+    """Anywhere within mean +- half_width, equally likely (JCGM 101 6.4.2).
+
+    Attributes
+    ----------
+    half_width : float
+        a, in the unit of the input: u = a / sqrt(3).
+
+    Examples
+    --------
+    >>> round(float(Rectangular(3.0).u), 4)
+    1.7321
+    """
 
     name = "rectangular"
 
@@ -258,7 +280,18 @@ class Rectangular(_Bounded):
 
 @dataclass(frozen=True)
 class Triangular(_Bounded):
-    """Within mean +- half_width, most likely the mean (JCGM 101 6.4.5): sd = a/sqrt(6)."""
+    """Within mean +- half_width, most likely the mean (JCGM 101 6.4.5).
+
+    Attributes
+    ----------
+    half_width : float
+        a, in the unit of the input: u = a / sqrt(6).
+
+    Examples
+    --------
+    >>> round(float(Triangular(3.0).u), 4)
+    1.2247
+    """
 
     name = "triangular"
 
@@ -273,7 +306,18 @@ class Triangular(_Bounded):
 
 @dataclass(frozen=True)
 class UShaped(_Bounded):
-    """Arc sine: a sine of unknown phase, mean +- half_width (JCGM 101 6.4.6): sd = a/sqrt(2)."""
+    """Arc sine: a sine of unknown phase, mean +- half_width (JCGM 101 6.4.6).
+
+    Attributes
+    ----------
+    half_width : float
+        a, in the unit of the input: u = a / sqrt(2).
+
+    Examples
+    --------
+    >>> round(float(UShaped(3.0).u), 4)
+    2.1213
+    """
 
     name = "u-shaped"
 

@@ -79,7 +79,15 @@ _ROWS_OF_SLOPE = 10
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was found: an error, or a warning that only deserves a look."""
+    """One thing that was found in a table.
+
+    Attributes
+    ----------
+    severity : str
+        "error", or "warning" for what only deserves a look.
+    problem : Problem
+        With its row and column.
+    """
 
     severity: str
     problem: Problem
@@ -100,7 +108,15 @@ class Finding:
 
 @dataclass(frozen=True, repr=False)
 class Report:
-    """Findings in the order of the file, and one line about each table that was read."""
+    """What was found in the tables of a file.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+        In the order of the file.
+    summaries : tuple of str
+        One line about each table that was read.
+    """
 
     findings: tuple[Finding, ...]
     summaries: tuple[str, ...]

@@ -16,7 +16,12 @@ _LEAST_GAP_M, _USUAL_GAP_M = 0.005, 0.02  # between the last row and the nominal
 
 @dataclass(frozen=True)
 class Nominal:
-    """What the tank is meant to hold (m3), and how high its shell is (m); None: not known."""
+    """What the tank is meant to hold, and how high its shell is; None: not known.
+
+    Attributes
+    ----------
+    volume_m3, diameter_m, height_m : float or None
+    """
 
     volume_m3: float | None = None
     diameter_m: float | None = None

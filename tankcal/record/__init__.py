@@ -15,27 +15,64 @@ __all__ = [
 
 
 def record_of(result):
-    """The record of a `chain.Result`: a dict of plain numbers, texts and lists."""
+    """The record of a result: everything that paper needs, so that paper needs nothing else.
+
+    Parameters
+    ----------
+    result : Result
+
+    Returns
+    -------
+    dict
+        Of plain numbers, texts and lists; every key is in docs/saved-keys.md.
+    """
     from tankcal.record.making import record_of  # reading a record needs nothing of this
 
     return record_of(result)
 
 
 def record_of_adjustment(job, adjustment):
-    """The record of a job whose survey was only adjusted (`survey.Adjustment`)."""
+    """The record of a job whose survey was only adjusted.
+
+    Parameters
+    ----------
+    job : Job
+    adjustment : survey.Adjustment
+
+    Returns
+    -------
+    dict
+        As of `record_of`.
+    """
     from tankcal.record.making import record_of_adjustment
 
     return record_of_adjustment(job, adjustment)
 
 
 def save(record, path):
-    """Write a record as UTF-8 JSON."""
+    """Write a record as UTF-8 JSON.
+
+    Parameters
+    ----------
+    record : dict
+        Of `record_of`.
+    path : path
+    """
     text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     Path(path).write_text(text + "\n", encoding="utf-8")
 
 
 def load(path):
     """Read a record of this version, or of an older one, to which is added what it did not have.
+
+    Parameters
+    ----------
+    path : path
+        Of a record.json.
+
+    Returns
+    -------
+    dict
 
     Raises
     ------
@@ -55,9 +92,22 @@ def load(path):
 
 
 def read(path):
-    """The record at `path` as a `record.making.Record`, each part a dataclass.
+    """The record in a file with each part a dataclass.
 
-    read("results/record.json").capacity.volume_m3[-1] is the volume at the top of the table.
+    Parameters
+    ----------
+    path : path
+        Of a record.json; read("results/record.json").capacity.volume_m3[-1] is the volume at the
+        top of the table.
+
+    Returns
+    -------
+    record.making.Record
+
+    Raises
+    ------
+    InputError
+        As `load`.
     """
     from tankcal.record.making import Record
     from tankcal.record.schema import from_plain

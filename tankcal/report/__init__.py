@@ -68,7 +68,16 @@ def build(record_path, directory, progress=None, language=None, letterhead=None,
 
 
 def missing(record):
-    """Names of what a record has nothing of, or, of an earlier version, does not know."""
+    """Names of what a record has nothing of, or, of an earlier version, does not know.
+
+    Parameters
+    ----------
+    record : dict
+
+    Returns
+    -------
+    list of str
+    """
     known = dict.fromkeys(_SINCE_UNCERTAINTY) | record
     return [part for part, value in known.items() if not value]
 

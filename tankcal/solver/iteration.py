@@ -53,6 +53,16 @@ def linearise(model, state):
     Its cofactors are those of a survey whose observations are what `state` computes, so it tells
     how well the unknowns will be known before anything is measured.
 
+    Parameters
+    ----------
+    model : Model
+    state : object
+        Values of all unknowns, as the model's groups understand them.
+
+    Returns
+    -------
+    Adjustment
+
     Raises
     ------
     SolutionError

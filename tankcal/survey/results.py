@@ -121,19 +121,33 @@ class DatumReport:
 
 @dataclass(frozen=True)
 class Dependence:
-    """Names of quantities, in words: those that depend on the datum, and those that do not."""
+    """What depends on the choice of the datum, and what does not.
+
+    Attributes
+    ----------
+    depends, independent : tuple of str
+        Quantities, in words.
+    """
 
     depends: tuple
     independent: tuple
 
 
 def datum_dependence(report):
-    """The Dependence of results on the choice of a DatumReport.
+    """The Dependence of results on the choice of a datum.
 
     A quantity does not depend on the choice when no motion or scaling that the observations leave
     open changes it (`network.datum.depends_on_datum` tests single ones). Silva (1995) blamed
     ill-conditioning for sds of 1.37 m with another fixed station: coordinates, and their sds, are
     of the datum; the shape, and its sds, is not.
+
+    Parameters
+    ----------
+    report : DatumReport
+
+    Returns
+    -------
+    Dependence
     """
     if not report.defect:
         return Dependence((), ("every result",))

@@ -118,13 +118,33 @@ class ShapedBottom(Part):
 
 
 def shaped_bottom(form, plan_m2, centre_m=0.0):
-    """`ShapedBottom`; a centre at level 0 makes it flat.
+    """A flat, conical or dished bottom; a centre at level 0 makes it flat.
+
+    Parameters
+    ----------
+    form : str
+        "flat", "cone" or "dish".
+    plan_m2 : float
+        Inside area of the first course at its bottom.
+    centre_m : float, optional
+        Level of the centre: above 0 the bottom bulges up, below 0 down.
+
+    Returns
+    -------
+    ShapedBottom
 
     Raises
     ------
     SolutionError
         For an unknown form, an area that cannot be, a flat bottom with a centre off the plane, and
         a dish deeper than half a sphere.
+
+    Examples
+    --------
+    A cone of 0.3 m below a floor of 100 m2 holds a third of its prism:
+
+    >>> round(float(shaped_bottom("cone", 100.0, -0.3).volume_m3([0.0])[0]), 9)
+    10.0
     """
     if form not in FORMS:
         raise SolutionError(f'bottom "{form}"; expected one of {", ".join(FORMS)}')
@@ -233,10 +253,21 @@ class SurfaceBottom(Part):
 
 
 def leaning_bottom(footprint, slope):
-    """A plate square to the shell's axis of slope (dx/dz, dy/dz), through level 0 at the axis.
+    """A plate square to the shell's axis, through level 0 at the axis.
 
-    Slid along the axis to the plane of level 0, its point at the distance x down the lean lies at
-    z = - m x / (1 + m^2).
+    Slid along the axis to the plane of level 0, its point at the distance x down the lean lies at z
+    = - m x / (1 + m^2).
+
+    Parameters
+    ----------
+    footprint : Footprint
+        Outline of the first course at its bottom.
+    slope : array_like, shape (2,)
+        (dx/dz, dy/dz) of the axis.
+
+    Returns
+    -------
+    SurfaceBottom
     """
     slope = np.asarray(slope, dtype=float)
     plan, faces = footprint.mesh(1, LEAN_AZIMUTHS)
@@ -244,6 +275,27 @@ def leaning_bottom(footprint, slope):
 
 
 def surveyed_bottom(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0)):
-    """The bottom through surveyed points; arguments and errors of `soundings.surveyed_surface`."""
+    """The bottom through surveyed points, smoothed by what they can tell.
+
+    Parameters
+    ----------
+    footprint : Footprint
+        Outline of the first course at its bottom.
+    xyz_m : ndarray, shape (n, 3)
+        x, y in the survey's frame, z above the bottom of the first course.
+    sd_m : ndarray, shape (n,), or float, optional
+        Standard deviations of z; None: noise and waves are estimated as one.
+    slope : array_like, shape (2,), optional
+        (dx/dz, dy/dz) of the shell's axis.
+
+    Returns
+    -------
+    SurfaceBottom
+
+    Raises
+    ------
+    SolutionError
+        As `soundings.surveyed_surface`.
+    """
     survey = surveyed_surface(footprint, xyz_m, sd_m, slope)
     return SurfaceBottom(survey.surface, survey)

@@ -73,7 +73,22 @@ class CourseShape:
 
 
 def barrel(t):
-    """Unit barrel 1 - (2 t - 1)^2 at parts t of a course's height."""
+    """Unit barrel 1 - (2 t - 1)^2: one in the middle of a course, nothing at its ends.
+
+    Parameters
+    ----------
+    t : array_like
+        Parts of the course's height, 0 to 1.
+
+    Returns
+    -------
+    ndarray or float
+
+    Examples
+    --------
+    >>> barrel(0.5), barrel(1.0)
+    (1.0, 0.0)
+    """
     return 1.0 - (2.0 * t - 1.0) ** 2
 
 

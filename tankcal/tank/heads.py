@@ -175,7 +175,24 @@ def meridian(end, radius_m):
 
 
 def depth_of(end, radius_m):
-    """Depth of an end from its tangent line to its tip, m, never negative."""
+    """Depth of an end from its tangent line to its tip.
+
+    Parameters
+    ----------
+    end : End
+    radius_m : float
+        Of the cylinder.
+
+    Returns
+    -------
+    float
+        In m, never negative.
+
+    Examples
+    --------
+    >>> round(depth_of(End("torispherical", dish_radius_m=2.0, knuckle_radius_m=0.2), 1.0), 4)
+    0.3875
+    """
     return max((float(arc.at(arc.stop)[0]) for arc in meridian(end, radius_m)), default=0.0)
 
 

@@ -255,6 +255,11 @@ class _Piece:
 class Sphere(Part):
     """A spherical tank; dips count from its lowest inside point: V = pi d^2 (3 R - d) / 3.
 
+    Attributes
+    ----------
+    diameter_m : float
+        Inside.
+
     Raises
     ------
     SolutionError
@@ -263,6 +268,11 @@ class Sphere(Part):
     References
     ----------
     .. [1] API MPMS 2.2D; closed form.
+
+    Examples
+    --------
+    >>> Sphere(2.0).volume_m3([1.0, 2.0]).round(4).tolist()
+    [2.0944, 4.1888]
     """
 
     diameter_m: float

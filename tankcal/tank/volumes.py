@@ -26,9 +26,14 @@ from tankcal.uncertainty import factor_of
 
 @dataclass(frozen=True)
 class ShellVolume:
-    """The courses of a shell, from the bottom up, and what can be integrated over them.
+    """The courses of a shell, and what can be integrated over them.
 
     The features of a shell are the products G_ij (i <= j) of all its courses, one after another.
+
+    Attributes
+    ----------
+    courses : tuple of CourseShape
+        From the bottom up.
     """
 
     courses: tuple[CourseShape, ...]

@@ -57,7 +57,24 @@ class Goal:
 
 
 def numerical_tolerance(u, digits=2):
-    """Half of the last of the significant digits of u (JCGM 101 7.9.2); nan for 0, inf and nan."""
+    """Half of the last of the significant digits of u (JCGM 101 7.9.2).
+
+    Parameters
+    ----------
+    u : array_like, shape (rows,)
+    digits : int, optional
+        Significant digits that count.
+
+    Returns
+    -------
+    ndarray, shape (rows,)
+        In the unit of u; nan for 0, inf and nan.
+
+    Examples
+    --------
+    >>> numerical_tolerance([0.0123, 45.6]).tolist()
+    [0.0005, 0.5]
+    """
     u = np.atleast_1d(np.asarray(u, dtype=float))
     sound = np.isfinite(u) & (u > 0)
     size = np.where(sound, u, 1.0)

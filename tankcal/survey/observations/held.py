@@ -83,7 +83,17 @@ class HeldOrientation(Observations):
 
 
 def lever(conditions, state):
-    """(n, m) change of a condition over that of its observation: cos(phi) for omega and kappa."""
+    """Change of a condition over that of its observation: cos(phi) for omega and kappa.
+
+    Parameters
+    ----------
+    conditions : Observations
+    state : State
+
+    Returns
+    -------
+    ndarray, shape (n, m)
+    """
     found = np.ones((len(conditions), conditions.rows))
     if isinstance(conditions, HeldOrientation):
         turning = (conditions.row == OMEGA) | (conditions.row == KAPPA)
@@ -101,7 +111,15 @@ def _element(rotation, i, j):
 
 
 def exact_rows(one):
-    """(n,) True for the observations of a table that hold exactly: sd 0, and taking part.
+    """Which observations of a table hold exactly: sd 0, and taking part.
+
+    Parameters
+    ----------
+    one : Observations
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
 
     Raises
     ------

@@ -22,7 +22,16 @@ AT_TOP_M = 1e-3  # a dip within a millimetre of the last row is the top
 
 @dataclass(frozen=True)
 class StatedVolume:
-    """A volume that the table is held against: at the dip high_m, or delivered down to low_m."""
+    """A volume that the table is held against.
+
+    Attributes
+    ----------
+    volume_m3 : float
+    high_m : float
+        Its dip.
+    low_m : float or None
+        Of a delivery, the dip that it ends at; None: the volume below `high_m`.
+    """
 
     volume_m3: float
     high_m: float

@@ -95,7 +95,20 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
 
 
 def deliveries_to_check(rule, table, tank):
-    """((low_m, high_m), ...) of the deliveries that a rule's limits are decided by, each once."""
+    """The deliveries that a rule's limits are decided by, each once.
+
+    Parameters
+    ----------
+    rule : Rule
+    table : Capacity
+    tank : str
+        Kind of tank.
+
+    Returns
+    -------
+    tuple of (float, float)
+        Lower and higher dip, m.
+    """
     limits = [one for one in rule.uncertainty if one.of == "deliveries" and _is_for(one, tank)]
     pairs = [pair for limit in limits for pair in deliveries_to_judge(limit, table)]
     return tuple(dict.fromkeys(pairs))
