@@ -130,7 +130,10 @@ def photos_in(record):
         return {one["photo"]: one["camera"] for one in record["adjustment"]["photos"]}
     except (KeyError, TypeError) as error:
         raise InputError(
-            _problem(message("camera_no_list", "no sound list"), "adjustment.photos")
+            _problem(
+                message("camera_no_list", "expected a list of photos, each with its camera"),
+                "adjustment.photos",
+            )
         ) from error
 
 
@@ -239,14 +242,22 @@ def interiors_in(record):
             _problem(
                 message(
                     "camera_no_adjustment",
-                    "no adjustment in this record: it says nothing of cameras",
+                    "this record has no adjustment, and so no cameras; expected a record "
+                    "with photographs",
                 )
             )
         )
     cameras = adjustment.get("cameras")
     if not isinstance(cameras, list) or not cameras:
         raise InputError(
-            _problem(message("camera_none_adjusted", "no camera in the adjustment of this record"))
+            _problem(
+                message(
+                    "camera_none_adjusted",
+                    "the adjustment of this record has no "
+                    "camera; expected a record with "
+                    "photographs",
+                )
+            )
         )
     found, problems = [], []
     for number, one in enumerate(cameras):
@@ -275,7 +286,8 @@ def _read(one, cameras):
         raise ValueError(
             message(
                 "camera_parameters_free",
-                "found parameters {names} and free {free}",
+                "found parameters {names} and free {free}; expected known parameters, and "
+                "free ones among them",
                 names=names,
                 free=list(free),
             )
@@ -288,10 +300,16 @@ def _read(one, cameras):
     half = np.array(one["edge_mm"], dtype=float).reshape(2)
     if not (np.isfinite(covariance).all() and np.isfinite(values).all() and (half > 0).all()):
         raise ValueError(
-            message("camera_number_not_finite", "found a number that is not finite, or no frame")
+            message(
+                "camera_number_not_finite",
+                "found a number that is not finite, or no "
+                "frame; expected finite numbers and a frame",
+            )
         )
     if (np.diag(covariance) < 0).any():
-        raise ValueError(message("camera_negative_variance", "found a negative variance"))
+        raise ValueError(
+            message("camera_negative_variance", "found a negative variance; expected 0 or more")
+        )
     if not values[0] > 0:
         raise ValueError(
             message(
@@ -345,7 +363,7 @@ def _reach(value):
 
 def _why(error):
     if isinstance(error, KeyError):
-        return message("camera_key_missing", "no {key!r} there", key=str(error.args[0]))
+        return message("camera_key_missing", "missing key {key!r}", key=str(error.args[0]))
     if error.args and isinstance(error.args[0], Message):
         return error.args[0]
     return message("camera_unreadable", "cannot be read: {error}", error=str(error))

@@ -259,7 +259,8 @@ def _linear(readings, marks, kind):
     if sizes[0] == 0 or (kind == "affine" and sizes[1] < ONE_LINE * sizes[0]):
         raise SolutionError(
             message(
-                "marks_on_a_line", "the marks lie on one line: they determine no transformation"
+                "marks_on_a_line",
+                "the marks lie on one line: they do not determine the transformation",
             )
         )
     return np.linalg.lstsq(rows, marks.ravel(), rcond=None)[0]

@@ -227,7 +227,7 @@ def _tell_error(what, camera):
             away = message("convert_um", "{error:.2g} um", error=camera.error_um)
         text = message(
             "convert_fitted",
-            "{what}: fitted, up to {away} away within the frame",
+            "{what}: fitted, differs by up to {away} within the frame",
             what=what,
             away=away,
         )
@@ -383,7 +383,8 @@ def _refuse_several(options, count):
     if options.out is not None and count > 1:
         several = message(
             "camera_several_sets",
-            "there are {count} sets of parameters; expected --camera or --photo, to write one",
+            "there are {count} sets of parameters; expected --camera or --photo, to choose "
+            "the one to write",
             count=count,
         )
         raise InputError(Problem("--out", several))

@@ -51,7 +51,7 @@ def _lint(options):
         say(finding.text)
     more = len(report.findings) - MOST_FINDINGS
     if more > 0:
-        say(message("more_findings", "and {more} more findings; mend these first", more=more))
+        say(message("more_findings", "and {more} more findings; correct these first", more=more))
     warnings = len(report.findings) - report.errors
     for summary in report.summaries:
         say(summary)

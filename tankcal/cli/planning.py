@@ -111,7 +111,8 @@ def _refuse_idle(options):
             Problem(
                 "--blunders",
                 message(
-                    "plan_nothing_simulated", "nothing is simulated; expected --simulate N as well"
+                    "plan_nothing_simulated",
+                    "nothing would be simulated; expected --simulate N as well",
                 ),
             )
         )
@@ -303,8 +304,8 @@ def _scatter(found):
     yield message(
         "plan_scatter",
         "{runs} simulated surveys, scatter over prediction: coordinates {ratio:.3f}, volume "
-        "{volume_ratio:.3f} (known to {ratio_sd:.2g}); {aside:.1f} values set aside in the mean, "
-        "{failed} surveys without a solution",
+        "{volume_ratio:.3f} (known to {ratio_sd:.2g}); {aside:.1f} values set aside on "
+        "average, {failed} surveys without a solution",
         runs=found.runs,
         ratio=found.ratio,
         volume_ratio=found.volume_ratio,

@@ -187,7 +187,8 @@ def _capacity(result):
     if not stated.U_m3[-1] > 0:
         return message(
             "holds_without_u",
-            "{tank}: {volume} m3 at {height} m, no uncertainty stated: none was declared{points}",
+            "{tank}: {volume} m3 at {height} m, no uncertainty stated, because none was "
+            "declared{points}",
             tank=result.job.tank.id,
             volume=fixed(top.value_m3, DECIMALS_WITHOUT_U, marks()),
             height=fixed(top_m, decimals_of_height(top_m), marks()),
@@ -269,7 +270,7 @@ def _fit_of(adjustment):
     if adjustment.redundancy <= 0:
         return message(
             "not_tested",
-            "redundancy {dof}, nothing redundant, not tested",
+            "redundancy {dof}, no observation is redundant, not tested",
             dof=adjustment.redundancy,
         )
     test = message("test_is_passed", "global test passed")

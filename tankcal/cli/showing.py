@@ -90,7 +90,8 @@ def print_doubts(warnings):
         complain(
             message(
                 "doubtful_input",
-                "DOUBTFUL INPUT, the result stands on it (so says the certificate's first page):",
+                "DOUBTFUL INPUT: the result depends on it (the first page of the certificate "
+                "says so):",
             )
         )
     warn(warnings)

@@ -143,7 +143,7 @@ def taubin_circle(local):
     mean = z.mean()
     if not mean > 0:
         raise SolutionError(
-            message("section_in_one_place", "all points of the section lie on one place")
+            message("section_in_one_place", "all points of the section lie in one place")
         )
     design = np.column_stack([(z - mean) / (2 * np.sqrt(mean)), local])
     values, vectors = np.linalg.svd(design, full_matrices=False)[1:]

@@ -232,7 +232,7 @@ def _refuse_undetermined(adjusted, local, residuals):
         raise SolutionError(
             message(
                 "points_in_a_plane",
-                "the points lie in a plane: {thick_m:.3g} m thick, where they scatter by "
+                "the points lie in a plane: {thick_m:.3g} m thick, with a scatter of "
                 "{scatter_m:.3g} m",
                 thick_m=thick,
                 scatter_m=scatter,
@@ -275,7 +275,7 @@ def _start_of_cylinder(local):
         raise SolutionError(
             message(
                 "cylinder_not_found",
-                "none of {count} directions leads to a cylinder",
+                "no cylinder was found from {count} starting directions",
                 count=len(tried),
             )
         )

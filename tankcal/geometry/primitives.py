@@ -226,7 +226,7 @@ def unit_vectors(d):
         raise SolutionError(
             message(
                 "point_in_the_centre",
-                "a point lies in the very centre of the shape that is fitted to it",
+                "a point lies at the centre of the fitted shape",
             )
         )
     return distance, d / distance[:, None]
@@ -282,7 +282,7 @@ def _direct_ellipse(local):
     a, b, c = vectors[:, np.argmax(4 * vectors[0] * vectors[2] - vectors[1] ** 2)]
     matrix = np.array([[a, b / 2], [b / 2, c]])
     if not np.linalg.det(matrix) > 0:
-        raise SolutionError(message("no_ellipse", "the points lie on no ellipse"))
+        raise SolutionError(message("no_ellipse", "the points do not lie on an ellipse"))
     d, e, f = back @ (a, b, c)
     centre = -np.linalg.solve(matrix, [d, e]) / 2
     size = centre @ matrix @ centre - f
@@ -300,7 +300,7 @@ def _axes(sxx, syy, sxy):
         raise SolutionError(
             message(
                 "ellipse_degenerate",
-                "the points lie on no ellipse: half axes {half_axis_m:.3g} m and 0",
+                "the points do not lie on an ellipse: half axes {half_axis_m:.3g} m and 0",
                 half_axis_m=middle + half,
             )
         )

@@ -152,8 +152,9 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
         raise SolutionError(
             message(
                 "no_shell",
-                "only {found} of {all} points between bottom and top lie on one wall: no shell "
-                "can be told from its surroundings; check nominal_diameter_m and points",
+                "only {found} of {all} points between bottom and top lie on one wall: the "
+                "shell cannot be told from its surroundings; check nominal_diameter_m and "
+                "points",
                 found=wall.sum(),
                 all=candidates.sum(),
             )
@@ -231,9 +232,9 @@ def _consensus_circle(xy, nominal_radius):
         raise SolutionError(
             message(
                 "no_circle",
-                "no circle within {band:.0f} % of the nominal radius {nominal_m:.3f} m holds "
-                "half of the points (best {share:.0f} %): check nominal_diameter_m, units and "
-                "axes",
+                "no circle within {band:.0f} % of the nominal radius {nominal_m:.3f} m "
+                "passes through half of the points (best {share:.0f} %): check "
+                "nominal_diameter_m, units and axes",
                 band=band,
                 nominal_m=nominal_radius,
                 share=share,

@@ -87,7 +87,7 @@ def choose(setups, names, file=CAMERAS_FILE):
         if name not in known:
             expected = message(
                 "no_such_camera",
-                "found {found}; expected a camera of it{hint}: {listed}",
+                "found {found}; expected a camera of this file{hint}: {listed}",
                 found=shown(name),
                 hint=nearest(name, known),
                 listed=list_some(known, 20),

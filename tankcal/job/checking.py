@@ -41,7 +41,7 @@ def refuse_repeated(table, column, log):
         if name in first_row:
             expected = message(
                 "name_twice",
-                "{name!r} is there already, in row {first_row}; expected once",
+                "{name!r} is already in row {first_row}; expected once",
                 name=name,
                 first_row=first_row[name],
             )
@@ -60,14 +60,14 @@ def course_heights(courses):
 
 def missing_beside(other):
     """What is said of a key that has to be given where another one is."""
-    return message("missing_beside", "missing; expected beside {other}", other=other)
+    return message("missing_beside", "missing; expected together with {other}", other=other)
 
 
 def same_parameter(other):
     """What is said of a key that stands beside another name of the same parameter."""
     return message(
         "same_parameter",
-        "given beside {other}; expected one of them: they are the same parameter",
+        "given together with {other}; expected only one of them: they are the same parameter",
         other=other,
     )
 

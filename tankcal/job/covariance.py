@@ -66,7 +66,7 @@ def _load(data, n, log):
         if unpacked > largest:
             expected = message(
                 "covariance_unpacks",
-                "unpacks to {unpacked} bytes, more than {n} points need",
+                "unpacks to {unpacked} bytes, more than the covariance of {n} points needs",
                 unpacked=unpacked,
                 n=n,
             )

@@ -97,7 +97,7 @@ def read_register(raw, name, log):
             if name_read != owner:
                 expected = message(
                     "spaces_in_name",
-                    "found {found}; expected {wanted}, without more spaces",
+                    "found {found}; expected {wanted}, without extra spaces",
                     found=shown(owner),
                     wanted=shown(name_read),
                 )
@@ -150,7 +150,7 @@ def _refuse_two_spellings(file, register, owner, entries, log):
         if _is_filled(entries, key) and _is_filled(entries, short):
             expected = message(
                 "short_spelling_too",
-                "given beside {key}; expected one of them: they are the same parameter",
+                "given together with {key}; expected only one of them: they are the same parameter",
                 key=key,
             )
             log.problem(file, expected, entries[short].row, f"{owner}.{short}")

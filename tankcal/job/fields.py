@@ -238,7 +238,9 @@ def _read_number(field, raw, decimal):
     if not math.isfinite(value):
         raise _refused(field, shown(raw), message("not_infinite", ", not NaN or infinite"))
     if field.low == 0 < value < NEXT_TO_ZERO:
-        raise _refused(field, shown(raw), message("next_to_zero", ", 0 or farther from 0"))
+        raise _refused(
+            field, shown(raw), message("next_to_zero", ": 0, or a number further from 0")
+        )
     if value > field.high or value < field.low or (field.above_low and value == field.low):
         hint = _other_unit(field, value)
         raise _refused(field, shown(raw), hint)

@@ -200,7 +200,7 @@ def read_register(file, data, log, register=None):
         if section != register or not isinstance(inside, dict):
             expected = message(
                 "outside_register",
-                "stands outside; expected sections such as [{register}.NAME]",
+                "is in no section; expected sections such as [{register}.NAME]",
                 register=register,
             )
             log.problem(file, expected, rows.get(section), section)
@@ -210,7 +210,7 @@ def read_register(file, data, log, register=None):
             if not isinstance(given, dict):
                 expected = message(
                     "in_no_register",
-                    "stands in no [{register}.NAME]; expected inside one",
+                    "is in no section [{register}.NAME]; expected in one",
                     register=register,
                 )
                 log.problem(file, expected, rows.get(where), name)
@@ -326,7 +326,7 @@ def flattened(file, data, rows, log):
                 settings[section][key] = Value(value, rows.get(name))
             else:
                 expected = message(
-                    "in_no_section", "stands in no [section]; expected inside one, such as [tank]"
+                    "in_no_section", "is in no [section]; expected in one, such as [tank]"
                 )
                 log.problem(file, expected, rows.get(name), name)
     return settings, sections
@@ -345,7 +345,7 @@ def csv_marks(file, settings, log):
         row = next(iter(settings["csv"].values())).row
         expected = message(
             "two_commas",
-            "separator and decimal are both a comma; expected two marks, such as ; and ,",
+            "separator and decimal are both a comma; expected two different marks, such as ; and ,",
         )
         log.problem(file, expected, row, "csv.separator")
         return None
@@ -387,7 +387,8 @@ def _csv_rows(file, text, separator, log):
             log.problem(
                 file,
                 message(
-                    "odd_quotation_marks", "quotation marks that do not pair up within the row"
+                    "odd_quotation_marks",
+                    "quotation marks without a partner in the row; expected pairs",
                 ),
                 number,
             )

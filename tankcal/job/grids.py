@@ -83,13 +83,13 @@ def _tell_hidden(place, grid, rows, log):
     for first, last in _runs(hidden):
         expected = message(
             "hidden_row",
-            "the row is hidden, and not blank; expected rows that show: unhide or delete it",
+            "the row is hidden, and not blank; expected visible rows: unhide or delete it",
         )
         if last > first:
             expected = message(
                 "hidden_rows",
-                "the rows {first} to {last} are hidden, and not blank; expected rows that show: "
-                "unhide or delete them",
+                "the rows {first} to {last} are hidden, and not blank; expected visible "
+                "rows: unhide or delete them",
                 first=first,
                 last=last,
             )
@@ -99,7 +99,7 @@ def _tell_hidden(place, grid, rows, log):
             left, right = column_letters(first), column_letters(last)
             expected = message(
                 "hidden_column",
-                "column {left} is hidden, and not blank; expected columns that show: unhide or "
+                "column {left} is hidden, and not blank; expected visible columns: unhide or "
                 "delete it",
                 left=left,
             )
@@ -107,7 +107,7 @@ def _tell_hidden(place, grid, rows, log):
                 expected = message(
                     "hidden_columns",
                     "one of the columns {left} to {right} is hidden, and not blank; expected "
-                    "columns that show: unhide or delete it",
+                    "visible columns: unhide or delete it",
                     left=left,
                     right=right,
                 )

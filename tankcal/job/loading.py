@@ -178,14 +178,14 @@ def _covariance(raw, points, log):
         if not is_unreadable:
             expected = message(
                 "covariance_without_points",
-                "given without points that it belongs to; expected points.csv beside it",
+                "given without its points; expected points.csv beside it",
             )
             log.problem(COVARIANCE_FILE, expected)
         return None
     if points.columns["sx_mm"] is not None:
         expected = message(
             "covariance_beside_sds",
-            "given beside sx_mm, sy_mm, sz_mm of the points; expected one of them",
+            "given together with sx_mm, sy_mm, sz_mm of the points; expected only one of them",
         )
         log.problem(COVARIANCE_FILE, expected)
     return read_covariance(raw.covariance, points.of("point"), log)

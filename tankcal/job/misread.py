@@ -33,7 +33,7 @@ def hint_of_text(text, in_cell=True):
     if unit is not None:
         return message(
             "number_alone",
-            ", stored as a number: type {number} alone, the unit stands in the heading",
+            ", stored as a number: type {number} alone, the unit is in the heading",
             number=number,
         )
     if marks > 1:

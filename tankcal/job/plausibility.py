@@ -185,8 +185,8 @@ def reference_doubt(reference_m, top_m, diameter_m):
     if reference_m > most:
         return message(
             "reference_far_above",
-            "{found_m:g} m, and the top of the tank is {top_m:.4g} m above the table's zero:"
-            " expected at most {most_m:.4g} m; in another unit?",
+            "{found_m:g} m, and the top of the tank is {top_m:.4g} m above the table's zero: "
+            "expected at most {most_m:.4g} m; is it in another unit?",
             found_m=reference_m,
             top_m=top_m,
             most_m=most,

@@ -139,7 +139,7 @@ def parse_rule(file, data, log):
         elif given:
             expected = message(
                 "in_no_limit",
-                "stands in no limit; expected inside one, such as [{part}.volumes]",
+                "is in no limit; expected in one, such as [{part}.volumes]",
                 part=part,
             )
             log.problem(file, expected, row, f"[{section}]")
@@ -174,7 +174,9 @@ def _tell_contradictions(file, part, section, values, given, row, log):
         if is_given("limit_percent") and is_given("limit_m3"):
             tell(
                 "limit_m3",
-                message("two_limits", "stands beside limit_percent; expected one of them"),
+                message(
+                    "two_limits", "given together with limit_percent; expected only one of them"
+                ),
             )
         elif not (is_given("limit_percent") or is_given("limit_m3")):
             tell(

@@ -63,8 +63,8 @@ def expected_sheets():
     """One phrase that names the sheets of a workbook."""
     return message(
         "sheets_of_workbook",
-        "a workbook has the sheets {settings}, {tables} (the last five optional), or those of a "
-        "survey in place of the points",
+        "a workbook has the sheets {settings}, {tables} (the last five are optional), or "
+        "those of a survey in place of the points",
         settings=SETTINGS_SHEET,
         tables=[*TANK_TABLES],
     )
@@ -115,7 +115,7 @@ def _table(name, sheet, log):
         log.problem(
             place,
             message(
-                "hidden_sheet", "the sheet is hidden; expected one that shows: unhide or delete it"
+                "hidden_sheet", "the sheet is hidden; expected a visible sheet: unhide or delete it"
             ),
         )
     rows, first_column = table_rows(place, sheet.grid, log)
@@ -185,7 +185,7 @@ def _settings(table, owner, log):
         sections.setdefault(section, row)
         if key in known:
             expected = message(
-                "key_twice", "given twice; the first stands in row {row}", row=known[key].row
+                "key_twice", "given twice, first in row {row}; expected once", row=known[key].row
             )
             log.problem(table.file, expected, row, f"{section}.{key}")
         else:

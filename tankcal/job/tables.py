@@ -115,7 +115,7 @@ class Log:
             more = len(problems) - MAX_PROBLEMS_PER_FILE
             if more > 0:
                 expected = message(
-                    "more_problems", "and {more} more problems; mend these first", more=more
+                    "more_problems", "and {more} more problems; correct these first", more=more
                 )
                 listed.append(Problem(file, expected, book=problems[0].book))
         raise InputError(listed)
@@ -219,7 +219,7 @@ def read_bytes(path, log, limit=MAX_FILE_BYTES):
         if not path.exists():
             return log.problem(path.name, message("file_not_found", "not found; expected a file"))
         if not path.is_file():
-            log.problem(path.name, message("no_file", "expected a file, found something else"))
+            log.problem(path.name, message("no_file", "not a file; expected a file"))
             return None
         size = path.stat().st_size
         if size <= limit:
@@ -308,8 +308,8 @@ def _headings(file, cells, number, log):
                     file,
                     message(
                         "other_separator",
-                        "the cells are separated by '{name}'; expected the comma, or what "
-                        "job.toml says under [csv] separator",
+                        "the cells are separated by '{name}'; expected the comma, or the "
+                        "separator under [csv] in job.toml",
                         name=name,
                     ),
                     number,
@@ -320,7 +320,7 @@ def _headings(file, cells, number, log):
         if not isinstance(cell, str) or not cell:
             column = position + 1
             expected = message(
-                "heading_no_text", "column {column} has a heading that is no text", column=column
+                "heading_no_text", "column {column} has a heading that is not text", column=column
             )
             if cell in (None, ""):
                 expected = message("no_heading", "column {column} has no heading", column=column)
@@ -329,7 +329,7 @@ def _headings(file, cells, number, log):
         elif cell in cells[:position]:
             log.problem(
                 file,
-                message("heading_twice", "this heading stands there twice; expected once"),
+                message("heading_twice", "this heading is given twice; expected once"),
                 number,
                 cell,
             )

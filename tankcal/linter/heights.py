@@ -235,12 +235,12 @@ def _tell_twin(teller, k, twin):
     first, second = teller.entries[twin].volume, teller.entries[k].volume
     found = message(
         "lint_height_twice",
-        "height {height} stands in row {row}, too",
+        "height {height} is also in row {row}",
         height=teller.shown(teller.height[k]),
         row=teller.row(twin),
     )
     if first.value == second.value:
-        teller.problem(k, message("lint_row_twice", "{found}: a row stands twice", found=found))
+        teller.problem(k, message("lint_row_twice", "{found}: the row is given twice", found=found))
         return
     expected = message(
         "lint_two_volumes",

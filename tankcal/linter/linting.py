@@ -65,7 +65,8 @@ def _check_size(table, entries, low, high, main, log):
     if high * unit < least * (1 - _AS_THE_TABLE) or low * unit > most * (1 + _AS_THE_TABLE):
         text = message(
             "lint_parts_size",
-            "parts of {part:.6g} a mark; expected {least:.6g} to {most:.6g}, as the table rises",
+            "proportional parts of {part:.6g} for each mark; expected {least:.6g} to "
+            "{most:.6g}, as the table rises",
             part=0.5 * (low + high),
             least=least / unit,
             most=most / unit,

@@ -15,7 +15,7 @@ from tankcal.messages import message
 THOUSANDS = (",", ".", " ", "'", "\u2019", "\u00a0", "\u2009", "\u202f")
 MOST_DECIMALS = 15
 LARGEST = 1e12
-BLANK = message("lint_blank", "nothing stands here; expected a number")
+BLANK = message("lint_blank", "blank; expected a number")
 
 
 @dataclass(frozen=True)

@@ -102,8 +102,8 @@ def _check_proportions(table, height_m, total_m3, log):
     if not _SLIMMEST < ratio < _FLATTEST:
         text = message(
             "lint_proportions",
-            "{total:.6g} m3 in {height:.6g} m of height is a cylinder of diameter "
-            "{diameter:.4g} m; expected a tank: are the units right?",
+            "{total:.6g} m3 in {height:.6g} m of height is a cylinder of {diameter:.4g} m "
+            "diameter; expected the proportions of a tank: are the units right?",
             total=total_m3,
             height=height_m,
             diameter=ratio * height_m,

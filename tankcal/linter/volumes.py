@@ -133,7 +133,8 @@ def volumes_of(table, series, log):
     _check_falls(teller, found.volume * quantum)
     if not found.complete:
         log.warning(
-            table.name, message("lint_rough", "too rough to be examined row by row to its end")
+            table.name,
+            message("lint_rough", "the volumes are too rough for every row to be examined"),
         )
     joints = tuple(float(height[row]) for row in found.joints)
     return Volumes(height, volume, decimals, joints)
@@ -150,7 +151,7 @@ def _left_out(table, entries, log):
             first, last = entries[rows[0]], entries[rows[-1]]
             text = message(
                 "lint_no_volumes",
-                "no volumes from here to row {last_row}: are these heights not for use?",
+                "no volumes from here to row {last_row}: are these heights out of use?",
                 last_row=last.row,
             )
             log.warning(table.name, text, first.row, first.volume_column)

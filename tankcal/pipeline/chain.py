@@ -243,7 +243,7 @@ class Result:
         reference = self.job.datum.reference_height_m
         if reference is None:
             raise HeightError(
-                message("no_ullage", "no ullage without datum.reference_height_m in the job")
+                message("no_ullage", "no ullage; expected datum.reference_height_m in the job")
             )
         return self.at(float(dips.ullage_m(reference, ullage_m)))
 
@@ -295,7 +295,10 @@ def run(
 def _run(job, progress, part_progress, simulated):
     if job.tank is None:
         raise InputError(
-            Problem("job.toml", message("no_tank", "no tank: only its survey can be adjusted"))
+            Problem(
+                "job.toml",
+                message("no_tank", "the job has no tank: only its survey can be adjusted"),
+            )
         )
     adjustment = None
     if job.measurements is not None:
@@ -409,7 +412,9 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjus
         raise InputError(
             Problem(
                 "job.toml",
-                message("no_measurements", "no measurements: there is nothing to adjust"),
+                message(
+                    "no_measurements", "the job has no measurements: there is nothing to adjust"
+                ),
             )
         )
     with _telling(job):
@@ -427,7 +432,8 @@ def _adjusted(job, progress):
     if job.points is not None and not job.points.from_adjustment:
         expected = message(
             "points_beside_survey",
-            "given beside a survey; expected one of them: the points are adjusted from it",
+            "given together with a survey; expected only one of them: the points come from "
+            "its adjustment",
         )
         raise InputError(Problem("points.csv", expected))
     adjustment = adjust_survey(job.measurements, progress)

@@ -141,9 +141,11 @@ def _of_shell(job, wall):
 BOTTOM_FORMULAS = {
     "flat": "",
     "leaning": message("leaning_bottom", "plane square to the leaning axis of the shell"),
-    "cone": message("cone_bottom", "π r² H/3 for a round shell; the shell's own outline is taken"),
+    "cone": message(
+        "cone_bottom", "π r² H/3 for a round shell; computed with the shell's own outline"
+    ),
     "dish": message(
-        "dish_bottom", "π H (3 r² + H²)/6 for a round shell; the shell's own outline is taken"
+        "dish_bottom", "π H (3 r² + H²)/6 for a round shell; computed with the shell's own outline"
     ),
     "points": message(
         "surveyed_bottom",

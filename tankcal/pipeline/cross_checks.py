@@ -34,9 +34,9 @@ def refuse_misfit(points, noise_m, diameter_m):
         return
     text = message(
         "points_make_no_shape",
-        "the points scatter by {noise_m:.3g} m (rms) about the best shape of {diameter_m:.4g} m"
-        " diameter; expected points of its wall: one axis in another unit, or points of something"
-        " else?",
+        "the points scatter by {noise_m:.3g} m (rms) about the best shape of "
+        "{diameter_m:.4g} m diameter; expected points of its wall: is one axis in another "
+        "unit, or are they points of something else?",
         noise_m=noise_m,
         diameter_m=diameter_m,
     )
@@ -131,9 +131,9 @@ def _against_tape(job, wall):
         return []
     text = message(
         "circumference_off",
-        "{measured_m:.4f} m by tape, {found_m:.4f} m by the points of the first course with"
-        " survey.side = {side}: they differ by {miss_mm:+.0f} mm. Is it the right side, unit and"
-        " scale?",
+        "{measured_m:.4f} m by tape, {found_m:.4f} m from the points of the first course "
+        "with survey.side = {side}: they differ by {miss_mm:+.0f} mm. Is it the right side, "
+        "unit and scale?",
         measured_m=measured,
         found_m=2 * np.pi * radius,
         side=job.survey.side,
@@ -154,9 +154,9 @@ def _beyond_ends(job, wall, radius_m):
             continue
         text = message(
             "points_off_shell",
-            "{count} points of the wall lie up to {most_m:.3g} m beyond the {end} of the shell,"
-            " which goes from z = {low_m:.6g} to {high_m:.6g} m: is datum.bottom_z_m right, and are"
-            " the courses all there?",
+            "{count} points of the wall lie up to {most_m:.3g} m beyond the {end} of the "
+            "shell, which goes from z = {low_m:.6g} to {high_m:.6g} m: is datum.bottom_z_m "
+            "right, and are all courses given?",
             count=int(off.sum()),
             most_m=float(beyond[off].max()),
             end=message("end_bottom", "bottom") if end == "bottom" else message("end_top", "top"),
@@ -191,8 +191,8 @@ def _plate_on_bottom(job, wall, radius_m):
         return []
     text = message(
         "dip_plate_off_bottom",
-        "{miss_m:+.3f} m from the bottom of form {form} at the dip point: is datum.dip_plate_z_m"
-        " right, and does the bottom go up or down to its centre?",
+        "{miss_m:+.3f} m from the bottom of form {form} at the dip point: is "
+        "datum.dip_plate_z_m right, and does the bottom slope up or down to its centre?",
         miss_m=float(miss),
         form=bottom.form,
     )
@@ -212,8 +212,8 @@ def refuse_other_side(job, is_within, adjustment):
     if np.all(is_inside) if side == "outside" else not np.any(is_inside):
         text = message(
             "stations_on_other_side",
-            "found {side}, and all {count} set-ups and photographs stand {other} the wall; expected"
-            " {other}",
+            "found {side}, but all {count} set-ups and photographs are {other} the wall; "
+            "expected {other}",
             side=side,
             other=other,
             count=len(is_inside),
@@ -245,7 +245,7 @@ def _against_drawing(job, diameter_m):
         return []
     text = message(
         "points_unlike_drawing",
-        "{nominal_m:g} m, the points say {found_m:.4f} m: they differ by {percent:+.1f} %",
+        "{nominal_m:g} m, but the points give {found_m:.4f} m: they differ by {percent:+.1f} %",
         nominal_m=nominal,
         found_m=diameter_m,
         percent=100 * (diameter_m / nominal - 1),

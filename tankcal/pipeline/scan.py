@@ -118,7 +118,7 @@ def _told(job, xyz_m, chosen):
     except SolutionError as error:
         problem = Problem(
             origin_of(job.points),
-            message("no_wall", "the points make no wall: {error}", error=error.args[0]),
+            message("no_wall", "no wall was found in the points: {error}", error=error.args[0]),
         )
         raise InputError(problem) from error
 

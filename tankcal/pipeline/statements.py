@@ -158,8 +158,8 @@ def _worst(job, table):
                 SETTINGS_FILE,
                 message(
                     "no_such_delivery",
-                    "found {one:g}; expected at most {height:g} m between two dips of the table "
-                    "that are for use: there is no such delivery",
+                    "found {one:g}; expected at most {height:g} m: no two usable dips of the "
+                    "table are further apart",
                     one=one,
                     height=height,
                 ),

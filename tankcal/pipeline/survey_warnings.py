@@ -19,10 +19,10 @@ CONFIRMED = 0.5  # scatter over given sds, or the other way round, from which on
 VAGUE = 5.0  # times the median sd: what a point with one poor ray too few has
 OF_VERTICAL = message(
     "gives_vertical",
-    "plumb lines, height differences, vertical or zenith angles, or control points with known"
-    " heights give it",
+    "plumb lines, height differences, vertical or zenith angles, or control points with "
+    "known heights determine it",
 )
-OF_SCALE = message("gives_scale", "distances, or control points that lie apart, give it")
+OF_SCALE = message("gives_scale", "distances, or control points in different places, determine it")
 
 
 def noise_is_estimated(job):
@@ -79,8 +79,9 @@ def open_questions(job, datum, causes):
     ):
         text = message(
             "heights_not_fixed",
-            "datum = {choice}: nothing measured fixes the heights of the frame. bottom_z_m is taken"
-            " in the frame of the results, held by {held}: check it there",
+            "datum = {choice}: no observation fixes the heights of the frame; bottom_z_m is "
+            "taken in the frame of the results, which is held by {held}: check its value in "
+            "that frame",
             choice=datum.choice,
             held=_held(datum.held),
         )
@@ -93,8 +94,8 @@ def open_questions(job, datum, causes):
     if scales and any(one.name == "scale" for one in job.inputs):
         text = message(
             "scale_twice",
-            "scale is declared beside that of {instruments} in instruments.toml, which the points"
-            " contain: both count, which is right only for different causes",
+            "scale is declared, and that of {instruments} in instruments.toml is already in "
+            "the points: both count, which is right only if their causes are different",
             instruments=list_some(scales, SHOWN),
         )
         problems.append(Problem("uncertainty.csv", text, column="input"))
@@ -121,7 +122,8 @@ def warn_of_vague_vertical(points):
         return []
     text = message(
         "vertical_vague",
-        "the vertical is known to {sd_mm_per_m:.1f} mm/m only (sd), so is the tilt: {remedy}",
+        "the vertical, and with it the tilt, is known only to {sd_mm_per_m:.1f} mm/m (sd): "
+        "{remedy}",
         sd_mm_per_m=1000 * sd,
         remedy=OF_VERTICAL,
     )
@@ -160,8 +162,8 @@ def warn_of_vague_points(points, accepted, sds_m, noise_m):
         texts.append(
             message(
                 "points_noisy",
-                "the points of the wall are known to {sd_mm:.1f} mm (median sd in plan): dents and"
-                " ovality of that size are not told from noise",
+                "the points of the wall are known to {sd_mm:.1f} mm (median sd in plan): "
+                "dents and ovality of that size cannot be told from noise",
                 sd_mm=1000 * middle,
             )
         )
@@ -183,8 +185,8 @@ def weak_sections(job, groups, azimuth_rad):
             texts.append(
                 message(
                     "section_weak",
-                    "section {section} (course {course}) stands on {count} points, {advised} or"
-                    " more are advised",
+                    "section {section} (course {course}) has only {count} points; {advised} "
+                    "or more are advised",
                     **named,
                     count=len(ordered),
                     advised=ADVISED_POINTS,
@@ -194,8 +196,8 @@ def weak_sections(job, groups, azimuth_rad):
             texts.append(
                 message(
                     "section_gap",
-                    "section {section} (course {course}) has no point over {gap_deg:.0f} deg of its"
-                    " turn: measure there",
+                    "section {section} (course {course}) has no point over {gap_deg:.0f} deg "
+                    "of its circumference: measure there",
                     **named,
                     gap_deg=gap,
                 )
@@ -222,8 +224,9 @@ def check_shell(job, shell, sections, given_sd_m):
         texts.append(
             message(
                 "many_outliers",
-                "{rejected} of {tested} points near the wall were rejected as outliers: are they"
-                " dents of the wall, or something before it? The working papers list them",
+                "{rejected} of {tested} points near the wall were rejected as outliers: are "
+                "they dents of the wall, or objects in front of it? The working papers list "
+                "them",
                 rejected=snooped,
                 tested=tested,
             )
@@ -263,7 +266,7 @@ def incomplete_certificate(job):
         return ()
     text = message(
         "certificate_incomplete",
-        "not given: {entries}; ISO/IEC 17025, 7.8.2, asks for them",
+        "not given: {entries}; ISO/IEC 17025, 7.8.2, requires them",
         entries=lacking,
     )
     return (Problem("job.toml", text, column="certificate"),)

@@ -108,7 +108,7 @@ def _shell(job, heights, sds):
         if job.points.from_adjustment:
             hint = message(
                 "told_by_targets",
-                "{error}, and bottom_z_m; targets.csv tells points of the wall from others",
+                "{error}, and bottom_z_m; list the points that are on the wall in targets.csv",
                 error=error.args[0],
             )
             raise SolutionError(hint) from error

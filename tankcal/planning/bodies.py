@@ -40,9 +40,9 @@ def describe_separate_bodies(found):
     told = "; ".join(", ".join(names) for names in found)
     return message(
         "plan_apart",
-        "{count} groups of set-ups hang together with no other: {told}; they "
-        "share fewer than {shared} points and do not see each other: add marks "
-        "or control points that neighbours both see, or set-ups between them",
+        "{count} groups of set-ups are not connected to the others: {told}; they share fewer "
+        "than {shared} points and do not see each other: add marks or control points that "
+        "neighbours both see, or set-ups between them",
         count=len(found),
         told=told,
         shared=SHARED,

@@ -46,8 +46,8 @@ def _unseen(prediction):
         return ()
     text = message(
         "plan_targets_lost",
-        "{count} of {all} targets are not determined, for they are seen from too few places:"
-        " {points}",
+        "{count} of {all} targets are not determined, because they are seen from too few "
+        "places: {points}",
         count=len(lost),
         all=len(targets),
         points=list_some(lost, SHOWN),
@@ -71,8 +71,8 @@ def idle_ties(plan, points):
         return ()
     text = message(
         "plan_ties_idle",
-        "{count} of {all} tapes, height differences and plumb lines do not count, for an end of"
-        " them is not determined: {ties}",
+        "{count} of {all} tapes, height differences and plumb lines have no effect, because "
+        "one of their ends is not determined: {ties}",
         count=len(idle),
         all=len(ties),
         ties=list_some(idle, SHOWN),
@@ -87,7 +87,7 @@ def _uncontrolled(groups):
         return ()
     text = message(
         "plan_uncontrolled",
-        "nothing controls {groups}: an error there goes unseen into the table",
+        "no other observation checks {groups}: an error there would enter the table unnoticed",
         groups=idle,
     )
     return (Problem(PLAN_FILE, text),)

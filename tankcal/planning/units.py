@@ -37,8 +37,8 @@ def warn_of_units(given, raw, values, log):
     if (limit["relative_u"] or 0.0) > LOOSE:
         text = message(
             "plan_limit_loose",
-            "found {share:g}, which is {percent:.3g} % of the volume: was it meant in percent?"
-            " 0.2 % is 0.002",
+            "found {share:g}, which is {percent:.3g} % of the volume: is it given in "
+            "percent? 0.2 % is 0.002",
             share=limit["relative_u"],
             percent=100 * limit["relative_u"],
         )
@@ -59,8 +59,8 @@ def warn_of_places(plan, given, log):
     if far:
         text = message(
             "plan_obstacles_far",
-            "hide nothing, for the shell stands at z = {bottom_m:.6g} to {top_m:.6g} m:"
-            " {obstacles}; are they in the frame of the survey, in metres?",
+            "hide nothing, because the shell is at z = {bottom_m:.6g} to {top_m:.6g} m: "
+            "{obstacles}; are they in the frame of the survey, in metres?",
             bottom_m=float(shell.low_m),
             top_m=float(shell.high_m),
             obstacles=list_some(far, SHOWN),

@@ -221,7 +221,7 @@ def checked(data, schema, name):
         elif len(problems) < MOST_TOLD:
             problems.append(Problem(name, expected, column=path))
         else:
-            more = message("record_has_more", "further values are not what they should be, either")
+            more = message("record_has_more", "further values are not as expected either")
             return sorted(missing), [*problems, Problem(name, more)]
     return sorted(missing), problems
 

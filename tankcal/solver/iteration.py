@@ -195,7 +195,7 @@ class _Work:
             raise SolutionError(
                 message(
                     "no_factor",
-                    "the normal equations have no factor{weakness}",
+                    "the normal equations cannot be factorised{weakness}",
                     weakness=weakness(self, state),
                 )
             )
@@ -225,7 +225,9 @@ class _Work:
             datum_basis = null_space * self.model.inner[:, None]
             if np.linalg.matrix_rank(datum_basis.T @ null_space) < null_space.shape[1]:
                 raise SolutionError(
-                    message("datum_not_fixed", "what is to hold the datum does not fix it")
+                    message(
+                        "datum_not_fixed", "the coordinates chosen to hold the datum do not fix it"
+                    )
                 )
             held = np.linalg.qr(null_space[:nr] / scale[:, None])[0]
         if self.plan.blocks == 0 and self.rows * nr * nr < SMALL:

@@ -66,12 +66,12 @@ def adjust_survey(measurements, progress=None):
     except SolutionError as error:
         if not measurements.settings.explain or isinstance(error, SeveralPlacesError):
             raise
-        progress(message("looking_for_faults", "looking for what is wrong"))
+        progress(message("looking_for_faults", "looking for mistakes in the input"))
         told = _why_not(measurements, str(error))
         if not told:
             raise
         raise SolutionError(*error.args, *(one.text for one in told)) from error
-    progress(message("judging_residuals", "working out what the residuals say"))
+    progress(message("judging_residuals", "testing the residuals"))
     return replace(_complete(*found, measurements), depth=depth)
 
 
@@ -79,7 +79,7 @@ def _adjusted(measurements, progress, snooping=None, most=100, like=None):
     """Searched, Gathered and Frame of measurements; like: network.Adjusted that is close to it."""
     gathered = gather(measurements)
     if not gathered.survey.points:
-        nothing = message("nothing_observed", "the survey has no observations to be adjusted")
+        nothing = message("nothing_observed", "the survey has no observations to adjust")
         raise InputError([Problem("job.toml", nothing), *gathered.warnings])
     progress(
         message(
@@ -183,8 +183,8 @@ def _kept(one, traces):
     trace = traces[one.source]
     text = message(
         "disagreeing_but_kept",
-        "reading {reading} disagrees with the others (w = {w:.1f}), and was kept: without it"
-        " something would not be determined",
+        "reading {reading} disagrees with the others (w = {w:.1f}), but was kept: without it "
+        "some unknowns would not be determined",
         reading="-".join(trace.ids[one.row]),
         w=one.w,
     )
@@ -233,9 +233,9 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
     if gone - left >= SPARED:
         text = message(
             "held_or_readings",
-            "the search for blunders would set {gone} values aside, and no more than {left} were a"
-            " held coordinate wrong instead: correct that coordinate or leave its standard"
-            " deviation blank, or mark the readings use = check if they are the wrong ones",
+            "the search for blunders would set {gone} values aside, but at most {left} if a "
+            "held coordinate is wrong instead: correct that coordinate or leave its standard "
+            "deviation blank, or mark the readings use = check if they are the wrong ones",
             gone=gone,
             left=left,
         )
@@ -259,12 +259,14 @@ def _cov_scale(adjusted, settings):
         return 1.0, []
     if adjusted.dof > 0 and adjusted.sigma0 > NOISELESS:
         return adjusted.sigma0**2, []
-    text = message("nothing_redundant", "nothing is redundant: covariances keep the a-priori scale")
+    text = message(
+        "nothing_redundant", "no observation is redundant: covariances keep the a-priori scale"
+    )
     if adjusted.dof > 0:
         text = message(
             "nothing_scatters",
-            "all residuals are zero (sigma0 = {sigma0:.1g}): that is no measure of the readings,"
-            " and covariances keep the a-priori scale",
+            "all residuals are zero (sigma0 = {sigma0:.1g}): they do not show how good the "
+            "readings are, so covariances keep the a-priori scale",
             sigma0=adjusted.sigma0,
         )
     return 1.0, [Problem("job.toml", text, None, "adjustment.scale")]

@@ -64,7 +64,7 @@ def make_frame(survey, gathered, settings):
     if free.shape[1] and not report.scale and settings.datum != "control":
         text = message(
             "scale_of_datum",
-            "nothing that was measured gives the scale: it is that of what holds the datum",
+            "no observation determines the scale: it comes from what holds the datum",
         )
         warnings = [*warnings, Problem("job.toml", text, None, "adjustment.datum")]
     spare = settings.datum != "minimal" or held.sum() > free.shape[1]
@@ -161,7 +161,8 @@ def _minimal(survey, bare, problem, free, gathered, settings):
     if len(wanted) > d:
         text = message(
             "too_many_held",
-            "{held} coordinates are held where {needed} would do: the others strain the network",
+            "{held} coordinates are held where {needed} are enough: the others can distort "
+            "the network",
             held=len(wanted),
             needed=d,
         )
@@ -180,7 +181,7 @@ def _photo(survey, bare, problem, free, gathered, settings):
         raise InputError(
             Problem(
                 "job.toml",
-                message("not_a_photo", "{name} is no photo of this survey", name=name),
+                message("not_a_photo", "{name} is not a photo of this survey", name=name),
                 None,
                 "adjustment.fixed_photo",
             )
@@ -257,7 +258,7 @@ def _released(survey, held, choice):
 def _nothing_left(choice):
     text = message(
         "nothing_left_to_hold",
-        "observations determine the frame already: nothing is left for datum = {choice}",
+        "the observations already determine the frame: datum = {choice} has nothing to fix",
         choice=choice,
     )
     return Problem("job.toml", text, None, "adjustment.datum")
@@ -295,7 +296,7 @@ def _wanted(survey, settings):
             missing.append(
                 Problem(
                     "job.toml",
-                    message("not_adjusted_point", "{name} is no adjusted point", name=name),
+                    message("not_adjusted_point", "{name} is not an adjusted point", name=name),
                     None,
                     "adjustment.datum_points",
                 )

@@ -104,7 +104,7 @@ def _of_excluded(excluded, where):
         return found
     text = message(
         "more_left_out",
-        "further points are left out for want of observations: {points}",
+        "further points are left out because they have too few observations: {points}",
         points=list_some(list(excluded)[TOLD - 1 :], TOLD),
     )
     return [*found[: TOLD - 1], Problem("job.toml", text, None, "adjustment")]

@@ -153,9 +153,9 @@ def mirrored_targets(xyz_m, points, measurements):
         return []
     text = message(
         "mirrored_generatrices",
-        "the adjusted points are a mirror image of the generatrices: these are numbered"
-        " anticlockwise (fine, if that is meant), or images are mirrored, or x and y of control are"
-        " swapped",
+        "the adjusted points are a mirror image of the generatrices: these are numbered "
+        "anticlockwise (correct if that is intended), or images are mirrored, or x and y of "
+        "control are swapped",
     )
     return [Problem("targets.csv", text, None, "generatrix")]
 

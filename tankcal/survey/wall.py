@@ -101,8 +101,8 @@ def _refuse_size(n):
         raise SolutionError(
             message(
                 "wall_too_large",
-                "{n} points of the wall were adjusted; at most {largest} can be taken on with "
-                "their full covariance: name the targets that are to be used in targets.csv",
+                "{n} points of the wall were adjusted; at most {largest} can be used with "
+                "their full covariance: name the targets to use in targets.csv",
                 n=n,
                 largest=LARGEST,
             )

@@ -152,7 +152,8 @@ def shaped_bottom(form, plan_m2, centre_m=0.0):
         raise SolutionError(
             message(
                 "bottom_impossible",
-                "bottom of {plan_m2:g} m2 with its centre at {centre_m:g} m",
+                "bottom of {plan_m2:g} m2 with its centre at {centre_m:g} m; expected an "
+                "area above 0 and a finite height",
                 plan_m2=plan_m2,
                 centre_m=centre_m,
             )

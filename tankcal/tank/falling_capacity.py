@@ -22,9 +22,9 @@ def refuse_falling(job, body, zero_m, heights_m, volumes_m3):
     file, column, what = _cause(job, body, between, zero_m)
     text = message(
         "table_falls",
-        "the capacity falls from {from_m3:.6g} to {to_m3:.6g} m3 between the dips of {low_m:g} and"
-        " {high_m:g} m, and {count} times in all; likely {what}, which takes more than the tank"
-        " holds there",
+        "the capacity falls from {from_m3:.6g} to {to_m3:.6g} m3 between the dips of "
+        "{low_m:g} and {high_m:g} m, and {count} times in all; the likely cause is {what}, "
+        "which takes up more than the tank holds there",
         from_m3=float(volumes_m3[worst]),
         to_m3=float(volumes_m3[worst + 1]),
         low_m=float(between[0]),

@@ -157,7 +157,7 @@ def meridian(end, radius_m):
             raise SolutionError(
                 message(
                     "flat_end_depth",
-                    "a flat end has no depth, {depth_m:g} m was given",
+                    "a flat end has no depth, but {depth_m:g} m was given",
                     depth_m=end.depth_m,
                 )
             )

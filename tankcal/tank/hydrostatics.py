@@ -222,7 +222,7 @@ def _refuse_numbers(modulus, gravity, *others):
             raise SolutionError(
                 message(
                     "modulus_or_gravity",
-                    "Young's modulus or gravity {value:g}; expected it above 0",
+                    "Young's modulus or gravity {value:g}; expected a value above 0",
                     value=value,
                 )
             )

@@ -85,7 +85,7 @@ class MeasuredBottom(Part):
             raise HeightError(
                 message(
                     "level_below_measured",
-                    "level {level_m:g} m is below the lowest one measured by liquid "
+                    "level {level_m:g} m is below the lowest level measured by liquid "
                     "({lowest_m:g} m, {volume_m3:g} m3)",
                     level_m=levels.min(),
                     lowest_m=lowest,

@@ -186,7 +186,7 @@ def test_lines_of_influence(run):
     text = text_of(lines)
     assert any(line.startswith("reference") for line in lines)
     assert any(line.startswith("=cmd, fixed") and "adjusted" in line for line in lines)
-    assert "no standard deviations to be weighted by" in text
+    assert "no standard deviations for its weights" in text
     moved = run["runs"][1]["shifts"]["points"]["largest_xyz_mm"]
     assert f"{moved:.3f}" in text
 

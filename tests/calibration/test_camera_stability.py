@@ -491,7 +491,9 @@ def test_a_grid_that_is_none(text):
 
 def test_a_grid_off_the_frame(seven):
     for grid in (parse("46x35,50,50,101"), Grid(2, 2, (-1, 0), 10), Grid(2, 3, (0, 0), 1728)):
-        with pytest.raises(InputError, match=r"expected all of it on the frame of 4608 x 3456 px"):
+        with pytest.raises(
+            InputError, match=r"expected the whole grid on the frame of 4608 x 3456 px"
+        ):
             compare(seven, "mis", grid)
 
 
@@ -527,7 +529,7 @@ def test_other_frames_and_pixels():
     small = replace(setup("b"), format_mm=np.array([4600, 3456]) * PIXEL_MM)
     fine = setup("c", pixel_mm=PIXEL_MM * 1.003)
     words = refusal([first, small, fine])
-    assert "b: a frame of 4600 x 3456 px; expected 4608 x 3456 as of a" in words
+    assert "b: a frame of 4600 x 3456 px; expected 4608 x 3456, as a has" in words
     assert "c: a pixel of 1.3039 x 1.3039 micrometres; expected that of a, 1.3 x 1.3" in words
     assert "b: the size of a pixel is not known" in refusal([first, replace(small, pixel_mm=None)])
 
@@ -564,7 +566,7 @@ def test_points_that_do_not_determine_an_orientation():
 
 def test_distortion_that_turns_back_within_the_frame():
     lens = setup("wild", Form("distortion_of_ideal"), K1=-0.05)
-    with pytest.raises(SolutionError, match="wild: its distortion cannot be taken out"):
+    with pytest.raises(SolutionError, match="wild: its distortion cannot be removed"):
         compare([setup("a"), lens], "mis")
 
 
@@ -702,7 +704,7 @@ def test_both_spellings_at_once(tmp_path):
     (problem,) = complaints(tmp_path, LONG + "K1 = -1.7e-3\n")
     assert (problem.row, problem.column) == (17, "one.K1")
     assert problem.expected == (
-        "given beside K1_mm-2; expected one of them: they are the same parameter"
+        "given together with K1_mm-2; expected only one of them: they are the same parameter"
     )
     (setup_,) = read(tmp_path, LONG + 'K1 = ""\n')  # blank: not given
     assert setup_.camera.values[3] == -1.7e-3
@@ -713,7 +715,7 @@ def test_a_bad_value_is_told_by_the_key_that_was_written(tmp_path):
     assert problem.column == "one.K1"
     (problem,) = complaints(tmp_path, SHORT.replace("K1 = -1.7e-3", "K1 = 0.9"))
     assert problem.column == "one.K1"
-    assert "of another unit than millimetres" in problem.expected
+    assert "is it in another unit than millimetres" in problem.expected
 
 
 @pytest.mark.parametrize(
@@ -735,9 +737,13 @@ def test_the_size_of_the_frame_in_each_way(tmp_path, size):
     ("size", "key", "words"),
     [
         ("", "format_mm", "missing; expected [width, height], or format_px with pixel_um"),
-        ("format_px = [4608, 3456]", "pixel_um", "missing beside format_px"),
+        ("format_px = [4608, 3456]", "pixel_um", "missing, but format_px"),
         ("pixel_um = 1.34", "format_mm", "missing; expected [width, height]"),
-        ("format_mm = [6.2, 4.6]", "pixel_um", "missing beside format_mm; expected the size of"),
+        (
+            "format_mm = [6.2, 4.6]",
+            "pixel_um",
+            "missing, but format_mm is given; expected the size of",
+        ),
         ("format_mm = [6.17, 4.7]\npixel_um = 1.34", "format_mm", "4604.4776 x 3507.4627 pixels"),
         ("format_px = [4608, 3456]\npixel_um = 0.00134", "pixel_um", "is it in millimetres?"),
         ("format_px = [4608, 3456]\npixel_um = 340", "pixel_um", "is it in another unit?"),
@@ -795,10 +801,10 @@ c_mm = 1
         ("[cameras]\n", "no camera; expected sections"),
         ('[cameras.a]\nc_mm = ""\n', "no camera; expected sections"),
         ("[cameras.a]\nc_mm = 1\n[cameras.a]\nc_mm = 2\n", "cannot be read"),
-        ("[cameras]\na = 1\n", "stands in no [cameras.NAME]"),
-        ("c_mm = 4\n", "stands outside; expected sections such as [cameras.NAME]"),
+        ("[cameras]\na = 1\n", "is in no section [cameras.NAME]"),
+        ("c_mm = 4\n", "is in no section; expected sections such as [cameras.NAME]"),
         ("\0", "a zero byte"),
-        ("[[cameras]]\na = 1\n", "stands outside"),
+        ("[[cameras]]\na = 1\n", "is in no section"),
     ],
 )
 def test_files_that_are_no_calibrations(tmp_path, text, words):
@@ -829,12 +835,12 @@ def test_doubts_are_told_to_who_asks(tmp_path):
         ("x0_mm", 62.5, "outside the format, whose width is 6.172 mm; expected at most 3.086"),
         ("y0_mm", -42.7, "outside the format, whose height is 4.629 mm"),
         ("c_mm", 4381.6, "with a format of 7.715 mm across; expected 0.386 to 1543 mm"),
-        ("c_mm", 0.0043816, "expected 0.386 to 1543 mm: in another unit?"),
+        ("c_mm", 0.0043816, "expected 0.386 to 1543 mm: is it in another unit?"),
         ("P1_mm-1", 0.8448316, "moves the corner of the image by 806 % of its radius"),
         ("P2_mm-1", -0.6318956, "moves the corner of the image by 480 % of its radius"),
         ("P4_mm-4", 1.0, "moves the corner of the image by"),
-        ("s_c_mm", 13.0, "with a format of 7.715 mm across; expected less: in another unit?"),
-        ("s_x0_mm", 381.1, "expected less: in another unit?"),
+        ("s_c_mm", 13.0, "with a format of 7.715 mm across; expected less: is it in another unit?"),
+        ("s_x0_mm", 381.1, "expected less: is it in another unit?"),
     ],
 )
 def test_numbers_a_thousand_times_off(tmp_path, key, value, words):
@@ -866,7 +872,8 @@ def test_choosing_by_name(seven):
         choose(seven, ["set1", "sett7", "set1", "=evil\n"], "seven.toml")
     lines = [str(one) for one in caught.value.problems]
     assert lines[0].startswith(
-        "seven.toml: found 'sett7'; expected a camera of it (did you mean set7?): set1, set2, set3"
+        "seven.toml: found 'sett7'; expected a camera of this file (did you mean set7?): "
+        "set1, set2, set3"
     )
     assert lines[1] == "seven.toml: 'set1' was named twice; expected once"
     assert "found '=evil?'" in lines[2]
@@ -883,7 +890,9 @@ def test_a_job_takes_both_spellings(tmp_path):
     for one, other in zip(before, after, strict=True):
         assert np.array_equal(one.camera.values, other.camera.values)
     camera["K1_mm-2"] = k1
-    with pytest.raises(InputError, match=r"K1: given beside K1_mm-2; expected one of them"):
+    with pytest.raises(
+        InputError, match=r"K1: given together with K1_mm-2; expected only one of them"
+    ):
         load(write_folder(tmp_path / "both", parts))
 
 

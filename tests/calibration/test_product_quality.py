@@ -357,11 +357,11 @@ def test_all_problems_of_differences_in_one_run(tmp_path):
     text = str(caught.value)
     for part in (
         "hight: unknown column",
-        "y_ref_m: missing column beside its pair",
+        "y_ref_m: missing column; the other one of its pair is given, expected both",
         "row 2, point: found '=cmd()'",
         "row 3, x_m: found 'nan'",
         "row 4, x_ref_m: missing",
-        "row 4, point: point P1 stands in row 3 already",
+        "row 4, point: point P1 is already in row 3",
         "row 5, point: missing",
         "row 6: no difference in this row",
         "row 7: 3 cells, expected 5",

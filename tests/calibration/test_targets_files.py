@@ -61,7 +61,7 @@ def test_corners_get_their_names(photos, tmp_path):
     assert [float(row["s_px"]) for row in rows[:4]] == pytest.approx(marker.sd_px, abs=1e-4)
     assert steps == [("left", 0, 2), ("right", 1, 2), ("done", 2, 2)]
     assert (reading.targets, reading.points, reading.refused) == (4, 16, {})
-    assert any("listed but never read: 1: 'T12'" in str(one) for one in reading.warnings)
+    assert any("listed, but found in no photo: 1: 'T12'" in str(one) for one in reading.warnings)
     assert rows_of(reading.refused_path) == []
 
 
@@ -70,7 +70,7 @@ def test_centres_have_the_plain_name(photos, tmp_path):
         photos[:1], tmp_path / "o.csv", Wanted(what="centres", dictionary=ARUCO)
     )
     assert [row["point"] for row in rows_of(reading.path)] == ["7", "9"]
-    assert any("give the list of ids" in str(one) for one in reading.warnings)
+    assert any("give the list of the ids" in str(one) for one in reading.warnings)
 
 
 def test_what_is_refused_is_listed(photos, tmp_path):
@@ -88,7 +88,7 @@ def test_nothing_is_overwritten_unasked(photos, tmp_path):
     out = tmp_path / "image_points.csv"
     out.write_text("mine")
     assert told(photos, out) == [
-        "image_points.csv: is there already; expected another name, or to replace it"
+        "image_points.csv: already exists; expected another name, or the choice to replace it"
     ]
     assert out.read_text() == "mine"
     assert read_photographs(photos, out, WANTED, replace=True).points == 16
@@ -192,8 +192,9 @@ def test_places_in_photos_that_are_not_given_are_told(circles, tmp_path):
     reading = read_photographs([circles[0]], tmp_path / "o.csv", wanted)
     assert [str(one) for one in reading.warnings if one.file == "places.csv"] == [
         "places.csv, row 2, photo: found 'disc'; expected one of the photos given"
-        " (did you mean discs?): not used",
-        "places.csv, row 5, photo: found 'other'; expected one of the photos given: not used",
+        " (did you mean discs?); the row is not used",
+        "places.csv, row 5, photo: found 'other'; expected one of the photos given; "
+        "the row is not used",
     ]
 
 

@@ -225,14 +225,14 @@ BOMB = '<!DOCTYPE x [<!ENTITY a "b">]>' + METASHAPE.split("\n", 1)[1]
 TWO_ALIKE = "1 PINHOLE 4000 3000 1 1 1 1\n" * 2
 BROKEN = {
     "doctype": (BOMB, None, "document type"),
-    "truncated xml": (METASHAPE[:150], None, "no readable XML"),
+    "truncated xml": (METASHAPE[:150], None, "not readable XML"),
     "f twice": (METASHAPE.replace("<cx>4.25</cx>", "<f>1</f>"), "'f'", "twice"),
     "no f": (METASHAPE.replace("<f>3000.5</f>", ""), "f", "missing"),
     "f 0": (METASHAPE.replace("3000.5", "0"), "f", "above 0"),
     "nan": (METASHAPE.replace("-0.07", "nan"), "k1", "finite"),
     "underscored": (METASHAPE.replace("3000.5", "3_000"), "f", "finite"),
     "fisheye xml": (METASHAPE.replace("frame", "fisheye"), "projection", "frame cameras"),
-    "deep xml": ("<calibration>" * 200_000, None, "no readable XML"),
+    "deep xml": ("<calibration>" * 200_000, None, "not readable XML"),
     "deep xml, whole": ("<calibration>" * 90_000 + "</calibration>" * 90_000, "width", "missing"),
     "document": ("<document></document>", None, "outermost"),
     "old photoscan": (METASHAPE.replace("f>", "fx>"), "fx", "PhotoScan"),
@@ -241,8 +241,8 @@ BROKEN = {
     "b1 larger than f": (METASHAPE.replace("<date>", "<b1>-4000</b1><date>"), "b1", "magnitude"),
     "colmap model": ("1 OPENCV_FISHEYE 4 3 1 1 1 1 0 0 0 0", "MODEL", "those read are"),
     "colmap count": ("1 PINHOLE 4000 3000 3000 2000 1500", "PARAMS", "expected 4"),
-    "colmap cut": ("1 PINHOLE 4000 3000 1 1 1 1\n2 PINHOLE 40", None, "cut off"),
-    "colmap twice": (TWO_ALIKE, "CAMERA_ID", "second"),
+    "colmap cut": ("1 PINHOLE 4000 3000 1 1 1 1\n2 PINHOLE 40", None, "incomplete line"),
+    "colmap twice": (TWO_ALIKE, "CAMERA_ID", "twice"),
     "colmap inf": ("1 PINHOLE 4000 3000 inf 1 1 1", "fx", "finite"),
     "colmap nothing": ("# CAMERA_ID, MODEL", None, "no camera"),
     "colmap name": ("=1+1 PINHOLE 4000 3000 1 1 1 1", "CAMERA_ID", "expected a name"),
@@ -261,19 +261,19 @@ BROKEN = {
     "yaml fisheye": (YAML + "distortion_model: equidistant\n", None, "fisheye"),
     "yaml size": (YAML.replace("image_height: 3000\n", ""), "image_height", "missing"),
     "yaml other size": (YAML.replace("_width: 4000", "_width: 400"), "format_px", "as given"),
-    "json cut": ('{"K": [[1, 0,', None, "no readable JSON"),
+    "json cut": ('{"K": [[1, 0,', None, "not readable JSON"),
     "json nan": ('{"K": [[NaN,0,1],[0,1,1],[0,0,1]], "dist": [0,0,0,0]}', "k", "finite"),
     "json text": ('{"K": "x", "dist": {}}', "k", "no numbers"),
     "json deep": ("{" + '"a":[' * 100_000, None, "JSON"),
     "json twice": ('{"K": [1,0,0,0,1,0,0,0,1], "k": 3, "dist": []}', "'k'", "twice"),
     "json true": ('{"K": [true,0,1,0,1,1,0,0,1], "dist": []}', "k", "finite"),
     "aicon no ck": ("Ck\nA1 2", "'Ck'", "one number"),
-    "aicon c above 0": (AICON.replace("-15", "15"), "Ck", "found 15; expected a number"),
+    "aicon c above 0": (AICON.replace("-15", "15"), "Ck", "found 15; expected a negative number"),
     "aicon key": (AICON + "Z 3", "'Z'", "unknown"),
     "aicon convention": (AICON + "convention odd", "convention", "expected one of"),
     "folds": (METASHAPE.replace("-0.07", "-0.9"), None, "folds"),
-    "nothing": ("", None, "no camera file"),
-    "letter": ("Dear Sir or Madam,", None, "no camera file"),
+    "nothing": ("", None, "not a known kind of camera file"),
+    "letter": ("Dear Sir or Madam,", None, "not a known kind of camera file"),
 }  # fmt: skip
 
 
@@ -312,7 +312,7 @@ def test_what_else_is_asked_for():
     assert problem.column == "format_px"
     (problem,) = problems_of(AICON, pixel_um=None)
     assert "size of a pixel is missing" in problem.expected
-    assert "was given" in problems_of(PIX4D, pixel_um=4.0)[0].expected
+    assert "as given" in problems_of(PIX4D, pixel_um=4.0)[0].expected
     assert "was given" in problems_of(AICON + "pixel_width 0.006\npixel_height 0.006")[0].expected
     assert problems_of(AICON + "pixel_width 0.006")[0].column == "pixel_width"
     assert "expected one of" in problems_of(YAML, kind="tiff")[0].expected

@@ -261,7 +261,7 @@ def test_lint_shows_the_first_findings_only(tmp_path, capsys):
     assert main(["lint", str(tmp_path / "t.csv")]) == 2
     lines = capsys.readouterr().out.splitlines()
     assert lines[50].startswith("and ")
-    assert lines[50].endswith(" more findings; mend these first")
+    assert lines[50].endswith(" more findings; correct these first")
 
 
 @pytest.mark.parametrize(

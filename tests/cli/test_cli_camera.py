@@ -332,7 +332,7 @@ def test_convert_from_what_is_said_whatever_the_name_of_the_file(tmp_path, capsy
 @pytest.mark.slow
 def test_convert_a_record_of_film(record, capsys):
     assert main(["camera", "convert", str(record), "--to", "opencv"]) == 2
-    assert "UMK.pixel_um: missing; opencv counts in pixels" in capsys.readouterr().err
+    assert "UMK.pixel_um: missing; a file of kind opencv is in pixels" in capsys.readouterr().err
     assert main(["camera", "convert", str(record), "--to", "cameras.toml"]) == 0
     in_mm = tomllib.loads(capsys.readouterr().out)["cameras"]["UMK"]
     assert in_mm["format_mm"] == [180, 130]
@@ -503,7 +503,7 @@ def test_targets_of_a_photograph(tmp_path, capsys):
     assert first[:2] == ["P1", "17-1"]
     assert [float(value) for value in first[2:4]] == pytest.approx([79.5, 99.5], abs=0.02)
     assert run("read", tmp_path / "P1.png", "--out", out) == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
     cv2.imwrite(str(tmp_path / "P2.jpg"), blurred)
     assert run("read", tmp_path / "P2.jpg", "--out", out, "--replace") == 0
     assert "taken as sRGB" in capsys.readouterr().err

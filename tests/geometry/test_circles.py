@@ -82,7 +82,7 @@ def test_a_circle_at_utm_coordinates_loses_nothing():
     ("points", "message"),
     [
         (np.zeros((2, 2)), "needs 3 points"),
-        (np.ones((6, 2)), "on one place"),
+        (np.ones((6, 2)), "in one place"),
         (np.column_stack([np.arange(6.0), 2 * np.arange(6.0)]), "on a line"),
     ],
 )

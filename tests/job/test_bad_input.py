@@ -100,7 +100,7 @@ def test_a_size_next_to_zero(tmp_path, rows):
     courses += [list(courses[-1]) for _ in range(rows)]
     courses[2][place] = "1e-308"
     problems = problems_of(write(tmp_path, parts, "folder"))
-    (problem,) = [one for one in problems if "0 or farther from 0" in str(one.expected)]
+    (problem,) = [one for one in problems if "0, or a number further from 0" in str(one.expected)]
     assert (problem.file, problem.row, problem.column) == ("courses.csv", 3, "thickness_mm")
 
 
@@ -135,7 +135,7 @@ BAD_CELLS = [
     ("courses", 3, "thickness_mm", 8000.0, "from 0 to 100"),
     ("courses", 3, "thickness_mm", None, "blank"),
     ("courses", 3, "paint_mm", 11.0, "from 0 to 10"),
-    ("courses", 3, "course", "1", "already, in row 2"),
+    ("courses", 3, "course", "1", "already in row 2"),
     ("points", 7, "sx_mm", -2.0, "above 0"),
     ("points", 7, "sx_mm", 0.0, "above 0"),
     ("points", 7, "sx_mm", 1001.0, "at most 1000"),
@@ -147,7 +147,7 @@ BAD_CELLS = [
     ("uncertainty", 2, "dof", 0.5, "1 or more"),
     ("uncertainty", 2, "type", "C", "'A' or 'B'"),
     ("uncertainty", 2, "distribution", "flat", "rectangular"),
-    ("uncertainty", 3, "input", "scale", "already, in row 2"),
+    ("uncertainty", 3, "input", "scale", "already in row 2"),
     ("uncertainty", 2, "u", "nan", "expected a number"),
     ("uncertainty", 2, "u", "5,5", "expected a number"),
     ("uncertainty", 2, "u", None, "blank"),
@@ -159,7 +159,7 @@ BAD_CELLS = [
     ("uncertainty", 3, "dof", 2.0, "expected above 2"),
     ("uncertainty", 4, "distribution", None, "normal has no half-width"),
     ("uncertainty", 4, "u", 1e3, "a standard uncertainty of 577.35 kg/m3"),
-    ("uncertainty", 4, "k", 2.0, "or u_is = expanded beside it"),
+    ("uncertainty", 4, "k", 2.0, "or u_is = expanded with it"),
     ("uncertainty", 5, "k", None, "expected the coverage factor"),
     ("uncertainty", 5, "k", 0.95, "from 1 to 20"),
     ("uncertainty", 5, "k", 95.0, "from 1 to 20"),
@@ -172,7 +172,7 @@ BAD_CELLS = [
     ("correlations", 2, "with", "rounding", "expected 'scale'"),
     ("correlations", 2, "with", "scale", "expected another input"),
     ("correlations", 2, "with", "paint", "expected an input of"),
-    ("correlations", 3, "with", "scale", "already, in row 2"),
+    ("correlations", 3, "with", "scale", "already in row 2"),
     ("stated", 2, "high_m", 95.0, "expected at most 9.5, the top of the tank"),
     ("stated", 2, "high_m", None, "blank"),
     ("stated", 2, "high_m", "9,0", "expected a number"),
@@ -475,7 +475,7 @@ def test_a_long_list_of_problems_is_cut_and_counted(tmp_path):
         row[1] = "x"
     problems = problems_of(write_folder(tmp_path / "job", parts))
     assert len(problems) == 51
-    assert problems[-1].expected == "and 70 more problems; mend these first"  # of 120
+    assert problems[-1].expected == "and 70 more problems; correct these first"  # of 120
 
 
 @pytest.mark.parametrize("name", ["", "nowhere", "nul\0l", "job.xlsx", "job.xls"])

@@ -47,28 +47,28 @@ BAD_CELLS = [
     ("image_points", 27, "line_px", -1.0, "expected -0.5 to 3999.5 pixels"),
     ("image_points", 4, "sx_um", None, "expected both sx_um and sy_um, or none"),
     ("image_points", 4, "sx_um", 0.0, "above 0"),
-    ("image_points", 4, "s_px", 0.5, "given beside sx_um"),
-    ("image_points", 2, "photo", "F9", "expected a name that stands in photos.csv"),
+    ("image_points", 4, "s_px", 0.5, "given together with sx_um"),
+    ("image_points", 2, "photo", "F9", "expected a name defined in photos.csv"),
     ("image_points", 2, "photo", "=F1", "a letter, digit or underscore first"),
     ("image_points", 2, "use", "maybe", "'adjust' or 'check'"),
     ("photos", 3, "camera", "UMK 10/1381", "did you mean UMK 10/1318?"),
-    ("photos", 3, "photo", "F1", "already, in row 2"),
+    ("photos", 3, "photo", "F1", "already in row 2"),
     ("photos", 4, "sx_m", 0.01, "given without x_m"),
     ("photos", 2, "omega_gon", 100.0, "in two units"),
     ("photos", 2, "omega_deg", 361.0, "is it in gon?"),
     ("photos", 2, "s_phi_deg", 0.1, "in two units"),
     ("control", 2, "sx_mm", -1.0, "from 0"),
     ("control", 2, "x_m", None, "given without x_m"),
-    ("control", 3, "point", "W1", "already, in row 2"),
-    ("setups", 3, "setup", "1", "already, in row 2"),
-    ("setups", 2, "instrument", "TC", "expected a name that stands in instruments.toml"),
+    ("control", 3, "point", "W1", "already given, in row 2"),
+    ("setups", 3, "setup", "1", "already in row 2"),
+    ("setups", 2, "instrument", "TC", "expected a name defined in instruments.toml"),
     ("setups", 2, "instrument_height_m", 1550.0, "another unit"),
     ("distances", 2, "instrument", "tape 2", "did you mean tape 1?"),
     ("distances", 2, "to", "W1", "between 'W1' and itself"),
     ("distances", 2, "distance_m", 0.0, "above 0"),
     ("distances", 2, "s_mm", None, "blank"),
     ("distances", 2, "kind", "slope", "'spatial' or 'horizontal'"),
-    ("slope_distances", 2, "setup", "7", "expected a name that stands in setups.csv"),
+    ("slope_distances", 2, "setup", "7", "expected a name defined in setups.csv"),
     ("slope_distances", 2, "to", "S1", "from station 'S1' to itself"),
     ("directions", 5, "direction_deg", 385.0, "is it in gon?"),
     ("directions", 5, "direction_deg", None, "blank; expected direction_deg"),
@@ -83,7 +83,7 @@ BAD_CELLS = [
     ("vertical_angles", 2, "angle_deg", 95.0, "is it in gon?"),
     ("height_differences", 2, "to", "W1", "between 'W1' and itself"),
     ("plumb_lines", 2, "to", "W1", "between 'W1' and itself"),
-    ("targets", 3, "point", "W1", "already, in row 2"),
+    ("targets", 3, "point", "W1", "already in row 2"),
     ("targets", 3, "offset_mm", 600.0, "from -500 to 500"),
 ]
 
@@ -123,18 +123,24 @@ BAD_KEYS = [
     ),
     ("cameras", FILM, "b1", 1e-4, "they are the same parameter"),
     ("cameras", FILM, "b2", 1e-4, "given with affinity = both_y"),
-    ("cameras", FILM, "s_K1", None, "expected it above 0, for the parameter is block weighted"),
-    ("cameras", FILM, "K1_mm-2", 1e-3, "of normalised coordinates?"),
-    ("cameras", FILM, "P1_mm-1", 0.01, "of normalised coordinates?"),
+    (
+        "cameras",
+        FILM,
+        "s_K1",
+        None,
+        "expected a value above 0: the parameter is block weighted",
+    ),
+    ("cameras", FILM, "K1_mm-2", 1e-3, "for normalised coordinates?"),
+    ("cameras", FILM, "P1_mm-1", 0.01, "for normalised coordinates?"),
     ("cameras", FILM, "x0_mm", 100.0, "outside the format, whose width is 180 mm"),
-    ("cameras", FILM, "c_mm", 0.1, "expected 11.1 to 44407 mm: in another unit?"),
-    ("cameras", FILM, "s_c_mm", 300.0, "expected less: in another unit?"),
+    ("cameras", FILM, "c_mm", 0.1, "expected 11.1 to 44407 mm: is it in another unit?"),
+    ("cameras", FILM, "s_c_mm", 300.0, "expected less: is it in another unit?"),
     ("cameras", FILM, "K1_mm-2", 1.2e-7, "expected the same"),
     ("cameras", "D", "pixel_um", None, "expected the size of a pixel"),
     ("cameras", "D", "format_mm", [30.0, 20.0], "format_px times pixel_um is 24 x 16 mm"),
     ("cameras", "D", "format_px", [6000.5, 4000.0], "whole numbers"),
     ("instruments", "TS", "kind", None, "missing"),
-    ("instruments", "tape 1", "certified_temperature_c", None, "beside expansion_per_k"),
+    ("instruments", "tape 1", "certified_temperature_c", None, "but expansion_per_k is given"),
     ("instruments", "tape 1", "u_scale_ppm", "unknown", "or 'free'"),
     ("instruments", "tape 1", "u_scale", 1e-6, "unknown key (did you mean u_scale_ppm?)"),
     ("instruments", "tape 1", "correction", 20.0, "from -0.1 to 0.1"),
@@ -161,7 +167,7 @@ BAD_SETTINGS = [
     (
         {"adjustment.image_sd_um": None},
         "image_sd_um",
-        "that carry none: 1, the first of them row 26",
+        "without one: 1, the first of them row 26",
     ),
     ({"adjustment.image_sd_um": 0.0}, "image_sd_um", "above 0"),
     ({"adjustment.datum": "free"}, "datum", "'inner'"),
@@ -235,7 +241,7 @@ def test_points_and_a_survey_are_one_too_many(tmp_path):
     with pytest.raises(InputError) as caught:
         load(write_folder(tmp_path / "job", parts))
     told = [problem for problem in caught.value.problems if problem.file == "points.csv"]
-    assert ["given beside a survey" in problem.expected for problem in told] == [True]
+    assert ["given together with a survey" in problem.expected for problem in told] == [True]
 
 
 def test_nothing_to_adjust(tmp_path):
@@ -317,7 +323,7 @@ def test_an_unknown_name_is_told_once_for_all_its_rows(tmp_path):
     del parts.tables["photos"][1]
     problem = problem_of(tmp_path, parts)
     assert (problem.file, problem.row, problem.column) == ("image_points.csv", 2, "photo")
-    assert problem.expected.endswith("8 rows name it")
+    assert problem.expected.endswith("8 rows refer to it")
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -401,7 +407,7 @@ def test_a_point_in_two_spellings(tmp_path, other, count):
     for row in rows[:count]:
         row[1] = other
     parts.tables["targets"] = parts.tables["targets"][:1]
-    words = f"{other!r} stands in {count} row"
+    words = f"{other!r} is in {count} row"
     if count == 1:
         problem = problem_of(tmp_path, parts)
         assert (problem.file, problem.row, problem.column) == ("image_points.csv", 4, "point")
@@ -432,14 +438,14 @@ def test_what_counts_as_a_spelling_of_one_name(one, other, same):
 @pytest.mark.parametrize(
     ("table", "rows", "words"),
     [
-        ("distances", [["W1", "W2", 5.0, 0.0]], "'W1' and 'W2' are held already (xyz"),
-        ("height_differences", [["W1", "W2", 0.9, 0.0]], "are held already (z in"),
-        ("plumb_lines", [["W1", "W2", 0.0]], "are held already (xy in"),
-        ("distances", [["W5", "W6", 5.0, 0.0], ["W6", "W5", 5.1, 0.0]], "held at another value"),
+        ("distances", [["W1", "W2", 5.0, 0.0]], "'W1' and 'W2' are already held (xyz"),
+        ("height_differences", [["W1", "W2", 0.9, 0.0]], "are already held (z in"),
+        ("plumb_lines", [["W1", "W2", 0.0]], "are already held (xy in"),
+        ("distances", [["W5", "W6", 5.0, 0.0], ["W6", "W5", 5.1, 0.0]], "not the value at which"),
         (
             "height_differences",
             [["W5", "W6", 0.9, 0.0], ["W5", "W6", 0.8, 0.0]],
-            "held at another value than in row",
+            "not the value at which row",
         ),
     ],
 )
@@ -460,7 +466,7 @@ def test_a_held_azimuth_between_held_points(tmp_path):
     parts.tables["azimuths"].append(["W1", "W2", "112 30 00", 0.0])
     for row in parts.tables["control"][1:3]:
         row[4:6] = [0.0, 0.0]
-    assert "are held already (xy in control.csv)" in problem_of(tmp_path, parts).expected
+    assert "are already held (xy in control.csv)" in problem_of(tmp_path, parts).expected
 
 
 @pytest.mark.parametrize(
@@ -537,7 +543,7 @@ def test_reciprocal_azimuths_in_gon(tmp_path):
     ]
     problem = problem_of(tmp_path, parts)
     assert (problem.file, problem.row, problem.column) == ("azimuths.csv", None, "azimuth_deg")
-    assert "make 200.00 as half a circle, which is gon; expected degrees" in problem.expected
+    assert "half a circle as 200.00, so they are in gon; expected degrees" in problem.expected
 
 
 def test_reciprocal_zenith_angles_in_degrees_given_as_gon(tmp_path):
@@ -547,7 +553,7 @@ def test_reciprocal_zenith_angles_in_degrees_given_as_gon(tmp_path):
         ["2", "S1", 92.01, 5.0, None, None],
     ]
     problem = problem_of(tmp_path, parts)
-    assert "make 180.01 as half a circle, which is degrees" in problem.expected
+    assert "half a circle as 180.01, so they are in degrees" in problem.expected
 
 
 def test_zenith_angles_to_marks_on_the_ground_are_no_evidence(tmp_path):
@@ -578,7 +584,7 @@ def test_directions_between_known_points(tmp_path, factor):
         ]
         problem = problem_of(tmp_path, parts)
         assert problem.column == "direction_deg"
-        assert "when they are gon" in problem.expected
+        assert "if they are in gon" in problem.expected
 
 
 @pytest.mark.parametrize(
@@ -594,7 +600,7 @@ def test_directions_between_known_points(tmp_path, factor):
         ),
         (
             lambda parts: parts.tables["check"].append(["W1", 0.0, 6.5, 1.0]),
-            "'W1' is a control point, too",
+            "'W1' is also a control point",
         ),
         (
             lambda parts: parts.tables["check"].append(["Z9", 0.0, 6.5, 1.0]),
@@ -616,11 +622,11 @@ def test_directions_between_known_points(tmp_path, factor):
         ),
         (
             lambda parts: parts.registers["cameras"][FILM].update({"s_c_mm": 0.01}),
-            'without effect, not weighted (s_c_mm); [adjustment.camera] c = "camera weighted" uses',
+            "without effect: the parameter is not weighted (s_c_mm); [adjustment.camera] c =",
         ),
         (
             lambda parts: parts.registers["cameras"][FILM].update({"K3_mm-6": 1e-14}),
-            "adjustment.camera.K3 is off; it is held at this value",
+            "adjustment.camera.K3 is off: the parameter is held at this value",
         ),
         (
             lambda parts: parts.registers["cameras"][FILM].update({"c_mm": 15.0}),
@@ -662,17 +668,17 @@ def test_free_and_held_contradict(tmp_path):
     parts.registers["cameras"]["D"]["s_c_mm"] = 0.0
     problem = problem_of(tmp_path, parts)
     assert problem.column == "D.s_c_mm"
-    assert "adjustment.camera.c says free" in problem.expected
+    assert "adjustment.camera.c has it free" in problem.expected
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("[camera.D]\nc_mm = 1.0\n", "expected sections such as [cameras.NAME]"),
-        ("[cameras]\nc_mm = 1.0\n", "stands in no [cameras.NAME]"),
+        ("[cameras]\nc_mm = 1.0\n", "is in no section [cameras.NAME]"),
         ("c_mm = 1.0\n", "expected sections such as [cameras.NAME]"),
         ("[cameras.D\n", "cannot be read"),
-        ('[cameras." D"]\nc_mm = 1.0\n', "found ' D'; expected 'D', without more spaces"),
+        ('[cameras." D"]\nc_mm = 1.0\n', "found ' D'; expected 'D', without extra spaces"),
         ('[cameras."=cmd()"]\nc_mm = 1.0\n', "a letter, digit or underscore first"),
     ],
 )

@@ -40,8 +40,8 @@ SETTINGS_OF_VERTICAL = [
     ({"table.height_unit": "ft-in-8"}, "table.step_m", "expected a blank"),
     ({"table.height_unit": "feet"}, "table.height_unit", "'ft-in-16'"),
     ({"table.volume_unit": "gal"}, "table.volume_unit", "'bbl'"),
-    ({"table.fine_step_m": 0.001}, "table.fine_zones", "expected beside fine_step_m"),
-    ({"table.fine_zones": [[0, 0.3]]}, "table.fine_step_m", "expected beside fine_zones"),
+    ({"table.fine_step_m": 0.001}, "table.fine_zones", "expected together with fine_step_m"),
+    ({"table.fine_zones": [[0, 0.3]]}, "table.fine_step_m", "expected together with fine_zones"),
     ({"table.max_interpolation_error_l": 0}, "table.max_interpolation_error_l", "above 0"),
     ({"table.height_expansion": "perhaps"}, "table.height_expansion", "true or false"),
     ({"table.liquid_density_kg_m3": 0.85}, "table.liquid_density_kg_m3", "in g/cm3?"),
@@ -58,11 +58,11 @@ SETTINGS_OF_VERTICAL = [
     ({"corrections.plate": "off"}, "corrections.plate", "true or false"),
     ({"certificate.date_of_issue": "2024-05-30"}, "certificate.date_of_issue", "before the survey"),
     ({"corrections.plates": True}, "corrections.plates", "did you mean plate?"),
-    ({"survey.liquid_level_m": 3.0}, "survey.liquid_density_kg_m3", "the liquid's density"),
+    ({"survey.liquid_level_m": 3.0}, "survey.liquid_density_kg_m3", "the density of the liquid"),
     (
         {"survey.liquid_level_m": 3.0, "survey.liquid_density_kg_m3": 0},
         "survey.liquid_density_kg_m3",
-        "the liquid's density",
+        "the density of the liquid",
     ),
     (
         {"survey.liquid_level_m": 9.6, "survey.liquid_density_kg_m3": 850.0},
@@ -126,7 +126,7 @@ def test_a_fine_step_is_a_whole_part_of_the_step(tmp_path, fine_step):
     parts = job_parts(settings=settings)
     (problem,) = problems_of(write_folder(tmp_path / "job", parts))
     assert problem.column == "table.fine_step_m"
-    assert "a whole part of the step" in problem.expected
+    assert "divided by a whole number" in problem.expected
 
 
 def test_too_many_rows(tmp_path):
@@ -149,7 +149,7 @@ ROWS_OF_VERTICAL = [
     ("deadwood", [("a", -0.5, 0.1, -0.1)], 2, "bottom_m", "the tank's lowest point"),
     ("deadwood", [("a", -2.5, 0.1, 0.1)], 2, "bottom_m", "the tank's lowest point"),
     ("deadwood", [("a", 500, 1000, -0.1)], 2, "top_m", "from -100 to 100"),
-    ("deadwood", [("a", 0, 1, -0.1), ("a", 1, 2, -0.1)], 3, "name", "already, in row 2"),
+    ("deadwood", [("a", 0, 1, -0.1), ("a", 1, 2, -0.1)], 3, "name", "already in row 2"),
     ("deadwood", [("a", 0, 1, None)], 2, "volume_m3", "blank"),
     ("deadwood", [("a", 0, 1, -0.1, -0.01)], 2, "u_m3", "from 0"),
     ("bottom", RINGS[:2], None, None, "2 points; expected 12 or more"),
@@ -169,7 +169,7 @@ ROWS_OF_VERTICAL = [
     ("bottom_volumes", [*LEVELS, (0.15, 30.0)], 5, "level_m", "found 0.15 after 0.2"),
     ("bottom_volumes", [*LEVELS, (0.3, 25.2)], 5, "volume_m3", "found 25.2 after 25.2"),
     ("bottom_volumes", [(a, 1000 * v) for a, v in LEVELS[:2]], 3, "volume_m3", "in litres?"),
-    ("bottom_volumes", [*LEVELS, (0.3, 50.0)], 5, "volume_m3", "holds 13.27 m3 there"),
+    ("bottom_volumes", [*LEVELS, (0.3, 50.0)], 5, "volume_m3", "expected about 13.27 m3"),
     ("bottom_volumes", [(1 + a, v) for a, v in LEVELS], 2, "level_m", "a row at dip 0"),
     ("bottom_volumes", [(a - 0.3, v) for a, v in LEVELS], 4, "level_m", "up to the shell, 0 m"),
     ("bottom_volumes", [*LEVELS, (30.0, 2600.0)], 5, "level_m", "in millimetres?"),
@@ -196,11 +196,11 @@ def test_a_bottom_that_does_not_fit_its_form(tmp_path, form):
     file = table_file(form, "bottom")
     both = [[*one, level, 1.0 + level] for level, one in enumerate(RINGS)]
     cases = [
-        (job_parts(bottom=RINGS, settings={"bottom.form": "flat"}), None, "rows beside"),
+        (job_parts(bottom=RINGS, settings={"bottom.form": "flat"}), None, "rows are given, but"),
         (job_parts(bottom=RINGS, settings={"bottom.form": "liquid"}), "level_m", "not given"),
         (job_parts(settings={"bottom.form": "points"}), None, "no rows"),
         (job_parts(bottom=[one[:2] for one in RINGS]), "z_m", "not given"),
-        (job_parts(bottom=RINGS), "x_m", "never both"),
+        (job_parts(bottom=RINGS), "x_m", "not both"),
     ]
     cases[-1][0].tables["bottom"] = [["x_m", "y_m", "z_m", "level_m", "volume_m3"], *both]
     for number, (parts, column, words) in enumerate(cases):
@@ -220,8 +220,8 @@ def test_as_many_points_of_a_bottom_as_a_surface_is_made_through(tmp_path):
 
 
 ROOFS = [
-    ({"mass_kg": None}, "mass_kg", "expected beside critical_bottom_m"),
-    ({"weighing": None}, "weighing", "expected beside mass_kg"),
+    ({"mass_kg": None}, "mass_kg", "expected together with critical_bottom_m"),
+    ({"weighing": None}, "weighing", "expected together with mass_kg"),
     ({"weighing": "water"}, "weighing", "'air' or 'vacuum'"),
     ({"mass_kg": 9.0}, "mass_kg", "in tonnes?"),
     ({"mass_kg": 9e6}, "mass_kg", "in grams?"),
@@ -270,7 +270,7 @@ SETTINGS_OF_KINDS = [
     ("horizontal", {"horizontal.length_m": None}, "horizontal.length_m", "missing"),
     ("horizontal", {"horizontal.length_m": 10000.0}, "horizontal.length_m", "another unit"),
     ("horizontal", {"horizontal.diameter_m": None}, "horizontal.diameter_m", "or points.csv"),
-    ("horizontal", {"horizontal.width_m": 2.0}, "horizontal.width_m", "beside diameter_m"),
+    ("horizontal", {"horizontal.width_m": 2.0}, "horizontal.width_m", "with diameter_m"),
     ("horizontal", {"horizontal.end_a": None}, "horizontal.end_a", "missing"),
     ("horizontal", {"horizontal.end_a": "round"}, "horizontal.end_a", "'ellipsoidal'"),
     ("horizontal", {"horizontal.end_a": "conical"}, "horizontal.end_a_depth_m", "missing"),
@@ -302,7 +302,7 @@ SETTINGS_OF_KINDS = [
         "horizontal.dip_from_a_m",
         "leave the top at 10.020 m",  # 9.9 + 0.05 * 2.4
     ),
-    ("horizontal", {"horizontal.azimuth_deg": 10.0}, "horizontal.azimuth_deg", "beside points"),
+    ("horizontal", {"horizontal.azimuth_deg": 10.0}, "horizontal.azimuth_deg", "with points"),
     ("horizontal", {"horizontal.thickness_mm": 8.0}, "horizontal.thickness_mm", "outside"),
     ("horizontal", {"survey.side": "outside"}, "horizontal.thickness_mm", "missing"),
     ("horizontal", {"survey.side": None}, "survey.side", "missing"),
@@ -343,7 +343,7 @@ def test_settings_of_other_kinds(tmp_path, form, kind, changes, key, words):
 @pytest.mark.parametrize(
     ("changes", "key", "words"),
     [
-        ({"height_m": None}, "height_m", "expected beside width_m"),
+        ({"height_m": None}, "height_m", "expected together with width_m"),
         ({"end_a": "torispherical"}, "end_a", "round cylinders only"),
         ({"end_a": "spherical", "end_a_depth_m": 0.3}, "end_a", "round cylinders only"),
     ],
@@ -389,7 +389,7 @@ def test_torispherical_ends(tmp_path, dish, knuckle, key, words):
         ("horizontal", LYING, {"horizontal.azimuth_deg": None}, "horizontal.azimuth_deg", "A to B"),
         ("horizontal", LYING, {"horizontal.dip_from_a_m": None}, "horizontal.dip_from_a_m", "dip"),
         ("horizontal", LYING, {"survey.side": "outside"}, "horizontal.thickness_mm", "missing"),
-        ("horizontal", LYING, {"datum.dip_plate_z_m": 50}, "datum.dip_plate_z_m", "about there"),
+        ("horizontal", LYING, {"datum.dip_plate_z_m": 50}, "datum.dip_plate_z_m", "close to them"),
         ("sphere", BALL, {"sphere.diameter_m": 20.0}, "sphere.diameter_m", "one of them"),
     ],
 )
@@ -409,7 +409,7 @@ def test_settings_beside_points(tmp_path, form, kind, points, changes, key, word
         ("sphere", BALL[:11], None, "11 points; expected 12 or more"),
         ("horizontal", [(n, 1e3 * x, 1e3 * y, z) for n, x, y, z in LYING], "x_m", "millimetres?"),
         ("sphere", [(n, 1e3 * x, 1e3 * y, z) for n, x, y, z in BALL], "x_m", "millimetres?"),
-        ("sphere", [*BALL, BALL[0]], "point", "already, in row 2"),
+        ("sphere", [*BALL, BALL[0]], "point", "already in row 2"),
     ],
 )
 def test_scans(tmp_path, form, kind, points, column, words):
@@ -509,7 +509,7 @@ def test_inputs_of_points_are_theirs(tmp_path):
             kind=kind, extra_points=points, settings=changes, uncertainty=[(name, 1.0, unit)]
         )
         (problem,) = problems_of(write_folder(tmp_path / f"{name} {kind}", parts))
-        assert "it comes from the points" in problem.expected
+        assert "its uncertainty comes from the points" in problem.expected
 
 
 # what does not stop a job: changes of a sound vertical job, place of the warning

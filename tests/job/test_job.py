@@ -490,7 +490,11 @@ def test_covariances_that_are_refused(tmp_path, matrix, words):
         ({"points": None}, "points", "missing array"),
         ({"covariance_m2": None}, "covariance_m2", "missing array"),
         ({"points": np.array([{}] * 120, dtype=object)}, None, "plain arrays"),
-        ({"covariance_m2": np.zeros((2000, 2000))}, "covariance_m2", "more than 120 points need"),
+        (
+            {"covariance_m2": np.zeros((2000, 2000))},
+            "covariance_m2",
+            "more than the covariance of 120 points needs",
+        ),
     ],
 )
 def test_archives_that_are_refused(tmp_path, arrays, column, words):
@@ -508,7 +512,7 @@ def test_archives_that_are_refused(tmp_path, arrays, column, words):
 
 def test_either_a_covariance_or_standard_deviations(tmp_path):
     folder = write_job(tmp_path / "job", covariance_m2=covariance(360), sd_mm=2.0)
-    with pytest.raises(InputError, match=r"points_cov\.npz: given beside sx_mm"):
+    with pytest.raises(InputError, match=r"points_cov\.npz: given together with sx_mm"):
         load(folder)
 
 

@@ -205,7 +205,7 @@ def test_marks_beyond_the_limit_are_rejected_and_listed(tmp_path):
     assert fit.marks == ("1", "3", "4")
     (one,) = fit.rejected
     np.testing.assert_allclose(one.sd_mm, 0.004 / np.sqrt(3), rtol=1e-9)
-    assert any("nothing controls it" in one.expected for one in job.warnings)
+    assert any("cannot be detected" in one.expected for one in job.warnings)
 
 
 # --- film that is not flat, focus -----------------------------------------------------------------
@@ -267,17 +267,17 @@ def test_a_camera_with_two_focus_calibrations(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "key", "words"),
     [
-        ({"focus_m": None}, "focus_m", "missing beside focus_calibrations"),
-        ({"lens_focal_length_mm": None}, "lens_focal_length_mm", "missing beside"),
+        ({"focus_m": None}, "focus_m", "missing, but focus_calibrations"),
+        ({"lens_focal_length_mm": None}, "lens_focal_length_mm", "missing, but"),
         ({"focus_calibrations.K1_mm-2": None, "focus_calibrations.K2_mm-4": None},
          "focus_calibrations.distance_m", None),
         ({"focus_calibrations.K1_mm-2": [1e-7]}, "focus_calibrations.K1_mm-2", "1 numbers"),
         ({"focus_calibrations.distance_m": [5.0, 5.0]}, "focus_calibrations.distance_m", "twice"),
         ({"focus_m": 0.099}, "focus_m", "expected metres"),
         ({"lens_focal_length_mm": 9.9}, "lens_focal_length_mm", "expected about the same"),
-        ({"K1_mm-2": 1e-7}, "K1_mm-2", "given beside focus_calibrations"),
-        ({"radial_balance_mm": 60.0}, "radial_balance_mm", "not with focus_calibrations"),
-        ({"convention": None}, "convention", "missing beside"),
+        ({"K1_mm-2": 1e-7}, "K1_mm-2", "given together with focus_calibrations"),
+        ({"radial_balance_mm": 60.0}, "radial_balance_mm", "cannot be used with focus_"),
+        ({"convention": None}, "convention", "missing, but"),
         ({"focus_calibrations.K9": [1e-7, 2e-7]}, "focus_calibrations.K9", "unknown key"),
         ({"focus_calibrations.distance_m": "near"}, "focus_calibrations.distance_m", "near"),
     ],
@@ -340,7 +340,7 @@ PROBLEMS = {
     "three numbers": (lambda p: p.registers[CAMERA][UMK].__setitem__("marks.1", [1.0, 2.0, 3.0]),
                       "cameras.toml", None, "3 numbers; expected two"),
     "the same place": (lambda p: p.registers[CAMERA][UMK].__setitem__("marks.2", [-84.0, -59.0]),
-                       "cameras.toml", None, "at the place of mark '1'"),
+                       "cameras.toml", None, "at the same place as mark '1'"),
     "formula": (lambda p: _marks(p)[1].__setitem__(1, "=1+1"), FILES, 2, "=1+1"),
     "film of nobody": (lambda p: _column(p, "film", 0, lambda v: None), "film.csv", None, "camera"),
     "film of both": (lambda p: _column(p, "film", 1, lambda v: "D1"), "film.csv", 2, "both given"),

@@ -53,7 +53,7 @@ def test_spaces_before_quotation_marks_are_none_of_the_cell():
         (b'a,b\n"1,2\n3,4\n', 2, "quotation marks"),
         (b"a,b\n1,2\n3\n", 3, "1 cells, expected 2"),
         (b"a,b\n1,2,3\n", 2, "3 cells, expected 2 as in the heading; for decimal commas"),
-        (b"a,b,a\n1,2,3\n", 1, "stands there twice"),
+        (b"a,b,a\n1,2,3\n", 1, "is given twice"),
         (b"a,,b\n1,2,3\n", 1, "column 2 has no heading"),
         (b"a;b\n1;2\n", 1, "separated by ';'"),
     ],
@@ -86,7 +86,7 @@ def test_settings_know_their_rows():
     [
         ("[tank]\nid = T-1\n", 2, "Invalid value"),
         ("[tank]\nid = 1\nid = 2\n", 3, "overwrite"),
-        ("id = 1\n", 1, "stands in no [section]"),
+        ("id = 1\n", 1, "is in no [section]"),
         ("x = " + "[" * 3000, None, "too deeply nested"),
         ("x = 1" + "0" * 5000, 1, "more than 4000 characters"),
     ],
@@ -111,7 +111,7 @@ def test_decimal_commas_of_settings_are_told_one_by_one_and_hide_nothing():
         (5, "found 'step_m = 0,01'; expected a decimal point, as in every .toml file"),
         (6, "found 'low_m=-1,5e-1'; expected a decimal point, as in every .toml file"),
     ]
-    assert "stands in no [section]" in log.problems[2].expected  # x: what else is wrong is told
+    assert "is in no [section]" in log.problems[2].expected  # x: what else is wrong is told
     found = {key: (value.raw, value.row) for key, value in settings["table"].items()}
     assert found == {"step_m": (0.01, 5), "low_m": (-0.15, 6), "list": ([1, 5], 7)}
 

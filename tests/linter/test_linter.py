@@ -427,7 +427,7 @@ def changed(row, volume=None, height=None, rows=None):
         ("6.000", "expected about 65.000: 65.000? (a digit is missing)"),
         ("655.000", "found 655.000; expected about 65.000: 65."),
         ("71.234", "found 71.234; expected about 65.000"),
-        ("", "nothing stands here; expected a number"),
+        ("", "blank; expected a number"),
         ("65.OOO", "found '65.OOO'; expected a number"),
         ("-65.000", "expected a volume of 0 or more"),
     ],
@@ -449,7 +449,7 @@ def test_a_long_blank_is_told_once_and_a_short_one_row_by_row(tmp_path):
         report = lint_rows(tmp_path, rows)
         said = list(found(report).values())
         assert sum("no volumes from here to row" in text for text in said) == told
-        assert sum("nothing stands here" in text for text in said) == report.errors == errors
+        assert sum("blank; expected a number" in text for text in said) == report.errors == errors
 
 
 def test_shifted_rows_are_told_together(tmp_path):
@@ -492,8 +492,8 @@ def test_rows_that_are_missing_or_doubled(tmp_path):
     }
     assert "3 rows are missing" in found(lint_rows(tmp_path, rows[:50] + rows[53:]))[52]
     doubled = found(lint_rows(tmp_path, [*rows[:50], rows[49], *rows[50:]]))
-    assert "height 0.49 stands in row" in next(iter(doubled.values()))
-    assert "a row stands twice" in next(iter(doubled.values()))
+    assert "height 0.49 is also in row" in next(iter(doubled.values()))
+    assert "the row is given twice" in next(iter(doubled.values()))
     other = found(lint_rows(tmp_path, [*rows[:50], ["0.49", "64.000"], *rows[50:]]))
     assert any("with volume 6" in text for text in other.values())
 
@@ -756,7 +756,7 @@ def test_units_that_are_off_by_a_thousand(unit, tmp_path):
     volume = str if unit == "m3" else lambda v: f"{v / 1e6:.6f}"
     (finding,) = lint_text(tmp_path, text + pairs(",", volume=volume)).findings
     assert finding.severity == "warning"
-    assert "expected a tank: are the units right?" in str(finding)
+    assert "expected the proportions of a tank: are the units right?" in str(finding)
 
 
 PARTS = [round(np.pi * 6.5**2 * part) for part in range(1, 10)]

@@ -136,8 +136,8 @@ def test_control_that_stands_there_twice_or_in_another_frame(changed):
     rows = "1-1,,,,2,2,2,\n9-5,,,,2,2,2,\n1-1,,,,2,2,2,\nP,1,,3,2,2,2,\n17-1,,,,2,2,2,UTM\n"
     (folder / "control.csv").write_text(heading + rows)
     twice, foreign = told(folder)
-    assert twice == "control.csv, row 4, point: '1-1' is there already, in row 2; expected once"
-    assert foreign.startswith("control.csv, row 6, system: found 'UTM'; expected blank")
+    assert twice == "control.csv, row 4, point: '1-1' is already in row 2; expected once"
+    assert foreign.startswith("control.csv, row 6, system: found 'UTM'; expected a blank")
     (folder / "control.csv").write_text(heading + "1-1,,,,2,2,2,\nP,1,,3,2,2,2,\n")
     (line,) = told(folder)
     assert line.startswith("control.csv, row 3, point: P is no target of the plan")
@@ -336,7 +336,7 @@ def test_slope_distances_without_zenith_angles(tmp_path):
     text = (folder / "plan.toml").read_text().replace("s_zenith_arcsec = 3.0\n", "")
     (folder / "plan.toml").write_text(text)
     (line,) = told(folder)
-    assert "setup_rings[1].s_zenith_arcsec: missing; slope distances (s_mm) need zenith" in line
+    assert "setup_rings[1].s_zenith_arcsec: missing; expected zenith angles" in line
 
 
 def test_deliveries_that_are_longer_than_the_shell(changed):
@@ -436,6 +436,6 @@ def test_too_few_generatrices(changed):
     """Each section of the wall needs as many points as in a job; told once, not by the section."""
     (line,) = told(changed(("generatrices = 24", "generatrices = 4")))
     assert line == (
-        "plan.toml, row 30, pattern.generatrices: found 4, the points of each section of the wall; "
+        "plan.toml, row 30, pattern.generatrices: found 4 points in each section of the wall; "
         "expected at least 5 (10 or more are advised)"
     )

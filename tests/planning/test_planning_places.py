@@ -140,7 +140,7 @@ def test_targets_on_one_another(tmp_path):
         "pattern.generatrices",
         "pattern.heights_m",
     ]
-    assert "nearer than 20 mm to one another where they keep 300 mm from welds" in lines[0]
+    assert "nearer than 20 mm to one another when they are kept 300 mm from welds" in lines[0]
     assert lines[0].count(" and ") == 6
     assert "and 7 more" in lines[0]
     assert "rows at 1 and 1.01 m; expected rows at least 20 mm apart" in lines[1]

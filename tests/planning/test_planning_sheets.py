@@ -88,7 +88,7 @@ def test_what_is_not_seen_is_marked(hidden):
     paper = PlanPaper(hidden)
     text = texts_of(sheets(paper))
     assert "Targets not seen" in text
-    assert "Of them without effect" in text
+    assert "Without effect, because one end is not seen" in text
     assert "end not seen" in text
     assert "not seen" in labels_of(sketches.wall(paper))
 

@@ -77,7 +77,8 @@ def test_a_tape_with_a_hidden_end(prediction):
     box = np.array([plan.extra["H1a"] - 0.03, plan.extra["H1a"] + 0.03])
     found = predict(replace(plan, obstacles=(Box(*box, "sign"),)))
     assert (
-        "1 of 8 tapes, height differences and plumb lines do not count" in lines(found.warnings)[0]
+        "1 of 8 tapes, height differences and plumb lines have no effect"
+        in lines(found.warnings)[0]
     )
     assert "H1 (H1a)" in lines(found.warnings)[0]
 
@@ -103,7 +104,7 @@ def afloat(prediction):
 
 def test_a_tape_that_nothing_controls(prediction, afloat):
     found = predict(replace(afloat, ties=(*afloat.ties, prediction.plan.ties[0])))
-    (told,) = (one for one in lines(found.warnings) if "nothing controls" in one)
+    (told,) = (one for one in lines(found.warnings) if "no other observation checks" in one)
     assert "the only value of distance (V1a-V1b)" in told
 
 
@@ -161,7 +162,7 @@ def test_set_ups_that_share_no_points(tmp_path):
     plan = load_plan(folder)
     alone = tuple(replace(one, sights=()) for one in plan.setups[::3])
     with pytest.raises(
-        SolutionError, match="2 groups of set-ups hang together with no other: T1-1"
+        SolutionError, match="2 groups of set-ups are not connected to the others: T1-1"
     ):
         predict(replace(plan, setups=alone))
 
@@ -182,4 +183,4 @@ def test_rows_on_horizontal_welds(tmp_path):
     rows = "heights_m = [1.0, 1.9, 2.8, 4.0, 5.0, 7.0, 9.0] #"
     (said,) = lines(load_plan(changed_plan(tmp_path, ("levels = 1 ", rows))).warnings)
     assert "pattern.heights_m: 2 rows of targets are nearer than 300 mm" in said
-    assert "weld: 1.9, 4 m; are they meant there?" in said
+    assert "weld: 1.9, 4 m; is that intended?" in said

@@ -103,7 +103,7 @@ def test_a_code_that_has_no_words_is_one_line(again, tmp_path, capsys):
     (tmp_path / "record.json").write_text(json.dumps(record), encoding="utf-8")
     assert main(["report", str(tmp_path), "--out", str(tmp_path / "out"), "--quiet"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("tankcal: record.json: does not hold what a record does (")
+    assert line.startswith("tankcal: record.json: does not have the content of a record (")
     assert names_of(tmp_path) == ["record.json"]
 
 

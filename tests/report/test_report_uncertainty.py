@@ -264,13 +264,13 @@ def test_inputs_are_told_apart(of_example, example):
     assert "(default)" in said["Of each reading of the table"]
     declared = [line["input"] for line in lines if line["u"] is not None and not line["is_default"]]
     assert said["Inputs declared"].count("u\xa0=\xa0") == len(declared)
-    told = said["NOT in U, for nothing was declared"]
+    told = said["NOT in U, because nothing was declared"]
     assert told == words["texts"]["nothing_missing"]  # the example declares everything
 
 
 def test_what_is_not_declared_is_named(found, record):
     (missing,) = (one["value"] for one in record["choices"] if one["code"] == "not_in_budget")
-    names = facts(found)["NOT in U, for nothing was declared"].split("; ")
+    names = facts(found)["NOT in U, because nothing was declared"].split("; ")
     assert names == [load_words()["inputs"][name] for name in missing]
     assert names
 

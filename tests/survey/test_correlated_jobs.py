@@ -167,7 +167,7 @@ def test_vectors_alone_hang_on_one_point(tmp_path):
         ("vectors,9,x,vectors,3,x,0.3", "row 2, row_1: found 9, and vectors has no such row"),
         ("vectors,2,,vectors,3,x,0.3", "row 2, value_1: expected x, y or z"),
         ("distances,2,,vectors,3,x,0.3", "row_1: found 2, and distances has no such row"),
-        ("vectors,3,x,vectors,3,x,0.3", "a value with itself"),
+        ("vectors,3,x,vectors,3,x,0.3", "a value is correlated with itself"),
         ("levels,3,x,vectors,3,x,0.3", "row 2, table_1"),
         ("vectors,2,x,vectors,3,x,1.3", "row 2, r: found '1.3'; expected a number from -1 to 1"),
     ],

@@ -297,7 +297,9 @@ def test_a_missing_datum_is_told_in_words(what):
 def test_one_point_holds_no_datum(survey):
     """A point keeps its place whichever way the rest turns: told, not a singular matrix."""
     bare = replace(survey, observations=survey.observations[1:])
-    with pytest.raises(SolutionError, match="what is to hold the datum does not fix it"):
+    with pytest.raises(
+        SolutionError, match="the coordinates chosen to hold the datum do not fix it"
+    ):
         adjust(bare, datum="inner", over=np.array([0]))
 
 
@@ -321,7 +323,7 @@ def test_poor_points_and_photos_are_named(survey):
     keep[first[1:]] = False
     poor = replace(survey, image_points=replace(images, use=keep.astype(float)))
     found = adjust(poor)
-    assert found.problem.set_aside[20] == "point P20 has one ray"
+    assert found.problem.set_aside[20] == "point P20 has only one ray"
     assert np.isnan(found.xyz_m[20]).all()
     assert np.isfinite(np.delete(found.xyz_m, 20, axis=0)).all()
     lonely = (images.photo != 3) | (np.cumsum(images.photo == 3) < 3)

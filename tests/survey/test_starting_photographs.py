@@ -182,7 +182,9 @@ def test_two_groups_of_photos_that_share_nothing():
     apart = np.vstack([cloud(5), cloud(6)])
     single, _ = seen_from(apart, np.vstack([THREE, THREE]), np.zeros(3))
     survey = replace(single, image_points=replace(single.image_points, use=own * 1.0))
-    with pytest.raises(SolutionError, match=r"photos S., S., S. hang together, but share only 0"):
+    with pytest.raises(
+        SolutionError, match=r"photos S., S., S. are connected to each other, but share only 0"
+    ):
         approximate(survey)
 
 

@@ -382,10 +382,10 @@ def test_a_point_with_one_ray_is_set_aside(photos):
         rows=tuple(images.rows[i] for i in rows),
     )  # fmt: skip
     found = adjust_survey(replace(photos[0], image_points=fewer))
-    assert "point P20 has one ray" in found.aside
+    assert "point P20 has only one ray" in found.aside
     assert "P20" not in found.names
     told = [str(one) for one in found.warnings]
-    assert f"image_points.csv, row {images.rows[mine[0]]}: point P20 has one ray" in told
+    assert f"image_points.csv, row {images.rows[mine[0]]}: point P20 has only one ray" in told
 
 
 def test_a_photo_with_too_few_points_is_refused(photos):

@@ -63,7 +63,7 @@ def test_gon_read_as_degrees_from_one_station(stations):
     mine = np.array([name == "set-up 1" for name in table.setup])
     value = np.where(mine, table.value / 0.9, table.value)
     text = told(changed(stations, "directions", value=value))
-    assert "the angles from set-up 1 fit once they are taken for gon read as degrees" in text
+    assert "the angles from set-up 1 fit if they are gon read as degrees" in text
 
 
 @pytest.mark.slow
@@ -79,7 +79,7 @@ def test_a_mirrored_photo(photos, how):
     text = told(
         replace(photos, image_points=replace(images, xy_mm=np.where(mine, other, images.xy_mm)))
     )
-    assert "image_points.csv: photo S2: its image points fit once the image is mirrored" in text
+    assert "image_points.csv: photo S2: its image points fit if the image is mirrored" in text
 
 
 def test_a_photo_upside_down_is_a_photo_like_any_other(photos):
@@ -117,7 +117,7 @@ def test_a_name_spelt_in_another_way(photos):
     names[first] = "p-26"
     text = told(replace(photos, image_points=replace(images, point=tuple(names))))
     row = images.rows[first]
-    assert f"image_points.csv, row {row}: point p-26 has one ray" in text
+    assert f"image_points.csv, row {row}: point p-26 has only one ray" in text
     assert "image_points.csv: point p-26 could not be adjusted: is it P26?" in text
     assert normalize_name("P-007") == normalize_name("p7") == "p7"
     assert normalize_name("lO1") == normalize_name("101")

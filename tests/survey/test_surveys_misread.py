@@ -33,13 +33,13 @@ def on_four_sides(columns=(0, 1, 2)):
 def test_all_control_swapped(photos):
     """On four sides of the tank: swapped, it is the tank in a mirror."""
     text = told(replace(photos, control=on_four_sides([1, 0, 2])))
-    assert "control.csv: all coordinates fit once x and y are swapped" in text
+    assert "control.csv: all coordinates fit if x and y are swapped" in text
 
 
 def test_all_distances_in_feet(stations):
     table = stations.readings[2]
     text = told(changed(stations, "slope_distances", value=table.value / 0.3048))
-    assert "slope_distances.csv: the distances fit once they are taken for feet" in text
+    assert "slope_distances.csv: the distances fit if they are in feet" in text
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_all_distances_in_feet(stations):
 def test_a_whole_file_in_the_other_unit(stations, factor, what):
     table = stations.readings[1]
     text = told(changed(stations, "zenith_angles", value=table.value * factor))
-    assert f"zenith_angles.csv: the angles fit once they are taken for {what}" in text
+    assert f"zenith_angles.csv: the angles fit if they are {what}" in text
 
 
 def test_all_angles_in_the_other_unit(stations):
@@ -56,14 +56,14 @@ def test_all_angles_in_the_other_unit(stations):
     for name in ("directions", "zenith_angles"):
         table = next(one for one in stations.readings if one.table == name)
         both = changed(both, name, value=table.value / 0.9)
-    assert "all angles together fit once they are taken for gon read as degrees" in told(both)
+    assert "all angles together fit if they are gon read as degrees" in told(both)
 
 
 def test_all_photos_mirrored(photos):
     """A mirrored tank: whether images or control are to blame, nobody can tell; both are named."""
     images = replace(photos.image_points, xy_mm=photos.image_points.xy_mm * [1, -1])
     text = told(replace(photos, image_points=images, control=on_four_sides()))
-    assert "image_points.csv: its image points fit once the image is mirrored" in text
+    assert "image_points.csv: its image points fit if the image is mirrored" in text
 
 
 @pytest.mark.study
@@ -81,9 +81,7 @@ def test_a_circle_read_anticlockwise(stations):
     table = next(one for one in stations.readings if one.table == "directions")
     with pytest.raises(SolutionError, match="do not fit together") as told_:
         adjust_survey(changed(stations, "directions", value=-table.value))
-    assert "directions.csv: the angles fit once they are taken for those of a circle read anti" in (
-        str(told_.value)
-    )
+    assert "directions.csv: the angles fit if the circle was read anti" in (str(told_.value))
 
 
 def test_two_control_points_exchanged(stations):
@@ -91,7 +89,7 @@ def test_two_control_points_exchanged(stations):
     xyz = control.xyz_m[[1, 0, 2]]
     text = told(replace(stations, control=replace(control, xyz_m=xyz)))
     a, b = control.point[:2]
-    assert f"control.csv, row 3, point: all fits once {a} and {b} are exchanged" in text
+    assert f"control.csv, row 3, point: everything fits if {a} and {b} are exchanged" in text
 
 
 def test_a_further_system_with_x_and_y_swapped(stations):
@@ -112,7 +110,7 @@ def test_a_further_system_with_x_and_y_swapped(stations):
             rows=tuple(range(2, len(own.point) + 10)),
         )
         text = told(replace(stations, control=both))
-        wanted = "control.csv: all coordinates of system plant fit once x and y are swapped"
+        wanted = "control.csv: all coordinates of system plant fit if x and y are swapped"
         assert (wanted in text) == swapped
 
 
@@ -128,7 +126,7 @@ def test_one_camera_of_two_mirrored(photos):
     both = replace(
         photos, cameras=(photos.cameras[0], second), photos=pictures, image_points=mirrored
     )
-    assert "its image points fit once the image is mirrored" in told(both)
+    assert "its image points fit if the image is mirrored" in told(both)
 
 
 def test_distances_that_alone_give_the_scale_are_not_taken_for_another_unit():

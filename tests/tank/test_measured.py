@@ -130,7 +130,7 @@ def test_below_the_lowest_dip():
     heel = measured_bottom([0.0, 0.1, 0.2], [3.0, 15.0, 28.0])
     assert heel.volume_m3([0.0])[0] == 3.0
     assert heel.lowest_m == 0.0
-    with pytest.raises(HeightError, match="below the lowest one measured"):
+    with pytest.raises(HeightError, match="below the lowest level measured"):
         heel.volume_m3([0.1, -0.01])
 
 

@@ -66,7 +66,7 @@ def refuse_others(setup, calibrations, file=FILE):
     for one in calibrations:
         name = one.camera.name
         if name in seen:
-            text = message("camera_name_twice", "this name stands there twice; expected once")
+            text = message("camera_name_twice", "this name is given twice; expected once")
             problems.append(Problem(file, text, None, name))
         seen.add(name)
         for what, unit, theirs, ours in (

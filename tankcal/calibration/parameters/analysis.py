@@ -127,7 +127,7 @@ def analyse_job(
         raise InputError(
             Problem(
                 "job.toml",
-                message("camera_none_to_judge", "no photographs: there is no camera to be judged"),
+                message("camera_none_to_judge", "no photographs: there is no camera to test"),
             )
         )
     photos = {one.name: one.camera for one in job.measurements.photos}
@@ -148,7 +148,7 @@ def _of_all(interiors, statistics, choices, file, source="record"):
     if not judged:
         text = message(
             "camera_nothing_adjusted",
-            "no parameter of any camera is adjusted: there is nothing to be judged",
+            "no parameter of any camera is adjusted: there is nothing to test",
         )
         raise InputError(Problem(file, text))
     try:

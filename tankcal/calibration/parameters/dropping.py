@@ -134,7 +134,7 @@ def movement(before, after):
     places = {name: i for i, name in enumerate(after.names)}
     both = [(i, places[name]) for i, name in enumerate(before.names) if name in places]
     if not both:
-        raise SolutionError(message("camera_no_point_left", "no point is left to be compared"))
+        raise SolutionError(message("camera_no_point_left", "no point is left to compare"))
     here, there = np.array(both).T
     change = after.xyz_m[there] - before.xyz_m[here]
     sd = np.sqrt(np.maximum(np.einsum("nii->ni", before.covariance_m2[here]), 0.0))

@@ -87,7 +87,8 @@ def _limit(interior, statistics, choices):
             raise ValueError(
                 message(
                     "camera_no_pixels",
-                    "{camera} has no pixels: expected its limit in micrometres",
+                    "the size of a pixel of {camera} is not known; expected the limit in "
+                    "micrometres",
                     camera=interior.camera,
                 )
             )

@@ -66,9 +66,7 @@ def differences_of(adjustment):
             raise InputError(
                 Problem(
                     "record.json",
-                    message(
-                        "check_no_points_in_record", "no check points; expected some to judge by"
-                    ),
+                    message("check_no_points_in_record", "no check points; expected one or more"),
                 )
             )
         values = [[row.get(name) for name in _DIFFERENCES] for row in rows]
@@ -80,7 +78,7 @@ def differences_of(adjustment):
         raise InputError(
             Problem(
                 "check.csv",
-                message("check_no_points", "no check points; expected some to judge by"),
+                message("check_no_points", "no check points; expected one or more"),
             )
         )
     return Differences(tuple(found.names), np.array(found.difference_m, dtype=float))
@@ -151,14 +149,17 @@ def _columns(table, fields, log):
     if direct and paired:
         text = message(
             "check_both_forms",
-            "differences beside coordinates; expected one of them: {forms}",
+            "differences and coordinates are both given; expected only one of them: {forms}",
             forms=FORMS,
         )
         log.problem(table.file, text, table.heading_row, direct[0])
     for name in (name for pair in paired for name in pair if name not in columns):
         log.problem(
             table.file,
-            message("check_column_of_pair", "missing column beside its pair"),
+            message(
+                "check_column_of_pair",
+                "missing column; the other one of its pair is given, expected both",
+            ),
             table.heading_row,
             name,
         )
@@ -199,7 +200,10 @@ def _row(table, number, columns, fields, log):
             if lacking in columns:
                 log.problem(
                     table.file,
-                    message("check_value_of_pair", "missing; expected it beside its pair"),
+                    message(
+                        "check_value_of_pair",
+                        "missing; the other value of its pair is given, expected both",
+                    ),
                     row,
                     lacking,
                 )
@@ -208,7 +212,7 @@ def _row(table, number, columns, fields, log):
     ):
         log.problem(
             table.file,
-            message("check_row_without", "no difference in this row; expected one at least"),
+            message("check_row_without", "no difference in this row; expected at least one"),
             row,
         )
     return given
@@ -221,7 +225,7 @@ def _tell_repeated(table, rows, log):
         if name in seen and name is not None:
             text = message(
                 "check_point_twice",
-                "point {point} stands in row {row} already; expected once",
+                "point {point} is already in row {row}; expected once",
                 point=name,
                 row=seen[name],
             )

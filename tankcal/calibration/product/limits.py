@@ -41,7 +41,7 @@ _TABLE = {
         Field(
             "source",
             "text",
-            message("limits_note_source", "where its numbers were read"),
+            message("limits_note_source", "where its numbers were published"),
             required=True,
         ),
         Field("verified", "flag", "whether they were read in the legal or technical text itself"),

@@ -93,7 +93,7 @@ def _complaint(one, first, frame):
     if np.any(one.format_px != frame):
         return message(
             "compare_frame",
-            "a frame of {found} px; expected {frame} as of {first}",
+            "a frame of {found} px; expected {frame}, as {first} has",
             found=_sides(one.format_px),
             frame=_sides(frame),
             first=of_first,

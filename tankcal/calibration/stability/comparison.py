@@ -237,8 +237,8 @@ def _corrected(setup, grid, format_px):
         raise SolutionError(
             message(
                 "compare_folds",
-                "{name}: its distortion cannot be taken out of all points of the grid; "
-                "the polynomial turns back within the frame",
+                "{name}: its distortion cannot be removed at every point of the grid: the "
+                "polynomial turns back within the frame",
                 name=camera.name,
             )
         )

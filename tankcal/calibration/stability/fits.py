@@ -94,7 +94,7 @@ def orientation_model(place, c_mm, start, pixel_mm):
             raise SolutionError(
                 message(
                     "compare_behind",
-                    "points behind the camera: these are not bundles of one camera",
+                    "points behind the camera; expected bundles of rays of one camera",
                 )
             )
         xi, eta, by_x, by_y = ideal_point(*seen, rotation.ravel(), c_mm)

@@ -67,9 +67,9 @@ class Grid:
                     "--grid",
                     message(
                         "compare_grid_off",
-                        "columns {first_column:g} to {last_column:g}, lines {first_line:g} to "
-                        "{last_line:g}; expected all of it on the frame of {columns:g} x "
-                        "{lines:g} px",
+                        "columns {first_column:g} to {last_column:g}, lines {first_line:g} "
+                        "to {last_line:g}; expected the whole grid on the frame of "
+                        "{columns:g} x {lines:g} px",
                         first_column=first[0],
                         last_column=last[0],
                         first_line=first[1],

@@ -25,7 +25,7 @@ PLACES = (
     Field(
         "column_px",
         "number",
-        message("targets_note_column", "about there, pixels"),
+        message("targets_note_column", "approximate column, pixels"),
         required=True,
         low=-1e6,
         high=1e6,
@@ -33,7 +33,7 @@ PLACES = (
     Field(
         "line_px",
         "number",
-        message("targets_note_line", "about there, pixels"),
+        message("targets_note_line", "approximate line, pixels"),
         required=True,
         low=-1e6,
         high=1e6,
@@ -63,7 +63,7 @@ def read_names(path, log, suffixes=()):
             if (column, value) in first:
                 expected = message(
                     "targets_twice",
-                    "{found!r} stands in row {row} already; expected once",
+                    "{found!r} is already in row {row}; expected once",
                     found=value,
                     row=first[column, value],
                 )
@@ -75,7 +75,11 @@ def read_names(path, log, suffixes=()):
         except Refused as refusal:
             log.problem(
                 file,
-                message("targets_with_corner", "with its corner {refusal}", refusal=refusal.text),
+                message(
+                    "targets_with_corner",
+                    "with the ending of a corner: {refusal}",
+                    refusal=refusal.text,
+                ),
                 row,
                 "point",
             )
@@ -99,7 +103,7 @@ def read_places(path, log):
         if (photo, point) in first:
             expected = message(
                 "targets_place_twice",
-                "{point!r} stands in row {first_row} already; expected once in photo {photo!r}",
+                "{point!r} is already in row {first_row}; expected once in photo {photo!r}",
                 point=point,
                 first_row=first[photo, point],
                 photo=photo,
@@ -120,7 +124,7 @@ def warn_of_unused(places, photos, file, log):
             hint = nearest(photo, photos)
             expected = message(
                 "targets_unused_photo",
-                "found {found}; expected one of the photos given{hint}: not used",
+                "found {found}; expected one of the photos given{hint}; the row is not used",
                 found=shown(photo),
                 hint=hint,
             )

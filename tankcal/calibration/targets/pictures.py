@@ -130,9 +130,7 @@ def read_picture(path, log, encoding="by_file"):
     if header is None:
         return log.problem(
             path.name,
-            message(
-                "targets_no_picture", "no picture that can be read; expected {kinds}", kinds=KINDS
-            ),
+            message("targets_no_picture", "not a readable picture; expected {kinds}", kinds=KINDS),
         )
     columns, lines = header.size_px
     if columns * lines > MOST_PIXELS:
@@ -157,7 +155,10 @@ def read_picture(path, log, encoding="by_file"):
     if image is None or image.shape != (lines, columns):
         return log.problem(
             path.name,
-            message("targets_damaged", "damaged: it cannot be decoded as its header says"),
+            message(
+                "targets_damaged",
+                "damaged: the picture cannot be decoded as its header describes it",
+            ),
         )
     if encoding == "by_file":
         encoding = "srgb" if data.startswith(JPEG_START) else "linear"

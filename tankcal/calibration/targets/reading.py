@@ -110,8 +110,8 @@ def read_photographs(paths, out_csv, wanted=None, replace=False, progress=None):
     if encodings["srgb"] and wanted.encoding == "by_file":
         expected = message(
             "targets_srgb",
-            "{count} of JPEG: grey values are taken as sRGB; where that is wrong, edges are half a "
-            "pixel off",
+            "JPEG files ({count}): grey values are taken as sRGB; if that is wrong, edges "
+            "are half a pixel off",
             count=encodings["srgb"],
         )
         log.warning("photographs", expected)
@@ -164,7 +164,7 @@ def _lists(wanted, log):
                 "places",
                 message(
                     "targets_places_missing",
-                    "missing; circles get their names from approximate places",
+                    "missing; expected approximate places, which give the circles their names",
                 ),
             )
             return None, {}
@@ -207,7 +207,7 @@ def _titles(paths, log):
         if title in seen:
             expected = message(
                 "targets_photo_twice",
-                "the photo {photo!r} is {file} already; expected another file name",
+                "photo {photo!r} is already read from {file}; expected another file name",
                 photo=title,
                 file=seen[title],
             )
@@ -215,7 +215,10 @@ def _titles(paths, log):
         seen.setdefault(title, path.name)
         found.append((path, title))
     if not seen and not log.problems:
-        log.problem("photographs", message("targets_none_given", "none given"))
+        log.problem(
+            "photographs",
+            message("targets_none_given", "no photograph given; expected one or more"),
+        )
     return found
 
 
@@ -240,7 +243,7 @@ def _photo(title, picture, wanted, names, places, log):
         listed = ", ".join(str(number) for number in found.doubtful[:10])
         expected = message(
             "targets_mirror",
-            "ids that would read the same in a mirror, corners exchanged: {numbers}",
+            "ids that read the same in a mirror image, with corners exchanged: {numbers}",
             numbers=listed,
         )
         log.warning(title, expected)
@@ -285,8 +288,8 @@ def _warn(photos, wanted, names, log):
         if photo.orientation != 1:
             expected = message(
                 "targets_turned",
-                "its file asks to be turned (orientation {orientation}); not done: columns and "
-                "lines are those of the sensor",
+                "the file asks for the picture to be rotated (orientation {orientation}); it "
+                "is not rotated: columns and lines are those of the sensor",
                 orientation=photo.orientation,
             )
             log.warning(photo.photo, expected)
@@ -321,7 +324,7 @@ def _warn(photos, wanted, names, log):
             Path(wanted.names).name,
             message(
                 "targets_unseen",
-                "listed but never read: {count}: {names}",
+                "listed, but found in no photo: {count}: {names}",
                 count=len(unseen),
                 names=listed,
             ),
@@ -331,8 +334,8 @@ def _warn(photos, wanted, names, log):
         if chance > CHANCE_TOLD:
             expected = message(
                 "targets_chance",
-                "one of {frames:.0f} black frames with anything inside is a code of it; give the "
-                "list of ids that there are",
+                "by chance, one of {frames:.0f} black frames with anything inside is read as "
+                "a code; give the list of the ids that were placed",
                 frames=1 / chance,
             )
             log.warning("dictionary", expected)

@@ -53,7 +53,8 @@ def refused_path(path):
 
 def _there_already():
     return message(
-        "targets_there_already", "is there already; expected another name, or to replace it"
+        "targets_there_already",
+        "already exists; expected another name, or the choice to replace it",
     )
 
 
@@ -61,7 +62,7 @@ def check_free(path, replace, log):
     """Tell `log` of what stands in the way of writing."""
     for one in (Path(path), refused_path(path)):
         if not one.parent.is_dir():
-            log.problem(one.name, message("targets_no_folder", "its folder is not there"))
+            log.problem(one.name, message("targets_no_folder", "its folder does not exist"))
             return
         if one.exists() and not replace:
             log.problem(one.name, _there_already())

@@ -153,7 +153,7 @@ def _check(values, notes):
         notes.tell(
             message(
                 "convert_balanced_ck",
-                "found {found:g}; expected a number of mm below 0",
+                "found {found:g}; expected a negative number, mm",
                 found=values["Ck"],
             ),
             key="Ck",

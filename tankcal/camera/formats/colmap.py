@@ -106,7 +106,7 @@ def parse(text, notes):
             notes.tell(
                 message(
                     "convert_colmap_twice",
-                    "camera {name} a second time; expected each once",
+                    "camera {name} is given twice; expected each camera once",
                     name=short_text(name),
                 ),
                 row,
@@ -126,7 +126,10 @@ def parse(text, notes):
 def _parsed(words, row, notes):
     if len(words) < 4:
         notes.tell(
-            message("convert_colmap_cut", "cut off; expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS"),
+            message(
+                "convert_colmap_cut",
+                "incomplete line; expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS",
+            ),
             row,
         )
         return None

@@ -166,7 +166,7 @@ def _json(text, notes):
     except (ValueError, RecursionError) as error:
         notes.tell(
             message(
-                "convert_no_json", "no readable JSON ({error}); is the file complete?", error=error
+                "convert_no_json", "not readable JSON ({error}); is the file complete?", error=error
             ),
             getattr(error, "lineno", None),
         )

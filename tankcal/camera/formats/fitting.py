@@ -65,7 +65,7 @@ def fit(rays, image_mm, pixel_mm, form, start, used, extras=()):
             raise SolutionError(
                 message(
                     "convert_not_told_apart",
-                    "the parameters of the camera cannot be told apart over the frame",
+                    "the parameters of the camera cannot be separated over the frame",
                 )
             )
         moved = np.zeros_like(values)

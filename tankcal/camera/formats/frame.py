@@ -120,7 +120,7 @@ def refuse_folds(points_px, off_px):
             message(
                 "convert_folds",
                 "the distortion folds the image at column {column:.0f}, line {line:.0f}: "
-                "no one ray belongs to {bad} of {all} points of the frame",
+                "{bad} of {all} points of the frame have no unique ray",
                 column=column,
                 line=line,
                 bad=np.count_nonzero(bad),

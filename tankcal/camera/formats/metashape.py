@@ -154,7 +154,7 @@ def _root(text, notes):
         row = getattr(error, "position", (None,))[0]
         notes.tell(
             message(
-                "convert_no_xml", "no readable XML ({error}); is the file complete?", error=error
+                "convert_no_xml", "not readable XML ({error}); is the file complete?", error=error
             ),
             row,
         )

@@ -50,7 +50,7 @@ def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
     if needs_pixel and pixel_um is None:
         expected = message(
             "convert_pixel_missing",
-            "missing; a file of kind {form} does not say it. Give it in micrometres",
+            "missing; a file of kind {form} does not hold it: give it in micrometres",
             form=kind,
         )
         notes.tell(expected, key="pixel_um")
@@ -126,7 +126,7 @@ def _text(path, notes):
         )
         return None
     if b"\0" in data:
-        notes.tell(message("convert_no_text", "no text; expected a text file (UTF-8)"))
+        notes.tell(message("convert_no_text", "not text; expected a text file (UTF-8)"))
         return None
     try:
         return data.decode("utf-8-sig")
@@ -158,7 +158,7 @@ def _recognised(text, notes):
     notes.tell(
         message(
             "convert_not_known",
-            "no camera file that is known; expected one of {known}",
+            "not a known kind of camera file; expected one of {known}",
             known=", ".join(KINDS),
         )
     )
@@ -227,13 +227,16 @@ def _aicon(text, notes, file, size_px):
         notes.tell(
             message(
                 "convert_one_side_of_film",
-                "one side of a film; expected format_width and format_height",
+                "only one side of a film; expected format_width and format_height",
             ),
             key="format_width",
         )
     if len(film_mm) == 2 and len(frame) > 2:
         notes.tell(
-            message("convert_film_and_pixels", "given beside pixels; expected a format, or pixels"),
+            message(
+                "convert_film_and_pixels",
+                "given together with pixels; expected a format, or pixels",
+            ),
             key="format_width",
         )
     if film_mm:
@@ -245,7 +248,7 @@ def _aicon(text, notes, file, size_px):
         notes.tell(
             message(
                 "convert_one_side_of_pixel",
-                "one side of a pixel; expected pixel_width and pixel_height",
+                "only one side of a pixel; expected pixel_width and pixel_height",
             ),
             key="pixel_width",
         )
@@ -280,7 +283,9 @@ def _one_size(of_file, given, notes):
     """(columns, lines) of the file or as given; told when there is none, or when they differ."""
     if of_file is None and given is None:
         notes.tell(
-            message("convert_no_size", "missing; the file does not say it. Give columns and lines"),
+            message(
+                "convert_no_size", "missing; the file does not hold it: give columns and lines"
+            ),
             key="format_px",
         )
     elif of_file is not None and given is not None and tuple(of_file) != tuple(given):
@@ -301,7 +306,7 @@ def _refuse_other_pixel(of_file_mm, given_mm):
         raise SolutionError(
             message(
                 "convert_other_pixel",
-                "a pixel of {found:.5g} um in the file, {given:.5g} um was given",
+                "a pixel of {found:.5g} um in the file; expected {given:.5g} um, as given",
                 found=of_file_mm * 1e3,
                 given=given_mm * 1e3,
             )

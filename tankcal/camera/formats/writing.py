@@ -160,7 +160,8 @@ def _refuse_film(kind, cameras, file):
     """Raise InputError for cameras whose pixels are not known."""
     expected = message(
         "convert_to_pixels",
-        "missing; {form} counts in pixels: expected their size, micrometres (--pixel-um)",
+        "missing; a file of kind {form} is in pixels: expected the size of a pixel, "
+        "micrometres (--pixel-um)",
         form=kind,
     )
     problems = [

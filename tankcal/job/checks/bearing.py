@@ -6,7 +6,8 @@ from tankcal.job.contract.bottom import bottom_form
 from tankcal.messages import message
 
 NOT_SUBTRACTED = message(
-    "nothing_subtracted", "expected only with side = outside: nothing is subtracted"
+    "nothing_subtracted",
+    "expected only with side = outside: with side = inside nothing is subtracted",
 )
 
 
@@ -16,7 +17,7 @@ def useless_inputs(values, tables, kind):
     values, tables  of the job; what is blank or bad there counts as not given
     """
     others = {
-        name: message("no_bearing", "it has no bearing on a tank of kind {of_kind}", of_kind=kind)
+        name: message("no_bearing", "it has no effect on a tank of kind {of_kind}", of_kind=kind)
         for name, known in INPUTS.items()
         if kind not in known.kinds
     }
@@ -92,7 +93,8 @@ def _of_bottom(values, bottom):
         "liquid": message("u_in_bottom", "expected u_m3 in bottom.csv instead"),
         "flat": message(
             "bottom_is_flat",
-            "expected only with a bottom that is not flat: of a flat one datum says it all",
+            "expected only with a bottom that is not flat: the height of a flat one is given "
+            "by datum",
         ),
     }.get(bottom_form(values, bottom), "")
 
@@ -142,20 +144,17 @@ def _of_wall(given, values, has_points):
     switched_off = values["corrections"]["plate"] is False
     outside = values["survey"]["side"] == "outside" and not switched_off
     nothing = message(
-        "no_plates", "expected only with side = outside and a thickness_mm: nothing is subtracted"
+        "no_plates",
+        "expected only with side = outside and a thickness_mm: without them nothing is subtracted",
     )
     return {
         "diameter": _from_points(has_points),
         "offset": ""
         if has_points
-        else message("no_points", "expected only beside points; without them: diameter"),
+        else message("no_points", "expected only with points; without points, declare diameter"),
         "plate_thickness": "" if outside and given["thickness_mm"] else nothing,
     }
 
 
 def _from_points(has_points):
-    return (
-        message("from_points", "it comes from the points, with their uncertainty")
-        if has_points
-        else ""
-    )
+    return message("from_points", "its uncertainty comes from the points") if has_points else ""

@@ -41,7 +41,7 @@ def check_scan(points, values, kind, raw, log):
     if len(xyz) + unplaced < MIN_POINTS_OF_SCAN.get(kind, 0):
         expected = message(
             "scan_of_few_points",
-            "{count} points; expected {fewest} or more of the wall",
+            "{count} points; expected {fewest} or more on the wall",
             count=len(xyz),
             fewest=MIN_POINTS_OF_SCAN[kind],
         )
@@ -61,7 +61,7 @@ def check_scan(points, values, kind, raw, log):
     elif across > LARGEST_SPHERE_M:
         expected = message(
             "scan_too_wide",
-            "the points are {across:.4g} m apart; expected at most {most} m: in millimetres?",
+            "the points are {across:.4g} m apart; expected at most {most} m: is it in millimetres?",
             across=across,
             most=LARGEST_SPHERE_M,
         )
@@ -72,7 +72,7 @@ def check_scan(points, values, kind, raw, log):
         expected = message(
             "plate_far_from_points",
             "found {plate:g}; the points lie from z = {low:.4g} to {high:.4g} m, expected it "
-            "about there",
+            "close to them",
             plate=plate,
             low=low[2],
             high=high[2],

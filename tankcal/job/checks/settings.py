@@ -35,7 +35,7 @@ def check_steps(table, extent, raw, log):
     if ratio and (ratio < 1.5 or abs(ratio - round(ratio)) > 1e-6):
         expected = message(
             "fine_step_no_part",
-            "found {fine:g}; expected a whole part of the step of the table, {step:g} m",
+            "found {fine:g}; expected the step of the table, {step:g} m, divided by a whole number",
             fine=fine,
             step=step,
         )
@@ -60,7 +60,7 @@ def _check_presence(table, raw, log):
             "step_m",
             message(
                 "step_beside_inches",
-                "found {step:g}; expected a blank: {unit} is a step",
+                "found {step:g}; expected a blank: {unit} is the step",
                 step=step,
                 unit=table["height_unit"],
             ),
@@ -79,7 +79,7 @@ def _check_presence(table, raw, log):
     if table["fine_step_m"] is not None and (inches or is_not_given(raw, "table", "step_m")):
         expected = message(
             "fine_step_without_step",
-            "found beside no step_m; expected fine zones only in a table with step_m",
+            "given without step_m; expected fine zones only in a table with step_m",
         )
         tell_problem("fine_step_m", expected)
 
@@ -91,7 +91,7 @@ def _check_step(step, table, height, raw, log):
     if step >= height:
         expected = message(
             "step_above_height",
-            "found {step:g}; expected less than the height, {height:g} m: in millimetres?",
+            "found {step:g}; expected less than the height, {height:g} m: is it in millimetres?",
             step=step,
             height=height,
         )
@@ -130,7 +130,7 @@ def _check_zones(zones, extent, raw, log):
         elif top is not None and high > top + 1e-9:
             expected = message(
                 "zone_above_top",
-                "found {low:g}-{high:g}; expected dips up to {top:g} m: in another unit?",
+                "found {low:g}-{high:g}; expected dips up to {top:g} m: is it in another unit?",
                 low=low,
                 high=high,
                 top=top,
@@ -140,7 +140,8 @@ def _check_zones(zones, extent, raw, log):
         if next_low < high:
             expected = message(
                 "zones_overlap",
-                "{low:g}-{high:g} and {next_low:g}-{next_high:g} overlap; expected apart",
+                "{low:g}-{high:g} and {next_low:g}-{next_high:g} overlap; expected zones "
+                "that do not overlap",
                 low=low,
                 high=high,
                 next_low=next_low,
@@ -213,7 +214,7 @@ def _check_dip_plate(values, tables, kind, raw, log):
     if kind in ("horizontal", "sphere") and plate < low:
         expected = message(
             "plate_below_tank",
-            "{below:g} m below the inside bottom; expected 0 or above: no liquid stands below it",
+            "{below:g} m below the inside bottom; expected 0 or above: there is no liquid below it",
             below=low - plate,
         )
         tell(log.problem, raw, "datum", "dip_plate_z_m", expected)
@@ -226,8 +227,8 @@ def _check_dip_plate(values, tables, kind, raw, log):
     if above > 0:
         expected = message(
             "plate_above_bottom",
-            "{above:g} m above the bottom{of_edge}; expected at most {most:g} m: another unit or "
-            "frame?",
+            "{above:g} m above the bottom{of_edge}; expected at most {most:g} m: is it in "
+            "another unit or frame?",
             above=above,
             of_edge=of_edge,
             most=MAX_DIP_OFFSET_M,
@@ -235,8 +236,8 @@ def _check_dip_plate(values, tables, kind, raw, log):
     else:
         expected = message(
             "plate_below_bottom",
-            "{below:g} m below the bottom{of_edge}; expected at most {most:g} m: another unit or "
-            "frame?",
+            "{below:g} m below the bottom{of_edge}; expected at most {most:g} m: is it in "
+            "another unit or frame?",
             below=below,
             of_edge=of_edge,
             most=MAX_DIP_OFFSET_M,
@@ -266,7 +267,7 @@ def _check_survey_liquid(survey, extent, raw, log):
     if level and (density == 0 or is_not_given(raw, "survey", "liquid_density_kg_m3")):
         expected = message(
             "level_without_density",
-            "missing beside liquid_level_m = {level:g}; expected the liquid's density",
+            "missing, but liquid_level_m = {level:g}; expected the density of the liquid",
             level=level,
         )
         tell(log.problem, raw, "survey", "liquid_density_kg_m3", expected)
@@ -274,7 +275,7 @@ def _check_survey_liquid(survey, extent, raw, log):
         expected = message(
             "level_above_shell",
             "found {level:g}; expected at most the top of the shell, {top_m:g} m above the "
-            "table's zero: in another unit?",
+            "table's zero: is it in another unit?",
             level=level,
             top_m=extent.top_m,
         )
@@ -309,15 +310,16 @@ def _check_densities(values, raw, log):
     if len(set(all_of_table)) < len(all_of_table):
         expected = message(
             "density_twice",
-            "a density twice, or the one of liquid_density_kg_m3 again; expected others",
+            "a density is given twice, or is that of liquid_density_kg_m3; expected other "
+            "densities",
         )
         tell(log.problem, raw, "table", "other_densities_kg_m3", expected)
     own, of_roof = table["liquid_density_kg_m3"], values["roof"]["reference_density_kg_m3"]
     if own and of_roof and own != of_roof:
         text = message(
             "roof_density",
-            "{roof_kg_m3:g} kg/m3 beside {table_kg_m3:g} kg/m3 of the table: its roof is that of"
-            " another liquid than its head",
+            "{roof_kg_m3:g} kg/m3 beside {table_kg_m3:g} kg/m3 of the table: roof and liquid "
+            "head are computed for different liquids",
             roof_kg_m3=of_roof,
             table_kg_m3=own,
         )

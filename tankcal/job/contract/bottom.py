@@ -71,7 +71,8 @@ def check_bottom(values, table, points, extent, raw, log):
         if has_rows(table):
             expected = message(
                 "bottom_rows_unused",
-                "rows beside bottom.form = {form}; expected points or liquid, or no rows",
+                "rows are given, but bottom.form = {form}; expected form points or liquid, "
+                "or no rows",
                 form=form,
             )
             log.problem(table.file, expected)
@@ -98,7 +99,8 @@ def _has_its_columns(table, form, wanted, log):
     if surveyed and measured:
         expected = message(
             "bottom_of_two_forms",
-            "given beside {measured}; expected surveyed points or measured volumes, never both",
+            "given together with {measured}; expected surveyed points or measured volumes, "
+            "not both",
             measured=measured[0],
         )
         log.problem(table.file, expected, None, surveyed[0])
@@ -143,8 +145,8 @@ def _check_centre(form, values, raw, log):
     if not -deepest <= rise <= highest:
         expected = message(
             "bottom_centre_far",
-            "{rise:+g} m from its edge (datum.bottom_z_m); expected at most {highest:g} m above, "
-            "{deepest:g} m below: another unit or frame?",
+            "{rise:+g} m from its edge (datum.bottom_z_m); expected at most {highest:g} m "
+            "above, {deepest:g} m below: is it in another unit or frame?",
             rise=rise,
             highest=highest,
             deepest=deepest,
@@ -160,7 +162,7 @@ def _check_centre(form, values, raw, log):
         tell(log.warning, raw, "bottom", "centre_z_m", expected)
     elif rise == 0:
         expected = message(
-            "bottom_flat", "at the height of the edge: bottom.form = {form} is flat", form=form
+            "bottom_flat", "at the height of the edge, so this {form} is flat", form=form
         )
         tell(log.warning, raw, "bottom", "centre_z_m", expected)
 
@@ -191,14 +193,14 @@ def _check_points(table, wall, values, log):
     if spread < NARROW * diameter:
         expected = message(
             "bottom_points_on_a_line",
-            "all points lie in one place or on one line; expected them all over the bottom",
+            "all points lie in one place or on one line; expected points all over the bottom",
         )
         log.problem(table.file, expected, None, "x_m")
         return
     if spread < PARTIAL * diameter:
         expected = message(
             "bottom_partly_surveyed",
-            "the points cover a small part of the bottom; expected them all over it",
+            "the points cover a small part of the bottom; expected points all over it",
         )
         log.warning(table.file, expected, None, "x_m")
     _refuse_same_places(table, xyz, log)
@@ -253,7 +255,7 @@ def _check_depths(table, rise, diameter, log):
     if steep and not np.any(bad):
         expected = message(
             "bottom_deep",
-            "{depth_m:.4g} m below datum.bottom_z_m, which is deep: in metres?",
+            "{depth_m:.4g} m below datum.bottom_z_m, which is deep: is it in metres?",
             depth_m=-np.min(rise),
         )
         log.warning(table.file, expected, table.rows[int(np.argmin(rise))], "z_m")
@@ -286,7 +288,7 @@ def _tell_rows(table, column, bad, texts, log):
         first = texts[int(np.argmax(bad))]
         expected = message(
             "bottom_other_frame",
-            "{first}: in millimetres, or in another frame than the points of the wall?",
+            "{first}: is it in millimetres, or in another frame than the points of the wall?",
             first=first,
         )
         log.problem(table.file, expected, None, column)
@@ -351,7 +353,7 @@ def _check_reach(table, levels, volumes, values, extent, log):
     if extent.top_m is not None and levels[-1] > extent.top_m:
         expected = message(
             "bottom_ends_late",
-            "found {levels:g}; expected dips within the shell: in millimetres?",
+            "found {levels:g}; expected dips within the shell: is it in millimetres?",
             levels=levels[-1],
         )
         log.problem(table.file, expected, table.rows[-1], "level_m")
@@ -365,8 +367,8 @@ def _check_slices(table, levels, volumes, extent, log):
     texts = [
         message(
             "bottom_overfull",
-            "{dv:.4g} m3 more than the row above; the full cross-section holds {v:.4g} m3 there, "
-            "expected about that: in litres?",
+            "{dv:.4g} m3 more than the row above; expected about {v:.4g} m3, what the full "
+            "cross-section holds there: is it in litres?",
             dv=dv,
             v=v,
         )
@@ -379,8 +381,8 @@ def _check_slices(table, levels, volumes, extent, log):
     if not np.any(bad) and filled[-1] < EMPTY:
         expected = message(
             "bottom_hardly_filled",
-            "{more_m3:.4g} m3 more than the row above; the full cross-section holds {full_m3:.4g}"
-            " m3 there: is the bottom not covered yet, or is it another unit?",
+            "{more_m3:.4g} m3 more than the row above; the full cross-section holds "
+            "{full_m3:.4g} m3 there: is the bottom not covered yet, or is it in another unit?",
             more_m3=volumes[-1] - volumes[-2],
             full_m3=full[-1],
         )

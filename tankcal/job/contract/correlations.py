@@ -42,7 +42,7 @@ def check_correlations(table, inputs, raw, log):
         if None not in pair and pair in first_row:
             expected = message(
                 "correlation_twice",
-                "{one} and {other} are there already, in row {first_row}; expected once",
+                "{one} and {other} are already in row {first_row}; expected once",
                 one=one,
                 other=other,
                 first_row=first_row[pair],
@@ -75,7 +75,7 @@ def _check_together(table, pairs, log):
     except ValueError as error:
         expected = message(
             "correlations_impossible",
-            "{error}; expected coefficients that can hold together",
+            "{error}; expected coefficients that are possible together",
             error=str(error),
         )
         log.problem(table.file, expected, None, "r")

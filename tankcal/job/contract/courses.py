@@ -38,7 +38,7 @@ def check_courses(courses, values, log):
         if thickness is not None and 0 < thickness < SMALLEST_THICKNESS_MM:
             expected = message(
                 "thin_plate",
-                "found {thickness:g}; expected millimetres, 0 or at least 1: in metres?",
+                "found {thickness:g}; expected millimetres, 0 or at least 1: is it in metres?",
                 thickness=thickness,
             )
             log.problem(courses.file, expected, row, "thickness_mm")
@@ -53,8 +53,8 @@ def check_courses(courses, values, log):
     if abs(miss) > allowed * (1 + 1e-9):
         expected = message(
             "courses_do_not_add_up",
-            "the courses add up to {sum:.4g} m, expected tank.nominal_height_m = {nominal:g} m "
-            "within {allowed:.0f} mm; they miss it by {miss:.0f} mm",
+            "the courses add up to {sum:.4g} m, expected tank.nominal_height_m = {nominal:g} "
+            "m within {allowed:.0f} mm; they differ by {miss:.0f} mm",
             sum=sum(heights),
             nominal=nominal,
             allowed=1000 * allowed,

@@ -88,23 +88,23 @@ def _check_sign(table, row, name, volume, log):
     if volume > 0 and takes and not gives:
         text = message(
             "deadwood_takes",
-            "{volume_m3:+g} m3 gives room, and {name} is a thing that takes it: expected a"
-            " negative volume",
+            "{volume_m3:+g} m3 adds to the capacity, but {name} takes up room: expected a "
+            "negative volume",
             **values,
         )
     elif volume > 0 and not gives:
         text = message(
             "deadwood_sign_unsaid",
-            "{volume_m3:+g} m3 gives room, and the name {name} does not say how: expected a"
-            " negative volume for what stands in the tank, or the name of what gives room, such as"
-            " manhole or sump",
+            "{volume_m3:+g} m3 adds to the capacity, and the name {name} does not show how: "
+            "expected a negative volume for what stands in the tank, or the name of what "
+            "adds room, such as manhole or sump",
             **values,
         )
     elif volume < 0 and gives:
         text = message(
             "deadwood_gives",
-            "{volume_m3:+g} m3 takes room, and {name} is a thing that gives it: expected a"
-            " positive volume",
+            "{volume_m3:+g} m3 reduces the capacity, but {name} adds room: expected a "
+            "positive volume",
             **values,
         )
     else:
@@ -145,7 +145,7 @@ def _check_place(table, row, bottom, top, volume, extent, log):
 
 def _check_volume(table, row, height, volume, extent, log):
     if volume == 0:
-        expected = message("deadwood_of_nothing", "found 0; it has no effect")
+        expected = message("deadwood_of_nothing", "found 0, which has no effect")
         log.warning(table.file, expected, row, "volume_m3")
     if extent.area_m2 is None:
         return
@@ -153,8 +153,8 @@ def _check_volume(table, row, height, volume, extent, log):
     if abs(volume) > SLACK * full:
         expected = message(
             "deadwood_too_large",
-            "found {volume:g}; the whole tank holds {full:.4g} m3 between bottom_m and top_m, "
-            "expected less, in cubic metres: in litres?",
+            "found {volume:g}; the whole tank holds {full:.4g} m3 between bottom_m and "
+            "top_m, expected less, in cubic metres: is it in litres?",
             volume=volume,
             full=full,
         )
@@ -162,8 +162,8 @@ def _check_volume(table, row, height, volume, extent, log):
     elif abs(volume) > LARGE_SHARE * full:
         expected = message(
             "deadwood_large",
-            "found {volume_m3:g}; the whole tank holds {full_m3:.4g} m3 between bottom_m and"
-            " top_m: in litres?",
+            "found {volume_m3:g}; the whole tank holds {full_m3:.4g} m3 between bottom_m and "
+            "top_m: is it in litres?",
             volume_m3=volume,
             full_m3=full,
         )

@@ -157,7 +157,8 @@ def check_horizontal(values, has_points, raw, log):
                 "dip_from_a_m",
                 message(
                     "dip_missing_beside_points",
-                    "missing; expected the place of the dip point, for the points tell a tilt",
+                    "missing; expected the place of the dip point, because the points "
+                    "determine a tilt",
                 ),
             ),
         ):
@@ -170,7 +171,7 @@ def check_horizontal(values, has_points, raw, log):
                 "azimuth_deg",
                 message(
                     "azimuth_without_points",
-                    "given without points.csv; expected only beside points",
+                    "given without points.csv; expected only with points",
                 ),
             )
     for end in ("end_a", "end_b"):
@@ -183,7 +184,8 @@ def _refuse_given(given, keys, raw, log, section="horizontal"):
         if given[key] is not None:
             expected = message(
                 "size_beside_points",
-                "given beside points.csv; expected one of them: it comes from the points",
+                "given together with points.csv; expected only one of them: the size comes "
+                "from the points",
             )
             tell(log.problem, raw, section, key, expected)
 
@@ -199,7 +201,7 @@ def _check_sizes(given, raw, log):
             if not missing(key):
                 expected = message(
                     "size_beside_diameter",
-                    "given beside diameter_m; expected the diameter, or width and height",
+                    "given together with diameter_m; expected the diameter, or width and height",
                 )
                 tell(log.problem, raw, "horizontal", key, expected)
         return
@@ -220,12 +222,13 @@ def _check_thickness(given, side, section, raw, log):
     if side == "outside" and is_not_given(raw, section, "thickness_mm"):
         expected = message(
             "thickness_missing",
-            "missing beside survey.side = outside; expected plate and paint (0: none)",
+            "missing, but survey.side = outside; expected plate and paint (0: none)",
         )
         tell(log.problem, raw, section, "thickness_mm", expected)
     elif side != "outside" and given["thickness_mm"]:
         expected = message(
-            "thickness_unused", "expected only beside survey.side = outside: nothing is subtracted"
+            "thickness_unused",
+            "expected only with survey.side = outside: with side = inside nothing is subtracted",
         )
         tell(log.problem, raw, section, "thickness_mm", expected)
 
@@ -244,7 +247,7 @@ def _check_end(given, end, has_points, raw, log):
             end,
             message(
                 "round_ends_only",
-                "found {form}; expected another form: it is for round cylinders only",
+                "found {form}; expected another form: this one is for round cylinders only",
                 form=form,
             ),
         )
@@ -258,12 +261,14 @@ def _check_end(given, end, has_points, raw, log):
         )
     if depth is not None and not needs_depth:
         expected = message(
-            "end_has_no_depth", "given for a {form} end; expected a blank: it has none", form=form
+            "end_has_no_depth",
+            "given for a {form} end; expected a blank: such an end has no depth",
+            form=form,
         )
         if form == "torispherical":
             expected = message(
                 "end_depth_from_radii",
-                "given for a {form} end; expected a blank: its radii tell it",
+                "given for a {form} end; expected a blank: its radii determine it",
                 form=form,
             )
         tell_problem(f"{end}_depth_m", expected)
@@ -331,25 +336,25 @@ def _check_dip(given, raw, log):
             if dip <= length:
                 expected = message(
                     "dip_leaves_top",
-                    "found {dip:g}; expected a dip within the cylinder, 0 to {length:g} m from "
-                    "A, but it would leave the top at {at_top:.3f} m",
+                    "found {dip:g}; expected a dip within the cylinder, 0 to {length:g} m "
+                    "from A; it would leave the top at {at_top:.3f} m",
                     dip=dip,
                     length=length,
                     at_top=at_top,
                 )
             tell(log.problem, raw, "horizontal", "dip_from_a_m", expected)
     if given["roll_deg"] and given["diameter_m"] is not None:
-        expected = message("roll_of_round_tank", "of no effect on a round cylinder")
+        expected = message("roll_of_round_tank", "it has no effect on a round cylinder")
         tell(log.warning, raw, "horizontal", "roll_deg", expected)
     if tilt and is_not_given(raw, "horizontal", "dip_from_a_m"):
         expected = message(
-            "dip_missing", "missing; expected the place of the dip point, for the tank leans"
+            "dip_missing", "missing; expected the place of the dip point, because the tank leans"
         )
         tell(log.problem, raw, "horizontal", "dip_from_a_m", expected)
     if tilt and abs(tilt) > STRONG_TILT_MM_PER_M:
         expected = message(
             "large_tilt",
-            "{tilt_mm_per_m:g} mm/m is much; tanks lean by 5 to 20: is it in another unit?",
+            "{tilt_mm_per_m:g} mm/m is large; tanks lean by 5 to 20: is it in another unit?",
             tilt_mm_per_m=tilt,
         )
         tell(log.warning, raw, "horizontal", "tilt_mm_per_m", expected)

@@ -63,7 +63,7 @@ def check_points(points, log):
         if given and name not in given:
             expected = message(
                 "sd_of_some_axes",
-                "not given; expected beside {given}, for all points or for none",
+                "missing, but {given} is given; expected both, for all points or for none",
                 given=given[0],
             )
             log.problem(points.file, expected, None, name)

@@ -75,8 +75,8 @@ def check_roof(roof, extent, raw, log):
             if roof[name] is not None and roof[name] > extent.top_m:
                 expected = message(
                     "roof_above_shell",
-                    "found {dip:g}; expected a dip within the shell, at most {top_m:.4g} m: in "
-                    "another unit?",
+                    "found {dip:g}; expected a dip within the shell, at most {top_m:.4g} m: "
+                    "is it in another unit?",
                     dip=roof[name],
                     top_m=extent.top_m,
                 )
@@ -88,9 +88,9 @@ def check_roof(roof, extent, raw, log):
 def _check_mass(roof, area, raw, log):
     mass, density = roof["mass_kg"], roof["reference_density_kg_m3"]
     if not LIGHTEST_KG_M2 <= mass / area <= HEAVIEST_KG_M2:
-        guess = message("in_grams", "in grams?")
+        guess = message("in_grams", "is it in grams?")
         if mass / area < LIGHTEST_KG_M2:
-            guess = message("in_tonnes", "in tonnes?")
+            guess = message("in_tonnes", "is it in tonnes?")
         expected = message(
             "roof_mass",
             "found {mass:g}, which is {per_m2:.3g} kg for each m2 of the tank; expected "
@@ -107,8 +107,8 @@ def _check_mass(roof, area, raw, log):
     if not least <= mass <= most:
         text = message(
             "roof_mass_strange",
-            "{found_kg:g} kg, expected {least_kg:.3g} to {most_kg:.3g} kg for a roof of"
-            " {area_m2:.4g} m2: in another unit?",
+            "{found_kg:g} kg, expected {least_kg:.3g} to {most_kg:.3g} kg for a roof of "
+            "{area_m2:.4g} m2: is it in another unit?",
             found_kg=mass,
             least_kg=least,
             most_kg=most,
@@ -122,7 +122,7 @@ def _check_mass(roof, area, raw, log):
     if draught > high - low:
         expected = message(
             "roof_cannot_float",
-            "{above:.4g} m above critical_bottom_m; expected more, for a roof of {mass:g} kg "
+            "{above:.4g} m above critical_bottom_m; expected more: a roof of {mass:g} kg "
             "floats only when {draught:.3g} m of it are in the liquid",
             above=high - low,
             mass=mass,

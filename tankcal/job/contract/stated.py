@@ -55,7 +55,7 @@ def check_stated(table, extent, log):
         elif (high, low) in first_row:
             expected = message(
                 "stated_twice",
-                "this dip is there already, in row {first_row}; expected once",
+                "this dip is already in row {first_row}; expected once",
                 first_row=first_row[high, low],
             )
             log.problem(table.file, expected, row, "high_m")
@@ -86,15 +86,16 @@ def _check_volume(table, row, high, low, volume, extent, log):
     if volume > UNIT_FACTOR * full:
         expected = message(
             "stated_too_much",
-            "found {volume:g}; the whole tank holds about {full:.4g} m3, expected m3: in litres?",
+            "found {volume:g}; the whole tank holds about {full:.4g} m3, expected m3: is it "
+            "in litres?",
             volume=volume,
             full=full,
         )
         if low is not None:
             expected = message(
                 "delivered_too_much",
-                "found {volume:g}; the tank between low_m and high_m holds about {full:.4g} m3, "
-                "expected m3: in litres?",
+                "found {volume:g}; the tank between low_m and high_m holds about {full:.4g} "
+                "m3, expected m3: is it in litres?",
                 volume=volume,
                 full=full,
             )

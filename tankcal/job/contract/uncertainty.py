@@ -241,7 +241,7 @@ def _contradictions(u_is, k, distribution, dof):
                 "k",
                 message(
                     "coverage_factor_missing",
-                    "blank; expected the coverage factor, beside u_is = expanded",
+                    "blank; expected the coverage factor, because u_is = expanded",
                 ),
             )
         )
@@ -251,7 +251,7 @@ def _contradictions(u_is, k, distribution, dof):
                 "k",
                 message(
                     "coverage_factor_unused",
-                    "found {k:g}; expected a blank, or u_is = expanded beside it",
+                    "found {k:g}; expected a blank, or u_is = expanded with it",
                     k=k,
                 ),
             )
@@ -299,7 +299,7 @@ def _of_others(u_is, name):
             "u_is",
             message(
                 "only_beside_t",
-                "found {u_is}; expected it only beside distribution = t, this one is {name}",
+                "found {u_is}; expected it only with distribution = t; this one is {name}",
                 u_is=u_is,
                 name=name,
             ),
@@ -310,7 +310,7 @@ def _of_others(u_is, name):
             "distribution",
             message(
                 "no_half_width",
-                "{name} has no half-width; expected {bounded} beside it",
+                "{name} has no half-width; expected {bounded} with it",
                 name=name,
                 bounded=bounded,
             ),
@@ -320,7 +320,7 @@ def _of_others(u_is, name):
             "distribution",
             message(
                 "not_normal",
-                "found {name}; expected {normal} or a blank beside u_is = expanded",
+                "found {name}; expected {normal} or a blank with u_is = expanded",
                 name=name,
                 normal=NORMAL,
             ),

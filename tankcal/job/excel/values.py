@@ -23,7 +23,7 @@ def uncalculated():
     return BadCell(
         message(
             "not_calculated",
-            "a formula without its result; open the workbook in Excel or LibreOffice, save",
+            "a formula without its result; open the workbook in Excel or LibreOffice and save it",
         )
     )
 

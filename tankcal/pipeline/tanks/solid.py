@@ -59,7 +59,8 @@ def solid_zero(job):
     if datum.bottom_z_m is None:
         expected = message(
             "plate_beside_scan",
-            "not available beside a scan: dips count from the inside bottom; expected blank",
+            "cannot be given with a scan, whose dips count from the inside bottom; expected "
+            "a blank",
         )
         raise InputError(Problem("job.toml", expected, column="datum.dip_plate_z_m"))
     zero = datum.dip_plate_z_m - datum.bottom_z_m

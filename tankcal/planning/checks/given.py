@@ -79,8 +79,8 @@ def _check_pattern(pattern, log):
     if lines in range(FEWEST_POINTS):
         expected = message(
             "plan_few_lines",
-            "found {lines:g}, the points of each section of the wall; expected at "
-            "least {fewest} ({advised} or more are advised)",
+            "found {lines:g} points in each section of the wall; expected at least {fewest} "
+            "({advised} or more are advised)",
             lines=lines,
             fewest=FEWEST_POINTS,
             advised=ADVISED_POINTS,
@@ -95,7 +95,7 @@ def _check_pattern(pattern, log):
     if common > whole and not pattern.is_refused("form_mm"):
         expected = message(
             "plan_form_part",
-            "found {common:g}; it is a part of form_mm: expected at most {whole:g}",
+            "found {common:g}, which is a part of form_mm; expected at most {whole:g}",
             common=common,
             whole=whole,
         )
@@ -169,7 +169,7 @@ def _check_tables(given, log):
             if system is not None:
                 expected = message(
                     "plan_own_frame",
-                    "found {system!r}; expected blank: a plan is in the survey's own frame",
+                    "found {system!r}; expected a blank: a plan is in the frame of the survey",
                     system=system,
                 )
                 log.problem(given.control.file, expected, row, "system")
@@ -181,7 +181,7 @@ def _check_accuracies(values, given, raw, log):
     for one in given.repeated["photo_rings"]:
         if "s_um" not in one.filled and not has_common:
             expected = message(
-                "plan_image_sd_missing", "missing; expected s_um, or adjustment.image_sd_um"
+                "plan_image_sd_missing", "missing; expected s_um here, or adjustment.image_sd_um"
             )
             one.tell(log.problem, "s_um", expected)
         elif one["s_um"] == 0:
@@ -208,6 +208,6 @@ def _check_accuracies(values, given, raw, log):
         if "s_mm" in one.filled and "s_zenith_arcsec" not in one.filled:
             expected = message(
                 "plan_zenith_missing",
-                "missing; slope distances (s_mm) need zenith angles beside them",
+                "missing; expected zenith angles together with slope distances (s_mm)",
             )
             one.tell(log.problem, "s_zenith_arcsec", expected)

@@ -78,7 +78,7 @@ def _through(plan, ends, xyz):
     if beyond:
         return message(
             "plan_tape_beyond_wall",
-            "{ends} beyond the wall of the tank; expected both ends within it",
+            "{ends} beyond the wall of the tank; expected both ends inside it",
             ends=join_with_and(beyond),
         )
     return ""
@@ -176,8 +176,8 @@ def _check_lines(plan, pattern, log):
     if touching:
         expected = message(
             "plan_lines_touch",
-            "lines {names} are nearer than {touch_mm:g} mm to one another where they "
-            "keep {clearance:g} mm from welds; expected fewer generatrices, another "
+            "lines {names} come nearer than {touch_mm:g} mm to one another when they are "
+            "kept {clearance:g} mm from welds; expected fewer generatrices, another "
             "first_azimuth_deg or a smaller weld_clearance_mm",
             names=_first(touching),
             touch_mm=1000 * TOUCH_M,
@@ -227,8 +227,8 @@ def _check_rows(plan, pattern, log):
     if len(close):
         text = message(
             "plan_targets_on_welds",
-            "{count} rows of targets are nearer than {clearance_mm:g} mm to a horizontal weld:"
-            " {heights} m; are they meant there?",
+            "{count} rows of targets are nearer than {clearance_mm:g} mm to a horizontal "
+            "weld: {heights} m; is that intended?",
             count=len(close),
             clearance_mm=1000 * clearance,
             heights=list_some([f"{height:g}" for height in close], SHOWN),
@@ -243,8 +243,8 @@ def _first(names):
 
 NEAR_M = 0.05  # of the wall: a station nearer than this stands in it
 WITHOUT_FORM = (
-    "not given: U is without what the wall departs from a circle between its targets, and will be "
-    "larger in the survey; expected its rms departure"
+    "not given: U leaves out how far the wall departs from a circle between its targets, and will "
+    "be larger in the survey; expected its rms departure"
 )
 
 

@@ -108,7 +108,8 @@ def rebuild(record_path, directory, progress=None, language=None, letterhead=Non
     try:
         return _write(prepare, directory, progress, language, letterhead)
     except VocabularyError as error:
-        found = message("record_speaks_otherwise", "does not hold what a record does ({what})",
+        found = message("record_speaks_otherwise", "does not have the content of a record "
+                                                   "({what})",
                         what=str(error))  # fmt: skip
         raise InputError(Problem(source.name, found)) from error
     except TankcalError:
@@ -116,7 +117,7 @@ def rebuild(record_path, directory, progress=None, language=None, letterhead=Non
     except (LookupError, TypeError, ValueError, AttributeError) as error:
         found = message(
             "no_record",
-            "does not hold what a record does ({name}: {error})",
+            "does not have the content of a record ({name}: {error})",
             name=type(error).__name__,
             error=str(error),
         )

@@ -110,7 +110,8 @@ def _cause(off, large):
     if large:
         return message(
             "no_group_explains",
-            "no group alone explains it: look for blunders, or a model that does not hold",
+            "no single group of observations explains it: look for blunders, or for a model "
+            "that does not fit",
         )
     return None
 
@@ -196,7 +197,7 @@ def wrong_angles(readings, doubtful):
             if len(mine) > 1 + free and _least(computed, factor * turns, free) < LEFT * now:
                 text = message(
                     "angles_from_station",
-                    "the angles from {station} fit once they are taken for {what}",
+                    "the angles from {station} fit if they are {what}",
                     station=station,
                     what=what,
                 )
@@ -240,8 +241,8 @@ def mirrored_photos(adjusted):
 
 MIRROR = message(
     "image_mirrored",
-    "its image points fit once the image is mirrored: x and y seem to be swapped, or one of them"
-    " counted the wrong way round",
+    "its image points fit if the image is mirrored: x and y seem to be swapped, or one of "
+    "them counted the wrong way round",
 )
 
 

@@ -182,9 +182,9 @@ def _wrong(adjusted, known, point, axis, here_m, value_m):
     name = adjusted.survey.points[point]
     text = message(
         "wrongly_held",
-        "{axis} of {point} is held fixed at {value_m:.4f}, and the readings put it at"
-        " {here_m:.4f}; were it not held, far fewer readings would be set aside: it may be"
-        " wrong, or another value that is held",
+        "{axis} of {point} is held fixed at {value_m:.4f}, but the readings give "
+        "{here_m:.4f}; if it were not held, far fewer readings would be set aside: this "
+        "value, or another one that is held, may be wrong",
         axis="xyz"[axis],
         point=name,
         value_m=value_m,
@@ -222,8 +222,9 @@ def _strained(one):
     sd = one.mdb / noncentrality()
     text = message(
         "held_contradicted",
-        "{axis} of {point} is held fixed at {value_m:.4f}, and released alone it would be"
-        " {here_m:.4f} (standard deviation {sd_mm:.1f} mm, w = {w:.1f}): it may be wrong",
+        "{axis} of {point} is held fixed at {value_m:.4f}, but if it alone is released it "
+        "becomes {here_m:.4f} (standard deviation {sd_mm:.1f} mm, w = {w:.1f}): it may be "
+        "wrong",
         axis=one.element,
         point=one.ids[0],
         value_m=one.value,
@@ -273,8 +274,9 @@ def _scale(name):
         sd = _sd_of(adjusted, adjusted.problem.layout.scale[i])
         text = message(
             "scale_explains",
-            "the distances of {name} fit once they may all be {scale_ppm:+.0f} ppm off (standard"
-            " uncertainty {u_ppm:.0f} ppm): look at its certificate, its unit and its u_scale_ppm",
+            "the distances of {name} fit if all of them are {scale_ppm:+.0f} ppm off "
+            "(standard uncertainty {u_ppm:.0f} ppm): check its certificate, its unit and its "
+            "u_scale_ppm",
             name=name,
             scale_ppm=1e6 * scale,
             u_ppm=1e6 * sd,
@@ -297,8 +299,8 @@ def _principal_distance(name, held_mm):
         sd = _sd_of(adjusted, adjusted.problem.layout.interior[place])
         text = message(
             "principal_distance_explains",
-            "the images fit once c may be {c_mm:.3f} mm (standard uncertainty {u_mm:.3f} mm) in"
-            " place of {held_mm:.3f} mm",
+            "the images fit if c is {c_mm:.3f} mm (standard uncertainty {u_mm:.3f} mm) "
+            "instead of {held_mm:.3f} mm",
             c_mm=c,
             u_mm=sd,
             held_mm=held_mm,

@@ -61,7 +61,7 @@ def _mirrored(measurements):
         if one.table in HORIZONTAL:
             text = message(
                 "angles_anticlockwise",
-                "the angles fit once they are taken for those of a circle read anticlockwise",
+                "the angles fit if the circle was read anticlockwise",
             )
             yield Problem(one.file, text), _times(measurements, [one.table], -1.0)
 
@@ -78,7 +78,7 @@ def _exchanged(measurements):
             order[[i, j]] = j, i
             text = message(
                 "names_exchanged",
-                "all fits once {point} and {other} are exchanged",
+                "everything fits if {point} and {other} are exchanged",
                 point=names[i],
                 other=names[j],
             )
@@ -93,16 +93,16 @@ def _in_other_units(measurements):
     angles = [one.table for one in tables if KINDS[one.table].is_angle]
     for factor, what in GON:
         if len(angles) > 1:
-            template = "all angles together fit once they are taken for {what}"
+            template = "all angles together fit if they are {what}"
             text = message("all_angles_misread", template, what=what)
             yield Problem("job.toml", text), _times(measurements, angles, factor)
-        text = message("angles_misread", "the angles fit once they are taken for {what}", what=what)
+        text = message("angles_misread", "the angles fit if they are {what}", what=what)
         for table in angles:
             yield Problem(f"{table}.csv", text), _times(measurements, [table], factor)
     for table in ("distances", "slope_distances"):
         if any(one.table == table for one in tables) and _scale_is_known(measurements, table):
             for factor, what in OTHER_UNITS:
-                template = "the distances fit once they are taken for {what}"
+                template = "the distances fit if they are in {what}"
                 text = message("distances_misread", template, what=what)
                 yield Problem(f"{table}.csv", text), _times(measurements, [table], factor)
 
@@ -118,13 +118,11 @@ def _of_control(measurements):
         if system is None or not mine.all():
             xyz, sd = control.xyz_m.copy(), control.sd_m.copy()
             xyz[mine], sd[mine] = xyz[mine][:, [1, 0, 2]], sd[mine][:, [1, 0, 2]]
-            text = message(
-                "all_coordinates_swapped", "all coordinates fit once x and y are swapped"
-            )
+            text = message("all_coordinates_swapped", "all coordinates fit if x and y are swapped")
             if system:
                 text = message(
                     "system_swapped",
-                    "all coordinates of system {system} fit once x and y are swapped",
+                    "all coordinates of system {system} fit if x and y are swapped",
                     system=system,
                 )
             changed = replace(control, xyz_m=xyz, sd_m=sd)

@@ -75,8 +75,8 @@ def _far_more(name, k, n):
 def _much_of_photo(name, k, n):
     return message(
         "photo_lost_much",
-        "{gone} of the {count} values of photo {photo} were set aside, far more than of others:"
-        " look at the whole of it",
+        "{gone} of the {count} values of photo {photo} were set aside, far more than of "
+        "others: check the whole photo",
         gone=k,
         count=n,
         photo=name,
@@ -98,8 +98,8 @@ def _lost_control(readings):
 def _lost(one):
     return message(
         "control_set_aside",
-        "{axis} of {point} was set aside: given as {value_m:.4f} (sd {sd_m:.4f}), and the readings"
-        " put it at {here_m:.4f}",
+        "{axis} of {point} was set aside: given as {value_m:.4f} (sd {sd_m:.4f}), but the "
+        "readings give {here_m:.4f}",
         axis=one.element,
         point=one.ids[0],
         value_m=one.value,
@@ -113,8 +113,9 @@ def _many(gone, total):
         return []
     text = message(
         "many_set_aside",
-        "{gone} of {total} values ({percent:.0f} %) were set aside: more than single blunders"
-        " explain; doubt what is held fixed, a scale, or the standard deviations first",
+        "{gone} of {total} values ({percent:.0f} %) were set aside: more than single "
+        "blunders explain; first check what is held fixed, the scales and the standard "
+        "deviations",
         gone=gone,
         total=total,
         percent=100 * gone / total,
@@ -135,8 +136,8 @@ def find_undecided_outliers(adjusted, removed, traces, held):
             names = [_named(adjusted, traces, *other) for other in others]
             text = message(
                 "undecided",
-                "{reading} was set aside, but it may as well be {others} that is wrong: the"
-                " readings cannot tell",
+                "{reading} was set aside, but the error may equally be in {others}: the "
+                "readings cannot decide",
                 reading=_named(adjusted, traces, one.source, one.row),
                 others=_either(names),
             )
@@ -145,7 +146,7 @@ def find_undecided_outliers(adjusted, removed, traces, held):
     if len(found) > LISTED:
         text = message(
             "more_undecided",
-            "of {more} more readings set aside the same is true",
+            "the same is true of {more} more readings that were set aside",
             more=len(found) - LISTED,
         )
         found[LISTED:] = [Problem("job.toml", text, None, "adjustment.snooping")]

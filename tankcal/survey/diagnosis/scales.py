@@ -27,9 +27,9 @@ def check_readings_off(readings):
             continue
         text = message(
             "check_reading_off",
-            "the check reading {reading} differs by {times:.1f} times its standard deviation from"
-            " what the adjusted points say ({difference_ppm:+.0f} ppm of its value): the scale, or"
-            " this reading?",
+            "the check reading {reading} differs by {times:.1f} times its standard deviation "
+            "from the value that the adjusted points give ({difference_ppm:+.0f} ppm of its "
+            "value): is the scale wrong, or this reading?",
             reading=message(
                 "length_between", "{kind} {ids}", kind=one.kind, ids="-".join(map(str, one.ids))
             ),
@@ -63,7 +63,7 @@ def scale_of_control(adjusted, readings, measurements, cov_scale=1.0):
         " given ({points}): {hint}",
         scale_ppm=1e6 * float(np.median([ratio for ratio, _ in off])),
         points=list_some(pairs, SHOWN),
-        hint=message("look_at_scale", "look at unit, correction and scale of the lengths measured"),
+        hint=message("look_at_scale", "check unit, correction and scale of the measured lengths"),
     )
     return [Problem(table.file, text)]
 

@@ -152,8 +152,8 @@ def _refuse_coincident(survey, groups, state):
                 raise SolutionError(
                     message(
                         "ends_coincide",
-                        "the approximate places of the ends of {observation} are one and the "
-                        "same: the points hang on too little, or one has two names",
+                        "both ends of {observation} have the same approximate place: the "
+                        "points have too few observations, or one point has two names",
                         observation=told(survey, one, bad[0]),
                     )
                 )
@@ -187,7 +187,7 @@ def _poor(name, rays):
 
 def one_ray_sentence(name):
     """What is said of a point that one image alone shows."""
-    return message("one_ray", "point {point} has one ray", point=name)
+    return message("one_ray", "point {point} has only one ray", point=name)
 
 
 def _refuse_poor_photos(survey):

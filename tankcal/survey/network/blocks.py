@@ -108,7 +108,8 @@ def _made(survey, centre, all_of, source, row, component, covariance):
         raise SolutionError(
             message(
                 "correlated_covariance_impossible",
-                "the covariance of correlated observations is not possible",
+                "the correlated observations have an impossible covariance: it is not "
+                "positive definite",
             )
         ) from None
 

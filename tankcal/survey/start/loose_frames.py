@@ -121,11 +121,14 @@ def _apart(survey, own, piece):
             "but the {common} points that they share with the rest do not fit",
             common=common,
         )
-        return message("photos_apart", "photos {some} hang together, {why}", some=some, why=why)
+        return message(
+            "photos_apart", "photos {some} are connected to each other, {why}", some=some, why=why
+        )
     return message(
         "photos_loose",
-        "photos {some} hang together, but share only {common} known points with the rest: 3 that "
-        "do not lie on a line, and more to tell their positions apart, are needed",
+        "photos {some} are connected to each other, but share only {common} known points "
+        "with the rest: 3 that do not lie on a line are needed, and more to choose between "
+        "possible positions",
         some=some,
         common=common,
     )

@@ -117,9 +117,8 @@ def unfixed_point_error(survey, found, point, centre_m):
     return SeveralPlacesError(
         message(
             "point_at_several_places",
-            "point {name} may stand at {places}, which fit as well: another reading "
-            "is needed, or approximate coordinates (in control.csv, standard "
-            "deviations blank)",
+            "point {name} may be at {places}, which fit equally well: another reading is "
+            "needed, or approximate coordinates (in control.csv, standard deviations blank)",
             name=name,
             places=join_with_or(places),
         )
@@ -134,21 +133,21 @@ def loose_frame_sentence(survey, local, known):
     if common > 1:
         return message(
             "either_side",
-            "points {some} may stand on either side of the line through the known ones: give one "
-            "of them approximate coordinates (in control.csv, standard deviations blank)",
+            "points {some} may be on either side of the line through the known ones: give "
+            "one of them approximate coordinates (in control.csv, standard deviations blank)",
             some=some,
         )
     if common == 1:
         return message(
             "points_share_one",
-            "points {some} hang together, but share only 1 known point with the rest: 2 are "
-            "needed, or 1 and an azimuth",
+            "points {some} are connected to each other, but share only 1 known point with "
+            "the rest: 2 are needed, or 1 and an azimuth",
             some=some,
         )
     return message(
         "points_share_few",
-        "points {some} hang together, but share only {common} known points with the rest: 2 are "
-        "needed, or 1 and an azimuth",
+        "points {some} are connected to each other, but share only {common} known points "
+        "with the rest: 2 are needed, or 1 and an azimuth",
         some=some,
         common=common,
     )
@@ -173,7 +172,7 @@ def _no_heights(survey, level):
         "no zenith angle, vertical angle or levelled height difference was observed",
     )
     if observed:
-        why = message("heights_hang_free", "they are tied to no point with a known z")
+        why = message("heights_hang_free", "they are not connected to any point with a known z")
     end = (
         message(
             "distances_taken_spatial",

@@ -95,7 +95,7 @@ def parse_dip(text, height_unit="m"):
         raise HeightError(
             message(
                 "no_dip_in_metres",
-                "{text!r} is no dip; expected metres, such as 1.035",
+                "{text!r} is not a dip; expected metres, such as 1.035",
                 text=text[:40],
             )
         )
@@ -105,7 +105,7 @@ def parse_dip(text, height_unit="m"):
         raise HeightError(
             message(
                 "no_dip_in_feet",
-                "{text!r} is no dip; expected feet and inches, such as 3' 4 5/8\"",
+                "{text!r} is not a dip; expected feet and inches, such as 3' 4 5/8\"",
                 text=text[:40],
             )
         )

@@ -64,7 +64,7 @@ def _place(xyz):
 def _arrays(vertices, faces, name):
     vertices, faces = np.asarray(vertices), np.asarray(faces)
     if faces.size == 0 or vertices.size == 0:
-        raise problem(name, message("mesh_empty", "holds no triangles; expected a closed mesh"))
+        raise problem(name, message("mesh_empty", "has no triangles; expected a closed mesh"))
     if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype.kind not in "fiu":
         raise problem(name, f"vertices of shape {vertices.shape}; expected numbers (n, 3)")
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
@@ -143,7 +143,7 @@ def _refuse_open(vertices, faces, name):
             name,
             message(
                 "mesh_without_triangles",
-                "holds no triangle of three corners; expected a closed mesh",
+                "has no triangle with three different corners; expected a closed mesh",
             ),
         )
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
@@ -185,7 +185,7 @@ def _refuse_open(vertices, faces, name):
             name,
             message(
                 "mesh_faces_twice",
-                "{count} faces are there twice, the first at {where} m; expected once",
+                "{count} faces are given twice, the first at {where} m; expected once",
                 count=(times > 1).sum(),
                 where=where,
             ),

@@ -117,7 +117,7 @@ def parse_mesh(name, data, unit_m=1.0):
             name,
             message(
                 "mesh_unreadable",
-                "is no {kind_of_file} file that can be read; expected closed triangles",
+                "is not a readable {kind_of_file} file; expected closed triangles",
                 kind_of_file=kind.upper(),
             ),
         ) from error

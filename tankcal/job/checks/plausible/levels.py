@@ -88,8 +88,8 @@ def _check_dip_plate(values, tables, extent, kind, raw, log):
     if away > most * (1 + 1e-9):
         text = message(
             "dip_plate_far",
-            "{away_m:.3g} m from the bottom, expected at most {most_m:.3g} m: the whole table"
-            " counts from here",
+            "{away_m:.3g} m from the bottom, expected at most {most_m:.3g} m: all dips of "
+            "the table count from it",
             away_m=away,
             most_m=most,
         )
@@ -103,8 +103,8 @@ def _check_top(values, raw, log):
         return
     text = message(
         "top_not_met",
-        "with tank.nominal_height_m = {height_m:g} m the shell ends at z = {end_m:.4g} m,"
-        " checks.top_z_m is {top_m:.4g} m: they miss each other by {miss_m:+.3f} m",
+        "with tank.nominal_height_m = {height_m:g} m the shell ends at z = {end_m:.4g} m, "
+        "checks.top_z_m is {top_m:.4g} m: they differ by {miss_m:+.3f} m",
         height_m=height,
         end_m=bottom + height,
         top_m=top,
@@ -123,8 +123,8 @@ def _check_slope(values, raw, log):
     if drawn is not None and drawn != found:
         text = message(
             "bottom_slopes_otherwise",
-            "{rise_m:+.3g} m from the edge (datum.bottom_z_m), so that the bottom goes {found} to"
-            " its centre; checks.bottom_slopes is {drawn}: expected one of them",
+            "{rise_m:+.3g} m from the edge (datum.bottom_z_m), so the bottom slopes {found} "
+            "to its centre, but checks.bottom_slopes is {drawn}; expected both to agree",
             rise_m=centre - edge,
             found=found,
             drawn=drawn,
@@ -133,8 +133,9 @@ def _check_slope(values, raw, log):
     elif drawn is None and diameter is not None and centre - edge > SLOPE_UP * diameter / 2:
         text = message(
             "bottom_rises_much",
-            "{rise_m:+.3g} m from the edge (datum.bottom_z_m), which is steep for a bottom that"
-            " goes up to its centre: is it down? checks.bottom_slopes says which",
+            "{rise_m:+.3g} m from the edge (datum.bottom_z_m), which is steep for a bottom "
+            "that slopes up to its centre: does it slope down? Then say so in "
+            "checks.bottom_slopes",
             rise_m=centre - edge,
         )
         tell(log.warning, raw, "bottom", "centre_z_m", text)
@@ -142,8 +143,8 @@ def _check_slope(values, raw, log):
     elif drawn is None and (diameter is None or abs(centre - edge) <= STEEP_FACTOR * diameter):
         text = message(  # a steeper one is asked about already
             "bottom_slopes_unsaid",
-            "blank; the bottom goes {found} to its centre by {rise_m:.3g} m, and nothing else says"
-            " that it does: expected up or down as the drawing has it",
+            "blank; the bottom slopes {found} to its centre by {rise_m:.3g} m, and no other "
+            "entry confirms it; expected up or down, as on the drawing",
             found=found,
             rise_m=abs(centre - edge),
         )

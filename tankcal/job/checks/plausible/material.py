@@ -96,7 +96,9 @@ def _check_expansion(values, shell, raw, log):
         hint = message("power_of_ten", "is a digit or a power of ten wrong?")
         if others:
             hint = message(
-                "is_of_metal", "that of {shell}? Then say so in checks.shell", shell=others[0]
+                "is_of_metal",
+                "is the shell of {shell}? Then say so in checks.shell",
+                shell=others[0],
             )
         _tell_strange("expansion_per_k", "1/K", found, bounds, shell, hint, raw, log)
 
@@ -107,7 +109,7 @@ def _check_modulus(values, shell, raw, log):
         if loads_the_shell(values) or values["survey"]["liquid_level_m"]:
             _check_given("e_gpa", shell, raw, log)
     elif bounds is not None and _beyond(found, bounds):
-        hint = message("another_metal", "another metal? Then say so in checks.shell")
+        hint = message("another_metal", "is it another metal? Then say so in checks.shell")
         _tell_strange("e_gpa", "GPa", found, bounds, shell, hint, raw, log)
 
 
@@ -116,8 +118,7 @@ def _check_given(key, shell, raw, log):
         return
     text = message(
         "constant_missing",
-        "missing; expected that of {shell}, for what is taken where it is blank is that of carbon"
-        " steel",
+        "missing; expected the value of {shell}: where it is blank, that of carbon steel is taken",
         shell=shell,
     )
     tell(log.problem, raw, "material", key, text)

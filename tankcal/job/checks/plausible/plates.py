@@ -55,7 +55,8 @@ def _check_courses(values, courses, log):
             text = message(
                 "plate_thin",
                 "{found_mm:g} mm, expected {limit_mm:.3g} mm or more for {head_m:.4g} m of shell"
-                " above it and a diameter of {diameter_m:g} m: in centimetres, or half of it?",
+                " above it and a diameter of {diameter_m:g} m: is it in centimetres, or "
+                "half of it?",
                 **_of_course(plate, least, head, diameter),
             )
         if text is not None:
@@ -63,8 +64,8 @@ def _check_courses(values, courses, log):
     if thickness and 0 < RISING_PLATES * thickness[0] < thickness[-1]:
         text = message(
             "courses_top_down",
-            "the plates grow thicker upwards, from {first_mm:g} to {last_mm:g} mm; expected the"
-            " courses from the bottom up: do they stand from the top down?",
+            "the plates grow thicker upwards, from {first_mm:g} to {last_mm:g} mm; expected "
+            "the courses from the bottom up: are they listed from the top down?",
             first_mm=thickness[0],
             last_mm=thickness[-1],
         )
@@ -82,7 +83,7 @@ def _check_paint(values, courses, log):
         if paint is not None and paint > PAINT_MM:
             text = message(
                 "paint_thick",
-                "{found_mm:g} mm of paint, expected at most {most_mm:g}: in another unit?",
+                "{found_mm:g} mm of paint, expected at most {most_mm:g}: is it in another unit?",
                 found_mm=paint,
                 most_mm=PAINT_MM,
             )
@@ -90,8 +91,8 @@ def _check_paint(values, courses, log):
     if values["survey"]["side"] == "inside" and any(paints):
         text = message(
             "paint_of_inside",
-            "paint is given, which is subtracted from what was measured outside, and survey.side is"
-            " inside: is it outside?",
+            "paint is given, which is subtracted only from what was measured outside, but "
+            "survey.side is inside: was it measured outside?",
         )
         log.warning(courses.file, text, None, "paint_mm")
 
@@ -121,7 +122,7 @@ def _check_solid(values, kind, raw, log):
         text = message(
             "solid_plate_strange",
             "{found_mm:g} mm, expected {least_mm:.3g} to {most_mm:.3g} mm for a diameter of"
-            " {diameter_m:g} m: ten times too thick, or in centimetres?",
+            " {diameter_m:g} m: is it ten times too thick, or in centimetres?",
             found_mm=plate,
             least_mm=least,
             most_mm=most,

@@ -43,7 +43,7 @@ def check_rings(values, points, courses, log):
         return
     hint = message("heights_right", "are the heights of the courses and datum.bottom_z_m right?")
     if _nearest(rings, np.cumsum(heights[::-1])[:-1])[0] > 2 * NEAR_JOINT_M:
-        hint = message("from_top_down", "do the courses stand from the top down?")
+        hint = message("from_top_down", "are the courses listed from the top down?")
     text = message(
         "ring_on_joint",
         "a ring of points lies {near_mm:.0f} mm from the joint above course {course}, which is"
@@ -105,7 +105,7 @@ def _check_sphere(values, raw, log):
     if found is not None and found > SPHERE_M:
         text = message(
             "sphere_large",
-            "{found_m:g} m, expected at most {most_m:g} m: in feet?",
+            "{found_m:g} m, expected at most {most_m:g} m: is it in feet?",
             found_m=found,
             most_m=SPHERE_M,
         )
@@ -154,7 +154,8 @@ def _check_length(length, diameter, raw, log):
     if ratio > MOST_LENGTH_OVER_DIAMETER:
         text = message(
             "length_impossible",
-            "found {found_m:g} m, {ratio:.3g} diameters; expected at most {most:g}: in decimetres?",
+            "found {found_m:g} m, {ratio:.3g} diameters; expected at most {most:g}: is it "
+            "in decimetres?",
             found_m=length,
             ratio=ratio,
             most=MOST_LENGTH_OVER_DIAMETER,
@@ -217,8 +218,8 @@ def _check_alike(given, sizes, raw, log):
         end, other = ("a", "b") if a > b else ("b", "a")
         text = message(
             "ends_differ",
-            "{found_m:g} m, and {other_m:g} m at end {other}: expected two ends of one form to be"
-            " alike",
+            "{found_m:g} m, and {other_m:g} m at end {other}: expected equal ends where both "
+            "have the same form",
             found_m=max(a, b),
             other=other.upper(),
             other_m=min(a, b),

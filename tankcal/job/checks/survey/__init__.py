@@ -33,7 +33,8 @@ def check_survey(values, tables, registers, raw, is_whole, log):
     if is_whole and has_rows(tables["points"]):
         expected = message(
             "points_and_survey",
-            "given beside a survey; expected one of them: a survey's points are adjusted",
+            "given together with a survey; expected only one of them: the points of a survey "
+            "come from its adjustment",
         )
         log.problem(tables["points"].file, expected)
     told = frozenset((problem.file, problem.row) for problem in log.problems)
@@ -57,7 +58,8 @@ def _tell_nothing_to_adjust(values, tables, raw, is_whole, log):
         return
     if not is_whole:
         expected = message(
-            "no_survey", "nothing to adjust; expected image points, distances or other observations"
+            "no_survey",
+            "there is nothing to adjust; expected image points, distances or other observations",
         )
         log.problem(raw.settings_file, expected)
         return

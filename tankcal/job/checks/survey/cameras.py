@@ -66,7 +66,7 @@ def _check_pixels(files, name, given, in_pixels):
         if in_pixels and not files.is_given("cameras", name, "pixel_um"):
             expected = message(
                 "pixel_missing",
-                "missing beside format_mm; expected the size of a pixel, or format_px",
+                "missing, but format_mm is given; expected the size of a pixel, or format_px",
             )
             files.tell_key(files.log.problem, "cameras", name, "pixel_um", expected)
         return
@@ -102,7 +102,7 @@ def _refuse_two_blocks(files, settings):
                 first = next(iter(cameras))
                 expected = message(
                     "block_of_two_values",
-                    "of another value or standard deviation than {first!r} has; expected the "
+                    "its value or standard deviation is not that of {first!r}; expected the "
                     "same: adjustment.camera.{setting} is block weighted",
                     first=first,
                     setting=parameter.setting,
@@ -141,7 +141,7 @@ def _check_format(files, name, given):
             "pixel_um",
             message(
                 "pixel_missing_beside_px",
-                "missing beside format_px; expected the size of a pixel, micrometres",
+                "missing, but format_px is given; expected the size of a pixel, micrometres",
             ),
         )
         return False
@@ -210,7 +210,7 @@ def _check_affinity(files, name, given):
         if given[first] and not files.is_given("cameras", name, "affinity"):
             expected = message(
                 "affinity_missing",
-                "missing beside {first}; expected the form: both_y, both_x, b1_b2 or "
+                "missing, but {first} is given; expected the form: both_y, both_x, b1_b2 or "
                 "before_distortion",
                 first=first,
             )
@@ -225,8 +225,8 @@ def _check_convention(files, name, given, parameters):
     if with_value:
         expected = message(
             "convention_missing",
-            "missing beside {keys}; expected correction_added, correction_subtracted or "
-            "distortion_of_ideal: sources differ in sign",
+            "missing, but {keys} is given; expected correction_added, correction_subtracted "
+            "or distortion_of_ideal: sources differ in sign",
             keys=[*with_value],
         )
         files.tell_key(files.log.problem, "cameras", name, "convention", expected)
@@ -250,14 +250,15 @@ def _check_states(files, name, parameters):
             if not files.is_given("cameras", name, parameter.sd_key):
                 expected = message(
                     "parameter_sd_missing",
-                    "missing; expected it above 0, for the parameter is {asked}",
+                    "missing; expected a value above 0: the parameter is {asked}",
                     asked=asked,
                 )
                 files.tell_key(files.log.problem, "cameras", name, parameter.sd_key, expected)
         elif parameter.sd == 0 and parameter.is_own and _asks_free(files, parameter):
             expected = message(
                 "held_and_free",
-                "found 0, which holds it, but {section} says free; expected one of them",
+                "found 0, which holds the parameter fixed, but {section} has it free; "
+                "expected only one of them",
                 section=section,
             )
             files.tell_key(files.log.problem, "cameras", name, parameter.sd_key, expected)
@@ -266,7 +267,8 @@ def _check_states(files, name, parameters):
     if unused:
         expected = message(
             "sd_not_weighted",
-            "without effect, not weighted ({keys}); [adjustment.camera] {example} uses it",
+            "without effect: the parameter is not weighted ({keys}); [adjustment.camera] "
+            "{example} would use it",
             keys=[parameter.sd_key for parameter in unused],
             example=f'{unused[0].setting} = "{unused[0].scope} weighted"',
         )
@@ -282,7 +284,7 @@ def _warn_held(files, name, parameter):
     if parameter.value and parameter.is_own:
         expected = message(
             "parameter_held",
-            "{key} is off; it is held at this value",
+            "{key} is off: the parameter is held at this value",
             key=f"adjustment.camera.{parameter.setting}",
         )
         files.tell_key(files.log.warning, "cameras", name, parameter.key, expected)
@@ -304,7 +306,7 @@ def _check_principal_distance(files, name, given, size_mm):
     if _is_between(c / across, POSSIBLE_LENGTHS):
         expected = message(
             "strange_principal_distance",
-            "found {c_mm:g} with a format of {across_mm:.4g} mm across: in another unit?",
+            "found {c_mm:g} with a format of {across_mm:.4g} mm across: is it in another unit?",
             c_mm=c,
             across_mm=across,
         )
@@ -314,7 +316,7 @@ def _check_principal_distance(files, name, given, size_mm):
     expected = message(
         "principal_distance_impossible",
         "found {c:g} with a format of {across:.4g} mm across; expected {low:.3g} to {high:.5g} "
-        "mm: in another unit?",
+        "mm: is it in another unit?",
         c=c,
         across=across,
         low=low,
@@ -336,7 +338,7 @@ def _check_principal_point(files, name, given, size_mm):
             expected = message(
                 "principal_point_too_high",
                 "found {found:g}, outside the format, whose height is {length:.4g} mm; expected "
-                "at most {half:.4g} from its middle: in another unit?",
+                "at most {half:.4g} from its middle: is it in another unit?",
                 found=found,
                 length=length,
                 half=half,
@@ -345,7 +347,7 @@ def _check_principal_point(files, name, given, size_mm):
                 expected = message(
                     "principal_point_too_wide",
                     "found {found:g}, outside the format, whose width is {length:.4g} mm; "
-                    "expected at most {half:.4g} from its middle: in another unit?",
+                    "expected at most {half:.4g} from its middle: is it in another unit?",
                     found=found,
                     length=length,
                     half=half,
@@ -368,8 +370,8 @@ def _check_distortion(files, name, given, size_mm):
             to = files.log.problem if is_problem else files.log.warning
             expected = message(
                 "large_distortion",
-                "moves the corner of the image by {percent:.3g} % of its radius; expected less: of"
-                " another unit than millimetres, or of normalised coordinates?",
+                "moves the corner of the image by {percent:.3g} % of its radius; expected "
+                "less: is it in another unit than millimetres, or for normalised coordinates?",
                 percent=100 * parts[worst],
             )
             files.tell_key(to, "cameras", name, keys[worst], expected)
@@ -399,8 +401,8 @@ def _check_sds(files, name, given, size_mm):
         if (given[key] or 0.0) > across:
             expected = message(
                 "camera_sd_too_large",
-                "found {given:g} with a format of {across:.4g} mm across; expected less: in "
-                "another unit? For an unknown value, leave it out",
+                "found {given:g} with a format of {across:.4g} mm across; expected less: is "
+                "it in another unit? For an unknown value, leave it out",
                 given=given[key],
                 across=across,
             )

@@ -44,7 +44,7 @@ def _refuse_point_twice(files, table):
             )
             expected = message(
                 "known_twice",
-                "{point!r} is there already{within}, in row {row}; expected once",
+                "{point!r} is already given{within}, in row {row}; expected once",
                 point=point,
                 within=within,
                 row=before,
@@ -63,7 +63,7 @@ def _check_coordinates(files, table):
             axis=axis,
         )
         tell_rows(files.log.problem, table, sound & sd & ~value, f"s{axis}_mm", expected)
-    expected = message("no_coordinate", "no coordinate; expected one at least")
+    expected = message("no_coordinate", "no coordinate; expected at least one")
     tell_rows(files.log.problem, table, sound & ~known, "x_m", expected)
 
 
@@ -111,7 +111,7 @@ def _warn_control_that_checks(files):
         if (point, system) in used:
             expected = message(
                 "check_is_control",
-                "{point!r} is a control point, too; it is no independent check",
+                "{point!r} is also a control point, so it is not an independent check",
                 point=point,
             )
             files.log.warning(check.file, expected, row, "point")
@@ -170,7 +170,7 @@ def _refuse_between_held(files, name, table, places, held):
             named = join_with_and([repr(point) for point in points])
             expected = message(
                 "held_already",
-                "found 0, but {named} are held already ({axes} in control.csv); expected a "
+                "found 0, but {named} are already held ({axes} in control.csv); expected a "
                 "standard deviation above 0, or no such row",
                 named=named,
                 axes=axes,
@@ -199,8 +199,8 @@ def _refuse_two_values(files, name, table, places):
         if not np.allclose(values[before], values[place], rtol=0, atol=same, equal_nan=True):
             expected = message(
                 "held_at_two",
-                "held at another value than in row {row}; expected one value, or a standard "
-                "deviation above 0",
+                "not the value at which row {row} holds it; expected one value, or a "
+                "standard deviation above 0",
                 row=table.rows[before],
             )
             files.log.problem(table.file, expected, table.rows[place], "to")
@@ -261,7 +261,7 @@ def _check_photo(files, datum, photo):
             "fixed_photo",
             message(
                 "fixed_photo_bare",
-                "found {photo!r}; expected a photo with image points",
+                "found {photo!r}, which has no image points; expected a photo with image points",
                 photo=photo,
             ),
         )
@@ -299,9 +299,7 @@ def _check_points(files, datum, texts):
             _problem(
                 files,
                 "datum_points",
-                message(
-                    "datum_point_twice", "{name!r} stands there twice; expected once", name=name
-                ),
+                message("datum_point_twice", "{name!r} is given twice; expected once", name=name),
             )
         elif datum == "minimal":
             _check_known(files, name, axes)
@@ -328,7 +326,7 @@ def _check_known(files, name, axes):
         axes = join_with_and(lacking)
         expected = message(
             "datum_point_without",
-            "{name!r} has no {axes} in control.csv; expected it there",
+            "{name!r} has no {axes} in control.csv; expected coordinates there",
             name=name,
             axes=axes,
         )

@@ -140,8 +140,8 @@ def _check_size(files, places):
     if usual > MUCH_LARGER * size:
         expected = message(
             "known_in_millimetres",
-            "the known points lie {usual:.4g} m from their middle as a rule, and the tank "
-            "measures {size:.4g} m; expected metres: in millimetres?",
+            "the known points typically lie {usual:.4g} m from their middle, and the tank "
+            "measures {size:.4g} m; expected metres: are they in millimetres?",
             usual=usual,
             size=size,
         )
@@ -168,8 +168,8 @@ def _check_distances(files, places, table):
         found = distance[i]
         expected = message(
             "distance_in_millimetres",
-            "found {found:.4g} m where half of the distances are below {typical:.4g} m; expected "
-            "metres: in millimetres?",
+            "found {found:.4g} m where half of the distances are below {typical:.4g} m; "
+            "expected metres: is it in millimetres?",
             found=found,
             typical=typical,
         )
@@ -190,12 +190,14 @@ def _check_distances(files, places, table):
     elif THOUSANDFOLD[0] < ratio < THOUSANDFOLD[1]:
         found = message(
             "distances_beside_known",
-            "those between known points are {ratio:.4g} times what follows from coordinates",
+            "those between known points are {ratio:.4g} times what follows from their coordinates",
             ratio=ratio,
         )
     if found:
         expected = message(
-            "distances_in_millimetres", "{found}; expected metres: in millimetres?", found=found
+            "distances_in_millimetres",
+            "{found}; expected metres: are they in millimetres?",
+            found=found,
         )
         files.log.problem(table.file, expected, None, "distance_m")
 
@@ -234,7 +236,7 @@ def _tell_swapped(files, places):
 
 
 def _is_swapped(evidence):
-    return message("swapped", "{evidence}: x and y swapped?", evidence=evidence)
+    return message("swapped", "{evidence}: are x and y swapped?", evidence=evidence)
 
 
 def _far_unless_swapped(point, places, times=FAR, of_others=MIN_OF_OTHERS):
@@ -246,8 +248,8 @@ def _far_unless_swapped(point, places, times=FAR, of_others=MIN_OF_OTHERS):
     if far > times * usual > 0 and swapped < NEAR * usual:
         return message(
             "far_from_others",
-            "{point!r} is {far_m:.4g} m from the middle of the other known points, which lie"
-            " {usual_m:.3g} m from it as a rule; with x and y swapped {swapped_m:.3g} m",
+            "{point!r} is {far_m:.4g} m from the middle of the other known points, which "
+            "typically lie {usual_m:.3g} m from it; with x and y swapped {swapped_m:.3g} m",
             point=point,
             far_m=far,
             usual_m=usual,

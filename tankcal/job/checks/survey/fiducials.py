@@ -55,7 +55,7 @@ def _check_marks(files, name, given):
         elif place in places:
             expected = message(
                 "marks_in_one_place",
-                "at the place of mark {other!r}; expected each at its own",
+                "at the same place as mark {other!r}; expected each mark at its own place",
                 other=places[place],
             )
             files.tell_key(files.log.problem, "cameras", name, key, expected)
@@ -79,7 +79,8 @@ def _refuse_missing_sd(files, table):
     if is_not_given(files.raw, "adjustment", "image_sd_um"):
         expected = message(
             "mark_sd_missing",
-            "missing; expected it for the rows of {file} without s_um, the first of them row {row}",
+            "missing; expected a value for the rows of {file} without s_um, the first of "
+            "them row {row}",
             file=table.file,
             row=table.rows[int(np.argmax(lacking))],
         )
@@ -202,8 +203,8 @@ def _suspected(photo, found, names):
         share = 100 * (found.size - 1)
         return message(
             "marks_sheared",
-            "the marks of photo {photo!r} make a transformation sheared by {share:.2g} %: marks "
-            "confused?",
+            "the marks of photo {photo!r} give a transformation with a shear of {share:.2g} "
+            "%: are marks confused?",
             photo=photo,
             share=share,
         )
@@ -211,8 +212,8 @@ def _suspected(photo, found, names):
         marks = join_with_or(named)
         return message(
             "marks_exchanged",
-            "the marks of photo {photo!r} make no comparator's transformation unless {marks} "
-            "change names",
+            "the marks of photo {photo!r} fit no transformation of a comparator unless "
+            "{marks} exchange their names",
             photo=photo,
             marks=marks,
         )
@@ -227,8 +228,8 @@ def _suspected(photo, found, names):
     if found.what == "mirrored":
         return message(
             "marks_mirrored",
-            "{start}, and fit mirrored: the plate was read from the other side; turn x over, or "
-            "fiducial_transformation = affine does it",
+            "{start}, and fit mirrored: the plate was read from the other side; change the "
+            "sign of x, or set fiducial_transformation = affine",
             start=start,
         )
     if found.what == "exchanged":
@@ -243,13 +244,13 @@ def _suspected(photo, found, names):
     if found.what == "wrong":
         return message(
             "mark_wrong",
-            "{start}; without {worst} the others fit: is it misread, or another mark?",
+            "{start}; without {worst} the others fit: is it misread, or is it another mark?",
             start=start,
             worst=worst,
         )
     return message(
         "marks_confused",
-        "{start}, most of all {worst}: marks confused, misread, or of another camera?",
+        "{start}, most of all {worst}: are marks confused, misread, or of another camera?",
         start=start,
         worst=worst,
     )
@@ -266,9 +267,9 @@ def _test_fit(files, table, photo, fit, read, photos):
         of = message("of_mark", "of mark {mark!r}", mark=fit.marks[worst])
     expected = message(
         "marks_fit_badly",
-        "the marks of photo {photo!r} fit {times:.1f} times worse than their standard deviations"
-        " say (largest residual {largest_um:.1f} um, {of}): by this the transformation multiplies"
-        " the sd of an image coordinate by up to {growth:.1f}",
+        "the marks of photo {photo!r} fit {times:.1f} times worse than their standard "
+        "deviations say (largest residual {largest_um:.1f} um, {of}); the transformation "
+        "therefore multiplies the sd of an image coordinate by up to {growth:.1f}",
         photo=photo,
         times=found.sigma0,
         largest_um=1e3 * np.abs(fit.residual_mm[worst]).max(),
@@ -297,16 +298,16 @@ def _warn_of_all(files, table, bare, turned, grown):
     if bare:
         expected = message(
             "marks_uncontrolled",
-            "as many marks as the transformation needs in photos {photos}: nothing controls it, one"
-            " misread mark shows nowhere",
+            "photos {photos} have no more marks than the transformation needs: a misread "
+            "mark cannot be detected",
             photos=list_some(bare, TOLD),
         )
         files.log.warning(table.file, expected)
     if turned:
         expected = message(
             "read_mirrored",
-            "photos {photos} were read mirrored; the transformation turns them back (plate turned"
-            " over, or marks exchanged?)",
+            "photos {photos} were read mirrored; the transformation turns them back (was the "
+            "plate turned over, or are marks exchanged?)",
             photos=list_some(turned, TOLD),
         )
         files.log.warning(table.file, expected)
@@ -314,9 +315,9 @@ def _warn_of_all(files, table, bare, turned, grown):
         growth, photo = max(grown)
         expected = message(
             "transformation_coarse",
-            "the transformation makes the sd of image coordinates up to {growth:.1f} times as large"
-            " in photo {photo!r} (more than {limit:g} times in {photos} photos): marks too few, too"
-            " close together or read too coarsely",
+            "the transformation makes the sd of image coordinates up to {growth:.1f} times "
+            "as large in photo {photo!r} (more than {limit:g} times in {photos} photos): the "
+            "marks are too few, too close together or read too coarsely",
             growth=growth,
             photo=photo,
             limit=GROWTH,

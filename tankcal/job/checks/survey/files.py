@@ -73,7 +73,7 @@ def refuse_undefined(files, table, column, defined, where):
         row = min(first.values())
         expected = message(
             "register_missing",
-            "{file} is missing or empty; expected it: this column names what stands there",
+            "{file} is missing or empty; expected it: this column refers to its entries",
             file=file,
         )
         files.log.problem(table.file, expected, row, column)
@@ -81,13 +81,13 @@ def refuse_undefined(files, table, column, defined, where):
     for number, (name, row) in enumerate(first.items()):
         hint = nearest(name, defined) if number < MAX_HINTS else ""
         more = (
-            message("rows_name_it", "; {count} rows name it", count=count[name])
+            message("rows_name_it", "; {count} rows refer to it", count=count[name])
             if count[name] > 1
             else ""
         )
         expected = message(
             "name_undefined",
-            "found {name!r}; expected a name that stands in {file}{hint}{more}",
+            "found {name!r}; expected a name defined in {file}{hint}{more}",
             name=name,
             file=file,
             hint=hint,

@@ -32,7 +32,10 @@ def check_focus(files, name, given):
         if not files.is_given("cameras", name, key):
             problem(
                 key,
-                message("focus_missing", "missing beside focus_calibrations; expected it above 0"),
+                message(
+                    "focus_missing",
+                    "missing, but focus_calibrations are given; expected a value above 0",
+                ),
             )
     if not any(files.is_given("cameras", name, key) for key in radial):
         problem(
@@ -61,19 +64,24 @@ def _refuse_beside(files, name, given, problem):
                 key,
                 message(
                     "beside_focus",
-                    "given beside focus_calibrations, from which it follows; expected one",
+                    "given together with focus_calibrations, from which it follows; expected "
+                    "only one of them",
                 ),
             )
     if given["radial_balance_mm"]:
         problem(
             "radial_balance_mm",
-            message("balance_beside_focus", "not with focus_calibrations; expected the plain form"),
+            message(
+                "balance_beside_focus",
+                "cannot be used with focus_calibrations; expected the plain form",
+            ),
         )
     if not files.is_given("cameras", name, "convention"):
         problem(
             "convention",
             message(
-                "convention_of_focus", "missing beside focus_calibrations; expected what their K do"
+                "convention_of_focus",
+                "missing, but focus_calibrations are given; expected the convention of their K",
             ),
         )
 
@@ -81,7 +89,10 @@ def _refuse_beside(files, name, given, problem):
 def _check_sizes(given, key, problem):
     distances, focal, c = given[key], given["lens_focal_length_mm"], given["c_mm"]
     if distances is not None and len(distances) == 2 and distances[0] == distances[1]:
-        problem(key, message("one_focus_twice", "twice the same; expected two distances"))
+        problem(
+            key,
+            message("one_focus_twice", "the same distance is given twice; expected two distances"),
+        )
     if focal is None:
         return
     if c is not None and abs(focal / c - 1) > ALIKE:
@@ -115,7 +126,7 @@ def check_depth_of_field(files):
     if len(lacking) == len(cameras):
         expected = message(
             "no_focus_at_all",
-            "true, but no camera has focus_calibrations; expected them in cameras.toml",
+            "found true, but no camera has focus_calibrations; expected them in cameras.toml",
         )
         tell(files.log.problem, files.raw, "adjustment", "depth_of_field", expected)
     elif lacking:

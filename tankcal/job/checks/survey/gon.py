@@ -88,8 +88,8 @@ def _reciprocal(name, sights, unit):
     as_other, as_unit = IN_WORDS[other], IN_WORDS[unit]
     return message(
         "half_circle",
-        "sights there and back make {half:.2f} as half a circle, which is {as_other}; expected "
-        "{as_unit}, or the column in {unit}",
+        "forward and back sights give half a circle as {half:.2f}, so they are in "
+        "{as_other}; expected {as_unit}, or the column in {unit}",
         half=half,
         as_other=as_other,
         as_unit=as_unit,
@@ -116,9 +116,9 @@ def _known(name, sights, unit, places):
     here, there = misfit[unit], misfit[other]
     return message(
         "angles_of_known",
-        "between points of known coordinates the angles miss by {here:.2g} degrees (the middle "
-        "one), but by {there:.2g} when they are {as_other}; expected {as_unit}, or the column in "
-        "{unit}",
+        "between points of known coordinates the angles are off by {here:.2g} degrees "
+        "(median), but by {there:.2g} if they are in {as_other}; expected {as_unit}, or the "
+        "column in {unit}",
         here=here,
         there=there,
         as_other=as_other,

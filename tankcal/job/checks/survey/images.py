@@ -27,7 +27,7 @@ def check_film(files, imagery):
     for is_told, expected in (
         (
             has["camera"] & has["photo"],
-            message("film_of_both", "camera and photo both given; expected one of them"),
+            message("film_of_both", "camera and photo are both given; expected only one of them"),
         ),
         (
             ~has["camera"] & ~has["photo"],
@@ -43,8 +43,8 @@ def check_film(files, imagery):
         if not is_surface(surface):
             expected = message(
                 "film_without_surface",
-                "the {count} places of the film of {of_kind} {name!r} make no surface; expected "
-                "3 or more, each once, not on one line",
+                "the {count} places of the film of {of_kind} {name!r} do not define a "
+                "surface; expected 3 or more, each once, not on one line",
                 count=len(surface.xy_mm),
                 of_kind=kind,
                 name=name,
@@ -53,7 +53,8 @@ def check_film(files, imagery):
         elif 0 < np.abs(surface.height_mm).max() * 1000 < FLAT_UM:
             expected = message(
                 "film_flat",
-                "all heights of the film of {name!r} are below {limit_um:g} um: in millimetres?",
+                "all heights of the film of {name!r} are below {limit_um:g} um: are they in "
+                "millimetres?",
                 name=name,
                 limit_um=FLAT_UM,
             )
@@ -124,7 +125,7 @@ def _check_orientations(files, photos):
         for angle in ANGLES
     ]
     sound = files.sound(photos)
-    two_units = message("in_two_units", "in two units; expected one")
+    two_units = message("in_two_units", "given in two units; expected one")
     for column, values, sds in elements:
         count, count_sd = (
             sum(~np.isnan(photos.numbers(name)) for name in names) for names in (values, sds)
@@ -161,7 +162,7 @@ def _check_coordinates(files, images):
         "x_mm",
         message(
             "image_in_two_units",
-            "x_mm and y_mm and column_px and line_px given; expected one of them",
+            "x_mm and y_mm are given together with column_px and line_px; expected only one pair",
         ),
     )
     nothing = sound & ~in_mm & ~in_px
@@ -194,7 +195,8 @@ def _tell_cameras_without_pixels(files, images, lacking):
     for name in sorted(names & set(cameras)):
         if not files.is_given("cameras", name, "pixel_um"):
             expected = message(
-                "pixel_of_camera_missing", "missing; image points of this camera are in pixels"
+                "pixel_of_camera_missing",
+                "missing; expected the size of a pixel: image points of this camera are in pixels",
             )
             files.tell_key(files.log.problem, "cameras", name, "pixel_um", expected)
 
@@ -205,7 +207,9 @@ def _check_sds(files, images):
     for one, other, name in ((sx, sy, "sy_um"), (sy, sx, "sx_um")):
         expected = message("image_sd_of_one", "blank; expected both sx_um and sy_um, or none")
         tell_rows(files.log.problem, images, sound & one & ~other, name, expected)
-    expected = message("image_sd_in_two_units", "given beside sx_um; expected one of them")
+    expected = message(
+        "image_sd_in_two_units", "given together with sx_um; expected only one of them"
+    )
     tell_rows(files.log.problem, images, sound & (sx | sy) & s_px, "s_px", expected)
     lacking = sound & ~sx & ~sy & ~s_px
     if files.values is None or not lacking.any():
@@ -214,8 +218,8 @@ def _check_sds(files, images):
         row = images.rows[int(np.argmax(lacking))]
         expected = message(
             "image_sd_missing",
-            "missing; expected the standard deviation of image coordinates, micrometres; rows of "
-            "{file} that carry none: {count}, the first of them row {row}",
+            "missing; expected the standard deviation of image coordinates, micrometres; "
+            "rows of {file} without one: {count}, the first of them row {row}",
             file=images.file,
             count=int(lacking.sum()),
             row=row,
@@ -236,7 +240,7 @@ def _check_format(files, images, imagery, told):
     in_px = ~np.isnan(images.numbers("column_px"))
     hint = ""
     if of_corner.all() and not in_px.any():
-        hint = message("from_a_corner", ": counted from a corner instead of the middle?")
+        hint = message("from_a_corner", ": is it counted from a corner instead of the middle?")
     for place in np.flatnonzero(outside.any(axis=1)):
         axis = int(np.argmax(outside[place]))
         column = (("column_px", "line_px") if in_px[place] else ("x_mm", "y_mm"))[axis]

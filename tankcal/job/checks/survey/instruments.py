@@ -33,7 +33,7 @@ def _check_instrument(files, name, given):
     if correction is not None and abs(correction) > DOUBTFUL_CORRECTION:
         expected = message(
             "large_correction",
-            "found {correction:g}, {ppm:.0f} ppm; expected a plain ratio",
+            "found {correction:g}, {ppm:.0f} ppm; expected a small ratio, such as 0.0001",
             correction=correction,
             ppm=1e6 * correction,
         )
@@ -41,7 +41,7 @@ def _check_instrument(files, name, given):
     if expansion and not files.is_given("instruments", name, "certified_temperature_c"):
         expected = message(
             "certified_temperature_missing",
-            "missing beside expansion_per_k; expected the temperature of the certificate",
+            "missing, but expansion_per_k is given; expected the temperature of the certificate",
         )
         files.tell_key(files.log.problem, "instruments", name, "certified_temperature_c", expected)
 

@@ -73,7 +73,7 @@ def _tell(files, spellings, places):
             rows_of_other = places[most][3]
             expected = message(
                 "spelt_once",
-                "{point!r} stands in 1 row, {other!r} in {rows} rows; expected one spelling of "
+                "{point!r} is in 1 row, {other!r} in {rows} rows; expected one spelling of "
                 "one point, or another name",
                 point=point,
                 other=most,
@@ -82,7 +82,7 @@ def _tell(files, spellings, places):
             if rows_of_other == 1:
                 expected = message(
                     "each_spelt_once",
-                    "{point!r} stands in 1 row, {other!r} in 1 row; expected one spelling of one "
+                    "{point!r} is in 1 row, {other!r} in 1 row; expected one spelling of one "
                     "point, or another name",
                     point=point,
                     other=most,
@@ -91,8 +91,8 @@ def _tell(files, spellings, places):
         else:
             expected = message(
                 "two_spellings",
-                "{point!r} stands in {rows} rows, {other!r} in {rows_of_other} rows: one point in"
-                " two spellings?",
+                "{point!r} is in {rows} rows, {other!r} in {rows_of_other} rows: is it one "
+                "point in two spellings?",
                 point=point,
                 rows=count,
                 other=most,

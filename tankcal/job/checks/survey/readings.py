@@ -36,7 +36,8 @@ def check_correlated(files):
             continue
         if ends[0] == ends[1]:
             expected = message(
-                "correlated_with_itself", "a value with itself; expected two different values"
+                "correlated_with_itself",
+                "a value is correlated with itself; expected two different values",
             )
             files.log.problem(table.file, expected, row, "row_2")
             continue
@@ -44,7 +45,7 @@ def check_correlated(files):
         if before != row:
             expected = message(
                 "correlated_twice",
-                "this pair is there already, in row {before}; expected once",
+                "this pair is already in row {before}; expected once",
                 before=before,
             )
             files.log.problem(table.file, expected, row, "row_2")
@@ -103,8 +104,8 @@ def _doubt_of_control(named, place, axis):
     if not sd > 0:
         return "value", message(
             "correlated_no_observation",
-            "{axis} in row {at:g} of control has no standard deviation above 0; expected one: what"
-            " is held, or only approximate, is correlated with nothing",
+            "{axis} in row {at:g} of control has no standard deviation above 0; expected "
+            "one: a coordinate that is held, or only approximate, has no correlations",
             axis=axis,
             at=named.rows[place],
         )
@@ -208,8 +209,8 @@ def _warn_copies(files, table):
         return
     expected = message(
         "copied_rows",
-        "{count} rows are the same as another one to the last digit (rows {pairs}): copied?"
-        " Each counts as a reading of its own",
+        "{count} rows are the same as another one to the last digit (rows {pairs}): were "
+        "they copied? Each counts as a separate reading",
         count=len(copies),
         pairs=list_some([f"{row} = {before}" for row, before in copies], MOST_REPEATED),
     )
@@ -232,8 +233,8 @@ def _warn_single_directions(files, table):
                 where = message("set_of_setup", "{setup}, set {set}", setup=setup, set=name)
             expected = message(
                 "single_direction",
-                "set-up {where} has directions to one point only; they determine nothing but its"
-                " zero",
+                "set-up {where} has directions to one point only; they determine only its "
+                "orientation",
                 where=where,
             )
             files.log.warning(table.file, expected, next(iter(seen.values())), "to")
