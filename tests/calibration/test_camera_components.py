@@ -58,7 +58,7 @@ def test_published_shares_follow_from_the_published_eigenvalues(published, table
     np.testing.assert_allclose(found.cumulative_percent, given["cumulative"], atol=0.0101)
 
 
-def test_components_of_any_matrix_satisfy_what_defines_them():
+def test_components_of_any_matrix_satisfy_their_definition():
     """Property: C orthonormal, C'SC diagonal, loadings the correlations of parameters with C'x."""
     covariance = random_covariance(1)
     names = tuple("abcdef")
@@ -81,7 +81,7 @@ def test_components_of_any_matrix_satisfy_what_defines_them():
     np.testing.assert_allclose(np.sum(found.loadings**2, axis=1), 1.0)
 
 
-def test_values_of_components_are_of_standardised_parameters_unless_asked_otherwise():
+def test_components_use_standardised_parameters():
     """Closed form: two correlated parameters; y = (x1/s1 + x2/s2) / sqrt 2 and so on."""
     covariance = np.array([[4.0, 3.0], [3.0, 9.0]])
     values = np.array([2.0, 12.0])
@@ -104,7 +104,7 @@ def test_components_of_correlations_do_not_depend_on_units():
     )
 
 
-def test_a_matrix_that_is_not_positive_definite_is_told_with_its_smallest_eigenvalue():
+def test_indefinite_matrix_reports_smallest_eigenvalue():
     """Closed form: three correlations of -0.9 have the eigenvalue 1 - 2 * 0.9."""
     matrix = np.full((3, 3), -0.9) + 1.9 * np.eye(3)
     found = components(("a", "b", "c"), matrix)
@@ -119,7 +119,7 @@ def test_a_matrix_that_is_not_positive_definite_is_told_with_its_smallest_eigenv
     [np.zeros((2, 2)), [[1.0, np.nan], [np.nan, 1.0]], [[1.0, 0.5], [0.1, 1.0]], np.eye(3)],
     ids=["no variance", "not finite", "not symmetric", "too large"],
 )
-def test_what_is_no_covariance_is_refused(matrix):
+def test_matrix_that_is_not_a_covariance_is_refused(matrix):
     with pytest.raises(ValueError, match="matrix"):
         components(("a", "b"), matrix)
 
@@ -129,7 +129,7 @@ def test_an_unknown_matrix_is_refused():
         components(("a",), np.eye(1), of="cofactors")
 
 
-def test_table_3_of_silva_follows_from_table_2_by_the_schur_complement(published, figure):
+def test_silva_table_3_follows_from_table_2(published, figure):
     """Published: S table 3, within what two decimals of table 2 leave open; no other pair does it.
 
     Correlations of 0.98 in two decimals leave a conditional variance between 0.03 and 0.05.

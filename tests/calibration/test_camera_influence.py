@@ -262,7 +262,7 @@ def test_a_run_that_fails_is_a_result():
 # what is refused
 
 
-def test_all_that_cannot_stand_for_the_camera_is_told_at_once():
+def test_unfit_calibrations_are_reported_at_once():
     own = setup_of(FLIGHT, "a")
     others = (
         own,
@@ -349,7 +349,7 @@ def of_tank(tank):
     return found, heard
 
 
-def test_every_run_is_told(of_tank):
+def test_every_run_is_reported(of_tank):
     _, heard = of_tank
     assert heard == [
         ("reference", 0, 5), ("true, fixed", 1, 5), ("true, free", 2, 5), ("long, fixed", 3, 5),
@@ -568,14 +568,14 @@ def test_known_coordinates_become_approximations():
     assert np.isnan(found.photos[1].sd).tolist() == [False] * 3 + [True] * 3
 
 
-def test_a_parameter_that_only_a_calibration_has_is_free_in_all_runs():
+def test_parameter_of_calibration_only_is_free_in_all_runs():
     setup = setup_of(FLIGHT, "job")
     names = free_parameters(setup, (changed("a"), changed("b", K4=1e-9)))
     assert "K4" in names
     assert "K4" not in free_parameters(setup, (changed("a"),))
 
 
-def test_film_keeps_its_millimetres_unless_a_calibration_has_pixels():
+def test_film_stays_in_millimetres_without_pixels():
     film = replace(setup_of(FLIGHT, "job"), pixel_mm=None)
     measured = Measurements(cameras=(film,))
     for pixel_mm in (None, np.array([0.002, 0.003])):
@@ -590,7 +590,7 @@ def test_film_keeps_its_millimetres_unless_a_calibration_has_pixels():
     assert own.pixel_mm is digital.pixel_mm
 
 
-def test_what_has_no_pixel_counts_in_that_of_the_calibrations():
+def test_film_takes_the_pixel_of_the_calibrations():
     film = replace(setup_of(FLIGHT, "job"), pixel_mm=None)
     fine, same, coarse = (
         replace(changed(name), pixel_mm=np.full(2, size))

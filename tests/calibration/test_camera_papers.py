@@ -90,7 +90,7 @@ def test_the_pages_show_every_text_literally(folder):
 
 
 @pytest.mark.slow
-def test_a_folder_of_somebody_else_is_left_alone(tmp_path, product):
+def test_foreign_folder_is_not_touched(tmp_path, product):
     (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(InputError, match=r"mine\.txt"):
         camera_papers.write(product, tmp_path)
@@ -200,7 +200,7 @@ def test_lines_of_a_product(product):
     assert product["axes"][0]["biased"] is True
 
 
-def test_a_product_of_one_point_is_told_as_such():
+def test_product_of_one_point_is_reported():
     found = check_product(np.array([[0.001, 0.002, 0.003]]), limits=shipped_limits())
     text = text_of(camera_papers.lines(product_json.as_json(found)))
     assert "nothing can be tested" in text

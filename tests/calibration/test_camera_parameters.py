@@ -159,7 +159,7 @@ def test_f_of_groups_rejects_as_often_as_alpha_says(figure):
     assert share == pytest.approx(alpha, abs=4 * np.sqrt(alpha * (1 - alpha) / 4000))
 
 
-def test_a_parameter_without_a_sound_group_is_told():
+def test_a_parameter_without_a_sound_group_is_reported():
     """Closed form: two parameters of correlation 1."""
     (found,) = group_tests(("A", "B"), [1.0, 2.0], np.ones((2, 2)), np.inf)
     assert not found.positive_definite
@@ -192,7 +192,7 @@ def test_unknown_groups_and_levels_are_refused():
 # --- predictions --------------------------------------------------------------------------------
 
 
-def test_the_schur_complement_foretells_the_adjustment_without_parameters():
+def test_schur_complement_predicts_dropping_parameters():
     """Second method: a linear least-squares problem solved without the columns."""
     rng = np.random.default_rng(2)
     scale = np.array([1.0, 1e-3, 1e-8, 1e-12, 10.0])
@@ -210,7 +210,7 @@ def test_the_schur_complement_foretells_the_adjustment_without_parameters():
     np.testing.assert_allclose(found.sds, sds, rtol=1e-9)
 
 
-def test_dropping_parameters_that_cannot_be_told_apart_foretells_nothing():
+def test_dropping_inseparable_parameters_predicts_nothing():
     covariance = np.array([[1.0, 0, 0], [0, 1, 1], [0, 1, 1]])
     found = drop_parameters(("c", "A", "B"), covariance, ("A", "B"), [1.0, 2, 3])
     assert not found.positive_definite
@@ -226,7 +226,7 @@ def interior(**values):
     return np.array([values.get(name, 0.0) for name in PARAMETERS])
 
 
-def test_the_effect_of_a_radial_term_is_that_in_the_farthest_corner():
+def test_effect_of_radial_term_is_in_farthest_corner():
     """Closed form: K3 r^7, the corner (90 + 1, 60 + 2) from the principal point."""
     q = interior(c=100.0, x0=1.0, y0=-2.0, K1=3e-8, K3=1e-15)
     frame = Frame(np.array([90.0, 60.0]), 50.0, np.array([0.01, 0.02]))
@@ -249,7 +249,7 @@ def test_the_effect_of_a_radial_term_is_that_in_the_farthest_corner():
 @pytest.mark.parametrize(
     "convention", ["distortion_of_ideal", "correction_added", "correction_subtracted"]
 )
-def test_what_is_left_of_a_parameter_is_nothing_when_the_others_can_take_over(convention):
+def test_remaining_effect_is_zero_when_others_take_over(convention):
     """Property: the same camera leaves nothing; a shift of x0 is a turn, but for (r/c)^2 of it."""
     q = interior(c=100.0, x0=0.1, K1=2e-8, P1=1e-6)
     frame = Frame(np.array([30.0, 20.0]))
@@ -401,7 +401,7 @@ def test_volume_and_points_of_a_job(silva_parameters, silva_result):
 
 
 @pytest.mark.slow
-def test_dropping_is_the_adjustment_of_the_survey_with_the_parameter_off(a_tank, figure):
+def test_dropping_equals_adjustment_with_parameter_off(a_tank, figure):
     """Second method: adjust_survey of measurements whose camera lacks the parameters."""
     measured, _ = by_photographs(1, settings=QUIET)
     job = job_of(a_tank, measured, tank=True)
@@ -428,7 +428,7 @@ def test_dropping_is_the_adjustment_of_the_survey_with_the_parameter_off(a_tank,
 
 
 @pytest.mark.slow
-def test_readings_that_were_set_aside_stay_aside_and_no_others_go(a_tank):
+def test_trials_keep_the_readings_set_aside(a_tank):
     """Property: a blunder does not come back; what missing terms bend shows in sigma0."""
     strong = np.array([100.02, 0.03, -0.04, 2e-6, -1e-12, 0, 0, 3e-7, -2e-7, 0, 0, 1e-4, -8e-5])
     measured, _ = by_photographs(3, interior=strong)
@@ -537,7 +537,7 @@ def test_c_cannot_be_dropped(silva_job, silva_result):
 
 
 @pytest.mark.slow
-def test_the_misfit_grows_by_what_the_f_test_says(silva_parameters, figure):
+def test_misfit_grows_as_the_f_test_predicts(silva_parameters, figure):
     """Second method: v'Pv without p parameters is v'Pv + p F sigma0^2, group by group."""
     base = silva_parameters
     chi2, worst = base.sigma0**2 * base.dof, 0.0
@@ -551,7 +551,7 @@ def test_the_misfit_grows_by_what_the_f_test_says(silva_parameters, figure):
 
 
 @pytest.mark.slow
-def test_what_may_go_is_dropped_together_at_last(silva_parameters):
+def test_droppable_parameters_are_dropped_together(silva_parameters):
     goes = tuple(one.name for one in silva_parameters.recommendation if not one.keep)
     trial = next(t for t in silva_parameters.trials if "advised" in t.because)
     assert trial.names == goes
@@ -565,7 +565,7 @@ def test_what_may_go_is_dropped_together_at_last(silva_parameters):
 
 
 @pytest.mark.slow
-def test_a_record_says_the_same_but_for_what_was_dropped(silva_result, silva_job):
+def test_record_gives_the_same_without_trials(silva_result, silva_job):
     """Second method: the record as JSON against the job, nothing adjusted again."""
     record = json.loads(json.dumps(record_of(silva_result)))
     (one,) = analyse_record(record)
@@ -595,7 +595,7 @@ def test_all_of_it_is_plain_data(silva_parameters):
 
 
 @pytest.mark.slow
-def test_a_record_without_photographs_or_with_a_spoilt_camera_is_refused(silva_result):
+def test_record_without_photographs_or_sound_camera_is_refused(silva_result):
     record = json.loads(json.dumps(record_of(silva_result)))
     for spoilt in ({}, {"adjustment": None}, {"adjustment": {"cameras": []}}, []):
         with pytest.raises(InputError, match="record"):
@@ -621,7 +621,7 @@ def test_a_record_without_photographs_or_with_a_spoilt_camera_is_refused(silva_r
             analyse_record({**record, "adjustment": {**record["adjustment"], key: value}})
 
 
-def test_a_survey_without_photographs_or_free_parameters_is_refused(a_tank):
+def test_survey_without_free_camera_parameters_is_refused(a_tank):
     measured, _ = by_photographs(1, settings=QUIET)
     camera = measured.cameras[0].camera
     fixed = with_cameras(measured, replace(camera, values=camera.values, state=("fixed",) * 13))

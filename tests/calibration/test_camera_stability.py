@@ -91,7 +91,7 @@ def test_zrot_of_the_seven_calibrations(seven, figure):
     assert sum(pair.similar for pair in result.pairs) == 0
 
 
-def test_the_truth_of_the_seven_calibrations_is_that_of_the_shared_facts(shared, seven):
+def test_seven_calibrations_agree_with_shared_facts(shared, seven):
     facts = np.genfromtxt(shared / "facts" / "pessoa_T06_T09_iop.csv", delimiter=",", names=True)
     columns = ["f", "x0", "y0", "K1", "K2", "K3", None, "P1", "P2", None, None, "A", "B"]
     for row, one in zip(facts, seven, strict=True):
@@ -113,7 +113,7 @@ def test_the_truth_of_the_seven_calibrations_is_that_of_the_shared_facts(shared,
 
 
 @pytest.mark.slow
-def test_what_is_given_away_makes_the_figure_smaller(seven, figure):
+def test_more_freedom_makes_the_figure_smaller(seven, figure):
     of = {
         name: np.array([one.figure_px for one in compare(seven, method, terrain=terrain).pairs])
         for name, method, terrain in [
@@ -155,7 +155,7 @@ def test_the_seed_of_the_terrain_hardly_matters(seven, figure):
 
 
 @pytest.mark.slow
-def test_the_scatter_of_spr_says_what_one_terrain_is_worth(seven):
+def test_scatter_of_spr_between_terrains(seven):
     """Simulation: means of other terrains lie as far apart as the scatter over ten says."""
     pair = [seven[0], seven[4]]
     found = [compare(pair, "spr", SMALL_GRID, seed=seed).pairs[0] for seed in range(12)]
@@ -250,7 +250,7 @@ def test_the_same_bundle_in_another_dress():
     assert figure_of(first, second, "mis") > 1.0
 
 
-def test_conventions_are_compared_by_what_they_do():
+def test_conventions_are_compared_by_their_effect():
     """Property: the same lens with the other sign, and in another form of affinity, is the same."""
     values = {"K1": -2e-3, "P1": 8e-4, "A": 1e-4}
     opposite = {name: -value for name, value in values.items()}
@@ -519,7 +519,7 @@ def refusal(setups, method="mis", **options):
     return str(caught.value)
 
 
-def test_one_calibration_is_none_to_compare(seven):
+def test_comparing_one_calibration_is_refused(seven):
     assert refusal(seven[:1]) == "cameras.toml: 1 calibration; expected two or more to compare"
     assert "no calibration" in refusal([])
 
@@ -710,7 +710,7 @@ def test_both_spellings_at_once(tmp_path):
     assert setup_.camera.values[3] == -1.7e-3
 
 
-def test_a_bad_value_is_told_by_the_key_that_was_written(tmp_path):
+def test_bad_value_is_reported_by_its_written_key(tmp_path):
     (problem,) = complaints(tmp_path, SHORT.replace("K1 = -1.7e-3", 'K1 = "x"'))
     assert problem.column == "one.K1"
     (problem,) = complaints(tmp_path, SHORT.replace("K1 = -1.7e-3", "K1 = 0.9"))
@@ -822,7 +822,7 @@ def test_files_that_are_not_there(tmp_path, monkeypatch):
     assert len(read_cameras(tmp_path)) == 1
 
 
-def test_doubts_are_told_to_who_asks(tmp_path):
+def test_doubts_are_reported_on_request(tmp_path):
     told = []
     (tmp_path / "a.toml").write_text(LONG.replace("4.38", "0.5"), encoding="utf-8")
     read_cameras(tmp_path / "a.toml", told.append)
@@ -853,7 +853,7 @@ def test_numbers_a_thousand_times_off(tmp_path, key, value, words):
     assert words in problem.expected
 
 
-def test_a_published_calibration_and_lenses_of_every_length_are_taken(tmp_path):
+def test_published_calibrations_and_all_lenses_are_accepted(tmp_path):
     told = []
     (tmp_path / "a.toml").write_text(PUBLISHED_SET, encoding="utf-8")
     read_cameras(tmp_path / "a.toml", told.append)
@@ -911,7 +911,7 @@ def test_correlations_count_with_their_sign(method):
         )
 
 
-def test_differences_after_a_resection_have_the_sign_of_those_before_it():
+def test_differences_keep_their_sign_after_resection():
     first, second = setup("a"), setup("b", K2=4e-5)
     raw, left = (compare([first, second], method).pairs[0] for method in ("mis", "spr"))
     corner = np.argmax(np.linalg.norm(raw.difference_px, axis=1))

@@ -148,7 +148,7 @@ def test_ninety_percent_are_counted():
     assert (fewer.as_is.within, fewer.as_is.why) == (17, ("share_too_small",))
 
 
-def test_rmse_counts_beside_the_share():
+def test_rmse_counts_in_addition_to_the_share():
     found = verdict(at_distance(*[0.2] * 20))
     assert found.as_is.share == 1
     assert found.as_is.why == ("rmse_too_large",)
@@ -181,7 +181,7 @@ def test_every_class_of_a_scale_after_the_best_is_reached():
                 assert sorted(reached[scale : scale + 4]) == reached[scale : scale + 4]
 
 
-def test_axes_that_are_not_known_are_told():
+def test_axes_that_are_not_known_are_reported():
     d = np.full((12, 3), np.nan)
     d[:, 2] = scattered(12)
     found = check_product(d, limits=shipped_limits())
@@ -209,7 +209,7 @@ def test_points_of_one_part_only_still_count_there():
         (20, set()),
     ],
 )
-def test_too_few_points_are_told(n, codes):
+def test_too_few_points_are_reported(n, codes):
     d = np.random.default_rng(1).normal(0, 0.1, (n, 3))
     found = check_product(d, limits=shipped_limits())
     assert {code for code, _ in found.notes} == codes
@@ -311,7 +311,7 @@ def test_all_problems_of_a_table_in_one_run(tmp_path):
     assert all("bad.toml" in line for line in text.splitlines())
 
 
-def test_classes_stand_best_first(tmp_path):
+def test_classes_are_listed_best_first(tmp_path):
     (tmp_path / "own.toml").write_text(
         OWN.replace("good", "x").replace("fair", "good").replace("0.004", "0.001")
     )
@@ -380,7 +380,7 @@ def test_a_file_that_holds_no_differences(tmp_path, text):
         read_differences(tmp_path / "d.csv")
 
 
-def test_differences_of_an_adjustment_and_of_its_record_are_the_same():
+def test_differences_of_adjustment_and_record_agree():
     points = CheckPoints(
         ("A", "B"), np.array([[1.0, 2, np.nan], [3, 4, 5]]), np.ones((2, 3)), 1.0, 2.0, 1.0
     )
@@ -399,7 +399,7 @@ def test_differences_of_an_adjustment_and_of_its_record_are_the_same():
             differences_of(none)
 
 
-def test_the_json_says_what_the_check_says():
+def test_json_agrees_with_the_check():
     d = np.column_stack([scattered(20, 0.4, 0.05), scattered(20, 0, 0.05, 1)])
     found = as_json(check_product(d, ("x", "y"), limits=shipped_limits()))
     assert (found["format"], found["kind"]) == (FORMAT, "product")

@@ -181,13 +181,13 @@ def test_an_id_twice_is_never_accepted():
     assert codes(found) == ["duplicate", "duplicate"]
 
 
-def test_ids_that_are_not_listed_are_told():
+def test_ids_that_are_not_listed_are_reported():
     found = read_coded(one_scene(7), listed={1, 2})
     assert not found.targets
     assert [(one.code, one.id) for one in found.refused] == [("not_listed", 7)]
 
 
-def test_a_mirrored_target_is_told():
+def test_a_mirrored_target_is_reported():
     found = read_coded(one_scene(7)[:, ::-1])
     assert not found.targets
     assert [(one.code, one.id) for one in found.refused] == [("mirrored", 7)]
@@ -233,7 +233,7 @@ def test_a_damaged_code_is_refused(name):
         (tilted_square((42, 100), 78), "at_border"),
     ],
 )
-def test_what_cannot_be_measured_is_told(corners, code):
+def test_unmeasurable_target_is_reported(corners, code):
     found = read_coded(one_scene(corners=corners))
     assert not found.targets
     assert codes(found) in ([code], [])
@@ -258,7 +258,7 @@ def test_nothing_is_read_where_nothing_is(name, kind):
 
 
 @pytest.mark.parametrize("kind", ["grey", "noise"])
-def test_no_circles_where_none_are(kind):
+def test_no_circles_in_an_empty_photo(kind):
     """Truth: there is none."""
     image = 90 + (kind == "noise") * 30 * np.random.default_rng(0).normal(size=(200, 300))
     assert not read_circles(eight_bit(image)).targets

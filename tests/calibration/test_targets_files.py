@@ -73,7 +73,7 @@ def test_centres_have_the_plain_name(photos, tmp_path):
     assert any("give the list of the ids" in str(one) for one in reading.warnings)
 
 
-def test_what_is_refused_is_listed(photos, tmp_path):
+def test_refused_targets_are_listed(photos, tmp_path):
     names = tmp_path / "names.csv"
     names.write_text("id,point\n9,T9\n")
     reading = read_photographs(
@@ -84,7 +84,7 @@ def test_what_is_refused_is_listed(photos, tmp_path):
     assert reading.refused == {"not_listed": 1}
 
 
-def test_nothing_is_overwritten_unasked(photos, tmp_path):
+def test_existing_file_is_not_overwritten(photos, tmp_path):
     out = tmp_path / "image_points.csv"
     out.write_text("mine")
     assert told(photos, out) == [
@@ -94,7 +94,7 @@ def test_nothing_is_overwritten_unasked(photos, tmp_path):
     assert read_photographs(photos, out, WANTED, replace=True).points == 16
 
 
-def test_all_bad_files_are_told_in_one_run(photos, tmp_path):
+def test_all_bad_files_are_reported_in_one_run(photos, tmp_path):
     bad = {
         "empty.png": b"",
         "text.jpg": b"this is no picture, whatever its name says",
@@ -129,7 +129,7 @@ def test_settings_are_checked(photos, tmp_path):
     assert "expected one of DICT_4X4_100" in line
 
 
-def test_orientation_is_told_and_not_applied(tmp_path):
+def test_orientation_is_reported_and_not_applied(tmp_path):
     """Truth: the same pixels without the tag."""
     image = np.hstack([one_scene(7), one_scene(9)])
     _, plain = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 100])
@@ -184,7 +184,7 @@ def test_circles_are_named_by_their_places(circles, tmp_path):
     assert any("no circle within 15 px of 1 places: 'X'" in str(one) for one in reading.warnings)
 
 
-def test_places_in_photos_that_are_not_given_are_told(circles, tmp_path):
+def test_places_in_photos_that_are_not_given_are_reported(circles, tmp_path):
     places = tmp_path / "places.csv"
     rows = ("disc,C,63,48", "discs,A,63,48", "disc,D,5,5", "other,A,63,48")
     places.write_text("\n".join(["photo,point,column_px,line_px", *rows]))

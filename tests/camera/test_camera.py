@@ -50,7 +50,7 @@ def silva(x, y, q, affinity, balance):
 @pytest.mark.parametrize("balance", [0.0, 40.0])
 @pytest.mark.parametrize("affinity", AFFINITIES)
 @pytest.mark.parametrize("convention", CONVENTIONS)
-def test_each_convention_says_what_its_source_says(convention, affinity, balance):
+def test_conventions_agree_with_their_sources(convention, affinity, balance):
     """Published: the equations of Silva 39, Pessoa 10 and the distortion of the ideal point."""
     form = Form(convention, affinity, balance)
     found = distort_image_points(IDEAL, Q, form)
@@ -84,7 +84,7 @@ def test_an_affinity_before_the_distortion(figure):
     assert away > 1e-3  # of a sum of terms A and B are not the same
 
 
-def test_added_and_subtracted_differ_by_the_sign_of_all_parameters():
+def test_added_and_subtracted_conventions_differ_in_sign():
     other = np.concatenate([Q[:3], -Q[3:9], Q[9:11], -Q[11:]])
     added = distort_image_points(IDEAL, Q, Form("correction_added"))
     assert distort_image_points(IDEAL, other, Form("correction_subtracted")) == pytest.approx(
@@ -116,7 +116,7 @@ def test_opencv_camera(ratio):
     assert back.error_px < 1e-9
 
 
-def test_to_opencv_states_what_it_cannot_say(figure):
+def test_conversion_to_opencv_states_its_error(figure):
     """Second method: OpenCV's published model at the points; the error is the one stated."""
     size, pixel = (4000, 3000), 0.005
     q = np.array([15.0, 0.02, -0.01, -5e-4, 1e-6, 0, 0, 1e-5, -2e-5, 0, 0, 2e-4, 1e-4])

@@ -85,7 +85,7 @@ def problems_of(text, **arguments):
 
 
 @pytest.mark.parametrize("kind", writing.KINDS[1:])
-def test_what_is_written_reads_back(kind, figure):
+def test_written_file_is_read_back(kind, figure):
     """Property: 46 x 35 points of the frame within 1e-9 px, the kind recognised."""
     written = write_camera(kind, [("7", CAMERA)], radius_mm=6.0)
     assert written.error_px[0] < SAME_PX
@@ -279,7 +279,7 @@ BROKEN = {
 
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("what", BROKEN)
-def test_broken_files_are_told(what):
+def test_broken_files_are_reported(what):
     """Hostile and damaged files: one line with the key, never anything but InputError."""
     text, key, part = BROKEN[what]
     problems = problems_of(text)
@@ -299,7 +299,7 @@ def test_all_problems_in_one_run():
 
 
 @pytest.mark.parametrize("kind", ["opencv", "colmap", "metashape"])
-def test_the_size_of_a_pixel_is_asked_for(kind):
+def test_missing_pixel_size_is_reported(kind):
     """Property: no file of these three says it; without it there are no millimetres."""
     (problem,) = problems_of(GOOD[kind], pixel_um=None)
     assert problem.column == "pixel_um"
@@ -307,13 +307,13 @@ def test_the_size_of_a_pixel_is_asked_for(kind):
         assert {one.column for one in problems_of(GOOD[kind], pixel_um=bad)} == {"pixel_um"}
 
 
-def test_what_else_is_asked_for():
+def test_other_missing_values_are_reported():
     (problem,) = problems_of(PIX4D, size_px=None)
     assert problem.column == "format_px"
     (problem,) = problems_of(AICON, pixel_um=None)
     assert "size of a pixel is missing" in problem.expected
     assert "as given" in problems_of(PIX4D, pixel_um=4.0)[0].expected
-    assert "was given" in problems_of(AICON + "pixel_width 0.006\npixel_height 0.006")[0].expected
+    assert "as given" in problems_of(AICON + "pixel_width 0.006\npixel_height 0.006")[0].expected
     assert problems_of(AICON + "pixel_width 0.006")[0].column == "pixel_width"
     assert "expected one of" in problems_of(YAML, kind="tiff")[0].expected
     assert problems_of(YAML, size_px=(0, 5))[0].column == "columns"
@@ -351,7 +351,7 @@ def test_files_that_are_none(tmp_path):
         max_size=4,
     ),
 )
-def test_any_damage_is_read_or_told(kind, cuts):
+def test_damaged_file_is_read_or_reported(kind, cuts):
     """Property: a file that was cut and scribbled on gives finite cameras or InputError."""
     text = GOOD[kind]
     for start, length, scribble in cuts:
@@ -367,5 +367,5 @@ def test_any_damage_is_read_or_told(kind, cuts):
         assert not any("\n" in line for line in told)
 
 
-def test_kinds_are_named_alike():
+def test_kinds_have_the_same_names_everywhere():
     assert {*reading.KINDS, "cameras.toml"} == set(writing.KINDS)

@@ -215,7 +215,7 @@ SET_2 = [4.383, 0.0625, 0.0434, -0.001776504, 3.448238e-05, 5.623659e-07, 0]
 SET_2 += [0.0008462448, 0.0006382, 0, 0, 7.933755e-05, 2.264641e-05]
 
 
-def test_published_camera_of_pix4d_is_the_one_that_pessoa_calibrated(figure):
+def test_published_pix4d_camera_agrees_with_pessoa(figure):
     """Published: P frame 1 and table 6 are one camera: only these signs of T1, T2 and y agree."""
     points, pixel = frame_points(SIZE), 6.17219 / SIZE[0]
     own = make_framed_camera(SET_2, Form("correction_subtracted", "both_x"), pixel, SIZE)
@@ -280,7 +280,7 @@ def test_balanced_form_leaves_out_k4_and_carries_sds():
     assert np.sqrt(found.covariance[0, 0]) == pytest.approx(3e-3 * s, rel=0.02)
 
 
-def test_a_distortion_that_folds_is_told():
+def test_a_distortion_that_folds_is_reported():
     """Property: barrel distortion that turns back within the frame has no rays there."""
     matrix = np.array([[2000.0, 0, 2000], [0, 2000, 1500], [0, 0, 1]])
     with pytest.raises(SolutionError, match="folds the image at column"):

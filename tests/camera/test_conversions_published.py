@@ -167,7 +167,7 @@ def test_the_published_calibrations_as_the_plain_form(shared, figure):
         assert finer.rms_px <= usual.rms_px
 
 
-def test_only_what_may_be_used_is_used():
+def test_only_used_parameters_differ_from_zero():
     """Property: `used` names what may differ from 0, in a formula and in a fit."""
     few = ("c", "x0", "y0", "K1", "P1", "P2")
     for convention in CONVENTIONS:
@@ -232,7 +232,7 @@ def test_covariance_of_a_fit_is_that_of_drawn_cameras():
     assert np.abs(ratio - 1).max() < 4 / np.sqrt(200)
 
 
-def test_a_covariance_that_is_none_is_told():
+def test_impossible_covariance_is_reported():
     for bad in (
         np.zeros((3, 3)),
         np.full((13, 13), np.nan),

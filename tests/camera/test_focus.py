@@ -51,7 +51,7 @@ def test_the_second_distance_may_be_infinite():
     assert radial_at(8000.0, at, RADIAL, F)[0] == pytest.approx(k, rel=1e-13)
 
 
-def test_two_calibrations_at_one_distance_say_nothing():
+def test_two_calibrations_at_one_distance_are_refused():
     with pytest.raises(ValueError, match="same distance"):
         radial_at(5000.0, [NEAR, NEAR], RADIAL, F)
 

@@ -44,7 +44,7 @@ def test_help_loads_nothing_heavy():
 
 
 @pytest.mark.slow
-def test_adjusting_without_papers_loads_nothing_that_only_papers_or_simulations_need():
+def test_adjusting_without_papers_loads_no_paper_modules():
     code = (
         "import sys, tankcal.cli.running, tankcal.pipeline.chain, tankcal.report.outputs\n"
         "heavy = {'scipy.stats', 'matplotlib', 'openpyxl', 'xlsxwriter', 'nbformat', 'trimesh'}\n"
@@ -273,7 +273,7 @@ def test_lint_shows_the_first_findings_only(tmp_path, capsys):
         (["{table}", "--sheet", "x"], "no sheet 'x'"),
     ],
 )
-def test_lint_of_what_is_no_table(arguments, words, tmp_path, capsys):
+def test_lint_without_a_table(arguments, words, tmp_path, capsys):
     file = table(tmp_path / "t.csv")
     assert main(["lint", *(argument.format(table=file) for argument in arguments)]) == 2
     error = capsys.readouterr().err
@@ -342,7 +342,7 @@ temperature = false
 """
 
 
-def test_a_tank_without_any_uncertainty_says_so(tmp_path, capsys):
+def test_tank_without_uncertainty_is_reported(tmp_path, capsys):
     (tmp_path / "job.toml").write_text(BARE_TANK, encoding="utf-8")
     assert main(["run", str(tmp_path), "--no-papers", "--quiet"]) == 0
     said = capsys.readouterr().out

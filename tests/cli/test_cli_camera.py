@@ -62,7 +62,7 @@ def test_names_may_come_after_options(capsys):
         main(["run", "job", "another"])
 
 
-def test_pairs_stand_in_the_order_asked_for(capsys):
+def test_pairs_keep_the_requested_order(capsys):
     assert run("compare", SEVEN, "set2", "set1", "--json") == 0
     (pair,) = json.loads(capsys.readouterr().out)
     assert (pair["a"], pair["b"]) == ("set2", "set1")
@@ -98,7 +98,7 @@ def test_compare_chosen_ones_by_another_threshold(capsys):
         (("--seed", "-3"), "--seed"),
     ],
 )
-def test_what_cannot_be_compared_is_told(arguments, words, capsys):
+def test_incomparable_calibrations_are_reported(arguments, words, capsys):
     assert run("compare", SEVEN, *arguments) == 2
     told = capsys.readouterr()
     assert words in told.err
@@ -138,7 +138,7 @@ def in_spanish(folder):
 
 
 @pytest.mark.slow
-def test_tables_are_in_the_language_that_the_job_asks_for(tmp_path, capsys):
+def test_tables_are_in_the_language_of_the_job(tmp_path, capsys):
     job = in_spanish(tmp_path)
     assert run("parameters", job, "--no-trials") == 0
     assert "Grados de libertad" in capsys.readouterr().out
@@ -147,7 +147,7 @@ def test_tables_are_in_the_language_that_the_job_asks_for(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_tables_are_in_the_language_that_the_record_asks_for(record, tmp_path, capsys):
+def test_tables_are_in_the_language_of_the_record(record, tmp_path, capsys):
     found = json.loads(record.read_text(encoding="utf-8"))
     found["job"]["table"]["language"] = "pt-BR"
     (tmp_path / "record.json").write_text(json.dumps(found), encoding="utf-8")
@@ -175,7 +175,7 @@ def test_every_analysis_refuses_a_language_without_words(what, capsys):
         ("--camera", "NOCAMERA", "--camera: found 'NOCAMERA'; expected one of UMK"),
     ],
 )
-def test_parameters_of_what_is_not_there(record, option, name, words, capsys):
+def test_parameters_of_unknown_camera_or_photo(record, option, name, words, capsys):
     for source in (PHOTOS, record):
         assert run("parameters", source, "--no-trials", option, name) == 2
         told = capsys.readouterr()
@@ -236,7 +236,7 @@ def test_influence_of_a_film_camera(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_influence_counts_all_runs_of_film_in_the_pixels_of_a_calibration(tmp_path, capsys):
+def test_influence_of_film_uses_pixels_of_calibration(tmp_path, capsys):
     fine = FILM.replace("longer", "fine").replace("c_mm", "pixel_um = 10\nc_mm")
     (tmp_path / "cameras.toml").write_text(FILM + fine, encoding="utf-8")
     arguments = ("--cameras", tmp_path / "cameras.toml", "--states", "fixed", "--json")
@@ -318,7 +318,7 @@ def test_convert_there_and_back(form, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)[0]["figure_px"] < 1e-9
 
 
-def test_convert_from_what_is_said_whatever_the_name_of_the_file(tmp_path, capsys):
+def test_convert_uses_the_given_kind_of_file(tmp_path, capsys):
     odd = tmp_path / "cameras.txt"
     shutil.copy(SEVEN, odd)
     arguments = ["camera", "convert", str(odd), "--name", "set1", "--to", "aicon"]
@@ -440,7 +440,7 @@ def sd_of(camera, key):
     return next(camera[one] for one in (f"s_{key}", f"s_{name}") if one in camera)
 
 
-def test_convert_keeps_held_parameters_and_those_without_standard_deviation(tmp_path, capsys):
+def test_convert_keeps_parameters_without_sd(tmp_path, capsys):
     (tmp_path / "a.toml").write_text(
         "[cameras.a]\nformat_px = [6000, 4000]\npixel_um = 4\nc_mm = 24\nx0_mm = 0.1\nK1 = 1e-5\n"
         's_c = 0.01\ns_x0 = 0\nconvention = "correction_added"\n',
@@ -510,7 +510,7 @@ def test_targets_of_a_photograph(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_papers_say_what_they_were_made_from(tmp_path):
+def test_papers_name_their_source(tmp_path):
     out = tmp_path / "papers"
     assert run("compare", SEVEN, "set1", "set2", "--grid", "6x5,300,300,700", "--out", out) == 0
     found = json.loads((out / "camera.json").read_text(encoding="utf-8"))["made_from"]

@@ -62,7 +62,7 @@ TABLE = """height_m,volume_m3
 
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", OTHERS)
-def test_findings_are_told_in_the_language(tmp_path, capsys, monkeypatch, language):
+def test_findings_are_reported_in_the_language(tmp_path, capsys, monkeypatch, language):
     path = tmp_path / "t.csv"
     path.write_text(TABLE)
     assert main(["lint", str(path), "--language", language, "--nominal-volume", "200"]) == 2
@@ -77,7 +77,7 @@ def test_findings_are_told_in_the_language(tmp_path, capsys, monkeypatch, langua
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", OTHERS)
 @pytest.mark.parametrize("text", ["", "a\n", "height_m,volume_m3\n0,0\n1,1\n", "1;2\n3;4\n"])
-def test_what_is_no_table_is_told_in_the_language(tmp_path, capsys, language, text):
+def test_missing_table_is_reported_in_the_language(tmp_path, capsys, language, text):
     path = tmp_path / "t.csv"
     path.write_text(text)
     assert main(["lint", str(path), "--language", language]) == 2
@@ -85,7 +85,7 @@ def test_what_is_no_table_is_told_in_the_language(tmp_path, capsys, language, te
 
 
 @pytest.mark.parametrize("language", OTHERS)
-def test_a_plan_is_told_in_its_language(tmp_path, capsys, language):
+def test_a_plan_is_reported_in_its_language(tmp_path, capsys, language):
     for path in (EXAMPLE.parent / "plan-silva").iterdir():
         text = path.read_text(encoding="utf-8")
         if path.name == "plan.toml":
@@ -132,7 +132,7 @@ TOLD_BY = {"Problem", "InputError", "SolutionError", "problem", "warning", "warn
 
 
 @pytest.mark.slow
-def test_no_plain_text_is_told_in_these_rooms():
+def test_rooms_report_only_messages():
     """A text of several words that is handed to a teller of the user's is a `message`."""
     plain = []
     for room in ROOMS:

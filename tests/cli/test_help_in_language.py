@@ -47,7 +47,7 @@ def english():
 
 
 @pytest.mark.parametrize("language", OTHERS)
-def test_every_text_of_the_help_has_its_words_and_none_is_idle(english, language):
+def test_help_texts_and_their_words_match(english, language):
     known = dict(load_words(language)["help"])
     shared = known.pop("shared").keys()
     del known["argparse"], known["metavars"]

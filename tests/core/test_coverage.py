@@ -111,7 +111,7 @@ def test_intervals_cover_tanks_with_form_between_the_targets(common, share, figu
 
 @pytest.mark.study
 @FORMS
-def test_intervals_cover_tanks_with_form_between_the_targets_study(common, share, figure):
+def test_intervals_cover_tanks_with_form_study(common, share, figure):
     check(round(draws(450, 3000) * share), common, figure, round(3000 * share))
 
 

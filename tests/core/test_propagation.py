@@ -263,7 +263,7 @@ def test_a_triangle_is_two_rectangles():
         assert two.quantile(p) == pytest.approx(Triangular(1.0).quantile(p), abs=1e-8)
 
 
-def test_a_combination_that_cannot_be_summed_says_so():
+def test_unsummable_combination_is_reported():
     with pytest.raises(SolutionError, match="too sharp"):
         Combination([UShaped(1.0)]).quantile(0.9)
     with pytest.raises(ValueError, match="constants"):
@@ -375,7 +375,7 @@ def test_a_kink_or_a_jump_at_the_estimate_is_refused(model):
         propagate(lambda x: 0.001 * x[0] + model(np.real(x[1])), inputs)
 
 
-def test_a_kink_beside_the_estimate_is_left_to_monte_carlo():
+def test_kink_near_estimate_is_left_to_monte_carlo():
     """Closed form: the slope at the estimate, which an edge half a step away does not touch."""
     found = sensitivities_of(lambda x: np.abs(np.real(x[0])), [0.001], [0.01])
     assert found[0, 0] == pytest.approx(1.0, rel=1e-9)

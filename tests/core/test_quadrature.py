@@ -51,7 +51,7 @@ def test_height_basis_reproduces_polynomials_and_sums_to_one():
     assert height_basis(levels, z, 2) @ parabola == pytest.approx(expected, abs=1e-13)
 
 
-def test_height_products_are_the_area_of_a_frustum_at_every_height():
+def test_height_products_give_areas_of_frustum():
     levels, t = np.array([0.2, 0.8]), np.linspace(0, 1, 7)
     products = height_products(levels, 1)
     radii = 6.5 + 0.01 * levels

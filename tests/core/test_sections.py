@@ -74,7 +74,7 @@ def test_area_of_a_spoilt_point_moves_by_the_gradient():
     assert np.abs(differences - gradient).max() < 5e-4 * np.abs(gradient).max()
 
 
-def test_sliding_along_the_axis_keeps_a_leaning_cylinder_together():
+def test_sliding_along_axis_keeps_leaning_cylinder():
     slope, azimuth = (0.03, -0.01), azimuths(12)
     z = np.linspace(0, 1.5, 12)
     xyz = ring(6.5, azimuth) + np.column_stack([z * slope[0], z * slope[1], z])
@@ -158,7 +158,7 @@ def test_points_at_all_heights_of_a_barrel_are_exact():
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_a_leaning_cylinder_is_exact_whether_its_slope_is_known_or_not(known):
+def test_leaning_cylinder_with_known_and_unknown_slope(known):
     slope = (0.002, -0.001)
     volume = course_of_points(
         scan(lambda a, zeta: np.full_like(a, 6.5), slope=slope), slope=slope if known else (0, 0)
@@ -227,7 +227,7 @@ def test_the_areas_of_a_scanned_course_move_with_its_points(part, tolerance):
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])
-def test_what_a_scan_shows_of_a_barrel(degree):
+def test_barrel_from_a_scan(degree):
     """Against the mean radii of a scan whose wall has one: the whole of it only at degree 2."""
     amplitude = 1e-4
     shapes = []

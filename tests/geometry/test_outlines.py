@@ -89,7 +89,7 @@ def test_a_shared_azimuth_cannot_be_interpolated():
 
 
 @pytest.mark.parametrize("kind", ["interpolated", "smoothed"])
-def test_the_unseen_form_is_what_a_mode_of_one_sd_does(kind):
+def test_unseen_form_equals_effect_of_one_mode(kind):
     """Second method: fit the same azimuths to a shape that holds the mode."""
     plain = outlines()[kind]
     grid = np.linspace(0, 6, 7)

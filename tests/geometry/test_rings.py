@@ -68,7 +68,7 @@ def test_agrees_with_a_loop_of_masks_second_method():
         assert found.cell_sd_m[i] == pytest.approx(cells[:, 2], rel=1e-9)
 
 
-def test_exact_circles_of_a_leaning_wall_far_from_the_approximate_axis():
+def test_exact_circles_of_leaning_wall_with_poor_start():
     """Closed form: radius and centre of every ring, at UTM-size coordinates, axis 0.1 m off."""
     slope, base = np.array([0.01, -0.02]), np.array([300_000.0, 7_400_000.0])
     rng = np.random.default_rng(2)
@@ -122,7 +122,7 @@ def test_an_arc_with_noise_has_no_bias_of_kasas_kind(figure):
     assert abs(of_kasa) > 5 * standard_error
 
 
-def test_the_radius_on_coarse_noise_is_too_long_by_its_square_over_r():
+def test_radius_bias_by_coarse_noise():
     """Simulation: isotropic noise of R/20 on a whole turn, s^2 / R = 2.5e-3 (the docstring)."""
     rng = np.random.default_rng(5)
     xyz = ring(1.0, rng.uniform(0, 2 * np.pi, 400_000))
@@ -279,7 +279,7 @@ def test_memory_does_not_grow_with_the_points():
         (np.float32([[3e5, 7.4e6, 1]]), [0, 5], AXIS, {}, "float32 holds 7400000 m to 0.5 m only"),
     ],
 )
-def test_what_cannot_be_used_is_told(points, edges, axis, options, expected):
+def test_unusable_input_is_reported(points, edges, axis, options, expected):
     with pytest.raises(InputError, match=expected) as error:
         ring_sections(np.asarray(points), edges, axis, **options)
     assert len(str(error.value).splitlines()) == 1

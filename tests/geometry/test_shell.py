@@ -28,7 +28,7 @@ def clutter(rng, n=60):
 
 
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.002, -0.001), (0.03, 0.0)])
-def test_clutter_is_told_apart_and_the_tilt_is_found(tilt):
+def test_clutter_is_separated_and_tilt_found(tilt):
     rng = np.random.default_rng(7)
     good = wall(rng, tilt=tilt)
     bad = clutter(rng) + np.outer(np.zeros(63), [0, 0, 0])
@@ -123,7 +123,7 @@ def test_points_of_large_declared_sd_are_not_blunders():
     assert np.sum(find_shell(xyz, JOINTS, 6.5).reason != "") > 20  # what the sds are for
 
 
-def test_a_spiral_stair_before_the_wall_takes_no_wall_point_with_it():
+def test_spiral_stair_leaves_wall_points_accepted():
     """20 steps over a third of the turn, 20 to 60 mm off a wall of 15 mm ovality."""
     rng = np.random.default_rng(15)
     xyz = wall(rng, n=400, noise=0.002)
@@ -185,7 +185,7 @@ def test_a_barrel_of_three_rings_keeps_its_points():
     assert barrel.noise_m == pytest.approx(0.001, rel=0.15)
 
 
-def test_a_nozzle_and_a_stair_beside_rings_that_differ_still_go():
+def test_nozzle_and_stair_are_rejected_with_unequal_rings():
     """Six treads at heights of their own, 20 to 45 mm off, and the rim of a nozzle 30 mm off."""
     azimuth = np.linspace(1.0, 1.8, 6)
     treads = 6.5 + np.linspace(0.020, 0.045, 6)

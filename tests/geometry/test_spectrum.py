@@ -32,7 +32,7 @@ TOTAL = 0.030**2
     ("common", "own", "rising"),
     [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.5, 0.5, 0.0), (0.5, 0.3, 0.2)],
 )
-def test_the_parts_of_the_form_are_told_apart(common, own, rising):
+def test_the_parts_of_the_form_are_separated(common, own, rising):
     """Four shells of 6 scanned courses: the mean within 25 %, what is not there under 5 %."""
     truth = TOTAL * np.array([common, own, rising])
     found = []
@@ -44,7 +44,7 @@ def test_the_parts_of_the_form_are_told_apart(common, own, rising):
 
 
 @pytest.mark.slow
-def test_targets_at_the_same_azimuths_give_the_common_form_without_bias(figure):
+def test_common_form_is_unbiased_for_equal_azimuths(figure):
     """Simulation, 24 targets a course, modes to 200 aliased: mean of 60 shells of about 21 dof."""
     rng = np.random.default_rng(3)
     options = {"courses": 5, "n": 24, "noise": 0.001, "level": True}
@@ -90,7 +90,7 @@ def test_perfect_points_have_a_form_too():
     assert estimate_form(samples).common_m2 == pytest.approx(TOTAL, rel=0.8)
 
 
-def test_a_full_covariance_and_a_factor_of_it_are_the_same_as_variances():
+def test_full_covariance_and_its_factor_agree_with_variances():
     samples = simulated(np.random.default_rng(7), TOTAL, courses=2, n=40)
     full = [
         Sample(s.azimuth_rad, s.radius_m, np.diag(s.covariance_m2) / 4, s.course, s.zeta, s.degree)

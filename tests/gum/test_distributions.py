@@ -149,7 +149,7 @@ def test_a_normal_whose_u_was_estimated_is_a_t():
     assert one.sd == pytest.approx(0.3 * np.sqrt(2))
 
 
-def test_u_of_a_t_is_what_was_declared():
+def test_u_of_t_distribution_is_declared_one():
     by_scale = standard(0.3, "t", dof=4)
     by_sd = standard(by_scale.sd, "t", dof=4, u_is="sd")
     assert by_scale.u == 0.3
@@ -236,7 +236,7 @@ def test_nonsense_is_refused(make, message):
         make()
 
 
-def test_an_estimated_variance_beside_noise_is_that_of_a_simulation(figure):
+def test_estimated_variance_with_noise_agrees_with_simulation(figure):
     """Simulation: m residuals of signal and noise, the noise taken off, give back the law of X.
 
     With a flat prior for the whole variance, chi-square of m says where it may lie.
@@ -256,7 +256,7 @@ def test_an_estimated_variance_beside_noise_is_that_of_a_simulation(figure):
     assert one.characteristic(t) == pytest.approx(cosines, abs=2e-3)
 
 
-def test_without_noise_it_is_students_t_and_with_much_contrast_normal():
+def test_unsure_normal_limits_are_student_and_normal():
     p = np.array([0.001, 0.025, 0.3])
     t, near = StudentT(1.0, dof=12.0), UnsureNormal(1.0, 12.0001, dof=12.0)
     assert near.quantile(p) == pytest.approx(t.quantile(p), rel=1e-4)

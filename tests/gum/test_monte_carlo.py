@@ -67,7 +67,7 @@ def test_additive_models_of_jcgm_101(inputs, u, end, figure):
     assert found.controlled[0]
 
 
-def test_gum_is_not_validated_where_one_rectangular_input_dominates():
+def test_gum_fails_with_dominant_rectangular_input():
     """JCGM 101 9.2.4: GUM +-19.9 beside +-17.0 of Monte Carlo, u 10.1."""
     found = simulate(total, [rectangular(1.0)] * 3 + [rectangular(10.0)], goal=SOME)
     judged = verdict(found, [0.0], [np.sqrt(103)])
@@ -188,7 +188,7 @@ def test_law_of_two_arc_sines_and_a_normal_against_plain_draws():
 
 
 @pytest.mark.slow
-def test_linear_rows_of_heavy_tails_are_exact_in_u_and_close_in_the_ends(figure):
+def test_linear_rows_with_heavy_tails_u_and_ends(figure):
     """Purely linear, t of 3 to 5 degrees of freedom: u closed form, ends by the law without draws.
 
     The standard error of 1e6 plain draws in an end is sqrt(p q/1e6)/density.
@@ -231,7 +231,7 @@ def test_numerical_tolerance():
     assert numerical_tolerance(2.0, digits=1) == pytest.approx([0.5])
 
 
-def test_same_seed_same_numbers_and_progress_is_told():
+def test_same_seed_same_numbers_and_progress_is_reported():
     told = []
     found = [
         simulate(loss, loss_inputs(0.01), goal=SOME, progress=lambda *step: told.append(step))
@@ -258,7 +258,7 @@ def test_inputs_that_cannot_be():
         simulate(one, [Normal(1.0)] * 2)
 
 
-def test_correlated_inputs_that_are_not_normal_are_drawn_without_a_control():
+def test_correlated_non_normal_inputs_have_no_control_variate():
     """Sum of two equal rectangulars (scores r = 1): one of twice the width, closed form."""
     found = simulate(total, [Rectangular(1.0)] * 2, [[1, 1], [1, 1]], goal=SOME)
     assert not found.controlled[0]

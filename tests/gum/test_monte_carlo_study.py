@@ -84,7 +84,7 @@ def test_a_table_agrees_with_plain_draws(kinds):
 
 
 @pytest.mark.slow
-def test_shortest_interval_of_quadratic_rows_against_batches_of_draws(figure):
+def test_shortest_interval_of_quadratic_rows(figure):
     """Second method: the same rows as a model of which nothing is known but its values.
 
     The interval's length is flat about its least: a shortest interval is no longer than the other
@@ -145,7 +145,7 @@ def test_plain_draws_take_over_where_the_parabola_turns(figure):
     assert np.all(found.high > found.low)
 
 
-def test_a_control_that_says_nothing_does_no_harm(figure):
+def test_uncorrelated_control_variate_is_harmless(figure):
     """Comparison loss at x1 = 0.5 u, r = 0: scatter over batches with and without the control."""
 
     def loss(x):

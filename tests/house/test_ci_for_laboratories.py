@@ -43,14 +43,14 @@ def named(beginning):
     return found
 
 
-def test_the_workflow_installs_what_the_page_says_is_there():
+def test_workflow_installs_what_the_page_names():
     assert named("install") == "pip install -c constraints.txt wheels/tankcal-*.whl"
     assert "wheels/tankcal-*.whl" in PAGE.split("```yaml")[0]
 
 
 @pytest.mark.study
 @pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
-def test_every_step_of_the_workflow_does_what_it_says(tmp_path):
+def test_steps_of_the_workflow_run(tmp_path):
     """Of one job, its name with a space; that each job has its turn is the next test's."""
     write_job(tmp_path / "jobs" / "TK 108", settings={"table.step_m": 0.5})
     for beginning in ("compute", "papers", "the notebook"):
@@ -64,7 +64,7 @@ def test_every_step_of_the_workflow_does_what_it_says(tmp_path):
 
 @pytest.mark.study
 @pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
-def test_a_mistake_fails_its_step_and_the_other_jobs_are_computed(tmp_path):
+def test_mistake_fails_its_step_only(tmp_path):
     write_job(tmp_path / "jobs" / "A", settings={"table.step_m": "ten"})
     write_job(tmp_path / "jobs" / "B", settings={"table.step_m": 0.5})
     done = run("compute", tmp_path)

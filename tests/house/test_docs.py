@@ -72,7 +72,7 @@ def test_readme_is_short():
 
 
 @pytest.mark.parametrize("page", ["README.md"])
-def test_examples_of_pages_print_what_they_say(page, monkeypatch):
+def test_examples_of_pages_print_as_shown(page, monkeypatch):
     monkeypatch.chdir(ROOT)
     found = doctest.testfile(str(ROOT / page), module_relative=False)
     assert found.attempted >= 3
@@ -80,7 +80,7 @@ def test_examples_of_pages_print_what_they_say(page, monkeypatch):
 
 
 @pytest.mark.parametrize("module", WITH_EXAMPLES)
-def test_examples_of_docstrings_print_what_they_say(module, monkeypatch):
+def test_examples_of_docstrings_print_as_shown(module, monkeypatch):
     monkeypatch.chdir(ROOT)
     found = doctest.testmod(import_module(module))
     assert found.attempted > 0

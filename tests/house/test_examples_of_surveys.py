@@ -60,7 +60,7 @@ def test_the_unknowns_of_the_dissertation(results):
     assert results["photos"].adjustment.unknowns == 487
 
 
-def test_what_was_published_is_in_the_files():
+def test_published_values_are_in_the_files():
     """Published: names of control, eight tapes of 6.9 and 9.0 m, eleven photos, c = 100 mm."""
     published = ["15", "75", "81", "95", "115", "135", "161", "175", "215", "235", "241"]
     assert [row["point"] for row in rows(PHOTOS, "control.csv")] == published
@@ -240,7 +240,7 @@ def test_nothing_is_left_to_be_warned_of(one):
     assert one[1].warnings == ()
 
 
-def test_all_pages_say_that_it_is_a_simulation(one):
+def test_pages_state_that_data_are_simulated(one):
     _, result = one
     assert result.job.certificate["notice"] == "SIMULATION"
     assert result.job.certificate["laboratory"].startswith("None")  # nobody's is invented
@@ -261,7 +261,7 @@ def test_the_script_writes_the_same_tables_again(folder, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_linter_finds_nothing_in_the_tables_that_are_handed_out(one, tmp_path):
+def test_linter_accepts_the_tables_of_the_example(one, tmp_path):
     record = record_of(one[1])
     write_tables(record, tmp_path)
     write_workbook(record, tmp_path / "capacity.xlsx")

@@ -117,11 +117,11 @@ class at:
             error.add_note(f"seed of {self.what[0]}: {self.what[1]}; files in {self.what[3]}")
 
 
-def test_spoilt_jobs_are_told(folders, tmp_path):
+def test_spoilt_jobs_are_reported(folders, tmp_path):
     assert_jobs(folders, tmp_path / "job", range(FEW))
 
 
-def test_spoilt_workbooks_are_told(tmp_path):
+def test_spoilt_workbooks_are_reported(tmp_path):
     for name, (parts, _) in bases().items():
         for seed in range(FEW // 10):
             spoilt = spoilt_parts(parts, np.random.default_rng([7, seed]))
@@ -129,7 +129,7 @@ def test_spoilt_workbooks_are_told(tmp_path):
                 told(load, write_book(tmp_path / "job.xlsx", spoilt))
 
 
-def test_spoilt_plans_are_told(tmp_path):
+def test_spoilt_plans_are_reported(tmp_path):
     files = text_files(EXAMPLE.parent / "plan-silva")
     for seed in range(FEW):
         spoilt = spoilt_folder(files, np.random.default_rng([8, seed]))
@@ -137,7 +137,7 @@ def test_spoilt_plans_are_told(tmp_path):
             told(load_plan, written(tmp_path / "plan", spoilt))
 
 
-def test_spoilt_tables_are_told_by_the_linter(tmp_path):
+def test_spoilt_tables_are_reported_by_the_linter(tmp_path):
     rows = [f"{k / 100:.2f},{1.3 * k:.3f}" for k in range(60)]
     wide = [f"{k},{k * 13},{k + 60},{(k + 60) * 13}" for k in range(60)]
     lines = (["height_m,volume_m3", *rows], ["cm,L,cm,L", *wide], rows)

@@ -231,7 +231,7 @@ def test_zeros_for_an_interval_are_an_error_of_the_program():
         gum_intervals(volume, u, 0 * u)
 
 
-def test_an_interval_beside_the_volume_is_made_longer_up_to_it():
+def test_interval_is_extended_to_its_volume():
     """A square of an input is never below its value at 0: 2.5 % of chi-square is above it."""
     volume, u = np.array([0.041]), np.array([0.002])
     found = judged_intervals(judged(0.0411, 0.046), volume, u, 2 * u)
@@ -239,7 +239,7 @@ def test_an_interval_beside_the_volume_is_made_longer_up_to_it():
     assert found.U_m3[0] == pytest.approx(0.005)
 
 
-def test_no_tank_holds_less_than_nothing_and_an_exact_volume_has_no_width():
+def test_intervals_are_never_negative_nor_wide_when_exact():
     none = np.zeros(1)
     found = judged_intervals(judged(-0.001, 0.002), none, none, none, least_m3=0.0)
     assert found.low_m3[0] == 0.0

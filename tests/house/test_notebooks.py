@@ -22,7 +22,7 @@ def text_of(cell):
 
 
 @pytest.mark.parametrize("path", ALL, ids=lambda path: path.stem)
-def test_a_parameters_cell_stands_first(path):
+def test_parameters_cell_comes_first(path):
     """Where papermill writes its values below it: only names with plain values in it."""
     first, *others = code_of(path)
     assert "parameters" in first["metadata"].get("tags", [])

@@ -48,7 +48,7 @@ def test_an_empty_form_is_refused_in_its_language(tmp_path, capsys, language, ki
             assert all(line.startswith(f"job.xlsx, {sheet} ") for line in lines)
 
 
-def test_the_terminal_of_a_job_in_no_language_is_the_environments(monkeypatch):
+def test_terminal_language_defaults_to_environment(monkeypatch):
     problem = Problem("points.csv", "x", 12)
     speak()
     assert say_in_language(problem.text) == "points.csv, row 12: x"
@@ -121,7 +121,7 @@ def test_sides_of_a_form(word, value):
     assert read_value(Field("x", "choice", "", choices=("outside", "inside")), word) == value
 
 
-def test_another_word_is_refused_with_what_is_expected():
+def test_unknown_word_is_refused_with_expected_ones():
     with pytest.raises(Refused) as told:
         read_value(Field("x", "choice", "", choices=("outside", "inside")), "talvez")
     assert isinstance(told.value.text, Message)

@@ -76,7 +76,7 @@ BAD_SETTINGS = [
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("key", "value", "words"), BAD_SETTINGS)
-def test_bad_setting_is_told_with_its_row_and_key(tmp_path, form, key, value, words):
+def test_bad_setting_is_reported_with_its_row_and_key(tmp_path, form, key, value, words):
     parts = job_parts(settings={key: value})
     (problem,) = problems_of(write(tmp_path, parts, form))
     assert places([problem]) == [settings_place(form, parts, key)]
@@ -239,7 +239,9 @@ def full_parts(**changes):
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("table", "row", "column", "cell", "words"), BAD_CELLS)
-def test_bad_cell_is_told_with_its_row_and_column(tmp_path, form, table, row, column, cell, words):
+def test_bad_cell_is_reported_with_its_row_and_column(
+    tmp_path, form, table, row, column, cell, words
+):
     parts = full_parts()
     rows = parts.tables[table]
     rows[row - 1][rows[0].index(column)] = cell
@@ -433,7 +435,7 @@ BRAZILIAN = {"csv.separator": ";", "csv.decimal": ","}
 
 
 @pytest.mark.parametrize("lost", [b"[tank\n", b'owner = "Jo\xe3o"\n', None])
-def test_tables_are_not_judged_by_marks_that_unreadable_settings_would_have_given(tmp_path, lost):
+def test_tables_ignore_marks_of_unreadable_settings(tmp_path, lost):
     count = len(job_parts().tables["points"]) - 1
     parts = job_parts(
         settings=BRAZILIAN,
@@ -449,7 +451,7 @@ def test_tables_are_not_judged_by_marks_that_unreadable_settings_would_have_give
     assert problem.file == "job.toml"
 
 
-def test_tables_with_commas_are_judged_beside_unreadable_settings(tmp_path):
+def test_tables_with_commas_and_unreadable_settings(tmp_path):
     parts = job_parts()
     parts.tables["points"][3][1] = "x"
     folder = write_folder(tmp_path / "job", parts)
@@ -457,7 +459,7 @@ def test_tables_with_commas_are_judged_beside_unreadable_settings(tmp_path):
     assert places(problems_of(folder)) == [("job.toml", 1, None), ("points.csv", 4, "x_m")]
 
 
-def test_a_decimal_comma_in_the_settings_is_the_only_problem_of_tables_with_commas(tmp_path):
+def test_decimal_comma_in_settings_is_the_only_problem(tmp_path):
     parts = job_parts(settings=BRAZILIAN | {"table.step_m": 0.25})
     folder = write_folder(tmp_path / "job", parts)
     text = (folder / "job.toml").read_text(encoding="utf-8")

@@ -91,7 +91,9 @@ BAD_CELLS = [
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("table", "row", "column", "bad", "words"), BAD_CELLS)
-def test_bad_cell_is_told_with_its_row_and_column(tmp_path, form, table, row, column, bad, words):
+def test_bad_cell_is_reported_with_its_row_and_column(
+    tmp_path, form, table, row, column, bad, words
+):
     parts = survey_parts()
     spoil(parts, table, row, column, bad)
     problems = problems_of(write(tmp_path, parts, form))
@@ -253,7 +255,7 @@ def test_nothing_to_adjust(tmp_path):
     assert "nothing to adjust" in problem.expected
 
 
-def test_a_survey_without_observations_is_told(tmp_path):
+def test_a_survey_without_observations_is_reported(tmp_path):
     parts = survey_parts()
     kept = ("courses", "control", "targets")
     parts.tables = {name: rows for name, rows in parts.tables.items() if name in kept}
@@ -263,7 +265,7 @@ def test_a_survey_without_observations_is_told(tmp_path):
     assert "or the files of a survey" in problem.expected
 
 
-def test_what_is_of_a_survey_is_without_effect_beside_points(tmp_path):
+def test_survey_settings_have_no_effect_with_points(tmp_path):
     parts = job_parts(settings={"adjustment.datum": "inner", "adjustment.camera.c": "off"})
     parts.tables["control"] = survey_parts().tables["control"]
     warnings = warnings_of(tmp_path, parts)
@@ -316,7 +318,7 @@ def test_photographs_without_any_image_point(tmp_path, is_missing):
     )
 
 
-def test_an_unknown_name_is_told_once_for_all_its_rows(tmp_path):
+def test_unknown_name_is_reported_once(tmp_path):
     parts = survey_parts()
     for row in parts.tables["image_points"][1:9]:
         row[0] = "F4"
@@ -337,7 +339,7 @@ def test_a_photo_with_too_few_points(tmp_path, count):
     assert f"has {count} image point" in problem.expected
 
 
-def test_a_photo_whose_orientation_is_known_needs_no_three_points(tmp_path):
+def test_photo_with_known_orientation_needs_no_points(tmp_path):
     parts = survey_parts()
     del parts.tables["image_points"][2:9]
     for column in ("sx_m", "sy_m", "sz_m", "s_omega_deg", "s_phi_gon", "s_kappa_deg"):
@@ -431,7 +433,7 @@ def test_a_point_in_two_spellings(tmp_path, other, count):
         ("A", "B", False),
     ],
 )
-def test_what_counts_as_a_spelling_of_one_name(one, other, same):
+def test_spellings_of_one_name(one, other, same):
     assert (plain(one) == plain(other)) is same
 
 
@@ -449,7 +451,7 @@ def test_what_counts_as_a_spelling_of_one_name(one, other, same):
         ),
     ],
 )
-def test_what_is_held_twice(tmp_path, table, rows, words):
+def test_values_held_twice(tmp_path, table, rows, words):
     parts = survey_parts()
     parts.tables["check"] = parts.tables["check"][:1]
     for row in parts.tables["control"][1:3]:
@@ -768,7 +770,7 @@ def test_one_distance_in_millimetres(tmp_path):
     assert "half of the distances are below" in problem.expected
 
 
-def test_a_column_that_all_rows_lack_is_told_once(tmp_path):
+def test_column_missing_in_all_rows_is_reported_once(tmp_path):
     parts = survey_parts()
     at = parts.tables["image_points"][0].index("y_mm")
     for row in parts.tables["image_points"]:

@@ -393,7 +393,7 @@ def test_torispherical_ends(tmp_path, dish, knuckle, key, words):
         ("sphere", BALL, {"sphere.diameter_m": 20.0}, "sphere.diameter_m", "one of them"),
     ],
 )
-def test_settings_beside_points(tmp_path, form, kind, points, changes, key, words):
+def test_settings_with_points(tmp_path, form, kind, points, changes, key, words):
     scan = SCAN if kind == "horizontal" else {"sphere.diameter_m": None}
     parts = job_parts(kind=kind, extra_points=points, settings=scan | changes)
     (problem,) = problems_of(write(tmp_path, parts, form))
@@ -531,14 +531,14 @@ WARNINGS = [
 
 
 @pytest.mark.parametrize(("changes", "column"), WARNINGS)
-def test_what_is_only_doubtful(tmp_path, changes, column):
+def test_doubtful_values(tmp_path, changes, column):
     job = load(write_folder(tmp_path / "job", job_parts(**changes)))
     assert [warning.column for warning in job.warnings] == [column]
     assert len(lines(job.warnings)) == 1
 
 
 @pytest.mark.parametrize("changes", [{"tilt_mm_per_m": 60.0, "dip_from_a_m": 5.0}, {"roll_deg": 5}])
-def test_what_is_only_doubtful_of_a_horizontal_cylinder(tmp_path, changes):
+def test_doubtful_values_of_horizontal_cylinder(tmp_path, changes):
     settings = {f"horizontal.{name}": value for name, value in changes.items()}
     job = load(write_folder(tmp_path / "job", job_parts(kind="horizontal", settings=settings)))
     assert [warning.column for warning in job.warnings] == [f"horizontal.{next(iter(changes))}"]

@@ -57,7 +57,7 @@ def assumed(job):
 # --- what is assumed
 
 
-def test_what_is_assumed_of_a_tank_with_everything(tmp_path):
+def test_default_inputs_of_a_complete_tank(tmp_path):
     job = load(write_job(tmp_path / "job", **FULL))
     # closed form: half-width over the square root of three, in SI
     half_widths = {
@@ -130,11 +130,11 @@ def test_what_is_assumed_of_a_tank_with_everything(tmp_path):
         ),
     ],
 )  # fmt: skip
-def test_only_what_bears_on_the_job_is_assumed(tmp_path, changes, names):
+def test_only_relevant_defaults_are_assumed(tmp_path, changes, names):
     assert assumed(load(write_job(tmp_path / "job", **changes))) == names
 
 
-def test_what_is_declared_is_not_assumed_and_stands_first(tmp_path):
+def test_declared_inputs_replace_defaults_and_come_first(tmp_path):
     rows = [("survey_density", 2.0, "kg/m3"), ("expansion", 0.0, "1/K"), ("scale", 5.0, "ppm")]
     job = load(write_folder(tmp_path / "job", with_rows(rows, **FULL)))
     assert [one.name for one in job.inputs[:3]] == ["survey_density", "expansion", "scale"]
@@ -311,7 +311,7 @@ def test_correlations_are_read(tmp_path, form):
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_correlations_that_cannot_hold_together_are_one_problem(tmp_path, form):
+def test_impossible_correlations_are_one_problem(tmp_path, form):
     # closed form: r = -0.9 of all pairs of three has the eigenvalue 1 - 2 * 0.9 = -0.8
     pairs = [("scale", "offset", -0.9), ("datum", "offset", -0.9), ("datum", "scale", -0.9)]
     (problem,) = problems_of(write(tmp_path, correlated(*pairs), form))
@@ -398,7 +398,7 @@ def test_a_stated_volume_that_is_refused(tmp_path, row, column, words):
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_a_stated_dip_outside_the_table_is_told_where_it_stands(tmp_path, form):
+def test_stated_dip_outside_table_is_reported(tmp_path, form):
     job = load(write(tmp_path, stated((9.0, 2.0, None, None)), form))
     far = replace(job, stated=(replace(job.stated[0], high_m=11.0),))
     with pytest.raises(InputError) as caught:

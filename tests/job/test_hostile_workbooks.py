@@ -93,7 +93,7 @@ ATTRIBUTES = b'<row r="999" ' + b" ".join(b'a%d=""' % i for i in range(400_000))
         ({"sheet": b" " * 20_000_000}, "unpacks to more than 300 times its size"),
     ],
 )
-def test_what_would_cost_a_minute_or_a_gigabyte(book, changes, words):
+def test_oversized_input_is_refused_quickly(book, changes, words):
     assert words in refusal(book, packed(book, **changes))
 
 
@@ -123,7 +123,7 @@ PART_OF_ANOTHER_FILE = [
 
 
 @pytest.mark.parametrize(("name", "words"), PART_OF_ANOTHER_FILE)
-def test_what_no_job_needs_is_refused(book, name, words):
+def test_unneeded_workbook_parts_are_refused(book, name, words):
     said = refusal(book, packed(book, {name: b"<x/>"}))
     assert words in said
     assert "save it" in said

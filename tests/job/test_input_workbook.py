@@ -135,7 +135,7 @@ def test_the_unit_of_a_name(name, stem, unit):
 
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("kind", "survey", "language"), FORMS_IN_LANGUAGES)
-def test_an_empty_form_says_what_is_missing_and_nothing_else(tmp_path, kind, survey, language):
+def test_empty_form_reports_only_what_is_missing(tmp_path, kind, survey, language):
     """Property: explanations and examples, in any language, are not read."""
     path = write_input_workbook(tmp_path / "tank.xlsx", kind, survey, language)
     form, blanks = Form(kind, survey, language), []

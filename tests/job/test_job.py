@@ -108,7 +108,7 @@ def test_folder_and_workbook_give_the_same_job(tmp_path, changes):
     assert_same_job(folder, load(write_workbook(tmp_path / "job.xlsx", **changes)))
 
 
-def test_a_folder_its_settings_file_and_a_text_path_are_the_same_job(tmp_path):
+def test_folder_settings_file_and_text_path_are_one_job(tmp_path):
     folder = write_job(tmp_path / "job")
     one, two = load(str(folder)), load(folder / "job.toml")
     assert_same_job(one, two)
@@ -344,7 +344,7 @@ def test_parts_are_the_same_from_a_folder_and_a_workbook(tmp_path, changes):
     assert folder.files[-1].file == ("tank.stl" if changes is MESH else folder.files[-1].file)
 
 
-def test_lists_may_stand_as_text_and_as_one_number(tmp_path):
+def test_lists_may_be_text_or_one_number(tmp_path):
     lists = {"table.other_densities_kg_m3": [700.0], "table.fine_zones": [[0.0, 0.3]]}
     texts = {"table.other_densities_kg_m3": 700.0, "table.fine_zones": " 0 – 0.3 "}
     jobs = [
@@ -354,7 +354,7 @@ def test_lists_may_stand_as_text_and_as_one_number(tmp_path):
     assert_same_job(*jobs)
 
 
-def test_what_a_kind_cannot_use_may_stand_blank_zero_or_false(tmp_path):
+def test_unused_settings_may_be_blank_zero_or_false(tmp_path):
     nothing = {
         "survey.liquid_level_m": 0,
         "corrections.head": False,

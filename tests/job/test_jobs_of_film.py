@@ -282,7 +282,7 @@ def test_a_camera_with_two_focus_calibrations(tmp_path):
         ({"focus_calibrations.distance_m": "near"}, "focus_calibrations.distance_m", "near"),
     ],
 )  # fmt: skip
-def test_focus_calibrations_that_cannot_be_meant(tmp_path, changes, key, words):
+def test_impossible_focus_calibrations(tmp_path, changes, key, words):
     problems = problems_of(write_folder(tmp_path / "job", focused(changes)))
     if words is None:
         key, words = "focus_calibrations.K1_mm-2", "missing; expected K1 at both distances"
@@ -351,7 +351,7 @@ PROBLEMS = {
 
 
 @pytest.mark.parametrize("name", PROBLEMS)
-def test_what_cannot_be_meant_is_told(tmp_path, name):
+def test_impossible_values_are_reported(tmp_path, name):
     change, file, row, words = PROBLEMS[name]
     problems = problems_of(write_folder(tmp_path / "job", spoilt(change)))
     told = [one for one in problems if words in one.expected]

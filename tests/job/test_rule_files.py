@@ -95,14 +95,14 @@ def test_a_house_rule_is_read():
         ("limit_m3 = 2.5", "limit_m3 = 2,5", "found 'limit_m3 = 2,5'; expected a decimal point"),
     ],
 )
-def test_a_wrong_file_is_told_in_words(old, new, told):
+def test_wrong_rule_file_is_reported(old, new, told):
     assert OWN.count(old) >= 1
     with pytest.raises(InputError) as raised:
         read(OWN.replace(old, new, 1))
     assert told in str(raised.value)
 
 
-def test_all_problems_of_a_file_are_told_in_one_run_with_their_rows():
+def test_rule_file_reports_all_problems_with_rows():
     wrong = OWN.replace("0.25", "-1").replace('side = "upper"', 'side = "left"')
     wrong = wrong.replace('source = "contract 12"\n', "").replace("clause", "clauze")
     with pytest.raises(InputError) as raised:
@@ -135,7 +135,7 @@ def test_a_job_names_a_shipped_rule(tmp_path, form):
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_a_house_rule_lies_beside_the_job_and_is_hashed(tmp_path, form):
+def test_house_rule_in_job_folder_is_hashed(tmp_path, form):
     job = load(write(tmp_path, job_with("house rule.toml", OWN), form))
     assert job.rule == read(OWN)
     digest = hashlib.sha256(OWN.encode()).hexdigest()

@@ -55,7 +55,7 @@ def test_what_is_written(starter):
 
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("kind", KINDS)
-def test_each_kind_has_what_it_can_use(tmp_path, kind):
+def test_forms_have_the_settings_of_their_kind(tmp_path, kind):
     write_starter(tmp_path / "starter", kind)
     assert_written(tmp_path / "starter", kind)
 
@@ -116,7 +116,7 @@ def test_a_starter_for_a_survey(tmp_path, survey):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["", "job.xlsx"])
 @pytest.mark.parametrize("survey", SURVEYS)
-def test_an_empty_survey_is_told_like_missing_points(tmp_path, survey, name):
+def test_empty_survey_is_reported_as_missing_points(tmp_path, survey, name):
     write_starter(tmp_path / "starter", survey=survey)
     with pytest.raises(InputError) as caught:
         load(tmp_path / "starter" / name)
@@ -307,7 +307,7 @@ def test_the_inputs_of_the_documentation_are_declared(tmp_path):
     assert declared == ["scale", "offset", "datum"]
 
 
-def test_the_documentation_names_the_keys_of_cameras_and_instruments():
+def test_docs_name_keys_of_cameras_and_instruments():
     text = DOCS.read_text(encoding="utf-8")
     for register, fields in REGISTER_KEYS.items():
         assert f"{register}.toml" in text
@@ -358,7 +358,7 @@ def test_every_comment_of_the_text_files_is_in_the_language(tmp_path, language, 
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_form_asks_for_the_sizes_of_the_drawing(tmp_path, language, kind):
+def test_forms_have_the_sizes_of_the_drawing(tmp_path, language, kind):
     """What tells a slip of the hand: diameter, height and volume, in text and in the workbook."""
     folder = write_starter_in(tmp_path / "job", kind, None, language)
     settings = tomllib.loads((folder / "job.toml").read_text(encoding="utf-8"))

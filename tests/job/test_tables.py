@@ -36,7 +36,7 @@ def test_byte_order_mark_and_line_ends(start, end):
     assert table.rows == (("é",), ("B",))
 
 
-def test_spaces_before_quotation_marks_are_none_of_the_cell():
+def test_spaces_before_quotation_marks_are_ignored():
     table, problems = csv_table(b'"a", "b"\n"1", "x, y"\n')
     assert not problems
     assert (table.headings, table.rows) == (("a", "b"), (("1", "x, y"),))
@@ -58,7 +58,7 @@ def test_spaces_before_quotation_marks_are_none_of_the_cell():
         (b"a;b\n1;2\n", 1, "separated by ';'"),
     ],
 )
-def test_what_makes_a_csv_file_unreadable(data, row, words):
+def test_unreadable_csv_files(data, row, words):
     _, (problem,) = csv_table(data)
     assert (problem.file, problem.row) == ("a.csv", row)
     assert words in problem.expected
@@ -100,7 +100,7 @@ def test_settings_that_cannot_be_read(text, row, words):
     assert not settings
 
 
-def test_decimal_commas_of_settings_are_told_one_by_one_and_hide_nothing():
+def test_decimal_commas_in_settings_are_reported_one_by_one():
     log = Log()
     text = (
         'x = """\na = 1,5\n"""\r\n[table]\r\nstep_m = 0,01  # cm\r\nlow_m=-1,5e-1\nlist = [1,5]\n'
@@ -134,7 +134,7 @@ def test_settings_are_no_csv_in_words_about_their_encoding(encoding, words):
     assert problem.expected.endswith(f"{words} as UTF-8 text")
 
 
-def test_deeply_nested_settings_are_cut_to_sections_that_nobody_knows():
+def test_deeply_nested_settings_are_unknown_sections():
     settings, _ = read_toml("job.toml", b"a." * 1500 + b"a = 1", Log())
     assert list(settings) == ["a", "a.a", "a.a.a"]
 

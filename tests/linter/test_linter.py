@@ -347,7 +347,7 @@ def show(figure, counts, title):
 
 
 @pytest.mark.slow
-def test_what_is_found_in_spoilt_tables(tmp_path, figure):
+def test_mistakes_found_in_spoilt_tables(tmp_path, figure):
     """One twentieth of the study, of its own seed: nearly everything must be found and located."""
     counts = study(tmp_path, 60, seed=2, steps=("cm", "dm"))
     show(figure, counts, "linter, 60 spoilt tables of cm and dm")
@@ -432,7 +432,7 @@ def changed(row, volume=None, height=None, rows=None):
         ("-65.000", "expected a volume of 0 or more"),
     ],
 )
-def test_one_wrong_volume_is_told_with_what_was_meant(written, words, tmp_path):
+def test_wrong_volume_is_reported_with_correction(written, words, tmp_path):
     report = lint_rows(tmp_path, changed(50, written))
     assert words in found(report)[52]
     assert found(report)[52].startswith("table.csv, row 52, volume_m3: error: ")
@@ -440,7 +440,7 @@ def test_one_wrong_volume_is_told_with_what_was_meant(written, words, tmp_path):
     assert report.errors >= 1
 
 
-def test_a_long_blank_is_told_once_and_a_short_one_row_by_row(tmp_path):
+def test_long_blank_is_reported_once_short_one_by_row(tmp_path):
     """A critical zone is left blank in a table that is whole."""
     for blanks, told, errors in ((10, 1, 0), (9, 0, 9)):
         rows = [list(row) for row in cylinder_rows()]
@@ -452,7 +452,7 @@ def test_a_long_blank_is_told_once_and_a_short_one_row_by_row(tmp_path):
         assert sum("blank; expected a number" in text for text in said) == report.errors == errors
 
 
-def test_shifted_rows_are_told_together(tmp_path):
+def test_shifted_rows_are_reported_together(tmp_path):
     rows = cylinder_rows()
     for row in range(40, 60):
         rows = changed(row, f"{float(rows[row][1]) + 0.1:.3f}", rows=rows)
@@ -499,7 +499,7 @@ def test_rows_that_are_missing_or_doubled(tmp_path):
 
 
 @pytest.mark.parametrize("written", ["0.05", "5.00", "0.503", "0.80"])
-def test_one_wrong_height_is_told_with_the_right_one(written, tmp_path):
+def test_wrong_height_is_reported_with_the_right_one(written, tmp_path):
     report = lint_rows(tmp_path, changed(50, height=written))
     assert {finding.problem.row for finding in report.findings} == {52}
     assert "expected 0.5" in found(report)[52]
@@ -882,9 +882,7 @@ HEADINGS = st.sampled_from(["height_m,volume_m3", "cm;L;cm;L", "a,b", "", "Ullag
     spoilt_cells=st.lists(st.tuples(st.integers(0, 30), st.integers(0, 1), TOKENS), max_size=12),
     garbage=st.lists(st.lists(TOKENS, min_size=1, max_size=5), max_size=8),
 )
-def test_whatever_stands_in_a_file_is_told_in_words(
-    heading, separator, spoilt_cells, garbage, tmp_path_factory
-):
+def test_any_file_content_is_handled(heading, separator, spoilt_cells, garbage, tmp_path_factory):
     """Property: findings or one of our exceptions, never another one."""
     rows = [[f"{k / 100:.2f}", f"{1.3 * k:.3f}"] for k in range(31)]
     for row, column, token in spoilt_cells:

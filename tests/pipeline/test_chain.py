@@ -36,7 +36,7 @@ def test_an_inside_survey_keeps_its_radius(tmp_path):
 
 
 @pytest.mark.slow
-def test_two_rings_in_a_course_make_two_sections_and_a_frustum_is_exact(tmp_path):
+def test_two_rings_in_a_course_give_exact_frustum(tmp_path):
     found = result_of(tmp_path, radius=lambda theta, z: 6.5 + 0.004 * z, rings=2)
     assert len(found.wall.sections) == 10
     low, high, inset = 6.5, 6.5 + 0.004 * 9.5, 0.008
@@ -124,7 +124,7 @@ def test_the_frame_changes_nothing(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_given_covariance_equal_to_the_sds_gives_the_same_table(tmp_path):
+def test_covariance_equal_to_sds_gives_same_table(tmp_path):
     by_sd = result_of(tmp_path / "a", noise_mm=2.0, sd_mm=2.0)
     full = result_of(tmp_path / "b", noise_mm=2.0, covariance_m2=4e-6 * np.eye(360))
     assert full.table.u_m3 == pytest.approx(by_sd.table.u_m3, rel=1e-9)
@@ -153,7 +153,7 @@ def test_the_noise_is_estimated_when_no_covariance_is_given(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_posteriori_scaling_mends_wrong_sds(tmp_path):
+def test_a_posteriori_scaling_corrects_wrong_sds(tmp_path):
     options = {"noise_mm": 3.0, "sd_mm": 1.0, "points_per_ring": 72}
     prior = result_of(tmp_path / "a", **options)
     posterior = result_of(tmp_path / "b", **options, settings={"adjustment.scale": "a_posteriori"})
@@ -171,7 +171,7 @@ def test_a_course_left_without_wall_points_is_refused(tmp_path):
         run(replace(job, points=replace(job.points, xyz_m=xyz)))
 
 
-def test_progress_is_told(tmp_path):
+def test_progress_is_reported(tmp_path):
     write_job(tmp_path / "job")
     steps = []
     run(tankcal.load(tmp_path / "job"), steps.append)
@@ -244,7 +244,7 @@ def test_the_propagated_sd_is_the_scatter_of_simulated_surveys(example_result, f
 
 
 @pytest.mark.study
-def test_the_propagated_sd_is_that_by_differences_and_of_surveys_study(example_result, figure):
+def test_propagated_sd_by_differences_and_simulation_study(example_result, figure):
     """Differences have no scatter; the surveys beside them say that curvature adds nothing.
 
     The same draws through the differences take out what 200 surveys scatter by chance: the ratio is
@@ -269,7 +269,7 @@ def test_a_result_shows_itself_in_a_line_and_a_path_is_no_job(example_result):
 
 
 @pytest.mark.slow
-def test_a_fixed_point_in_a_full_covariance_is_no_stumbling_block(tmp_path):
+def test_full_covariance_with_fixed_point(tmp_path):
     """A network with a fixed point has a singular covariance.
 
     Its circle goes through that point, so the outline's origin moves by the noise, and the area of

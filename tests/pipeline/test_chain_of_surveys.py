@@ -63,7 +63,7 @@ def contribution(result, kind):
     return np.linalg.norm(np.concatenate(found))
 
 
-def test_a_wall_seen_from_the_other_side_than_was_said_is_refused(job, survey):
+def test_wall_seen_from_wrong_side_is_refused(job, survey):
     job = replace(job, measurements=with_control(survey))
     assert job.survey.side == "outside"
     with pytest.raises(InputError, match=r"survey.side: found inside, and all 8 set-ups") as told:
@@ -101,7 +101,7 @@ def _exact(result):
 
 
 @pytest.mark.slow
-def test_what_is_no_job_and_what_has_nothing_to_adjust(job, survey):
+def test_no_job_and_nothing_to_adjust(job, survey):
     with pytest.raises(TypeError, match="expected a Job: adjust"):
         adjust_job("examples/silva-1995")
     with pytest.raises(InputError, match="nothing to adjust"):
@@ -124,7 +124,7 @@ def test_no_capacity_without_a_vertical(job, survey):
     assert len(adjust_job(replace(job, measurements=loose)).names) == 48
 
 
-def test_what_is_undetermined_is_told_at_once():
+def test_undetermined_unknowns_are_reported_at_once():
     report = DatumReport("inner", 3, "", ("all",), vertical=False, scale=False)
     with pytest.raises(
         SolutionError, match=r"(?s)vertical is not .*zenith.*scale is not .*distances"
@@ -255,7 +255,7 @@ def test_a_vague_point_and_a_vague_wall_are_named(job, survey):
 
 
 @pytest.mark.slow
-def test_a_vertical_that_is_hardly_known_is_told(job, survey):
+def test_weak_vertical_is_reported(job, survey):
     points = run(replace(job, measurements=with_control(survey))).job.points
     x, _, z = (points.xyz_m - points.xyz_m.mean(axis=0)).T
     lean = 0.005 * np.column_stack([z, np.zeros(48), -x]).ravel()
@@ -384,5 +384,5 @@ def test_surveys_scatter_as_one_of_them_says(job, figure):
 
 
 @pytest.mark.study
-def test_surveys_scatter_as_one_of_them_says_study(job, figure):
+def test_surveys_scatter_as_predicted_study(job, figure):
     check_surveys(job, draws(250, 1000), figure)

@@ -50,7 +50,7 @@ def test_few_names_all_find_room_and_many_are_thinned():
 # ---- litres per centimetre
 
 
-def test_a_cone_has_a_curve_of_its_own_beside_the_shell():
+def test_cone_has_its_own_curve():
     """Below courses whose cut differs by 0.2 %, which a common axis would hide."""
     height_m = np.arange(0, 9.5, 0.01)
     shell = np.where(height_m < 5, 132.7, 132.5)

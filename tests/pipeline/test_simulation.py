@@ -165,7 +165,7 @@ def test_a_declared_sd_is_u_of_the_budget_and_sd_of_the_draws(tmp_path):
     assert top.k == pytest.approx(Z)  # an sd is known: its degrees of freedom are a shape
 
 
-def test_one_input_of_three_degrees_of_freedom_gives_a_student_interval(tmp_path):
+def test_input_of_three_dof_gives_student_interval(tmp_path):
     rows = [("scale", 5000, "ppm", "A", "normal", 3), ("plate_thickness", 0, "mm")]
     result = run(tmp_path / "job", uncertainty=rows, sd_mm=0.05, settings={"table.step_m": 1.0})
     found = simulated(result)
@@ -242,7 +242,7 @@ def test_slopes_are_those_of_the_tank_with_its_inputs_moved(tank, figure):
     assert len(tried) >= 3
 
 
-def test_curvature_by_temperature_and_expansion_is_the_closed_form(tmp_path):
+def test_curvature_by_temperature_and_expansion(tmp_path):
     settings = {"survey.shell_temperature_c": 30.0, "table.step_m": 0.1}
     result = run(tmp_path / "job", settings=settings)
     levels = result.table.height_m[1:]
@@ -260,7 +260,7 @@ def test_curvature_by_temperature_and_expansion_is_the_closed_form(tmp_path):
         assert column == pytest.approx(exact[pair], rel=2e-3), pair
 
 
-def test_what_is_declared_by_dips_bends_no_row(tmp_path):
+def test_inputs_declared_by_dips_add_no_curvature(tmp_path):
     """Deadwood and roof go with the table's zero: moving it leaves them where the dips are."""
     parts = {
         "deadwood": [("coil", 2.0, 2.5, -2.0, 0.1)],
@@ -305,7 +305,7 @@ def test_an_error_that_no_tank_can_have_takes_a_smaller_step(tmp_path):
 
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("r", [0.0, 1e-6, 1.0])
-def test_a_correlation_does_not_change_what_it_leaves_alone(tmp_path, r):
+def test_correlation_leaves_other_inputs_unchanged(tmp_path, r):
     """Two rectangular sizes: with r = 0 a trapezoid, nearly the same with hardly any r."""
     rows = [
         ("diameter", 3.0, "mm", "B", "rectangular"),
@@ -339,7 +339,7 @@ def test_u_of_a_cauchy_input_is_infinite_in_every_row(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_tilt_nobody_saw_adds_its_square(tmp_path):
+def test_unobserved_tilt_adds_its_square(tmp_path):
     """An upright tank: the slope by the tilt is 0, yet m^2/2 of the volume is never lost."""
     rows = [("tilt", 20.0, "mm/m"), ("plate_thickness", 0, "mm")]
     result = run(tmp_path / "job", uncertainty=rows, sd_mm=0.2, settings={"table.step_m": 1.0})
@@ -350,7 +350,7 @@ def test_a_tilt_nobody_saw_adds_its_square(tmp_path):
 
 
 @pytest.mark.slow
-def test_rows_between_those_that_are_drawn_for_follow_their_neighbours(monkeypatch, tmp_path):
+def test_rows_not_drawn_follow_their_neighbours(monkeypatch, tmp_path):
     """The same table with every row drawn for: ends within a thousandth of u."""
     rows = [("scale", 100, "ppm"), ("datum", 2.0, "mm"), ("offset", 0.5, "mm", "A", "normal", 4)]
     result = run(tmp_path / "job", uncertainty=rows, sd_mm=1.0, settings={"table.step_m": 0.005})
@@ -364,7 +364,7 @@ def test_rows_between_those_that_are_drawn_for_follow_their_neighbours(monkeypat
     assert np.array_equal(some.judged.validated, every.judged.validated)
 
 
-def test_the_result_has_what_the_job_asks_for(tmp_path):
+def test_result_has_what_the_job_requests(tmp_path):
     settings = {"table.step_m": 1.0, "table.monte_carlo": True}
     job = tankcal.load(write_job(tmp_path / "job", settings=settings))
     told = []

@@ -315,17 +315,17 @@ OF_KIND = [
 
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_plausible_job_is_told_nothing(tmp_path, kind):
+def test_plausible_job_has_no_warning(tmp_path, kind):
     assert implausible(told(tmp_path / "job", sound(kind))) == {}
 
 
 @pytest.mark.slow
-def test_a_plausible_cone_is_told_nothing(tmp_path):
+def test_plausible_cone_has_no_warning(tmp_path):
     assert implausible(told(tmp_path / "job", sound("vertical", settings=CONE))) == {}
 
 
 @pytest.mark.slow
-def test_random_jobs_as_they_are_built_are_told_nothing(tmp_path):
+def test_random_realistic_jobs_have_no_warning(tmp_path):
     """200 of all kinds and sizes, of three metals, at any temperature that tanks are kept at."""
     alarms = []
     for number, parts in enumerate(plausible_jobs(200)):
@@ -337,7 +337,7 @@ def test_random_jobs_as_they_are_built_are_told_nothing(tmp_path):
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("slip", "code", "key"), OF_ALL)
 @pytest.mark.parametrize("kind", STEEL)
-def test_a_slip_that_any_kind_knows(tmp_path, kind, slip, code, key):
+def test_slips_of_every_kind(tmp_path, kind, slip, code, key):
     assert_told(tmp_path, sound(kind, **slip), code, key)
 
 
@@ -372,7 +372,7 @@ def assert_told(tmp_path, parts, code, key):
 
 
 @pytest.mark.slow
-def test_a_doubt_stands_on_the_first_page_and_last_in_the_terminal(tmp_path, capsys):
+def test_doubtful_input_is_on_first_page_and_last_in_terminal(tmp_path, capsys):
     slip = settings(datum__reference_height_m=8.9, table__language="pt-BR")
     result = tankcal.run(tankcal.load(write_folder(tmp_path / "job", sound("vertical", **slip))))
     _tell(tmp_path / "out", [tmp_path / "record.json"], result.warnings, result, None)
@@ -392,7 +392,7 @@ def test_a_doubt_stands_on_the_first_page_and_last_in_the_terminal(tmp_path, cap
     assert "blocks.result(" in sources[place - 1]
 
 
-def test_a_certificate_without_doubts_says_nothing_of_them(tmp_path):
+def test_certificate_without_doubts_has_no_doubtful_section(tmp_path):
     result = tankcal.run(tankcal.load(write_folder(tmp_path / "job", sound("sphere"))))
     assert certificate.doubtful_input(Paper(record_of(result))) == []
 
@@ -442,7 +442,7 @@ def of_control(factor, readings=(), sd_m=0.0):
     return scale_of_control(adjusted, readings, SimpleNamespace(control=table, setups=setups))
 
 
-def test_lengths_a_thousandth_too_long_are_told_by_two_control_points():
+def test_two_control_points_reveal_a_scale_error():
     (line,) = of_control(1.001)
     assert (line.file, line.expected.code) == ("control.csv", "control_scale")
     assert "+1000.0 ppm" in str(line)
@@ -451,7 +451,7 @@ def test_lengths_a_thousandth_too_long_are_told_by_two_control_points():
     assert "+999.0 ppm" in str(line)
 
 
-def test_lengths_within_their_sds_are_not_told():
+def test_lengths_within_their_sds_give_no_warning():
     sound = [reading("slope distance", ("S1", "B"), 20.0, -0.003)]
     assert of_control(1.0002, sound) == []
     assert of_control(1.001, sd_m=0.02) == []  # 20 mm: no more than the adjusted point's own sd
@@ -459,7 +459,7 @@ def test_lengths_within_their_sds_are_not_told():
     assert of_control(1.001, opposite) == []  # no scale: a blunder, which the search tells
 
 
-def test_a_check_reading_that_denies_the_scale_is_told():
+def test_check_reading_against_the_scale_is_reported():
     off = reading("distance", ("P1", "P5"), 6.44, 0.0069, check=True)
     (line,) = check_readings_off([off, reading("distance", ("P1", "P5"), 6.44, 0.002, check=True)])
     assert (line.file, line.row, line.expected.code) == (
@@ -497,5 +497,5 @@ def test_the_table_names_keys_and_columns_that_there_are():
 
 
 @pytest.mark.parametrize("language", ["pt-BR", "es"])
-def test_every_line_of_the_table_is_told_in_other_languages(language):
+def test_plausibility_table_is_translated(language):
     assert set(load_words(language)["warnings"]) >= CODES

@@ -69,7 +69,7 @@ def test_the_delivery_that_decides_is_simulated(tmp_path, figure):
 
 
 @pytest.mark.slow
-def test_deliveries_hold_a_limit_from_where_those_to_the_empty_tank_do(tmp_path):
+def test_least_delivery_is_that_down_to_the_empty_tank(tmp_path):
     (found,) = computed(tmp_path).rule.uncertainty
     assert found.code == "holds_from"
     heights = [found.from_m, *np.linspace(found.from_m, 9.4, 7)]
@@ -98,7 +98,7 @@ READING[-2:] = [[*row, None, "B", "normal", None, None] for row in READING[-2:]]
 
 
 @pytest.mark.slow
-def test_what_reading_adds_is_in_u_whichever_method_counts(tmp_path):
+def test_reading_is_in_u_by_either_method(tmp_path):
     """Two readings between rows: 0.3 and 0.4 m3 twice each, 0.707 m3 in squares."""
     result = computed(tmp_path, "1.13,0,,\n5.13,4.02,,\n1,,,\n0.13,,,\n", inputs=READING, rule="")
     by_dips = {(one["low_m"], one["high_m"]): one for one in to_plain(budgets_of(result))}

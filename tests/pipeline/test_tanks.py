@@ -46,7 +46,7 @@ def test_liquid_head_is_that_of_the_published_example(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_survey_of_the_full_tank_needs_no_load_for_the_same_liquid(tmp_path):
+def test_survey_of_full_tank_needs_no_head_for_same_liquid(tmp_path):
     settings = {
         "survey.liquid_level_m": HEIGHT,
         "survey.liquid_density_kg_m3": 850.0,
@@ -59,7 +59,7 @@ def test_a_survey_of_the_full_tank_needs_no_load_for_the_same_liquid(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_table_of_another_density_is_that_of_a_job_of_that_density(tmp_path):
+def test_table_of_other_density_equals_its_own_job(tmp_path):
     both = inside_cylinder(
         tmp_path / "a",
         {"table.liquid_density_kg_m3": 700.0, "table.other_densities_kg_m3": [1000.0]},
@@ -106,7 +106,7 @@ def test_a_shaped_bottom_adds_its_volume(tmp_path, form, centre, volume):
 
 
 @pytest.mark.slow
-def test_dips_from_a_plate_in_the_middle_of_a_cone_begin_with_an_empty_tank(tmp_path):
+def test_dips_from_plate_in_cone_begin_with_empty_tank(tmp_path):
     settings = {
         "bottom.form": "cone",
         "bottom.centre_z_m": -0.15,
@@ -214,7 +214,7 @@ def test_a_correction_that_is_switched_off_is_shown_and_not_made(tmp_path):
 
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("slope", [0.03, 1 / 70])
-def test_sections_square_to_the_axis_times_the_factor_give_the_same_table(tmp_path, slope):
+def test_square_sections_times_tilt_factor_give_same_table(tmp_path, slope):
     """Both routes of methods for a leaning shell: cut level, or square to the axis and stretched.
 
     Second method: points turned upright, one circle a course, areas times sqrt(1 + m^2), course
@@ -250,7 +250,7 @@ def test_without_the_tilt_heights_are_along_the_axis(tmp_path):
     assert found.at(2.0).value_m3 == pytest.approx(PLAN * 2.0, rel=1e-6)
 
 
-def test_heights_expand_only_where_it_is_asked_for(tmp_path):
+def test_heights_expand_only_on_request(tmp_path):
     warm = {"survey.shell_temperature_c": -80.0 + 40.0, "table.height_expansion": True}
     found = inside_cylinder(tmp_path / "job", warm)
     stretch = 1 + 1.1e-5 * 60
@@ -366,7 +366,7 @@ def test_a_lying_tank_is_its_solid(tmp_path):
     assert found.gross is None
 
 
-def test_plates_of_an_outside_survey_come_off_a_lying_tank_and_a_sphere(tmp_path):
+def test_plates_are_subtracted_from_lying_tank_and_sphere(tmp_path):
     outside = {"survey.side": "outside"}
     settings = outside | {"horizontal.thickness_mm": 6.0}
     lying = result_of(tmp_path / "a", kind="horizontal", settings=settings)
@@ -416,7 +416,7 @@ def test_a_mesh_with_a_hole_is_refused(tmp_path):
         result_of(tmp_path / "job", kind="mesh", mesh=stl(lid=False))
 
 
-def test_what_a_solid_depends_on_is_named_when_it_is_not_declared(tmp_path):
+def test_undeclared_inputs_of_solid_are_named(tmp_path):
     found = result_of(
         tmp_path / "job", kind="horizontal", settings=INSIDE, uncertainty=[("diameter", 2.0, "mm")]
     )

@@ -48,7 +48,7 @@ def test_the_plan_is_the_network_of_the_dissertation(prediction):
     assert not prediction.weak
 
 
-def test_the_filled_job_adjusts_to_what_was_predicted(prediction, filled):
+def test_filled_job_adjusts_as_predicted(prediction, filled):
     """Second method: the whole adjustment of the survey, from readings without errors."""
     adjustment = adjust_survey(filled)
     assert adjustment.sigma0 < 1e-6
@@ -176,7 +176,7 @@ def test_sections_against_the_written_covariance(prediction):
 
 
 @pytest.mark.slow
-def test_what_a_blunder_does_to_the_volume(prediction, filled, figure):
+def test_effect_of_blunder_on_volume(prediction, filled, figure):
     """Second method: the tape that is told to be worst misread by its undetectable blunder, and the
     survey adjusted without a search."""
     group = next(one for one in prediction.reliability if one.kind == "distance")
@@ -281,7 +281,7 @@ def test_an_inside_plan(tmp_path):
     assert found.meets
 
 
-def test_what_a_prediction_tells_in_json(prediction):
+def test_json_of_a_prediction(prediction):
     found = plain_of(prediction)
     assert found["survey"]["unknowns"] == 487
     assert found["survey"]["datum"]["defect"] == 6

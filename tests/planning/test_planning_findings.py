@@ -75,7 +75,7 @@ def shape(predicted):
     return np.sqrt(np.diag(slopes @ adjusted.covariance_m2(points) @ slopes.T))
 
 
-def test_three_distances_along_three_axes_suffice_two_in_a_plane_do_not(shape_sds, figure):
+def test_three_distances_suffice_two_in_a_plane_do_not(shape_sds, figure):
     """Published: tests 5 (eight), 6 (three axes), 9 and 10 (two in a plane; residuals at check
     points are 1.3 times as large). Here: three are within a factor of 1.7 of eight in all of the
     shape; two upright ones lose the widths, two level ones the height."""
@@ -103,7 +103,7 @@ def test_rolled_photographs_do_without_the_third_axis(shape_sds, figure):
     assert (upright < 1.1 * three).all()
 
 
-def test_one_fixed_station_holds_the_frame_and_no_distance_the_scale(network, shape_sds):
+def test_fixed_station_holds_frame_but_not_scale(network, shape_sds):
     """Published: one fixed station is enough. A station holds six of seven ways of moving; without
     a distance the seventh is left, and told."""
     assert np.isfinite(shape_sds("H1")).all()

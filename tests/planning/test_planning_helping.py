@@ -51,7 +51,7 @@ def test_more_never_harms_and_less_never_helps(effects):
 
 
 @pytest.mark.slow
-def test_the_best_come_first_and_cost_what_they_cost(plan, effects):
+def test_best_changes_come_first_with_their_costs(plan, effects):
     assert [one.relative_u for one in effects] == sorted(one.relative_u for one in effects)
     for one in effects:
         assert one.change.cost == pytest.approx(cost_of(one.change.plan) - cost_of(plan))
@@ -61,7 +61,7 @@ def test_the_best_come_first_and_cost_what_they_cost(plan, effects):
 
 
 @pytest.mark.slow
-def test_what_is_added_into_an_obstacle_cannot_stand_there(plan):
+def test_addition_in_an_obstacle_is_refused(plan):
     """A station half-way between two others, where something is in the way."""
     added = next(one for one in changes_of(plan, ("add",), ("photo_station",)))
     place = next(one.xyz_m for one in added.plan.photos if one.station == added.name)
@@ -120,7 +120,7 @@ def test_a_row_that_is_added_keeps_away_from_the_welds(plan):
     assert rows == pytest.approx([0.5, 1.4])
 
 
-def test_names_of_what_is_added_may_stand_in_a_job(plan):
+def test_names_of_additions_are_valid_in_a_job(plan):
     for one in changes_of(plan, ("add",)):
         names = [*one.plan.points, *(photo.name for photo in one.plan.photos)]
         assert all(is_name(name) for name in names)
@@ -147,7 +147,7 @@ def test_greedy_goes_on_until_the_limit_is_met(plan):
 
 
 @pytest.mark.slow
-def test_the_smallest_design_meets_the_limit_and_nothing_more_can_go(plan):
+def test_smallest_design_meets_limit_and_is_minimal(plan):
     limit = 1.02 * predict(plan).relative_u
     limited = replace(plan, limits=replace(plan.limits, relative_u=limit))
     path = smallest(limited, items=("tape",))

@@ -90,7 +90,7 @@ def test_an_accuracy_of_zero_for_everything(changed):
     assert "an accuracy of zero for everything: expected standard deviations above 0" in line
 
 
-def test_names_that_nobody_defines(changed):
+def test_undefined_names(changed):
     lines = told(
         changed(
             ('camera = "UMK"', 'camera = "UMX"'),
@@ -129,7 +129,7 @@ def test_a_tie_from_a_point_to_itself(changed):
     assert line == "distances.csv, row 3, to: found '1-1' on both sides; expected two points"
 
 
-def test_control_that_stands_there_twice_or_in_another_frame(changed):
+def test_control_given_twice_or_in_another_frame(changed):
     """A row again would count as another observation of the same coordinates."""
     folder = changed()
     heading = "point,x_m,y_m,z_m,sx_mm,sy_mm,sz_mm,system\n"
@@ -413,7 +413,7 @@ def test_a_camera_that_sees_no_target(changed):
     assert "photograph R1-1 sees no target (other points: 3), and 10 more of this ring" in line
 
 
-def test_decimal_commas_are_told_each_with_its_row(changed):
+def test_decimal_commas_are_reported_with_their_rows(changed):
     lines = told(changed(("length_m = 9.0", "length_m = 9,0")))
     assert len(lines) == 3
     assert all("found 'length_m = 9,0'; expected a decimal point" in line for line in lines)
@@ -422,7 +422,7 @@ def test_decimal_commas_are_told_each_with_its_row(changed):
     assert "found 'c_mm = 100,0'; expected a decimal point" in line
 
 
-def test_what_a_change_is_called_on_the_terminal(changed):
+def test_names_of_changes_on_the_terminal(changed):
     """Rows of targets have theirs in their names, in changes.csv as well."""
     plan = load_plan(changed(("levels = 1 ", "levels = 2 ")))
     rows = changes_of(plan, ("add", "drop"), ("target_row",))

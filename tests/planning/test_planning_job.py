@@ -54,7 +54,7 @@ def rows_of(path):
     return list(csv.DictReader(line for line in lines if not line.startswith("#")))
 
 
-def test_an_empty_job_says_everything_that_is_missing(planned):
+def test_empty_job_reports_everything_missing(planned):
     """Every tape, every control coordinate, every setting that is known on the day only."""
     with pytest.raises(InputError) as caught:
         load(planned[1])
@@ -68,7 +68,7 @@ def test_an_empty_job_says_everything_that_is_missing(planned):
         assert "FILL IN: temperature of the shell" in text
 
 
-def test_what_is_known_beforehand_is_there(planned):
+def test_empty_job_has_what_is_known(planned):
     prediction, folder = planned
     plan = prediction.plan
     targets = rows_of(folder / "targets.csv")

@@ -72,7 +72,7 @@ def test_observed_values_do_not_matter(pair):
     assert other.point_sd_m == pytest.approx(predicted.point_sd_m, rel=1e-12)
 
 
-def test_a_missing_datum_is_told_as_by_the_adjustment():
+def test_missing_datum_is_reported_as_by_adjustment():
     _, survey = at_adjusted(PHOTOS)
     bare = replace(survey, observations=survey.observations[1:])
     with pytest.raises(SolutionError, match="datum defect 6"):

@@ -22,7 +22,7 @@ def test_at_the_limits_the_blur_is_the_one_allowed(f_number):
     assert near < 6.0 < far
 
 
-def test_the_hyperfocal_distance_is_sharp_from_its_half_to_the_end():
+def test_hyperfocal_distance_is_sharp_from_its_half():
     # closed form: 35 mm, f/8, 0.02 mm: 35^2 / 0.16 + 35 mm
     h = formulas.hyperfocal_m(35.0, 8, 0.02)
     assert h == pytest.approx(7.69125)

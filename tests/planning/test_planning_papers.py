@@ -118,7 +118,7 @@ def test_turns_and_rolls_are_those_of_the_plan(tmp_path):
     assert (first["photographs"], first["rolls"]) == (4, "0°, 90°")
 
 
-def test_what_tapes_are_and_how_long(prediction):
+def test_kinds_and_lengths_of_tapes(prediction):
     listed = {one["tape"]: one for one in rows.ties(prediction)}
     assert (listed["V1"]["what"], listed["H1"]["what"]) == ("upright", "level")
     assert listed["V1"]["expected_m"] == pytest.approx(9.0)
@@ -150,7 +150,7 @@ def test_lines_side_by_side_are_read_down(prediction):
 
 
 @pytest.mark.slow
-def test_weak_and_lost_points_are_told(poor):
+def test_weak_and_lost_points_are_reported(poor):
     assert poor.undetermined
     assert poor.weak
     text = " ".join(texts_of(outlook(PlanPaper(poor))))

@@ -106,7 +106,7 @@ def test_images_that_are_read_again(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_a_blunder_in_one_set_does(tmp_path, figure):
+def test_effect_of_blunder_in_one_set(tmp_path, figure):
     """Second method: the worst direction of one set misread by a hundredth of its undetectable
     blunder, which leaves the outlines as they are, and the filled job adjusted."""
     found = with_sets(tmp_path, 2)

@@ -67,7 +67,7 @@ def names_in(figure):
 
 
 @pytest.mark.slow
-def test_what_stands_on_the_reference_weld_has_no_arc(prediction):
+def test_arc_is_zero_on_the_reference_weld(prediction):
     """Rounding just short of a full turn is none: 0.000 m, not once around."""
     assert float(full_turn(-1e-17)) == 0.0
     assert float(full_turn(-0.25)) == pytest.approx(2 * np.pi - 0.25)
@@ -78,7 +78,7 @@ def test_what_stands_on_the_reference_weld_has_no_arc(prediction):
 
 
 @pytest.mark.slow
-def test_what_is_not_seen_is_marked(hidden):
+def test_unseen_targets_are_marked(hidden):
     """In lists, sheets, sketch and counts: a target that the prediction does not determine."""
     lost = {one.name for one in hidden.undetermined}
     marked = {one["point"] for one in rows.targets(hidden) if one["done"] == "unseen"}
@@ -146,7 +146,7 @@ def _changes(plan, item):
 
 
 @pytest.mark.slow
-def test_what_is_written_down_on_site_has_its_column(prediction):
+def test_field_readings_have_a_column(prediction):
     text = texts_of(sheets(PlanPaper(prediction)))
     assert "Temp. °C" in text
     assert "'heading': 'File'" in text
@@ -160,7 +160,7 @@ def test_an_accuracy_that_is_not_given_is_not_zero(prediction):
 
 
 @pytest.mark.slow
-def test_headings_stand_on_the_page_of_their_tables(prediction):
+def test_headings_are_on_the_page_of_their_tables(prediction):
     data = [block.data for block in sheets(PlanPaper(prediction))]
     for number, one in enumerate(data):
         if one.get("text") in ("Tapes, heights and plumb lines", "Control points"):
@@ -195,7 +195,7 @@ def test_the_unrolled_wall_shows_welds_and_the_names_of_tapes(prediction):
 
 
 @pytest.mark.slow
-def test_what_is_added_has_a_place(prediction, effects, tmp_path):
+def test_additions_have_a_place(prediction, effects, tmp_path):
     placed = {"photo_station", "tape", "control_point"}
     for one in effects:
         has_place = one.change.action == "add" and one.change.item in placed
@@ -214,7 +214,7 @@ def test_what_is_added_has_a_place(prediction, effects, tmp_path):
 
 
 @pytest.mark.slow
-def test_what_can_be_spared_is_listed_beside_what_would_help(prediction, effects):
+def test_spared_items_are_listed_with_helpful_ones(prediction, effects):
     drop, add = (
         next(one for one in effects if one.change.action == action) for action in ("drop", "add")
     )
@@ -232,7 +232,7 @@ def test_what_can_be_spared_is_listed_beside_what_would_help(prediction, effects
 
 
 @pytest.mark.slow
-def test_what_an_error_does_that_nothing_controls(tmp_path):
+def test_effect_of_uncontrolled_error(tmp_path):
     """Closed form: a scale that hangs on one tape of length L turns dL into 2 V dL / L."""
     rolled = ("rolls_deg = [0]", "rolls_deg = [0, 90]")
     folder = changed_plan(tmp_path, ('datum = "control"', 'datum = "inner"'), rolled)

@@ -24,7 +24,7 @@ def points(*xyz):
     return np.array(xyz, dtype=float)
 
 
-def test_a_box_hides_what_is_behind_it():
+def test_box_hides_targets_behind_it():
     """Closed form: the box from x = 4 to 5 stands in the way of rays that pass below z = 3."""
     box = Box(np.array([4.0, -1.0, 0.0]), np.array([5.0, 1.0, 3.0]))
     seen = points([10, 0, 2], [10, 0, 4.49], [10, 0, 4.51], [3.9, 0, 2], [10, 2.51, 2], [4.5, 0, 2])
@@ -32,7 +32,7 @@ def test_a_box_hides_what_is_behind_it():
     assert find_hidden(box, EYE, seen).tolist() == [True, True, False, False, False, True]
 
 
-def test_a_box_beside_a_ray_along_an_axis_hides_nothing():
+def test_box_next_to_an_axis_parallel_ray_hides_nothing():
     """Closed form: rays that run along the axes of the frame, with two sides of length zero."""
     box = Box(np.array([4.0, 0.5, 0.0]), np.array([5.0, 1.0, 3.0]))
     assert find_hidden(box, EYE, points([10, 0, 2], [10, 0.75 * 2, 2])).tolist() == [False, True]

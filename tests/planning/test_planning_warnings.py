@@ -32,7 +32,7 @@ def told(folder):
     return lines(predict(load_plan(folder)).warnings)
 
 
-def test_a_sound_plan_says_what_its_run_will_say(prediction):
+def test_plan_gives_the_warnings_of_its_run(prediction):
     """Second method: the chain itself, of the job with the values that the plan computes."""
     measurements = draw_measurements(prediction.plan, prediction.measurements, prediction.predicted)
     job = replace(prediction.plan.job, measurements=measurements)
@@ -53,7 +53,7 @@ def test_on_the_terminal_on_paper_and_in_plan_json(prediction, tmp_path, capsys)
     assert found[0]["text"] in said[0]
 
 
-def test_targets_that_are_not_seen_and_heights_that_nothing_fixes(tmp_path):
+def test_unseen_targets_and_undetermined_heights(tmp_path):
     """Four of six set-ups leave a part of the turn unseen; nothing measured holds the frame."""
     folder = with_setups(tmp_path)
     (folder / "control.csv").unlink()
@@ -167,7 +167,7 @@ def test_set_ups_that_share_no_points(tmp_path):
         predict(replace(plan, setups=alone))
 
 
-def test_what_a_camera_lacks_is_told_with_what_is_strange_in_it(tmp_path, capsys):
+def test_missing_and_strange_camera_values_are_reported(tmp_path, capsys):
     folder = changed_plan(tmp_path)
     text = (folder / "cameras.toml").read_text()
     assert "c_mm = " in text

@@ -35,7 +35,7 @@ def test_it_is_read_as_dataclasses(example_record, example_result):
 @pytest.mark.parametrize(
     "text", ["", "[]", "{}", '{"format": "tankcal-record/9"}', "\x00", "{" * 100_000]
 )
-def test_what_is_no_record_is_refused(text, tmp_path):
+def test_foreign_file_is_refused_as_record(text, tmp_path):
     path = tmp_path / "record.json"
     path.write_text(text)
     with pytest.raises(InputError, match=r"record\.json"):
@@ -78,7 +78,7 @@ def test_shares_of_the_budget_add_up_to_one(record):
     assert datum["sensitivity_unit"] == "m3/mm"
 
 
-def test_every_point_is_there_once_and_sections_hold_the_used_ones(record):
+def test_points_are_listed_once_and_sections_hold_used_ones(record):
     names = [row["point"] for row in record["points"]]
     assert len(names) == len(set(names)) == record["shell"]["points"]
     used = {row["point"] for row in record["points"] if row["used"]}
@@ -87,7 +87,7 @@ def test_every_point_is_there_once_and_sections_hold_the_used_ones(record):
     assert len(used) + len(record["rejected"]) == len(names)
 
 
-def test_the_files_are_told_by_their_hash(record):
+def test_files_are_identified_by_hash(record):
     import hashlib
 
     from conftest import EXAMPLE
@@ -105,7 +105,7 @@ def test_no_path_of_a_machine_is_in_the_record(example_record):
     assert str(ROOT) not in example_record.read_text()
 
 
-def test_what_was_not_declared_is_said(tmp_path):
+def test_undeclared_values_are_stated(tmp_path):
     write_job(tmp_path / "job", uncertainty=[("scale", 20, "ppm")])
     record = record_of(tankcal.run(tankcal.load(tmp_path / "job")))
     choices = {choice["code"]: choice["value"] for choice in record["choices"]}

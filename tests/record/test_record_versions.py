@@ -62,7 +62,7 @@ def test_a_record_goes_into_its_dataclass_and_back(made):
         assert to_plain(from_plain(Record, plain)) == plain
 
 
-def test_every_released_version_has_kept_records_with_all_its_keys():
+def test_every_version_has_kept_records_with_all_keys():
     """A list of keys that was released stays as it is: the kept records say the same."""
     listed = {int(path.parent.name): path for path in KEPT.glob("*/keys.txt")}
     assert set(listed) >= set(range(1, VERSION))

@@ -122,7 +122,7 @@ def test_what_cannot_be_read_is_refused_in_one_line(change, words, tmp_path):
     assert len(told.value.problems) == 1
 
 
-def test_beside_a_plan_of_a_version_to_come_nothing_is_replaced(tmp_path):
+def test_plan_of_later_version_is_not_replaced(tmp_path):
     (tmp_path / "job").mkdir()
     (tmp_path / "plan.json").write_text('{"format": "tankcal-plan/9"}', encoding="utf-8")
     with pytest.raises(InputError, match="tankcal-plan/9"):

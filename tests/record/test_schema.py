@@ -137,14 +137,14 @@ def test_a_number_that_no_float_holds_is_refused():
         from_plain(Thing, to_plain(thing()) | {"volume_m3": [10**400]})
 
 
-def test_of_many_problems_the_first_are_told():
+def test_first_of_many_problems_are_reported():
     plain = to_plain(thing()) | {"volume_m3": ["x"] * 99}
     _, found = checked(plain, json_schema(Thing), "t")
     assert len(found) == MOST_TOLD + 1
     assert "further values" in str(found[-1])
 
 
-def test_every_value_of_a_record_is_told_at_once(tmp_path, capsys):
+def test_all_wrong_values_of_record_are_reported(tmp_path, capsys):
     record = kept("film.json.gz")
     record["adjustment"]["sigma0"] = "high"
     record["points"][2]["x_m"] = {"a": 1}
@@ -174,7 +174,7 @@ def places(value, path=()):
         pytest.param("film.json.gz", 1, marks=pytest.mark.study),
     ],
 )
-def test_a_record_spoilt_anywhere_is_read_or_refused_in_plain_lines(name, every):
+def test_spoilt_record_is_read_or_refused_in_words(name, every):
     """Property: any value of a record replaced by any other; nothing but InputError comes out."""
     record, rng = kept(name), np.random.default_rng(len(name))
     refused = 0
@@ -238,7 +238,7 @@ def test_another_program_finds_a_result_valid(row):
     jsonschema.Draft202012Validator(saved_format.schema(found.get("kind"))).validate(found)
 
 
-def test_another_program_refuses_what_is_refused_here():
+def test_json_schema_refuses_the_same_records():
     """Other program: each single change of a value to one of another type."""
     schema = json_schema(Thing)
     judge = jsonschema.Draft202012Validator(schema)
@@ -262,7 +262,7 @@ def test_the_list_of_keys_in_the_docs_is_that_of_the_dataclasses():
     assert DOCS.read_text(encoding="utf-8") == documented(), STALE
 
 
-def test_every_key_of_the_record_is_told_in_its_description():
+def test_record_description_names_every_key():
     text = DOCS.with_name("record-format.md").read_text(encoding="utf-8")
     told = set(re.findall(r"[A-Za-z_][A-Za-z0-9_]*", text))
     keys = {one.rpartition(".")[2] for one in keys_of_schema(json_schema(Record))} - {"*"}

@@ -213,7 +213,7 @@ def assert_alike(one, other, place):
 
 
 @pytest.mark.slow
-def test_a_survey_alone_has_the_same_format_and_nothing_of_a_tank(only, whole):
+def test_record_of_survey_alone_has_no_tank(only, whole):
     record, full = only[0], records.load(whole[1] / "record.json")
     assert record.keys() == full.keys()
     assert all(not record[key] for key in ("shell", "capacity", "sections", "courses", "budget"))
@@ -248,7 +248,7 @@ def test_the_full_covariance_is_read_as_a_job_reads_it(only):
     np.testing.assert_allclose(blocks, own, rtol=1e-9, atol=1e-20)
 
 
-def test_what_was_measured_with_is_in_the_record(only):
+def test_instruments_are_in_the_record(only):
     found = only[0]["adjustment"]
     (tape,) = found["instruments"]
     assert tape["details"] == {"certificate": HARD_TEXT}
@@ -286,7 +286,7 @@ def test_error_ellipsoid_and_ellipse_in_closed_form():
     assert adjusted_points_of(made(turned))[0].ellipse_azimuth_deg == pytest.approx(45.0)
 
 
-def test_with_an_estimated_variance_factor_ellipsoids_are_those_of_fisher():
+def test_ellipsoids_with_estimated_variance_factor_use_fisher():
     """Closed form: 3 F(0.95; 3, 10) in place of the chi-square."""
     (point,) = adjusted_points_of(made(np.diag([1e-6] * 3), cov_scale=1.1))
     factor = np.sqrt(3 * scipy.stats.f.ppf(0.95, 3, 10))
@@ -440,7 +440,7 @@ def test_of_very_many_points_the_sheet_has_the_weakest(only, tmp_path, monkeypat
 
 
 @pytest.mark.slow
-def test_without_papers_there_is_what_they_are_made_of(job, only, tmp_path, capsys):
+def test_without_papers_record_and_tables_are_written(job, only, tmp_path, capsys):
     out = tmp_path / "out"
     command = ["run", str(job), "--only", "adjustment", "--out", str(out), "--quiet"]
     assert main([*command, "--no-papers"]) == 0
@@ -475,7 +475,7 @@ def test_csv_files_are_those_of_pandas(tmp_path):
         assert own.read_bytes() == other.read_bytes()
 
 
-def test_what_is_too_large_stays_beside_the_pdf(tmp_path, monkeypatch):
+def test_large_attachments_stay_outside_the_pdf(tmp_path, monkeypatch):
     (tmp_path / "record.json").write_bytes(b"12345")
     assert [one.name for one in attachments.beside(tmp_path, {"record.json": ""})] == [
         "record.json"
@@ -524,7 +524,7 @@ def test_the_chapter_vanishes_without_an_adjustment():
     assert "capacity_curves" in sources
 
 
-def test_long_tables_are_cut_and_say_so(only):
+def test_long_tables_are_cut_with_a_note(only):
     paper = Paper(only[1] / "record.json")
     rows = 30 * readings.removed(paper)
     table, note = readings.table(paper, "removed_readings", rows)
@@ -542,7 +542,7 @@ def test_writing_lets_the_garbage_collector_rest_and_wakes_it():
     assert gc.isenabled()
 
 
-def test_a_plan_asks_for_its_extent_twice_however_many_points_it_has(only, monkeypatch):
+def test_network_plan_computes_its_extent_twice(only, monkeypatch):
     """Asked for each of 26 321 points it took more than ten minutes."""
     asked = []
     extent = figures._extent
@@ -564,7 +564,7 @@ def test_figures_are_drawn_of_every_kind_of_survey(only, station):
     assert "Photo S7" in svg
 
 
-def test_the_ellipses_of_very_many_points_are_those_of_the_weakest(only, monkeypatch):
+def test_plan_of_many_points_draws_weakest_ellipses(only, monkeypatch):
     paper = Paper(only[1] / "record.json")
     assert figures.plan_name(paper) == "plan"
     monkeypatch.setattr(figures, "MANY", 10)
@@ -610,7 +610,7 @@ def test_nothing_redundant_is_said(only):
 
 
 @pytest.mark.parametrize(("chi2", "words"), [(1e6, "lies above"), (1.0, "lies below")])
-def test_a_failed_global_test_says_on_which_side(chi2, words, only):
+def test_failed_global_test_names_its_side(chi2, words, only):
     paper = Paper(only[1] / "record.json")
     paper.record["adjustment"] |= {"chi2": chi2, "passed": False}
     facts = dict(statistics.facts(paper).data["items"])
@@ -638,7 +638,7 @@ def test_every_kind_of_observation_has_words():
 
 
 @pytest.mark.slow
-def test_the_summary_says_how_good_it_is(job, only, capsys, monkeypatch):
+def test_summary_states_the_quality(job, only, capsys, monkeypatch):
     monkeypatch.setattr(outputs, "write_adjustment", lambda *rest: [Path("record.json")])
     assert main(["run", str(job), "--only", "adjustment", "--strict"]) == 0
     out = capsys.readouterr().out

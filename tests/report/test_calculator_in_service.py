@@ -142,7 +142,7 @@ def test_a_factor_of_ones_own(calculated):
     assert abs(found.line("factor_used")[2] - 0.9951) > 1e-3  # to 15 °C: another factor
 
 
-def test_what_is_typed_of_a_product_is_refused_in_words(calculated):
+def test_wrong_product_input_is_refused_in_words(calculated):
     typed = calculated["hostile"]
     for place, (wrong, state, words) in enumerate(HOSTILE_PRODUCTS):
         said = typed.sentences(state)[place].replace("−", "-")

@@ -39,7 +39,7 @@ def path(record, tmp_path_factory):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_each_open_cell_has_a_name_and_says_what_it_takes(record, language, tmp_path):
+def test_input_cells_have_names_and_prompts(record, language, tmp_path):
     """XlsxWriter leaves a validation out whose texts are too long for Excel."""
     write(record, tmp_path / "capacity.xlsx", language)
     book = openpyxl.load_workbook(tmp_path / "capacity.xlsx")

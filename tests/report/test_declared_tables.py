@@ -55,7 +55,7 @@ def added():
     return record, table, [f"{row['half_m']:.3f}" for row in with_half(record)]
 
 
-def test_an_added_column_is_on_paper_in_the_web_page_and_in_the_terminal(added, tmp_path):
+def test_added_column_is_in_every_output(added, tmp_path):
     record, table, halves = added
     block = Paper(record, WORDS).show(table)
     assert [row[-1] for row in block.data["rows"]] == halves
@@ -131,7 +131,7 @@ def test_a_column_follows_its_uncertainty_in_every_medium(tmp_path):
     assert sheet["Radius (m)"].cells == [row["radius_m"] for row in record["courses"]]
 
 
-def test_keys_that_stand_last_are_of_the_table():
+def test_last_keys_belong_to_the_table():
     for table in every_table():
         keys = {column.key for column in table.columns}
         keys |= {column.in_sheet.get("key") for column in table.columns}

@@ -28,7 +28,7 @@ def test_a_quantity_is_a_sentence():
     assert "554.56 m3" in one._repr_html_()
 
 
-def test_u_of_monte_carlo_has_no_k_and_none_is_said():
+def test_U_of_monte_carlo_is_stated_without_k():
     assert volume_text(0.041, 0.012, None).endswith("(Monte Carlo)")
     assert volume_text(10.0, 0.0, 1.96) == "10.000 m3, no uncertainty declared"
 
@@ -37,7 +37,7 @@ def test_text_of_a_user_is_no_markup():
     assert "<b>" not in table_html("<b>", ["<b>"], [["<b>", None, 1.5]])
 
 
-def test_result_budget_and_delivery_show_the_numbers_of_the_table(example_result):
+def test_shown_result_budget_and_delivery_agree_with_table(example_result):
     top = example_result.table.height_m[-1]
     assert str(example_result.budget()).endswith(str(example_result.at(top)))
     assert str(example_result.budget(7.5, 2.0)).endswith(str(example_result.delivery(2.0, 7.5)))
@@ -87,7 +87,7 @@ def test_an_adjustment_shows_its_points(adjusted):
     assert len(frame) == 167
 
 
-def test_the_package_says_that_it_is_typed():
+def test_package_is_marked_as_typed():
     assert Path(tankcal.__file__).with_name("py.typed").exists()
     assert set(tankcal.__all__) - {"__version__"} == set(tankcal._ROOM_OF)
 
@@ -98,7 +98,7 @@ def test_tankcal_alone_prints_its_help(capsys):
         assert capsys.readouterr().out.startswith("usage: tankcal")
 
 
-def test_a_job_that_is_wrong_says_so_in_json(tmp_path, capsys):
+def test_wrong_job_is_reported_in_json(tmp_path, capsys):
     assert main(["run", str(tmp_path), "--json"]) == 2
     told = json.loads(capsys.readouterr().out)
     assert told["exit_status"] == 2

@@ -94,7 +94,7 @@ def test_a_mistake_is_one_line(laboratory, text, message):
     assert all(line.startswith("lab.toml") for line in lines)
 
 
-def test_all_mistakes_are_told_at_once(laboratory):
+def test_all_mistakes_are_reported_at_once(laboratory):
     text = '[laboratory]\nlogo = "logo.svg"\n[colours]\nink = "#eeeeee"\nline = "grey"'
     lines = problems_of(laboratory(text, logo_svg=b"no picture"))
     assert len(lines) == 4
@@ -128,7 +128,7 @@ def test_an_svg_that_multiplies_itself_is_refused():
     assert "draws more than" in svg_problem(SVG.format("".join(levels)).encode())
 
 
-def test_what_is_no_plain_svg_is_refused():
+def test_unsafe_or_unsized_svg_is_refused():
     assert "<!DOCTYPE" in svg_problem(b"<!DOCTYPE svg>" + SVG.format("").encode())
     assert "xml-stylesheet" in svg_problem(b'<?xml-stylesheet href="x"?>' + SVG.format("").encode())
     assert "has no size" in svg_problem(b'<svg xmlns="http://www.w3.org/2000/svg"/>')
@@ -231,7 +231,7 @@ def test_the_colours_are_those_of_the_letterhead(headed):
 # ---- the accreditation mark
 
 
-def test_the_mark_is_read_beside_the_logo_or_as_a_place(laboratory):
+def test_mark_is_read_as_file_or_place(laboratory):
     text = '[laboratory]\nname = "Lab"\naccreditation_mark = "m.svg"\naccreditation_text = "Mark"'
     found = load(laboratory(text, m_svg=SVG.format(CIRCLE).encode()))
     assert (found.logo, found.mark.kind, found.mark.alt) == (None, "svg", "Mark")
@@ -242,7 +242,7 @@ def test_the_mark_is_read_beside_the_logo_or_as_a_place(laboratory):
 
 
 @pytest.mark.parametrize("is_certificate", [True, False])
-def test_the_mark_stands_on_the_certificate_alone(laboratory, tmp_path, is_certificate):
+def test_mark_is_on_the_certificate_only(laboratory, tmp_path, is_certificate):
     """A letterhead that was saved before there were marks is read, too."""
     text = '[laboratory]\nname = "Lab"\naccreditation_mark = "m.svg"'
     letterhead = load(laboratory(text, m_svg=SVG.format(CIRCLE).encode()))

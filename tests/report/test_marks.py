@@ -68,7 +68,7 @@ def test_a_table_with_portuguese_marks_lines_up(paper):
     assert cells == ["1.234,568", "12.346" + blank]
 
 
-def test_the_axes_of_a_figure_bear_the_mark_but_names_stay(paper):
+def test_axes_use_the_decimal_mark_but_names_do_not(paper):
     figure = Figure()
     left, right = figure.subplots(1, 2)
     left.plot([0.0, 0.5], [0.0, 0.25])

@@ -73,7 +73,7 @@ def text_of(pdf):
     ).stdout
 
 
-def test_the_record_says_what_is_in_the_tank(furnished):
+def test_record_has_bottom_deadwood_and_roof(furnished):
     result, folder = furnished
     record = record_in(folder)
     roof = {line["code"]: line["value"] for line in record["roof"]}
@@ -91,7 +91,7 @@ def _rows(record):
     return record["capacity"]["height_m"], record["capacity"]["for_use"]
 
 
-def test_the_workbook_has_a_sheet_for_what_is_in_the_tank(furnished):
+def test_workbook_has_sheet_of_bottom_deadwood_and_roof(furnished):
     _, folder = furnished
     record = record_in(folder)
     book = openpyxl.load_workbook(folder / "capacity.xlsx")
@@ -109,7 +109,7 @@ def test_the_workbook_has_a_sheet_for_what_is_in_the_tank(furnished):
     assert [row[0] for row in capacity[4:] if row[use] == "not for use"] == [1.5]
 
 
-def test_the_csv_table_has_further_densities_and_what_is_not_for_use(furnished):
+def test_csv_table_has_other_densities_and_not_for_use(furnished):
     _, folder = furnished
     record = record_in(folder)
     table = pd.read_csv(folder / "capacity.csv")
@@ -126,7 +126,7 @@ def test_the_certificate_prints_every_part(furnished):
         assert words in text
 
 
-def test_tables_of_other_densities_mark_what_is_not_for_use(furnished):
+def test_tables_of_other_densities_mark_critical_zone(furnished):
     found = density_blocks(Paper(record_in(furnished[1])))
     assert len(found) == 2
     for block in found:
@@ -135,7 +135,7 @@ def test_tables_of_other_densities_mark_what_is_not_for_use(furnished):
         assert len(rows) == len(record_in(furnished[1])["capacity"]["height_m"])
 
 
-def test_a_tank_without_courses_has_no_files_and_sheets_about_them(lying):
+def test_tank_without_courses_has_no_course_outputs(lying):
     _, folder = lying
     record = record_in(folder)
     assert record["shell"] is record["gross"] is None
@@ -145,7 +145,7 @@ def test_a_tank_without_courses_has_no_files_and_sheets_about_them(lying):
     assert not {"Courses and sections", "Points and residuals"} & set(book.sheetnames)
 
 
-def test_a_table_in_feet_and_barrels_has_both_beside_the_metres(lying):
+def test_table_in_feet_and_barrels_also_has_metres(lying):
     result, folder = lying
     capacity = cells(openpyxl.load_workbook(folder / "capacity.xlsx")["Capacity"])
     assert capacity[3][:4] == [
@@ -157,7 +157,7 @@ def test_a_table_in_feet_and_barrels_has_both_beside_the_metres(lying):
     assert row[1] == pytest.approx(result.at(13 * 0.0254).value_m3 / 0.158987294928, rel=1e-12)
 
 
-def test_the_papers_of_a_tank_without_courses_show_its_dimensions(lying):
+def test_papers_of_tank_without_courses_show_dimensions(lying):
     text = text_of(lying[1] / "report.pdf")
     for words in ("ellipsoidal", "0.6000 m", "bbl", "1' 1\"", "Volume of the full tank"):
         assert words in text

@@ -83,7 +83,7 @@ def test_report_is_certificate_and_working_papers(example):
     assert counts["certificate"] <= 7
 
 
-def test_certificate_says_what_a_certificate_must(example):
+def test_certificate_has_required_statements(example):
     texts = pages(example / "certificate.pdf")
     whole = " ".join(texts)
     for words in (
@@ -149,7 +149,7 @@ def test_text_is_never_markup_in_the_html(hard):
 
 
 @pytest.mark.slow
-def test_html_asks_the_network_for_nothing(hard):
+def test_html_makes_no_network_request(hard):
     text = (hard / "report.html").read_text(encoding="utf-8")
     assert re.findall(r'(?:src|href|action)="(?!data:|#)', text) == []
     assert "url(" not in text

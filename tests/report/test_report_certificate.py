@@ -38,14 +38,14 @@ def items(block):
     return dict(block.data["items"])
 
 
-def test_what_is_not_given_is_a_line_to_write_on(paper):
+def test_missing_entries_are_lines_to_write_on(paper):
     found = items(certificate.parties(paper()))
     labels = ("Laboratory", "Address", "Customer", "Address of the customer", "Date of issue")
     assert {found[label] for label in labels} == {""}
     assert found["Place of calibration"] == "Fictitious place"  # where the tank stands
 
 
-def test_what_cannot_be_written_in_by_hand_is_named_as_missing(paper):
+def test_entries_without_a_line_are_named_as_missing(paper):
     said = certificate.statements(paper(method="ISO 7507-3")).data["items"]
     assert said[-1].endswith("requires it: Traceability, Conditions, Condition of the tank.")
     given = dict.fromkeys(("method", "traceability", "conditions", "condition_of_tank"), "x")
@@ -76,7 +76,7 @@ def test_every_field_of_the_contract_is_printed(example_record, tmp_path):
     assert "value of authorised_by, value of authorised_role" in printed
 
 
-def test_the_laboratory_of_the_letterhead_is_not_asked_for(paper):
+def test_laboratory_of_letterhead_is_not_missing(paper):
     of_job = paper(laboratory="Lab")
     assert of_job.laboratory() == "Lab"
     assert "Laboratory" not in items(certificate.parties(of_job))
@@ -89,7 +89,7 @@ def test_the_laboratory_of_the_letterhead_is_not_asked_for(paper):
     assert other.laboratory() == "Another"  # beside the letterhead: never hidden
 
 
-def test_instruments_of_the_survey_are_named_with_their_certificates(paper):
+def test_instruments_are_listed_with_certificates(paper):
     measured = paper()
     tools = [
         {"instrument": "tape 1", "details": {"certificate": "C-1"}},
@@ -141,7 +141,7 @@ def test_a_date_is_written_in_the_language(form, month, written, example_record)
 
 
 @pytest.mark.slow
-def test_user_text_is_printed_literally_wherever_it_reaches_paper(example_record, tmp_path):
+def test_user_text_is_printed_literally(example_record, tmp_path):
     """typst, LaTeX, HTML and spreadsheet markup in every text field of the job."""
     record = json.loads(example_record.read_text(encoding="utf-8"))
     short = {"authorised_by": "#a *b* $c$", "authorised_role": "<i>"}  # in a narrow column
@@ -165,7 +165,7 @@ def test_user_text_is_printed_literally_wherever_it_reaches_paper(example_record
     assert "<b>" not in bundle["text/html"]
 
 
-def test_the_sketch_shows_zero_reference_height_levels_and_courses(example_record, tmp_path):
+def test_sketch_shows_zero_reference_height_and_courses(example_record, tmp_path):
     paper = Paper(example_record)
     block = paper.figure(sketch.sketch(paper), "sketch")
     for words in (
@@ -176,14 +176,14 @@ def test_the_sketch_shows_zero_reference_height_levels_and_courses(example_recor
     assert block.data["alt"]
 
 
-def test_what_is_not_drawn_has_no_sketch(paper):
+def test_mesh_has_no_sketch(paper):
     drawn = paper()
     assert sketch.has_sketch(drawn.record)
     drawn.record["job"]["tank"]["kind"] = "mesh"
     assert not sketch.has_sketch(drawn.record)
 
 
-def test_every_page_bears_the_record(example_record):
+def test_every_page_names_the_record(example_record):
     document = Paper(example_record).document("certificate").data
     assert document["footer"].startswith("Page {page} of {pages} · Record ")
     (held,) = document["attachments"]

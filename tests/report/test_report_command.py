@@ -84,7 +84,7 @@ def test_the_covariance_that_no_record_holds_is_taken_over(again, tmp_path):
         ({}, ["--letterhead", "none.toml"], "none.toml: not found"),
     ],
 )
-def test_what_cannot_be_used_is_one_line(again, tmp_path, capsys, change, options, message):
+def test_unusable_letterhead_is_one_problem(again, tmp_path, capsys, change, options, message):
     record = tmp_path / "record.json"
     text = (again / "record.json").read_text(encoding="utf-8")
     if isinstance(change, dict):
@@ -108,7 +108,7 @@ def test_a_code_that_has_no_words_is_one_line(again, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_folder_of_somebody_else_is_refused(again, tmp_path, capsys):
+def test_foreign_folder_is_refused(again, tmp_path, capsys):
     shutil.copyfile(again / "record.json", tmp_path / "record.json")
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
     assert main(["report", str(tmp_path), "--quiet"]) == 2
@@ -136,7 +136,7 @@ def test_record_and_workbook_are_inside_byte_for_byte(results, tmp_path, name):
 
 
 @pytest.mark.slow
-def test_what_is_inside_is_named_and_described(results):
+def test_attachments_are_named_and_described(results):
     content = (results / "certificate.pdf").read_bytes()
     for entry in (b"/AFRelationship/Source", b"/AFRelationship/Data", b"(record.json)"):
         assert entry in content

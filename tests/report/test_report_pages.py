@@ -55,7 +55,7 @@ def test_a_long_table_has_no_lone_rows(printed, above):
 
 
 @pytest.mark.parametrize("above", range(38, 46))
-def test_a_caption_stands_above_its_table(printed, above):
+def test_caption_is_above_its_table(printed, above):
     rows = [[f"row {n}"] for n in range(20)]
     found = printed(*lines_above(above), blocks.table(["a"], rows, "the caption"))
     assert rows_of(next(page for page in found if "the caption" in page)) >= TOGETHER
@@ -107,7 +107,7 @@ def test_a_heading_goes_with_its_long_table(tmp_path, above, count):
 
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("count", range(230, 400, 10))
-def test_the_end_mark_stands_below_rows(printed, count):
+def test_end_mark_is_below_rows(printed, count):
     rows = [[f"row {n}"] for n in range(count)]
     end = blocks.end_mark("the end")
     found = printed(*lines_above(3), blocks.columns_table(["a"], rows, "c", across=4), end)
@@ -134,7 +134,7 @@ ADDRESS = "Avenida do Porto 1200, third floor, Harbour District, 59000-000 Natal
 
 
 @pytest.mark.parametrize(("parties", "facts"), [(3, 10), (6, 13), (9, 13), (10, 14)])
-def test_the_sketch_stands_on_the_first_page(tmp_path, parties, facts):
+def test_sketch_is_on_the_first_page(tmp_path, parties, facts):
     """However many addresses and facts there are above it."""
     of_parties = [(f"party {n}", ADDRESS) for n in range(parties)]
     made = [
@@ -164,7 +164,7 @@ def test_a_first_page_without_facts_has_its_figure(printed):
     assert "the sketch" in page
 
 
-def test_facts_keep_their_distance_from_what_is_above(tmp_path):
+def test_facts_keep_distance_from_text_above(tmp_path):
     """A list too long for one block stands no closer below a paragraph than a short one."""
     found = []
     for count in (5, 20):
@@ -198,7 +198,7 @@ def test_the_papers_of_the_example_have_full_pages(example_record, tmp_path, lan
 
 
 @pytest.mark.study
-def test_many_long_tables_are_all_there_and_their_pages_are_counted(printed, monkeypatch):
+def test_long_tables_are_complete_with_page_numbers(printed, monkeypatch):
     """typst cannot find the places of eight tables in its five passes: then none is asked for."""
     asked = []
     compiled = typst.compile_with_warnings

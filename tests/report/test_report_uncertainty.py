@@ -91,7 +91,7 @@ def changed(record, **capacity):
 
 
 @pytest.mark.slow
-def test_the_table_prints_the_U_that_counts_and_marks_the_rows_of_monte_carlo(found, record):
+def test_table_prints_stated_U_and_marks_monte_carlo_rows(found, record):
     capacity = record["capacity"]
     stated = capacity["stated_U_m3"]
     assert stated != capacity["U_m3"]
@@ -103,7 +103,7 @@ def test_the_table_prints_the_U_that_counts_and_marks_the_rows_of_monte_carlo(fo
     assert [row[3] for row in rows] == [mark or "–" if mark else "" for mark in marks]
 
 
-def test_k_stands_only_where_U_is_k_u(found, of_example, record, example):
+def test_k_is_given_only_where_U_is_k_u(found, of_example, record, example):
     (result,) = (block for block in found if block["kind"] == "result")
     U = record["capacity"]["stated_U_m3"][-1]
     assert f"U = {fixed(U, 2)}\N{NO-BREAK SPACE}m³" in result["text"]
@@ -181,7 +181,7 @@ def test_a_stated_volume_has_the_U_of_its_row_and_of_its_reading(record):
     assert (row["simulated"], row["k"]) == (True, None)
 
 
-def test_where_gum_is_validated_a_stated_volume_has_the_U_of_its_budget(result, record):
+def test_validated_stated_volume_has_U_of_its_budget(result, record):
     (row,) = (row for row in _stated(result, by_gum=[True] * 25) if row["high_m"] == 1.2)
     (of_budget,) = (one for one in record["budgets"] if one["high_m"] == 1.2)
     assert (row["U_m3"], row["k"]) == (of_budget["U_m3"], of_budget["k"])
@@ -208,7 +208,7 @@ def test_between_two_rows_the_largest_U_is_stated(result, record, largest):
     assert row["simulated"] == (largest != "budget")  # else it is k u
 
 
-def test_a_delivery_has_monte_carlos_interval_where_gums_is_not_validated(result, record):
+def test_delivery_has_monte_carlo_interval_if_gum_fails(result, record):
     found, judged = result.simulation.of_deliveries
     lows = [one.low_m for one in result.stated.deliveries]
     place, sound = lows.index(1.0), lows.index(1.4)
@@ -236,7 +236,7 @@ def test_a_delivery_has_monte_carlos_interval_where_gums_is_not_validated(result
     ]
 
 
-def test_the_worst_delivery_of_each_minimum_height_is_told(found, record):
+def test_the_worst_delivery_of_each_minimum_height_is_reported(found, record):
     rows = table_of(found, "Stated volumes")
     assert len(rows) == len(record["budgets"])
     assert [row[-1] for row in rows[-2:]] == [
@@ -253,7 +253,7 @@ def test_the_worst_delivery_of_each_minimum_height_is_told(found, record):
 # ---- inputs and budgets
 
 
-def test_inputs_are_told_apart(of_example, example):
+def test_inputs_are_separated(of_example, example):
     lines = example["budgets"][0]["lines"]
     words, said = load_words(), facts(of_example)
     defaults = [line["input"] for line in lines if line["is_default"]]
@@ -268,7 +268,7 @@ def test_inputs_are_told_apart(of_example, example):
     assert told == words["texts"]["nothing_missing"]  # the example declares everything
 
 
-def test_what_is_not_declared_is_named(found, record):
+def test_undeclared_inputs_are_named(found, record):
     (missing,) = (one["value"] for one in record["choices"] if one["code"] == "not_in_budget")
     names = facts(found)["NOT in U, because nothing was declared"].split("; ")
     assert names == [load_words()["inputs"][name] for name in missing]
@@ -306,7 +306,7 @@ def test_many_stated_volumes_are_set_in_even_tables(record):
     assert widths == [1 + 5, 1 + 4]
 
 
-def test_what_is_worth_measuring_better_comes_first(found, record):
+def test_most_useful_input_comes_first(found, record):
     rows = table_of(found, "What U would be")
     other = copy.deepcopy(record)
     other["budget"].reverse()
@@ -345,7 +345,7 @@ def test_every_name_has_words():
 # ---- deliveries and Monte Carlo, drawn
 
 
-def test_the_curve_of_deliveries_ends_at_the_delivery_of_the_whole_tank(record):
+def test_delivery_curve_ends_at_the_whole_tank(record):
     """From the factor of the rows; the record's own u of that delivery is a second method."""
     left, right = drawn.delivery_curve(Paper(record)).axes
     below, delivered, worst = left.lines
@@ -359,7 +359,7 @@ def test_the_curve_of_deliveries_ends_at_the_delivery_of_the_whole_tank(record):
     assert list(right.lines[2].get_ydata()) == pytest.approx(expected)
 
 
-def test_the_numbers_between_powers_of_ten_bear_the_decimal_mark(record):
+def test_numbers_between_powers_of_ten_have_decimal_mark(record):
     other = copy.deepcopy(record)
     capacity = other["capacity"]
     capacity["volume_m3"] = list(np.linspace(1000, 1001, len(capacity["volume_m3"])))
@@ -426,7 +426,7 @@ def test_the_usual_sentence_on_k_is_of_the_rows_whose_U_is_k_u(record, k, dof, s
         assert "coverage probability of approximately 95\xa0%." in sentence
 
 
-def test_what_not_validated_means_is_said_below_the_deliveries(record):
+def test_note_on_validation_is_below_deliveries(record):
     paper = Paper(record)
     plain = [one for one in paper.record["budgets"] if one["monte_carlo"] is not None]
     for one in plain:
@@ -465,7 +465,7 @@ def test_the_verdict_of_the_rule_in_words(found, record):
     assert f"The worst delivery is sought by the law of propagation; {simulated}" in whole
 
 
-def test_the_verdict_of_a_rule_that_nobody_read_stays_out_of_the_certificate(found, record):
+def test_verdict_of_unread_rule_is_not_on_certificate(found, record):
     """Its name, its verdict and its limits are in the working papers alone."""
     assert record["rule"]["verified"] is False
     certificate = " ".join(texts(of_part(found, "certificate")))
@@ -476,7 +476,7 @@ def test_the_verdict_of_a_rule_that_nobody_read_stays_out_of_the_certificate(fou
     assert "no statement of conformity, and it is not on the certificate" in papers
 
 
-def test_the_verdict_of_a_rule_that_was_read_is_on_the_certificate(record):
+def test_verdict_of_verified_rule_is_on_certificate(record):
     other = copy.deepcopy(record)
     other["rule"]["verified"] = True
     shown = [block.data for block in rule.blocks_of_verdict(Paper(other))]
@@ -557,7 +557,7 @@ def test_an_earlier_record_is_printed_with_what_it_has(tmp_path):
     assert pdf(found, path.parent).startswith(b"%PDF")
 
 
-def test_without_monte_carlo_the_certificate_says_so(record, tmp_path):
+def test_certificate_without_monte_carlo_states_it(record, tmp_path):
     off = changed(record, interval=["gum"] * 25, stated_U_m3=record["capacity"]["U_m3"])
     off["monte_carlo"] = None
     off["job"]["table"]["monte_carlo"] = False

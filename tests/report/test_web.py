@@ -45,7 +45,7 @@ def block_of(found, kind):
     return one
 
 
-def test_the_policy_names_the_scripts_and_the_style_by_their_hash(text):
+def test_content_policy_has_hashes_of_scripts_and_style(text):
     policy = re.search(r'Content-Security-Policy" content="([^"]*)"', text)[1]
     assert "default-src 'none'" in policy
     assert "unsafe" not in policy
@@ -132,7 +132,7 @@ def test_the_data_are_those_of_the_record(example_record, found):
     assert numbers(data["u"], "<f4") == pytest.approx(capacity["u_m3"], rel=1e-7)
 
 
-def test_few_rows_of_the_factor_stand_for_all(example_record, found, figure):
+def test_few_rows_of_factor_represent_all(example_record, found, figure):
     """Second method: the factor between the kept rows against every row of the record."""
     capacity = json.loads(example_record.read_text())["capacity"]
     factor, height = np.array(capacity["factor_m3"]), np.array(capacity["height_m"])
@@ -214,7 +214,7 @@ def without_courses(tmp_path_factory):
 
 
 @pytest.mark.parametrize("kind", ["horizontal", "sphere"])
-def test_a_curve_turned_about_its_axis_has_the_volume_of_the_tank(without_courses, kind):
+def test_solid_of_revolution_has_the_volume_of_the_tank(without_courses, kind):
     """Other method: Pappus' sum over the curve that is drawn, against the full capacity."""
     paper = without_courses[kind]
     solid = tank_view(paper).data["solid"]
@@ -225,7 +225,7 @@ def test_a_curve_turned_about_its_axis_has_the_volume_of_the_tank(without_course
     assert volume * np.prod(solid["flat"]) == pytest.approx(full, rel=2e-3)
 
 
-def test_a_tank_that_cannot_be_drawn_says_why(without_courses):
+def test_view_that_cannot_be_drawn_states_why(without_courses):
     paper = without_courses["sphere"]
     record = paper.record["job"]["tank"] | {"kind": "mesh"}
     other = {**paper.record, "job": {**paper.record["job"], "tank": record}}

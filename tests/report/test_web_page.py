@@ -73,7 +73,7 @@ def expected_volume(capacity, row, marks=ENGLISH):
     return f"V = {volume} m³ with U = {U} m³ ({k}, 95 %)"
 
 
-def test_nothing_is_asked_of_the_network(browser, report):
+def test_page_makes_no_network_request(browser, report):
     browser.open(report)
     browser.type("#dip", "2.5")
     assert browser.requests == []
@@ -90,7 +90,7 @@ def test_a_dip_typed_gives_the_volume_of_the_record(browser, report, record):
             assert browser.text("#volume") == expected_volume(capacity, row)
 
 
-def test_between_two_rows_the_volume_is_straight_and_U_the_larger(browser, report, record):
+def test_web_interpolation_is_linear_with_larger_U(browser, report, record):
     browser.open(report)
     capacity = record["capacity"]
     browser.type("#dip", "4.2375")
@@ -122,7 +122,7 @@ def test_the_top_as_it_is_printed_is_the_top(browser, report, record):
         ("", "Type a dip in metres."),
     ],
 )
-def test_what_is_no_dip_of_the_table_is_refused(browser, report, typed, answer):
+def test_dip_outside_the_table_is_refused(browser, report, typed, answer):
     browser.open(report)
     browser.type("#dip", typed)
     assert browser.text("#volume").startswith(answer)
@@ -280,7 +280,7 @@ def test_the_tank_is_drawn_turned_and_its_deviations_enlarged(browser, report):
     assert abs(width_of_the_rim(first) - width_of_the_rim(plain)) > 5
 
 
-def test_the_legend_says_the_largest_deviation(browser, report, record):
+def test_legend_shows_largest_deviation(browser, report, record):
     browser.open(report)
     largest = max(
         abs(radius - section["radius_m"])
@@ -293,7 +293,7 @@ def test_the_legend_says_the_largest_deviation(browser, report, record):
     assert float(browser.text("#most")[1:-3]) > 1000 * largest  # the tilt is among them
 
 
-def test_names_of_points_stand_beside_them(browser, report):
+def test_points_are_labelled(browser, report):
     browser.open(report)
     browser.run("document.querySelector('#show-names').click()")
     browser.drawn()
@@ -301,7 +301,7 @@ def test_names_of_points_stand_beside_them(browser, report):
     assert browser.run(f"{shown}.length") == 119 + 4
 
 
-def test_without_webgl_the_page_says_so(report):
+def test_page_without_webgl_has_a_note(report):
     with Browser("--disable-3d-apis") as browser:
         browser.open(report)
         assert "shows no three-dimensional pictures" in browser.text("#view")

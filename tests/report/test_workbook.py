@@ -140,7 +140,7 @@ def test_the_certificate_has_volume_U_and_k_on_one_line(book, record):
     assert "k =" in line[3].number_format
 
 
-def test_the_certificate_lists_tank_and_choices_and_leaves_the_authorisation_empty(book, record):
+def test_certificate_sheet_lists_tank_and_choices(book, record):
     sheet = book["Certificate"]
     words = load_words("en")
     said = texts(sheet)
@@ -181,7 +181,7 @@ def with_a_rejected_point(record):
 
 
 @pytest.mark.slow
-def test_every_point_is_listed_and_a_rejected_one_with_its_reason(record, tmp_path):
+def test_points_sheet_lists_all_with_rejection_reasons(record, tmp_path):
     words = load_words("en")
     record = with_a_rejected_point(record)
     book = written(record, tmp_path)
@@ -228,7 +228,7 @@ def test_provenance_names_every_file_by_its_hash(book, record):
 
 
 @pytest.mark.slow
-def test_a_record_with_nothing_rejected_corrected_or_warned_is_written(record, tmp_path):
+def test_workbook_of_record_without_rejections_or_warnings(record, tmp_path):
     bare = copy.deepcopy(record)
     bare |= {"rejected": [], "warnings": [], "corrections": []}
     bare["points"] = [point for point in bare["points"] if point["used"]]
@@ -247,7 +247,7 @@ def test_the_book_opens_on_the_dip_calculator(book):
     assert book.active.title == "Dip calculator"
 
 
-def test_printing_everything_prints_the_certificate_with_its_table(book):
+def test_whole_workbook_prints_certificate_and_table(book):
     """Hidden sheets are not printed with the whole workbook."""
     shown = [sheet.title for sheet in book if sheet.sheet_state == "visible"]
     assert shown == ["Certificate", "Capacity", "Proportional parts", "Dip calculator"]
@@ -318,7 +318,7 @@ def test_the_same_record_gives_the_same_bytes(record, path, tmp_path):
         pytest.param(None, 2023, marks=pytest.mark.study),
     ],
 )
-def test_a_date_of_issue_that_is_none_gives_way_to_the_survey(record, tmp_path, issued, year):
+def test_impossible_date_of_issue_is_replaced_by_survey_date(record, tmp_path, issued, year):
     undated = copy.deepcopy(record)
     undated["job"]["certificate"]["date_of_issue"] = issued
     undated["job"]["survey"]["date"] = "2023-05-06"

@@ -78,7 +78,7 @@ def test_no_cell_of_a_table_is_merged(books, kind):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_no_word_of_a_heading_and_no_number_is_wider_than_its_column(books, kind):
+def test_headings_and_numbers_fit_their_columns(books, kind):
     for sheet in books[kind]:
         for left, top, right, _ in tables_of(sheet):
             for cell in sheet[top][left - 1 : right]:
@@ -201,7 +201,7 @@ def test_a_line_may_break_after_a_hyphen():
 
 
 @pytest.mark.slow
-def test_the_calculator_says_its_units_where_the_table_has_others(books):
+def test_calculator_states_units_that_differ_from_table(books):
     said = {kind: books[kind]["Dip calculator"]["A2"].value for kind in ("lying", "uncertain")}
     assert "metres and cubic metres" in said["lying"]  # a table in feet and barrels
     assert "metres" not in said["uncertain"]

@@ -174,7 +174,7 @@ def english(records, tmp_path_factory):
 @pytest.mark.filterwarnings("error:Duplicate header name")
 @pytest.mark.parametrize("language", [code for code in SHIPPED if code != "en"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_names_of_ranges_and_tables_are_the_same_in_every_language(
+def test_range_and_table_names_are_equal_in_all_languages(
     records, english, kind, language, tmp_path
 ):
     path = tmp_path / "capacity.xlsx"

@@ -140,7 +140,7 @@ def test_reliability_in_the_general_form(network):
     np.testing.assert_allclose(values_of(adjusted, "effect_m"), moves, rtol=1e-6)
 
 
-def test_what_is_set_aside_is_as_a_bias_unknown(network):
+def test_setting_aside_equals_a_bias_unknown(network):
     """A whole vector set aside: the result of an adjustment with three biases, and their test."""
     survey, covariances = network
     use = np.ones(6)
@@ -183,7 +183,7 @@ ROWS = {
 }
 
 
-def test_a_vector_that_is_alone_in_its_block_is_tested_when_set_aside(network):
+def test_single_vector_of_a_block_is_tested_when_set_aside(network):
     """Nothing of its block takes part; what the others say of it is told all the same."""
     survey, covariances = network
     q = covariances[0].copy()
@@ -213,7 +213,7 @@ def test_a_vector_that_is_alone_in_its_block_is_tested_when_set_aside(network):
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("single", [False, True], ids=["all correlated", "levels are not"])
 @pytest.mark.parametrize(("wrong", "size"), [((0, 4), 0.04), ((1, 2), 0.08), ((2, 1), 0.02)])
-def test_what_may_be_wrong_instead(network, single, wrong, size):
+def test_readings_that_may_be_wrong_instead(network, single, wrong, size):
     """Second method: of an observation and of another one biases are estimated, in all pairs.
 
     The other one may be wrong instead where its own biases are significant, and those of the first

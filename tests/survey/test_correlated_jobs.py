@@ -112,7 +112,7 @@ def test_a_wrong_vector_is_found_whole(tmp_path):
     assert {(one.file, one.row) for one in removed} == {("vectors.csv", 4)}
 
 
-def test_gross_readings_beside_correlated_ones(tmp_path):
+def test_blunders_with_correlated_readings(tmp_path):
     """A distance fifty times too long goes; correlated ones of its table stay themselves."""
     length = {one: np.linalg.norm(np.subtract(PLACES[one[1]], PLACES[one[0]])) for one in LINES}
 
@@ -172,7 +172,7 @@ def test_vectors_alone_hang_on_one_point(tmp_path):
         ("vectors,2,x,vectors,3,x,1.3", "row 2, r: found '1.3'; expected a number from -1 to 1"),
     ],
 )
-def test_pairs_that_cannot_be_meant(tmp_path, line, expected):
+def test_impossible_correlated_pairs(tmp_path, line, expected):
     heading = "table_1,row_1,value_1,table_2,row_2,value_2,r\n"
     written(
         tmp_path, change=lambda files: files.update({"correlated_readings.csv": heading + line})

@@ -177,7 +177,7 @@ def all_around(name):
 @pytest.mark.parametrize(
     "name", [pytest.param("photographs", marks=pytest.mark.study), "instruments"]
 )
-def test_mirrored_axes_are_told(name):
+def test_mirrored_axes_are_reported(name):
     """x east and y north swapped in the control: no answer, or one with a warning that says so."""
     measurements = all_around(name)
     before = adjust_survey(measurements)

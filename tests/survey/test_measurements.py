@@ -87,7 +87,7 @@ def test_cameras(survey):
     np.testing.assert_allclose(digital.pixel_mm, [0.004, 0.004])
 
 
-def test_what_is_adjusted_of_a_camera(survey):
+def test_adjusted_parameters_of_a_camera(survey):
     camera = survey.cameras[0].camera
     scope = ["camera"] * 3 + ["block", "camera", "off", "off"] + ["camera"] * 2 + ["off"] * 2
     assert camera.scope == (*scope, "camera", "camera")
@@ -243,7 +243,7 @@ def test_the_adjustment_alone_needs_no_tank(tmp_path):
         load(tmp_path / "job", only="volumes")
 
 
-def test_the_adjustment_alone_reads_what_there_is_of_the_tank(tmp_path):
+def test_adjustment_alone_reads_an_incomplete_tank(tmp_path):
     parts = survey_parts({"tank.id": "T-9", "tank.kind": "vertical"}, tank=False)
     job = load(write_folder(tmp_path / "job", parts), only="adjustment")
     assert (job.tank.id, job.survey, job.datum.bottom_z_m) == ("T-9", None, None)
@@ -333,7 +333,7 @@ def test_degrees_minutes_seconds(text, degrees):
         123.0405,
     ],
 )
-def test_what_is_no_angle(text):
+def test_values_that_are_not_angles(text):
     with pytest.raises(Refused, match="such as 123 04 05"):
         read_value(DMS, text, ".")
 

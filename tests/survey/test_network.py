@@ -285,7 +285,7 @@ DEFECTS = {
 
 
 @pytest.mark.parametrize("what", DEFECTS)
-def test_a_missing_datum_is_told_in_words(what):
+def test_a_missing_datum_is_reported_in_words(what):
     make, kept, message = DEFECTS[what]
     survey = make()[0]
     survey = replace(survey, observations=tuple(survey.observations[i] for i in kept))

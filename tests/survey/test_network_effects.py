@@ -93,7 +93,7 @@ def test_effects_in_large_surveys(datum, monkeypatch, figure):
     figure(f"bound elsewhere over largest effect, datum {datum}", f"median {np.median(size):.1f}")
 
 
-def test_what_is_set_aside_moves_nothing():
+def test_reading_set_aside_has_no_influence():
     use = np.ones(len(SURVEY.image_points.point))
     use[7] = 0
     found = adjust(replace(SURVEY, image_points=replace(SURVEY.image_points, use=use)))
@@ -221,7 +221,7 @@ def test_which_quantities_depend_on_the_datum():
 
 
 @pytest.mark.parametrize("datum", CASES)
-def test_cofactors_of_an_observation_are_its_rows_times_its_responses(datum):
+def test_cofactors_of_observation_are_rows_times_responses(datum):
     """Second method: the change of all unknowns, Q J', through the rows once more."""
     found = sharply(CASES[datum], datum)
     solution, model = found.solution, found.problem.model

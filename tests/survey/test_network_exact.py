@@ -229,7 +229,7 @@ def test_levels_that_close_and_levels_that_do_not(survey):
         adjust(replace(survey, observations=(*survey.observations, bad)))
 
 
-def test_contradictions_are_told(survey):
+def test_contradictions_are_reported(survey):
     """A distance against two fixed points; two values of one coordinate; an open triangle."""
     xyz = TRUTH.xyz_m
     point, axis = np.repeat([0, 9], 3), np.tile([0, 1, 2], 2)
@@ -252,7 +252,7 @@ def test_contradictions_are_told(survey):
         adjust(replace(survey, observations=(*survey.observations, triangle)))
 
 
-def test_what_cannot_hold_exactly_is_refused(survey):
+def test_impossible_exact_values_are_refused(survey):
     images = survey.image_points
     with pytest.raises(SolutionError, match="an image coordinate cannot hold exactly"):
         adjust(replace(survey, image_points=replace(images, sd_mm=0 * images.sd_mm)))
@@ -261,7 +261,7 @@ def test_what_cannot_hold_exactly_is_refused(survey):
         adjust(replace(survey, observations=(*survey.observations, half)))
 
 
-def test_snooping_leaves_alone_what_holds_exactly(survey):
+def test_snooping_keeps_exact_values(survey):
     """A fixed distance 5 cm wrong shows in its test quantity, and is not set aside."""
     one = exactly(Distances, **ENDS, instrument=np.array([-1, -1]))
     wrong = replace(one, value=one.value + [0.05, 0])

@@ -69,7 +69,7 @@ def scene(xyz, stations, azimuth, tilt, roll, free=(), control=(), tapes=(), noi
 
 
 @pytest.mark.parametrize("noise", [0.0, 1.0])
-def test_a_plane_seen_at_right_angles_says_nothing_of_c(noise):
+def test_plane_at_right_angles_does_not_determine_c(noise):
     """Closed form: a photo of a plane at right angles knows c over the distance only."""
     survey = scene(SQUARE, FOUR, **LEVEL, free={0}, control=SPREAD, noise=noise)
     with pytest.raises(

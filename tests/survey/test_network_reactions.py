@@ -64,7 +64,7 @@ def test_a_line_of_levels_between_held_heights():
 
 
 @pytest.mark.parametrize("tied", [False, True])
-def test_the_reaction_is_what_a_release_says(held, tied):
+def test_reaction_equals_release(held, tied):
     """Second method: each coordinate released in turn, and everything adjusted again."""
     ties = exact_ties(photographed()[1].xyz_m) if tied else ()
     survey = replace(held, observations=(*held.observations, *ties))
@@ -102,7 +102,7 @@ def test_held_is_the_limit_of_observed_with_a_small_sd(held):
     assert one.residuals(found.problem).mdb == pytest.approx(other.mdb, rel=2e-3)
 
 
-def test_what_only_holds_the_datum_cannot_be_tested():
+def test_values_that_only_hold_the_datum_are_untestable():
     """Property: as many coordinates as the defect: nothing pulls, and nothing controls them."""
     survey = photographed()[0]
     fixed = np.zeros((48, 3), dtype=bool)
@@ -113,7 +113,7 @@ def test_what_only_holds_the_datum_cannot_be_tested():
     assert not one.w.any()
 
 
-def test_a_coordinate_that_an_exact_tie_to_another_held_one_holds_cannot_be_released(held):
+def test_coordinate_held_by_exact_tie_cannot_be_released(held):
     """Closed form: the height between two held points holds exactly, so that neither gives way."""
     rise = held.xyz_m[19, 2] - held.xyz_m[1, 2]
     tie = HeightDifferences(np.array([rise]), np.zeros(1), np.array([1]), np.array([19]))

@@ -98,7 +98,7 @@ def test_mixtures_that_fix_a_point(text):
         ("distances A-P + distances B-P + distances C-P", "may be at"),
     ],
 )
-def test_what_is_missing_is_told(text, told):
+def test_undetermined_points_are_refused(text, told):
     """A line of sight there and back is one line; two circles cut at two places."""
     shots = shots_of(text)
     assert assert_sound(shots) == "refused"

@@ -19,7 +19,7 @@ def quantity(survey, uses, row):
     return float(table.test_statistic[table.rows == row][0])
 
 
-def test_without_what_is_named_an_image_point_agrees_again_and_else_it_does_not():
+def test_image_point_agrees_only_without_the_named_reading():
     """Second method: every ray of the same point in turn is left out, and all adjusted again."""
     measurements = by_photographs(3, photos=8)[0]
     images = measurements.image_points
@@ -46,7 +46,7 @@ def test_without_what_is_named_an_image_point_agrees_again_and_else_it_does_not(
     assert others
 
 
-def test_all_unknowns_are_asked_for_once_for_each_observation_set_aside(monkeypatch):
+def test_unknowns_are_solved_once_per_observation_set_aside(monkeypatch):
     """Asked again for every candidate, a block of 26 321 points took two minutes more."""
     measurements = by_photographs(3, photos=8)[0]
     found = adjust_survey(

@@ -73,7 +73,7 @@ def test_control_alone_carries_from_photo_to_photo():
 
 
 @pytest.mark.slow
-def test_a_photo_with_three_known_points_is_decided_by_tie_points():
+def test_photo_of_three_known_points_is_resolved_by_ties():
     survey, truth = photographed(seed=2)
     known = np.full_like(truth.xyz_m, np.nan)
     images = survey.image_points
@@ -116,7 +116,7 @@ def test_from_a_metre_and_twenty_degrees():
     assert found.xyz_m == pytest.approx(adjust(survey).xyz_m, abs=1e-7)
 
 
-def test_what_cannot_be_found_is_named():
+def test_points_without_start_values_are_named():
     survey, truth = photographed()
     known = np.full_like(truth.xyz_m, np.nan)
     known[:2] = truth.xyz_m[:2]

@@ -166,7 +166,7 @@ def test_traverse_between_two_known_points_without_an_azimuth(backwards):
     assert approximate(survey).xyz_m == pytest.approx(SQUARE, abs=1e-6)
 
 
-def test_forward_intersection_by_horizontal_angles_and_heights_by_levels():
+def test_forward_intersection_with_levelled_heights():
     triples = [
         (0, 1, 2),
         (0, 2, 4),
@@ -391,7 +391,7 @@ def test_a_point_with_one_sight_is_left_to_the_adjustment():
     assert np.isnan(adjust(found).xyz_m[3]).all()
 
 
-def test_what_nothing_was_measured_to_stays_out_of_the_way():
+def test_unmeasured_points_have_no_influence():
     """A point fixed at the origin of UTM, a given point without a sight, a set without one."""
     far = SQUARE + [5e5, 7.5e6, 100]
     pairs = [(0, 1), (0, 2), (0, 3), (1, 0), (1, 4), (1, 5)]
@@ -430,7 +430,7 @@ def test_most_sights_outvote_a_blunder():
     assert place(origin, towards, *none) == pytest.approx(point, abs=1e-9)
 
 
-def test_a_station_on_the_circle_of_its_three_targets_is_not_guessed():
+def test_station_on_danger_circle_is_not_started():
     """The dangerous circle: every station on it sees the targets under the same angles."""
     angle = np.deg2rad([10, 100, 200])
     targets = 10 * np.column_stack([np.sin(angle), np.cos(angle)])

@@ -53,7 +53,7 @@ def cloud(seed=0, count=25):
 THREE = np.array([[-6.0, -14, 0], [5, -15, 2], [0, -13, 5]])
 
 
-def test_five_points_give_the_true_essential_matrix_among_at_most_ten():
+def test_five_points_give_the_true_essential_matrix():
     """Closed form: E = R [b]x of the truth is, up to its factor, among the solutions."""
     survey, rotation = seen_from(cloud(), THREE[:2], np.zeros(3))
     images = survey.image_points
@@ -70,7 +70,7 @@ def test_five_points_give_the_true_essential_matrix_among_at_most_ten():
 
 
 @pytest.mark.parametrize("flat", [False, True])
-def test_two_photos_stand_to_one_another_with_blunders(flat):
+def test_relative_orientation_with_blunders(flat):
     """Property: the true pose, 10 % of the points being wild in either photo."""
     xyz = cloud(1, 60) * ([1, 0.0, 1] if flat else 1)
     survey, rotation = seen_from(xyz, THREE[:2], np.zeros(3), 0.003)

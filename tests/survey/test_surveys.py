@@ -82,7 +82,7 @@ def test_every_value_has_its_row(photos, adjustment):
     assert (known_before.ids, known_before.element) == (("tape 1",), "scale")
 
 
-def test_groups_say_how_good_each_is(adjustment):
+def test_variance_factors_of_groups(adjustment):
     """Closed form: factor2 = v'Pv over redundancy, in each group."""
     names = [(one.kind, one.name) for one in adjustment.groups]
     assert ("image coordinate", "camera") in names
@@ -185,7 +185,7 @@ def test_averaging_is_adjusting_all_readings(photos):
 
 
 @pytest.mark.slow
-def test_scatter_that_contradicts_its_sds_is_told(photos):
+def test_scatter_that_contradicts_its_sds_is_reported(photos):
     rng = np.random.default_rng(6)
     measurements = repeated(photos[0], 3, 1.0, rng)
     xy = measurements.image_points.xy_mm.copy()
@@ -289,7 +289,7 @@ def test_tapes_are_corrected_by_their_certificate(photos, adjustment):
     assert value == pytest.approx(measurements.readings[0].value[0], abs=1e-12)
 
 
-def test_causes_are_what_one_sd_of_an_instrument_does(photos):
+def test_causes_are_effects_of_one_instrument_sd(photos):
     """Second method: adjusted again with the a-priori value shifted by one standard uncertainty."""
     tool = Instrument("tape 1", "tape", u_scale=2e-4, u_offset_m=5e-4)
     measurements = replace(photos[0], instruments=(tool,))

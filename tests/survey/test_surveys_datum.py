@@ -60,7 +60,7 @@ def test_the_shape_is_the_same_in_every_datum(photos, figure):
 
 
 @pytest.mark.slow
-def test_what_depends_on_the_datum_and_what_does_not(photos):
+def test_quantities_that_depend_on_the_datum(photos):
     """Property: coordinates depend on it; lengths do when no tape gives the scale."""
     found = chosen(photos, "inner").adjusted
     line = Distances(
@@ -91,7 +91,7 @@ def test_minimal_takes_control_that_is_far_apart(photos):
 
 
 @pytest.mark.slow
-def test_too_little_and_too_much_are_told(photos):
+def test_too_few_and_too_many_held_coordinates(photos):
     with pytest.raises(SolutionError, match=r"datum defect 6: three translations .* fix 3 of 6"):
         chosen(photos, "minimal", datum_points=(("P1", "xyz"),))
     much = chosen(photos, "minimal", datum_points=(("P1", "xyz"), ("P7", "xyz"), ("P43", "y")))
@@ -126,7 +126,7 @@ def test_a_frame_that_is_known_leaves_nothing_to_choose(photos):
 
 
 @pytest.mark.slow
-def test_without_control_the_defect_is_told_in_words(photos):
+def test_without_control_the_defect_is_reported_in_words(photos):
     message = (
         "datum defect 6: three translations and three rotations are not determined by any "
         "observation; add control or choose datum = inner"
@@ -139,7 +139,7 @@ def test_without_control_the_defect_is_told_in_words(photos):
 
 
 @pytest.mark.slow
-def test_vertical_and_scale_are_judged_by_what_is_known(photos):
+def test_vertical_and_scale_are_judged_by_given_values(photos):
     """Plumb lines, zenith angles and declared control know the vertical; a photo does not."""
     bare = replace(photos, control=None)
     report = chosen(bare, "inner").datum
@@ -196,7 +196,7 @@ def partly_held(measurements):
 
 
 @pytest.mark.slow
-def test_inner_constraints_are_over_what_held_coordinates_leave_free(photos, figure):
+def test_inner_constraints_complement_held_coordinates(photos, figure):
     """Invariance: held coordinates stay, their sds are 0, the shape is that of any other datum."""
     measurements = partly_held(photos)
     found, plain = chosen(measurements, "inner"), chosen(photos, "inner")
@@ -218,7 +218,7 @@ def test_inner_constraints_are_over_what_held_coordinates_leave_free(photos, fig
 
 
 @pytest.mark.slow
-def test_the_trace_is_the_smallest_of_all_datums_that_hold_the_same(photos):
+def test_inner_constraints_give_smallest_trace(photos):
     """Property: over the points of the constraints, among minimal datums with the same held."""
     measurements = partly_held(photos)
     over = tuple((name, "xyz") for name in ("P13", "P19", "P25", "P31", "P37", "P43"))
@@ -234,7 +234,7 @@ def test_the_trace_is_the_smallest_of_all_datums_that_hold_the_same(photos):
 
 
 @pytest.mark.slow
-def test_held_control_that_fixes_all_leaves_nothing_for_inner_constraints(photos):
+def test_inner_constraints_with_fully_held_control(photos):
     _, truth = by_photographs()
     names = [int(name[1:]) for name in photos.control.point]
     fixed = replace(photos, control=known(photos.control.point, truth.xyz_m[names], 0.0))
@@ -248,7 +248,7 @@ def test_held_control_that_fixes_all_leaves_nothing_for_inner_constraints(photos
 
 
 @pytest.mark.parametrize("datum", ["minimal", "fixed_photo"])
-def test_held_control_that_a_datum_releases_is_told(photos, datum):
+def test_held_control_that_a_datum_releases_is_reported(photos, datum):
     photo = {"fixed_photo": "S0"} if datum == "fixed_photo" else {}
     found = chosen(partly_held(photos), datum, **photo)
     text = "\n".join(map(str, found.warnings))

@@ -129,7 +129,7 @@ def test_one_camera_of_two_mirrored(photos):
     assert "its image points fit if the image is mirrored" in told(both)
 
 
-def test_distances_that_alone_give_the_scale_are_not_taken_for_another_unit():
+def test_distances_that_define_the_scale_keep_their_unit():
     """Sds ten times too small in a free network: a thousandth fits better, and means nothing."""
     rng = np.random.default_rng(4)
     xy = rng.uniform(0, 50, (7, 2))

@@ -89,7 +89,7 @@ def test_blunders_alone_do_not_bring_control_into_doubt(stations):
 
 
 @pytest.mark.slow
-def test_weighted_control_that_gives_way_to_a_tape_is_told(stations):
+def test_weighted_control_that_gives_way_to_a_tape_is_reported(stations):
     """The only scale is that of a tape 0.2 % long: coordinates of control go; both are named."""
     plan = next(one for one in stations.readings if one.table == "directions")
     slopes = next(one for one in stations.readings if one.table == "slope_distances")
@@ -185,7 +185,7 @@ def test_only_values_that_one_reading_contradicts_are_torn_apart():
     assert np.array_equal(torn[6:9], label[6:9])
 
 
-def test_the_detectable_bias_of_what_was_set_aside_is_that_with_it(stations):
+def test_detectable_bias_of_reading_set_aside(stations):
     """Property: nearly the figure that the sound reading has in the adjustment with it."""
     sound = {(one.file, one.row): one for one in adjust_survey(stations).readings}
     slopes = next(one for one in stations.readings if one.table == "slope_distances")
@@ -210,7 +210,7 @@ def intersection(stations):
     return adjust_survey(Measurements(control=control, readings=(azimuths,)))
 
 
-def test_of_three_rays_nobody_can_tell_the_wrong_one():
+def test_wrong_ray_of_three_cannot_be_identified():
     """Closed form: with one redundant ray all three have the same |w|."""
     found = intersection("ABC")
     assert len(found.removed) == 1
@@ -274,7 +274,7 @@ def test_a_fixed_principal_distance_that_is_wrong_is_named(photos, factor):
     assert f"instead of {values[0]:.3f} mm" in text
 
 
-def test_a_check_point_that_disagrees_is_told(stations):
+def test_a_check_point_that_disagrees_is_reported(stations):
     name, place = "P0", TRUTH[1][0] + [0.0, 0.05, 0.0]
     text = told(replace(stations, check=known([name], [place], 0.001, file="check.csv")))
     assert "check.csv, row 2, y_m: y of P0 differs by -" in text
@@ -307,7 +307,7 @@ def test_two_sets_of_one_station_are_one_ray(stations):
 
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("seed", range(12))
-def test_what_agrees_with_the_rest_does_not_stay_set_aside(seed):
+def test_agreeing_reading_is_taken_back(seed):
     """Property: six rays to one point, two of them wrong; whatever is out disagrees in the end."""
     rng = np.random.default_rng(seed)
     xy = rng.uniform(-20, 20, (6, 2))
@@ -346,7 +346,7 @@ def test_every_held_coordinate_has_a_row_with_its_test(stations):
 
 
 @pytest.mark.slow
-def test_sound_readings_are_not_given_up_for_a_held_coordinate_that_is_wrong():
+def test_wrong_held_coordinate_does_not_cost_sound_readings():
     """A point of many rays held 20 mm off: all its rays would go; it is asked, not gone on."""
     measurements, truth = by_photographs(photos=16)
     control = measurements.control
@@ -405,13 +405,13 @@ def test_every_held_coordinate_that_explains_as_much_is_named(error_m):
     assert named == expected
 
 
-def test_a_wrong_corner_that_costs_many_readings_is_asked_for():
+def test_wrong_corner_that_costs_readings_is_questioned():
     text = told(corners(0.2))
     assert text.startswith("the search for blunders would set ")
     assert "x of B is held fixed at 100.2000, but the readings give " in text
 
 
-def test_a_reading_of_a_held_point_may_be_right_and_the_point_wrong():
+def test_held_point_may_be_wrong_instead_of_its_reading():
     """Property: what was set aside is told with the held coordinates that explain it as well."""
     measurements = corners(0.0)
     tapes = measurements.readings[0]

@@ -65,14 +65,14 @@ def test_rows_are_volumes_areas_and_sources_at_one_go():
         assert np.array_equal(one.columns_m3, other.columns_m3)
 
 
-def test_what_bears_and_was_not_declared_is_named():
+def test_relevant_undeclared_inputs_are_named():
     body = Body((Slab(10.0, 3.0),), (Declared("scale"),), 0.0, 4.0)
     assert body.undeclared() == ("datum",)
     assert Body((Slab(10.0, 0.0),), (), 0.0, 4.0).undeclared() == ("datum",)  # scale moves nothing
 
 
 @pytest.mark.parametrize(("courses", "named"), [(1, False), (2, True)])
-def test_heights_of_several_courses_bear_even_on_a_perfect_shell(courses, named):
+def test_course_heights_affect_even_a_perfect_shell(courses, named):
     outline = section_of(ring(6.5, azimuths(24))).outline
     shapes = [course_shape(i, i + 1, [i + 0.5], [outline]) for i in range(courses)]
     perfect = ShellPart(ShellVolume(tuple(shapes)), (), 1.0, 1.1e-5)
@@ -81,7 +81,7 @@ def test_heights_of_several_courses_bear_even_on_a_perfect_shell(courses, named)
     assert ("course_heights" in body.undeclared()) == named
 
 
-def test_a_declared_input_that_no_part_knows_changes_nothing():
+def test_irrelevant_declared_input_changes_nothing():
     body = Body((Slab(10.0, 3.0),), (Declared("roof_mass"),), 0.0, 4.0)
     assert [source.kind for source in body.sources(LEVELS)] == ["points"]
 
@@ -147,7 +147,7 @@ def test_a_solid_grows_with_its_temperature_in_all_directions():
     )  # fmt: skip
 
 
-def test_what_the_survey_of_a_solid_gave_is_a_source_and_no_longer_an_input():
+def test_surveyed_sizes_of_solid_are_sources_not_inputs():
     levels = np.array([5.0, 19.0])
     plain = sphere()
     found = SolidPart(

@@ -72,7 +72,7 @@ def test_the_area_is_the_derivative_by_the_level(form, centre):
 
 
 @pytest.mark.parametrize(("form", "centre"), SHAPES[1:])
-def test_derivatives_of_shapes_by_scale_and_by_lifting_the_bottom(form, centre):
+def test_derivatives_of_bottoms_by_scale_and_height(form, centre):
     """Lifting by b: the tank's volume is that at L - b, the level counted from the lifted edge."""
     part = shaped_bottom(form, AREA, centre)
     found = part.derivatives(BETWEEN)
@@ -227,7 +227,7 @@ def test_derivatives_of_a_surveyed_bottom():
         assert_derivative(moved, [0.0], found[name][:, None], step=step, tolerance=1e-5)
 
 
-def test_the_uncertainty_of_a_surveyed_bottom_grows_with_the_wet_area():
+def test_u_of_surveyed_bottom_grows_with_wet_area():
     """Property: none below the surface, common to all rows above it, in two sources."""
     part = survey()
     levels = np.array([part.lowest_m - 0.01, -0.09, -0.05, part.surface.highest_m, 0.3, 9.5])

@@ -64,7 +64,7 @@ def test_groups_keep_their_order_and_leave_others_alone():
     assert np.sum(found[1].columns_m3[-1] ** 2) == pytest.approx(expected)
 
 
-def test_shares_add_up_and_what_dips_share_cancels():
+def test_shares_add_up_and_common_errors_cancel():
     both = table(source("scale", 0, 10, 20), source("zero", 7, 7, 7))
     at_top, delivered = budget(both, 2.0), budget(both, 2.0, 1.0)
     assert sum(line.share for line in at_top.lines) == pytest.approx(1)

@@ -37,7 +37,7 @@ def test_few_degrees_of_freedom_enlarge_k():
     assert found.dof[-1] == pytest.approx(5.0)
 
 
-def test_one_source_of_many_columns_has_its_degrees_of_freedom_once():
+def test_source_of_many_columns_counts_its_dof_once():
     """Ten columns from one noise estimate of 9 dof are 9 dof, not 90 (GUM G.4.1)."""
     found = table(points=(np.ones(10), 9.0))
     assert found.dof[-1] == pytest.approx(9.0)
@@ -49,7 +49,7 @@ def test_a_table_without_uncertainty_has_none():
     assert np.all(np.isinf(found.dof))
 
 
-def test_a_delivery_cancels_what_both_dips_share():
+def test_delivery_cancels_common_errors():
     shared = Capacity(
         HEIGHTS,
         130 * HEIGHTS,
@@ -95,7 +95,7 @@ def test_the_top_may_be_typed_as_it_is_read():
         found.at(9.501)
 
 
-def test_the_critical_zone_of_a_roof_is_flagged_and_its_edges_are_not():
+def test_critical_zone_of_roof_is_flagged_without_edges():
     found = replace(table(), critical_m=(1.9, 3.8))
     assert found.for_use([0.0, 1.9, 2.0, 3.7, 3.8]).tolist() == [True, True, False, False, True]
     assert not found.at(2.5).for_use

@@ -106,7 +106,7 @@ def test_a_dip_outside_the_table_is_refused(pair):
         deliveries(tank(), *pair)
 
 
-def test_a_common_scale_is_worst_everywhere_alike():
+def test_common_scale_is_equally_bad_everywhere():
     """Closed form: V = (1 + s) V0 has U/V = k s for each delivery, U = k s V for the largest."""
     table = replace(tank(), sources=tank().sources[2:3])
     found = worst_deliveries(table, 1.5)
@@ -115,7 +115,7 @@ def test_a_common_scale_is_worst_everywhere_alike():
     assert (found.absolute.low_m, found.absolute.high_m) == (0.0, 9.5)
 
 
-def test_what_both_dips_share_is_in_no_delivery():
+def test_common_errors_are_in_no_delivery():
     table = replace(tank(), sources=tank().sources[3:4])
     found = worst_deliveries(table, 1.5)
     assert found.absolute.U_m3 == 0
@@ -176,7 +176,7 @@ def test_the_bound_holds_between_rows_where_k_changes(minimum, figure):
     )
 
 
-def test_k_can_make_a_dip_between_rows_the_worst_and_the_bound_says_so():
+def test_bound_covers_worst_dip_between_rows():
     """Closed form: the sure input passes through 0 in mid-step, so there one dof is left.
 
     u = 1 of one dof throughout, and the other runs from 1 to -1: at the rows dof = (1 + 1)^2 = 4
@@ -205,7 +205,7 @@ def test_the_worst_of_a_minimum_height_may_lie_between_two_rows():
     assert found.at_minimum == found.relative
 
 
-def test_a_larger_delivery_can_be_worse_than_those_of_the_minimum_height():
+def test_larger_delivery_can_be_worse_than_minimum():
     """Closed form: columns of opposite slope cancel in 1.5 m from any dip, not in 2 m."""
     h = np.linspace(0, 4, 401)
     wave = np.sin(np.pi * h / 0.75)[:, None]  # period 1.5 m
@@ -258,7 +258,7 @@ def test_a_minimum_height_is_above_0(minimum):
         worst_deliveries(tank(), minimum)
 
 
-def test_where_nothing_is_delivered_no_relative_limit_can_be_kept():
+def test_empty_deliveries_hold_no_relative_limit():
     """Dips below the tank's lowest point: the first rows are 0, and a datum that is not sure."""
     h = np.linspace(0, 5, 51)
     volume = 100 * np.maximum(h - 2, 0)
@@ -270,7 +270,7 @@ def test_where_nothing_is_delivered_no_relative_limit_can_be_kept():
 
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("few_dof", [False, True])
-def test_the_least_delivery_height_is_where_the_limit_begins_to_hold(few_dof):
+def test_least_delivery_height_is_where_limit_holds(few_dof):
     table = tank(70, 1, few_dof)
     limit = worst_deliveries(table, 2.345).relative.relative
     height = least_delivery_m(table, limit)

@@ -193,7 +193,7 @@ def test_dips_in_metres_as_text():
 # straight lines between rows
 
 
-def test_a_centimetre_table_of_a_lying_tank_is_three_litres_wrong_near_its_ends(figure):
+def test_interpolation_error_of_lying_tank_near_its_ends(figure):
     """Second method: the exact volume where the area equals the mean area of the interval."""
     heights = table_heights(0.01, 2.4)
     found = interpolation_errors(lying, heights)
@@ -387,7 +387,7 @@ def test_parts_of_a_cone_keep_their_bound_or_are_not_given():
         assert np.abs(cone_and_shell(rows) + part - cone_and_shell(marks / 1000)).max() < 0.002
 
 
-def test_a_stretch_is_cut_into_the_longest_zones_that_keep_the_bound():
+def test_zones_are_the_longest_within_the_bound():
     """Property: zones of a widening tank meet, and each one row longer would break the bound."""
 
     def widening(h):
@@ -445,7 +445,7 @@ def test_rows_read_back_exactly():
     assert found.height_m.tolist() == HEIGHTS.tolist()
 
 
-def test_the_uncertainty_of_a_dip_is_that_of_the_volume_over_the_area():
+def test_u_of_dip_is_u_of_volume_over_area():
     table = np.array([0.0, 1.0, 3.0])
     found = dips_of([0, 1, 2], table, [[0.0, 0.0], [3.0, 4.0], [3.0, 4.0]], [0.5, 1.0, 2.0])
     assert found.u_m.tolist() == [2.5, 5.0, 2.5]  # closed form: slopes 1, 1 and 2 m2
@@ -494,7 +494,7 @@ def test_flat_places_elsewhere_do_no_harm():
 # rounding
 
 
-def test_rows_are_rounded_from_the_exact_value_and_never_added_up(figure):
+def test_rows_are_rounded_from_exact_volumes(figure):
     exact = volume_from_m3(lying(HEIGHTS), "L")
     once = round_each(exact, 0)
     assert np.abs(once - exact).max() <= 0.5  # property of rounding

@@ -75,7 +75,7 @@ def test_each_item_is_a_source_of_its_own():
         assert_derivative(volume, [0.0], source.columns_m3 / source.u)
 
 
-def test_the_lowest_level_is_that_of_what_adds():
+def test_lowest_level_is_that_of_the_parts():
     assert part_of(ITEMS).lowest_m == -0.6
     assert part_of(ITEMS[:1]).lowest_m == np.inf
 
@@ -131,7 +131,7 @@ def test_weighing_in_air_moves_the_deduction_published(figure):
 
 
 @pytest.mark.parametrize("weighing", ["air", "vacuum"])
-def test_the_density_correction_makes_the_table_that_of_the_observed_density(weighing):
+def test_density_correction_gives_table_of_observed_density(weighing):
     """Property: table for 850 plus correction = table for the observed density, above the zone."""
     for observed in (780.0, 850.0, 900.0):
         own = floating_roof(25_000, 1.2, 1.6, observed, weighing)

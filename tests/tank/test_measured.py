@@ -53,7 +53,7 @@ def test_above_the_zone_the_shell_is_added():
     assert not np.any(Above(Cylinder(), 0.30).volume_m3(LEVELS))
 
 
-def test_above_the_zone_only_what_was_added_is_uncertain():
+def test_above_the_zone_only_increments_are_uncertain():
     """Both parts of the shell's errors that the measured zone replaced cancel."""
     part = Above(Cylinder(), 0.30)
     levels = np.array([0.1, 0.30, 0.5, 9.5])
@@ -107,7 +107,7 @@ def test_the_area_is_the_derivative_by_the_level():
     assert part.derivatives(between) == {}
 
 
-def test_every_dip_has_its_own_uncertainty_and_rows_above_the_last():
+def test_measured_dips_have_u_and_rows_above_the_last():
     errors, curve = measured().sources(np.append(LEVELS, [0.31, 9.0]))
     u = np.sqrt(np.sum(errors.columns_m3**2, axis=1))
     assert u == pytest.approx(np.append(U, [0.08, 0.08]), rel=1e-12)
@@ -115,7 +115,7 @@ def test_every_dip_has_its_own_uncertainty_and_rows_above_the_last():
     assert errors.columns_m3[-1] - errors.columns_m3[-2] == pytest.approx(0.0)
 
 
-def test_a_delivery_within_the_zone_is_as_uncertain_as_what_was_metered_between():
+def test_delivery_in_liquid_zone_has_u_of_metered_volume():
     """Independent batches of sd 0.01, 0.02, ...: closed form, differences of their sums."""
     batches = np.array([0.01, 0.02, 0.01, 0.03, 0.02, 0.01, 0.02, 0.01])
     part = measured(np.sqrt(np.cumsum(batches**2)))
@@ -145,6 +145,6 @@ def test_below_the_lowest_dip():
         ([0.0, 0.1], [1.0, 2.0], [0.0, -1.0], "volume 2 measured"),
     ],
 )
-def test_what_cannot_be_measured_is_refused(levels, volumes, u, words):
+def test_impossible_measured_volumes_are_refused(levels, volumes, u, words):
     with pytest.raises(SolutionError, match=words):
         measured_bottom(levels, volumes, u)

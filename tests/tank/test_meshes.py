@@ -177,7 +177,7 @@ def test_a_cone_and_a_ball_in_closed_form(figure):
     assert (4 * fine - coarse) / 3 == pytest.approx([0, 0, 0], abs=2e-6)
 
 
-def test_steps_of_the_free_surface_are_told_apart():
+def test_steps_of_the_free_surface_are_separated():
     """Two cubes, one on a taller pedestal: area from above at a step, below at the top."""
     high, faces = cube((5, 0, 1), 1.0)
     part = mesh_part(closed_mesh(*together(cube(size=1.5), (high, faces))))
@@ -233,7 +233,7 @@ def plain(corners, weights, height, power):
     bits=st.sampled_from([2, 5, 40]),
     noise=st.sampled_from([0.0, 1e-9, 1e-90]),
 )
-def test_the_tree_sums_what_a_plain_loop_sums(seed, rows, bits, noise):
+def test_tree_sum_equals_plain_loop(seed, rows, bits, noise):
     """Second method; heights on few places make level faces, edges, and rows at corners."""
     rng = np.random.default_rng(seed)
     corners = np.sort(rng.integers(0, 2**bits, (50, 3)) / 2**bits + noise * rng.random((50, 3)))
@@ -297,7 +297,7 @@ def test_a_hollow_a_heap_and_a_turned_mesh():
 
 
 @pytest.mark.parametrize(("many", "bodies"), [(40, 40), (999, None)])
-def test_nested_hollows_are_told_apart_or_refused_at_once(many, bodies):
+def test_nested_hollows_are_separated_or_refused(many, bodies):
     """Closed form: shells of alternating sign; of a thousand in one another nobody waits."""
     sizes = 1 + np.arange(many) / many
     nested = [
@@ -313,7 +313,7 @@ def test_nested_hollows_are_told_apart_or_refused_at_once(many, bodies):
     assert found.capacity_m3 == pytest.approx(np.sum(signs * sizes**3), rel=1e-12)
 
 
-def test_bars_that_cross_without_a_vertex_inside_are_counted_twice_as_documented():
+def test_crossing_bars_without_inner_vertex_count_twice():
     """The limit of the checks: two bars of 3 x 1 x 1 that share a unit cube hold 5 m3, not 6."""
     first, faces = cube()
     across = first * (3, 1, 1) - (1.5, 0.5, 0.5), faces
@@ -323,7 +323,7 @@ def test_bars_that_cross_without_a_vertex_inside_are_counted_twice_as_documented
     assert mesh_part(found).volume_m3([1.0])[0] == pytest.approx(6.0)
 
 
-def test_what_is_harmless_is_repaired_and_noted():
+def test_harmless_defects_are_repaired_and_noted():
     vertices, faces = cube()
     unused = np.vstack([vertices, [[0, 0, -9]]])
     needle = np.vstack([faces, [[0, 1, 1], [3, 3, 3]]])
@@ -396,7 +396,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_what_encloses_no_volume_beyond_doubt_is_told(name):
+def test_mesh_without_volume_is_reported(name):
     (vertices, faces), expected = BAD[name]
     with pytest.raises(InputError, match=expected) as error:
         closed_mesh(vertices, faces, name="tank.stl")
@@ -418,7 +418,7 @@ def test_files_in_millimetres_are_read(kind, tmp_path):
     assert len(again.faces) == len(mesh.faces)
 
 
-def test_a_mesh_at_utm_coordinates_is_written_from_a_nearby_origin(tmp_path):
+def test_mesh_at_utm_coordinates_has_nearby_origin(tmp_path):
     """Property: STL from an origin within the tank holds the volume to its seven digits."""
     mesh, origin = hull(9), np.array([3e5, 7.4e6, 12.0])
     found = closed_mesh(mesh.vertices + origin, mesh.faces)
@@ -430,7 +430,7 @@ def test_a_mesh_at_utm_coordinates_is_written_from_a_nearby_origin(tmp_path):
 
 
 @pytest.mark.parametrize("unit_m", [0.0, -0.001, np.nan, np.inf])
-def test_a_unit_that_is_no_length_is_told(unit_m):
+def test_impossible_unit_is_reported(unit_m):
     with pytest.raises(InputError, match="expected a length above 0"):
         closed_mesh(*cube(), unit_m=unit_m)
 
@@ -461,7 +461,7 @@ def test_a_unit_that_is_no_length_is_told(unit_m):
         ("gone.stl", None, "cannot be read: No such file"),
     ],
 )
-def test_bad_files_are_told_in_one_line(name, content, expected, tmp_path):
+def test_bad_mesh_files_are_reported_in_one_line(name, content, expected, tmp_path):
     if content is not None:
         (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=expected) as error:
@@ -489,7 +489,7 @@ def _text_of(kind):
 
 
 @pytest.mark.parametrize("kind", ["off", "obj", "ply"])
-def test_what_says_nothing_in_a_mesh_file_changes_nothing(kind):
+def test_unused_lines_of_mesh_file_change_nothing(kind):
     """Property: blank rows, comments, names in quotation marks, tabs and any line end."""
     lines, start = _text_of(kind)
     comment = {"off": "# x", "obj": "# x", "ply": "comment x"}[kind]
@@ -534,7 +534,7 @@ def dented_shell(seed=3, inset=0.008, scale=1.0004):
 
 
 @pytest.mark.slow
-def test_the_loft_of_a_shell_agrees_with_the_quadrature_second_method(figure):
+def test_loft_of_shell_agrees_with_quadrature(figure):
     """Every row; the error falls with the square of the spacing, to the quadrature."""
     volume, sections, options = dented_shell()
     rows = np.array([0.95, 1.9, 2.85, 3.8, 4.75, 5.7])

@@ -246,7 +246,7 @@ def test_sources_have_a_row_for_each_level(name):
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_every_kind_names_the_contract_and_what_it_is(name):
+def test_parts_fulfil_the_contract_and_name_their_kind(name):
     assert Part in type(part_of(name)).__mro__
     assert part_of(name).kind in ("wall", "bottom", "deadwood", "roof")
 

@@ -101,7 +101,7 @@ def test_few_degrees_of_freedom_count():
     assert judge_uncertainty(uncertainty(), table(scale=8e-4, dof=5.0)).code == "fails"
 
 
-def test_a_limit_that_is_broken_in_the_middle_holds_from_above_it():
+def test_limit_broken_in_the_middle_holds_above():
     bump = np.where(np.abs(HEIGHTS - 6) < 0.05, 5.0, 0.0)[:, None]
     middle = replace(table(), sources=(Source("bump", bump),))
     assert judge_uncertainty(uncertainty(), middle).from_m == pytest.approx(6.1)
@@ -144,7 +144,7 @@ def test_between_rows_the_limit_holds_where_it_holds_at_rows():
         assert found.U_m3 <= 0.1 * found.value_m3
 
 
-def test_deliveries_of_a_seam_keep_the_limit_from_the_closed_form_on():
+def test_deliveries_of_a_seam_hold_limit_by_closed_form():
     """U = k 0.5 m3 across the seam at 5 m: 0.2 % of 490 m3, so deliveries of 4.900 m and more."""
     seam = Source("seam", np.where(HEIGHTS < 5, 0, 0.5)[:, None])
     tank = replace(table(), sources=(seam,))
@@ -239,7 +239,7 @@ def test_without_uncertainty_the_probability_is_0_or_1():
     assert conformity_probability(1.0, 0.0, 1.0, 2.0, 4.0) == 1
 
 
-def test_at_the_guarded_limit_the_risk_is_what_the_guard_band_is_for():
+def test_risk_at_guarded_limit():
     """w = U, k = 1.96, two limits far apart: a value at A_U conforms with 97.5 %."""
     tank = table(datum=0.5)
     stated = StatedVolume(500.0, 5.0)
@@ -318,7 +318,7 @@ def test_a_stated_volume_in_the_critical_zone_is_not_judged():
 # --- whole rules
 
 
-def test_the_shipped_rules_say_what_was_read():
+def test_shipped_rules_state_what_was_verified():
     verified = {name: shipped_rule(name).verified for name in shipped_names()}
     assert verified == {
         "france_2003": True,
@@ -362,7 +362,7 @@ def test_each_kind_of_tank_has_one_limit_of_its_volumes(name, tank, percent):
     ("tank", "height"),
     [("horizontal", 1.5), ("vertical_fixed_roof", 2), ("vertical_floating_roof", 3), ("sphere", 3)],
 )
-def test_french_law_asks_for_the_worst_delivery_and_does_not_limit_it(tank, height):
+def test_french_rule_states_worst_delivery_without_limit(tank, height):
     # published: arrêté of 8 July 2003, 34.3, hauteurs minimales de livraison
     found = judge(shipped_rule("france_2003"), table(datum=0.5, scale=1e-3), tank)
     (delivery,) = [one for one in found.uncertainty if one.limit.of == "deliveries"]
@@ -372,7 +372,7 @@ def test_french_law_asks_for_the_worst_delivery_and_does_not_limit_it(tank, heig
     assert delivery.worst_ratio == pytest.approx(K95 * 1e-3, rel=1e-9)
 
 
-def test_every_kind_of_tank_is_in_the_international_and_french_rules():
+def test_oiml_and_french_rules_cover_every_kind_of_tank():
     for name in ("oiml_r71", "france_2003"):
         for tank in TANKS:
             assert judge(shipped_rule(name), table(), tank).code == "passed"
@@ -473,7 +473,7 @@ def test_a_guard_band_is_the_U_that_is_printed_at_the_dip(dip, expected):
     assert found.u_m3 == pytest.approx(one.at(dip).u_m3 * found.U_m3 / own)
 
 
-def test_a_deviation_within_the_guard_band_of_the_printed_U_is_not_accepted():
+def test_deviation_in_guard_band_of_printed_U_is_refused():
     """9.37 m3 off, limit 10 m3: accepted with U 0.61, not with 0.64."""
     rule = replace(
         shipped_rule("oiml_r71"), uncertainty=(), deviation=(deviation(limit_m3=10.0, guard="U"),)
@@ -486,7 +486,7 @@ def test_a_deviation_within_the_guard_band_of_the_printed_U_is_not_accepted():
     assert judge(rule, one, "sphere", stated=stated, printed=larger).code == "not_accepted"
 
 
-def test_deliveries_are_judged_with_the_factor_that_simulated_ones_needed():
+def test_deliveries_are_judged_with_factor_of_simulated_ones():
     one, limit = table(scale=1e-3), uncertainty("deliveries", 0.2, minimum=1.0)
     assert judge_uncertainty(limit, one).code == "holds"  # U/V = 0.196 %
     found = judge_uncertainty(limit, one, printed=printed(factor=1.1))

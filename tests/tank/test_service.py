@@ -23,7 +23,7 @@ def test_the_coefficient_is_that_of_the_customary_units():
     assert pytest.approx(6.20e-6 * 1.8, rel=1e-12) == MILD_STEEL_PER_K
 
 
-def test_a_bare_shell_is_an_eighth_ambient_an_insulated_one_is_not():
+def test_shell_temperature_of_bare_and_insulated_tank():
     """(7 * 60 + 20) / 8 = 55, closed form."""
     assert shell_temperature_c(60.0, 20.0) == 55
     assert shell_temperature_c(60.0, insulated=True) == 60

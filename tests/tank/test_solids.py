@@ -355,7 +355,7 @@ def test_level_tanks_are_symmetric(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_tilted_tanks_with_equal_ends_are_symmetric_about_their_middle(kind):
+def test_tilted_tank_with_equal_ends_is_symmetric(kind):
     tank = round_tank(kind, tilt=0.08, dip_from_a_m=2.5, dip_direction="square")
     dip = np.linspace(0, 2, 101)
     assert tank.volume_m3(dip) + tank.volume_m3(2 - dip) == pytest.approx(
@@ -373,7 +373,7 @@ def test_ends_swapped_and_tilt_reversed_is_the_same_tank(a, b, direction):
     assert there.area_m2(dip) == pytest.approx(here.area_m2(dip), rel=1e-9)
 
 
-def test_a_quarter_turn_swaps_width_and_height_and_roll_does_not_touch_a_round_tank():
+def test_quarter_turn_swaps_width_and_height():
     dip = np.linspace(0, 1.4, 51)
     lying = LyingTank(1.8, 1.4, 4.0, END["ellipsoidal"], FLAT, 0.05, 0.0, 1.5)
     rolled = replace(lying, width_m=1.4, height_m=1.8, roll_rad=np.pi / 2)
@@ -384,7 +384,7 @@ def test_a_quarter_turn_swaps_width_and_height_and_roll_does_not_touch_a_round_t
 
 
 @pytest.mark.parametrize("kind", KINDS[1:])
-def test_what_an_inward_end_takes_is_what_an_outward_one_adds_when_level(kind):
+def test_inward_end_takes_what_outward_end_adds(kind):
     dip = np.linspace(0, 2, 51)
     inward = replace(END[kind], inward=True)
     tank = replace(round_tank(kind), end_b=inward)

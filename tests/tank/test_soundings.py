@@ -193,7 +193,7 @@ def test_the_noise_is_estimated_where_none_is_given():
     assert surveyed_surface(ROUND, sounded, 0.004).noise_dof == np.inf
 
 
-def test_a_blunder_is_told_apart(figure):
+def test_a_blunder_is_separated(figure):
     sounded = points(true_bottom(np.random.default_rng(4), 6.5, "cone"), count=60)
     sounded[17, 2] += 0.1
     w = np.abs(surveyed_surface(ROUND, sounded, 0.0015).w)

@@ -91,7 +91,7 @@ def test_the_area_is_the_derivative_of_the_volume():
     )
 
 
-def test_wet_weights_are_minus_the_derivative_by_the_heights_of_vertices():
+def test_wet_weights_are_derivatives_by_vertex_heights():
     plan, faces = ROUND.mesh(3, 12)
     heights = 0.05 * np.sin(plan[:, 0]) + 0.02 * plan[:, 1]
     levels = np.array([-0.05, 0.013, 0.3])

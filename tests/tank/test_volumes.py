@@ -69,13 +69,13 @@ def test_the_loss_by_plate_is_the_derivative_by_the_inset():
     assert_derivative(volume, [0.008], -loss[:, None], step=1e-5)
 
 
-def test_three_sections_close_together_do_not_extrapolate_a_parabola():
+def test_close_sections_do_not_extrapolate_a_parabola():
     stack = shell([0, 1.9], [[0.9, 0.95, 1.0]], lambda z: 6.5 + 0.02 * (z - 0.95))
     assert stack.courses[0].degree == 0
     assert stack.volume_m3([1.9])[0] == pytest.approx(np.pi * 6.5**2 * 1.9, rel=1e-6)
 
 
-def test_features_move_with_the_parameters_as_their_jacobian_says():
+def test_features_follow_their_jacobian():
     rng = np.random.default_rng(2)
     outlines = []
     for _ in range(2):

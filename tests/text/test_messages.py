@@ -78,7 +78,7 @@ def test_each_code_is_made_in_one_place():
 
 @pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", OTHERS)
-def test_a_language_says_every_message_with_its_values(language):
+def test_language_has_every_message_with_its_values(language):
     words, places = load_words(language), made()
     said = {code: text for group in MESSAGES for code, text in words[group].items()}
     assert sum(len(words[group]) for group in MESSAGES) == len(said)
@@ -88,7 +88,7 @@ def test_a_language_says_every_message_with_its_values(language):
 
 
 @pytest.mark.parametrize("language", OTHERS)
-def test_a_language_says_the_texts_of_every_shipped_rule(language):
+def test_language_has_texts_of_every_shipped_rule(language):
     texts = load_words(language)["rule_texts"]
     assert set(texts) == set(shipped_names())
     assert all(set(one) == {"name", "source", "remark"} for one in texts.values())
@@ -154,7 +154,7 @@ def test_parts_in_a_row():
     assert join_with_and(["a", "b", "c"]) == "a, b and c"
 
 
-def test_a_copy_of_a_message_knows_what_it_says():
+def test_copy_of_message_keeps_code_and_values():
     text = message("of", "of {names}", names=["a"])
     for other in (copy.deepcopy(text), pickle.loads(pickle.dumps(text))):
         assert (other, other.code, other.values) == ("of a", "of", {"names": ["a"]})
@@ -180,7 +180,7 @@ def test_every_warning_of_the_record_has_its_code(result):
     }
 
 
-def test_a_record_is_told_in_the_language_of_its_reader(result):
+def test_record_is_written_in_language_of_its_reader(result):
     record = record_of(result)
     told = translate_record(WORDS, record)
     (undeclared,) = (one for one in told["warnings"] if one["code"] == "undeclared")
@@ -205,7 +205,7 @@ def test_a_record_without_codes_keeps_its_texts(result):
     assert told["adjustment"] == old["adjustment"]
 
 
-def test_a_shipped_rule_speaks_the_language_and_another_one_does_not(result):
+def test_only_shipped_rules_are_translated(result):
     words = WORDS | {"rule_texts": {"oiml_r71": {"remark": "Não lido"}}}
     rule = {"code": "passed", "rule": {"name": "OIML R 71", "remark": "Not read"}}
     record = record_of(result) | {"rule": rule}

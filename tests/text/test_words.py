@@ -31,7 +31,7 @@ def promised_codes(beginning):
     return re.findall(r"`([a-z_]+)`", rest)
 
 
-def test_the_format_promises_what_this_test_looks_for():
+def test_record_format_page_names_what_is_tested():
     assert {"zero", "coverage", "not_in_budget", "snooping"} <= {c for c, _ in promised_choices()}
     codes = "plate paint temperature tilt head bottom deadwood roof"
     assert promised_codes("Correction codes:") == codes.split()
