@@ -66,7 +66,7 @@ def contribution(result, kind):
 def test_wall_seen_from_wrong_side_is_refused(job, survey):
     job = replace(job, measurements=with_control(survey))
     assert job.survey.side == "outside"
-    with pytest.raises(InputError, match=r"survey.side: found inside, and all 8 set-ups") as told:
+    with pytest.raises(InputError, match=r"survey.side: found inside, but all 8 set-ups") as told:
         run(replace(job, survey=replace(job.survey, side="inside")), simulated=False)
     assert told.value.problems[0].expected.code == "stations_on_other_side"
 
