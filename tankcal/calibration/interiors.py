@@ -253,8 +253,7 @@ def interiors_in(record):
             _problem(
                 message(
                     "camera_none_adjusted",
-                    "the adjustment of this record has no "
-                    "camera; expected a record with "
+                    "the adjustment of this record has no camera; expected a record with "
                     "photographs",
                 )
             )

@@ -152,9 +152,8 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
         raise SolutionError(
             message(
                 "no_shell",
-                "only {found} of {all} points between bottom and top lie on one wall: the "
-                "shell cannot be told from its surroundings; check nominal_diameter_m and "
-                "points",
+                "only {found} of {all} points between bottom and top lie on one wall: the shell "
+                "cannot be told from its surroundings; check nominal_diameter_m and points",
                 found=wall.sum(),
                 all=candidates.sum(),
             )

@@ -79,9 +79,8 @@ def open_questions(job, datum, causes):
     ):
         text = message(
             "heights_not_fixed",
-            "datum = {choice}: no observation fixes the heights of the frame; bottom_z_m is "
-            "taken in the frame of the results, which is held by {held}: check its value in "
-            "that frame",
+            "datum = {choice}: no observation fixes the heights of the frame; bottom_z_m is taken "
+            "in the frame of the results, which is held by {held}: check its value in that frame",
             choice=datum.choice,
             held=_held(datum.held),
         )
@@ -224,9 +223,8 @@ def check_shell(job, shell, sections, given_sd_m):
         texts.append(
             message(
                 "many_outliers",
-                "{rejected} of {tested} points near the wall were rejected as outliers: are "
-                "they dents of the wall, or objects in front of it? The working papers list "
-                "them",
+                "{rejected} of {tested} points near the wall were rejected as outliers: are they "
+                "dents of the wall, or objects in front of it? The working papers list them",
                 rejected=snooped,
                 tested=tested,
             )

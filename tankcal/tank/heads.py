@@ -231,10 +231,9 @@ def _torispherical(end, radius_m):
         raise SolutionError(
             message(
                 "torispherical_radii_impossible",
-                "a torispherical end with a knuckle of {knuckle_m:g} m and a dish of "
-                "{dish_m:g} m on a radius of {radius_m:g} m: expected 0 < knuckle <= "
-                "radius < dish (an end without knuckle, or a hemisphere, is a spherical "
-                "one)",
+                "a torispherical end with a knuckle of {knuckle_m:g} m and a dish of {dish_m:g} m "
+                "on a radius of {radius_m:g} m: expected 0 < knuckle <= radius < dish (an end "
+                "without knuckle, or a hemisphere, is a spherical one)",
                 knuckle_m=knuckle,
                 dish_m=dish,
                 radius_m=radius_m,

@@ -121,9 +121,8 @@ def measured_bottom(levels_m, volumes_m3, u_m3=None):
         raise SolutionError(
             message(
                 "measured_volume_wrong",
-                "volume {number} measured by liquid: level {level_m:g} m, {volume_m3:g} "
-                "m3, u {u_m3:g} m3; expected rising levels, volumes that do not fall, "
-                "none negative",
+                "volume {number} measured by liquid: level {level_m:g} m, {volume_m3:g} m3, u "
+                "{u_m3:g} m3; expected rising levels, volumes that do not fall, none negative",
                 number=row + 1,
                 level_m=levels[row],
                 volume_m3=volumes[row],

@@ -100,9 +100,8 @@ class LyingTank(Part):
             raise SolutionError(
                 message(
                     "dip_off_cylinder",
-                    "the dip touches the bottom {low_m:g} m and leaves the top {high_m:g} m "
-                    "from the start of the cylinder: expected both between 0 and "
-                    "{length_m:g} m",
+                    "the dip touches the bottom {low_m:g} m and leaves the top {high_m:g} m from "
+                    "the start of the cylinder: expected both between 0 and {length_m:g} m",
                     low_m=low,
                     high_m=high,
                     length_m=self.length_m,

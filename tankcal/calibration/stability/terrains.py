@@ -81,9 +81,8 @@ def parse_terrain(text):
             "--terrain",
             message(
                 "compare_terrain",
-                "found {found!r}; expected I, II, or LOW,RANGE in metres with a range of "
-                "0 or more and all of it below the camera at {height:g} m, such as "
-                "200,100",
+                "found {found!r}; expected I, II, or LOW,RANGE in metres with a range of 0 or more "
+                "and all of it below the camera at {height:g} m, such as 200,100",
                 found=text[:60],
                 height=camera_m,
             ),

@@ -191,9 +191,8 @@ def _check_lines(plan, pattern, log):
         near = _first([names[i] for i in np.flatnonzero(close)])
         expected = message(
             "plan_lines_on_weld",
-            "lines {names} are as near as {off_mm:.0f} mm to a weld, moved away from "
-            "another one; expected welds further apart, or a weld_clearance_mm below "
-            "{clearance:g}",
+            "lines {names} are as near as {off_mm:.0f} mm to a weld, moved away from another one; "
+            "expected welds further apart, or a weld_clearance_mm below {clearance:g}",
             names=near,
             off_mm=1000 * off.min(),
             clearance=clearance,
@@ -368,9 +367,8 @@ def _misplaced(plan, xyz):
     if not shell.outside and (away > shell.radius_m or not level):
         return message(
             "plan_outside_the_tank",
-            "stands outside the tank, {away:.3f} m from its axis (radius "
-            "{radius:.3f} m), z = {z:.3f} m, but survey.side is inside; expected it "
-            "within the shell",
+            "stands outside the tank, {away:.3f} m from its axis (radius {radius:.3f} m), z = "
+            "{z:.3f} m, but survey.side is inside; expected it within the shell",
             away=away,
             radius=shell.radius_m,
             z=xyz[2],

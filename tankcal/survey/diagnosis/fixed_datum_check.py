@@ -222,9 +222,8 @@ def _strained(one):
     sd = one.mdb / noncentrality()
     text = message(
         "held_contradicted",
-        "{axis} of {point} is held fixed at {value_m:.4f}, but if it alone is released it "
-        "becomes {here_m:.4f} (standard deviation {sd_mm:.1f} mm, w = {w:.1f}): it may be "
-        "wrong",
+        "{axis} of {point} is held fixed at {value_m:.4f}, but if it alone is released it becomes "
+        "{here_m:.4f} (standard deviation {sd_mm:.1f} mm, w = {w:.1f}): it may be wrong",
         axis=one.element,
         point=one.ids[0],
         value_m=one.value,
@@ -274,9 +273,8 @@ def _scale(name):
         sd = _sd_of(adjusted, adjusted.problem.layout.scale[i])
         text = message(
             "scale_explains",
-            "the distances of {name} fit if all of them are {scale_ppm:+.0f} ppm off "
-            "(standard uncertainty {u_ppm:.0f} ppm): check its certificate, its unit and its "
-            "u_scale_ppm",
+            "the distances of {name} fit if all of them are {scale_ppm:+.0f} ppm off (standard "
+            "uncertainty {u_ppm:.0f} ppm): check its certificate, its unit and its u_scale_ppm",
             name=name,
             scale_ppm=1e6 * scale,
             u_ppm=1e6 * sd,

@@ -113,9 +113,8 @@ def _many(gone, total):
         return []
     text = message(
         "many_set_aside",
-        "{gone} of {total} values ({percent:.0f} %) were set aside: more than single "
-        "blunders explain; first check what is held fixed, the scales and the standard "
-        "deviations",
+        "{gone} of {total} values ({percent:.0f} %) were set aside: more than single blunders "
+        "explain; first check what is held fixed, the scales and the standard deviations",
         gone=gone,
         total=total,
         percent=100 * gone / total,

@@ -26,10 +26,9 @@ def refuse_worthless_cameras(survey, problem, solution):
         raise SolutionError(
             message(
                 "c_not_determined",
-                "c of {camera} is not determined: its sd would be {sd:.2g} mm; c and the "
-                "distances of the photos can hardly be told apart: fix c or give it a "
-                "standard deviation, or add photos from nearer, from further away or at an "
-                "angle",
+                "c of {camera} is not determined: its sd would be {sd:.2g} mm; c and the distances "
+                "of the photos can hardly be told apart: fix c or give it a standard deviation, or "
+                "add photos from nearer, from further away or at an angle",
                 camera=camera,
                 sd=sd[i],
             )

@@ -96,9 +96,8 @@ def unfixed_point_error(survey, found, point, centre_m):
         return SolutionError(
             message(
                 "point_moves_freely",
-                "the readings between point {name} and known points leave it free to "
-                "move (lines or circles that coincide, or hardly cross): another reading "
-                "is needed",
+                "the readings between point {name} and known points leave it free to move (lines "
+                "or circles that coincide, or hardly cross): another reading is needed",
                 name=name,
             )
         )

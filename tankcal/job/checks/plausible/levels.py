@@ -133,9 +133,8 @@ def _check_slope(values, raw, log):
     elif drawn is None and diameter is not None and centre - edge > SLOPE_UP * diameter / 2:
         text = message(
             "bottom_rises_much",
-            "{rise_m:+.3g} m from the edge (datum.bottom_z_m), which is steep for a bottom "
-            "that slopes up to its centre: does it slope down? Then say so in "
-            "checks.bottom_slopes",
+            "{rise_m:+.3g} m from the edge (datum.bottom_z_m), which is steep for a bottom that "
+            "slopes up to its centre: does it slope down? Then say so in checks.bottom_slopes",
             rise_m=centre - edge,
         )
         tell(log.warning, raw, "bottom", "centre_z_m", text)

@@ -54,9 +54,8 @@ def _check_courses(values, courses, log):
         elif plate < least:
             text = message(
                 "plate_thin",
-                "{found_mm:g} mm, expected {limit_mm:.3g} mm or more for {head_m:.4g} m of shell"
-                " above it and a diameter of {diameter_m:g} m: is it in centimetres, or "
-                "half of it?",
+                "{found_mm:g} mm, expected {limit_mm:.3g} mm or more for {head_m:.4g} m of shell "
+                "above it and a diameter of {diameter_m:g} m: is it in centimetres, or half of it?",
                 **_of_course(plate, least, head, diameter),
             )
         if text is not None:

@@ -116,9 +116,8 @@ def _known(name, sights, unit, places):
     here, there = misfit[unit], misfit[other]
     return message(
         "angles_of_known",
-        "between points of known coordinates the angles are off by {here:.2g} degrees "
-        "(median), but by {there:.2g} if they are in {as_other}; expected {as_unit}, or the "
-        "column in {unit}",
+        "between points of known coordinates the angles are off by {here:.2g} degrees (median), "
+        "but by {there:.2g} if they are in {as_other}; expected {as_unit}, or the column in {unit}",
         here=here,
         there=there,
         as_other=as_other,
