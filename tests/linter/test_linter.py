@@ -359,7 +359,7 @@ def test_mistakes_found_in_spoilt_tables(tmp_path, figure):
 @pytest.mark.study
 def test_the_study_of_spoilt_tables(tmp_path, figure):
     """Tables of all steps alike, as in docs/table.md, take twice as long: in CI few are of 1 mm."""
-    in_ci = ["mm", *5 * ["cm"], *3 * ["dm"], *3 * ["eighths"]]
+    in_ci = ["mm", *8 * ["cm"], *4 * ["dm"], *3 * ["eighths"]]
     counts = study(tmp_path, 600, seed=1, steps=draws(in_ci, list(STEPS)))
     show(figure, counts, "linter, 600 spoilt tables")
     for spoil in SPOILING:
