@@ -1,5 +1,7 @@
 """The columns of the tables of a survey: photographs, angles, distances, levels, control."""
 
+from dataclasses import dataclass
+
 from tankcal.job.fields import Field
 
 ANGLE_UNITS = ("deg", "gon", "dms")
@@ -9,13 +11,6 @@ USE = Field(
     "choice",
     "check: compared with the adjustment, not adjusted; blank: adjust",
     choices=("adjust", "check"),
-)
-
-
-# tables whose rows may be correlated with others, besides control
-VALUES_OF = (
-    *("distances", "slope_distances", "directions", "zenith_angles", "azimuths"),
-    *("horizontal_angles", "vertical_angles", "height_differences", "vectors"),
 )
 
 
@@ -273,6 +268,54 @@ VECTORS = (
     ),
     USE,
 )
+
+
+@dataclass(frozen=True)
+class SurveyTable:
+    """A table of a survey: its columns, and what its rows are.
+
+    Attributes
+    ----------
+    columns : tuple of Field
+    is_reading : bool
+        Its rows are readings between points.
+    angle : str
+        The angle that is read, whose columns carry its unit; "" for a table of lengths.
+    may_correlate : bool
+        Its readings may be correlated with others (correlated_readings.csv).
+    """
+
+    columns: tuple[Field, ...]
+    is_reading: bool = False
+    angle: str = ""
+    may_correlate: bool = False
+
+
+def _read(columns, angle="", may_correlate=True):
+    return SurveyTable(columns, True, angle, may_correlate)
+
+
+# a new kind of reading is one line here, its columns above
+TABLES = {
+    "targets": SurveyTable(TARGETS),
+    "photos": SurveyTable(PHOTOS),
+    "image_points": SurveyTable(IMAGE_POINTS),
+    "fiducials": SurveyTable(FIDUCIALS),
+    "film": SurveyTable(FILM),
+    "control": SurveyTable(CONTROL, may_correlate=True),
+    "check": SurveyTable(CHECK),
+    "setups": SurveyTable(SETUPS),
+    "distances": _read(DISTANCES),
+    "slope_distances": _read(SLOPE_DISTANCES),
+    "directions": _read(DIRECTIONS, "direction"),
+    "zenith_angles": _read(ZENITH_ANGLES, "zenith"),
+    "azimuths": _read(AZIMUTHS, "azimuth"),
+    "horizontal_angles": _read(HORIZONTAL_ANGLES, "angle"),
+    "vertical_angles": _read(VERTICAL_ANGLES, "angle"),
+    "height_differences": _read(HEIGHT_DIFFERENCES),
+    "plumb_lines": _read(PLUMB_LINES, may_correlate=False),
+    "vectors": _read(VECTORS),
+}
 CORRELATED_READINGS = (
     *(
         field
@@ -283,7 +326,7 @@ CORRELATED_READINGS = (
                 "choice",
                 f"{which}: the table in which it stands",
                 required=True,
-                choices=("control", *VALUES_OF),
+                choices=tuple(name for name, one in TABLES.items() if one.may_correlate),
             ),
             Field(
                 f"row_{number}",
@@ -304,38 +347,10 @@ CORRELATED_READINGS = (
     _number("r", "their correlation", -1, 1, True),
 )
 
-COLUMNS = {
-    "targets": TARGETS,
-    "photos": PHOTOS,
-    "image_points": IMAGE_POINTS,
-    "fiducials": FIDUCIALS,
-    "film": FILM,
-    "control": CONTROL,
-    "check": CHECK,
-    "setups": SETUPS,
-    "distances": DISTANCES,
-    "slope_distances": SLOPE_DISTANCES,
-    "directions": DIRECTIONS,
-    "zenith_angles": ZENITH_ANGLES,
-    "azimuths": AZIMUTHS,
-    "horizontal_angles": HORIZONTAL_ANGLES,
-    "vertical_angles": VERTICAL_ANGLES,
-    "height_differences": HEIGHT_DIFFERENCES,
-    "plumb_lines": PLUMB_LINES,
-    "vectors": VECTORS,
-    "correlated_readings": CORRELATED_READINGS,
-}
-ANGLES = {
-    "directions": "direction",
-    "zenith_angles": "zenith",
-    "azimuths": "azimuth",
-    "horizontal_angles": "angle",
-    "vertical_angles": "angle",
-}
-READINGS = (
-    *("distances", "slope_distances", "directions", "zenith_angles", "azimuths"),
-    *("horizontal_angles", "vertical_angles", "height_differences", "plumb_lines", "vectors"),
-)
+COLUMNS = {name: one.columns for name, one in TABLES.items()}
+COLUMNS["correlated_readings"] = CORRELATED_READINGS
+READINGS = tuple(name for name, one in TABLES.items() if one.is_reading)
+ANGLES = {name: one.angle for name, one in TABLES.items() if one.angle}
 # tables of each usual kind of survey; those of the other kind may be added
 SURVEYS = {
     "photos": (
