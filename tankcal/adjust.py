@@ -237,7 +237,7 @@ def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=Fa
 
     References
     ----------
-    .. [1] Baarda 1968, A testing procedure for use in geodetic networks.
+    Baarda 1968, A testing procedure for use in geodetic networks.
 
     Examples
     --------

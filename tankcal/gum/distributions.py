@@ -183,7 +183,7 @@ class UnsureNormal(Distribution):
 
     References
     ----------
-    .. [1] JCGM 101:2008 6.4.9 for the t that it becomes.
+    JCGM 101:2008 6.4.9 for the t that it becomes.
     """
 
     name = "normal"

@@ -21,9 +21,7 @@ from tankcal.survey.readings import (
     Numbers,
     Trace,
     bend_per_m,
-    compared_only,
-    observations_of_table,
-    table_of,
+    observations_of_readings,
 )
 from tankcal.survey.repeated_readings import reject_scattered
 
@@ -154,10 +152,13 @@ def _gathered(measurements, excluded):
         add(one, trace)
     bend = bend_per_m(measurements.settings.refraction)
     for readings in measurements.readings:
-        table = table_of(readings, numbers, rows_of(measurements.correlated, readings.table))
-        for one, trace in observations_of_table(table, bend, warnings):
+        alone = rows_of(measurements.correlated, readings.table)
+        adjusted, compared = observations_of_readings(
+            readings, numbers, bend=bend, warnings=warnings, correlated=alone
+        )
+        for one, trace in adjusted:
             add(one, trace)
-        checks += compared_only(table, bend)
+        checks += compared
     photos, cameras, order = gathered_photos(measurements)
     images = None
     if photos is not None:

@@ -1,4 +1,4 @@
-"""Tables of distances, angles and levels as observations between numbered points."""
+"""From the readings of a table, with names, to observations, with arrays for the solver."""
 
 from dataclasses import dataclass, field, replace
 
@@ -74,9 +74,40 @@ def true_distance_m(reading_m, tool, temperature_c):
     return found * (1.0 + tool.expansion_per_k * warmer)
 
 
+def observations_of_readings(readings, numbers, *, bend, warnings, correlated=frozenset()):
+    """The observations of a table of readings: those that are adjusted, those that are compared.
+
+    Distances are corrected by the certificates of their instruments; repeated readings become one.
+
+    Parameters
+    ----------
+    readings : Readings
+        By the user's names, in SI.
+    numbers : Numbers
+        Readings between points that have no number are left out.
+    bend : float
+        Of the lines of sight, `bend_per_m`, 1/m.
+    warnings : list of Problem
+        To which warnings of scatter are added.
+    correlated : frozenset of int
+        Rows of the file that are correlated with others: they are not averaged.
+
+    Returns
+    -------
+    adjusted, compared : list of (Observations, Trace)
+    """
+    table = _numbered_table(readings, numbers, correlated)
+    use = _between_known(table)
+    adjusted = list(_adjusted(table, use & ~table.check, bend, warnings))
+    use &= table.check
+    if table.kind.has("set"):
+        use &= table.set >= 0
+    return adjusted, list(_one_by_one(table, np.flatnonzero(use), bend))
+
+
 @dataclass(frozen=True)
-class Table:
-    """A table of readings with numbers in place of names; arrays (n,), -1: no such number."""
+class _Table:
+    """Readings with numbers in place of names; arrays (n,), -1: no such number."""
 
     table: str
     file: str
@@ -93,7 +124,7 @@ class Table:
     horizontal: np.ndarray
     check: np.ndarray
     ids: tuple
-    correlated: frozenset = frozenset()  # rows of the file that are correlated with others
+    correlated: frozenset  # rows of the file that are correlated with others
 
     @property
     def kind(self):
@@ -101,11 +132,7 @@ class Table:
         return KINDS[self.table]
 
 
-def table_of(readings, numbers, correlated=frozenset()):
-    """The Table of job.Readings, distances corrected by the certificates of their instruments.
-
-    correlated  rows of its file that are correlated with others: they are not averaged
-    """
+def _numbered_table(readings, numbers, correlated):
     n = len(readings.value)
     setups = [numbers.setups[name] for name in readings.setup]
     start = [one.station for one in setups] if setups else readings.start
@@ -124,7 +151,7 @@ def table_of(readings, numbers, correlated=frozenset()):
     ids = zip(from_names, readings.end, strict=True)
     if readings.origin:
         ids = zip(from_names, readings.origin, readings.end, strict=True)
-    return Table(
+    return _Table(
         table=readings.table, file=readings.file, rows=tuple(readings.rows), value=value,
         sd=np.asarray(readings.sd, dtype=float),
         start=_numbered(start, numbers.points), end=_numbered(readings.end, numbers.points),
@@ -148,12 +175,8 @@ def _corrected(value, tools, temperature_c, known):
     return value
 
 
-def observations_of_table(table, bend, warnings):
-    """Pairs (observations, Trace) of the readings of a Table that are adjusted.
-
-    bend      see `bend_per_m`            warnings  list that warnings of scatter are added to
-    """
-    use = _between_known(table) & ~table.check
+def _adjusted(table, use, bend, warnings):
+    """Pairs (observations, Trace) of the rows (n,) bool that are adjusted, repeated ones as one."""
     if table.value.ndim > 1:
         yield from _one_by_one(table, np.flatnonzero(use), bend)
         return
@@ -187,14 +210,6 @@ def _one_by_one(table, rows, bend):
         if len(mine):
             trace = _trace(table, mine, np.ones(len(mine), dtype=int))
             yield _made(table, mine, *_values(table, mine), bend), trace
-
-
-def compared_only(table, bend):
-    """Pairs (observations, Trace) of the readings of a Table that are only compared."""
-    use = _between_known(table) & table.check
-    if table.kind.has("set"):
-        use &= table.set >= 0
-    yield from _one_by_one(table, np.flatnonzero(use), bend)
 
 
 def _values(table, rows):

@@ -57,7 +57,7 @@ class LyingTank(Part):
 
     References
     ----------
-    .. [1] Jones 2001, Computing fluid tank volumes (untilted); the tilt by quadrature, `heads`.
+    Jones 2001, Computing fluid tank volumes (untilted); the tilt by quadrature, `heads`.
     """
 
     width_m: float
@@ -266,7 +266,7 @@ class Sphere(Part):
 
     References
     ----------
-    .. [1] API MPMS 2.2D; closed form.
+    API MPMS 2.2D; closed form.
 
     Examples
     --------
