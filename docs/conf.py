@@ -51,6 +51,26 @@ def set_plain_docstrings(app, what, name, obj, options, lines):
         lines[first:] = ["", "::", "", *("   " + line for line in rest), ""]
 
 
+def tell_fields_apart(app, what, name, obj, options, lines):
+    """Attributes that share a line ("low, high : ndarray") become one each, as napoleon needs."""
+    if "Attributes" not in lines:
+        return
+    at = lines.index("Attributes") + 2
+    while at < len(lines):
+        names, _, kind = lines[at].partition(" : ")
+        end = at + 1
+        while end < len(lines) and lines[end].startswith(" "):
+            end += 1
+        if re.fullmatch(r"\w+(, \w+)+", names):
+            told = [
+                [f"{one} : {kind}" if kind else one, *lines[at + 1 : end]]
+                for one in names.split(", ")
+            ]
+            lines[at:end] = [line for one in told for line in one]
+            end = at + sum(map(len, told))
+        at = end
+
+
 def mark_code(app, what, name, obj, options, lines):
     """A single backtick in a docstring means code, whatever the markup of the site says."""
     end = lines.index("::") if "::" in lines else len(lines)
@@ -61,4 +81,5 @@ def mark_code(app, what, name, obj, options, lines):
 def setup(app):
     """Docstrings are taken as they stand in this house."""
     app.connect("autodoc-process-docstring", set_plain_docstrings, priority=100)
+    app.connect("autodoc-process-docstring", tell_fields_apart, priority=200)
     app.connect("autodoc-process-docstring", mark_code, priority=900)
