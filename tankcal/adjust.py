@@ -22,7 +22,7 @@ from tankcal.errors import SolutionError
 from tankcal.messages import message
 
 ALPHA, POWER = 0.001, 0.80  # of every test of single readings, and of the blunder it can show
-CRITICAL = 3.29  # of a test statistic, two-sided normal: ALPHA of the sound ones are above it
+CRITICAL = 3.29  # of a test statistic: ALPHA, two-sided normal, to the digits of the field
 SMALLEST_PIVOT = 1e-12  # of normal equations with ones in the diagonal: below it is rounding
 
 
