@@ -113,7 +113,20 @@ def _of(setup, name):
 
 
 def sets_to_be(measurements, camera=None, photo=None):
-    """How many sets of parameters an adjustment of job.Measurements will give, of these names."""
+    """How many sets of camera parameters an adjustment will give, known before it is run.
+
+    Parameters
+    ----------
+    measurements : Measurements
+    camera, photo : str, optional
+        Only of this camera, of this photo.
+
+    Returns
+    -------
+    int
+        One for each camera, or one for each photo of a camera that has parameters of its own in
+        each photo.
+    """
     photos = [one for one in measurements.photos if camera in (None, one.camera)]
     alone = {
         one.camera.name

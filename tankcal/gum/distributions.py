@@ -181,9 +181,26 @@ class UnsureNormal(Distribution):
     noise, a variance that is small by chance has no Cauchy tail. The mean over chi-square is taken
     by Gauss quadrature in the cube root of its probability, dense where it is small and v large.
 
+    Attributes
+    ----------
+    scale : float
+        u, the estimated standard deviation, in the unit of the input.
+    contrasts : float
+        m, number of independent contrasts; above dof.
+
+    Raises
+    ------
+    ValueError
+        For contrasts that are not above dof, or not finite.
+
     References
     ----------
     JCGM 101:2008 6.4.9 for the t that it becomes.
+
+    Examples
+    --------
+    >>> UnsureNormal(2.0, 30.0, dof=10.0).u
+    2.0
     """
 
     name = "normal"

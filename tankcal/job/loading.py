@@ -51,6 +51,13 @@ def load(path: str | PathLike, only: str | None = None) -> Job:
         With every problem of the input, each with its file, row and column.
     ValueError
         `only` is something else.
+
+    Examples
+    --------
+    >>> import tankcal
+    >>> job = tankcal.load("examples/silva-1995")
+    >>> len(job.courses), len(job.points.names), job.tank.nominal_diameter_m
+    (5, 119, 13.0)
     """
     if only not in (None, "adjustment"):
         raise ValueError(f"found only = {only!r}; expected 'adjustment'")

@@ -165,6 +165,20 @@ def lint(
     ------
     InputError
         For a file that cannot be read or holds no table.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import tankcal
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "table.csv")
+    ...     size = path.write_text("height_m,volume_m3\\n0,0\\n0.1,10\\n0.2,19\\n0.3,18\\n")
+    ...     report = tankcal.lint(path)
+    >>> print(report)
+    1 errors, 0 warnings
+    >>> print(report.findings[0].problem.expected)
+    found 18 after 19; expected volumes that do not fall
     """
     path, log = Path(path), Log()
     grids = read_grids(path, log)

@@ -286,6 +286,13 @@ def run(
         no wall.
     TypeError
         For anything but a `Job`.
+
+    Examples
+    --------
+    >>> import tankcal
+    >>> result = tankcal.run(tankcal.load("examples/silva-1995"))
+    >>> print(result.at(9.5))
+    1249.8 m3, U = 1.5 m3 (k = 1.96)
     """
     _refuse_other(job, "run")
     with _telling(job):

@@ -53,7 +53,7 @@ _TURN = (-4, 364)  # degrees: points at north are not cut off
 
 
 def styled(draw, **more):
-    """A function that draws, in the one style of notebooks and papers."""
+    """A function that draws in the one style of notebooks and papers; `more` adds to that style."""
 
     @wraps(draw)
     def drawing(*arguments, **options):
@@ -81,12 +81,16 @@ def english_label(key, **values):
 class Ring:
     """A section as it is drawn: its circle, its outline, and the residuals of its points.
 
-    name, height        what stands beside it, as texts
-    radius_m            of the circle
-    azimuth_deg         (n,) of the points
-    residual_m          (n,) of the points from the circle, outwards positive
-    outline_deg         (m,) azimuths of the outline
-    outline_m           (m,) its radii about the centre of the circle
+    Attributes
+    ----------
+    name, height : str
+        What stands beside it.
+    radius_m : float
+        Of the circle, m.
+    azimuth_deg, residual_m : ndarray, shape (n,)
+        Of the points: azimuth, and distance from the circle, outwards positive, m.
+    outline_deg, outline_m : ndarray, shape (m,)
+        Azimuths of the outline and its radii about the centre of the circle, m.
     """
 
     name: str
@@ -111,7 +115,20 @@ class Ring:
 
 
 def residual_panels(rings, words=english_label, most=8):
-    """Residuals in mm against azimuth, one panel a section, up to `most` panels a figure."""
+    """Residuals in mm against azimuth, one panel a section.
+
+    Parameters
+    ----------
+    rings : sequence of Ring
+    words : callable, optional
+        words(key, **values) gives the texts at the axes; English by default.
+    most : int, default 8
+        Panels in one figure.
+
+    Returns
+    -------
+    list of Drawing
+    """
     largest_m = max((np.max(np.abs(ring.residual_m), initial=0.0) for ring in rings), default=0.0)
     return [
         _residual_panels(group, 1.1e3 * largest_m or 1.0, words)
@@ -140,7 +157,7 @@ def _residual_panels(rings, limit_mm, words):
 
 
 def polar_factor(rings):
-    """How many times larger than the tank the deviations of `polar` are drawn: 1, 2 or 5·10^n."""
+    """How many times `polar` enlarges the deviations: 1, 2 or 5 times a power of ten."""
     largest = max(
         max(np.max(np.abs(of), initial=0.0) for of in (ring.deviation_m, ring.residual_m))
         / ring.radius_m
@@ -150,13 +167,41 @@ def polar_factor(rings):
 
 
 def round_factor(wanted):
-    """The largest of 1, 2, 5 times a power of ten that is at most `wanted`, and at least 1."""
+    """The largest of 1, 2, 5 times a power of ten that is at most `wanted`, and at least 1.
+
+    Parameters
+    ----------
+    wanted : float
+        Above 0.
+
+    Returns
+    -------
+    int
+
+    Examples
+    --------
+    >>> round_factor(470.0), round_factor(0.3)
+    (200, 1)
+    """
     power = 10.0 ** floor(log10(wanted))
     return max(1, round(power * max(step for step in (1, 2, 5) if step * power <= wanted)))
 
 
 def polar(rings, words=english_label, most=12):
-    """The sections about their circles, deviations enlarged by `polar_factor`."""
+    """The sections about their circles, deviations enlarged by `polar_factor`.
+
+    Parameters
+    ----------
+    rings : sequence of Ring
+    words : callable, optional
+        words(key, **values) gives the texts; English by default.
+    most : int, default 12
+        Sections in one figure.
+
+    Returns
+    -------
+    list of Drawing
+    """
     factor = polar_factor(rings)
     return [_polar_panels(group, factor, words) for group in even_groups(rings, most)]
 
@@ -195,7 +240,21 @@ def _enlarged(azimuth_deg, deviation, factor):
 
 @styled
 def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english_label):
-    """The wall unrolled: azimuth by height, every point coloured by its residual."""
+    """The wall unrolled: azimuth by height, every point coloured by its residual.
+
+    Parameters
+    ----------
+    azimuth_deg, height_m, residual_m : ndarray, shape (n,)
+        Of the points.
+    joints_m : ndarray
+        Heights of the joints between courses, m.
+    words : callable, optional
+        words(key, **values) gives the texts at the axes; English by default.
+
+    Returns
+    -------
+    Drawing
+    """
     residual_mm = 1e3 * np.asarray(residual_m)
     limit = np.max(np.abs(residual_mm), initial=0.0) or 1.0
     figure = Drawing(figsize=(WIDTH, 2.6))
@@ -220,9 +279,25 @@ def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english_lab
 
 
 def bottom_rows(area_m2):
-    """How many rows, from the lowest on, lie in a bottom; 0: none. Above it the cut hardly changes.
+    """How many rows of a table, from the lowest on, lie in a bottom.
 
-    Beside a cut that grows from nothing, what distinguishes the courses of a shell cannot be seen.
+    Above it the cut hardly changes. Beside a cut that grows from nothing, what distinguishes the
+    courses of a shell cannot be seen.
+
+    Parameters
+    ----------
+    area_m2 : array_like, shape (rows,)
+        Area of the cut at each row, m2.
+
+    Returns
+    -------
+    int
+        0: the tank has no such bottom.
+
+    Examples
+    --------
+    >>> bottom_rows([1.0, 5.0, 10.0, 10.0, 10.0, 10.0])
+    2
     """
     area = np.array(area_m2, dtype=float)
     shell = np.median(area)
@@ -238,7 +313,19 @@ def bottom_rows(area_m2):
 
 @styled
 def capacity_curves(height_m, area_m2, U_m3, words=english_label):
-    """Litres per centimetre, and U, against height; a bottom has a panel of its own."""
+    """Litres per centimetre, and U, against height; a bottom has a panel of its own.
+
+    Parameters
+    ----------
+    height_m, area_m2, U_m3 : ndarray, shape (rows,)
+        Of the table: dips, m, area of the cut, m2, and expanded uncertainty, m3.
+    words : callable, optional
+        words(key, **values) gives the texts at the axes; English by default.
+
+    Returns
+    -------
+    Drawing
+    """
     height_m = np.asarray(height_m)
     litres_per_cm = 10.0 * np.array(area_m2, dtype=float)  # 1 m2 is 10 L/cm
     of_bottom = bottom_rows(area_m2)
@@ -268,7 +355,16 @@ def capacity_curves(height_m, area_m2, U_m3, words=english_label):
 def budget_bars(bars, words=english_label):
     """The share of the variance of each input, in percent; defaults are pale.
 
-    bars  [(name, share of the variance, whether it is a default), ...]
+    Parameters
+    ----------
+    bars : iterable of tuple
+        (name, share of the variance, whether it is a default) of each input.
+    words : callable, optional
+        words(key, **values) gives the texts at the axes; English by default.
+
+    Returns
+    -------
+    Drawing
     """
     bars = sorted((one for one in bars if abs(one[1]) >= LEAST_SHARE), key=lambda one: -one[1])
     names = [textwrap.fill(name, LETTERS_OF_A_BAR) for name, _, _ in bars]
@@ -324,7 +420,23 @@ def network(names, xy_m, covariance_m2, most_names=60):
 
 
 def even_groups(items, most):
-    """The sections in figures, or the columns in tables, of nearly equal size."""
+    """Split items into groups of nearly equal size: sections into figures, columns into tables.
+
+    Parameters
+    ----------
+    items : sequence
+    most : int
+        Items in one group.
+
+    Returns
+    -------
+    list of sequence
+
+    Examples
+    --------
+    >>> even_groups("abcde", 4)
+    ['abc', 'de']
+    """
     count = max(1, ceil(len(items) / most))
     size = max(1, ceil(len(items) / count))
     return [items[i : i + size] for i in range(0, len(items), size)]
@@ -336,7 +448,7 @@ def rasterize_many(points):
 
 
 def set_margins(figure, left, right, bottom, top, **spaces):
-    """Margins in inches."""
+    """Margins of a figure in inches."""
     width, height = figure.get_size_inches()
     figure.subplots_adjust(
         left=left / width, right=1 - right / width, bottom=bottom / height, top=1 - top / height,

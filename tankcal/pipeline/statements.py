@@ -34,11 +34,26 @@ class Statements:
 
 
 def statements(job, table, largest_interpolation_m3):
-    """`Statements` of a `Capacity` made from a job.
+    """What is stated of a table beside its rows, as the job asks or by default.
 
-    Volumes at the dips of stated.csv, else at the rows next to the quarters of the table. The
-    deliveries of stated.csv, then of each minimum height the worst one by U over its volume.
-    Raises InputError for a stated dip outside the table.
+    Parameters
+    ----------
+    job : Job
+    table : Capacity
+        Made from it.
+    largest_interpolation_m3 : float
+        Largest error of linear interpolation between two rows, m3.
+
+    Returns
+    -------
+    Statements
+        Volumes at the dips of stated.csv, else at the rows next to the quarters of the table. The
+        deliveries of stated.csv, then of each minimum height the worst one by U over its volume.
+
+    Raises
+    ------
+    InputError
+        For a stated dip outside the table.
     """
     _refuse_outside(job.stated, table)
     reading = reading_sources(job.inputs, largest_interpolation_m3)

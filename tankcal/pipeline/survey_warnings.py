@@ -41,9 +41,17 @@ def origin_of(points):
 
 
 def refuse_undetermined(datum):
-    """Raise SolutionError while a survey's vertical or scale is not determined.
+    """Refuse a capacity while the vertical or the scale of a survey is not determined.
 
-    datum  `surveys.DatumReport`
+    Parameters
+    ----------
+    datum : DatumReport
+        Of the adjusted survey.
+
+    Raises
+    ------
+    SolutionError
+        With what would determine them.
     """
     missing = []
     if not datum.vertical:
@@ -67,9 +75,19 @@ def refuse_undetermined(datum):
 
 
 def open_questions(job, datum, causes):
-    """What an adjusted survey leaves open: heights of the frame, a scale twice.
+    """What a user must decide about an adjusted survey: its heights, a scale given twice.
 
-    datum  `surveys.DatumReport`         causes  `surveys.Cause` of its points
+    Parameters
+    ----------
+    job : Job
+    datum : DatumReport
+        Of the adjusted survey.
+    causes : sequence of Cause
+        Causes of uncertainty of its points.
+
+    Returns
+    -------
+    tuple of Problem
     """
     problems = []
     if (

@@ -34,12 +34,19 @@ CLOSED = 1e-3  # of its largest free surface: one that is smaller at the top cou
 class ComputedTable:
     """A tank with its capacity table.
 
-    body          the tank as the sum of its parts (`body.Body`)
-    zero_m        level of the table's zero: dip 0 in the frame of the parts
-    levels_m      (rows,) levels of the rows there
-    breakpoints_m dips between empty and full at which the area jumps
-    table         `capacity.Capacity`
-    straightness  how far linear interpolation between the rows is from the exact volume
+    Attributes
+    ----------
+    body : Body
+        The tank as the sum of its parts.
+    zero_m : float
+        Level of the table's zero, m: dip 0 in the frame of the parts.
+    levels_m : ndarray, shape (rows,)
+        Levels of the rows there, m.
+    breakpoints_m : ndarray
+        Dips between empty and full at which the area jumps, m.
+    table : Capacity
+    straightness : Straightness
+        How far linear interpolation between the rows is from the exact volume.
     """
 
     body: Body
@@ -65,10 +72,24 @@ class ComputedTable:
 
 
 def compute_table(job, survey, progress=lambda text: None):
-    """The `ComputedTable` of a job.
+    """Compute the capacity table of a job, with the covariance of its rows.
 
-    survey  its `wall.Wall`, `scan.Scan` or mesh, None where sizes alone tell of the tank
-    progress  called with a line of text as each step begins
+    Parameters
+    ----------
+    job : Job
+    survey : Wall, Scan, mesh or None
+        What was found of the tank; None where declared sizes alone describe it.
+    progress : callable, optional
+        Called with a line of text as each step begins.
+
+    Returns
+    -------
+    ComputedTable
+
+    Raises
+    ------
+    InputError, SolutionError
+        When the capacity falls with rising dips: see `refuse_falling`.
     """
     progress(message("integrating", "integrating volumes"))
     body = body_of(job, survey)
@@ -96,7 +117,19 @@ def compute_table(job, survey, progress=lambda text: None):
 
 
 def check_table(job, survey, made):
-    """Warnings of what was surveyed, and of the `ComputedTable` that was made of it."""
+    """Warnings about a survey and the capacity table that was computed from it.
+
+    Parameters
+    ----------
+    job : Job
+    survey : Wall, Scan, mesh or None
+        As `compute_table` was given it.
+    made : ComputedTable
+
+    Returns
+    -------
+    tuple of Problem
+    """
     return (
         *_doubts_of_survey(job, survey, made.top_m),
         *warn_of_undeclared(made.body.undeclared()),

@@ -22,10 +22,21 @@ def plot(result, what: str | None = None) -> "Figure":
         at the top consists of; of a surveyed wall the sections about their circles, the residuals
         of their points, the wall unrolled.
 
+    Returns
+    -------
+    Figure
+
     Raises
     ------
     ValueError
         For another name, or a drawing of the wall where none was surveyed.
+
+    Examples
+    --------
+    >>> import tankcal
+    >>> result = tankcal.run(tankcal.load("examples/silva-1995"))
+    >>> tankcal.plot(result, "wall").get_size_inches().tolist()
+    [6.5, 2.6]
     """
     if isinstance(result, Adjustment):
         if what is not None:

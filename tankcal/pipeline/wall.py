@@ -36,13 +36,22 @@ from tankcal.sections import (
 class Wall:
     """The wall of a tank as surveyed.
 
-    shell          axis, tilt, and what became of every point
-    joints_m       (courses + 1,) heights of the joints above the bottom, along the vertical
-    accepted       (m,) indices of the accepted points in job.points
-    covariance_m2  (3m, 3m) of the accepted points, sparse or dense
-    noise_dof      degrees of freedom of that covariance's scale
-    form           what the points tell of the form between them (`spectrum.Form`)
-    sections       from the bottom up
+    Attributes
+    ----------
+    shell : Shell
+        Axis, tilt, and what became of every point.
+    joints_m : ndarray, shape (courses + 1,)
+        Heights of the joints above the bottom, along the vertical, m.
+    accepted : ndarray, shape (m,)
+        Indices of the accepted points in job.points.
+    covariance_m2 : ndarray or sparse array, shape (3 m, 3 m)
+        Of the accepted points, m2.
+    noise_dof : float
+        Degrees of freedom of that covariance's scale.
+    form : Form
+        What the points tell of the form between them.
+    sections : tuple of Section
+        From the bottom up.
     """
 
     shell: Shell
@@ -55,13 +64,28 @@ class Wall:
 
 
 def find_wall(job, progress, dof=np.inf, form=None):
-    """The wall, its axis and its sections, from the points of a job.
+    """Separate the wall from clutter, and fit its axis and sections to the points of a job.
 
-    progress  called with a line of text as each step begins
-    dof   degrees of freedom of the points' covariance, where it was given
-    form  `Form` of the shell where it is known beforehand; None: the points tell it
-    Raises InputError when a course is left with too few points, SolutionError when there is no
-    wall.
+    Parameters
+    ----------
+    job : Job
+    progress : callable
+        Called with a line of text as each step begins.
+    dof : float, default inf
+        Degrees of freedom of the points' covariance, where it was given.
+    form : Form, optional
+        Form of the shell, where it is known beforehand; None: it is estimated from the points.
+
+    Returns
+    -------
+    Wall
+
+    Raises
+    ------
+    InputError
+        When a course is left with too few points.
+    SolutionError
+        When the points show no wall.
     """
     progress(
         message(
@@ -195,10 +219,21 @@ def _azimuths(job, shell, wall):
 def s_transform(points):
     """Adjusted points with the covariance that they have among themselves.
 
-    C' = S C S + s2 D D',  S = I - D D',  D an orthonormal basis of their common shift and their
-    turn about the vertical, s2 the mean variance that is left. No volume depends on these, and a
-    datum that holds one photo or one point gives them whatever variance it has: sections fitted
-    with it would depend on that choice. Columns of causes go along.
+        C' = S C S + s2 D D',   S = I - D D'
+
+    D is an orthonormal basis of their common shift and their turn about the vertical, s2 the mean
+    variance that is left. No volume depends on these four, but a datum that holds one photo or one
+    point gives them whatever variance it has: sections fitted with it would depend on that choice.
+
+    Parameters
+    ----------
+    points : Points
+        n points with covariance_m2 (3n, 3n), m2.
+
+    Returns
+    -------
+    Points
+        With C', and with the columns of their causes projected by S.
     """
     basis, given = common_motions(points.xyz_m), points.covariance_m2
     across = s_transform_factors(basis, given @ basis, np.trace(given))
@@ -211,7 +246,24 @@ def s_transform(points):
 
 
 def common_motions(xyz_m):
-    """(3n, 4) orthonormal basis of the shifts and the turn about the vertical of points (n, 3)."""
+    """Orthonormal basis of the shifts of points and their turn about the vertical.
+
+    Parameters
+    ----------
+    xyz_m : ndarray, shape (n, 3)
+        Coordinates, m.
+
+    Returns
+    -------
+    ndarray, shape (3 n, 4)
+        Orthonormal columns, in the order x, y, z of each point.
+
+    Examples
+    --------
+    >>> basis = common_motions(np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 1]]))
+    >>> bool(np.allclose(basis.T @ basis, np.eye(4)))
+    True
+    """
     x, y, _ = (xyz_m - xyz_m.mean(axis=0)).T
     motions = np.zeros((len(x), 3, 4))
     motions[:, :, :3] = np.eye(3)
@@ -220,9 +272,30 @@ def common_motions(xyz_m):
 
 
 def s_transform_factors(basis, spread, trace):
-    """A (3n, 4) of C' = C - D A' - A D', which is S C S + s2 D D' of `s_transform`.
+    """A of C' = C - D A' - A D', the covariance of `s_transform`, without forming S C S.
 
-    A = C D - D (D'C D + s2 I) / 2; basis D, spread C D, trace of C
+        A = C D - D (D'C D + s2 I) / 2
+
+    Parameters
+    ----------
+    basis : ndarray, shape (3 n, 4)
+        D, of `common_motions`.
+    spread : ndarray, shape (3 n, 4)
+        C D, m2.
+    trace : float
+        Of C, m2.
+
+    Returns
+    -------
+    ndarray, shape (3 n, 4)
+        A, m2.
+
+    Examples
+    --------
+    >>> basis = common_motions(np.array([[0.0, 0, 0], [4, 0, 0], [0, 3, 1]]))
+    >>> a = s_transform_factors(basis, basis, trace=9.0)  # of C = I nothing changes
+    >>> bool(np.allclose(a, 0))
+    True
     """
     across = spread - 0.5 * basis @ (basis.T @ spread)
     left = trace - 2 * np.sum(basis * across)

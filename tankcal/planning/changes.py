@@ -31,7 +31,17 @@ class Change:
 
 
 def cost_of(plan):
-    """What a Plan costs: the sum of its items times the costs that it states; 0 where none."""
+    """What a plan costs: the sum of its items times the costs that it states.
+
+    Parameters
+    ----------
+    plan : Plan
+
+    Returns
+    -------
+    float
+        In the unit of those costs; 0 where the plan states none.
+    """
     count = {
         "photo_station": len(plan.stations),
         "photograph": len(plan.photos),

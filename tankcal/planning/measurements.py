@@ -75,7 +75,17 @@ def _control(plan):
 
 
 def targets_of(plan):
-    """job.Targets of a Plan: its targets.csv."""
+    """The targets of a plan as a survey would have them: its targets.csv.
+
+    Parameters
+    ----------
+    plan : Plan
+
+    Returns
+    -------
+    Targets
+        As a job reads them; heights and offsets in m.
+    """
     one = plan.targets
     return Targets(
         one.names,

@@ -125,7 +125,14 @@ class Known:
 
 @dataclass(frozen=True)
 class Box:
-    """An obstacle between two corners (3,), sides along the axes of the survey's frame, m."""
+    """An obstacle whose sides are along the axes of the survey's frame.
+
+    Attributes
+    ----------
+    low_m, high_m : ndarray, shape (3,)
+        Two opposite corners, m.
+    name : str
+    """
 
     low_m: np.ndarray
     high_m: np.ndarray

@@ -45,7 +45,17 @@ def place_of(plan, xyz_m):
 
 
 def reference_rad(plan):
-    """Azimuth of the reference weld, -pi to pi: that of a target less its arc."""
+    """Azimuth of the reference weld: that of a target less its arc along the wall.
+
+    Parameters
+    ----------
+    plan : Plan
+
+    Returns
+    -------
+    float
+        rad, -pi to pi, clockwise from +y.
+    """
     targets, shell = plan.targets, plan.shell
     east, north = targets.xyz_m[0, :2] - shell.axis_m
     azimuth = np.arctan2(east, north) - targets.arc_m[0] / shell.radius_m

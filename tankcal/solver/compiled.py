@@ -40,9 +40,18 @@ _worked = 0  # rows that arrays have worked through in this process
 
 
 def is_worth_compiling(rows=0):
-    """True when compiled loops are to be used, for so many rows after those that came before.
+    """Whether compiled loops are to be used, given how much work arrays have done so far.
 
-    The first call about a problem names its rows; what follows from them names none.
+    Parameters
+    ----------
+    rows : int, default 0
+        Rows of a new problem, named by the first call about it; later calls about it name none.
+
+    Returns
+    -------
+    bool
+        `available()`, but where TANKCAL_COMPILED is "patient": then False until arrays have worked
+        through enough rows to pay for the compiler.
     """
     global _worked
     if _asked_for() != "patient":
@@ -53,10 +62,18 @@ def is_worth_compiling(rows=0):
 
 @cache
 def compile_functions(module, names):
-    """The functions `names` of a module, compiled; callees before their callers.
+    """Compile functions of one module; the compiled ones call each other, not the plain ones.
 
-    module  a module object
-    names   tuple of function names
+    Parameters
+    ----------
+    module : module
+    names : tuple of str
+        Names of its functions, those that are called before those that call them.
+
+    Returns
+    -------
+    SimpleNamespace
+        The compiled functions by their names; compiled once in a process.
     """
     import numba
 

@@ -20,10 +20,38 @@ AT_ONCE = 4e6  # numbers of a dense part that is worked on at a time
 
 
 def variances(cofactors, columns, jac):
-    """J Q J' of each row (n, m) of any functions of the unknowns, those not in the model too.
+    """Variances of functions of the unknowns, also of functions that are not observed.
 
-    columns  (n, K) unknown of each derivative, -1 where it is fixed
-    jac      (n, m, K)
+        s2 = J Q J'
+
+    Parameters
+    ----------
+    cofactors : Cofactors
+        Of the adjustment: `Adjustment.cofactor`.
+    columns : ndarray, shape (n, K)
+        Number of the unknown of each derivative, -1 where it is fixed.
+    jac : ndarray, shape (n, m, K)
+        Derivatives of n times m functions, unit of the function per unit of the unknown.
+
+    Returns
+    -------
+    ndarray, shape (n, m)
+        Variance of each function for variance factor 1, its unit squared.
+
+    Examples
+    --------
+    The sum of two unknowns, each observed once with a standard deviation of 1:
+
+    >>> import numpy as np
+    >>> from tankcal.solver import Group, Model, solve
+    >>> def fill(x, w, jac):
+    ...     w[:, 0] = x - [1.0, 3.0]
+    ...     if len(jac):
+    ...         jac[:] = 1.0
+    >>> each = Group(np.array([[0], [1]]), 1, fill)
+    >>> found = solve(Model(2, 0, (each,), lambda x, step: x + step), np.zeros(2))
+    >>> variances(found.cofactor, np.array([[0, 1]]), np.ones((1, 1, 2)))
+    array([[2.]])
     """
     n, m, _ = jac.shape
     rows, found = sparse_rows(cofactors.model.unknowns, columns, jac), []
@@ -56,7 +84,24 @@ def _through(cofactors, rows):
 
 
 def responses(cofactors, columns, jac):
-    """Parts (slice of the n m rows, Q J' (unknowns, k)), one after the other; see variances."""
+    """What an error of one in each row changes in all unknowns, Q J', part by part.
+
+    Parameters
+    ----------
+    cofactors : Cofactors
+        Of the adjustment.
+    columns : ndarray, shape (n, K)
+        Number of the unknown of each derivative, -1 where it is fixed.
+    jac : ndarray, shape (n, m, K)
+        Whitened rows of observations; for any other functions see `covariances`.
+
+    Yields
+    ------
+    part : slice
+        Which of the n times m rows.
+    change : ndarray, shape (unknowns, k)
+        Change of the unknowns by each of these k rows.
+    """
     n, m, _ = jac.shape
     rows = sparse_rows(cofactors.model.unknowns, columns, jac)
     for part in _parts(n * m, cofactors.model.unknowns):
@@ -68,12 +113,24 @@ def responses(cofactors, columns, jac):
 
 
 def covariances(cofactors, columns, jac):
-    """Covariance (unknowns, m) of all unknowns with m functions of some of them, Q J'.
+    """Covariances of all unknowns with functions of some of them, Q J'.
 
-    columns  (K,) unknowns, -1 where fixed         jac  (m, K)
-
-    Other than in `responses` the functions may be any, not only what observations can see: where a
+    Unlike in `responses` the functions may be any, not only what observations determine: where a
     datum is chosen they may change with it.
+
+    Parameters
+    ----------
+    cofactors : Cofactors
+        Of the adjustment.
+    columns : ndarray, shape (K,)
+        Number of the unknown of each derivative, -1 where it is fixed.
+    jac : ndarray, shape (m, K)
+        Derivatives of the functions.
+
+    Returns
+    -------
+    ndarray, shape (unknowns, m)
+        For variance factor 1.
     """
     rows, found = sparse_rows(cofactors.model.unknowns, columns[None], jac[None]), []
     with threads_for(cofactors.plan.reduced):
@@ -97,9 +154,23 @@ def _response(cofactors, rows):
 
 
 def cofactors_within(cofactors, columns, jac):
-    """Cofactors J Q J' (n, m, m) of the rows of each observation among themselves; see variances.
+    """Cofactors of the rows of each observation with one another, J Q J'.
 
     For a few observations: the cofactors of all their unknowns are worked out at once.
+
+    Parameters
+    ----------
+    cofactors : Cofactors
+        Of the adjustment.
+    columns : ndarray, shape (n, K)
+        Number of the unknown of each derivative, -1 where it is fixed.
+    jac : ndarray, shape (n, m, K)
+        Rows of n observations.
+
+    Returns
+    -------
+    ndarray, shape (n, m, m)
+        For variance factor 1.
     """
     free = columns >= 0
     unknowns, place = np.unique(columns[free], return_inverse=True)
@@ -110,10 +181,21 @@ def cofactors_within(cofactors, columns, jac):
 
 
 def own_responses(cofactors, group, jac):
-    """Change (n, m, 3) of the three unknowns that a group's rows name first, by an error of one.
+    """What an error of one in a row changes in the point that the row is about.
 
-    group  number of a group whose first three columns are the point that a row is about
-    jac    (n, m, K) of all its rows
+    Parameters
+    ----------
+    cofactors : Cofactors
+        Of the adjustment.
+    group : int
+        Number of a group whose first three columns are that point.
+    jac : ndarray, shape (n, m, K)
+        All rows of the group, whitened.
+
+    Returns
+    -------
+    ndarray, shape (n, m, 3)
+        Change of the three unknowns, in their unit.
     """
     plan, out = cofactors.plan, np.zeros((*jac.shape[:2], 3))
     of_block, cross = cofactors.of_blocks
@@ -138,7 +220,22 @@ def own_responses(cofactors, group, jac):
 
 
 def own_leverage(cofactors, group, jac):
-    """E V^-1 E' of each row (n, m): the part of its leverage that stays within its block."""
+    """The part of each row's leverage that stays within its own block, E V^-1 E'.
+
+    Parameters
+    ----------
+    cofactors : Cofactors
+        Of the adjustment.
+    group : int
+        Number of the group.
+    jac : ndarray, shape (n, m, K)
+        All rows of the group, whitened.
+
+    Returns
+    -------
+    ndarray, shape (n, m)
+        Without unit, 0 to 1; 0 for a row without a block.
+    """
     out = np.zeros(jac.shape[:2])
     for batch in cofactors.plan.batches:
         if batch.group == group and batch.block is not None:
@@ -149,10 +246,47 @@ def own_leverage(cofactors, group, jac):
 
 
 def constraint_reactions(cofactors):
-    """What pulls at the exact conditions: k (m,), its sd (m,), and changes (unknowns, m).
+    """Reactions (Lagrange multipliers) of the exact conditions, and what each condition moves.
 
-    The changes are those of all unknowns when a condition's value changes by one. Conditions that
-    follow from others have k and sd 0 and change nothing.
+        C'k = -g,   g the gradient of half the sum of squares at the minimum
+
+    Parameters
+    ----------
+    cofactors : Cofactors
+        Of the adjustment of a Model with `exact` conditions.
+
+    Returns
+    -------
+    k : ndarray, shape (m,)
+        Reaction of each condition, per unit of the condition.
+    sd : ndarray, shape (m,)
+        Its standard deviation for variance factor 1; 0, as k, for a condition that follows from
+        others.
+    changes : ndarray, shape (unknowns, m)
+        Change of all unknowns when the value of a condition changes by one.
+
+    Examples
+    --------
+    Two unknowns, observed as 1 and 3 with a standard deviation of 1, that must be equal:
+
+    >>> import numpy as np
+    >>> from tankcal.solver import Group, Model, solve
+    >>> def fill(x, w, jac):
+    ...     w[:, 0] = x - [1.0, 3.0]
+    ...     if len(jac):
+    ...         jac[:] = 1.0
+    >>> def difference(x, w, jac):
+    ...     w[0, 0] = x[0] - x[1]
+    ...     if len(jac):
+    ...         jac[:] = [1.0, -1.0]
+    >>> each, equal = Group(np.array([[0], [1]]), 1, fill), Group(np.array([[0, 1]]), 1, difference)
+    >>> model = Model(2, 0, (each,), lambda x, step: x + step, exact=(equal,))
+    >>> found = solve(model, np.zeros(2))
+    >>> found.unknowns.round(9).tolist()
+    [2.0, 2.0]
+    >>> k, sd, changes = constraint_reactions(found.cofactor)
+    >>> k.round(3).tolist(), sd.round(3).tolist(), changes.round(3).tolist()
+    ([-1.0], [0.707], [[0.5], [-0.5]])
     """
     factor, conditions = cofactors.factor, cofactors.conditions
     tangent, rank = factor.tangent, factor.tangent.rank
@@ -185,7 +319,27 @@ def _gradient(cofactors):
 
 
 def sparse_rows(unknowns, columns, jac):
-    """All rows (n m, unknowns) as one sparse matrix; columns (n, K), -1 where fixed."""
+    """All rows as one sparse matrix over the unknowns.
+
+    Parameters
+    ----------
+    unknowns : int
+        Number of unknowns.
+    columns : ndarray, shape (n, K)
+        Number of the unknown of each derivative, -1 where it is fixed.
+    jac : ndarray, shape (n, m, K)
+        Derivatives.
+
+    Returns
+    -------
+    csr_array, shape (n m, unknowns)
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> sparse_rows(3, np.array([[0, 2]]), np.array([[[5.0, 7.0]]])).toarray()
+    array([[5., 0., 7.]])
+    """
     n, m, k = jac.shape
     place = np.broadcast_to(columns[:, None, :], jac.shape).reshape(n * m, k)
     row = np.broadcast_to(np.arange(n * m)[:, None], (n * m, k))

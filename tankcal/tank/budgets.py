@@ -22,11 +22,21 @@ HALF_A_LITRE_M3 = 5e-4
 class Budget:
     """A volume read from the table and what its uncertainty is made of.
 
-    low_m, high_m  dips; low_m None: the volume below high_m
-    table_u_m3     of the table alone; u_m3, dof, k, U_m3 with what the reading adds, alone
-                   `reading_U_m3`
-    for_use        False where a dip stands in a zone in which the table must not be used
-    lines          in the order of the table's sources, then the reading's; shares add up to 1
+    Attributes
+    ----------
+    low_m, high_m : float
+        Dips, m; low_m None: the volume below high_m.
+    volume_m3 : float
+        Volume below, or between, m3.
+    table_u_m3 : float
+        Standard uncertainty by the table alone, m3; what reading adds alone is `reading_U_m3`.
+    u_m3, dof, k, U_m3 : float
+        With what the reading adds: standard uncertainty, m3, degrees of freedom, coverage factor,
+        expanded uncertainty, m3.
+    for_use : bool
+        False where a dip stands in a zone in which the table must not be used.
+    lines : tuple of BudgetRow
+        In the order of the table's sources, then the reading's; their shares add up to 1.
     """
 
     low_m: float | None
@@ -70,10 +80,25 @@ class Budget:
 
 
 def reading_sources(declared, largest_interpolation_m3):
-    """The two causes that reading adds, m3 of one dip: `Source`s of one row.
+    """The two uncertainties that reading a table adds: interpolation and rounding.
 
-    declared  of the job: inputs "interpolation" and "rounding" there count instead of the defaults,
-              rectangular: half a litre, and the largest error of a straight line between two rows
+    Parameters
+    ----------
+    declared : sequence of Input
+        Inputs of the job; "interpolation" and "rounding" there replace the defaults.
+    largest_interpolation_m3 : float
+        Largest error of a straight line between two rows, m3.
+
+    Returns
+    -------
+    tuple of Source
+        Of one dip, one row each. The defaults are rectangular, with half a litre and the largest
+        error of interpolation as half-widths.
+
+    Examples
+    --------
+    >>> [f"{source.kind} {source.u:.6f} m3" for source in reading_sources((), 0.003)]
+    ['interpolation 0.001732 m3', 'rounding 0.000289 m3']
     """
     given = {one.name: one for one in declared}
     defaults = {"interpolation": largest_interpolation_m3, "rounding": HALF_A_LITRE_M3}
@@ -97,9 +122,41 @@ def _default(name, half_width):
 
 
 def budget(table, high_m, low_m=None, reading=()):
-    """`Budget` of the volume below a dip, or between two; HeightError outside the table.
+    """Uncertainty budget of the volume below a dip, or between two dips.
 
-    reading  of `reading_sources`; () for the table alone
+    Parameters
+    ----------
+    table : Capacity
+    high_m : float
+        Dip, m.
+    low_m : float, optional
+        Lower dip of a delivery, m.
+    reading : sequence of Source, optional
+        Of `reading_sources`; none for the table alone.
+
+    Returns
+    -------
+    Budget
+
+    Raises
+    ------
+    HeightError
+        For a dip outside the table.
+
+    References
+    ----------
+    JCGM 100:2008 5.1.3, 5.2.2, 7.2.7.
+
+    Examples
+    --------
+    A dip between two rows of a table whose upper row has u = 0.2 m3:
+
+    >>> import numpy as np
+    >>> from tankcal.tank.capacity import Capacity
+    >>> form = Source("form", np.array([[0.0], [0.2]]))
+    >>> table = Capacity(np.array([0, 1.0]), np.array([0, 100.0]), np.ones(2), (form,), 0.95)
+    >>> print(budget(table, 0.5))
+    0.5 m: 50.00 m3, U = 0.20 m3 (k = 1.96)
     """
     found = table.at(high_m) if low_m is None else table.delivery(low_m, high_m)
     dips = [high_m] if low_m is None else [low_m, high_m]

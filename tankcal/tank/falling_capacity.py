@@ -9,9 +9,24 @@ ROUNDING = 1e-9  # of the capacity: a table that falls by less does not
 
 
 def refuse_falling(job, body, zero_m, heights_m, volumes_m3):
-    """Raise InputError, or SolutionError where no input is the cause, for volumes that fall.
+    """Refuse a table whose volumes fall with rising dips, and name the likely cause.
 
-    heights_m, volumes_m3  (n,) dips, ascending, and volumes there
+    Parameters
+    ----------
+    job : Job
+    body : Body
+        The tank as the sum of its parts.
+    zero_m : float
+        Level of the table's zero in the frame of the parts, m.
+    heights_m, volumes_m3 : ndarray, shape (n,)
+        Ascending dips, m, and the volumes there, m3.
+
+    Raises
+    ------
+    InputError
+        When deadwood, the floating roof or the bottom takes more than the tank holds there.
+    SolutionError
+        When the wall itself does.
     """
     rise = np.diff(volumes_m3)
     falls = np.flatnonzero(rise < -ROUNDING * np.abs(volumes_m3).max())

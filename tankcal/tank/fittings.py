@@ -94,10 +94,34 @@ class Deadwood(Part):
 
 
 def deadwood(names, bottoms_m, tops_m, volumes_m3, u_m3=None):
-    """`Deadwood` of items; u_m3 None: exact; an item's None: unknown.
+    """Deadwood of items that stand in a tank, or beside it.
 
-    Raises SolutionError, naming the item, for a top below its bottom, a negative uncertainty, or a
-    number that is not finite.
+    Parameters
+    ----------
+    names : sequence of str
+        n items.
+    bottoms_m, tops_m : array_like, shape (n,)
+        Levels, m; equal ones for an item that counts whole from its level on.
+    volumes_m3 : array_like, shape (n,)
+        Signed: below 0 for what takes capacity away, m3.
+    u_m3 : array_like, shape (n,), optional
+        Standard uncertainties, m3; None: exact; None for an item: unknown.
+
+    Returns
+    -------
+    Deadwood
+
+    Raises
+    ------
+    SolutionError
+        Naming the item, for a top below its bottom, a negative uncertainty or a number that is not
+        finite.
+
+    Examples
+    --------
+    >>> ladder = deadwood(["ladder"], [0.0], [10.0], [-0.5])
+    >>> ladder.volume_m3([5.0]).tolist()
+    [-0.25]
     """
     names = tuple(names)
     u = np.zeros(len(names)) if u_m3 is None else u_m3
@@ -209,7 +233,33 @@ class FloatingRoof(Part):
 
 
 def floating_roof(mass_kg, critical_bottom_m, critical_top_m, reference_density_kg_m3, weighing):
-    """`FloatingRoof`; raises SolutionError for a mass, zone, density or weighing that cannot be."""
+    """A floating roof, from its mass and its critical zone.
+
+    Parameters
+    ----------
+    mass_kg : float
+    critical_bottom_m, critical_top_m : float
+        Levels of the critical zone, m: below it the roof displaces nothing, above it all.
+    reference_density_kg_m3 : float
+        Density of the liquid that the table is for, kg/m3.
+    weighing : {"air", "vacuum"}
+        How the mass is to be understood: see `FloatingRoof.displacement_m3`.
+
+    Returns
+    -------
+    FloatingRoof
+
+    Raises
+    ------
+    SolutionError
+        For a mass, zone, density or weighing that cannot be.
+
+    Examples
+    --------
+    >>> roof = floating_roof(80_000.0, 1.5, 1.8, 800.0, "vacuum")
+    >>> roof.displacement_m3()
+    100.0
+    """
     if not (np.isfinite(mass_kg) and mass_kg > 0):
         raise SolutionError(
             message(

@@ -166,13 +166,38 @@ def liquid_head(
     gravity_m_s2=STANDARD_GRAVITY,
     scale=1.0,
 ):
-    """The liquid head of a shell.
+    """What the head of the liquid adds to a shell, course by course as thin hoops.
 
-    volume         `volumes.ShellVolume` as surveyed, inside
-    thicknesses_m  (courses,) plate of each course, from the bottom up
-    scale          of horizontal lengths that `volumes.course_shape` was given
-    The rest is as in `LiquidHead`. Raises SolutionError for what cannot be: a modulus, density,
-    level or gravity, or a course that carries liquid and has no plate.
+        dr(z) = K rho (h - z),  z < h,      K = g r0^2 / (E t)
+
+    Parameters
+    ----------
+    volume : ShellVolume
+        The shell as surveyed, inside.
+    thicknesses_m : array_like, shape (courses,)
+        Plate of each course from the bottom up, m.
+    youngs_modulus_pa : float
+    density_kg_m3 : float
+        Of the liquid that the table is for, kg/m3; 0: the empty shell.
+    survey_density_kg_m3, survey_level_m : float, default 0
+        Liquid in the tank during the survey; its level above the bottom of the first course, m.
+    gravity_m_s2 : float
+    scale : float, default 1
+        Of horizontal lengths, as `course_shape` was given it.
+
+    Returns
+    -------
+    LiquidHead
+
+    Raises
+    ------
+    SolutionError
+        For a modulus, density, level or gravity that cannot be, or a course that carries liquid
+        and has no plate.
+
+    References
+    ----------
+    ISO 7507-1 and API MPMS 2.2A (liquid head); thin hoop: Timoshenko, Strength of Materials.
     """
     thicknesses = np.asarray(thicknesses_m, dtype=float)
     if thicknesses.shape != (len(volume.courses),):

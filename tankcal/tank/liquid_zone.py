@@ -96,12 +96,37 @@ class MeasuredBottom(Part):
 
 
 def measured_bottom(levels_m, volumes_m3, u_m3=None):
-    """A bottom measured by liquid: volumes below dips, cumulative, with their standard uncertainty.
+    """A bottom that was measured by liquid.
 
-    Where u grows from one dip to the next, its growth is the error of what was added between, on
-    its own; where it does not, both errors are one: a delivery within the zone is as uncertain as
-    what was metered between. Raises SolutionError, with the number of the row, when levels do not
-    rise or volumes fall.
+    Where u grows from one dip to the next, its growth is the independent error of what was added
+    between them; where it does not, both dips have one error: a delivery within the zone is as
+    uncertain as what was metered between.
+
+    Parameters
+    ----------
+    levels_m : array_like, shape (n,)
+        Rising dips, two or more, m.
+    volumes_m3 : array_like, shape (n,)
+        Volume below each, cumulative, m3.
+    u_m3 : array_like, shape (n,), optional
+        Standard uncertainty of each, m3; None: exact.
+
+    Returns
+    -------
+    MeasuredBottom
+
+    Raises
+    ------
+    SolutionError
+        With the number of the row, when levels do not rise or volumes fall, or one is negative.
+
+    Examples
+    --------
+    >>> bottom = measured_bottom([0.0, 0.1, 0.2], [0.0, 5.0, 10.0], [0.0, 0.03, 0.05])
+    >>> float(bottom.volume_m3([0.1])[0])
+    5.0
+    >>> bottom.errors_m3.round(3).tolist()
+    [[0.0, 0.0, 0.0], [0.0, 0.03, 0.0], [0.0, 0.03, 0.04]]
     """
     levels, volumes = np.asarray(levels_m, dtype=float), np.asarray(volumes_m3, dtype=float)
     u = np.zeros(len(levels)) if u_m3 is None else np.asarray(u_m3, dtype=float)
@@ -143,6 +168,13 @@ class Above(Part):
     """Another part of the tank, counted from a level up: P(L) - P(level) for L above it, else 0.
 
     Its derivatives and sources likewise, so that what a measured zone replaced cancels.
+
+    Attributes
+    ----------
+    part : Part
+        The part that is counted.
+    level_m : float
+        The level from which it counts, m.
     """
 
     part: Part

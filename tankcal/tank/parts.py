@@ -103,7 +103,23 @@ def as_levels(levels_m):
 
 
 def sum_derivatives(derivatives):
-    """{input: sum} of what several parts give by each input."""
+    """Sum what several parts give by each input.
+
+    Parameters
+    ----------
+    derivatives : iterable of dict
+        {input: derivative} of each part.
+
+    Returns
+    -------
+    dict
+        {input: sum}.
+
+    Examples
+    --------
+    >>> sum_derivatives([{"datum": 2.0, "scale": 1.0}, {"datum": 3.0}])
+    {'datum': 5.0, 'scale': 1.0}
+    """
     total = {}
     for found in derivatives:
         for name, by in found.items():

@@ -10,7 +10,32 @@ BASE_C = 15.0  # customary tables: 60 degF, that is (60 - 32) / 1.8 degC
 def shell_temperature_c(liquid_c, ambient_c=None, *, insulated=False):
     """Temperature of the shell in service: (7 liquid + ambient) / 8; insulated: the liquid's.
 
-    Temperatures in degC, numbers or arrays. Raises ValueError for a bare shell without ambient_c.
+    Parameters
+    ----------
+    liquid_c : float or ndarray
+        Temperature of the liquid, degC.
+    ambient_c : float or ndarray, optional
+        Of the air about the shell, degC.
+    insulated : bool, default False
+
+    Returns
+    -------
+    float or ndarray
+        degC.
+
+    Raises
+    ------
+    ValueError
+        For a shell that is not insulated, without ambient_c.
+
+    References
+    ----------
+    API MPMS 12.1.1.
+
+    Examples
+    --------
+    >>> shell_temperature_c(35.0, 27.0)
+    34.0
     """
     if insulated:
         return liquid_c
@@ -20,10 +45,32 @@ def shell_temperature_c(liquid_c, ambient_c=None, *, insulated=False):
 
 
 def shell_factor(shell_c, base_c=BASE_C, expansion_per_k=MILD_STEEL_PER_K):
-    """CTSh = 1 + 2 a dT + a^2 dT^2, the factor of a volume read from the table; dT = shell - base.
+    """Factor of a volume read from the table, for a shell that is warmer than the table supposes.
 
-    shell_c  temperature of the shell in service, degC (`shell_temperature_c`)
-    base_c   reference temperature of the table, degC
+        CTSh = 1 + 2 a dT + a^2 dT^2,   dT = shell - base
+
+    Parameters
+    ----------
+    shell_c : float or ndarray
+        Temperature of the shell in service, degC (`shell_temperature_c`).
+    base_c : float, default 15
+        Reference temperature of the table, degC.
+    expansion_per_k : float
+        a, linear expansion, 1/K; that of mild steel by default.
+
+    Returns
+    -------
+    float or ndarray
+        Without unit.
+
+    References
+    ----------
+    API MPMS 12.1.1 (CTSh); 2.2A for the coefficient of mild steel.
+
+    Examples
+    --------
+    >>> round(shell_factor(34.0), 6)
+    1.000424
     """
     stretch = expansion_per_k * (shell_c - base_c)
     return 1 + 2 * stretch + stretch**2

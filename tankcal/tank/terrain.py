@@ -16,8 +16,17 @@ FULL_TURN = 2 * np.pi
 class Footprint:
     """The inside outline of the first course at its bottom.
 
-    x_m, y_m  its centre, on the shell's axis
-    radius_m  (n,) about it, at n even azimuths from +y on
+    Attributes
+    ----------
+    x_m, y_m : float
+        Its centre, on the shell's axis, m.
+    radius_m : ndarray, shape (n,)
+        About it, at n even azimuths from +y on, m.
+
+    Examples
+    --------
+    >>> round(Footprint(0.0, 0.0, np.full(36, 2.0)).area_m2, 3)
+    12.566
     """
 
     x_m: float

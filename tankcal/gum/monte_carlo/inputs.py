@@ -34,7 +34,29 @@ def is_normal(distribution):
 
 
 def uniforms(count, inputs, seed):
-    """(count, inputs) scrambled Sobol points: each uniform, together evenly spread (Owen 1998)."""
+    """Scrambled Sobol points: each coordinate uniform, together evenly spread.
+
+    Parameters
+    ----------
+    count, inputs : int
+        Numbers of points and of coordinates; a power of two spreads the points best.
+    seed : int
+        Of the scrambling: the same seed gives the same points.
+
+    Returns
+    -------
+    ndarray, shape (count, inputs)
+        In [0, 1).
+
+    References
+    ----------
+    Owen 1998.
+
+    Examples
+    --------
+    >>> uniforms(4, 2, seed=1).shape
+    (4, 2)
+    """
     from scipy.stats import qmc  # half a second to import, which is for those who simulate
 
     points = qmc.Sobol(inputs, scramble=True, rng=np.random.default_rng(seed))
@@ -92,9 +114,30 @@ class Inputs:
 def inputs_of(distributions, correlation=None):
     """Inputs ready for drawing.
 
-    correlation  (n, n) correlation coefficients; of inputs that are not normal, those of their
-                 normal scores (Gaussian copula)
-    Raises ValueError when the correlation is no correlation matrix.
+    Parameters
+    ----------
+    distributions : sequence of Distribution
+        n of them, with mean, sd and quantile(p).
+    correlation : ndarray, shape (n, n), optional
+        Correlation coefficients; of inputs that are not normal those of their normal scores (a
+        Gaussian copula). None: independent.
+
+    Returns
+    -------
+    Inputs
+
+    Raises
+    ------
+    ValueError
+        When the correlation is no correlation matrix.
+
+    Examples
+    --------
+    >>> from tankcal.gum.distributions import Normal
+    >>> pair = inputs_of([Normal(1.0), Normal(2.0)], [[1.0, 0.5], [0.5, 1.0]])
+    >>> values, _ = pair.draws(uniforms(4, 2, seed=1))
+    >>> values.shape
+    (4, 2)
     """
     distributions = tuple(distributions)
     mean = np.array([float(d.mean) for d in distributions])

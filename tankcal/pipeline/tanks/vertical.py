@@ -273,7 +273,21 @@ def _factors(job, wall, volume):
 
 
 def volume_by_points(job, wall, levels_m):
-    """(rows, 3m) derivative of the shell's volume below levels by the accepted points, m2."""
+    """Derivative of the shell's volume by the coordinates of the accepted points.
+
+    Parameters
+    ----------
+    job : Job
+    wall : Wall
+        With m accepted points.
+    levels_m : array_like, shape (rows,)
+        Levels above the bottom of the first course, m.
+
+    Returns
+    -------
+    ndarray, shape (rows, 3 m)
+        m3 per m.
+    """
     volume = _shell(job, wall, job.switches, False).volume
     jacobian = _features_by_points(volume, wall.sections, wall.covariance_m2.shape[0])
     return volume.weights_m(np.maximum(levels_m, 0.0)) @ jacobian
