@@ -6,8 +6,14 @@ import numpy as np
 
 from tankcal.camera.model import Form, distort_image_points
 from tankcal.geometry.rotations import apply_small_rotation, rotation_of_view
-from tankcal.survey.network import Camera, ImagePoints, Photos, Survey
-from tankcal.survey.observations import ControlCoordinates, Directions, Distances, VerticalAngles
+from tankcal.survey.network import Camera, Photos, Survey
+from tankcal.survey.observations import (
+    ControlCoordinates,
+    Directions,
+    Distances,
+    ImageCoordinates,
+    VerticalAngles,
+)
 
 INTERIOR = np.array([100.02, 0.03, -0.04, 2e-8, -1e-12, 0, 0, 3e-7, -2e-7, 0, 0, 1e-4, -8e-5])
 SCOPE = tuple("block" if i in (0, 1, 2, 3, 4, 7, 8, 11, 12) else "off" for i in range(13))
@@ -65,7 +71,7 @@ def photographed(seed=0, photos=8, form=None, interior=INTERIOR, noise=1.0, scop
     survey = Survey(
         points=tuple(f"P{i}" for i in range(len(xyz))),
         xyz_m=xyz + rng.normal(0, 0.05, xyz.shape),
-        image_points=ImagePoints(point, photo, xy, np.full(xy.shape, IMAGE_SD_MM)),
+        image_points=ImageCoordinates(xy, np.full(xy.shape, IMAGE_SD_MM), point, photo),
         photos=Photos(
             tuple(f"S{i}" for i in range(photos)),
             np.zeros(photos, dtype=int),

@@ -36,8 +36,8 @@ def image_readings(survey):
     return ImageReadings(
         photo=tuple(survey.photos.names[i] for i in seen.photo),
         point=tuple(survey.points[i] for i in seen.point),
-        xy_mm=seen.xy_mm,
-        sd_mm=seen.sd_mm,
+        xy_mm=seen.value,
+        sd_mm=seen.sd,
         check=np.zeros(len(seen.point), dtype=bool),
     )
 

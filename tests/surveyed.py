@@ -67,8 +67,8 @@ def by_photographs(seed=0, settings=None, **options):
             image_points=ImageReadings(
                 tuple(photos[i] for i in images.photo),
                 tuple(names[i] for i in images.point),
-                images.xy_mm,
-                images.sd_mm,
+                images.value,
+                images.sd,
                 np.zeros(n, dtype=bool),
                 tuple(range(2, n + 2)),
             ),

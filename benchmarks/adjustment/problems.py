@@ -7,8 +7,8 @@ import numpy as np
 
 from tankcal.camera.model import Form
 from tankcal.geometry.rotations import apply_small_rotation, rotation_of_view
-from tankcal.survey.network import Camera, ImagePoints, Photos, Survey
-from tankcal.survey.observations import ControlCoordinates, Distances
+from tankcal.survey.network import Camera, Photos, Survey
+from tankcal.survey.observations import ControlCoordinates, Distances, ImageCoordinates
 
 TANK_PARAMETERS = [0, 1, 2, 3, 4, 5, 7, 8, 11, 12]
 
@@ -23,7 +23,9 @@ def tank(p):
     return Survey(
         points=tuple(f"P{i}" for i in range(points)),
         xyz_m=p["X"],
-        image_points=ImagePoints(p["pt"], p["ph"], p["xy"], np.full(p["xy"].shape, p["sigma"])),
+        image_points=ImageCoordinates(
+            p["xy"], np.full(p["xy"].shape, p["sigma"]), p["pt"], p["ph"]
+        ),
         photos=Photos(
             tuple(f"S{i}" for i in range(photos)),
             np.zeros(photos, dtype=int),
@@ -66,8 +68,8 @@ def bal(path):
     return Survey(
         points=tuple(map(str, range(points))),
         xyz_m=xyz,
-        image_points=ImagePoints(
-            table[:, 1].astype(int), table[:, 0].astype(int), table[:, 2:], np.ones((rays, 2))
+        image_points=ImageCoordinates(
+            table[:, 2:], np.ones((rays, 2)), table[:, 1].astype(int), table[:, 0].astype(int)
         ),
         photos=Photos(
             tuple(map(str, range(cameras))),

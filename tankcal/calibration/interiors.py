@@ -88,7 +88,7 @@ def _interior(adjustment, setups, number, photos, part, others):
     common = others and any(scope == "block" for scope in camera.scope)
     images = adjusted.survey.image_points
     mine = np.isin(images.photo, photos) & (True if images.use is None else images.use > 0)
-    seen = images.xy_mm[mine]
+    seen = images.value[mine]
     half = np.abs(seen).max(axis=0, initial=0.0) if size is None else np.asarray(size) / 2
     return Interior(
         camera=camera.name,

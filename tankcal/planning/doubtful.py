@@ -61,24 +61,20 @@ class SingleReadings:
         return np.sqrt(self.share)[:, None]
 
 
-def single_readings(plan, observations, trace, rows):
-    """The SingleReadings of some observations of a Plan.
-
-    trace  surveys' Trace of their table        rows  (n,) numbers there
-    """
-    rows = rows.tolist()
+def single_readings(plan, observations):
+    """The SingleReadings of some observations of a Plan."""
+    trace, times = observations.trace, {}
     if trace.table in TAPED:
-        return _of_ties(plan, observations, trace, rows)
-    times = {}
+        return _of_ties(plan, observations)
     if trace.table in SIGHTED:
         times = {one.name: one.sets for one in plan.setups}
     elif observations.kind == ImageCoordinates.kind:
         times = {one.name: one.readings for one in plan.photos}
-    count = np.array([times.get(trace.ids[i][0], 1) for i in rows])
-    turn = np.zeros(len(rows))
+    count = np.array([times.get(ids[0], 1) for ids in trace.ids])
+    turn = np.zeros(len(count))
     if trace.table == "directions":
         turn = (1.0 - 1.0 / count) * _share_of_set(observations)
-    return SingleReadings(np.arange(len(rows)), 1.0 / count, count, turn)
+    return SingleReadings(np.arange(len(count)), 1.0 / count, count, turn)
 
 
 def _share_of_set(directions):
@@ -87,16 +83,16 @@ def _share_of_set(directions):
     return weight / np.bincount(directions.set, weight)[directions.set]
 
 
-def _of_ties(plan, observations, trace, rows):
+def _of_ties(plan, observations):
     """Ties of one line may differ in their sds: each is a lot of readings that are alike."""
-    lots = defaultdict(list)
+    trace, lots = observations.trace, defaultdict(list)
     for one in plan.ties:
         if one.table == trace.table and one.sd_m > 0:
             line = _line(one.table, (one.start, one.end), one.instrument, one.kind == "horizontal")
             lots[line].append((one.sd_m**-2, one.readings))
     flat, of, share, count = getattr(observations, "horizontal", False), [], [], []
-    for number, i in enumerate(rows):
-        mine = lots[_line(trace.table, trace.ids[i], trace.group[i], flat)]
+    for number, (ids, group) in enumerate(zip(trace.ids, trace.group, strict=True)):
+        mine = lots[_line(trace.table, ids, group, flat)]
         weight, times = np.array(mine).T
         of += [number] * len(mine)
         share += (weight / (weight @ times)).tolist()
@@ -164,16 +160,15 @@ def reliability(plan, predicted, covariance, by_points_m2):
     problem, solution = adjusted.problem, adjusted.solution
     pull = _pull(solution, problem.layout.points[covariance.points].ravel(), by_points_m2)
     found = []
-    parts = zip(problem.observations, problem.sources, problem.rows_of, strict=True)
-    for number, (one, source, rows) in enumerate(parts):
-        if source not in predicted.gathered.traces:
+    for number, one in enumerate(problem.observations):
+        if one.trace is None:
             continue
-        trace, jac = predicted.gathered.traces[source], solution.cofactor.jacobians[number]
+        jac = solution.cofactor.jacobians[number]
         r = 1.0 - solution.cofactor.leverage(number, jac)
         columns = problem.model.groups[number].columns
         effect = np.abs(np.einsum("nmk,nk->nm", jac, pull[columns]))
-        single = single_readings(plan, one, trace, rows)
-        found += _by_name(one, trace, rows, single, single.redundancy(r), effect)
+        single = single_readings(plan, one)
+        found += _by_name(one, single, single.redundancy(r), effect)
     return tuple(found)
 
 
@@ -182,13 +177,13 @@ def _pull(solution, columns, gradient):
     return np.append(covariances(solution.cofactor, columns, gradient[None])[:, 0], 0.0)
 
 
-def _by_name(one, trace, rows, single, redundancy, effect):
+def _by_name(one, single, redundancy, effect):
     """The groups of one table of observations.
 
     single  SingleReadings (k)      redundancy  (k, m) of these     effect  (n, m) of the rows
     """
-    rows = rows[single.of]
-    names = np.array([trace.group[i] for i in rows.tolist()], dtype=object)
+    trace = one.trace.taken(single.of)
+    names = np.array(trace.group, dtype=object)
     controlled = redundancy > UNCONTROLLED
     size = np.where(controlled, noncentrality() / np.sqrt(np.where(controlled, redundancy, 1)), 0)
     weight = one.using(np.ones(len(one))).weight[single.of] * single.root()
@@ -208,9 +203,9 @@ def _by_name(one, trace, rows, single, redundancy, effect):
             uncontrolled=int(count @ np.sum(~controlled[mine], axis=1)),
             redundancy=float(count @ redundancy[mine].mean(axis=1) / count.sum()),
             blunder=float(blunder[worst].max()) if known else float("nan"),
-            of=trace.ids[rows[worst]],
+            of=trace.ids[worst],
             volume_m3=float(volume[moves].max()) if known else float("nan"),
-            volume_of=trace.ids[rows[moves]],
+            volume_of=trace.ids[moves],
             per_unit_m3=float(per_unit[alone].max()) if is_bare else float("nan"),
-            per_unit_of=trace.ids[rows[alone]] if is_bare else (),
+            per_unit_of=trace.ids[alone] if is_bare else (),
         )  # fmt: skip

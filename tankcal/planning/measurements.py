@@ -170,14 +170,12 @@ def _drawn(rng):
 def _computed(predicted):
     """{(table, horizontal, names): value} of all readings, computed from the nominal places."""
     found, problem = {}, predicted.adjusted.problem
-    parts = [*zip(problem.observations, problem.sources, problem.rows_of, strict=True)]
-    parts += [(held.observations, held.source, held.rows) for held in problem.exact]
-    for one, source, rows in parts:
-        trace = predicted.gathered.traces.get(source)
+    for one in (*problem.observations, *(held.observations for held in problem.exact)):
+        trace = one.trace
         if trace is None or not trace.table:
             continue
         computed = one.computed(problem.state, False)[0]
-        for row, value in zip(rows.tolist(), computed[:, 0].tolist(), strict=True):
+        for row, value in enumerate(computed[:, 0].tolist()):
             key = trace.table, bool(getattr(one, "horizontal", False))
             found[*key, *trace.ids[row]] = value
             if KINDS[trace.table].either_way:  # a tape is read either way

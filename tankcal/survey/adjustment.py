@@ -24,8 +24,9 @@ from tankcal.survey.diagnosis.outlier_attribution import (
     find_undecided_outliers,
 )
 from tankcal.survey.diagnosis.scales import check_readings_off, scale_of_control
-from tankcal.survey.network.reactions import HELD, reactions
+from tankcal.survey.network.reactions import reactions
 from tankcal.survey.network.soundness import find_hardly_determined
+from tankcal.survey.network.survey import IMAGES
 from tankcal.survey.network_of_survey import gather, held_trace, named_in
 from tankcal.survey.results import Adjustment
 from tankcal.survey.rows import gone_with_their_points, readings_of
@@ -120,7 +121,7 @@ def _why_not(measurements, message):
 
 
 def _count(survey):
-    images = 0 if survey.image_points is None else 2 * len(survey.image_points.point)
+    images = 0 if survey.image_points is None else 2 * len(survey.image_points)
     return images + sum(len(one) * one.rows for one in survey.observations)
 
 
@@ -130,27 +131,27 @@ def _complete(search, gathered, frame, measurements):
     scale, warnings = _cov_scale(adjusted, measurements.settings)
     warnings = [*gathered.warnings, *frame.warnings, *search.warnings, *warnings]
     held = reactions(adjusted.problem, adjusted.solution, frame.tested & ~gathered.idle)
-    traces = gathered.traces | {HELD: held_trace(gathered.known, adjusted.survey.points)}
-    readings, groups = readings_of(adjusted, traces, held.residuals(adjusted.problem))
-    readings += gone_with_their_points(adjusted, search.removed, gathered.traces)
+    of_held = held_trace(gathered.known, adjusted.survey.points)
+    readings, groups = readings_of(adjusted, held.residuals(adjusted.problem), of_held)
+    readings += gone_with_their_points(adjusted, search.removed)
     removed = sorted((one for one in readings if one.removed), key=lambda one: -abs(one.w))
     readings += check_readings(adjusted, gathered.checks, scale)
     readings = _in_order(readings)
     there = np.flatnonzero(np.isfinite(adjusted.xyz_m).all(axis=1))
     late = {i: why for i, why in enumerate(adjusted.problem.set_aside) if why}
     warnings += [_lost(measurements, adjusted.survey.points[i], why) for i, why in late.items()]
-    warnings += [_kept(one, gathered.traces) for one in search.needed if one.w > CRITICAL]
+    warnings += [_kept(one, adjusted.survey) for one in search.needed if one.w > CRITICAL]
     diagnoses = _diagnoses(adjusted, readings, groups, gathered, measurements)
     doubts = _causes(adjusted, readings, gathered, measurements, diagnoses)
-    rays, others = [], [one for one in search.removed if one.source != "image points"]
+    rays, others = [], [one for one in search.removed if one.source != IMAGES]
     if doubts:
         others = [one for one in others if one.kind.startswith("control coordinate")]
     else:
-        of_images = [one for one in search.removed if one.source == "image points"]
+        of_images = [one for one in search.removed if one.source == IMAGES]
         rays = find_undecided_outliers(
-            adjusted, of_images, traces, held
+            adjusted, of_images, held, of_held
         )  # one more or less: a warning
-    doubts += find_undecided_outliers(adjusted, others, traces, held)
+    doubts += find_undecided_outliers(adjusted, others, held, of_held)
     warnings = [*doubts, *warnings, *diagnoses, *rays]
     known = gathered.known
     acting = frame.held
@@ -178,9 +179,9 @@ def _complete(search, gathered, frame, measurements):
     )
 
 
-def _kept(one, traces):
+def _kept(one, survey):
     """Problem of a reading that disagrees, but cannot be spared."""
-    trace = traces[one.source]
+    trace = survey.table(one.source).trace
     text = message(
         "disagreeing_but_kept",
         "reading {reading} disagrees with the others (w = {w:.1f}), but was kept: without it "

@@ -6,7 +6,7 @@ from scipy.sparse.csgraph import connected_components
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.survey.observations import Block
+from tankcal.survey.observations import Block, ControlCoordinates
 
 SMALLEST = 1e-10  # eigenvalue of a correlation matrix: below it the values contradict
 
@@ -19,7 +19,7 @@ def rows_of(correlated, table):
     return frozenset(correlated.at[mine].tolist())
 
 
-def blocks_of(measurements, observations, traces):
+def blocks_of(measurements, observations):
     """The Blocks of correlated values of a survey's observations.
 
     Raises InputError for correlations that are not possible together.
@@ -27,12 +27,8 @@ def blocks_of(measurements, observations, traces):
     sources, rows, components, sds, places = [], [], [], [], {}
     pairs = []
     for source, one in enumerate(observations):
-        trace = traces[source]
-        table = trace.table or (
-            "control"
-            if trace.file.endswith(CONTROL) and hasattr(one, "axis") and not hasattr(one, "system")
-            else ""
-        )
+        trace = one.trace
+        table = "control" if isinstance(one, ControlCoordinates) else trace.table
         own = table == "vectors"
         named = rows_of(measurements.correlated, table)
         sd = np.reshape(one.sd, (len(one), one.rows))
@@ -49,9 +45,6 @@ def blocks_of(measurements, observations, traces):
     pairs += _within_vectors(measurements, places)
     pairs += _between(measurements.correlated, places)
     return _split(np.array(sources), np.array(rows), np.array(components), np.array(sds), pairs)
-
-
-CONTROL = ("control.csv", "control")  # its file, or its sheet
 
 
 def _within_vectors(measurements, places):

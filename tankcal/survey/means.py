@@ -5,7 +5,7 @@ chi2 = sum(p (l - mean)2) with one degree of freedom fewer than readings. The ad
 means gives the same unknowns and covariance as that of all readings. Source: Koch 1999, section 3.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtri
@@ -93,11 +93,49 @@ def contradictory_labels(label, averages):
     return np.where(torn[averages.group], own, label)
 
 
-def scatter_warnings(averages, name_of, file, rows):
+def average_repeated(one, label, warnings, *, name_of=None, apart=False):
+    """Observations of which those of the same value are one, their weighted mean.
+
+    Parameters
+    ----------
+    one : Observations
+        Readings one by one, with their Trace.
+    label : ndarray of int, shape (n,)
+        The same number for readings of the same value.
+    warnings : list of Problem
+        To which warnings of scatter are added.
+    name_of : callable
+        What a value is called in them, of its names and element in the Trace; None: its names.
+    apart : bool
+        True: values that one reading alone contradicts are not averaged.
+
+    Returns
+    -------
+    Observations
+        In the order of their first readings; the Trace has their number and scatter.
+    """
+    if not len(one):
+        return one
+    angle = one.unit == "rad"
+    means = average_readings(label, one.value, one.sd, angle=angle)
+    warnings += _scatter_warnings(means, one.trace, name_of or _joined)
+    torn = contradictory_labels(label, means) if apart else label
+    if torn is not label:
+        means = average_readings(torn, one.value, one.sd, angle=angle)
+    first = one.taken(means.first)
+    value, sd = (np.reshape(of, np.shape(first.value)) for of in (means.value, means.sd))
+    trace = replace(first.trace, repeats=means.repeats, scatter=means.chi2.sum(axis=1))
+    return replace(first, value=value, sd=sd, trace=trace)
+
+
+def _joined(ids, element):
+    return "-".join(ids)
+
+
+def _scatter_warnings(averages, trace, name_of):
     """Problem rows for repeated readings that scatter other than their sds say.
 
-    averages  Averages       name_of  name_of(k) -> in words, the value that reading k is of
-    rows      (readings,) of the file, or ()
+    averages  Averages       trace  Trace of the readings       name_of  see average_repeated
 
     Each value is tested, at a level that errs for one file in a thousand; and all values together.
     """
@@ -111,17 +149,16 @@ def scatter_warnings(averages, name_of, file, rows):
     for i in np.argsort(-ratio)[:5]:
         if ratio[i] > 1:
             share, first = np.sqrt((averages.chi2[i] / dof[i]).max()), averages.first[i]
-            row = rows[first] if len(rows) else None
             text = message(
                 "readings_scatter",
                 "the {count} readings of {what} scatter {times:.1f} times as much as their standard"
                 " deviations say",
                 count=averages.repeats[i],
-                what=name_of(first),
+                what=name_of(trace.ids[first], trace.element[first]),
                 times=share,
             )
-            found.append(Problem(file, text, row))
-    return found + _of_all(averages.chi2.sum(), int(dof.sum()), file, bool(found))
+            found.append(Problem(trace.file, text, trace.rows[first]))
+    return found + _of_all(averages.chi2.sum(), int(dof.sum()), trace.file, bool(found))
 
 
 def _of_all(chi2, dof, file, told):

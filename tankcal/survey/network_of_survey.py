@@ -13,16 +13,17 @@ from tankcal.survey.diagnosis.undetermined import (
     find_untouched_coordinates,
     unmeasured_sentence,
 )
-from tankcal.survey.means import average_readings, scatter_warnings
-from tankcal.survey.network import ImagePoints, Instrument, Survey, System
-from tankcal.survey.observations import KINDS, ControlCoordinates, SystemCoordinates
-from tankcal.survey.photographs import gathered_photos, orientation_of
-from tankcal.survey.readings import (
-    Numbers,
-    Trace,
-    bend_per_m,
-    observations_of_readings,
+from tankcal.survey.means import average_repeated
+from tankcal.survey.network import Instrument, Survey, System
+from tankcal.survey.observations import (
+    KINDS,
+    ControlCoordinates,
+    ImageCoordinates,
+    Source,
+    SystemCoordinates,
 )
+from tankcal.survey.photographs import gathered_photos, orientation_of
+from tankcal.survey.readings import Numbers, bend_per_m, observations_of_readings
 from tankcal.survey.repeated_readings import reject_scattered
 
 AXES = "xyz"
@@ -31,13 +32,11 @@ TOLD = 10  # points left out that are told one by one
 
 @dataclass(frozen=True)
 class Gathered:
-    """A survey before it has start values, and where each of its observations comes from.
+    """A survey before it has start values; its observations know which readings they are of.
 
     survey   network.Survey: coordinates that are not known are nan; control acts as observations
              and fixed coordinates with datum "control" only
-    traces   {source: Trace}, source as network.Residuals name it
-    checks   tuple of (observations, Trace) that are compared, not adjusted; image coordinates as
-             network.ImagePoints
+    checks   tuple of Observations that are compared, not adjusted
     known    Known: control in the frame of the survey
     idle     (points, 3) True: no observation touches this coordinate, it keeps its start
     lost     {name: file} of points that cannot be adjusted
@@ -47,7 +46,6 @@ class Gathered:
     """
 
     survey: Survey
-    traces: dict
     checks: tuple
     known: object
     idle: np.ndarray
@@ -134,49 +132,37 @@ def _gathered(measurements, excluded):
     warnings = []
     numbers = _numbers(measurements, excluded)
     known = _known(measurements.control, numbers.points)
-    observations, traces, checks = [], {}, []
-
-    def add(one, trace):
-        traces[len(observations)] = trace
-        observations.append(one)
-
+    observations, checks = [], []
     fixed = None
     if measurements.settings.datum == "control":
         fixed = np.nan_to_num(known.sd_m, nan=1.0) == 0
         fixed &= np.isfinite(known.xyz_m)
         alone = rows_of(measurements.correlated, "control")
-        for one, trace in _control(measurements.control, numbers.points, warnings, alone):
-            add(one, trace)
-    systems, pairs = _systems(measurements.control, numbers.points)
-    for one, trace in pairs:
-        add(one, trace)
+        observations += _control(measurements.control, numbers.points, warnings, alone)
+    systems, of_systems = _systems(measurements.control, numbers.points)
+    observations += of_systems
     bend = bend_per_m(measurements.settings.refraction)
     for readings in measurements.readings:
         alone = rows_of(measurements.correlated, readings.table)
         adjusted, compared = observations_of_readings(
             readings, numbers, bend=bend, warnings=warnings, correlated=alone
         )
-        for one, trace in adjusted:
-            add(one, trace)
+        observations += adjusted
         checks += compared
     photos, cameras, order = gathered_photos(measurements)
     images = None
     if photos is not None:
-        images, traces["image points"], more = _images(
-            measurements, numbers.points, order, warnings
-        )
-        checks += more
-        for one, trace in orientation_of(measurements, order):
-            add(one, trace)
+        images, compared = _images(measurements, numbers.points, order, warnings)
+        checks += compared
+        observations += orientation_of(measurements, order)
     survey = Survey(
         points=tuple(numbers.points), xyz_m=np.full((len(numbers.points), 3), np.nan),
         fixed=fixed, image_points=images, photos=photos, cameras=cameras,
         observations=tuple(observations), sets=np.full(len(numbers.sets), np.nan),
         instruments=_instruments(measurements, numbers), systems=systems,
-        repeated={source: one.repeated for source, one in traces.items()},
-        correlated=blocks_of(measurements, observations, traces),
+        correlated=blocks_of(measurements, observations),
     )  # fmt: skip
-    return Gathered(survey, traces, tuple(checks), known, None, {}, (), tuple(warnings))
+    return Gathered(survey, tuple(checks), known, None, {}, (), tuple(warnings))
 
 
 def _numbers(measurements, excluded):
@@ -252,57 +238,44 @@ def _coordinates(control, rows, points):
 
 
 def _control(control, points, warnings, alone=frozenset()):
-    """Pairs (observations, Trace) of weighted control coordinates."""
+    """The weighted control coordinates, as a list of one table or none."""
     if control is None:
-        return
+        return []
     row, point, axis, value, sd = _coordinates(control, _own(control), points)
-    free = sd > 0
-    if free.any():
-        row, point, axis, value, sd = (a[free] for a in (row, point, axis, value, sd))
-        label = 3 * point + axis
-        if alone:  # values that are correlated with others are not averaged
-            mine = np.isin([control.rows[i] for i in row], list(alone))
-            label = np.where(mine, 3 * len(points) + np.arange(len(label)), label)
-        means = average_readings(label, value, sd)
-        first = means.first
-        trace = _control_trace(control, row[first], axis[first], means.repeats)
-        trace = replace(trace, scatter=means.chi2.sum(axis=1))
-        warnings += scatter_warnings(
-            means, lambda k: f"{control.point[row[k]]} {'xyz'[axis[k]]}", control.file,
-            [control.rows[i] for i in row] if control.rows else (),
-        )  # fmt: skip
-        yield (
-            ControlCoordinates(means.value[:, 0], means.sd[:, 0], point[first], axis[first]),
-            trace,
-        )
+    trace = _control_source(control, row, axis).trace()
+    one = ControlCoordinates(value, sd, point, axis, trace=trace).taken(sd > 0)
+    label = 3 * one.point + one.axis
+    if alone:  # values that are correlated with others are not averaged
+        mine = np.isin(one.trace.rows, list(alone))
+        label = np.where(mine, 3 * len(points) + np.arange(len(label)), label)
+    found = average_repeated(
+        one, label, warnings, name_of=lambda ids, element: f"{ids[0]} {element[0]}"
+    )
+    return [found] if len(found) else []
 
 
-def _control_trace(control, rows, axis, repeats):
-    return Trace(
+def _control_source(control, rows, axis, group=()):
+    return Source(
         control.file,
-        tuple(control.rows[i] if control.rows else None for i in rows),
+        tuple(control.rows[i] for i in rows) if control.rows else (),
         tuple((control.point[i],) for i in rows),
-        repeats,
-        ("",) * len(rows),
-        tuple(("xyz"[k],) for k in axis),
+        tuple((AXES[k],) for k in axis),
+        group,
     )
 
 
 def held_trace(known, points):
     """The Trace of held coordinates, numbered 3 point + axis, of Known control."""
-    n = len(points)
-    return Trace(
+    return Source(
         "control.csv",
         tuple(known.row.get(name) for name in points for _ in AXES),
         tuple((name,) for name in points for _ in AXES),
-        np.ones(3 * n, dtype=int),
-        ("",) * (3 * n),
-        tuple((axis,) for axis in AXES) * n,
-    )
+        tuple((axis,) for axis in AXES) * len(points),
+    ).trace()
 
 
 def _systems(control, points):
-    """Further systems, and pairs (observations, Trace) of their coordinates."""
+    """Further systems, and a list of their coordinates."""
     if control is None:
         return (), []
     names = {}
@@ -318,14 +291,14 @@ def _systems(control, points):
     if not len(row):
         return (), []
     system = np.array([names[control.system[i]] for i in row])
-    trace = _control_trace(control, row, axis, np.ones(len(row), dtype=int))
-    trace = replace(trace, group=tuple(control.system[i] for i in row))
-    one = SystemCoordinates(value, sd, point, axis, system)
-    return tuple(System(name) for name in names), [(one, trace)]
+    group = tuple(control.system[i] for i in row)
+    trace = _control_source(control, row, axis, group=group).trace()
+    one = SystemCoordinates(value, sd, point, axis, system, trace=trace)
+    return tuple(System(name) for name in names), [one]
 
 
 def _images(measurements, points, order, warnings):
-    """ImagePoints that are adjusted with their Trace, and [(ImagePoints, Trace)] to compare."""
+    """The ImageCoordinates that are adjusted, and a list of those to compare."""
     images = measurements.image_points
     sd = np.array(images.sd_mm, dtype=float)
     if measurements.settings.image_sd_mm is not None:
@@ -335,36 +308,31 @@ def _images(measurements, points, order, warnings):
     point = np.array([points.get(name, -1) for name in images.point], dtype=int)
     check = np.asarray(images.check, dtype=bool)
     there = (photo >= 0) & (point >= 0)
-    rows = np.flatnonzero(there & ~check)
-    cameras = {one.name: one.camera for one in measurements.photos}
-    means = average_readings(photo[rows] * len(points) + point[rows], images.xy_mm[rows], sd[rows])
-    first = rows[means.first]
-    trace = _image_trace(images, first, means.repeats, cameras)
-    trace = replace(trace, scatter=means.chi2.sum(axis=1))
-    warnings += scatter_warnings(
-        means, lambda k: image_point_label(*trace.ids[means.group[k]]), images.file,
-        [images.rows[i] for i in rows] if images.rows else (),
+    trace = _image_source(measurements).trace()
+    whole = ImageCoordinates(images.xy_mm, sd, point, photo, trace=trace)
+    used = whole.taken(there & ~check)
+    used = average_repeated(
+        used, used.photo * len(points) + used.point, warnings,
+        name_of=lambda ids, _: image_point_label(*ids),
     )  # fmt: skip
-    shared = np.zeros_like(sd) if images.shared_sd_mm is None else images.shared_sd_mm
-    used = ImagePoints(point[first], photo[first], means.value, np.hypot(means.sd, shared[first]))
-    rows = np.flatnonzero(there & check)
-    if not len(rows):
-        return used, trace, []
-    left = ImagePoints(
-        point[rows], photo[rows], images.xy_mm[rows], np.hypot(sd[rows], shared[rows])
-    )
-    return used, trace, [(left, _image_trace(images, rows, np.ones(len(rows), dtype=int), cameras))]
+    left = whole.taken(there & check)
+    used, left = (
+        one if images.shared_sd_mm is None
+        else replace(one, sd=np.hypot(one.sd, images.shared_sd_mm[one.trace.reading]))
+        for one in (used, left)
+    )  # fmt: skip
+    return used, [left] if len(left) else []
 
 
-def _image_trace(images, rows, repeats, cameras):
-    rows = rows.tolist()
-    return Trace(
+def _image_source(measurements):
+    images = measurements.image_points
+    cameras = {one.name: one.camera for one in measurements.photos}
+    return Source(
         images.file,
-        tuple(images.rows[i] for i in rows) if images.rows else (None,) * len(rows),
-        tuple((images.photo[i], images.point[i]) for i in rows),
-        repeats,
-        tuple(cameras[images.photo[i]] for i in rows),
-        (("x", "y"),) * len(rows),
+        images.rows,
+        tuple(zip(images.photo, images.point, strict=True)),
+        (("x", "y"),) * len(images.photo),
+        tuple(cameras.get(name, "") for name in images.photo),
     )
 
 

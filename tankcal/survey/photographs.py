@@ -6,8 +6,7 @@ from tankcal.errors import InputError, Problem
 from tankcal.geometry.rotations import rotation_of_angles
 from tankcal.messages import message
 from tankcal.survey.network import Photos
-from tankcal.survey.observations import PhotoOrientation, PhotoRotation
-from tankcal.survey.readings import Trace
+from tankcal.survey.observations import PhotoOrientation, PhotoRotation, Source
 
 ELEMENTS = ("x", "y", "z", "omega", "phi", "kappa")
 TURNS = ("about x", "about y", "about z")  # of the image, away from the rotation that was given
@@ -68,7 +67,7 @@ def _refuse_poor(photos, seen):
 
 
 def orientation_of(measurements, order):
-    """Pairs (observations, Trace) of the elements of orientation known beforehand.
+    """Observations of the elements of orientation known beforehand, a list.
 
     Fixed coordinates and fixed rotations are not among them: these are no unknowns.
     """
@@ -84,36 +83,28 @@ def orientation_of(measurements, order):
             single += [(one, int(3 + element)) for element in np.flatnonzero(sd[3:] == 0)]
         if rotation.all():
             whole.append(one)
-    if single:
-        yield _single(single, order)
-    if whole:
-        yield _whole(whole, order)
+    found = [_single(single, order)] if single else []
+    return [*found, _whole(whole, order)] if whole else found
 
 
 def _single(single, order):
     value = np.array([one.values[element] for one, element in single])
     sd = np.array([one.sd[element] for one, element in single])
     photo = np.array([order[one.name] for one, _ in single])
-    observation = PhotoOrientation(value, sd, photo, np.array([element for _, element in single]))
-    return observation, _trace([one for one, _ in single], [(ELEMENTS[e],) for _, e in single])
+    element = np.array([element for _, element in single])
+    trace = _trace([one for one, _ in single], [(ELEMENTS[e],) for e in element])
+    return PhotoOrientation(value, sd, photo, element, trace=trace)
 
 
 def _whole(photos, order):
     angles = np.array([one.values[3:] for one in photos], dtype=float)
     sd = np.array([one.sd[3:] for one in photos], dtype=float)
     photo = np.array([order[one.name] for one in photos])
-    observation = PhotoRotation(
-        np.zeros((len(photos), 3)), sd, photo, rotation_of_angles(*angles.T)
-    )
-    return observation, _trace(photos, [TURNS] * len(photos))
+    trace = _trace(photos, [TURNS] * len(photos))
+    known = rotation_of_angles(*angles.T)
+    return PhotoRotation(np.zeros((len(photos), 3)), sd, photo, known, trace=trace)
 
 
 def _trace(photos, elements):
-    return Trace(
-        "photos.csv",
-        tuple(one.row for one in photos),
-        tuple((one.name,) for one in photos),
-        np.ones(len(photos), dtype=int),
-        ("",) * len(photos),
-        tuple(elements),
-    )
+    names = tuple((one.name,) for one in photos)
+    return Source("photos.csv", tuple(one.row for one in photos), names, tuple(elements)).trace()

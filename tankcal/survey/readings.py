@@ -1,42 +1,13 @@
 """From the readings of a table, with names, to observations, with arrays for the solver."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from tankcal.survey.means import average_readings, contradictory_labels, scatter_warnings
-from tankcal.survey.observations import KINDS
+from tankcal.survey.means import average_repeated
+from tankcal.survey.observations import KINDS, Source
 
 EARTH_RADIUS_M = 6_371_000.0
-
-
-@dataclass(frozen=True)
-class Trace:
-    """Where n observations of one kind come from.
-
-    file     name                   rows     (n,) first row of each, or None
-    ids      (n,) tuples of names   repeats  (n,) readings that were averaged
-    group    (n,) names of the groups whose sds are judged together ("tape 1")
-    element  (n,) tuples, a name for each value: ("x", "y"); ("",) where there is only one
-    table    as job.Readings name it; "" for everything else
-    scatter  (n,) chi-square of the readings that were averaged, about their mean; None: none were
-    """
-
-    file: str
-    rows: tuple
-    ids: tuple
-    repeats: np.ndarray
-    group: tuple
-    element: tuple
-    table: str = ""
-    scatter: np.ndarray | None = None
-
-    @property
-    def repeated(self):
-        """(chi-square (n,), degrees of freedom (n,)) of the readings that were averaged."""
-        scatter = np.zeros(len(self.rows)) if self.scatter is None else self.scatter
-        values = np.array([len(one) for one in self.element], dtype=int)
-        return scatter, (np.asarray(self.repeats) - 1) * values
 
 
 @dataclass(frozen=True)
@@ -94,73 +65,81 @@ def observations_of_readings(readings, numbers, *, bend, warnings, correlated=fr
 
     Returns
     -------
-    adjusted, compared : list of (Observations, Trace)
+    adjusted, compared : list of Observations
+        Each with the Trace of its readings; horizontal distances stand apart from spatial ones.
     """
-    table = _numbered_table(readings, numbers, correlated)
-    use = _between_known(table)
-    adjusted = list(_adjusted(table, use & ~table.check, bend, warnings))
-    use &= table.check
-    if table.kind.has("set"):
-        use &= table.set >= 0
-    return adjusted, list(_one_by_one(table, np.flatnonzero(use), bend))
+    single, averaged, compared = [], [], []
+    kind = KINDS[readings.table]
+    if not len(readings.value):
+        return [], []
+    for one in _observed(readings, numbers, kind, bend):
+        check = np.asarray(readings.check, dtype=bool)[one.trace.reading]
+        alone = np.full(len(one), np.ndim(readings.value) > 1)  # correlated with one another
+        alone |= np.isin(one.trace.rows, list(correlated)) if correlated else False
+        compared.append(one.taken(check))
+        single.append(one.taken(~check & alone))
+        rest = one.taken(~check & ~alone)
+        averaged.append(average_repeated(rest, _labels(rest, kind), warnings, apart=True))
+    return [one for one in single + averaged if len(one)], [one for one in compared if len(one)]
 
 
-@dataclass(frozen=True)
-class _Table:
-    """Readings with numbers in place of names; arrays (n,), -1: no such number."""
+def _observed(readings, numbers, kind, bend):
+    """Observations of all readings between points that have numbers, one by one.
 
-    table: str
-    file: str
-    rows: tuple
-    value: np.ndarray
-    sd: np.ndarray
-    start: np.ndarray
-    end: np.ndarray
-    origin: np.ndarray
-    rise_m: np.ndarray
-    set: np.ndarray
-    instrument: np.ndarray
-    tools: tuple
-    horizontal: np.ndarray
-    check: np.ndarray
-    ids: tuple
-    correlated: frozenset  # rows of the file that are correlated with others
-
-    @property
-    def kind(self):
-        """observations.Kind of its rows."""
-        return KINDS[self.table]
-
-
-def _numbered_table(readings, numbers, correlated):
+    A table for spatial, one for horizontal distances; other kinds are one.
+    """
     n = len(readings.value)
     setups = [numbers.setups[name] for name in readings.setup]
     start = [one.station for one in setups] if setups else readings.start
     tools = [one.instrument for one in setups] if setups else readings.instrument
-    of_distances = KINDS[readings.table].has("instrument")
-    tools = tuple(tools) if of_distances and len(tools) else (None,) * n
+    tools = tools if kind.has("instrument") and len(tools) else (None,) * n
     heights = np.array([one.height_m for one in setups]) if setups else np.zeros(n)
     target = readings.target_height_m
-    rise = heights - (0.0 if target is None else np.nan_to_num(target))
-    value = np.array(readings.value, dtype=float)
-    if of_distances:
-        value = _corrected(value, tools, readings.temperature_c, numbers.tools)
     sets = readings.set or (None,) * n
-    horizontal = np.zeros(n, dtype=bool) if readings.horizontal is None else readings.horizontal
-    from_names = readings.setup or readings.start
-    ids = zip(from_names, readings.end, strict=True)
-    if readings.origin:
-        ids = zip(from_names, readings.origin, readings.end, strict=True)
-    return _Table(
-        table=readings.table, file=readings.file, rows=tuple(readings.rows), value=value,
-        sd=np.asarray(readings.sd, dtype=float),
-        start=_numbered(start, numbers.points), end=_numbered(readings.end, numbers.points),
-        origin=_numbered(readings.origin or start, numbers.points), rise_m=rise,
-        set=_numbered(zip(readings.setup or sets, sets, strict=True), numbers.sets),
-        instrument=_numbered(tools, numbers.instruments), tools=tools,
-        horizontal=np.asarray(horizontal, dtype=bool),
-        check=np.asarray(readings.check, dtype=bool), ids=tuple(ids), correlated=correlated,
-    )  # fmt: skip
+    rise = heights - (0.0 if target is None else np.nan_to_num(target))
+    columns = {
+        "start": _numbered(start, numbers.points),
+        "end": _numbered(readings.end, numbers.points),
+        "origin": _numbered(readings.origin or start, numbers.points),
+        "instrument": _numbered(tools, numbers.instruments),
+        "set": _numbered(zip(readings.setup or sets, sets, strict=True), numbers.sets),
+        "rise_m": rise if rise.any() else None,
+        "bend_per_m": bend,
+    }
+    columns = {name: given for name, given in columns.items() if kind.has(name)} | kind.options
+    value = np.array(readings.value, dtype=float)
+    if kind.has("instrument"):
+        value = _corrected(value, tools, readings.temperature_c, numbers.tools)
+    value, sd = (_of_rows(of, n, kind.observes.rows) for of in (value, readings.sd))
+    trace = _source(readings, kind, tools).trace()
+    whole = kind.observes(value, sd, **columns, trace=trace)
+    numbered = (*whole.ties, "set") if kind.has("set") else whole.ties
+    known = np.all([getattr(whole, name) >= 0 for name in numbered], axis=0)
+    if readings.horizontal is None:
+        return [whole.taken(known)]
+    flat = np.asarray(readings.horizontal, dtype=bool)
+    return [
+        replace(whole.taken(known & (flat == horizontal)), horizontal=horizontal)
+        for horizontal in (False, True)
+    ]
+
+
+def _of_rows(of, n, m):
+    """(n,) or, of several values a row, (n, m); one for all m where one is given."""
+    of = np.array(np.broadcast_to(np.asarray(of, dtype=float).reshape(n, -1), (n, m)))
+    return of[:, 0] if m == 1 else of
+
+
+def _source(readings, kind, tools):
+    names = readings.setup or readings.start, readings.origin, readings.end
+    return Source(
+        file=readings.file,
+        rows=tuple(readings.rows),
+        ids=tuple(zip(*(one for one in names if one), strict=True)),
+        element=(kind.elements,) * len(readings.value),
+        group=tuple(tool or kind.group for tool in tools),
+        table=readings.table,
+    )
 
 
 def _numbered(names, numbers):
@@ -175,96 +154,17 @@ def _corrected(value, tools, temperature_c, known):
     return value
 
 
-def _adjusted(table, use, bend, warnings):
-    """Pairs (observations, Trace) of the rows (n,) bool that are adjusted, repeated ones as one."""
-    if table.value.ndim > 1:
-        yield from _one_by_one(table, np.flatnonzero(use), bend)
-        return
-    alone = np.isin(table.rows, list(table.correlated)) if table.rows else use & False
-    yield from _one_by_one(table, np.flatnonzero(use & alone), bend)
-    use &= ~alone
-    for horizontal in (False, True):
-        rows = np.flatnonzero(use & (table.horizontal == horizontal))
-        if len(rows):
-            label, angle = _labels(table, rows), table.kind.is_angle
-            value, sd = _values(table, rows)
-            means = average_readings(label, value, sd, angle=angle)
-            warnings += scatter_warnings(
-                means, lambda k, r=rows: "-".join(table.ids[r[k]]), table.file,
-                [table.rows[i] for i in rows] if table.rows else (),
-            )  # fmt: skip
-            apart = contradictory_labels(label, means)
-            if apart is not label:
-                means = average_readings(apart, value, sd, angle=angle)
-            first = rows[means.first]
-            yield (
-                _made(table, first, means.value, means.sd, bend),
-                replace(_trace(table, first, means.repeats), scatter=means.chi2.sum(axis=1)),
-            )
-
-
-def _one_by_one(table, rows, bend):
-    """Pairs (observations, Trace) of rows (k,) that are not averaged with others."""
-    for horizontal in (False, True):
-        mine = rows[table.horizontal[rows] == horizontal]
-        if len(mine):
-            trace = _trace(table, mine, np.ones(len(mine), dtype=int))
-            yield _made(table, mine, *_values(table, mine), bend), trace
-
-
-def _values(table, rows):
-    """Values and sds (k, m) of rows (k,); a column holds for all m values where there is one."""
-    shape = len(rows), table.kind.observes.rows
-    columns = (a[rows].reshape(len(rows), -1) for a in (table.value, table.sd))
-    return (np.array(np.broadcast_to(column, shape)) for column in columns)
-
-
-def _between_known(table):
-    return (table.start >= 0) & (table.end >= 0) & (table.origin >= 0)
-
-
-def _labels(table, rows):
+def _labels(one, kind):
     """(n,) the same number for readings of the same value; taped lines go either way."""
-    start, end = table.start[rows], table.end[rows]
-    source = [table.ids[i][0] for i in rows]
-    if table.kind.either_way:
-        start, end = np.minimum(start, end), np.maximum(start, end)
-        source = [None] * len(rows)
-    back = table.origin[rows].tolist() if table.kind.has("origin") else source
+    columns = {field.name: getattr(one, field.name) for field in fields(one)}
+    for name in ("value", "sd", "use"):
+        del columns[name]
+    columns = {name: of for name, of in columns.items() if isinstance(of, np.ndarray)}
+    if kind.either_way:
+        ends = columns["start"], columns["end"]
+        columns |= {"start": np.minimum(*ends), "end": np.maximum(*ends)}
+    else:  # two set-ups on one station see the same value twice
+        columns["from"] = np.array([names[0] for names in one.trace.ids], dtype=object)
     known = {}
-    keys = zip(
-        start.tolist(), end.tolist(), back,
-        table.rise_m[rows].tolist(), table.set[rows].tolist(), [table.tools[i] for i in rows],
-        source, strict=True,
-    )  # fmt: skip
-    return np.array([known.setdefault(key, len(known)) for key in keys])
-
-
-def _made(table, rows, value, sd, bend):
-    """The observations of some rows, with values and sds (n, m)."""
-    kind, rise = table.kind, table.rise_m[rows]
-    known = {
-        "instrument": table.instrument[rows],
-        "set": table.set[rows],
-        "origin": table.origin[rows],
-        "horizontal": bool(table.horizontal[rows[0]]),
-        "rise_m": rise if rise.any() else None,
-        "bend_per_m": bend,
-    }
-    more = {name: given for name, given in known.items() if kind.has(name)} | kind.options
-    if kind.observes.rows == 1:
-        value, sd = value[:, 0], sd[:, 0]
-    return kind.observes(value, sd, start=table.start[rows], end=table.end[rows], **more)
-
-
-def _trace(table, rows, repeats):
-    group = tuple(table.tools[i] or table.kind.group for i in rows)
-    return Trace(
-        table.file,
-        tuple(table.rows[i] for i in rows) if table.rows else (None,) * len(rows),
-        tuple(table.ids[i] for i in rows),
-        repeats,
-        group,
-        (table.kind.elements,) * len(rows),
-        table.table,
-    )
+    keys = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return np.array([known.setdefault(key, len(known)) for key in keys], dtype=int)

@@ -12,11 +12,12 @@ from tankcal.survey.results import GroupOfReadings, Reading
 TOOLS = {"scale": ("scale", ""), "offset_m": ("offset", "m")}
 
 
-def readings_of(adjusted, traces, held):
+def readings_of(adjusted, held, held_trace):
     """Reading rows in the order of the tables, and a GroupOfReadings for each kind and name.
 
-    adjusted  network.Adjusted       traces  {source: Trace}
-    held      network.Residuals of held coordinates: rows of no group, for they are not observed
+    adjusted    network.Adjusted
+    held        network.Residuals of held coordinates: rows of no group, for they are not observed
+    held_trace  their Trace
     """
     found, groups = [], {}
     for number, table in enumerate((*adjusted.residuals, held)):
@@ -24,8 +25,7 @@ def readings_of(adjusted, traces, held):
             trace = _known_trace(adjusted, adjusted.problem.observations[number])
             value = adjusted.problem.observations[number].value
         else:
-            trace = traces[table.source]
-            value = _values(adjusted.survey, table)
+            trace, value = _observed(adjusted.survey, table, held_trace)
         if not len(table.rows):
             continue
         rows = table.rows.tolist()
@@ -39,11 +39,10 @@ def readings_of(adjusted, traces, held):
         for name, unit in dict.fromkeys(zip(names, units, strict=True)):
             mine = (names == name) & (np.array(units, dtype=object) == unit)
             groups.setdefault((table.kind, name, unit), []).append((table, mine))
-    repeated = adjusted.survey.repeated
-    return found, tuple(_group(*key, parts, repeated) for key, parts in groups.items())
+    return found, tuple(_group(*key, parts, adjusted.survey) for key, parts in groups.items())
 
 
-def gone_with_their_points(adjusted, removed, traces):
+def gone_with_their_points(adjusted, removed):
     """Reading rows of what was set aside, and whose points are no longer adjusted.
 
     removed  network.snooping.Removed
@@ -52,31 +51,28 @@ def gone_with_their_points(adjusted, removed, traces):
     listed = {(table.source, row) for table in adjusted.residuals for row in table.rows.tolist()}
     nan, inf, found = float("nan"), float("inf"), []
     for one in removed:
-        if (one.source, one.row) in listed or one.source not in traces:
+        of = survey.table(one.source)
+        if (one.source, one.row) in listed or of is None:
             continue
-        trace, images = traces[one.source], one.source == "image points"
-        of = survey.image_points if images else survey.observations[one.source]
-        values, sds = (of.xy_mm, of.sd_mm) if images else (of.value, of.sd)
-        value, sd = np.atleast_1d(values[one.row]), np.atleast_1d(sds[one.row])
-        unit = "mm" if images else of.unit
+        trace = of.trace
+        value, sd = np.atleast_1d(of.value[one.row]), np.atleast_1d(of.sd[one.row])
         for k, name in enumerate(trace.element[one.row]):
             found.append(
                 Reading(
                     one.kind, trace.ids[one.row], name, trace.file, trace.rows[one.row],
-                    int(trace.repeats[one.row]), unit, float(value[k]), nan, float(sd[k]), 0.0,
+                    int(trace.repeats[one.row]), of.unit, float(value[k]), nan, float(sd[k]), 0.0,
                     float(one.w), nan, inf, inf, True,
                 )
             )  # fmt: skip
     return found
 
 
-def _values(survey, table):
-    """Observed values of a table of residuals."""
-    images = table.source == "image points"
+def _observed(survey, table, held_trace):
+    """Trace and observed values of a table of residuals."""
     if table.source == HELD:
-        return survey.xyz_m.ravel()[table.rows]
-    value = survey.image_points.xy_mm if images else survey.observations[table.source].value
-    return value[table.rows]
+        return held_trace, survey.xyz_m.ravel()[table.rows]
+    one = survey.table(table.source)
+    return one.trace, one.value[table.rows]
 
 
 def _rows(table, value, trace, units, sigma0):
@@ -143,13 +139,14 @@ def _known_names(adjusted, one):
     return names, elements, units, "cameras.toml"
 
 
-def _group(kind, name, unit, parts, repeated):
+def _group(kind, name, unit, parts, survey):
     """The GroupOfReadings of parts (table, mask of its rows)."""
     used = [mine & table.used for table, mine in parts]
     scatter = np.zeros(2)
     for (table, _), mine in zip(parts, used, strict=True):
-        if table.source in repeated:
-            scatter += [part[table.rows[mine]].sum() for part in repeated[table.source]]
+        one = survey.table(table.source)
+        if one is not None:
+            scatter += [part[table.rows[mine]].sum() for part in one.trace.repeated]
     residual, sd, share, parts_of_chi2 = (
         np.concatenate(
             [

@@ -239,7 +239,7 @@ def _bent(survey, gathered, measurements):
     observations = list(survey.observations)
     for number, one in enumerate(observations):
         slope = isinstance(one, Distances) and not one.horizontal
-        if slope and gathered.traces[number].table == "slope_distances":
+        if slope and one.trace.table == "slope_distances":
             rise = 0.0 if one.rise_m is None else one.rise_m
             line = (survey.xyz_m[one.end] - survey.xyz_m[one.start])[:, :2]
             observations[number] = replace(one, rise_m=rise + bend * np.sum(line**2, axis=1))

@@ -114,7 +114,7 @@ def test_the_sd_of_a_transformed_coordinate(film):
              found.adjusted.survey.points.index(images.point[0]))  # fmt: skip
     row = np.flatnonzero((used.photo == place[0]) & (used.point == place[1]))[0]
     own = fit.turned(np.full((1, 2), 0.005))[0]
-    np.testing.assert_allclose(used.sd_mm[row] ** 2, own**2 + added, rtol=1e-9)
+    np.testing.assert_allclose(used.sd[row] ** 2, own**2 + added, rtol=1e-9)
 
 
 def test_readings_repeated_share_the_error_of_the_marks(film):
@@ -133,7 +133,7 @@ def test_readings_repeated_share_the_error_of_the_marks(film):
         },
     )
     once, four = (
-        gather(replace(job.measurements, image_points=one)).survey.image_points.sd_mm
+        gather(replace(job.measurements, image_points=one)).survey.image_points.sd
         for one in (images, twice)
     )
     np.testing.assert_allclose(once**2 - four**2, 0.75 * images.sd_mm**2, rtol=1e-9)

@@ -20,9 +20,7 @@ LINES = "from,to,s_mm,readings,instrument\n3-1,3-5,2,2,tape\n3-5,3-1,1,3,tape\n9
 
 def each_apart(monkeypatch):
     """Readings of one value are not averaged any more: the network has each of them."""
-    monkeypatch.setattr(
-        tankcal.survey.readings, "_labels", lambda table, rows: np.arange(len(rows))
-    )
+    monkeypatch.setattr(tankcal.survey.readings, "_labels", lambda one, kind: np.arange(len(one)))
 
 
 def with_sets(folder, sets):

@@ -76,7 +76,7 @@ def write_photos(folder, image_sd_um=5):
     photos = survey.photos.names
     write_table(folder, "photos.csv", "photo camera", [[name, "UMK"] for name in photos])
     images = survey.image_points
-    xy = images.xy_mm.copy()
+    xy = images.value.copy()
     xy[list(BLUNDERS)] += 0.2
     write_table(folder, "image_points.csv", "photo point x_mm y_mm sx_um sy_um", [
         [photos[photo], names[point], *place, image_sd_um, image_sd_um]

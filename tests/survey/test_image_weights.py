@@ -77,7 +77,7 @@ def test_the_ideal_form_is_that_of_scipy():
         away = xyz[images.point] - stations[images.photo]
         u, v, w = np.einsum("nij,nj->in", turn[images.photo], away)
         ideal = -interior[0] * np.column_stack([u / w, v / w])
-        of_images = (ideal - correct_image_points(images.xy_mm, interior, form)) / IMAGE_SD_MM
+        of_images = (ideal - correct_image_points(images.value, interior, form)) / IMAGE_SD_MM
         of_control = (xyz[control.point, control.axis] - control.value) / CONTROL_SD_M
         length = np.linalg.norm(xyz[tape.start] - xyz[tape.end], axis=1)
         of_tape = (length - tape.value) / TAPE_SD_M

@@ -171,8 +171,8 @@ def moved(survey, rotation, shift, order=None):
             images,
             point=images.point[order],
             photo=images.photo[order],
-            xy_mm=images.xy_mm[order],
-            sd_mm=images.sd_mm[order],
+            value=images.value[order],
+            sd=images.sd[order],
         )
     return replace(
         survey,
@@ -400,9 +400,9 @@ def test_a_blunder_is_found_and_a_false_alarm_comes_back(survey, adjusted):
     table = next(t for t in adjusted.residuals if t.source == "image points")
     i = int(np.argmax(table.redundancy.min(axis=1)))
     row = table.rows[i]
-    xy = images.xy_mm.copy()
-    xy[row] += [15 * images.sd_mm[row, 0], 0]
-    found = snoop(replace(survey, image_points=replace(images, xy_mm=xy)), robust=False)
+    xy = images.value.copy()
+    xy[row] += [15 * images.sd[row, 0], 0]
+    found = snoop(replace(survey, image_points=replace(images, value=xy)), robust=False)
     assert [(one.source, one.row) for one in found.removed] == [("image points", row)]
     out = np.zeros(len(images.point))
     out[:] = 1
@@ -418,9 +418,9 @@ def test_ten_percent_of_blunders_are_survived(survey, adjusted, figure):
     n = len(images.point)
     bad = rng.choice(n, n // 10, replace=False)
     angle = rng.uniform(0, 2 * np.pi, len(bad))
-    xy = images.xy_mm.copy()
-    xy[bad] += 20 * images.sd_mm[bad] * np.column_stack([np.cos(angle), np.sin(angle)])
-    found = snoop(replace(survey, image_points=replace(images, xy_mm=xy)))
+    xy = images.value.copy()
+    xy[bad] += 20 * images.sd[bad] * np.column_stack([np.cos(angle), np.sin(angle)])
+    found = snoop(replace(survey, image_points=replace(images, value=xy)))
     removed = {one.row for one in found.removed if one.source == "image points"}
     figure("blunders found of those made, and others", f"{len(removed & set(bad))} of {len(bad)}, "
            f"{len(removed - set(bad))}")  # fmt: skip

@@ -45,9 +45,9 @@ def sharply(survey, datum):
 def biased(survey, source, row, value, by):
     """The survey with an error in one value."""
     if source == "image points":
-        xy = survey.image_points.xy_mm.copy()
+        xy = survey.image_points.value.copy()
         xy[row, value] += by
-        return replace(survey, image_points=replace(survey.image_points, xy_mm=xy))
+        return replace(survey, image_points=replace(survey.image_points, value=xy))
     one = survey.observations[source]
     changed = one.value.copy()
     changed[row] += by
@@ -155,12 +155,12 @@ def test_the_tau_test_does_not_need_the_true_sds(figure):
     images = SURVEY.image_points
     hopeful = replace(
         SURVEY,
-        image_points=replace(images, sd_mm=images.sd_mm / 3),
+        image_points=replace(images, sd=images.sd / 3),
         observations=tuple(replace(one, sd=one.sd / 3) for one in SURVEY.observations),
     )
-    xy = images.xy_mm.copy()
+    xy = images.value.copy()
     xy[50] += 0.15
-    hopeful = replace(hopeful, image_points=replace(hopeful.image_points, xy_mm=xy))
+    hopeful = replace(hopeful, image_points=replace(hopeful.image_points, value=xy))
     by_w = snoop(hopeful, robust=False)
     by_tau = snoop(hopeful, robust=False, test="tau")
     figure("set aside by w and tau, sds three times too small", f"{len(by_w.removed)}, "

@@ -255,7 +255,7 @@ def test_contradictions_are_reported(survey):
 def test_impossible_exact_values_are_refused(survey):
     images = survey.image_points
     with pytest.raises(SolutionError, match="an image coordinate cannot hold exactly"):
-        adjust(replace(survey, image_points=replace(images, sd_mm=0 * images.sd_mm)))
+        adjust(replace(survey, image_points=replace(images, sd=0 * images.sd)))
     half = PlumbLines(np.zeros((1, 2)), np.array([[0.0, 1.0]]), np.array([0]), np.array([12]))
     with pytest.raises(SolutionError, match=r"plumb line: all its values .* or none"):
         adjust(replace(survey, observations=(*survey.observations, half)))

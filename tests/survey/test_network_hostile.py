@@ -10,10 +10,10 @@ from networks import tank_points
 from tankcal.camera.model import Form, distort_image_points
 from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import rotation_of_view
-from tankcal.survey.network import Camera, ImagePoints, Photos, Survey, adjust
+from tankcal.survey.network import Camera, Photos, Survey, adjust
 from tankcal.survey.network.soundness import find_hardly_determined
 from tankcal.survey.network.unknowns import in_words
-from tankcal.survey.observations import ControlCoordinates, Distances
+from tankcal.survey.observations import ControlCoordinates, Distances, ImageCoordinates
 
 SQUARE = np.column_stack(
     [*(a.ravel() for a in np.meshgrid(np.linspace(-4, 4, 5), [0.0], np.linspace(0, 6, 4)))]
@@ -56,7 +56,7 @@ def scene(xyz, stations, azimuth, tilt, roll, free=(), control=(), tapes=(), noi
     return Survey(
         points=tuple(f"P{i}" for i in range(len(xyz))),
         xyz_m=xyz + noise * rng.normal(0, 0.02, xyz.shape),
-        image_points=ImagePoints(point, photo, xy, np.full(xy.shape, 0.005)),
+        image_points=ImageCoordinates(xy, np.full(xy.shape, 0.005), point, photo),
         photos=Photos(
             tuple(f"S{i}" for i in range(n)),
             np.zeros(n, dtype=int),

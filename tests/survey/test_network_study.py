@@ -27,7 +27,7 @@ def redrawn(exact, rng, scale_sd=TAPE_SCALE_SD):
     return replace(
         exact,
         image_points=replace(
-            images, xy_mm=images.xy_mm + rng.normal(0, IMAGE_SD_MM, images.xy_mm.shape)
+            images, value=images.value + rng.normal(0, IMAGE_SD_MM, images.value.shape)
         ),
         observations=(
             replace(control, value=control.value + rng.normal(0, CONTROL_SD_M, 24)),

@@ -33,9 +33,9 @@ SUSPECTS = {  # kind of survey and of observation, values of it
 def with_bias(survey, source, row, element, bias):
     """The survey with one value falsified."""
     if source == "image points":
-        xy = survey.image_points.xy_mm.copy()
+        xy = survey.image_points.value.copy()
         xy[row, element] += bias
-        return replace(survey, image_points=replace(survey.image_points, xy_mm=xy))
+        return replace(survey, image_points=replace(survey.image_points, value=xy))
     one = survey.observations[source]
     value = np.array(one.value)
     value[row] += bias
@@ -242,10 +242,10 @@ def blundered(kind, rng, share=0.1, size=20.0):
         n = len(images.point)
         bad = rng.choice(n, round(share * n), replace=False)
         way = rng.uniform(0, 2 * np.pi, len(bad))
-        xy = images.xy_mm.copy()
-        xy[bad] += size * images.sd_mm[bad] * np.column_stack([np.cos(way), np.sin(way)])
+        xy = images.value.copy()
+        xy[bad] += size * images.sd[bad] * np.column_stack([np.cos(way), np.sin(way)])
         rows["image points"] = set(bad.tolist())
-        return replace(survey, image_points=replace(images, xy_mm=xy)), rows
+        return replace(survey, image_points=replace(images, value=xy)), rows
     observations = []
     for source, one in enumerate(survey.observations):
         bad = rng.choice(len(one), round(share * len(one)), replace=False)

@@ -13,7 +13,7 @@ from networks import by_total_station
 
 from tankcal.camera.model import Form, distort_image_points
 from tankcal.geometry.rotations import rotation_of_angles
-from tankcal.survey.network import Camera, ImagePoints, Instrument, Photos, Survey, System, adjust
+from tankcal.survey.network import Camera, Instrument, Photos, Survey, System, adjust
 from tankcal.survey.observations import (
     Azimuths,
     ControlCoordinates,
@@ -21,6 +21,7 @@ from tankcal.survey.observations import (
     Distances,
     HeightDifferences,
     HorizontalAngles,
+    ImageCoordinates,
     KnownUnknowns,
     PlumbLines,
     SystemCoordinates,
@@ -276,7 +277,7 @@ def test_photographs_by_a_second_method(form, figure):
     survey = Survey(
         points=tuple(f"P{i}" for i in range(PHOTOGRAPHED)),
         xyz_m=xyz + rng.normal(0, 0.01, xyz.shape),
-        image_points=ImagePoints(number, photo, xy, np.full(xy.shape, 0.004)),
+        image_points=ImageCoordinates(xy, np.full(xy.shape, 0.004), number, photo),
         photos=Photos(tuple("abcd"), np.zeros(4, dtype=int), centre, rotation_of_angles(*angles.T)),
         cameras=(Camera(interior, form, scope=scope),),
         observations=(control,),

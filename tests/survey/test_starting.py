@@ -48,12 +48,12 @@ def test_nominal_geometry_alone_leads_to_the_same_answer(blunders):
     wild = survey.image_points
     n, rng = len(wild.point), np.random.default_rng(2)
     bad = rng.choice(n, int(blunders * n), replace=False)
-    xy = wild.xy_mm.copy()
+    xy = wild.value.copy()
     xy[bad] += rng.uniform(-20, 20, (len(bad), 2))
     nominal = nominal_places(
         np.tile(np.arange(12), 4) + 1, 12, np.repeat(np.linspace(0.3, 9, 4), 12), 6.5
     )
-    start = replace(unknown_photos(survey), xyz_m=nominal, image_points=replace(wild, xy_mm=xy))
+    start = replace(unknown_photos(survey), xyz_m=nominal, image_points=replace(wild, value=xy))
     found = approximate(start)
     assert np.abs(found.photos.xyz_m - survey.photos.xyz_m).max() < 1.0
     adjusted = adjust(replace(found, image_points=wild))

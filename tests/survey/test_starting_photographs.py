@@ -12,8 +12,8 @@ from test_starting_networks import control, sides, unknown
 from tankcal.camera.model import Form, distort_image_points
 from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import apply_small_rotation, rotation_of_angles, rotation_of_view
-from tankcal.survey.network import Camera, ImagePoints, Photos, Survey, adjust
-from tankcal.survey.observations import State
+from tankcal.survey.network import Camera, Photos, Survey, adjust
+from tankcal.survey.observations import ImageCoordinates, State
 from tankcal.survey.start.approximation import approximate
 from tankcal.survey.start.photographs import Wall
 from tankcal.survey.start.relative import essential_matrices, relative_poses
@@ -39,7 +39,7 @@ def seen_from(xyz, stations, aim, noise_mm=0.0, seed=0):
     survey = Survey(
         tuple(f"P{i}" for i in range(len(xyz))),
         np.full(xyz.shape, np.nan),
-        image_points=ImagePoints(point, photo, xy, np.full(xy.shape, 0.005)),
+        image_points=ImageCoordinates(xy, np.full(xy.shape, 0.005), point, photo),
         photos=Photos(tuple(f"S{i}" for i in range(len(d))), np.zeros(len(d), int), *nothing),
         cameras=(Camera(IDEAL, state=("fixed",) * 13),),
     )
@@ -57,7 +57,7 @@ def test_five_points_give_the_true_essential_matrix():
     """Closed form: E = R [b]x of the truth is, up to its factor, among the solutions."""
     survey, rotation = seen_from(cloud(), THREE[:2], np.zeros(3))
     images = survey.image_points
-    f1, f2 = (bearings(images.xy_mm[images.photo == i] / 100) for i in (0, 1))
+    f1, f2 = (bearings(images.value[images.photo == i] / 100) for i in (0, 1))
     found = essential_matrices(f1[None, :5], f2[None, :5])
     assert 1 <= len(found) <= 10
     base = rotation[0] @ (THREE[1] - THREE[0])
@@ -75,7 +75,7 @@ def test_relative_orientation_with_blunders(flat):
     xyz = cloud(1, 60) * ([1, 0.0, 1] if flat else 1)
     survey, rotation = seen_from(xyz, THREE[:2], np.zeros(3), 0.003)
     rng, images = np.random.default_rng(3), survey.image_points
-    first, second = (images.xy_mm[images.photo == i] / 100 for i in (0, 1))
+    first, second = (images.value[images.photo == i] / 100 for i in (0, 1))
     for image in (first, second):
         wild = rng.choice(60, 6, replace=False)
         image[wild] += rng.uniform(-0.2, 0.2, (6, 2))
@@ -108,9 +108,9 @@ def test_control_observations_and_images_are_enough(share):
     survey, truth = photographed(photos=12, seed=5)
     images, rng = survey.image_points, np.random.default_rng(8)
     wild = rng.choice(len(images.point), int(share * len(images.point)), replace=False)
-    xy = images.xy_mm.copy()
+    xy = images.value.copy()
     xy[wild] += rng.uniform(-20, 20, (len(wild), 2))
-    found = approximate(unknown(replace(survey, image_points=replace(images, xy_mm=xy))))
+    found = approximate(unknown(replace(survey, image_points=replace(images, value=xy))))
     assert np.median(np.abs(found.xyz_m - truth.xyz_m)) < 0.02
     assert np.abs(found.photos.xyz_m - truth.photo_xyz_m).max() < 0.5
     adjusted = adjust(replace(found, image_points=images))
@@ -241,8 +241,8 @@ def test_the_wall_decides_between_the_poses_of_three_points():
             observations=(),
             image_points=replace(
                 images,
-                point=images.point[use], photo=images.photo[use] * 0, xy_mm=images.xy_mm[use],
-                sd_mm=images.sd_mm[use],
+                point=images.point[use], photo=images.photo[use] * 0, value=images.value[use],
+                sd=images.sd[use],
             ),
             photos=Photos(
                 ("S",), np.zeros(1, int), np.full((1, 3), np.nan), np.full((1, 3, 3), np.nan)
@@ -298,11 +298,11 @@ def many(photos, points, blunders=0.0):
     survey, _ = seen_from(xyz, stations, [0.0, 0, 6], 0.005)
     images = survey.image_points
     facing = np.sum((stations[images.photo] - xyz[images.point]) * xyz[images.point] * [1, 1, 0], 1)
-    keep = (facing > 1) & (np.abs(images.xy_mm) < 90).all(axis=1)
-    xy, point, photo = images.xy_mm[keep], images.point[keep], images.photo[keep]
+    keep = (facing > 1) & (np.abs(images.value) < 90).all(axis=1)
+    xy, point, photo = images.value[keep], images.point[keep], images.photo[keep]
     wild = rng.choice(len(xy), int(blunders * len(xy)), replace=False)
     xy[wild] += rng.uniform(-20, 20, (len(wild), 2))
-    images = ImagePoints(point, photo, xy, np.full(xy.shape, 0.005))
+    images = ImageCoordinates(xy, np.full(xy.shape, 0.005), point, photo)
     known = control(xyz, rng.choice(points, 8, replace=False))
     return replace(survey, image_points=images, observations=(known,)), xyz, stations
 

@@ -15,6 +15,7 @@ from tankcal.survey import adjust_survey, wall_points
 from tankcal.survey.means import average_readings
 from tankcal.survey.measurements import AdjustmentSettings, Instrument, Measurements, Targets
 from tankcal.survey.network import adjust
+from tankcal.survey.observations import ImageCoordinates
 from tankcal.survey.readings import EARTH_RADIUS_M, true_distance_m
 from tankcal.survey.wall import move_to_wall
 
@@ -154,14 +155,11 @@ def test_averaging_is_adjusting_all_readings(photos):
     of = survey.observations[1]
     single = replace(
         survey,
-        repeated={},
-        image_points=replace(
-            survey.image_points, point=point, photo=photo, xy_mm=images.xy_mm, sd_mm=images.sd_mm
-        ),
+        image_points=ImageCoordinates(images.xy_mm, images.sd_mm, point, photo),
         observations=(
             survey.observations[0],
             replace(
-                of, value=tapes.value, sd=tapes.sd, instrument=np.zeros(16, dtype=int),
+                of, trace=None, value=tapes.value, sd=tapes.sd, instrument=np.zeros(16, dtype=int),
                 start=np.array([survey.points.index(name) for name in tapes.start]),
                 end=np.array([survey.points.index(name) for name in tapes.end]),
             ),

@@ -81,11 +81,12 @@ def _counted_anew(block, gross):
 
 def _without(survey, options, gross):
     """network.Cleaned of a survey: first without some readings, then with these set aside."""
-    thin = replace(
+    images = survey.image_points
+    thin = replace(  # without their traces: the scatter of repeated readings does not count here
         survey,
-        repeated={},
+        image_points=None if images is None else replace(images, trace=None),
         observations=tuple(
-            one.taken(~gross[number]) if number in gross else one
+            replace(one.taken(~gross[number]) if number in gross else one, trace=None)
             for number, one in enumerate(survey.observations)
         ),
         correlated=tuple(_counted_anew(one, gross) for one in survey.correlated),

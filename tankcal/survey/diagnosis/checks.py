@@ -1,10 +1,11 @@
 """What was kept apart and is only compared: check readings, check points, control not acting."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
-from tankcal.survey.network import ImagePoints
 from tankcal.survey.network.quality import compare_left_out
 from tankcal.survey.observations import ImageCoordinates
 from tankcal.survey.results import CheckPoints, Reading
@@ -16,15 +17,13 @@ LISTED = 10  # check points that are told
 def check_readings(adjusted, checks, cov_scale):
     """Reading rows (check=True) of observations that were left out of the adjustment.
 
-    checks  pairs (observations or ImagePoints, Trace)
+    checks  Observations
     """
     found = []
-    for one, trace in checks:
-        parts = [(one, np.arange(len(one.value)))] if not isinstance(one, ImagePoints) else []
-        if isinstance(one, ImagePoints):
-            parts = _image_parts(adjusted, one)
-        for part, rows in parts:
-            found += _rows(adjusted, part, rows, trace, cov_scale)
+    for one in checks:
+        parts = _by_form(adjusted, one) if isinstance(one, ImageCoordinates) else [one]
+        for part in parts:
+            found += _rows(adjusted, part, cov_scale)
     return found
 
 
@@ -56,45 +55,34 @@ def find_disagreeing_checks(found, table):
     return problems[:LISTED]
 
 
-def _rows(adjusted, one, rows, trace, cov_scale):
+def _rows(adjusted, one, cov_scale):
     ties = [np.asarray(getattr(one, name)) for name in one.ties]
     there = np.isfinite(adjusted.xyz_m[np.array(ties)]).all(axis=(0, 2))
-    one, rows = (one, rows) if there.all() else (one.taken(there), rows[there])
+    one = one.taken(there)
     if not len(one):
         return []
     result = compare_left_out(adjusted, one)
     sd = np.reshape(one.sd, result.difference.shape)
     spread = np.sqrt(sd**2 + cov_scale * np.maximum(result.sd**2 - sd**2, 0.0))
     value = np.reshape(one.value, sd.shape)
-    nan = float("nan")
+    trace, nan = one.trace, float("nan")
     return [
         Reading(
-            one.kind, trace.ids[row], name, trace.file, trace.rows[row], 1, one.unit,
+            one.kind, trace.ids[i], name, trace.file, trace.rows[i], 1, one.unit,
             float(value[i, k]), float(result.difference[i, k]), float(sd[i, k]), 1.0,
             float(result.difference[i, k] / spread[i, k]), nan, nan, nan, False, True,
         )
-        for i, row in enumerate(rows.tolist())
-        for k, name in enumerate(trace.element[row])
+        for i in range(len(one))
+        for k, name in enumerate(trace.element[i])
     ]  # fmt: skip
 
 
-def _image_parts(adjusted, images):
-    """ImageCoordinates with the number of each one's row, for each form of camera."""
-    survey, table = adjusted.survey, adjusted.problem.interior_of
-    camera = survey.photos.camera[images.photo]
-    for form in {one.form for one in survey.cameras}:
-        mine = [i for i, one in enumerate(survey.cameras) if one.form == form]
-        rows = np.flatnonzero(np.isin(camera, mine))
-        if len(rows):
-            spare = adjusted.problem.layout.interior.size - 1
-            active = np.flatnonzero((table < spare).any(axis=0))
-            yield (
-                ImageCoordinates(
-                    images.xy_mm[rows], images.sd_mm[rows], images.point[rows],
-                    images.photo[rows], form, active, table,
-                ),
-                rows,
-            )  # fmt: skip
+def _by_form(adjusted, images):
+    """ImageCoordinates of each form of camera, as the solver has them."""
+    table, spare = adjusted.problem.interior_of, adjusted.problem.layout.interior.size - 1
+    active = np.flatnonzero((table < spare).any(axis=0))
+    for form, rows in adjusted.survey.by_form(images):
+        yield replace(images.taken(rows), form=form, active=active, interior_of=table)
 
 
 def check_points(adjusted, measurements, known, acting, cov_scale):

@@ -17,8 +17,8 @@ from scipy.special import betainc
 from tankcal.errors import Problem
 from tankcal.messages import join_with_or, list_some, message
 from tankcal.survey.diagnosis.double_names import image_point_label
-from tankcal.survey.network.reactions import HELD
 from tankcal.survey.network.separability import alternatives
+from tankcal.survey.network.survey import IMAGES
 
 LEVEL = 0.001
 MANY = 0.12  # share of all values set aside, above which these are hardly single blunders
@@ -122,25 +122,25 @@ def _many(gone, total):
     return [Problem("job.toml", text, None, "adjustment.snooping")]
 
 
-def find_undecided_outliers(adjusted, removed, traces, held):
+def find_undecided_outliers(adjusted, removed, held, held_trace):
     """Problem rows of readings set aside in whose place others might have been.
 
-    removed  tuple of network.snooping.Removed, the worst first        traces  {source: Trace}
-    held     network.reactions.Reactions of held coordinates
+    removed     tuple of network.snooping.Removed, the worst first
+    held        network.reactions.Reactions of held coordinates        held_trace  their Trace
     """
     found = []
     for one in removed[:TESTED]:
         others = alternatives(adjusted, one.source, one.row, held)
         if others:
-            names = [_named(adjusted, traces, *other) for other in others]
+            names = [_named(adjusted, held_trace, *other) for other in others]
             text = message(
                 "undecided",
                 "{reading} was set aside, but the error may equally be in {others}: the "
                 "readings cannot decide",
-                reading=_named(adjusted, traces, one.source, one.row),
+                reading=_named(adjusted, held_trace, one.source, one.row),
                 others=_either(names),
             )
-            trace = traces[one.source]
+            trace = adjusted.survey.table(one.source).trace
             found.append(Problem(trace.file, text, trace.rows[one.row]))
     if len(found) > LISTED:
         text = message(
@@ -159,13 +159,14 @@ def _either(names):
     return join_with_or(names)
 
 
-def _named(adjusted, traces, source, row):
+def _named(adjusted, held_trace, source, row):
     """A reading in words."""
-    trace = traces[source]
+    one = adjusted.survey.table(source)
+    trace = held_trace if one is None else one.trace
     ids = trace.ids[row]
-    if source == "image points":
+    if source == IMAGES:
         return image_point_label(*ids)
-    kind = "control coordinate" if source == HELD else adjusted.survey.observations[source].kind
+    kind = "control coordinate" if one is None else one.kind
     of = trace.table.replace("_", " ") or kind.removesuffix(" of a further system")
     name, kind = (
         " ".join(filter(None, ["-".join(ids), trace.element[row][0]])),

@@ -9,7 +9,6 @@ _ROOM_OF = {
     "Adjusted": "results",
     "Camera": "survey",
     "Cleaned": "snooping",
-    "ImagePoints": "survey",
     "Instrument": "survey",
     "Photos": "survey",
     "Residuals": "reliability",

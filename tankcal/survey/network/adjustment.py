@@ -77,20 +77,18 @@ def _adjusted(survey, problem, datum, solved):
         raise SolutionError(text) from error
     if survey.photos is not None:
         refuse_worthless_cameras(survey, problem, solution)
-    chi2, dof = _scatter_of_repeats(survey, problem)
+    chi2, dof = _scatter_of_repeats(problem)
     solution = replace(solution, chi2=solution.chi2 + chi2, rows=solution.rows + dof)
     return Adjusted(survey, problem, solution)
 
 
-def _scatter_of_repeats(survey, problem):
+def _scatter_of_repeats(problem):
     """Chi-square of repeated readings about their means, and its degrees of freedom."""
     found = np.zeros(2)
-    for source, one, rows in zip(
-        problem.sources, problem.observations, problem.rows_of, strict=True
-    ):
-        if source in survey.repeated:
+    for one in problem.observations:
+        if one.trace is not None:
             use = np.ones(len(one)) if one.use is None else np.asarray(one.use) > 0
-            found += [use @ part[rows] for part in survey.repeated[source]]
+            found += [use @ part for part in one.trace.repeated]
     return float(found[0]), round(found[1])
 
 

@@ -8,7 +8,7 @@ from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver import Group, Model
 from tankcal.survey.network.blocks import CORRELATED, correlated_groups, is_in_block, relative
-from tankcal.survey.network.survey import FEWEST, SCOPES
+from tankcal.survey.network.survey import FEWEST, IMAGES, SCOPES
 from tankcal.survey.network.unknowns import (
     eliminated_points,
     in_words,
@@ -18,7 +18,6 @@ from tankcal.survey.network.unknowns import (
     told,
 )
 from tankcal.survey.observations import (
-    ImageCoordinates,
     KnownUnknowns,
     Layout,
     Sights,
@@ -110,7 +109,7 @@ def assemble(survey):
     layout, reduced = layout_of(survey, eliminated, used, interior_free, table)
     for one, rows in _image_groups(survey, used, layout, reduced, table):
         groups.append(one)
-        sources.append("image points")
+        sources.append(IMAGES)
         rows_of.append(rows)
     for one in known + _known_tools(survey):
         groups.append(one)
@@ -238,19 +237,6 @@ def _others(survey, used, centre):
     return groups, sources, rows_of, tuple(exact)
 
 
-def _taken(images, keep):
-    use = None if images.use is None else images.use[keep]
-    point, photo = images.point[keep], images.photo[keep]
-    return replace(
-        images,
-        point=point,
-        photo=photo,
-        xy_mm=images.xy_mm[keep],
-        sd_mm=images.sd_mm[keep],
-        use=use,
-    )
-
-
 def _centre(survey):
     """Middle of the start coordinates: where the adjustment puts its origin."""
     known = np.isfinite(survey.xyz_m).all(axis=1)
@@ -321,12 +307,9 @@ def _known_tools(survey):
 def _image_groups(survey, used, layout, reduced, table):
     """Image coordinates by form of camera, those of eliminated points first and point by point."""
     images = survey.image_points
-    if images is None or not len(images.point):
+    if images is None or not len(images):
         return
-    forms = {}
-    for number, camera in enumerate(survey.cameras):
-        forms.setdefault(camera.form, []).append(number)
-    if not (images.sd_mm > 0).all():
+    if not (images.sd > 0).all():
         raise SolutionError(
             message(
                 "image_coordinate_exact",
@@ -335,25 +318,16 @@ def _image_groups(survey, used, layout, reduced, table):
         )
     key = layout.points[images.point, 0]
     key = np.where(key < reduced, np.iinfo(np.int64).max, key)
-    for form, cameras in forms.items():
-        rows, left = slice(None), table
-        if len(forms) > 1:
-            rows = np.flatnonzero(np.isin(survey.photos.camera[images.photo], cameras))
-            left = table[np.isin(survey.photos.camera, cameras)]
-        order = np.arange(len(key))[rows]
+    for form, order in survey.by_form(images):
+        left = table[[survey.cameras[camera].form == form for camera in survey.photos.camera]]
         if not used.all():
             order = order[used[images.point[order]]]
         if (np.diff(key[order]) < 0).any():
             order = order[np.argsort(key[order], kind="stable")]
-        one = _taken(images, order)
         active = np.flatnonzero((left < layout.interior.size - 1).any(axis=0))
         active = active[(layout.interior[left[:, active]] >= 0).any(axis=0)]
-        yield (
-            ImageCoordinates(
-                one.xy_mm, one.sd_mm, one.point, one.photo, form, active, table, use=one.use
-            ),
-            order,
-        )
+        one = replace(images.taken(order), form=form, active=active, interior_of=table)
+        yield one, order
 
 
 def _state(survey, centre, values):

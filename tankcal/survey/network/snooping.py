@@ -15,6 +15,7 @@ from tankcal.adjust import snoop as search
 from tankcal.errors import SolutionError
 from tankcal.survey.network.adjustment import adjust
 from tankcal.survey.network.reliability import tau_limit
+from tankcal.survey.network.survey import IMAGES
 
 HUBER_ROUNDS, ROUNDS = 5, 25
 HUBER, DANISH = 2.0, 3.0
@@ -134,13 +135,9 @@ def set_use(survey, uses):
         for number, one in enumerate(survey.observations)
     ]
     images = survey.image_points
-    if "image points" in uses:
-        images = replace(images, use=uses["image points"])
+    if IMAGES in uses:
+        images = images.using(uses[IMAGES])
     return replace(survey, observations=tuple(observations), image_points=images)
-
-
-def _rows_of(survey, source):
-    return survey.image_points if source == "image points" else survey.observations[source]
 
 
 def _tables(adjusted):
@@ -173,13 +170,14 @@ class _Candidates:
     """The observations of a Survey in one row, those of one source after those of another."""
 
     def __init__(self, survey):
-        counts = {number: len(one) for number, one in enumerate(survey.observations)}
+        tables = dict(enumerate(survey.observations))
         if survey.image_points is not None:
-            counts["image points"] = len(survey.image_points.point)
+            tables[IMAGES] = survey.image_points
+        counts = {source: len(one) for source, one in tables.items()}
         ends = np.cumsum([0, *counts.values()]).tolist()
         self.count = ends[-1]
         self.slices = dict(zip(counts, map(slice, ends, ends[1:]), strict=False))
-        self.kinds = {number: one.kind for number, one in enumerate(survey.observations)}
+        self.kinds = {source: one.kind for source, one in tables.items()}
 
     def places(self, table):
         """(n,) places of the rows of Residuals."""
@@ -197,7 +195,7 @@ class _Candidates:
         """(k,) with which each takes part."""
         share = np.ones(self.count)
         for source, mine in self.slices.items():
-            use = _rows_of(survey, source).use
+            use = survey.table(source).use
             if use is not None:
                 share[mine] = use
         return share
@@ -211,9 +209,8 @@ class _Candidates:
         survey = adjusted.survey
         n, tied = len(survey.points), []
         for table in _tables(adjusted):
-            of = _rows_of(survey, table.source)
-            ties = ("point",) if of is survey.image_points else of.ties
-            owners = [np.asarray(getattr(of, name))[table.rows] for name in ties]
+            of = survey.table(table.source)
+            owners = [np.asarray(getattr(of, name))[table.rows] for name in of.ties]
             tied.append((self.places(table), owners))
         counts = sum(
             (np.bincount(one, minlength=n) for _, owners in tied for one in owners), np.zeros(n)
@@ -235,7 +232,7 @@ class _Candidates:
         """Removed for each of `which`, the worst first."""
         w = np.where(np.isnan(statistic), 0.0, statistic)
         found = [
-            Removed(self.kinds.get(source, "image coordinate"), source, int(i), float(w[mine][i]))
+            Removed(self.kinds[source], source, int(i), float(w[mine][i]))
             for source, mine in self.slices.items()
             for i in np.flatnonzero(which[mine])
         ]

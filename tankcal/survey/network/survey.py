@@ -6,6 +6,7 @@ import numpy as np
 
 from tankcal.camera.model import PARAMETERS, Form
 
+IMAGES = "image points"  # source of the image coordinates
 SCOPES = ("off", "block", "camera", "photo")
 FEWEST = 3  # values that speak of a point that can be determined
 STATES = ("free", "weighted", "fixed")
@@ -51,22 +52,6 @@ class Photos:
 
 
 @dataclass(frozen=True)
-class ImagePoints:
-    """Measured image coordinates.
-
-    point, photo  (n,)
-    xy_mm, sd_mm  (n, 2)
-    use           (n,) 1, or 0 when set aside; None: all are used
-    """
-
-    point: np.ndarray
-    photo: np.ndarray
-    xy_mm: np.ndarray
-    sd_mm: np.ndarray
-    use: np.ndarray = None
-
-
-@dataclass(frozen=True)
 class Instrument:
     """An instrument whose readings are (1 + scale) true + offset.
 
@@ -98,10 +83,13 @@ class System:
 class Survey:
     """Everything that goes into one adjustment. Coordinates are in the survey's frame.
 
+    The scatter of the readings that were averaged into an observation (its Trace) counts in sigma0
+    and in the redundancy as if they had been adjusted one by one.
+
     points        names
     xyz_m         (points, 3) start values
     fixed         (points, 3) True: not adjusted; None: nothing is
-    image_points  ImagePoints or None
+    image_points  ImageCoordinates of all cameras, or None
     photos        Photos or None
     cameras       tuple of Camera
     observations  tuple of tankcal.survey.observations (with coordinates in the survey's frame)
@@ -110,15 +98,12 @@ class Survey:
     systems       tuple of System
     correlated    tuple of tankcal.survey.observations.Block: values of the observations (none of
                   them held exactly) that are correlated; no value stands in two
-    repeated      {source: (chi-square (n,), degrees of freedom (n,))}: scatter of the readings that
-                  were averaged into each observation; it counts in sigma0 and in the redundancy as
-                  if they had been adjusted one by one. Sources as Residuals name them
     """
 
     points: tuple
     xyz_m: np.ndarray
     fixed: np.ndarray = None
-    image_points: ImagePoints = None
+    image_points: object = None
     photos: Photos = None
     cameras: tuple = ()
     observations: tuple = ()
@@ -126,15 +111,25 @@ class Survey:
     instruments: tuple = ()
     systems: tuple = ()
     correlated: tuple = ()
-    repeated: dict = field(default_factory=dict)
+
+    def table(self, source):
+        """The observations of a source as Residuals name it; None: they are not in the survey."""
+        if source == IMAGES:
+            return self.image_points
+        return None if isinstance(source, str) else self.observations[source]
+
+    def by_form(self, images):
+        """Pairs (Form, rows (k,)) of image coordinates (n,) whose cameras have one form."""
+        forms = {}
+        for number, camera in enumerate(self.cameras):
+            forms.setdefault(camera.form, []).append(number)
+        camera = self.photos.camera[images.photo]
+        return [(form, np.flatnonzero(np.isin(camera, mine))) for form, mine in forms.items()]
 
     def values_of_points(self):
         """(points,) how many values, fixed coordinates among them, speak of each point."""
         count, images = np.zeros(len(self.points), dtype=int), self.image_points
-        if images is not None:
-            seen = images.point if images.use is None else images.point[images.use > 0]
-            count += 2 * np.bincount(seen, minlength=len(count))
-        for one in self.observations:
+        for one in self.observations if images is None else (images, *self.observations):
             for name in one.ties:
                 point = getattr(one, name)
                 point = point if one.use is None else point[one.use > 0]
@@ -176,7 +171,7 @@ class Survey:
         )
         images = self.image_points
         if images is not None:
-            images = replace(images, sd_mm=images.sd_mm * factors.get("image points", 1.0))
+            images = replace(images, sd=images.sd * factors.get(IMAGES, 1.0))
         blocks = tuple(
             replace(one, covariance=one.covariance * np.outer(size, size))
             for one in self.correlated

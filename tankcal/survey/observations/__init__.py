@@ -25,6 +25,7 @@ from tankcal.survey.observations.sights import (
     Sights,
     VerticalAngles,
 )
+from tankcal.survey.observations.trace import Source, Trace
 
 __all__ = [
     "KINDS",
@@ -46,8 +47,10 @@ __all__ = [
     "PhotoRotation",
     "PlumbLines",
     "Sights",
+    "Source",
     "State",
     "SystemCoordinates",
+    "Trace",
     "Vectors",
     "VerticalAngles",
     "exact_rows",

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from tankcal.geometry.rotations import apply_small_rotation
+from tankcal.survey.observations.trace import Trace
 
 
 @dataclass(frozen=True)
@@ -106,11 +107,14 @@ class Observations:
         Like value, standard deviations.
     use : ndarray, shape (n,)
         Share with which each takes part: 1, 0 when set aside, between for robust starts.
+    trace : Trace
+        Which readings they were made of; None: of none that a user gave.
     """
 
     value: np.ndarray
     sd: np.ndarray
     use: np.ndarray = field(default=None, kw_only=True)
+    trace: Trace = field(default=None, kw_only=True, repr=False)
 
     kind = "observation"
     unit = "m"
@@ -138,6 +142,8 @@ class Observations:
             and name in self.__dataclass_fields__
             and name not in self.shared
         }
+        if self.trace is not None:
+            parts["trace"] = self.trace.taken(keep)
         return replace(self, **parts)
 
     def using(self, use):

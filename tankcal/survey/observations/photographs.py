@@ -18,24 +18,30 @@ from tankcal.survey.observations.base import Observations
 
 @dataclass(frozen=True)
 class ImageCoordinates(Observations):
-    """Measured image coordinates (n, 2) in mm, of cameras with one convention.
+    """Measured image coordinates (n, 2), mm: what a photo shows of a point.
+
+    With (u, v, w) = R (X - X0) the ideal image is (-c u / w, -c v / w); the distortion of the
+    camera moves it as its `form` says. A `Survey` has those of all cameras in one table; the solver
+    has one for each form of camera, with the interior parameters that take part.
 
     Attributes
     ----------
-    point, photo : ndarray, shape (n,)
-    form
-        Form of the distortion (tankcal.camera.model).
-    active : ndarray, shape (k,)
+    value, sd : ndarray, shape (n, 2)
+        x to the right and y up from the middle of the format, mm.
+    point, photo : ndarray of int, shape (n,)
+    form : tankcal.camera.model.Form
+        Of the distortion; None: not told apart yet.
+    active : ndarray of int, shape (k,)
         Places in PARAMETERS of the parameters that are not left out.
-    interior_of : ndarray, shape (photos, 13)
+    interior_of : ndarray of int, shape (photos, 13)
         Place of each photo's parameters in State.interior.
     """
 
     point: np.ndarray
     photo: np.ndarray
-    form: object
-    active: np.ndarray
-    interior_of: np.ndarray
+    form: object = None
+    active: np.ndarray = None
+    interior_of: np.ndarray = None
 
     kind, unit, rows, ties = "image coordinate", "mm", 2, ("point",)
     feels_datum, shared = False, ("active", "interior_of")

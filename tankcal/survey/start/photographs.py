@@ -52,7 +52,7 @@ def sights_of(survey):
     found = []
     for number, camera in enumerate(photos.camera):
         mine, setup = used[cuts[number] : cuts[number + 1]], survey.cameras[camera]
-        ideal = correct_image_points(images.xy_mm[mine], setup.values, setup.form) / setup.values[0]
+        ideal = correct_image_points(images.value[mine], setup.values, setup.form) / setup.values[0]
         found.append(Sight(images.point[mine], ideal))
     return tuple(found)
 
