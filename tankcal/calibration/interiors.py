@@ -87,7 +87,7 @@ def _interior(adjustment, setups, number, photos, part, others):
     size = _of(setup, "format_mm")
     common = others and any(scope == "block" for scope in camera.scope)
     images = adjusted.survey.image_points
-    mine = np.isin(images.photo, photos) & (True if images.use is None else images.use > 0)
+    mine = np.isin(images.photo, photos) & images.in_use
     seen = images.value[mine]
     half = np.abs(seen).max(axis=0, initial=0.0) if size is None else np.asarray(size) / 2
     return Interior(

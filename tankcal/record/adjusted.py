@@ -181,8 +181,7 @@ def _rays(adjustment):
     images = survey.image_points
     if images is None:
         return {}
-    kept = images.point if images.use is None else images.point[np.asarray(images.use) > 0]
-    counts = np.bincount(kept, minlength=len(survey.points)).tolist()
+    counts = np.bincount(images.point[images.in_use], minlength=len(survey.points)).tolist()
     return dict(zip(survey.points, counts, strict=True))
 
 

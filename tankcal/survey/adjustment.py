@@ -121,8 +121,7 @@ def _why_not(measurements, message):
 
 
 def _count(survey):
-    images = 0 if survey.image_points is None else 2 * len(survey.image_points)
-    return images + sum(len(one) * one.rows for one in survey.observations)
+    return sum(len(one) * one.rows for one in survey.tables.values())
 
 
 def _complete(search, gathered, frame, measurements):

@@ -91,7 +91,7 @@ def release_control(survey, gathered):
     gone = [
         number
         for number, one in enumerate(survey.observations)
-        if isinstance(one, ControlCoordinates) or not (one.use is None or one.use.any())
+        if isinstance(one, ControlCoordinates) or not one.in_use.any()
     ]
     return replace(survey.without(gone), fixed=gathered.idle)
 

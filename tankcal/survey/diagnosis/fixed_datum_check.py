@@ -87,7 +87,7 @@ class _Release:
             if isinstance(one, ControlCoordinates) and (one.sd == RELEASED_M).any()
         )
         self.doubted = one.sd == RELEASED_M
-        self.gone = np.zeros(len(one), dtype=bool) if one.use is None else one.use == 0
+        self.gone = ~one.in_use
         self.xyz_m, sd = trial.xyz_m, np.where(self.doubted, 0.0, one.sd)
         self.control = replace(one, sd=sd, use=np.where(self.doubted | ~self.gone, 1.0, 0.0))
         self.limit = CRITICAL**2 * max(1.0, np.nan_to_num(trial.sigma0) ** 2)

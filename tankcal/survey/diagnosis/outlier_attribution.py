@@ -180,8 +180,4 @@ def _named(adjusted, held_trace, source, row):
 
 def count_set_aside(survey):
     """Number of values that the survey of an adjustment leaves out."""
-    images = survey.image_points
-    count = 0 if images is None or images.use is None else 2 * int(np.sum(images.use == 0))
-    return count + sum(
-        one.rows * int(np.sum(one.use == 0)) for one in survey.observations if one.use is not None
-    )
+    return sum(one.rows * int(np.sum(~one.in_use)) for one in survey.tables.values())

@@ -5,7 +5,7 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.messages import join_with_and, list_some, message
 from tankcal.survey.network.assembly import one_ray_sentence
-from tankcal.survey.observations import ControlCoordinates, SystemCoordinates
+from tankcal.survey.observations import ControlCoordinates
 
 SHOWN = 5  # points in a sentence
 
@@ -85,7 +85,7 @@ def _counts(survey):
             plan += count * (0 in one.axes)
             height += count * (2 in one.axes)
             rows += count
-            measured |= (count > 0) & (not isinstance(one, SystemCoordinates))
+            measured |= (count > 0) & one.of_survey
     return plan, height, rows, rays, measured
 
 

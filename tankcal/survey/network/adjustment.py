@@ -87,8 +87,7 @@ def _scatter_of_repeats(problem):
     found = np.zeros(2)
     for one in problem.observations:
         if one.trace is not None:
-            use = np.ones(len(one)) if one.use is None else np.asarray(one.use) > 0
-            found += [use @ part for part in one.trace.repeated]
+            found += [one.in_use @ part for part in one.trace.repeated]
     return float(found[0]), round(found[1])
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver import Group, Model
-from tankcal.survey.network.blocks import CORRELATED, correlated_groups, is_in_block, relative
+from tankcal.survey.network.blocks import CORRELATED, correlated_groups, is_in_block
 from tankcal.survey.network.survey import FEWEST, IMAGES, SCOPES
 from tankcal.survey.network.unknowns import (
     eliminated_points,
@@ -20,10 +20,7 @@ from tankcal.survey.network.unknowns import (
 from tankcal.survey.observations import (
     KnownUnknowns,
     Layout,
-    Sights,
     State,
-    exact_rows,
-    make_conditions,
 )
 
 
@@ -90,7 +87,7 @@ class Problem:
 
     def relative(self, observations):
         """Observations in the survey's frame, as the model has them."""
-        return relative(observations, self.centre_m)
+        return observations.relative(self.centre_m)
 
 
 def assemble(survey):
@@ -145,17 +142,16 @@ def assemble(survey):
 def _refuse_coincident(survey, groups, state):
     """Raise when a sight starts with both its ends at one place: it has no derivatives there."""
     for one in groups:
-        if isinstance(one, Sights):
-            bad = np.flatnonzero(one.without_length(state))
-            if len(bad):
-                raise SolutionError(
-                    message(
-                        "ends_coincide",
-                        "both ends of {observation} have the same approximate place: the "
-                        "points have too few observations, or one point has two names",
-                        observation=told(survey, one, bad[0]),
-                    )
+        bad = np.flatnonzero(one.without_derivatives(state))
+        if len(bad):
+            raise SolutionError(
+                message(
+                    "ends_coincide",
+                    "both ends of {observation} have the same approximate place: the "
+                    "points have too few observations, or one point has two names",
+                    observation=told(survey, one, bad[0]),
                 )
+            )
 
 
 def _groups(observations, layout):
@@ -172,7 +168,7 @@ def _set_aside(survey):
         return ("",) * len(bad)
     rays = np.zeros(len(bad), dtype=int)
     if images is not None:
-        seen = images.point if images.use is None else images.point[images.use > 0]
+        seen = images.point[images.in_use]
         rays += np.bincount(seen, minlength=len(bad))
     names = zip(survey.points, rays.tolist(), bad, strict=True)
     return tuple(_poor(name, count) if is_bad else "" for name, count, is_bad in names)
@@ -192,7 +188,7 @@ def one_ray_sentence(name):
 def _refuse_poor_photos(survey):
     """Raise when a photo has fewer observations than unknowns."""
     images, photos = survey.image_points, survey.photos
-    seen = images.photo if images.use is None else images.photo[images.use > 0]
+    seen = images.photo[images.in_use]
     rays = np.bincount(seen, minlength=len(photos.names))
     count = 2 * rays
     for one in survey.observations:
@@ -223,15 +219,15 @@ def _others(survey, used, centre):
         keep = np.ones(len(one), dtype=bool)
         for name in one.ties:
             keep &= used[getattr(one, name)]
-        holds = exact_rows(one)
-        sharp = np.flatnonzero(keep & holds & (True if one.use is None else one.use > 0))
+        holds = one.exact
+        sharp = np.flatnonzero(keep & holds & one.in_use)
         if len(sharp):
-            taken = relative(one.taken(sharp), centre)
-            exact.append(Held(taken, *make_conditions(taken), number, sharp))
+            taken = one.taken(sharp).relative(centre)
+            exact.append(Held(taken, *taken.conditions(), number, sharp))
             if holds.all():
                 continue
         rows = np.flatnonzero(keep & ~holds & ~is_in_block(survey, number))
-        groups.append(relative(one if len(rows) == len(one) else one.taken(rows), centre))
+        groups.append((one if len(rows) == len(one) else one.taken(rows)).relative(centre))
         sources.append(number)
         rows_of.append(rows)
     return groups, sources, rows_of, tuple(exact)

@@ -20,7 +20,7 @@ from tankcal.adjust import ALPHA
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.solver.effects import responses
-from tankcal.survey.observations import ControlCoordinates, Correlated, Layout, PhotoOrientation
+from tankcal.survey.observations import Correlated, Layout
 
 CORRELATED = "correlated"  # source of their groups; their residuals stand under their own tables
 UNCONTROLLED = 1e-6
@@ -40,15 +40,6 @@ class Members:
     share: np.ndarray
     covariance: np.ndarray
     block: Correlated
-
-
-def relative(one, centre):
-    """An observation of coordinates, relative to the centre."""
-    if isinstance(one, ControlCoordinates):
-        return replace(one, value=one.value - centre[one.axis])
-    if isinstance(one, PhotoOrientation):
-        return replace(one, value=one.value - np.append(centre, np.zeros(3))[one.element])
-    return one
 
 
 def is_in_block(survey, number):
@@ -100,7 +91,7 @@ def _made(survey, centre, all_of, source, row, component, covariance):
     parts = []
     for mine in np.split(np.arange(len(source)), cuts):
         one = survey.observations[source[mine[0]]]
-        parts.append((relative(replace(one, use=None).taken(row[mine]), centre), component[mine]))
+        parts.append((replace(one, use=None).taken(row[mine]).relative(centre), component[mine]))
     zero = np.zeros((1, len(source)))
     try:
         return Correlated(zero, zero + 1, tuple(parts), covariance, all_of)

@@ -22,7 +22,6 @@ from scipy.special import chdtri, ndtri, stdtrit
 from tankcal.adjust import ALPHA, POWER
 from tankcal.solver.effects import constraint_reactions, own_leverage, own_responses, responses
 from tankcal.survey.network.blocks import test_values
-from tankcal.survey.observations import lever
 
 EXACTLY = 1e9  # products: up to here effects are worked out for all points, in about 0.2 s
 UNCONTROLLED = 1e-6  # a redundancy number below it is zero: the observation cannot be checked
@@ -233,7 +232,7 @@ def _of_exact(problem, solution, delta0):
     k, sd, changes = constraint_reactions(solution.cofactor)
     points = np.unique(problem.layout.points)
     moves = np.abs(changes[points[points >= 0]]).max(axis=0, initial=0.0)
-    levers = [lever(held.conditions, solution.unknowns).ravel() for held in problem.exact]
+    levers = [held.conditions.lever(solution.unknowns).ravel() for held in problem.exact]
     levers = np.concatenate(levers)
     moves, k, sd = moves * levers, k * levers, sd * levers
     tested, first = sd > 0, 0

@@ -170,9 +170,7 @@ class _Candidates:
     """The observations of a Survey in one row, those of one source after those of another."""
 
     def __init__(self, survey):
-        tables = dict(enumerate(survey.observations))
-        if survey.image_points is not None:
-            tables[IMAGES] = survey.image_points
+        tables = survey.tables
         counts = {source: len(one) for source, one in tables.items()}
         ends = np.cumsum([0, *counts.values()]).tolist()
         self.count = ends[-1]

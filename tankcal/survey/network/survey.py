@@ -112,11 +112,15 @@ class Survey:
     systems: tuple = ()
     correlated: tuple = ()
 
+    @property
+    def tables(self):
+        """{source: Observations} of everything that was observed, as Residuals name it."""
+        found = dict(enumerate(self.observations))
+        return found if self.image_points is None else found | {IMAGES: self.image_points}
+
     def table(self, source):
         """The observations of a source as Residuals name it; None: they are not in the survey."""
-        if source == IMAGES:
-            return self.image_points
-        return None if isinstance(source, str) else self.observations[source]
+        return self.tables.get(source)
 
     def by_form(self, images):
         """Pairs (Form, rows (k,)) of image coordinates (n,) whose cameras have one form."""
@@ -128,11 +132,10 @@ class Survey:
 
     def values_of_points(self):
         """(points,) how many values, fixed coordinates among them, speak of each point."""
-        count, images = np.zeros(len(self.points), dtype=int), self.image_points
-        for one in self.observations if images is None else (images, *self.observations):
+        count = np.zeros(len(self.points), dtype=int)
+        for one in self.tables.values():
             for name in one.ties:
-                point = getattr(one, name)
-                point = point if one.use is None else point[one.use > 0]
+                point = getattr(one, name)[one.in_use]
                 count += one.rows * np.bincount(point, minlength=len(count))
         return count if self.fixed is None else count + self.fixed.sum(axis=1)
 

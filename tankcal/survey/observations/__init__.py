@@ -10,9 +10,9 @@ from tankcal.survey.observations.coordinates import (
     Vectors,
 )
 from tankcal.survey.observations.correlated import Block, Correlated
-from tankcal.survey.observations.held import HeldOrientation, exact_rows, lever, make_conditions
 from tankcal.survey.observations.kinds import KINDS, Kind
 from tankcal.survey.observations.photographs import (
+    HeldOrientation,
     ImageCoordinates,
     PhotoOrientation,
     PhotoRotation,
@@ -53,7 +53,4 @@ __all__ = [
     "Trace",
     "Vectors",
     "VerticalAngles",
-    "exact_rows",
-    "lever",
-    "make_conditions",
 ]

@@ -10,7 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
+from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import apply_small_rotation
+from tankcal.messages import message
 from tankcal.survey.observations.trace import Trace
 
 
@@ -122,6 +124,9 @@ class Observations:
     feels_datum = True  # False: no motion or scale of the whole survey changes it
     ties = ()  # names of the fields that hold points
     axes = (0, 1, 2)  # of the points' coordinates that enter: x, y, z
+    places_points = False  # True: from one end that is known it tells where the other may be
+    knows_frame = False  # True: it has `off_frame(d)`, its misfits, m, of differences (n, 3)
+    of_survey = True  # False: it speaks of points in another frame, and measures none
     shared = ()  # names of the arrays that hold for the whole table; all others have n rows
 
     def __len__(self):
@@ -132,6 +137,42 @@ class Observations:
         """(n, m) what misclosures are multiplied by: root of `use`, over the sd."""
         weight = 1.0 / np.asarray(self.sd, dtype=float).reshape(len(self), self.rows)
         return weight if self.use is None else weight * np.sqrt(self.use)[:, None]
+
+    @property
+    def in_use(self):
+        """(n,) True for those that take part."""
+        return np.ones(len(self), dtype=bool) if self.use is None else np.asarray(self.use) > 0
+
+    @property
+    def exact(self):
+        """(n,) True for those that hold exactly: sd 0; SolutionError when only a part of one."""
+        zero = np.reshape(self.sd, (len(self), self.rows)) == 0
+        exact = zero.all(axis=1)
+        if (zero.any(axis=1) & ~exact).any():
+            raise SolutionError(
+                message(
+                    "exact_in_part",
+                    "{kind}: all its values hold exactly (sd 0) or none",
+                    kind=self.kind,
+                )
+            )
+        return exact
+
+    def conditions(self):
+        """Observations with sd 0, to be filled without an sd, and which each row is of (k,)."""
+        return replace(self, sd=np.ones(np.shape(self.value)), use=None), np.arange(len(self))
+
+    def lever(self, state):
+        """(n, m) change of a condition over that of its observation."""
+        return np.ones((len(self), self.rows))
+
+    def relative(self, centre):
+        """The same for coordinates that count from a centre (3,)."""
+        return self
+
+    def without_derivatives(self, state):
+        """(n,) True where no derivative exists: both ends of a sight are at one place."""
+        return np.zeros(len(self), dtype=bool)
 
     def taken(self, keep):
         """The observations `keep` (indices or a mask)."""

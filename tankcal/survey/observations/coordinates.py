@@ -32,6 +32,10 @@ class ControlCoordinates(Observations):
         computed = state.xyz_m[self.point, self.axis, None]
         return computed, np.eye(3)[self.axis][:, None, :] if derivatives else None
 
+    def relative(self, centre):
+        """Coordinates relative to a centre (3,)."""
+        return replace(self, value=self.value - centre[self.axis])
+
 
 @dataclass(frozen=True)
 class SystemCoordinates(Observations):
@@ -50,7 +54,7 @@ class SystemCoordinates(Observations):
     axis: np.ndarray
     system: np.ndarray
 
-    kind, ties = "control coordinate of a further system", ("point",)
+    kind, ties, of_survey = "control coordinate of a further system", ("point",), False
 
     def columns(self, layout):
         """Point (3), system (rotation 3, shift 3, scale)."""
@@ -89,7 +93,8 @@ class HeightDifferences(Observations):
     start: np.ndarray
     end: np.ndarray
 
-    kind, ties, axes = "height difference", ("start", "end"), (2,)
+    kind, ties, axes, places_points = "height difference", ("start", "end"), (2,), True
+    knows_frame = True
 
     def columns(self, layout):
         """z of end, z of start."""
@@ -100,6 +105,10 @@ class HeightDifferences(Observations):
         computed = state.xyz_m[self.end, 2:] - state.xyz_m[self.start, 2:]
         row = np.array([0.0, 0, 1, 0, 0, -1])
         return computed, np.tile(row, (len(self), 1, 1)) if derivatives else None
+
+    def off_frame(self, d):
+        """Misfits in metres, a list of (n,), of differences d (n, 3) of the ends."""
+        return [d[:, 2] - self.value]
 
 
 @dataclass(frozen=True)
@@ -117,7 +126,7 @@ class PlumbLines(Observations):
     start: np.ndarray
     end: np.ndarray
 
-    kind, rows, ties, axes = "plumb line", 2, ("start", "end"), (0, 1)
+    kind, rows, ties, axes, knows_frame = "plumb line", 2, ("start", "end"), (0, 1), True
 
     def columns(self, layout):
         """Point end (3), point start (3)."""
@@ -128,6 +137,10 @@ class PlumbLines(Observations):
         computed = state.xyz_m[self.end, :2] - state.xyz_m[self.start, :2]
         rows = np.hstack([np.eye(2, 3), -np.eye(2, 3)])
         return computed, np.tile(rows, (len(self), 1, 1)) if derivatives else None
+
+    def off_frame(self, d):
+        """Misfits in metres, a list of (n,), of differences d (n, 3) of the ends."""
+        return [d[:, 0], d[:, 1]]
 
     def undisturbed(self, state):
         """Plumb: an oblique pair would pretend to know the rotation about the vertical."""
@@ -150,7 +163,7 @@ class Vectors(Observations):
     start: np.ndarray
     end: np.ndarray
 
-    kind, rows, ties = "vector", 3, ("start", "end")
+    kind, rows, ties, places_points = "vector", 3, ("start", "end"), True
 
     def columns(self, layout):
         """Point end (3), point start (3)."""

@@ -1,6 +1,16 @@
-"""What photographs observe: image coordinates, and the exterior orientation known beforehand."""
+"""What photographs observe: image coordinates, and the exterior orientation known beforehand.
 
-from dataclasses import dataclass
+Elements of the orientation with an sd of zero hold exactly. Their rows are not divided by an sd;
+single angles are written so that they stay sound up to phi = 90 deg. With the rotation
+R = R3(kappa) R2(phi) R1(omega), rows counted from 0,
+
+    omega0     -R21 cos(omega0) - R22 sin(omega0) = cos(phi) sin(omega - omega0) = 0
+    kappa0     -R10 cos(kappa0) - R00 sin(kappa0) = cos(phi) sin(kappa - kappa0) = 0
+    phi0       phi - phi0 = 0, at +-90 deg  R00 = R10 = 0
+    all three  rotation vector from R0 = 0 (tests of the three are then about the camera's axes)
+"""
+
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,10 +20,14 @@ from tankcal.geometry.rotations import (
     angle_axes,
     angle_derivatives,
     angles_of,
+    rotation_of_angles,
     rotation_vector,
     vector_derivatives,
 )
 from tankcal.survey.observations.base import Observations
+
+UPRIGHT = 1e-6  # rad from 90 deg: phi is then no angle any more but a direction
+OMEGA, PHI, KAPPA, ACROSS, ALONG, VECTOR = 3, 4, 5, 6, 7, 8  # rows of HeldOrientation
 
 
 @dataclass(frozen=True)
@@ -113,6 +127,14 @@ class PhotoOrientation(Observations):
         found[angle] = np.angle(np.exp(1j * found[angle]))
         return found
 
+    def relative(self, centre):
+        """Projection centres relative to a centre (3,)."""
+        return replace(self, value=self.value - np.append(centre, np.zeros(3))[self.element])
+
+    def conditions(self):
+        """Elements that hold exactly, see above."""
+        return _held_elements(self)
+
 
 @dataclass(frozen=True)
 class PhotoRotation(Observations):
@@ -165,3 +187,98 @@ class PhotoRotation(Observations):
         w[:] = np.einsum("nij,nj->ni", self.whitener, away)
         if len(jac):
             jac[:] = self.whitener @ derivatives
+
+    def conditions(self):
+        """Rotations that hold exactly: three rows of each."""
+        n = len(self)
+        row = np.tile(VECTOR + np.arange(3), n)
+        rotation, photo = np.repeat(self.rotation, 3, axis=0), np.repeat(self.photo, 3)
+        return _held(np.zeros(3 * n), photo, row, rotation), np.repeat(np.arange(n), 3)
+
+
+@dataclass(frozen=True)
+class HeldOrientation(Observations):
+    """Elements of the exterior orientation that hold exactly; value in m (relative) or rad.
+
+    Attributes
+    ----------
+    photo : ndarray, shape (n,)
+    row : ndarray, shape (n,)
+        0 1 2 for x, y, z, 3 4 5 for omega, phi, kappa, 6 7 for phi at +-90 deg, 8 9 10 for the
+        rotation vector from `rotation`.
+    rotation : ndarray, shape (n, 3, 3)
+        Known, of rows 8 to 10.
+    """
+
+    photo: np.ndarray
+    row: np.ndarray
+    rotation: np.ndarray
+
+    kind, unit = "exterior orientation", "m or rad"
+
+    def columns(self, layout):
+        """Photo (6)."""
+        return layout.photos[self.photo]
+
+    def computed(self, state, derivatives):
+        """Misclosures (n, 1) of the rows, plus their values."""
+        r, value = state.rotation[self.photo], np.asarray(self.value, dtype=float)
+        off, jac = np.zeros(len(self)), np.zeros((len(self), 1, 6))
+        place = np.flatnonzero(self.row < 3)
+        off[place] = state.photo_xyz_m[self.photo[place], self.row[place]] - value[place]
+        jac[place, 0, self.row[place]] = 1.0
+        for row, (i, a), (j, b) in ((OMEGA, (2, 1), (2, 2)), (KAPPA, (1, 0), (0, 0))):
+            here = np.flatnonzero(self.row == row)
+            first, by_first = _element(r[here], i, a)
+            second, by_second = _element(r[here], j, b)
+            cos, sin = np.cos(value[here]), np.sin(value[here])
+            off[here] = -first * cos - second * sin
+            jac[here, 0, 3:] = -by_first * cos[:, None] - by_second * sin[:, None]
+        here = np.flatnonzero(self.row == PHI)
+        off[here] = angles_of(r[here])[:, 1] - value[here]
+        jac[here, 0, 3:] = angle_derivatives(r[here])[:, 1]
+        for row, i in ((ACROSS, 0), (ALONG, 1)):
+            here = np.flatnonzero(self.row == row)
+            off[here], jac[here, 0, 3:] = _element(r[here], i, 0)
+        here = np.flatnonzero(self.row >= VECTOR)
+        away = rotation_vector(r[here] @ self.rotation[here].transpose(0, 2, 1))
+        which = self.row[here] - VECTOR
+        off[here] = away[np.arange(len(here)), which]
+        jac[here, 0, 3:] = vector_derivatives(away)[np.arange(len(here)), which]
+        return (off + value)[:, None], jac if derivatives else None
+
+    def lever(self, state):
+        """cos(phi) for omega and kappa, else 1."""
+        found = super().lever(state)
+        turning = (self.row == OMEGA) | (self.row == KAPPA)
+        phi = angles_of(state.rotation[self.photo[turning]])[:, 1]
+        found[turning] = np.cos(phi)[:, None]
+        return found
+
+
+def _element(rotation, i, j):
+    """Element (n,) of rotation matrices, and its derivatives (n, 3) by a small rotation d x R."""
+    value, by = rotation[:, i, j], np.zeros((len(rotation), 3))
+    k, l = (i + 1) % 3, (i + 2) % 3
+    by[:, k], by[:, l] = rotation[:, l, j], -rotation[:, k, j]
+    return value, by
+
+
+def _held(value, photo, row, rotation):
+    return HeldOrientation(value, np.ones(len(value)), photo=photo, row=row, rotation=rotation)
+
+
+def _held_elements(one):
+    value, row = np.array(one.value, dtype=float), np.array(one.element)
+    rotation = np.tile(np.eye(3), (len(one), 1, 1))
+    for photo in np.unique(one.photo):
+        mine = np.flatnonzero((one.photo == photo) & (row > 2))
+        if len(mine) == 3 and len(np.unique(row[mine])) == 3:
+            rotation[mine] = rotation_of_angles(*value[mine[np.argsort(row[mine])]])
+            row[mine], value[mine] = row[mine] + VECTOR - OMEGA, 0.0
+    numbers = np.arange(len(one))
+    upright = np.flatnonzero((row == PHI) & (np.abs(np.abs(value) - np.pi / 2) < UPRIGHT))
+    value[upright], row[upright] = 0.0, ACROSS
+    numbers = np.concatenate([numbers, upright])
+    row = np.concatenate([row, np.full(len(upright), ALONG)])
+    return _held(value[numbers], one.photo[numbers], row, rotation[numbers]), numbers

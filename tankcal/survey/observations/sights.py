@@ -31,7 +31,7 @@ class Sights(Observations):
     end: np.ndarray
     rise_m: np.ndarray = field(default=None, kw_only=True)
 
-    ties = ("end", "start")
+    ties, places_points = ("end", "start"), True
 
     def columns(self, layout):
         """Point end (3), point start (3)."""
@@ -43,10 +43,6 @@ class Sights(Observations):
         if self.rise_m is not None:
             d[2] -= self.rise_m
         return d
-
-    def without_length(self, state):
-        """(n,) True where both ends are at one place, so that no derivative exists."""
-        raise NotImplementedError
 
     @staticmethod
     def of_ends(derivative):
@@ -88,7 +84,7 @@ class Distances(Sights):
         scale, offset = (np.append(c, -1)[self.instrument] for c in (layout.scale, layout.offset))
         return np.hstack([super().columns(layout), scale[:, None], offset[:, None]])
 
-    def without_length(self, state):
+    def without_derivatives(self, state):
         """(n,) True where both ends are at one place; in plan, if the distance is horizontal."""
         x, y, z = self.line(state)
         return (x == 0) & (y == 0) & (self.horizontal | (z == 0))
@@ -111,7 +107,7 @@ class Distances(Sights):
 class _Angles(Sights):
     unit = "rad"
 
-    def without_length(self, state):
+    def without_derivatives(self, state):
         """(n,) True where both ends are at one place in plan: no angle has derivatives there."""
         x, y, _ = self.line(state)
         return (x == 0) & (y == 0)
@@ -141,13 +137,18 @@ class Azimuths(_Angles):
         Points.
     """
 
-    kind, axes = "azimuth", (0, 1)
+    kind, axes, knows_frame = "azimuth", (0, 1), True
 
     def computed(self, state, derivatives):
         """The azimuths (n, 1)."""
         x, y, _ = self.line(state)
         value, derivative = azimuth(x, y)
         return value[:, None], self.of_ends(derivative) if derivatives else None
+
+    def off_frame(self, d):
+        """Misfits in metres, a list of (n,), of differences d (n, 3) of the ends."""
+        away = np.hypot(d[:, 0], d[:, 1])
+        return [d[:, 0] - away * np.sin(self.value), d[:, 1] - away * np.cos(self.value)]
 
 
 @dataclass(frozen=True)
@@ -199,10 +200,10 @@ class HorizontalAngles(_Angles):
 
     kind, ties, axes = "horizontal angle", ("end", "start", "origin"), (0, 1)
 
-    def without_length(self, state):
+    def without_derivatives(self, state):
         """(n,) True where the station is, in plan, where one of its targets is."""
         back = state.xyz_m[self.origin, :2] == state.xyz_m[self.start, :2]
-        return super().without_length(state) | back.all(axis=1)
+        return super().without_derivatives(state) | back.all(axis=1)
 
     def columns(self, layout):
         """Point end (3), point start (3), point origin (3)."""

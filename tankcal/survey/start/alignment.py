@@ -11,12 +11,11 @@ from itertools import permutations, product
 import numpy as np
 
 from tankcal.geometry.rotations import apply_small_rotation
-from tankcal.survey.observations import Azimuths, HeightDifferences, PlumbLines
+from tankcal.survey.observations import HeightDifferences
 from tankcal.survey.start.pieces import Motion
 
 STEPS = 30
 FAR = 5.0  # largest step of the logarithm of the scale
-KNOWS = (PlumbLines, HeightDifferences, Azimuths)
 
 
 def align_piece(survey, piece, known, place_m):
@@ -60,7 +59,7 @@ class _Clues:
         self.size = max(piece.extent, 1e-9)
         self.which = np.nonzero(np.vstack([points, photos]))
         self.others = [_between(one, piece.known) for one in survey.observations
-                       if isinstance(one, KNOWS)]  # fmt: skip
+                       if one.knows_frame]  # fmt: skip
         told = np.where(np.vstack([points, photos]), self.told, np.nan)
         counts = np.isfinite(told).sum(axis=0)
         levelled = any(isinstance(one, HeightDifferences) and len(one) for one in self.others)
@@ -71,21 +70,12 @@ class _Clues:
         xyz = scale * self.places @ rotation.T + shift
         found = [(xyz - self.told)[self.which]]
         for one in self.others:
-            d = xyz[one.end] - xyz[one.start]
-            if isinstance(one, PlumbLines):
-                found += [d[:, 0], d[:, 1]]
-            elif isinstance(one, HeightDifferences):
-                found.append(d[:, 2] - one.value)
-            else:
-                s, c = np.sin(one.value), np.cos(one.value)
-                away = np.hypot(d[:, 0], d[:, 1])
-                found += [d[:, 0] - away * s, d[:, 1] - away * c]
+            found += one.off_frame(xyz[one.end] - xyz[one.start])
         return np.concatenate(found)
 
 
 def _between(one, known):
-    used = np.ones(len(one), dtype=bool) if one.use is None else one.use > 0
-    return one.taken(used & known[one.start] & known[one.end])
+    return one.taken(one.in_use & known[one.start] & known[one.end])
 
 
 def _settled(clues, rotation, shift):

@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
-from tankcal.survey.observations import HeightDifferences, Sights, Vectors
+from tankcal.survey.observations import Vectors
 from tankcal.survey.start.heights import add_heights
 from tankcal.survey.start.lateration import lay_out_networks
 from tankcal.survey.start.photographs import Wall, grow_by_photos, wall_of
@@ -41,8 +41,7 @@ class Clues:
     @property
     def silent(self):
         """True when nothing but photos (and coordinates) was observed."""
-        kinds = (Sights, HeightDifferences, Vectors)
-        return not any(isinstance(one, kinds) for one in self.survey.observations)
+        return not any(one.places_points for one in self.survey.observations)
 
 
 def grow_piece(clues, piece, least, free=False):
@@ -68,9 +67,8 @@ def _by_vectors(clues, piece, free):
     groups = [one for one in clues.survey.observations if isinstance(one, Vectors) and len(one)]
     if not groups:
         return piece
-    used = [np.ones(len(one), dtype=bool) if one.use is None else one.use > 0 for one in groups]
     start, end, value = (
-        np.concatenate([getattr(one, name)[use] for one, use in zip(groups, used, strict=True)])
+        np.concatenate([getattr(one, name)[one.in_use] for one in groups])
         for name in ("start", "end", "value")
     )
     xyz = piece.xyz_m.copy()

@@ -54,7 +54,7 @@ def _differences(survey, plan, xyz_m):
     parts = [(plan.low[good], plan.high[good], by_slope[good])]
     for one in survey.observations:
         if isinstance(one, HeightDifferences):
-            used = np.ones(len(one), dtype=bool) if one.use is None else one.use > 0
+            used = one.in_use
             parts.append((one.start[used], one.end[used], one.value[used]))
     start, end, rise = (np.concatenate(column) for column in zip(*parts, strict=True))
     return start, end, rise

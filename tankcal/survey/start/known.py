@@ -47,7 +47,7 @@ def certain_places(survey):
         xyz = np.where(survey.fixed & _measured(survey)[:, None], survey.xyz_m, xyz)
     for one in survey.observations:
         if isinstance(one, ControlCoordinates):
-            used = np.ones(len(one), dtype=bool) if one.use is None else one.use > 0
+            used = one.in_use
             xyz[one.point[used], one.axis[used]] = one.value[used]
     photos = survey.photos
     if photos is None:

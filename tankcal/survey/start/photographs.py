@@ -46,7 +46,7 @@ def sights_of(survey):
         return ()
     if images is None:
         return (Sight(np.zeros(0, dtype=int), np.zeros((0, 2))),) * len(photos.names)
-    used = np.arange(len(images.photo)) if images.use is None else np.flatnonzero(images.use > 0)
+    used = np.flatnonzero(images.in_use)
     used = used[np.argsort(images.photo[used], kind="stable")]
     cuts = np.searchsorted(images.photo[used], np.arange(len(photos.names) + 1))
     found = []

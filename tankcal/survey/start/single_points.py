@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.survey.observations import Directions, HeightDifferences, Layout, Sights, State
+from tankcal.survey.observations import Directions, Layout, State
 from tankcal.survey.start.polar import APART, orient_circles
 
 MOST = 12  # points that are looked for at a time
@@ -92,7 +92,7 @@ def _tied(survey):
     """(points,) True for points that angles, distances or levels speak of."""
     found = np.zeros(len(survey.points), dtype=bool)
     for one in survey.observations:
-        if isinstance(one, (Sights, HeightDifferences)):
+        if one.places_points and one.rows == 1:
             for name in one.ties:
                 found[getattr(one, name)] = True
     return found
@@ -107,7 +107,7 @@ class _Ties:
         self.groups = []
         ends = []
         for one in survey.observations:
-            if not isinstance(one, (Sights, HeightDifferences)):
+            if not (one.places_points and one.rows == 1):
                 continue
             one = self._usable(one, in_plan)
             if len(one):
