@@ -290,21 +290,21 @@ def _edge_effect(name, values, form, corner_mm):
 def instruments_of(adjustment, measurements=None):
     """The `AdjustedInstrument` of each instrument."""
     adjusted = adjustment.adjusted
-    state, layout = adjusted.solution.unknowns, adjusted.problem.layout
+    found, layout = adjusted.solution.unknowns.nuisance, adjusted.problem.layout.nuisance
     declared = {one.name: one for one in getattr(measurements, "instruments", ())}
     rows = []
     for i, tool in enumerate(adjusted.survey.instruments):
         source = declared.get(tool.name)
-        sds = [_sd_of(adjustment, one[i]) for one in (layout.scale, layout.offset)]
+        sds = [_sd_of(adjustment, layout[of][i]) for of in ("scale", "offset_m")]
         rows.append(
             AdjustedInstrument(
                 tool.name,
                 getattr(source, "kind", None),
                 {one: str(value) for one, value in getattr(source, "details", {}).items()},
-                *(1e6 * one for one in (state.scale[i], sds[0], tool.scale, tool.scale_sd)),
+                *(1e6 * one for one in (found["scale"][i], sds[0], tool.scale, tool.scale_sd)),
                 *(
                     1e3 * one
-                    for one in (state.offset_m[i], sds[1], tool.offset_m, tool.offset_sd_m)
+                    for one in (found["offset_m"][i], sds[1], tool.offset_m, tool.offset_sd_m)
                 ),
             )
         )

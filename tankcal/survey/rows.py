@@ -7,9 +7,8 @@ import numpy as np
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.survey.network.reactions import HELD
 from tankcal.survey.network.reliability import UNCONTROLLED
+from tankcal.survey.observations import NUISANCES
 from tankcal.survey.results import GroupOfReadings, Reading
-
-TOOLS = {"scale": ("scale", ""), "offset_m": ("offset", "m")}
 
 
 def readings_of(adjusted, held, held_trace):
@@ -124,10 +123,10 @@ def _known_trace(adjusted, one):
 def _known_names(adjusted, one):
     """Names, elements, units and file of weighted unknowns."""
     survey, index = adjusted.survey, np.asarray(one.index).tolist()
-    if one.of in TOOLS:
-        element, unit = TOOLS[one.of]
-        names = [(survey.instruments[i].name,) for i in index]
-        return names, [element] * len(index), [unit] * len(index), "instruments.toml"
+    if one.of in NUISANCES:
+        of, owners = NUISANCES[one.of], survey.nuisances[one.of].owners
+        names = [(owners[i],) for i in index]
+        return names, [of.element] * len(index), [of.unit] * len(index), of.file
     table, names, elements, units = adjusted.problem.interior_of, [], [], []
     for place in index:
         photos, parameters = np.nonzero(table == place)

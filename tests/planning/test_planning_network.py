@@ -26,8 +26,8 @@ def at_adjusted(folder):
         replace(tool, scale=scale, offset_m=offset)
         for tool, scale, offset in zip(
             survey.instruments,
-            adjusted.solution.unknowns.scale,
-            adjusted.solution.unknowns.offset_m,
+            adjusted.solution.unknowns.nuisance["scale"],
+            adjusted.solution.unknowns.nuisance["offset_m"],
             strict=True,
         )
     )

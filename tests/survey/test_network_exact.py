@@ -42,7 +42,7 @@ def exactly(kind, **more):
     one = kind(zero, zero, **more)
     state = State(
         TRUTH.xyz_m, TRUTH.photo_xyz_m, TRUTH.rotation, np.append(TRUTH.interior, 0.0),
-        scale=np.zeros(1), offset_m=np.zeros(1),
+        nuisance={"scale": np.zeros(1), "offset_m": np.zeros(1)},
     )  # fmt: skip
     value = one.computed(state, False)[0].ravel()
     return replace(one, value=value + (1e-3 if one.unit == "m" else 3e-4) * np.array([1, -1]))

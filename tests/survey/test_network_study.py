@@ -209,5 +209,5 @@ def test_a_known_scale_is_one_observation():
     found = adjust(survey)
     known = [one for one in found.problem.observations if isinstance(one, KnownUnknowns)]
     assert [one.of for one in known] == ["scale"]
-    column = found.problem.layout.scale[0]
+    column = found.problem.layout.nuisance["scale"][0]
     assert found.solution.cofactor.among([column])[0, 0] < TAPE_SCALE_SD**2

@@ -10,6 +10,7 @@ from tankcal.survey.observations import (
     KINDS as TABLES,
 )
 from tankcal.survey.observations import (
+    NUISANCES,
     Azimuths,
     ControlCoordinates,
     Correlated,
@@ -47,9 +48,11 @@ def made_state():
         photo_xyz_m=away,
         rotation=rotation,
         interior=np.append(INTERIOR, 0.0),
-        orientation_rad=np.array([0.3, 2.0]),
-        scale=np.array([1e-3, -2e-3]),
-        offset_m=np.array([0.01, 0.02]),
+        nuisance={
+            "orientation_rad": np.array([0.3, 2.0]),
+            "scale": np.array([1e-3, -2e-3]),
+            "offset_m": np.array([0.01, 0.02]),
+        },
         system=rotation_of_angles(*RNG.normal(0, 1, (3, 2))),
         system_shift_m=RNG.normal(0, 5, (2, 3)),
         system_scale=np.array([0.01, -0.02]),
@@ -68,9 +71,7 @@ def made_layout(state):
         points=columns(POINTS, 3),
         photos=columns(PHOTOS, 6),
         interior=np.append(columns(13), -1),
-        orientation=columns(2),
-        scale=columns(2),
-        offset=columns(2),
+        nuisance={of: columns(2) for of in state.nuisance},
         system=columns(2, 7),
     )
 
@@ -140,7 +141,7 @@ KINDS = {
     "zenith angle": VerticalAngles(*FOUR, **ENDS, zenith=True, bend_per_m=1e-3),
     **{
         f"known {of}": KnownUnknowns(np.zeros(1), np.ones(1), of, np.array([1]))
-        for of in ("interior", "scale", "offset_m", "orientation_rad", "system_scale")
+        for of in ("interior", *NUISANCES, "system_scale")
     },
 }
 KINDS["correlated"] = Correlated(
@@ -217,7 +218,7 @@ def test_derivatives(kind):
 def test_closed_forms():
     """3-4-5 triangles and eighths of a circle."""
     xyz = np.array([[0.0, 0, 0], [3, 4, 0], [1, 1, 2**0.5], [-2, 0, 0]])
-    state = State(xyz_m=xyz, scale=np.array([0.01]), offset_m=np.array([0.5]))
+    state = State(xyz_m=xyz, nuisance={"scale": np.array([0.01]), "offset_m": np.array([0.5])})
     one, zero, origin = np.zeros(1), np.array([-1]), np.array([0])
 
     def computed(kind, end, **more):

@@ -189,7 +189,9 @@ def test_every_kind_by_a_second_method(figure):
     assert adjusted.solution.chi2 == pytest.approx(square, rel=1e-8)
     assert adjusted.dof == sum(np.size(one.value) for one in kinds) - len(start)
     first = PLACES.size + len(more["sets"])
-    assert adjusted.solution.unknowns.scale == pytest.approx(found[first : first + 2], abs=1e-10)
+    assert adjusted.solution.unknowns.nuisance["scale"] == pytest.approx(
+        found[first : first + 2], abs=1e-10
+    )
 
 
 @pytest.mark.parametrize("over", [None, np.arange(24, 28)])
@@ -204,7 +206,9 @@ def test_a_free_network_by_a_second_method(over, figure):
 
     start = np.concatenate([survey.xyz_m.ravel(), survey.sets])
     adjusted = adjust(survey, datum="inner", over=over, tolerance=1e-8)
-    at = np.concatenate([adjusted.xyz_m.ravel(), adjusted.solution.unknowns.orientation_rad])
+    at = np.concatenate(
+        [adjusted.xyz_m.ravel(), adjusted.solution.unknowns.nuisance["orientation_rad"]]
+    )
     sizes = np.concatenate([np.full(3 * n, 1e-3), np.full(4, 1e-5)])
     jac = dense.jacobian(misclosures, at, 1e-2 * sizes)
     gradient = jac.T @ misclosures(at)

@@ -268,7 +268,7 @@ def test_photographs_hang_on_a_total_station_without_control():
     near = [int(np.argmin(np.linalg.norm(truth.xyz_m - p, axis=1))) for p in other.xyz_m[:24]]
     place = np.array([*near, *range(48, 52)])
     xyz = np.vstack([truth.xyz_m, other.xyz_m[24:]])
-    state, observations = State(xyz_m=xyz, orientation_rad=sighted.sets), []
+    state, observations = State(xyz_m=xyz, nuisance={"orientation_rad": sighted.sets}), []
     for one in sighted.observations:
         again = replace(one, start=place[one.start], end=place[one.end])
         value = again.computed(state, False)[0][:, 0]

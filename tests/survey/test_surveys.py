@@ -76,7 +76,7 @@ def test_every_value_has_its_row(photos, adjustment):
     assert tape.ids == ("P0", "P36")
     assert tape.row == 2
     xyz = dict(zip(adjustment.names, adjustment.xyz_m, strict=True))
-    scale = adjustment.adjusted.solution.unknowns.scale[0]
+    scale = adjustment.adjusted.solution.unknowns.nuisance["scale"][0]
     computed = (1 + scale) * np.linalg.norm(xyz["P0"] - xyz["P36"])
     assert tape.residual == pytest.approx(computed - tape.value, abs=1e-9)
     known_before = next(r for r in readings if r.kind == "weighted unknown")
@@ -228,7 +228,7 @@ def test_check_rows_change_nothing(photos, adjustment):
     assert {one.kind for one in checks} == {"image coordinate", "distance"}
     distance = next(one for one in checks if one.kind == "distance")
     xyz = dict(zip(found.names, found.xyz_m, strict=True))
-    scale = found.adjusted.solution.unknowns.scale[0]
+    scale = found.adjusted.solution.unknowns.nuisance["scale"][0]
     length = (1 + scale) * np.linalg.norm(xyz["P4"] - xyz["P20"])
     assert distance.residual == pytest.approx(length - 12.0, abs=1e-9)
     assert abs(distance.w) > 100

@@ -269,8 +269,8 @@ def _scale(name):
         if name not in names:
             return None  # it measured no distance
         i = names.index(name)
-        scale = float(adjusted.solution.unknowns.scale[i])
-        sd = _sd_of(adjusted, adjusted.problem.layout.scale[i])
+        scale = float(adjusted.solution.unknowns.nuisance["scale"][i])
+        sd = _sd_of(adjusted, adjusted.problem.layout.nuisance["scale"][i])
         text = message(
             "scale_explains",
             "the distances of {name} fit if all of them are {scale_ppm:+.0f} ppm off (standard "

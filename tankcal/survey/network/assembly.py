@@ -108,7 +108,7 @@ def assemble(survey):
         groups.append(one)
         sources.append(IMAGES)
         rows_of.append(rows)
-    for one in known + _known_tools(survey):
+    for one in known + _known_nuisances(survey):
         groups.append(one)
         sources.append("known beforehand")
         rows_of.append(np.arange(len(one)))
@@ -288,15 +288,13 @@ def _interior(survey):
     return table, np.append(values, 0.0), np.append(free, False).astype(bool), observed
 
 
-def _known_tools(survey):
+def _known_nuisances(survey):
     """Scales and offsets of instruments with an sd: weighted unknowns."""
     observed = []
-    for of, value, sd in (("scale", "scale", "scale_sd"), ("offset_m", "offset_m", "offset_sd_m")):
-        values = np.array([getattr(tool, value) for tool in survey.instruments])
-        sds = np.array([getattr(tool, sd) for tool in survey.instruments])
-        index = np.flatnonzero(np.nan_to_num(sds) > 0)
+    for of, one in survey.nuisances.items():
+        index = np.flatnonzero(np.nan_to_num(one.sd) > 0)
         if len(index):
-            observed.append(KnownUnknowns(values[index], sds[index], of, index))
+            observed.append(KnownUnknowns(one.value[index], one.sd[index], of, index))
     return observed
 
 
@@ -327,13 +325,11 @@ def _image_groups(survey, used, layout, reduced, table):
 
 
 def _state(survey, centre, values):
-    photos, tools, systems = survey.photos, survey.instruments, survey.systems
+    photos, systems = survey.photos, survey.systems
     state = State(
         xyz_m=survey.xyz_m - centre,
         interior=values,
-        orientation_rad=np.array(survey.sets, dtype=float),
-        scale=np.array([tool.scale for tool in tools], dtype=float),
-        offset_m=np.array([tool.offset_m for tool in tools], dtype=float),
+        nuisance={of: one.value for of, one in survey.nuisances.items()},
     )
     if photos is not None:
         state = replace(state, photo_xyz_m=photos.xyz_m - centre, rotation=photos.rotation)

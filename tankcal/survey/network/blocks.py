@@ -111,9 +111,7 @@ def _every_unknown(state):
         "points": (len(state.xyz_m), 3),
         "photos": (len(state.photo_xyz_m), 6),
         "interior": (len(state.interior),),
-        "orientation": (len(state.orientation_rad),),
-        "scale": (len(state.scale),),
-        "offset": (len(state.offset_m),),
+        **{of: np.shape(value) for of, value in state.nuisance.items()},
         "system": (len(state.system), 7),
     }
     first, found = 0, {}
@@ -121,7 +119,8 @@ def _every_unknown(state):
         count = int(np.prod(shape))
         found[name] = first + np.arange(count).reshape(shape)
         first += count
-    return Layout(**found)
+    nuisance = {of: found.pop(of) for of in state.nuisance}
+    return Layout(**found, nuisance=nuisance)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.messages import join_with_and, message
+from tankcal.survey.observations.nuisance import NUISANCES
 
 SHIFTS, TURNS = ("x", "y", "z"), ("X", "Y", "Z")
 THREE_TURNS = message("rotations", "three rotations")
@@ -23,43 +24,37 @@ AS_IF_FIXED = 1e4  # weight of a fixed unknown among the rows, as if it were kno
 
 def directions(layout, state):
     """The seven directions (unknowns, 7) at a state; fixed unknowns are left out."""
-    whole = np.zeros((unknowns(layout) + 1, 7))
+    whole = np.zeros((layout.unknowns + 1, 7))
     for columns, derivative in _parts(layout, state):
         whole[columns.ravel()] = derivative.reshape(-1, 7)
     return whole[:-1]
 
 
-def unknowns(layout):
-    """Number of unknowns of a layout."""
-    return 1 + max((columns.max(initial=-1) for columns in vars(layout).values()), default=-1)
-
-
 def _parts(layout, state):
     """Columns (...) of each kind of unknown with their derivatives (..., 7)."""
-    yield from zip((getattr(layout, name) for name in _NAMES), _derivatives(state), strict=True)
-
-
-_NAMES = ("points", "photos", "orientation", "scale", "system")
+    derivatives = _derivatives(state)
+    for name in ("points", "photos"):
+        yield getattr(layout, name), derivatives[name]
+    for of in state.nuisance:
+        yield layout.nuisance[of], derivatives[of]
+    yield layout.system, derivatives["system"]
 
 
 def _derivatives(state):
-    """Derivatives (..., 7) of the unknowns of _NAMES by the seven ways."""
+    """{name: derivatives (..., 7)} by the seven ways of what they move."""
     n = len(state.photo_xyz_m)
     photos = np.zeros((n, 6, 7))
     if n:
         photos[:, :3] = _of_places(state.photo_xyz_m)
         photos[:, 3:, 3:6] = -state.rotation
-    turn = np.zeros((len(state.orientation_rad), 7))
-    turn[:, 5] = -1.0
-    stretch = np.zeros((len(state.scale), 7))
-    stretch[:, 6] = -(1.0 + state.scale)
     systems = np.zeros((len(state.system), 7, 7))
     if len(systems):
         m = 1.0 + state.system_scale
         systems[:, :3, 3:6] = -state.system
         systems[:, 3:6, :3] = -m[:, None, None] * state.system
         systems[:, 6, 6] = -m
-    return _of_places(state.xyz_m), photos, turn, stretch, systems
+    shared = {of: NUISANCES[of].ways(value) for of, value in state.nuisance.items()}
+    return {"points": _of_places(state.xyz_m), "photos": photos, **shared, "system": systems}
 
 
 def _of_places(xyz):
@@ -101,7 +96,7 @@ def null_space(problem, unfelt=UNFELT, fixed=True, state=None, count=None):
     for columns, derivative in _parts(layout, state):
         holds = (columns < 0) & np.logical_not(idle.get(id(columns), False))
         sharp = AS_IF_FIXED * derivative[holds].reshape(-1, 7)
-        if fixed and len(sharp):
+        if fixed and sharp.any():
             felt.append(np.linalg.qr(sharp, mode="r"))
             square += np.sum(sharp**2, axis=0)
     moving = (square > 0) | whole.any(axis=0)  # heights alone do not define the azimuth
@@ -122,11 +117,13 @@ def _feeling(problem):
 def _idle(problem):
     """{id of columns: mask} of the unknowns that have no column because nobody observed them."""
     layout = problem.layout
-    unused = np.ones(len(layout.scale), dtype=bool)
+    unused = {of: np.ones(len(columns), dtype=bool) for of, columns in layout.nuisance.items()}
     for one, _ in _feeling(problem):
-        instrument = getattr(one, "instrument", np.zeros(0, dtype=int))
-        unused[instrument[instrument >= 0]] = False
-    return {id(layout.points): problem.aside[:, None], id(layout.scale): unused}
+        for of, field in one.nuisances:
+            number = getattr(one, field)
+            unused[of][number[number >= 0]] = False
+    idle = {id(layout.nuisance[of]): rows for of, rows in unused.items()}
+    return {id(layout.points): problem.aside[:, None], **idle}
 
 
 def depends_on_datum(adjusted, quantities, fixed=False):
@@ -145,19 +142,15 @@ def depends_on_datum(adjusted, quantities, fixed=False):
     if not free.shape[1]:
         return np.zeros(len(quantities), dtype=bool)
     first, parts, whole = 0, {}, []
-    for name, derivative in zip(_NAMES, _derivatives(state), strict=True):
+    for name, derivative in _derivatives(state).items():
         count = int(np.prod(derivative.shape[:-1]))
         parts[name] = first + np.arange(count).reshape(derivative.shape[:-1])
         whole.append(derivative.reshape(count, 7))
         first += count
     one = problem.relative(quantities)
-    interior, offset = problem.layout.interior, problem.layout.offset
-    layout = replace(
-        problem.layout,
-        **parts,
-        interior=np.full_like(interior, -1),
-        offset=np.full_like(offset, -1),
-    )
+    nuisance = {of: parts.pop(of) for of in state.nuisance}
+    interior = np.full_like(problem.layout.interior, -1)
+    layout = replace(problem.layout, **parts, nuisance=nuisance, interior=interior)
     ways = np.vstack([*whole, np.zeros((1, 7))]) @ free
     _, derivatives = one.computed(state, True)
     columns = one.columns(layout)

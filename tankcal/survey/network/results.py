@@ -120,7 +120,7 @@ class Adjusted:
     def effect_of_known_m(self, of, index):
         """Change (3 points,) of all coordinates by one sd of an unknown known beforehand.
 
-        of     field of State: "scale", "offset_m" (of instruments), "interior", "orientation_rad"
+        of     as KnownUnknowns: "scale", "offset_m" (of instruments), "interior", "orientation_rad"
                or "system_scale"
         index  place in that field: the number of the instrument; for "interior"
                problem.interior_of[photo, number of the parameter]

@@ -120,7 +120,7 @@ def start_from_adjusted(survey, adjusted):
     state, centre = adjusted.solution.unknowns, adjusted.problem.centre_m
     found = np.isfinite(adjusted.xyz_m)
     changes = {"xyz_m": np.where(found, centre + state.xyz_m, survey.xyz_m)}
-    changes["sets"] = state.orientation_rad
+    changes["sets"] = state.nuisance["orientation_rad"]
     if survey.photos is not None:
         changes["photos"] = replace(
             survey.photos, xyz_m=centre + state.photo_xyz_m, rotation=state.rotation

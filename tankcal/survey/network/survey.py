@@ -80,6 +80,25 @@ class System:
 
 
 @dataclass(frozen=True)
+class Shared:
+    """The k unknowns of a survey that have one name of `observations.NUISANCES`.
+
+    Attributes
+    ----------
+    owners : tuple
+        (k,) whose each is, as the user calls it.
+    value : ndarray, shape (k,)
+        Start, and known beforehand where it has an sd.
+    sd : ndarray, shape (k,)
+        0: fixed at the value; nan: free; else a weighted unknown.
+    """
+
+    owners: tuple
+    value: np.ndarray
+    sd: np.ndarray
+
+
+@dataclass(frozen=True)
 class Survey:
     """Everything that goes into one adjustment. Coordinates are in the survey's frame.
 
@@ -111,6 +130,24 @@ class Survey:
     instruments: tuple = ()
     systems: tuple = ()
     correlated: tuple = ()
+
+    @property
+    def nuisances(self):
+        """{name of `observations.NUISANCES`: Shared}: unknowns that observations share."""
+        tools, sets = self.instruments, len(self.sets)
+        names = tuple(tool.name for tool in tools)
+
+        def of(field):
+            return np.array([getattr(tool, field) for tool in tools], dtype=float)
+
+        circles = tuple(f"direction set {i + 1}" for i in range(sets))
+        return {
+            "scale": Shared(names, of("scale"), of("scale_sd")),
+            "offset_m": Shared(names, of("offset_m"), of("offset_sd_m")),
+            "orientation_rad": Shared(
+                circles, np.array(self.sets, dtype=float), np.full(sets, np.nan)
+            ),
+        }
 
     @property
     def tables(self):

@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.camera.model import PARAMETERS
 from tankcal.messages import fill_template, list_some
-from tankcal.survey.observations import Layout
+from tankcal.survey.observations import NUISANCES, Layout
 
 
 def eliminated_points(survey, others, used, exact):
@@ -39,9 +39,6 @@ def layout_of(survey, eliminated, used, interior_free, table):
     free_photos = np.ones((0 if photos is None else len(photos.names), 6), dtype=bool)
     if photos is not None and photos.fixed is not None:
         free_photos = ~np.repeat(photos.fixed, (1, 1, 1, 3), axis=1)
-    tools = survey.instruments
-    free_scale = np.array([tool.scale_sd != 0 for tool in tools], dtype=bool)
-    free_offset = np.array([tool.offset_sd_m != 0 for tool in tools], dtype=bool)
     free_system = np.ones((len(survey.systems), 7), dtype=bool)
     free_system[:, 6] = [system.scale_free for system in survey.systems]
     next_column = 0
@@ -58,8 +55,8 @@ def layout_of(survey, eliminated, used, interior_free, table):
     interior = columns(interior_free & ~own.any(axis=0))
     both = columns(np.hstack([free_photos, own[:, own.any(axis=0)]]))  # each photo's own together
     of_photos, interior[own.any(axis=0)] = both[:, :6], both[:, 6:].max(axis=0, initial=-1)
-    scale, offset, system = (columns(free) for free in (free_scale, free_offset, free_system))
-    orientation = columns(np.ones(len(survey.sets), dtype=bool))
+    nuisance = {of: columns(one.sd != 0) for of, one in survey.nuisances.items()}
+    system = columns(free_system)
     of_points = columns(free_points & ~eliminated[:, None])
     reduced = next_column
     last = np.flatnonzero(eliminated)
@@ -70,7 +67,7 @@ def layout_of(survey, eliminated, used, interior_free, table):
         )
         last = last[np.argsort(seen[last], kind="stable")]
     of_points[last] = next_column + np.arange(3 * len(last)).reshape(-1, 3)
-    return Layout(of_points, of_photos, interior, orientation, scale, offset, system), reduced
+    return Layout(of_points, of_photos, interior, nuisance, system), reduced
 
 
 def _of_one_photo(table, interior_free):
@@ -116,11 +113,9 @@ def name_of(survey, layout, table, column):
         photo, number = np.argwhere(table == place)[0]
         camera = survey.cameras[survey.photos.camera[photo]].name
         return f"{PARAMETERS[number]} of {camera}"
-    for place in np.flatnonzero(layout.orientation == column):
-        return f"orientation of direction set {place + 1}"
-    for what, columns in (("scale", layout.scale), ("offset", layout.offset)):
+    for of, columns in layout.nuisance.items():
         for place in np.flatnonzero(columns == column):
-            return f"{what} of {survey.instruments[place].name}"
+            return f"{NUISANCES[of].element} of {survey.nuisances[of].owners[place]}"
     system = np.argwhere(layout.system == column)[0, 0]
     return f"transformation of system {survey.systems[system].name}"
 

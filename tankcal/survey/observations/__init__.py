@@ -11,6 +11,7 @@ from tankcal.survey.observations.coordinates import (
 )
 from tankcal.survey.observations.correlated import Block, Correlated
 from tankcal.survey.observations.kinds import KINDS, Kind
+from tankcal.survey.observations.nuisance import NUISANCES
 from tankcal.survey.observations.photographs import (
     HeldOrientation,
     ImageCoordinates,
@@ -29,6 +30,7 @@ from tankcal.survey.observations.trace import Source, Trace
 
 __all__ = [
     "KINDS",
+    "NUISANCES",
     "Azimuths",
     "Block",
     "ControlCoordinates",

@@ -29,11 +29,9 @@ class State:
         R3(kappa) R2(phi) R1(omega).
     interior : ndarray, shape (q + 1,)
         Interior parameters, mm; the last is 0, for those left out.
-    orientation_rad : ndarray, shape (sets,)
-        Of direction sets: azimuth of the circle's zero.
-    scale : ndarray, shape (instruments,)
-        Reading = true (1 + scale) + offset.
-    offset_m : ndarray, shape (instruments,)
+    nuisance : dict
+        Values (k,) of each name of NUISANCES: "scale" and "offset_m" of instruments (reading = true
+        (1 + scale) + offset), "orientation_rad" of direction sets (azimuth of the circle's zero).
     system : ndarray, shape (systems, 3, 3)
         Rotations of further control systems.
     system_shift_m : ndarray, shape (systems, 3)
@@ -45,9 +43,7 @@ class State:
     photo_xyz_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     rotation: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 3)))
     interior: np.ndarray = field(default_factory=lambda: np.zeros(1))
-    orientation_rad: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    scale: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    offset_m: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    nuisance: dict = field(default_factory=dict)
     system: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 3)))
     system_shift_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     system_scale: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -62,8 +58,8 @@ class Layout:
     points : ndarray of int, shape (points, 3)
     photos : ndarray of int, shape (photos, 6)
     interior : ndarray of int, shape (q + 1,)
-    orientation : ndarray of int, shape (sets,)
-    scale, offset : ndarray of int, shape (instruments,)
+    nuisance : dict
+        Of each name of NUISANCES, ndarray of int, shape (k,).
     system : ndarray of int, shape (systems, 7)
         Rotation, shift, scale.
     """
@@ -71,10 +67,14 @@ class Layout:
     points: np.ndarray
     photos: np.ndarray
     interior: np.ndarray
-    orientation: np.ndarray
-    scale: np.ndarray
-    offset: np.ndarray
+    nuisance: dict
     system: np.ndarray
+
+    @property
+    def unknowns(self):
+        """Number of unknowns."""
+        named = (one for one in vars(self).values() if isinstance(one, np.ndarray))
+        return 1 + max(one.max(initial=-1) for one in (*named, *self.nuisance.values()))
 
     def moved(self, state, step):
         """The state after a step (unknowns,); rotations are turned, everything else is added."""
@@ -85,11 +85,9 @@ class Layout:
             changes["photo_xyz_m"] = state.photo_xyz_m + photos[:, :3]
             changes["rotation"] = apply_small_rotation(state.rotation, photos[:, 3:])
             changes["interior"] = state.interior + step[self.interior]
-        if len(state.orientation_rad):
-            changes["orientation_rad"] = state.orientation_rad + step[self.orientation]
-        if len(state.scale):
-            changes["scale"] = state.scale + step[self.scale]
-            changes["offset_m"] = state.offset_m + step[self.offset]
+        changes["nuisance"] = {
+            of: value + step[self.nuisance[of]] for of, value in state.nuisance.items()
+        }
         if len(system):
             changes["system"] = apply_small_rotation(state.system, system[:, :3])
             changes["system_shift_m"] = state.system_shift_m + system[:, 3:6]
@@ -123,6 +121,7 @@ class Observations:
     rows = 1
     feels_datum = True  # False: no motion or scale of the whole survey changes it
     ties = ()  # names of the fields that hold points
+    nuisances = ()  # pairs: a name of NUISANCES, the field with each row's number; -1: none
     axes = (0, 1, 2)  # of the points' coordinates that enter: x, y, z
     places_points = False  # True: from one end that is known it tells where the other may be
     knows_frame = False  # True: it has `off_frame(d)`, its misfits, m, of differences (n, 3)
@@ -192,8 +191,22 @@ class Observations:
         return replace(self, use=np.asarray(use, dtype=float))
 
     def columns(self, layout):
-        """(n, K) column of the unknown of each derivative, -1 where it is fixed."""
-        raise NotImplementedError
+        """(n, K) column of the unknown of each derivative, -1 where it is fixed.
+
+        Three of each point of `ties`, one of each of `nuisances`.
+        """
+        points = [layout.points[getattr(self, name)] for name in self.ties]
+        return np.hstack([*points, *(one[:, None] for one in self._each(layout.nuisance, -1))])
+
+    def nuisance(self, state):
+        """Values (n,) of each of `nuisances`; 0 where a row has none."""
+        return self._each(state.nuisance, 0.0)
+
+    def _each(self, of_all, none):
+        return [
+            np.append(of_all.get(of, np.zeros(0, dtype=int)), none)[getattr(self, number)]
+            for of, number in self.nuisances
+        ]
 
     def computed(self, state, derivatives):
         """Computed values (n, m) and, if asked for, derivatives (n, m, K)."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.survey.observations.base import Observations
+from tankcal.survey.observations.nuisance import NUISANCES
 
 
 @dataclass(frozen=True)
@@ -22,10 +23,6 @@ class ControlCoordinates(Observations):
     axis: np.ndarray
 
     kind, ties = "control coordinate", ("point",)
-
-    def columns(self, layout):
-        """Point (3)."""
-        return layout.points[self.point]
 
     def computed(self, state, derivatives):
         """The coordinates (n, 1)."""
@@ -58,7 +55,7 @@ class SystemCoordinates(Observations):
 
     def columns(self, layout):
         """Point (3), system (rotation 3, shift 3, scale)."""
-        return np.hstack([layout.points[self.point], layout.system[self.system]])
+        return np.hstack([super().columns(layout), layout.system[self.system]])
 
     def computed(self, state, derivatives):
         """The coordinates (n, 1)."""
@@ -80,7 +77,19 @@ class SystemCoordinates(Observations):
 
 
 @dataclass(frozen=True)
-class HeightDifferences(Observations):
+class _Differences(Observations):
+    start: np.ndarray
+    end: np.ndarray
+
+    ties = ("start", "end")
+
+    def columns(self, layout):
+        """Point end (3), point start (3)."""
+        return np.hstack([layout.points[self.end], layout.points[self.start]])
+
+
+@dataclass(frozen=True)
+class HeightDifferences(_Differences):
     """Height differences: z of `end` minus z of `start`; derivatives 1 and -1.
 
     Parameters
@@ -90,15 +99,8 @@ class HeightDifferences(Observations):
         Points.
     """
 
-    start: np.ndarray
-    end: np.ndarray
-
-    kind, ties, axes, places_points = "height difference", ("start", "end"), (2,), True
+    kind, axes, places_points = "height difference", (2,), True
     knows_frame = True
-
-    def columns(self, layout):
-        """z of end, z of start."""
-        return np.hstack([layout.points[self.end], layout.points[self.start]])
 
     def computed(self, state, derivatives):
         """The differences (n, 1)."""
@@ -112,7 +114,7 @@ class HeightDifferences(Observations):
 
 
 @dataclass(frozen=True)
-class PlumbLines(Observations):
+class PlumbLines(_Differences):
     """Pairs of points on one vertical: x and y of `end` minus those of `start` are zero.
 
     Parameters
@@ -123,14 +125,7 @@ class PlumbLines(Observations):
         Points.
     """
 
-    start: np.ndarray
-    end: np.ndarray
-
-    kind, rows, ties, axes, knows_frame = "plumb line", 2, ("start", "end"), (0, 1), True
-
-    def columns(self, layout):
-        """Point end (3), point start (3)."""
-        return np.hstack([layout.points[self.end], layout.points[self.start]])
+    kind, rows, axes, knows_frame = "plumb line", 2, (0, 1), True
 
     def computed(self, state, derivatives):
         """Differences in x and y (n, 2)."""
@@ -150,7 +145,7 @@ class PlumbLines(Observations):
 
 
 @dataclass(frozen=True)
-class Vectors(Observations):
+class Vectors(_Differences):
     """Vectors from `start` to `end` in the axes of the survey: GNSS baselines; derivatives +-I.
 
     Parameters
@@ -160,14 +155,7 @@ class Vectors(Observations):
         Points.
     """
 
-    start: np.ndarray
-    end: np.ndarray
-
-    kind, rows, ties, places_points = "vector", 3, ("start", "end"), True
-
-    def columns(self, layout):
-        """Point end (3), point start (3)."""
-        return np.hstack([layout.points[self.end], layout.points[self.start]])
+    kind, rows, places_points = "vector", 3, True
 
     def computed(self, state, derivatives):
         """Differences in x, y and z (n, 3)."""
@@ -183,7 +171,7 @@ class KnownUnknowns(Observations):
     Attributes
     ----------
     of : str
-        "interior", "scale", "offset_m", "orientation_rad" or "system_scale": field of State.
+        "interior" or "system_scale", fields of State, or a name of NUISANCES.
     index : ndarray, shape (n,)
         Place in that field.
     """
@@ -197,10 +185,10 @@ class KnownUnknowns(Observations):
         """The unknown itself."""
         if self.of == "system_scale":
             return layout.system[self.index, 6:]
-        place = {"offset_m": "offset", "orientation_rad": "orientation"}.get(self.of, self.of)
-        return getattr(layout, place)[self.index, None]
+        columns = layout.interior if self.of == "interior" else layout.nuisance[self.of]
+        return columns[self.index, None]
 
     def computed(self, state, derivatives):
         """The values (n, 1)."""
-        computed = getattr(state, self.of)[self.index, None]
-        return computed, np.ones((len(self), 1, 1)) if derivatives else None
+        values = state.nuisance[self.of] if self.of in NUISANCES else getattr(state, self.of)
+        return values[self.index, None], np.ones((len(self), 1, 1)) if derivatives else None

@@ -33,10 +33,6 @@ class Sights(Observations):
 
     ties, places_points = ("end", "start"), True
 
-    def columns(self, layout):
-        """Point end (3), point start (3)."""
-        return np.hstack([layout.points[self.end], layout.points[self.start]])
-
     def line(self, state):
         """Differences x, y, z (3, n)."""
         d = (state.xyz_m[self.end] - state.xyz_m[self.start]).T
@@ -73,16 +69,12 @@ class Distances(Sights):
     horizontal: bool = field(default=False, kw_only=True)
 
     kind = "distance"
+    nuisances = ("scale", "instrument"), ("offset_m", "instrument")
 
     @property
     def axes(self):
         """Heights do not enter horizontal distances."""
         return (0, 1) if self.horizontal else (0, 1, 2)
-
-    def columns(self, layout):
-        """Point end (3), point start (3), scale, offset."""
-        scale, offset = (np.append(c, -1)[self.instrument] for c in (layout.scale, layout.offset))
-        return np.hstack([super().columns(layout), scale[:, None], offset[:, None]])
 
     def without_derivatives(self, state):
         """(n,) True where both ends are at one place; in plan, if the distance is horizontal."""
@@ -95,8 +87,9 @@ class Distances(Sights):
         if self.horizontal:
             d[2] = 0.0
         s = np.sqrt(np.sum(d * d, axis=0))
-        m = 1.0 + np.append(state.scale, 0.0)[self.instrument]
-        computed = (m * s + np.append(state.offset_m, 0.0)[self.instrument])[:, None]
+        scale, offset = self.nuisance(state)
+        m = 1.0 + scale
+        computed = (m * s + offset)[:, None]
         if not derivatives:
             return computed, None
         of_tools = np.stack([s, np.ones_like(s)], axis=1)[:, None, :]
@@ -169,16 +162,13 @@ class Directions(_Angles):
     set: np.ndarray
 
     kind, axes = "direction", (0, 1)
-
-    def columns(self, layout):
-        """Point end (3), point start (3), orientation."""
-        return np.hstack([super().columns(layout), layout.orientation[self.set, None]])
+    nuisances = (("orientation_rad", "set"),)
 
     def computed(self, state, derivatives):
         """The directions (n, 1)."""
         x, y, _ = self.line(state)
         value, derivative = azimuth(x, y)
-        computed = (value - state.orientation_rad[self.set])[:, None]
+        computed = (value - self.nuisance(state)[0])[:, None]
         if not derivatives:
             return computed, None
         turn = np.full((len(self), 1, 1), -1.0)
@@ -204,10 +194,6 @@ class HorizontalAngles(_Angles):
         """(n,) True where the station is, in plan, where one of its targets is."""
         back = state.xyz_m[self.origin, :2] == state.xyz_m[self.start, :2]
         return super().without_derivatives(state) | back.all(axis=1)
-
-    def columns(self, layout):
-        """Point end (3), point start (3), point origin (3)."""
-        return np.hstack([super().columns(layout), layout.points[self.origin]])
 
     def computed(self, state, derivatives):
         """The angles (n, 1)."""

@@ -104,6 +104,7 @@ class _Ties:
     def __init__(self, survey, xyz_m, zeros, point, in_plan):
         self.survey, self.xyz, self.point = survey, xyz_m, point
         self.zeros = zeros
+        self.nuisance = {of: one.value for of, one in survey.nuisances.items()}
         self.groups = []
         ends = []
         for one in survey.observations:
@@ -184,20 +185,15 @@ class _Ties:
         own = np.tile(self.xyz[self.point], (k, 1))
         own[:, self.axes] = places[:, : len(self.axes)]
         zeros = np.concatenate([self.zeros, places[:, len(self.axes) :].ravel()])
-        tools = self.survey.instruments
-        state = State(
-            xyz_m=np.vstack([self.xyz, own]),
-            orientation_rad=zeros,
-            scale=np.array([tool.scale for tool in tools], dtype=float),
-            offset_m=np.array([tool.offset_m for tool in tools], dtype=float),
-        )
+        nuisance = self.nuisance | {"orientation_rad": zeros}
+        state = State(xyz_m=np.vstack([self.xyz, own]), nuisance=nuisance)
         columns = np.full((n + k, 3), -1)
         columns[n:, self.axes] = np.arange(len(self.axes))
         turns = np.full(len(zeros), -1)
         turns[sets:] = np.tile(len(self.axes) + np.arange(len(self.sets)), k)
-        none = np.full(max(len(tools), 1), -1)
-        layout = Layout(columns, np.zeros((0, 6)), none, turns, none[: len(tools)],
-                        none[: len(tools)], np.zeros((0, 7)))  # fmt: skip
+        fixed = {of: np.full(len(value), -1) for of, value in nuisance.items()}
+        layout = Layout(columns, np.zeros((0, 6)), np.full(1, -1),
+                        fixed | {"orientation_rad": turns}, np.zeros((0, 7)))  # fmt: skip
         off, jac = [], []
         for one in self.groups:
             many = self._copied(one, k)
