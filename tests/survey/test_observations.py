@@ -6,6 +6,7 @@ from jacobians import assert_derivative
 
 from tankcal.camera.model import AFFINITIES, CONVENTIONS, Form
 from tankcal.geometry.rotations import apply_small_rotation, rotation_of_angles
+from tankcal.survey.network import Survey
 from tankcal.survey.observations import (
     KINDS as TABLES,
 )
@@ -164,6 +165,12 @@ def test_all_kinds_are_compared():
     kinds = {one for one in below(Observations) if "computed" in vars(one) or "fill" in vars(one)}
     assert kinds - {Observations} == {type(one) for one in KINDS.values()}
     assert {one.observes for one in TABLES.values()} <= kinds
+
+
+def test_nuisances_are_those_of_a_survey():
+    """Property: each has a start and an sd in a survey, and observations name no other."""
+    assert list(Survey((), np.zeros((0, 3))).nuisances) == list(NUISANCES)
+    assert {of for one in KINDS.values() for of, _ in one.nuisances} == set(NUISANCES)
 
 
 @pytest.mark.parametrize("kind", KINDS)
