@@ -47,17 +47,22 @@ def test_every_pdf_conforms(verapdf, example_record, tmp_path, language):
     assert_conform(verapdf, paths)
 
 
+@pytest.fixture(scope="module")
+def prediction():
+    return predict(load_plan(EXAMPLE.parent / "plan-silva"))
+
+
 @pytest.mark.study
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_the_papers_of_a_plan_conform(verapdf, tmp_path, language):
-    prediction = predict(load_plan(EXAMPLE.parent / "plan-silva"))
+def test_the_papers_of_a_plan_conform(verapdf, prediction, tmp_path, language):
     planning_papers.write(prediction, tmp_path / "out", language=language)
     names = ("prediction.pdf", "field-sheets.pdf")
     assert_conform(verapdf, [str(tmp_path / "out" / name) for name in names])
 
 
 def assert_conform(verapdf, paths):
-    for flavour in FLAVOURS:
-        command = [*verapdf, "--format", "text", "--flavour", flavour, *paths]
-        said = subprocess.run(command, capture_output=True, encoding="utf-8", check=False).stdout
-        assert sorted(said.splitlines()) == sorted(f"PASS {path} {flavour}" for path in paths)
+    """Each file passes in each flavour; without --flavour veraPDF takes those that it declares."""
+    command = [*verapdf, "--format", "text", *paths]
+    said = subprocess.run(command, capture_output=True, encoding="utf-8", check=False).stdout
+    expected = [f"PASS {path} {flavour}" for path in paths for flavour in FLAVOURS]
+    assert sorted(said.splitlines()) == sorted(expected)
