@@ -83,11 +83,11 @@ class Curve:
     def residuals(self):
         return self.residual_maker @ (self.values * self.weight)
 
-    @property
+    @cached_property
     def rss(self):
         return float(self.residuals @ self.residuals)
 
-    @property
+    @cached_property
     def excess(self):
         if len(self.values) <= self.parameters:
             return 0.0

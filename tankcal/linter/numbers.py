@@ -6,8 +6,10 @@ least often, so that 1.234 is read as 1.234 m3 in one file and as 1234 L in anot
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from math import isfinite
+from typing import NamedTuple
 
 from tankcal.job.tables import BadCell, shown
 from tankcal.messages import message
@@ -18,8 +20,7 @@ LARGEST = 1e12
 BLANK = message("lint_blank", "blank; expected a number")
 
 
-@dataclass(frozen=True)
-class Style:
+class Style(NamedTuple):
     """How numbers are written: decimal mark, and the mark between thousands ("": none)."""
 
     decimal: str
@@ -72,12 +73,13 @@ def has_letter(cell):
 
 def read_number(cell, style):
     """`Reading` of a cell of a sheet (a number or a text) in a style."""
+    if isinstance(cell, str):
+        text = cell.strip()
+        return _read_text(text, style) if text else Reading(None, complaint=BLANK)
     if isinstance(cell, BadCell):
         return Reading(None, complaint=cell.complaint)
     if is_blank(cell):
         return Reading(None, complaint=BLANK)
-    if isinstance(cell, str):
-        return _read_text(cell.strip(), style)
     if isinstance(cell, bool) or not isinstance(cell, int | float) or not isfinite(cell):
         return Reading(None, complaint=_no_number(cell))
     return _read_text(f"{cell:.15g}" if isinstance(cell, float) else str(cell), PLAIN, False)
@@ -87,6 +89,7 @@ def _no_number(found):
     return message("lint_no_number", "found {found}; expected a number", found=shown(found))
 
 
+@lru_cache(maxsize=50_000)  # style_of reads most cells first
 def _read_text(text, style, is_typed=True):
     plain, marks = text, False
     if style.thousands and style.thousands in text:
