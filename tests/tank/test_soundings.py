@@ -21,7 +21,7 @@ def waves(rng, sd, length):
     wave, phase = rng.normal(size=(300, 2)) / length, rng.uniform(0, 2 * np.pi, 300)
 
     def height(plan):
-        angles = (plan @ wave.T + phase).astype(np.float32)  # their cosines take a fifth of the time
+        angles = (plan @ wave.T + phase).astype(np.float32)  # cosines in a fifth of the time
         return sd * np.sqrt(2 / 300) * np.cos(angles).sum(axis=1, dtype=float)
 
     return height
