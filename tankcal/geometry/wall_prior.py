@@ -1,0 +1,138 @@
+"""What is known of a wall before it is measured: its components, and how large each may be.
+
+The radius of a wall at azimuth a and height zeta of a course (-1 at its bottom, +1 at its top) is
+
+    r = rho + x sin a + y cos a + sum over components of f(a, zeta),
+
+rho, x and y free for each course. A component is a random field of covariance
+
+    variance * c(a - a') * h(zeta, zeta'),  c(0) = 1,  the mean of h(zeta, zeta) over a course = 1,
+
+so that its amplitude, the root of its variance, is the rms departure that it makes. It is the same
+in all courses, or each course has its own. How large it is a survey tells in part; before it, the
+logarithm of the variance is normal: about that of `median_m`, with `log_sd`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+FULL_TURN = 2 * np.pi
+OVALITY_MODES = np.arange(2.0, 37.0)
+OVALITY_WEIGHTS = OVALITY_MODES**-3 / np.sum(OVALITY_MODES**-3)
+SEAM_LENGTH_M = 0.4  # along the arc, of a seam's flank
+ORDERS = 6  # of the Legendre polynomials in the height of a course
+LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
+
+
+@dataclass(frozen=True)
+class Component:
+    """One way in which a wall departs from a cylinder.
+
+    Attributes
+    ----------
+    name : str
+    kind : str
+        Its name in a budget.
+    shape : str
+        Along the azimuth: "mean" (none: the mean radius), "oval" (mode k of variance k^-3, from 2
+        on) or "seam" (the spectrum (1 + (k SEAM_LENGTH_M / R)^2)^-2 from mode 2 on, cusps).
+    common : bool
+        The same in all courses.
+    orders : tuple of float, or None
+        Variances of the Legendre polynomials 0..6 in the height, up to a factor; None: the
+        covariance exp(-|zeta - zeta'| / LOCAL_LENGTH).
+    median_m, log_sd : float
+        Median of its amplitude, m, and standard deviation of the logarithm of its variance.
+    """
+
+    name: str
+    kind: str
+    shape: str
+    common: bool
+    orders: tuple | None
+    median_m: float
+    log_sd: float
+
+    def height_weights(self):
+        """(7,) variances of the Legendre polynomials, so that the mean variance is one."""
+        weights = np.array(self.orders, dtype=float)
+        return weights / np.sum(weights / (2 * np.arange(len(weights)) + 1))
+
+    def height_covariance(self, zeta, other):
+        """(n, m) h between heights (n,) and (m,) of a course."""
+        if self.orders is None:
+            return np.exp(-np.abs(np.subtract.outer(zeta, other)) / LOCAL_LENGTH)
+        return (legendre(zeta) * self.height_weights()) @ legendre(other).T
+
+
+_LEVEL = (1.0, 0, 0, 0, 0, 0, 0)
+COMPONENTS = (
+    Component("common bulge", "bulge", "mean", True, (0, 0, 1, 0, 0.02, 0, 0.003), 2e-3, 1.0),
+    Component(
+        "own bulge", "bulge", "mean", False, (0, *(j**-2.0 for j in range(1, 7))), 1e-3, 1.0
+    ),
+    Component("common ovality", "ovality", "oval", True, _LEVEL, 4e-3, 3.0),
+    Component("own ovality", "ovality", "oval", False, _LEVEL, 2e-3, 3.0),
+    Component("common seams", "seams", "seam", True, _LEVEL, 3e-3, 1.5),
+    Component("own seams", "seams", "seam", False, _LEVEL, 2e-3, 1.5),
+    Component("dents", "seams", "seam", False, None, 2e-3, 1.5),
+)
+
+
+def legendre(zeta):
+    """(n, 7) Legendre polynomials of order 0 to 6."""
+    return np.polynomial.legendre.legvander(np.asarray(zeta, dtype=float), ORDERS)
+
+
+def oval_correlation(difference_rad):
+    """c of an azimuth difference: mode k has the variance k^-3, k = 2..36."""
+    x = np.cos(difference_rad)
+    # Clenshaw: sum of w_k cos k a
+    later, last = np.zeros_like(x), np.zeros_like(x)
+    for weight in OVALITY_WEIGHTS[::-1]:
+        last, later = 2 * x * last - later + weight, last
+    for _ in range(2):  # modes 1 and 0 have no weight
+        last, later = 2 * x * last - later, last
+    return last - x * later
+
+
+def seam_correlation(difference_rad, radius_m):
+    """c of an azimuth difference on a wall of that radius: sum over k >= 2 of (1 + (k/k0)^2)^-2.
+
+    k0 = R / SEAM_LENGTH_M; all modes are summed in closed form,
+
+        sum over all k of exp(i k x) / (k^2 + b^2)^2
+            = pi / (2 b^2) (C / b - (pi - x) S + pi C coth(pi b)),  0 <= x <= pi,
+        C = cosh(b (pi - x)) / sinh(pi b),  S = sinh(b (pi - x)) / sinh(pi b),
+
+    and modes 0 and 1 are taken off.
+    """
+    b = radius_m / SEAM_LENGTH_M
+    x = np.asarray(difference_rad, dtype=float)
+    found = _all_modes(x, b) - b**-4 - 2 * np.cos(x) / (1 + b**2) ** 2
+    at_zero = _all_modes(np.zeros(1), b)[0] - b**-4 - 2 / (1 + b**2) ** 2
+    return found / at_zero
+
+
+def _all_modes(x, b):
+    x = np.abs((x + np.pi) % FULL_TURN - np.pi)
+    near, far, turn = np.exp(-b * x), np.exp(-b * (FULL_TURN - x)), np.exp(-b * FULL_TURN)
+    cosh, sinh = (near + far) / (1 - turn), (near - far) / (1 - turn)
+    coth = (1 + turn) / (1 - turn)
+    return np.pi / (2 * b**2) * (cosh / b - (np.pi - x) * sinh + np.pi * cosh * coth)
+
+
+def azimuth_correlations(azimuth_rad, other_rad, radius_m):
+    """{"mean", "oval", "seam": (n, m) c} between azimuths (n,) and (m,); nan: the mean over a turn.
+
+    The mean over a turn of what has no mode 0 is nothing.
+    """
+    difference = np.subtract.outer(azimuth_rad, other_rad)
+    mean = np.isnan(difference)
+    difference = np.where(mean, 0.0, difference)
+    return {
+        "mean": np.ones(difference.shape),
+        "oval": np.where(mean, 0.0, oval_correlation(difference)),
+        "seam": np.where(mean, 0.0, seam_correlation(difference, radius_m)),
+    }
