@@ -25,6 +25,8 @@ NOISE_MEDIAN_M, NOISE_LOG_SD = 2e-3, 3.0  # of readings without a given standard
 LEAST_M, MOST_M = 1e-5, 0.3  # amplitudes that are tried
 LEAST_NOISE_M = 1e-6  # what is given as perfect is not quite
 SAME_AZIMUTH_RAD = 1e-9
+SMALLEST = 1e-9  # of the largest variance of a direction of the common form
+MOST_FOLLOWED = 80  # directions of the common form that are followed through all courses
 LOG_STEP = 0.2  # of the differences that give the curvature
 
 
@@ -111,65 +113,58 @@ def _curvature(evidence, best):
 class _Course:
     """What one course tells, in the coordinates that radius and centre leave free.
 
-    radius (m,), own (q, m, m) covariances of its own components at unit variance, last the noise
-    where that is estimated; fixed (m, m) what is not; waves (m, k) its places among the common
-    azimuths; bulge (m, 7) Legendre polynomials
+    radius (m,), own (q, m, m) covariances at unit variance: of its own components, of what the
+    common columns miss, and last of the noise where that is estimated; fixed (m, m) the noise that
+    is not; common (m, k) columns of the common components at unit variance
     """
 
     radius: np.ndarray
     own: np.ndarray
     fixed: np.ndarray
-    waves: np.ndarray
-    bulge: np.ndarray
+    common: np.ndarray
 
 
 @dataclass(frozen=True)
 class _Evidence:
+    """courses; own (q,) and common (k,): component of each covariance and of each column."""
+
     courses: tuple
-    common: dict  # component: (k, k) covariance at the common azimuths
+    own: np.ndarray
+    common: np.ndarray
     middle: np.ndarray
     log_sd: np.ndarray
-    estimate_noise: bool
 
     @classmethod
     def of(cls, sites, radius_m, noise_m2, nominal_m, estimate_noise):
-        place, azimuths = distinct_azimuths(sites.azimuth_rad)
+        columns, missed = _common_columns(sites, nominal_m)
         courses = tuple(
-            _course(sites, radius_m, noise_m2, nominal_m, members, place, azimuths, estimate_noise)
+            _course(sites, radius_m, noise_m2, nominal_m, members, columns, missed, estimate_noise)
             for members in (np.flatnonzero(sites.course == c) for c in np.unique(sites.course))
         )
-        there = azimuth_correlations(azimuths, azimuths, nominal_m)
-        common = {
-            i: there[one.shape] for i, one in enumerate(COMPONENTS) if one.common and one.shape != "mean"
-        }
+        own = [i for i, one in enumerate(COMPONENTS) if not one.common] + list(missed)
+        common = [i for i, block in columns.items() for _ in range(block.shape[1])]
         middle = 2 * np.log([one.median_m for one in COMPONENTS])
         log_sd = np.array([one.log_sd for one in COMPONENTS])
         if estimate_noise:
+            own.append(len(COMPONENTS))
             typical = np.median(np.diag(noise_m2) if np.ndim(noise_m2) == 2 else noise_m2)
             middle = np.append(middle, 2 * np.log(NOISE_MEDIAN_M) - np.log(typical))
             log_sd = np.append(log_sd, NOISE_LOG_SD)
-        return cls(courses, common, middle, log_sd, estimate_noise)
+        return cls(courses, np.array(own), np.array(common), middle, log_sd)
 
     def misfit(self, logs):
         """Doubled negative logarithm of the density but for a constant, and its derivative."""
         variances = np.exp(logs)
-        own = [i for i, one in enumerate(COMPONENTS) if not one.common]
-        own += [len(COMPONENTS)] * self.estimate_noise
-        bulges = [i for i, one in enumerate(COMPONENTS) if one.common and one.shape == "mean"]
-        count = len(next(iter(self.common.values())))
-        waves = sum(variances[i] * one for i, one in self.common.items())
-        factor = np.linalg.cholesky(waves + 1e-9 * waves[0, 0] * np.eye(count))
-        rises = np.sqrt(sum(variances[i] * COMPONENTS[i].height_weights() for i in bulges))
-        inner, right, value, solved = np.eye(count + len(rises)), 0.0, 0.0, []
+        scale = np.sqrt(variances[self.common])
+        inner, right, value, solved = np.eye(len(scale)), 0.0, 0.0, []
         for course in self.courses:
-            covariance = course.fixed + np.tensordot(variances[own], course.own, 1)
+            covariance = course.fixed + np.tensordot(variances[self.own], course.own, 1)
             root = np.linalg.cholesky(covariance)
             value += 2 * np.sum(np.log(np.diag(root)))
             inverse = scipy.linalg.solve_triangular(
                 root, np.eye(len(root)), lower=True, check_finite=False
             )
-            common = np.hstack([course.waves @ factor, course.bulge * rises])
-            white = inverse @ np.column_stack([common, course.radius])
+            white = inverse @ np.column_stack([course.common * scale, course.radius])
             inner += white[:, :-1].T @ white[:, :-1]
             right = right + white[:, :-1].T @ white[:, -1]
             value += white[:, -1] @ white[:, -1]
@@ -185,18 +180,37 @@ class _Evidence:
             left = across[:, -1] - across[:, :-1] @ common
             outer = inverse.T @ inverse - across[:, :-1] @ spread @ across[:, :-1].T
             outer -= left[:, None] * left
-            slopes[own] += variances[own] * np.einsum("qij,ij->q", course.own, outer)
-        outer = np.eye(len(spread)) - spread - common[:, None] * common
-        inverse = scipy.linalg.solve_triangular(factor, np.eye(count), lower=True)
-        for i, one in self.common.items():
-            within = inverse.T @ outer[:count, :count] @ inverse
-            slopes[i] += variances[i] * np.sum(within * one)
-        share = np.diag(outer)[count:]
-        for i in bulges:
-            part = variances[i] * COMPONENTS[i].height_weights()
-            slopes[i] += np.sum(share * np.divide(part, rises**2, where=rises > 0, out=0 * part))
+            np.add.at(slopes, self.own, np.einsum("qij,ij->q", course.own, outer))
+        slopes *= variances
+        np.add.at(slopes, self.common, 1.0 - np.diag(spread) - common**2)
         away = (logs - self.middle) / self.log_sd
         return value + away @ away, slopes + 2 * away / self.log_sd
+
+
+def _common_columns(sites, nominal_m):
+    """{component: (n, k) columns of unit variance}, and a list of those that these miss a part of.
+
+    Of a form B = K_z L_z^-T at some azimuths z, K_z L_z^-T (..)' = K where these are all that the
+    survey has; else z are even, and K - B B', never negative, is taken as each course's own.
+    """
+    place, azimuths = distinct_azimuths(sites.azimuth_rad)
+    few = len(azimuths) <= MOST_FOLLOWED
+    chosen = azimuths if few else np.arange(MOST_FOLLOWED) * 2 * np.pi / MOST_FOLLOWED
+    among = azimuth_correlations(chosen, chosen, nominal_m)
+    to = azimuth_correlations(azimuths, chosen, nominal_m)
+    columns, missed = {}, []
+    for i, one in enumerate(COMPONENTS):
+        if one.common and one.shape == "mean":
+            columns[i] = legendre(sites.zeta) * np.sqrt(one.height_weights())
+            columns[i] = columns[i][:, one.height_weights() > 0]
+        elif one.common:
+            values, vectors = np.linalg.eigh(among[one.shape])
+            keep = values > SMALLEST * values[-1]
+            half = to[one.shape] @ (vectors[:, keep] / np.sqrt(values[keep]))
+            columns[i] = half[place]
+            if not few:
+                missed.append(i)
+    return columns, missed
 
 
 def distinct_azimuths(azimuth_rad):
@@ -211,14 +225,17 @@ def free_of_course(azimuth_rad):
     return np.column_stack([np.ones(len(azimuth_rad)), np.sin(azimuth_rad), np.cos(azimuth_rad)])
 
 
-def _course(sites, radius_m, noise_m2, nominal_m, members, place, azimuths, estimate_noise):
+def _course(sites, radius_m, noise_m2, nominal_m, members, columns, missed, estimate_noise):
     azimuth, zeta = sites.azimuth_rad[members], sites.zeta[members]
     left = scipy.linalg.null_space(free_of_course(azimuth).T)
 
     def seen(covariance):
         return left.T @ covariance @ left
 
-    noise = noise_m2[np.ix_(members, members)] if np.ndim(noise_m2) == 2 else np.diag(noise_m2[members])
+    if np.ndim(noise_m2) == 2:
+        noise = noise_m2[np.ix_(members, members)]
+    else:
+        noise = np.diag(noise_m2[members])
     noise = noise + LEAST_NOISE_M**2 * np.eye(len(members))
     there = azimuth_correlations(azimuth, azimuth, nominal_m)
     own = [
@@ -226,13 +243,14 @@ def _course(sites, radius_m, noise_m2, nominal_m, members, place, azimuths, esti
         for one in COMPONENTS
         if not one.common
     ]
+    own += [
+        seen(there[COMPONENTS[i].shape] - columns[i][members] @ columns[i][members].T)
+        for i in missed
+    ]
     own += [seen(noise)] * estimate_noise
-    waves = np.zeros((len(members), len(azimuths)))
-    waves[np.arange(len(members)), place[members]] = 1.0
     return _Course(
         left.T @ radius_m[members],
         np.array(own),
         seen(noise) * (not estimate_noise),
-        left.T @ waves,
-        left.T @ legendre(zeta),
+        left.T @ np.hstack([block[members] for block in columns.values()]),
     )
