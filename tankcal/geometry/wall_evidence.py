@@ -19,7 +19,7 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from tankcal.geometry.wall_prior import COMPONENTS, azimuth_correlations, legendre
+from tankcal.geometry.wall_prior import COMPONENTS, azimuth_correlations
 
 NOISE_MEDIAN_M, NOISE_LOG_SD = 2e-3, 3.0  # of readings without a given standard deviation
 LEAST_M, MOST_M = 1e-5, 0.3  # amplitudes that are tried
@@ -201,8 +201,7 @@ def _common_columns(sites, nominal_m):
     columns, missed = {}, []
     for i, one in enumerate(COMPONENTS):
         if one.common and one.shape == "mean":
-            columns[i] = legendre(sites.zeta) * np.sqrt(one.height_weights())
-            columns[i] = columns[i][:, one.height_weights() > 0]
+            columns[i] = one.height_columns(sites.zeta)
         elif one.common:
             values, vectors = np.linalg.eigh(among[one.shape])
             keep = values > SMALLEST * values[-1]

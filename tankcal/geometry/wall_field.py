@@ -19,7 +19,7 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.geometry.wall_evidence import Amplitudes, Sites, distinct_azimuths, free_of_course
-from tankcal.geometry.wall_prior import COMPONENTS, FULL_TURN, azimuth_correlations, legendre
+from tankcal.geometry.wall_prior import COMPONENTS, FULL_TURN, azimuth_correlations
 
 GRID_M, FEWEST_OF_GRID = 0.1, 720  # along the arc, and azimuths, of outlines that are integrated
 
@@ -72,7 +72,7 @@ class WallField:
             size = self.amplitudes.variances_m2[i]
             along = self._to_grid[one.shape]
             for course, members in enumerate(self._members):
-                if one.orders is None or one.orders[0] == 0:
+                if not one.is_level:
                     chosen = np.arange(len(solved)) if one.common else members
                     height = one.height_covariance(self.levels, self.sites.zeta[chosen])
                     part = height * solved[chosen]

@@ -22,7 +22,11 @@ OVALITY_MODES = np.arange(2.0, 37.0)
 OVALITY_WEIGHTS = OVALITY_MODES**-3 / np.sum(OVALITY_MODES**-3)
 SEAM_LENGTH_M = 0.4  # along the arc, of a seam's flank
 ORDERS = 6  # of the Legendre polynomials in the height of a course
+JOINT_LENGTH = 0.2  # of half a course: how far a joint draws the plate in
 LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
+
+
+_LEVEL = (1.0, 0, 0, 0, 0, 0, 0)
 
 
 @dataclass(frozen=True)
@@ -39,9 +43,10 @@ class Component:
         on) or "seam" (the spectrum (1 + (k SEAM_LENGTH_M / R)^2)^-2 from mode 2 on, cusps).
     common : bool
         The same in all courses.
-    orders : tuple of float, or None
-        Variances of the Legendre polynomials 0..6 in the height, up to a factor; None: the
-        covariance exp(-|zeta - zeta'| / LOCAL_LENGTH).
+    orders : tuple of float, str
+        Variances of the Legendre polynomials 0..6 in the height, up to a factor; "joints": the
+        profile exp(-(1 - |zeta|) / JOINT_LENGTH) less its mean; "local": the covariance
+        exp(-|zeta - zeta'| / LOCAL_LENGTH).
     median_m, log_sd : float
         Median of its amplitude, m, and standard deviation of the logarithm of its variance.
     """
@@ -50,39 +55,55 @@ class Component:
     kind: str
     shape: str
     common: bool
-    orders: tuple | None
+    orders: tuple | str
     median_m: float
     log_sd: float
 
-    def height_weights(self):
-        """(7,) variances of the Legendre polynomials, so that the mean variance is one."""
+    def height_columns(self, zeta):
+        """(n, r) columns whose products are h: of a component that is not local."""
+        if self.orders == "joints":
+            return joint_profile(zeta)[:, None]
         weights = np.array(self.orders, dtype=float)
-        return weights / np.sum(weights / (2 * np.arange(len(weights)) + 1))
+        weights = weights / np.sum(weights / (2 * np.arange(len(weights)) + 1))
+        return (legendre(zeta) * np.sqrt(weights))[:, weights > 0]
 
     def height_covariance(self, zeta, other):
         """(n, m) h between heights (n,) and (m,) of a course."""
-        if self.orders is None:
+        if self.orders == "local":
             return np.exp(-np.abs(np.subtract.outer(zeta, other)) / LOCAL_LENGTH)
-        return (legendre(zeta) * self.height_weights()) @ legendre(other).T
+        return self.height_columns(zeta) @ self.height_columns(other).T
+
+    @property
+    def is_level(self):
+        """Whether it is the same at all heights of a course."""
+        return self.orders == _LEVEL
 
 
-_LEVEL = (1.0, 0, 0, 0, 0, 0, 0)
 COMPONENTS = (
     Component("common bulge", "bulge", "mean", True, (0, 0, 1, 0, 0.02, 0, 0.003), 2e-3, 1.0),
     Component(
         "own bulge", "bulge", "mean", False, (0, *(j**-2.0 for j in range(1, 7))), 1e-3, 1.0
     ),
+    Component("drawn-in joints", "bulge", "mean", True, "joints", 0.8e-3, 1.5),
     Component("common ovality", "ovality", "oval", True, _LEVEL, 4e-3, 3.0),
     Component("own ovality", "ovality", "oval", False, _LEVEL, 2e-3, 3.0),
     Component("common seams", "seams", "seam", True, _LEVEL, 3e-3, 1.5),
     Component("own seams", "seams", "seam", False, _LEVEL, 2e-3, 1.5),
-    Component("dents", "seams", "seam", False, None, 2e-3, 1.5),
+    Component("dents", "seams", "seam", False, "local", 2e-3, 1.5),
 )
 
 
 def legendre(zeta):
     """(n, 7) Legendre polynomials of order 0 to 6."""
     return np.polynomial.legendre.legvander(np.asarray(zeta, dtype=float), ORDERS)
+
+
+def joint_profile(zeta):
+    """(n,) how a joint draws the plate in, of mean zero and mean square one over a course."""
+    w = JOINT_LENGTH
+    mean = w * (1 - np.exp(-1 / w))
+    square = w / 2 * (1 - np.exp(-2 / w)) - mean**2
+    return (np.exp(-(1 - np.abs(zeta)) / w) - mean) / np.sqrt(square)
 
 
 def oval_correlation(difference_rad):
