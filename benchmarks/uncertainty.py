@@ -26,15 +26,13 @@ from dataclasses import dataclass
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.linalg import block_diag
 
-from tankcal.geometry.form import Form
-from tankcal.geometry.outlines import interpolate_outline
+from tankcal.geometry.field.estimate import LEVELS
 from tankcal.job import DeclaredInput
 from tankcal.tank.body import Body, ShellPart, survey_factors
 from tankcal.tank.capacity import Capacity
-from tankcal.tank.courses import course_shape
+from tankcal.tank.courses import CourseShape, gauss_levels
 from tankcal.tank.fittings import deadwood
 from tankcal.tank.volumes import ShellVolume
 
@@ -105,14 +103,13 @@ def case_of(rows):
 def body_of(case):
     """The tank as the chain makes it, from the radii and their covariance."""
     scale = 1 + EXPANSION * (REFERENCE_C - SHELL_C)
-    directions = np.column_stack([np.sin(AZIMUTHS), np.cos(AZIMUTHS)])
+    zeta, inset = 2 * gauss_levels() - 1, PLATE_M + PAINT_M
     shapes = []
     for bottom, ring in zip(JOINTS_M, case.estimates[:RADII].reshape(COURSES, -1), strict=True):
-        outline = interpolate_outline(ring[:, None] * directions, 0, 0, Form())
-        span = bottom, bottom + COURSE_M
-        inset = PLATE_M + PAINT_M
-        shapes.append(course_shape(*span, [np.mean(span)], [outline], inset_m=inset, scale=scale))
-    by_radii = block_diag(*(shape.upper("by_parameters") for shape in shapes))
+        inside = np.tile(scale * (ring - inset), (LEVELS, 1))
+        missed = {"barrel": -(zeta**2)}  # beyond the ring at the middle of a course
+        shapes.append(CourseShape(bottom, bottom + COURSE_M, inside, inset, scale, missed))
+    by_radii = block_diag(*(2 * np.pi / POINTS * shape.gradients_m for shape in shapes))
     covariance = by_radii @ case.covariance[:RADII, :RADII] @ by_radii.T
     shell = ShellPart(
         ShellVolume(tuple(shapes)),
@@ -120,6 +117,7 @@ def body_of(case):
         scale,
         EXPANSION,
         bearing=("plate_thickness", "paint", "shell_temperature", "expansion"),
+        departures=("barrel",),
     )
     declared = [DeclaredInput(name, u, "", u, dof=dof) for name, (_, u, dof) in SHARED.items()]
     declared.append(DeclaredInput("course_heights", HEIGHT_U_M, "m", HEIGHT_U_M))
@@ -147,8 +145,8 @@ class Plain:
         scale, self.datum, offset, self.barrel, plate, paint, shell_c, expansion = shared
         heights, self.fittings = x[CORRELATED:][:COURSES], x[-len(FITTINGS) :]
         size = 1 + expansion * (REFERENCE_C - shell_c)
-        inside, products = (rings * scale + (offset - plate - paint)) * size, spline_products()
-        self.area = np.array([ring @ products @ ring for ring in inside], dtype=x.dtype)
+        inside = (rings * scale + (offset - plate - paint)) * size
+        self.area = np.array([np.pi / POINTS * (ring @ ring) for ring in inside], dtype=x.dtype)
         self.below = np.zeros_like(self.area)  # what a course that began at 0 would lack
         joint = 0.0
         for course in range(1, COURSES):
@@ -163,16 +161,6 @@ class Plain:
         for fitting, part in zip(self.fittings, parts, strict=True):
             found = found + fitting * part
         return found
-
-
-def spline_products():
-    """(POINTS, POINTS) W of the area r' W r within the periodic cubic through radii r."""
-    around, unit = np.append(AZIMUTHS, 2 * np.pi), np.eye(POINTS)
-    spline = CubicSpline(around, np.vstack([unit, unit[:1]]), bc_type="periodic")
-    nodes, weights = np.polynomial.legendre.leggauss(4)
-    half = np.pi / POINTS
-    values = spline((AZIMUTHS[:, None] + half * (1 + nodes)).ravel())
-    return 0.5 * half * values.T @ (values * np.tile(weights, POINTS)[:, None])
 
 
 def rows_of(case):

@@ -1,7 +1,7 @@
 """Horizontal sections of a shell: points grouped, the circle through them, and their outline.
 
-Points of a course that do not lie level make no section: they are fitted together, and the course
-is integrated through outlines at its Gauss levels.
+Points of a course that do not lie level make no section: their circle and outline are those at
+their mean height, fitted with a taper and a lean.
 """
 
 from dataclasses import dataclass, replace
@@ -10,16 +10,15 @@ import numpy as np
 import scipy.sparse
 
 from tankcal.geometry.circles import Circle, fit_circle, radial_covariance, taubin_circle
-from tankcal.geometry.form import Form, Sample, free_columns, harmonics
+from tankcal.geometry.form import Sample, free_columns, harmonics
 from tankcal.geometry.outlines import (
     Outline,
     evenly_spread,
     interpolate_outline,
     polar,
     radii_by_coordinates,
-    smooth_outlines,
+    smooth_outline,
 )
-from tankcal.quadrature import panels
 
 RING_GAP, RING_SPREAD = 0.10, 0.15  # of the course height: between rings, within one ring
 LEAST_SD_M = 1e-6  # added to a full covariance that is singular
@@ -61,26 +60,8 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Level:
-    """An outline at one height, of those that a course is integrated through.
-
-    Attributes
-    ----------
-    height_m : float
-        Above the bottom, m.
-    outline : Outline
-    by_points : ndarray, shape (p, 3n)
-        Derivative of the outline's parameters by x, y, z of the group's points.
-    """
-
-    height_m: float
-    outline: Outline
-    by_points: np.ndarray
-
-
-@dataclass(frozen=True)
 class Section:
-    """Points of a group, their circle, their outline, and the levels that its volume is made of.
+    """Points of a group, their circle, and their outline.
 
     Attributes
     ----------
@@ -89,18 +70,14 @@ class Section:
         Least-squares circle.
     outline : Outline
         At group.height_m.
-    parameters_by_points : ndarray, shape (p, 3n)
-        Derivative of the outline's parameters by x, y, z of the points.
-    levels : tuple of Level
-        The outline itself; of points that are not level, the outlines at two or three Gauss levels
-        of the course.
+    radii_by_points : sparse array, shape (n, 3n)
+        Derivative of the outline's n measured radii by x, y, z of the points.
     """
 
     group: Group
     circle: Circle
     outline: Outline
-    parameters_by_points: np.ndarray
-    levels: tuple[Level, ...]
+    radii_by_points: scipy.sparse.csr_array
 
 
 def group_by_height(height_m, azimuth_rad, course, joints_m):
@@ -332,9 +309,9 @@ def slide(xyz_m, slope, z_m):
 
 
 def sample_of(group, xyz_m, covariance_m2, slope, z_m):
-    """What a group of points tells of the shell's form.
+    """Radii of a group of points about the centre of their circle, for the field of the wall.
 
-    Radius and centre are free in the estimation of the form, so an approximate centre will do.
+    Radius and centre are free there, so an approximate centre will do.
 
     Parameters
     ----------
@@ -353,12 +330,11 @@ def sample_of(group, xyz_m, covariance_m2, slope, z_m):
     return Sample(azimuth, radius, noise, group.course, _zeta(group, xyz_m, z_m), group.degree)
 
 
-def fit_section(group, xyz_m, covariance_m2, slope, z_m, form):
-    """Circle and outlines of the points of one group.
+def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
+    """Circle and outline of the points of one group.
 
-    The outline of level points is interpolated where they are evenly spread, else smoothed. Points
-    that are not level (group.degree above 0) give smoothed outlines at the Gauss levels of the
-    course, fitted together.
+    The outline of level points is interpolated where they are evenly spread, else smoothed, as that
+    of points that are not level (group.degree above 0).
 
     Parameters
     ----------
@@ -371,8 +347,8 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form):
         Of the axis: metres in x and y for a metre of height.
     z_m : float
         Height of the cut (group.height_m) in the frame of the points.
-    form : Form or float
-        Of the shell, or the amplitude (m2) of one that is common to all sections.
+    form_m2 : float
+        Amplitude of the shell's form: mode k >= 2 of the outline has the variance form_m2 k^-3.
 
     Returns
     -------
@@ -396,26 +372,18 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form):
     >>> round(float(np.sqrt(section.circle.cofactor_m2[2, 2])) * 1000, 4)
     0.2887
     """
-    form = form if isinstance(form, Form) else Form(common_m2=form)
     xy, by_xyz = slide(xyz_m, slope, z_m)
     covariance_xy = by_xyz @ covariance_m2 @ by_xyz.T
     circle = fit_circle(xy, covariance_xy)
     centre = circle.x_m, circle.y_m
     here, zeta = float(group.zeta(group.height_m)), _zeta(group, xyz_m, z_m)
     if group.degree == 0 and evenly_spread(polar(xy, *centre)[0]):
-        outlines = (interpolate_outline(xy, *centre, form, here),) * 2
-        heights = [group.height_m]
+        outline = interpolate_outline(xy, *centre, form_m2)
     else:
         noise = radial_covariance(xy, centre, covariance_xy)
-        heights = panels(group.span_m, group.degree + 1)[0] if group.degree else [group.height_m]
-        zetas = [here, *group.zeta(heights)]
-        outlines = smooth_outlines(xy, *centre, noise, form, zeta, zetas, group.degree)
-    by_radii = radii_by_coordinates(outlines[0], xy) @ by_xyz
-    by_points = [outline.from_radii @ by_radii for outline in outlines]
-    levels = zip(heights, outlines[1:], by_points[1:], strict=True)
-    return Section(
-        group, circle, outlines[0], by_points[0], tuple(Level(float(h), o, b) for h, o, b in levels)
-    )
+        away = zeta - here
+        outline = smooth_outline(xy, *centre, noise, form_m2, away, group.degree)
+    return Section(group, circle, outline, radii_by_coordinates(outline, xy) @ by_xyz)
 
 
 def _zeta(group, xyz_m, z_m):

@@ -3,6 +3,7 @@
 import numpy as np
 
 import tankcal.sections as sections
+from tankcal.tank.courses import CourseShape, gauss_levels
 
 
 def ring(radius, azimuth, centre=(0.0, 0.0), z=0.0):
@@ -34,3 +35,11 @@ def section_of(xyz, z=0.0, course=0, variance=1e-6, form_m2=0.0):
     group = sections.Group("1", course, z, np.arange(len(xyz)))
     covariance = variance * np.eye(3 * len(xyz))
     return sections.fit_section(group, xyz, covariance, (0.0, 0.0), z, form_m2)
+
+
+def course_of(bottom, top, radius_at, *, inset_m=0.0, scale=1.0, missed=None, count=72):
+    """A CourseShape of surveyed radii: radius_at(z) a number or a function of the azimuth."""
+    heights = bottom + gauss_levels() * (top - bottom)
+    radii = np.stack([ring(radius_at(z), azimuths(count))[:, :2] for z in heights])
+    inside = scale * (np.hypot(*radii.transpose(2, 0, 1)) - inset_m)
+    return CourseShape(bottom, top, inside, inset_m, scale, missed or {})

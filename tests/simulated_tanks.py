@@ -16,11 +16,9 @@ from shapes import azimuths, ring
 
 import tankcal
 from tankcal.geometry.form import harmonics
-from tankcal.geometry.spectrum import estimate_form
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.tanks import body_of, zero_height
-from tankcal.pipeline.wall import find_wall
-from tankcal.sections import fit_section, sample_of
+from tankcal.pipeline.wall import find_wall, fit_wall
 from tankcal.tank.capacity import Capacity
 from tankcal.uncertainty import Source
 
@@ -211,21 +209,8 @@ class VerticalTanks:
         return job, np.array(shell) + volume * (1 + off["deadwood"]) * wet
 
     def table(self, job):
-        """The table of a survey: sections about the axis of the design, none of its points lost."""
-        joints = np.cumsum([0.0] + [course.height_m for course in job.courses])
-        fits = []
-        for group in (section.group for section in self.wall.sections):
-            noise = np.diag(np.full(3 * len(group.members), self.point_sd**2))
-            xyz = job.points.xyz_m[group.members]
-            fits.append((group, xyz, noise, self.wall.shell.slope, group.height_m))
-        form = estimate_form([sample_of(*one) for one in fits])
-        wall = replace(
-            self.wall,
-            joints_m=joints / np.hypot(1.0, self.wall.shell.tilt),
-            form=form,
-            sections=tuple(fit_section(*one, form) for one in fits),
-        )
-        return table_of(job, wall, self.dips)
+        """The table of a survey about the axis of the design, none of its points lost."""
+        return table_of(job, fit_wall(job, self.wall.shell), self.dips)
 
     def _waves(self, rng):
         """(3, 2 (MODES - 1)) amplitudes of the modes 2, 3, ... of each course's outline, m.

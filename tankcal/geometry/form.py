@@ -1,8 +1,7 @@
 """The form of a shell: what departs from a circle, as a spectrum that its own points are asked for.
 
 Mode k >= 2 of the outline has the variance amplitude k^-3 (dents, ovality, plates that do not meet
-in a circle). One part of it runs up the whole shell, one belongs to each course, and one grows with
-the height within a course.
+in a circle).
 """
 
 from dataclasses import dataclass
@@ -12,37 +11,6 @@ import scipy.linalg
 
 HARMONICS = 36  # of a smoothed outline: a dent of 10 deg still shows, if the prior believes it
 FORM_MODES = 100  # of the form that may lie between points; the others hold 2.5e-4 of its variance
-
-
-@dataclass(frozen=True)
-class Form:
-    """Amplitudes of the form: variance amplitude k^-3 of the cos and the sin of each mode k >= 2.
-
-    Attributes
-    ----------
-    common_m2, own_m2 : float
-        Of what runs up the whole shell, and of what each course has of its own, m2.
-    rising_m2 : float
-        Of what grows from the middle of a course, -1 at its bottom to +1 at its top, m2.
-    common_dof, own_dof : float
-        Degrees of freedom of the first two.
-    common_contrasts, own_contrasts : float
-        Residuals that they were estimated from, noise and all: more than the degrees of freedom
-        where much of what they show is noise.
-    """
-
-    common_m2: float = 0.0
-    own_m2: float = 0.0
-    rising_m2: float = 0.0
-    common_dof: float = np.inf
-    own_dof: float = np.inf
-    common_contrasts: float = np.inf
-    own_contrasts: float = np.inf
-
-    @property
-    def level_m2(self):
-        """Amplitude of the form of one section."""
-        return self.common_m2 + self.own_m2
 
 
 @dataclass(frozen=True)

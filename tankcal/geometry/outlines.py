@@ -14,7 +14,6 @@ import scipy.sparse
 from tankcal.errors import SolutionError
 from tankcal.geometry.form import (
     HARMONICS,
-    Form,
     free_columns,
     harmonics,
     mode_variances,
@@ -45,12 +44,8 @@ class Outline:
         Derivative of the parameters by the n measured radii.
     azimuth_rad : ndarray, shape (n,)
         Azimuths of the measured radii, rad.
-    zeta : ndarray, shape (n,)
-        Their heights within the course, -1 at its bottom to +1 at its top.
-    level_zeta : float
-        Height of the outline within the course.
-    form : Form
-        Form of the shell.
+    form_m2 : float
+        Amplitude of the shell's form.
     knots_rad : ndarray, shape (k,)
         Ascending azimuths where the polynomial pieces meet, rad.
     """
@@ -61,9 +56,7 @@ class Outline:
     parameters: np.ndarray
     from_radii: np.ndarray
     azimuth_rad: np.ndarray
-    zeta: np.ndarray
-    level_zeta: float
-    form: Form
+    form_m2: float
     knots_rad: np.ndarray
 
     def basis(self, azimuth_rad, derivative=0):
@@ -89,26 +82,13 @@ class Outline:
         azimuth, weight = self.nodes()
         return float(polar_products(self.radius_m(azimuth), weight)[0, 0])
 
-    def shown_form(self):
-        """(2, p, modes) parameters that a form of amplitude one, sd of each mode, makes here.
-
-        First of a form that is the same at all heights, then of one that grows with zeta.
-        """
-        waves = unit_form(self.azimuth_rad)
-        return np.stack([self.from_radii @ waves, self.from_radii @ (waves * self.zeta[:, None])])
-
     def unseen_form_m(self, azimuth_rad):
-        """(len(azimuth), 2 modes) how far the outline misses one sd of each mode of the form.
+        """(len(azimuth), modes) how far the outline misses one sd of each mode of the form.
 
-        The outline of a mode sampled at the points, less the mode itself: first of the form that is
-        the same at all heights of the course, then of the rising form.
+        The outline of a mode sampled at the points, less the mode itself.
         """
-        shown = self.basis(azimuth_rad) @ self.shown_form()
-        there = unit_form(azimuth_rad)
-        missed = shown - np.stack([there, self.level_zeta * there])
-        return np.hstack(
-            [np.sqrt(self.form.level_m2) * missed[0], np.sqrt(self.form.rising_m2) * missed[1]]
-        )
+        shown = self.basis(azimuth_rad) @ (self.from_radii @ unit_form(self.azimuth_rad))
+        return np.sqrt(self.form_m2) * (shown - unit_form(azimuth_rad))
 
     def modes_m(self, highest=6):
         """(highest + 1, 2) cos and sin amplitude of each Fourier mode; row 0 is the mean radius."""
@@ -171,7 +151,7 @@ def evenly_spread(azimuth_rad):
     return bool(gaps.max() <= WIDEST_GAP * middle and gaps.min() >= NARROWEST_GAP * middle)
 
 
-def interpolate_outline(xy_m, x_m, y_m, form, zeta=0.0):
+def interpolate_outline(xy_m, x_m, y_m, form_m2):
     """Periodic cubic r(azimuth) through every point, about the centre (x_m, y_m).
 
     The spline has continuous curvature and no end.
@@ -182,10 +162,8 @@ def interpolate_outline(xy_m, x_m, y_m, form, zeta=0.0):
         Points, m.
     x_m, y_m : float
         Centre, m.
-    form : Form
-        Form of the shell.
-    zeta : float, optional
-        Height of the section within its course, -1 to 1.
+    form_m2 : float
+        Amplitude of the shell's form.
 
     Returns
     -------
@@ -200,7 +178,7 @@ def interpolate_outline(xy_m, x_m, y_m, form, zeta=0.0):
     --------
     >>> angle = np.arange(8) * np.pi / 4
     >>> xy_m = 2 * np.column_stack([np.sin(angle), np.cos(angle)])
-    >>> interpolate_outline(xy_m, 0.0, 0.0, Form()).parameters.round(9)
+    >>> interpolate_outline(xy_m, 0.0, 0.0, 0.0).parameters.round(9)
     array([2., 2., 2., 2., 2., 2., 2., 2.])
     """
     azimuth, radius = polar(xy_m, x_m, y_m)
@@ -229,20 +207,16 @@ def interpolate_outline(xy_m, x_m, y_m, form, zeta=0.0):
         parameters=radius[order],
         from_radii=np.eye(n)[order],
         azimuth_rad=azimuth,
-        zeta=np.full(n, zeta),
-        level_zeta=zeta,
-        form=form,
+        form_m2=form_m2,
         knots_rad=knots,
     )
 
 
-def smooth_outlines(xy_m, x_m, y_m, noise_m2, form, zeta, levels_zeta, degree):
-    """Outlines at some heights of a course, fitted together to points that are not level.
+def smooth_outline(xy_m, x_m, y_m, noise_m2, form_m2, away, degree):
+    """Outline smoothed by harmonics, of points that may not be level.
 
-    r(a, zeta) = r0(a) + zeta r1(a) + (3 zeta^2 - 1)/2 c, with harmonics to order 36 in r0 (prior
-    variance form.level_m2 k^-3 of mode k >= 2) and in r1 (form.rising_m2 k^-3). Free are radius and
-    centre of r0, from degree 1 on those of r1 (taper and lean, so that a frustum and a leaning
-    cylinder are exact), and at degree 2 the barrel c. At degree 0 nothing changes with height.
+    r(a) with harmonics to order 36 (prior variance form_m2 k^-3 of mode k >= 2). Free are radius
+    and centre, from degree 1 on taper and lean, and at degree 2 the barrel.
 
     Parameters
     ----------
@@ -252,18 +226,16 @@ def smooth_outlines(xy_m, x_m, y_m, noise_m2, form, zeta, levels_zeta, degree):
         Centre, m.
     noise_m2 : ndarray, shape (n, n) or (n,)
         Covariance of the measured radii, m2.
-    form : Form
-        Form of the shell.
-    zeta : ndarray, shape (n,)
-        Heights of the points within the course, -1 to 1.
-    levels_zeta : sequence of float
-        Heights of the outlines.
+    form_m2 : float
+        Amplitude of the shell's form.
+    away : ndarray, shape (n,)
+        Heights of the points above the outline, in halves of the course.
     degree : int
         0, 1 or 2.
 
     Returns
     -------
-    tuple of Outline
+    Outline
 
     Raises
     ------
@@ -271,26 +243,22 @@ def smooth_outlines(xy_m, x_m, y_m, noise_m2, form, zeta, levels_zeta, degree):
         When the points do not determine what is free.
     """
     azimuth, radius = polar(xy_m, x_m, y_m)
-    free = free_columns(azimuth, zeta, degree)
-    waves = unit_form(azimuth, HARMONICS)
-    random = [np.sqrt(form.level_m2) * waves]
-    random += [np.sqrt(form.rising_m2) * waves * zeta[:, None]] * (degree > 0)
-    solution = _shrunk(np.hstack([free, *random]), free.shape[1], noise_m2)
-    return tuple(
-        Outline(
-            x_m=x_m,
-            y_m=y_m,
-            kind="smoothed",
-            parameters=from_radii @ radius,
-            from_radii=from_radii,
-            azimuth_rad=azimuth,
-            zeta=zeta,
-            level_zeta=level,
-            form=form,
-            knots_rad=np.arange(4 * HARMONICS) * FULL_TURN / (4 * HARMONICS),
-        )
-        for level in levels_zeta
-        for from_radii in [_at_level(solution, level, form, degree)]
+    free = free_columns(azimuth, away, degree)
+    waves = np.sqrt(form_m2) * unit_form(azimuth, HARMONICS)
+    solution = _shrunk(np.hstack([free, waves]), free.shape[1], noise_m2)
+    sd = np.sqrt(form_m2 * mode_variances(HARMONICS))[:, None]
+    from_radii = np.vstack([solution[:3], sd * solution[free.shape[1] :]])
+    if degree == 2:
+        from_radii[0] -= 0.5 * solution[6]  # the parabola where the outline stands
+    return Outline(
+        x_m=x_m,
+        y_m=y_m,
+        kind="smoothed",
+        parameters=from_radii @ radius,
+        from_radii=from_radii,
+        azimuth_rad=azimuth,
+        form_m2=form_m2,
+        knots_rad=np.arange(4 * HARMONICS) * FULL_TURN / (4 * HARMONICS),
     )
 
 
@@ -308,20 +276,6 @@ def _shrunk(design, free, noise_m2):
             )
         )
     return np.linalg.solve(normal, whiten(white, noise_m2, transposed=True).T)
-
-
-def _at_level(solution, level, form, degree):
-    """(2 HARMONICS + 1, n) coefficients of the outline at one height, by the radii."""
-    free = len(free_columns(np.zeros(1), np.zeros(1), degree)[0])
-    sd = np.sqrt(mode_variances(HARMONICS))[:, None]
-    first = free + len(sd)
-    coefficients = np.vstack([solution[:3], np.sqrt(form.level_m2) * sd * solution[free:first]])
-    if degree >= 1:
-        rising = np.sqrt(form.rising_m2) * sd * solution[first:]
-        coefficients = coefficients + level * np.vstack([solution[3:6], rising])
-    if degree == 2:
-        coefficients[0] += (1.5 * level**2 - 0.5) * solution[6]
-    return coefficients
 
 
 def radii_by_coordinates(outline, xy_m):

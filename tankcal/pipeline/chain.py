@@ -184,7 +184,7 @@ class Result:
         """The shell as surveyed, without any correction (`volumes.ShellVolume`); else None."""
         if self.wall is None:
             return None
-        return shell_volume(self.job.courses, self.wall.joints_m, self.wall.sections)
+        return shell_volume(self.wall)
 
     @property
     def capacity(self) -> pd.DataFrame:

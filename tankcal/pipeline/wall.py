@@ -1,15 +1,17 @@
-"""From surveyed points to the sections of the shell: wall and axis, covariance, form, outlines."""
+"""From surveyed points to the wall: told from clutter, its axis, covariance, field and sections."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg
 import scipy.sparse
 
 from tankcal.errors import InputError, Problem, SolutionError
-from tankcal.geometry.form import Form
+from tankcal.geometry.field.amplitudes import Sites, estimate_amplitudes
+from tankcal.geometry.field.components import OVALITY_MODES
+from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.outlines import polar
 from tankcal.geometry.shell import Shell, course_of, find_shell
-from tankcal.geometry.spectrum import estimate_form
 from tankcal.messages import message
 from tankcal.pipeline.survey_warnings import (
     ADVISED_POINTS,
@@ -48,10 +50,12 @@ class Wall:
         Of the accepted points, m2.
     noise_dof : float
         Degrees of freedom of that covariance's scale.
-    form : Form
-        What the points tell of the form between them.
+    field : WallField
+        The wall itself, between the points too: what the table is made of.
+    radii_by_points : sparse array, shape (m, 3 m)
+        Derivative of the field's readings, in their order, by x, y, z of the accepted points.
     sections : tuple of Section
-        From the bottom up.
+        Circles and outlines through the points, from the bottom up.
     """
 
     shell: Shell
@@ -59,12 +63,13 @@ class Wall:
     accepted: np.ndarray
     covariance_m2: object
     noise_dof: float
-    form: Form
+    field: WallField
+    radii_by_points: scipy.sparse.csr_array
     sections: tuple[Section, ...]
 
 
-def find_wall(job, progress, dof=np.inf, form=None):
-    """Separate the wall from clutter, and fit its axis and sections to the points of a job.
+def find_wall(job, progress, dof=np.inf, amplitudes=None):
+    """Separate the wall from clutter, and fit axis, field and sections to the points of a job.
 
     Parameters
     ----------
@@ -73,8 +78,8 @@ def find_wall(job, progress, dof=np.inf, form=None):
         Called with a line of text as each step begins.
     dof : float, default inf
         Degrees of freedom of the points' covariance, where it was given.
-    form : Form, optional
-        Form of the shell, where it is known beforehand; None: it is estimated from the points.
+    amplitudes : Amplitudes, optional
+        Of the wall's components, where they are known beforehand; None: they are estimated.
 
     Returns
     -------
@@ -94,29 +99,103 @@ def find_wall(job, progress, dof=np.inf, form=None):
             count=len(job.points.names),
         )
     )
-    heights = np.cumsum([0.0] + [course.height_m for course in job.courses])
-    sds, estimated = radial_sds(job.points), noise_is_estimated(job)
-    shell = _shell(job, heights, sds)
-    accepted = np.flatnonzero(shell.reason == "")
-    joints = heights / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
+    shell = _shell(job, _heights(job), radial_sds(job.points))
     progress(
         message(
             "fitting_sections",
             "fitting sections through {count} points of the wall",
-            count=len(accepted),
+            count=np.count_nonzero(shell.reason == ""),
         )
     )
+    return fit_wall(job, shell, dof, amplitudes=amplitudes)
+
+
+def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
+    """Fit field and sections to the points of a job that are known to be of its wall.
+
+    Parameters
+    ----------
+    job : Job
+    shell : Shell
+        Which points are of the wall, and its axis.
+    dof, amplitudes
+        As in `find_wall`.
+
+    Returns
+    -------
+    Wall
+
+    Raises
+    ------
+    InputError
+        When a course is left with too few points.
+    """
+    accepted = np.flatnonzero(shell.reason == "")
+    joints = _heights(job) / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
     groups = _groups(job, shell, accepted, joints)
-    given = _given_covariance(job.points, accepted)
-    factor = (shell.noise_m / _median_sd(sds)) ** 2 if estimated else 1.0
-    if form is None:
-        samples = [sample_of(*one) for one in _to_fit(job, shell, accepted, groups, given)]
-        form = estimate_form(samples, factor)
-    covariance = given if factor == 1.0 else given * factor  # it may be half a gigabyte
+    sds, estimated = radial_sds(job.points), noise_is_estimated(job)
+    covariance = _given_covariance(job.points, accepted)
+    if estimated:  # what is given counts in relation; about as large as the points scatter
+        covariance = covariance * (shell.noise_m / _median_sd(sds)) ** 2
     to_fit = _to_fit(job, shell, accepted, groups, covariance)
-    sections = tuple(fit_section(*one, form) for one in to_fit)
-    noise_dof = shell.noise_dof if estimated else dof
-    return Wall(shell, joints, accepted, covariance, noise_dof, form, sections)
+    sites, radius, noise = _sites(groups, [sample_of(*one) for one in to_fit])
+    nominal = job.tank.nominal_diameter_m / 2
+    if amplitudes is None:
+        amplitudes = estimate_amplitudes(sites, radius, noise, nominal, estimate_noise=estimated)
+    if amplitudes.noise != 1.0:  # it may be half a gigabyte
+        covariance, noise = covariance * amplitudes.noise, noise * amplitudes.noise
+    field = WallField(sites, radius, noise, amplitudes, nominal)
+    form_m2 = _form_m2(amplitudes)
+    to_fit = _to_fit(job, shell, accepted, groups, covariance)
+    sections = tuple(fit_section(*one, form_m2) for one in to_fit)
+    return Wall(
+        shell=shell,
+        joints_m=joints,
+        accepted=accepted,
+        covariance_m2=covariance,
+        noise_dof=amplitudes.noise_dof if estimated else dof,
+        field=field,
+        radii_by_points=_radii_by_points(sections, len(accepted)),
+        sections=sections,
+    )
+
+
+def _heights(job):
+    """(courses + 1,) heights of the joints above the bottom, along the shell."""
+    return np.cumsum([0.0] + [course.height_m for course in job.courses])
+
+
+def _sites(groups, samples):
+    """`Sites` of the field, the radii there, and their covariance: (n,) without correlations."""
+    counts = [len(one.radius_m) for one in samples]
+    sites = Sites(
+        course=np.repeat([one.course for one in groups], counts),
+        ring=np.repeat(np.arange(len(groups)), counts),
+        zeta=np.concatenate([one.zeta for one in samples]),
+        azimuth_rad=np.concatenate([one.azimuth_rad for one in samples]),
+        leans=np.repeat([one.degree > 0 for one in groups], counts),
+    )
+    noise = [
+        np.diag(one.covariance_m2) if np.ndim(one.covariance_m2) == 1 else one.covariance_m2
+        for one in samples
+    ]
+    radius = np.concatenate([one.radius_m for one in samples])
+    return sites, radius, scipy.linalg.block_diag(*noise)
+
+
+def _form_m2(amplitudes):
+    """Amplitude of k^-3 that has all departures from a circle: what smooths an outline."""
+    total = amplitudes.total_m2(common=True) + amplitudes.total_m2(common=False)
+    return total / np.sum(OVALITY_MODES**-3)
+
+
+def _radii_by_points(sections, count):
+    """(m, 3 m) derivative of the radii of all sections, one after another, by all points."""
+    rows = scipy.sparse.block_diag([one.radii_by_points for one in sections], format="csc")
+    order = np.concatenate([coordinates_of(one.group.members) for one in sections])
+    place = np.empty(3 * count, dtype=int)
+    place[order] = np.arange(len(order))
+    return rows[:, place].tocsr()
 
 
 def _shell(job, heights, sds):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.geometry.form import Form, mode_variances
+from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.model import Box, Known, Limits, Pillar, Plan, Tie
 from tankcal.planning.patterns import photographs_of, setups_of, shell_of, tape_of, targets_of
@@ -50,7 +50,7 @@ def assemble_plan(job, given, folder):
         facing=facing,
         obstacles=tuple(_obstacle(one) for one in given.repeated["obstacles"]),
         limits=_limits(given.single["limits"]),
-        form=_form(pattern),
+        amplitudes=_amplitudes(pattern),
         costs={key: value or 0.0 for key, value in given.single["costs"].values.items()},
         folder=folder,
     )
@@ -110,11 +110,7 @@ def _limits(given):
     )
 
 
-def _form(pattern):
-    """The expected Form: an rms departure s is the amplitude s^2 / sum of k^-3 over k >= 2.
-
-    The variance of a form of amplitude A at one azimuth is A sum k^-3, for cos^2 + sin^2 = 1.
-    """
-    whole, common = ((pattern[key] or 0.0) / 1000 for key in ("form_mm", "common_form_mm"))
-    unit = mode_variances(HIGHEST_MODE)[::2].sum()
-    return Form(common_m2=common**2 / unit, own_m2=max(whole**2 - common**2, 0.0) / unit)
+def _amplitudes(pattern):
+    """The `Amplitudes` of the wall to be surveyed: as assumed, but for what the plan says."""
+    given = (pattern[key] for key in ("form_mm", "common_form_mm"))
+    return assumed_amplitudes(*(None if one is None else one / 1000 for one in given))

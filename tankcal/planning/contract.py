@@ -57,7 +57,7 @@ PATTERN = (
     _number("offset_mm", "from the wall to the centre of a target; blank: 0", 0, 500),
     _number("axis_x_m", "x of the tank's axis; blank: 0", -1e8, 1e8),
     _number("axis_y_m", "y of the tank's axis; blank: 0", -1e8, 1e8),
-    _number("form_mm", "rms departure of a course from a circle, as expected; blank: 0", 0, 500),
+    _number("form_mm", "rms ovality of a course, as expected; blank: as walls have it", 0, 500),
     _number("common_form_mm", "the part of it that runs up the whole shell; blank: 0", 0, 500),
 )
 PHOTO_RINGS = (

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tankcal.geometry.form import Form
+from tankcal.geometry.field.amplitudes import Amplitudes, assumed_amplitudes
 from tankcal.job.model import Job
 from tankcal.job.tables import RawJob
 
@@ -195,8 +195,8 @@ class Plan:
         Tuples of the classes above; extra are points off the wall, {name: (3,) nominal place}.
     facing : dict
         {name: (3,) unit normal} of the marks among them that face one way, as tape ends do.
-    form : Form
-        What the wall departs from a circle, as it is expected.
+    amplitudes : Amplitudes
+        How far the wall departs from a cylinder, as it is expected.
     costs : dict
         {item: cost of one}: "photo_station", "photograph", "setup", "tape", "control_point",
         "target", "reading".
@@ -217,7 +217,7 @@ class Plan:
     facing: dict
     obstacles: tuple
     limits: Limits
-    form: Form = field(default_factory=Form)
+    amplitudes: Amplitudes = field(default_factory=assumed_amplitudes)
     costs: dict = field(default_factory=dict)
     folder: str = ""
     given: RawJob | None = None

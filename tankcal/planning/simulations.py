@@ -132,7 +132,7 @@ def _made(plan, measurements):
     adjustment = adjust_survey(measurements)
     points = wall_points(adjustment, measurements, plan.job.survey.side)
     job = replace(plan.job, points=s_transform(points), measurements=None)
-    wall = find_wall(job, lambda text: None, adjustment.dof, plan.form)
+    wall = find_wall(job, lambda text: None, adjustment.dof, plan.amplitudes)
     body = compute_table(job, wall).body
     return adjustment, float(body.volume_m3(np.array([body.highest_m]))[0])
 

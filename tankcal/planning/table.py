@@ -53,7 +53,7 @@ def predicted_table(plan, predicted):
     """
     there, covariance = _covered(plan, predicted)
     job = replace(plan.job, points=_points(plan, there, covariance), measurements=None)
-    wall = find_wall(job, lambda text: None, form=plan.form)
+    wall = find_wall(job, lambda text: None, amplitudes=plan.amplitudes)
     if len(wall.accepted) < len(there):
         covariance = PredictedCovariance(covariance.adjusted, covariance.points[wall.accepted])
     wall = replace(wall, covariance_m2=covariance)

@@ -26,7 +26,7 @@ class BudgetLine(Saved):
     halved: float | None = key("factor of U if u were half as large")
     is_default: bool | None = key("whether nobody declared the input")
     correlations: list = key("[input, r] of the inputs that it is correlated with")
-    note: str = key("as declared")
+    note: str = key("as declared; of the wall: learned, half_learned or assumed")
 
 
 class VolumeJudged(Saved):

@@ -6,7 +6,9 @@ import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.record.schema import Saved, filled_from, key
-from tankcal.tank.courses import FORM_GRID
+from tankcal.sections import coordinates_of
+
+EVEN = 720  # azimuths; they resolve products of an outline with the highest mode of the form
 
 
 class Wall(Saved):
@@ -263,13 +265,13 @@ def _section_of(result, section):
 
 
 def _area_sd(result, section):
-    azimuth, weight = section.outline.nodes()
-    gradient = (section.outline.radius_m(azimuth) * weight) @ section.outline.basis(azimuth)
-    by_points = gradient @ section.parameters_by_points
-    index = (3 * section.group.members[:, None] + np.arange(3)).ravel()
-    even = np.arange(FORM_GRID) * FULL_TURN / FORM_GRID
-    form = section.outline.radius_m(even) @ section.outline.unseen_form_m(even)
-    form = form * FULL_TURN / FORM_GRID
+    outline = section.outline
+    azimuth, weight = outline.nodes()
+    gradient = (outline.radius_m(azimuth) * weight) @ outline.basis(azimuth)
+    by_points = (gradient @ outline.from_radii) @ section.radii_by_points
+    index = coordinates_of(section.group.members)
+    even = np.arange(EVEN) * FULL_TURN / EVEN
+    form = outline.radius_m(even) @ outline.unseen_form_m(even) * FULL_TURN / EVEN
     return np.sqrt(
         by_points @ (result.wall.covariance_m2[index][:, index] @ by_points) + form @ form
     )

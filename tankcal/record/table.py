@@ -198,12 +198,12 @@ def _shell_choices(job, result):
         "covariance": _covariance_choice(job) if result.adjustment is None else "adjusted",
         "course_of_points": "section" if any(job.points.section) else "height",
         "shape": _one_or_mixed(section.outline.kind for section in wall.sections),
-        "between_sections": _between_sections(result),
+        "between_sections": "field",
         "tilt": _tilt_choice(job, wall.shell),
         "course_heights": "along_axis",
         "roof": _fitting_choice(job.switches.roof, roof, roof),
         "snooping": CRITICAL if job.snooping else "off",
-        "form": "estimated",
+        "form": "learned",
         "covariance_sd_mm": 1000 * np.sqrt(np.median(wall.covariance_m2.diagonal())),
     }
 
@@ -250,11 +250,6 @@ def _thickness_choice(job):
     if not given:
         return "none"
     return "subtracted" if job.switches.plate and job.switches.paint else "off"
-
-
-def _between_sections(result):
-    constant = [course.degree == 0 for course in result.body.shell.volume.courses]
-    return "constant" if all(constant) else "mixed" if any(constant) else "polynomial"
 
 
 def _one_or_mixed(values):

@@ -27,7 +27,7 @@ class Factor:
     Attributes
     ----------
     kind : str
-        "points", "form", "own_form", or what a named cause is ("instrument_scale").
+        "points", "bulge", "ovality", "seams", or what a named cause is ("instrument_scale").
     columns : ndarray, shape (f, c)
         Factor of the covariance of a shell's features or of a solid's inputs.
     dof, u, unit, type, note, contrasts
@@ -105,8 +105,7 @@ class ShellPart(Part):
         Inside, at the table's temperature.
     factors : tuple of Factor
         What the survey leaves uncertain about the shell's features: of the points, of causes that
-        they share, and of the form between them, common to all courses ("form") or of each course
-        ("own_form").
+        they share, and of the wall between them ("bulge", "ovality", "seams").
     scale : float
         Of horizontal lengths, by temperature; expansion_per_k its coefficient.
     stretch : float
@@ -116,6 +115,8 @@ class ShellPart(Part):
         used.
     tilt : float
         Of the axis, m/m.
+    departures : tuple of str
+        Those of "barrel" and "taper" that were declared: the others are in the factor "bulge".
     """
 
     volume: ShellVolume
@@ -125,6 +126,7 @@ class ShellPart(Part):
     stretch: float = 1.0
     bearing: tuple[str, ...] = ()
     tilt: float = 0.0
+    departures: tuple[str, ...] = ()
 
     @property
     def breakpoints_m(self):
@@ -142,10 +144,10 @@ class ShellPart(Part):
     def derivatives(self, levels_m):
         """{input: (rows,)} m3 per SI unit; of "course_heights" (rows, courses), each its own.
 
-        "barrel" is the same in all courses, for in a real tank they had one sign. "scale"
-        multiplies the surveyed lengths square to the axis, "offset" adds to every surveyed radius,
-        "datum" lifts the table's zero. "tilt" leans the shell as surveyed: the horizontal cut is
-        sqrt(1 + m^2) times the one square to the axis.
+        "barrel" and "taper", where they were declared, are the same in all courses, for in a real
+        tank they had one sign. "scale" multiplies the surveyed lengths square to the axis, "offset"
+        adds to every surveyed radius, "datum" lifts the table's zero. "tilt" leans the shell as
+        surveyed: the horizontal cut is sqrt(1 + m^2) times the one square to the axis.
         """
         wet = np.maximum(levels_m, 0.0)
         features = self.volume.features, self.volume.girth_features, self.volume.scale_features
@@ -164,7 +166,7 @@ class ShellPart(Part):
             "scale": by_scale,
             "datum": area,
             "offset": loss,
-            "barrel": self.volume.by_common_barrel_m2(wet),
+            **{name: self.volume.by_missed_m2(wet, name) for name in self.departures},
             "course_heights": self.volume.by_course_heights_m2(wet),
             "tilt": volume * self.tilt / (1 + self.tilt**2),
             **{name: of_corrections[name] for name in self.bearing},

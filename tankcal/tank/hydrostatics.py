@@ -11,7 +11,7 @@ on, so with the table's liquid up to h the surveyed radius at the height z chang
 
 and the volume below h by the integral of girth(z) d + pi d^2 over z < h: the whole of
 1/2 integral (r + d)^2 da less 1/2 integral r^2 da of an irregular outline r(a). The integral is
-exact: girths are quadratic in z at most, d is linear below and above h_s.
+exact: girths are of degree six in z, d is linear below and above h_s.
 
 K belongs to a course; r0 is its mean inside radius over azimuth and height, unloaded.
 Sources: ISO 7507-1 and API MPMS 2.2A (liquid head); thin hoop: Timoshenko, Strength of Materials.
@@ -23,13 +23,15 @@ from functools import cached_property
 import numpy as np
 
 from tankcal.errors import HeightError, SolutionError
+from tankcal.geometry.field.estimate import LEVELS
 from tankcal.messages import message
-from tankcal.tank.courses import CourseShape
+from tankcal.quadrature import height_polynomials
+from tankcal.tank.courses import CourseShape, gauss_levels
 from tankcal.tank.parts import Part, as_levels
 from tankcal.tank.volumes import ShellVolume
 
 STANDARD_GRAVITY = 9.80665  # m/s2
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(2)  # exact to degree three
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact to degree seven
 INPUTS = (
     "datum",
     "youngs_modulus",
@@ -264,8 +266,7 @@ def _refuse_numbers(modulus, gravity, *others):
 
 def _hoop(course, plate, modulus, gravity, scale, density, level):
     """The hoop of a course; r0 + B r0^2 is the surveyed radius, B of the survey's liquid."""
-    powers = np.vander(course.levels, increasing=True)
-    girths = np.linalg.solve(powers, np.diag(course.girths_m) / scale)
+    girths = height_polynomials(gauss_levels(), LEVELS - 1) @ course.girths_m / scale
     height = course.height_m
     girth = _integrals(course, girths, np.array([course.top_m]))[0]
     surveyed = girth[0] / (2 * np.pi * height)
@@ -341,7 +342,7 @@ def _integrals(course, girth_m, ends):
     z = course.bottom_m + half * (1 + NODES[:, None])
     girth = _girth_m(course, girth_m, z)
     terms = [girth, girth * z, np.ones_like(z), z, z**2]
-    return np.array([(WEIGHTS[0] * term[0] + WEIGHTS[1] * term[1]) * half for term in terms])
+    return np.array([(WEIGHTS @ term) * half for term in terms])
 
 
 def _girth_m(course, girth_m, z):

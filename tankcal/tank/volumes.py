@@ -1,13 +1,11 @@
-"""The volume of a shell of courses, from its sections, with the covariance kept to every row.
+"""The volume of a shell of courses, from its outlines, with the covariance kept to every row.
 
-Within a course the outline is interpolated in height, r(a, z) = sum l_i(z) r_i(a), never the area,
-and never across a joint. What a course is integrated through are the outlines of that polynomial at
-its Gauss levels. With their area products G_ij = 1/2 integral r_i r_j da, inside,
+What a course is integrated through are its outlines at its Gauss levels. With their areas A_i,
 
-    A(z) = sum l_i(z) l_j(z) G_ij,      V(h) = sum over courses of G_ij integral l_i l_j dz,
+    A(t) = sum l_i(t) A_i,      V(h) = sum over courses of A_i integral l_i dz,
 
-so every row is a weighted sum of a few products: that is the whole propagation. Heights in this
-room count from the bottom of the first course, in metres.
+so every row is a weighted sum of a few areas: that is the whole propagation. Nothing is
+interpolated across a joint. Heights in this room count from the bottom of the first course, m.
 """
 
 from dataclasses import dataclass
@@ -15,20 +13,19 @@ from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
-import scipy.linalg
 
 from tankcal.errors import HeightError
+from tankcal.geometry.field.estimate import LEVELS
 from tankcal.messages import message
-from tankcal.quadrature import height_polynomials, height_products
+from tankcal.quadrature import height_polynomials, panels
 from tankcal.tank.courses import CourseShape, gauss_levels
-from tankcal.uncertainty import factor_of
 
 
 @dataclass(frozen=True)
 class ShellVolume:
     """The courses of a shell, and what can be integrated over them.
 
-    The features of a shell are the products G_ij (i <= j) of all its courses, one after another.
+    The features of a shell are the areas at the Gauss levels of all its courses, one after another.
 
     Attributes
     ----------
@@ -49,39 +46,25 @@ class ShellVolume:
         polynomials = self._by_height(self.features)
         return np.array([below.sum() - above[0] for below, above in pairwise(polynomials)])
 
-    @property
-    def form_m2(self):
-        """(f, modes) effect on the features of one sd of each mode of the common form."""
-        return np.vstack([course.upper("by_form_m2") for course in self.courses])
-
-    @property
-    def own_form_m2(self):
-        """(f, c) factor of the features' covariance by the form that each course has of its own."""
-        factors = []
-        for course in self.courses:
-            effect = course.upper("by_own_form_m2")
-            factors.append(factor_of(effect @ effect.T))
-        return scipy.linalg.block_diag(*factors)
-
     @cached_property
     def features(self):
-        """(f,) the products that every volume is a sum of, m2."""
-        return np.concatenate([course.upper("products_m2") for course in self.courses])
+        """(f,) the areas that every volume is a sum of, m2."""
+        return np.concatenate([course.areas_m2 for course in self.courses])
 
     @cached_property
     def girth_features(self):
         """(f,) what the features lose by metre of inset, m."""
-        return np.concatenate([course.upper("girths_m") for course in self.courses])
+        return np.concatenate([course.girths_m for course in self.courses])
 
     @cached_property
     def scale_features(self):
         """(f,) derivative of the features by a scale of the surveyed lengths, m2."""
-        return np.concatenate([course.upper("by_scale_m2") for course in self.courses])
+        return np.concatenate([course.by_scale_m2 for course in self.courses])
 
     def integrated(self, heights_m, features):
         """(rows, ...) sums over the features of the volume below each height, m times their unit.
 
-        features (f,) or (f, c): each column stands for the products G_ij of all courses.
+        features (f,) or (f, c): each column stands for the areas of all courses.
         Raises HeightError for a height outside the shell.
         """
         features = np.asarray(features, dtype=float)
@@ -118,23 +101,22 @@ class ShellVolume:
         """(rows,) derivative of the volume below each height by a scale of surveyed lengths."""
         return self.integrated(heights_m, self.scale_features)
 
-    def by_barrel_m2(self, heights_m):
-        """(rows, courses) derivative of the volume below each height by the barrel of each course.
+    def by_missed_m2(self, heights_m, name, *, each=False):
+        """Derivative of the volume below each height by a departure that was not declared.
 
-        A barrel of b adds b (1 - (2 t - 1)^2) to the radius at the part t of the course's height: b
-        in the middle, nothing at the ends. What the outlines do not show of it, times the girth, is
-        integrated: after one section in the middle -1/3 of the barrel at the top of the course,
-        after two at the Gauss levels nothing there, after three nothing at any height. Independent
-        barrels of u = 4 mm and one section at mid-height are 145 ppm of the volume of 8 courses of
-        radius 6.5 m: 2 u / (3 R sqrt(8)).
+        name  "barrel" or "taper": the estimate lacks `CourseShape.missed` of it
+        each  False: (rows,) by one departure of all courses; True: (rows, courses) by that of each
+
+        After one ring in the middle of each course nobody knows of a barrel: b zeta^2 is lacking,
+        and -1/3 of b in the volume of a course.
         """
-        alone = np.eye(len(self.courses))
-        polynomials = [np.outer(*pair) for pair in zip(self._missed_m, alone, strict=True)]
-        return self._integral(heights_m, polynomials)
-
-    def by_common_barrel_m2(self, heights_m):
-        """(rows,) derivative of the volume below each height by one barrel of all courses."""
-        return self._integral(heights_m, self._missed_m)
+        missed = [course.girths_m * course.missed[name] for course in self.courses]
+        if not each:
+            return self.integrated(heights_m, np.concatenate(missed))
+        own = np.zeros((len(self.features), len(missed)))
+        for index, one in enumerate(missed):
+            own[index * LEVELS : (index + 1) * LEVELS, index] = one
+        return self.integrated(heights_m, own)
 
     def by_course_heights_m2(self, heights_m):
         """(rows, courses) derivative of the volume below each height by the height of each course.
@@ -149,33 +131,18 @@ class ShellVolume:
 
     @property
     def barrels_m(self):
-        """(courses,) barrel of the mean radius; nan of a course seen at two levels or one."""
-        found = []
-        for course in self.courses:
-            radii = np.sqrt(np.diag(course.products_m2) / np.pi)
-            seen = _height_polynomials(course.degree) @ radii
-            found.append(-seen[2] / 4 if course.degree == 2 else np.nan)
-        return np.array(found)
-
-    @cached_property
-    def _missed_m(self):
-        """For each course by the powers of t the unseen part of a unit barrel, times the girth."""
-        missed = []
-        for course in self.courses:
-            powers = _height_polynomials(course.degree)
-            unseen = np.array([0.0, 4.0, -4.0])
-            unseen[: course.degree + 1] -= powers @ course.barrel
-            missed.append(np.convolve(powers @ np.diag(course.girths_m), unseen))
-        return missed
+        """(courses,) barrel of the mean radius: that of its parabola of least squares in height."""
+        zeta, weights = panels([-1.0, 1.0], LEVELS)
+        parabola = 1.5 * zeta**2 - 0.5
+        radii = [np.sqrt(course.areas_m2 / np.pi) for course in self.courses]
+        return np.array([-1.5 * 2.5 * np.sum(weights * parabola * one) for one in radii])
 
     def _by_height(self, features):
-        """For each course the coefficients of sum l_i(t) l_j(t) features_ij by the powers of t."""
-        polynomials, start = [], 0
-        for course in self.courses:
-            weights = _height_weights(course.degree)
-            polynomials.append(weights @ features[start : start + weights.shape[1]])
-            start += weights.shape[1]
-        return polynomials
+        """For each course the coefficients of sum l_i(t) features_i by the powers of t."""
+        return [
+            _height_polynomials() @ features[start : start + LEVELS]
+            for start in range(0, len(features), LEVELS)
+        ]
 
     def _integral(self, heights_m, polynomials):
         """(rows, ...) integral below each height of a polynomial in t of each course.
@@ -223,14 +190,6 @@ class ShellVolume:
 
 
 @cache
-def _height_polynomials(degree):
-    """(degree + 1, degree + 1) coefficients of l_i(t) of the Gauss levels, by the powers of t."""
-    return height_polynomials(gauss_levels(degree), degree)
-
-
-@cache
-def _height_weights(degree):
-    """(2 degree + 1, f) coefficients of l_i l_j, what stands below the diagonal counted there."""
-    products = height_products(gauss_levels(degree), degree)
-    rows, columns = np.triu_indices(products.shape[1])
-    return products[:, rows, columns] * np.where(rows == columns, 1.0, 2.0)
+def _height_polynomials():
+    """(LEVELS, LEVELS) coefficients of l_i(t) of the Gauss levels, by the powers of t."""
+    return height_polynomials(gauss_levels(), LEVELS - 1)

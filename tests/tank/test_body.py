@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from jacobians import assert_derivative
-from shapes import azimuths, ring, section_of
+from shapes import course_of
 
 from tankcal.tank.body import Body, Factor, ShellPart, SolidPart
-from tankcal.tank.courses import course_shape
 from tankcal.tank.parts import Part
 from tankcal.tank.solids import Sphere
 from tankcal.tank.volumes import ShellVolume
@@ -73,8 +72,7 @@ def test_relevant_undeclared_inputs_are_named():
 
 @pytest.mark.parametrize(("courses", "named"), [(1, False), (2, True)])
 def test_course_heights_affect_even_a_perfect_shell(courses, named):
-    outline = section_of(ring(6.5, azimuths(24))).outline
-    shapes = [course_shape(i, i + 1, [i + 0.5], [outline]) for i in range(courses)]
+    shapes = [course_of(i, i + 1, lambda z: 6.5) for i in range(courses)]
     perfect = ShellPart(ShellVolume(tuple(shapes)), (), 1.0, 1.1e-5)
     assert not perfect.derivatives(LEVELS / 4)["course_heights"].any()
     body = Body((perfect,), (), 0.0, float(courses))
@@ -87,10 +85,9 @@ def test_irrelevant_declared_input_changes_nothing():
 
 
 def shell(inset=0.008, temperature=12.0, expansion=1.1e-5, radius=6.5, heights=False):
-    outline = section_of(ring(radius, azimuths(24))).outline
     scale = 1 + expansion * temperature
     stretch = scale if heights else 1.0
-    course = course_shape(0, 9.5 * stretch, [4.0 * stretch], [outline], inset_m=inset, scale=scale)
+    course = course_of(0, 9.5 * stretch, lambda z: radius, inset_m=inset, scale=scale)
     names = ("plate_thickness", "paint", "shell_temperature", "expansion")
     return ShellPart(ShellVolume((course,)), (), scale, expansion, stretch, names)
 

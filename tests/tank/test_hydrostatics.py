@@ -5,10 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from jacobians import assert_derivative
-from shapes import azimuths, modes, ring, section_of
+from shapes import course_of, modes
 
 from tankcal.errors import HeightError, SolutionError
-from tankcal.tank.courses import course_shape
 from tankcal.tank.hydrostatics import STANDARD_GRAVITY, liquid_head
 from tankcal.tank.volumes import ShellVolume
 
@@ -16,15 +15,9 @@ E_PA, JOINTS, PLATES = 206e9, np.array([0, 3.2, 6.4, 9.5]), np.array([0.010, 0.0
 LEVELS = np.array([-0.1, 0.0, 0.4, 1.7, 3.2, 3.3, 4.99, 5.0, 5.01, 6.4, 7.7, 9.4, 9.5])
 
 
-def shell(joints, radius_at, points=24, **options):
-    """Courses with sections at two heights each; radius_at(z) a number or function of azimuth."""
-    courses = []
-    for bottom, top in pairwise(joints):
-        levels = bottom + np.array([0.2, 0.7]) * (top - bottom)
-        rings = [ring(radius_at(z), azimuths(points)) for z in levels]
-        outlines = [section_of(xyz).outline for xyz in rings]
-        courses.append(course_shape(bottom, top, levels, outlines, **options))
-    return ShellVolume(tuple(courses))
+def shell(joints, radius_at, **options):
+    """Courses of radii radius_at(z), a number or a function of the azimuth."""
+    return ShellVolume(tuple(course_of(*span, radius_at, **options) for span in pairwise(joints)))
 
 
 def compliance(z, radius=6.5):
@@ -66,7 +59,7 @@ def bulging(survey_density, survey_level, *, scale=1.0):
         bulge = compliance(z) * survey_density * max(survey_level - z, 0)
         return lambda azimuth: outline(azimuth) + bulge
 
-    return outline, shell(JOINTS, surveyed, points=90, scale=scale)
+    return outline, shell(JOINTS, surveyed, count=90, scale=scale)
 
 
 def fine_volume(outline, density, level):
@@ -184,7 +177,7 @@ def test_the_area_is_the_derivative_by_the_level():
 
 
 def test_a_thermal_scale_of_the_shell_does_not_move_the_girths():
-    """Two ways to the same inside radius: scaled at once, or by course_shape (property)."""
+    """Two ways to the same inside radius: scaled at once, or as the course's scale (property)."""
     at_once = shell(JOINTS, lambda z: 6.5 * 1.01)
     by_shape = shell(JOINTS, lambda z: 6.5, scale=1.01)
     one = liquid_head(at_once, PLATES, E_PA, 1000.0)

@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from jacobians import assert_derivative
-from shapes import azimuths, modes, ring, section_of
+from shapes import azimuths, course_of, modes, ring
 
 from tankcal.errors import HeightError, InputError
-from tankcal.tank.courses import course_shape
 from tankcal.tank.meshes import (
     Band,
     closed_mesh,
@@ -516,31 +515,28 @@ def test_unused_lines_of_mesh_file_change_nothing(kind):
 
 
 def dented_shell(seed=3, inset=0.008, scale=1.0004):
-    """Three courses of 1, 2 and 3 sections with ovality, a lean and steps, and the outlines."""
-    rng = np.random.default_rng(seed)
-    joints, levels = [0.0, 1.9, 3.8, 5.7], [[1.0], [2.3, 3.4], [4.0, 4.75, 5.5]]
-    shapes, outlines = [], []
-    for index, heights in enumerate(levels):
-        own = []
-        for height in heights:
-            outline, _ = modes(6.5 - 0.01 * index, 2, *rng.normal(0, 0.02, (2, 4)))
-            centre = (3e5 + 0.01 * height, 7.4e6 - 0.02 * height)
-            own.append(section_of(ring(outline, azimuths(24), centre)).outline)
-        options = {"inset_m": inset * (index + 1), "scale": scale}
-        shapes.append(course_shape(joints[index], joints[index + 1], heights, own, **options))
-        outlines.append(own)
-    insets = [inset, 2 * inset, 3 * inset]
-    return ShellVolume(tuple(shapes)), (levels, outlines), {"insets_m": insets, "scale": scale}
+    """Three courses with ovality that turns with the height, and steps."""
+    rng, joints, courses = np.random.default_rng(seed), [0.0, 1.9, 3.8, 5.7], []
+    for index, low in enumerate(joints[:-1]):
+        ends = [modes(0.0, 2, *rng.normal(0, 0.02, (2, 4)))[0] for _ in range(2)]
+
+        def radius_at(z, low=low, ends=ends, index=index):
+            t = (z - low) / 1.9
+            return lambda a: 6.5 - 0.01 * index + (1 - t) * ends[0](a) + t**2 * ends[1](a)
+
+        own = {"inset_m": inset * (index + 1), "scale": scale}
+        courses.append(course_of(low, joints[index + 1], radius_at, **own))
+    return ShellVolume(tuple(courses))
 
 
 @pytest.mark.slow
 def test_loft_of_shell_agrees_with_quadrature(figure):
     """Every row; the error falls with the square of the spacing, to the quadrature."""
-    volume, sections, options = dented_shell()
+    volume = dented_shell()
     rows = np.array([0.95, 1.9, 2.85, 3.8, 4.75, 5.7])
     exact, errors = volume.volume_m3(rows), []
     for slices, count in ((8, 180), (16, 360), (32, 720)):
-        mesh = loft(shell_bands(volume, *sections, slices=slices, azimuths=count, **options))
+        mesh = loft(shell_bands(volume, slices=slices, azimuths=count))
         assert mesh.bodies == 1
         errors.append(mesh_part(mesh).volume_m3(rows) / exact - 1)
     limit = (4 * errors[2] - errors[1]) / 3
@@ -554,8 +550,8 @@ def test_loft_of_shell_agrees_with_quadrature(figure):
 
 
 def test_the_loft_is_watertight_where_courses_step_trimesh():
-    volume, sections, options = dented_shell()
-    mesh = loft(shell_bands(volume, *sections, slices=2, azimuths=90, **options))
+    volume = dented_shell()
+    mesh = loft(shell_bands(volume, slices=2, azimuths=90))
     local = mesh.vertices_m - mesh.vertices_m.mean(axis=0)
     found = trimesh.Trimesh(local, mesh.faces, process=False)
     assert found.is_watertight

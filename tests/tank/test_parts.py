@@ -7,13 +7,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from jacobians import assert_derivative
-from shapes import azimuths, ring, section_of
+from shapes import course_of
 
 from tankcal.pipeline.tanks.vertical import widen_bottom
 from tankcal.quadrature import panels
 from tankcal.tank.body import Factor, ShellPart, SolidPart
 from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
-from tankcal.tank.courses import course_shape
 from tankcal.tank.fittings import deadwood, floating_roof
 from tankcal.tank.heads import End
 from tankcal.tank.hydrostatics import liquid_head
@@ -52,8 +51,8 @@ class Example:
 def shell_volume(scale=1.0, inset=0.01):
     shapes = []
     for bottom, radius in ((0.0, 6.5), (3.0, 6.49)):
-        outline = section_of(ring(scale * radius, azimuths(24))).outline
-        shapes.append(course_shape(bottom, bottom + 3.0, [bottom + 1.5], [outline], inset_m=inset))
+        wide = scale * radius
+        shapes.append(course_of(bottom, bottom + 3.0, lambda z, wide=wide: wide, inset_m=inset))
     return ShellVolume(tuple(shapes))
 
 

@@ -87,6 +87,9 @@ INPUTS = {
         "mm", 1e3, 500, "height of the bottom's surface, the same error everywhere"
     ),
     "barrel": _of_shell("mm", 1e3, 100, "how far a course bulges between its sections"),
+    "taper": _of_shell(
+        "mm", 1e3, 100, "how far one end of a course is wider than its middle, the same in all"
+    ),
     "roof_mass": _of_shell("kg", 1, 1e6, "mass of the floating roof", default_share=0.01),
     "deadwood": Declarable(
         "%",

@@ -11,7 +11,7 @@ def estimates_of(job):
     """
     survey, table, material = job.survey, job.table, job.material
     given = {
-        **dict.fromkeys(("scale", "datum", "offset", "bottom", "barrel", "deadwood"), 0.0),
+        **dict.fromkeys(("scale", "datum", "offset", "bottom", "barrel", "taper", "deadwood"), 0.0),
         "surface": 0.0,
         "plate_thickness": _only([1000 * course.thickness_m for course in job.courses]),
         "paint": _only([1000 * course.paint_m for course in job.courses]),

@@ -4,19 +4,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.geometry.field.components import COMPONENTS, KINDS
+from tankcal.geometry.field.estimate import gauss_heights
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.tanks.common import deadwood_part, estimates_of, is_warmed, thermal_scale
 from tankcal.sections import coordinates_of
 from tankcal.tank.body import Body, Factor, ShellPart, survey_factors
 from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
-from tankcal.tank.courses import course_shape
+from tankcal.tank.courses import DEPARTURES, CourseShape
 from tankcal.tank.fittings import floating_roof
 from tankcal.tank.hydrostatics import liquid_head
 from tankcal.tank.liquid_zone import Above, measured_bottom
 from tankcal.tank.parts import Part
 from tankcal.tank.terrain import Footprint
 from tankcal.tank.volumes import ShellVolume
-from tankcal.uncertainty import factor_of
+from tankcal.uncertainty import dof_of_unsure_variance, factor_of
 
 # A bottom whose plan is the shell's own: what widens the shell widens it, too.
 
@@ -75,6 +77,7 @@ def widen_bottom(part, shell):
     return Widened(part, {name: rate for name, rate in rates.items() if name in bearing})
 
 
+LEARNED, HALF_LEARNED = 0.1, 0.5  # share of a variance's logarithm that is assumed, at most
 FOOTPRINT = 360  # azimuths of the outline that a bottom is computed over
 
 
@@ -87,26 +90,30 @@ def insets_of(job, switches):
     ]
 
 
-def shell_volume(courses, joints_m, sections, insets_m=None, scale=1.0, stretch=1.0):
-    """The shell of courses from its sections; every course has one section at least.
+def shell_volume(wall, insets_m=None, scale=1.0, stretch=1.0):
+    """The shell of courses as the field of its wall has it.
 
     insets_m (courses,) off the radii; scale of horizontal lengths, stretch of heights
     """
-    shapes = []
-    for index in range(len(courses)):
-        own = [s.levels for s in sections if s.group.course == index]
-        levels = [level for of_section in own for level in of_section]
-        shapes.append(
-            course_shape(
-                stretch * joints_m[index],
-                stretch * joints_m[index + 1],
-                [stretch * level.height_m for level in levels],
-                [level.outline for level in levels],
-                inset_m=insets_m[index] if insets_m else 0.0,
-                scale=scale,
+    outlines, sites, levels = wall.field.outlines_m, wall.field.sites, gauss_heights()
+    missed = {
+        name: departure(levels) - wall.field.seen(departure(sites.zeta))
+        for name, departure in DEPARTURES.items()
+    }
+    insets = insets_m or [0.0] * len(outlines)
+    return ShellVolume(
+        tuple(
+            CourseShape(
+                stretch * wall.joints_m[index],
+                stretch * wall.joints_m[index + 1],
+                scale * (outlines[index] - inset),
+                inset,
+                scale,
+                {name: lacking[index] for name, lacking in missed.items()},
             )
+            for index, inset in enumerate(insets)
         )
-    return ShellVolume(tuple(shapes))
+    )
 
 
 def shell_zero(job, wall):
@@ -184,16 +191,12 @@ def _footprint(wall, shell):
 
     As large as the shell is there.
     """
-    level = min((level for section in wall.sections for level in section.levels), key=_height)
-    outline = level.outline
+    lowest = wall.sections[0]
+    outline, height = lowest.outline, lowest.group.height_m
     radius = outline.radius_m(np.arange(FOOTPRINT) * FULL_TURN / FOOTPRINT)
     larger = shell.volume.area_m2([0.0])[0] / (np.pi * np.mean(radius**2))
-    x, y = np.array([outline.x_m, outline.y_m]) - level.height_m * np.array(wall.shell.slope)
+    x, y = np.array([outline.x_m, outline.y_m]) - height * np.array(wall.shell.slope)
     return Footprint(float(x), float(y), radius * np.sqrt(larger))
-
-
-def _height(level):
-    return level.height_m
 
 
 def _head(job, shell, zero):
@@ -232,9 +235,7 @@ def _shell(job, wall, switches, uncertain):
     stretch = scale if job.table.height_expansion else 1.0
     leaning = np.hypot(1.0, wall.shell.tilt)  # horizontal cut over cut square to the axis
     volume = shell_volume(
-        job.courses,
-        wall.joints_m,
-        wall.sections,
+        wall,
         insets_of(job, switches),
         scale if switches.tilt else scale / np.sqrt(leaning),
         stretch if switches.tilt else stretch * leaning,
@@ -247,29 +248,70 @@ def _shell(job, wall, switches, uncertain):
         stretch,
         _bearing(job, switches),
         wall.shell.tilt if switches.tilt else 0.0,
+        tuple(name for name in DEPARTURES if name in _declared(job)),
     )
+
+
+def _declared(job):
+    return {one.name for one in job.inputs}
 
 
 def _factors(job, wall, volume):
-    """What the survey leaves uncertain about the features of the shell: points, and form."""
-    jacobian = _features_by_points(volume, wall.sections, wall.covariance_m2.shape[0])
+    """What the survey leaves uncertain about the features of the shell: the points, and the wall
+    between them by the kinds of its components.
+    """
+    features = _functionals(wall, volume)
+    jacobian = features.weights @ wall.radii_by_points
     covariance = jacobian @ (wall.covariance_m2 @ jacobian.T)
     causes, index = job.points.causes, coordinates_of(wall.accepted)
     effects = [jacobian @ cause.column_m[index] for cause in causes]
-    common, form = volume.form_m2, wall.form
-    of_form = (
-        Factor(
-            "form",
-            factor_of(common @ common.T),
-            form.common_dof,
-            contrasts=form.common_contrasts,
-        ),
-        Factor("own_form", volume.own_form_m2, form.own_dof, contrasts=form.own_contrasts),
-    )
     return (
         *survey_factors(covariance, wall.noise_dof, causes, effects),
-        *(one for one in of_form if one.columns.shape[1]),
+        *_of_the_unseen(wall, volume, features, _declared(job)),
     )
+
+
+def _of_the_unseen(wall, volume, features, declared):
+    """A `Factor` of each kind of component that the survey did not see all of.
+
+    Its degrees of freedom are those of the full shell's volume. What was declared, a barrel or a
+    taper, is not counted again.
+    """
+    amplitudes, top = wall.field.amplitudes, volume.weights_m([volume.height_m])[0]
+    assumed, found = amplitudes.assumed_share(), []
+    for kind in KINDS:
+        chosen = [
+            index
+            for index, one in enumerate(COMPONENTS)
+            if one.kind == kind and one.declared_as not in declared
+        ]
+        if not chosen:
+            continue
+        parts = [features.unseen(index) for index in chosen]
+        shares = np.maximum([top @ part @ top for part in parts], 1e-30)
+        shares = shares / shares.sum()
+        log_sd = np.sqrt(shares @ amplitudes.log_covariance[np.ix_(chosen, chosen)] @ shares)
+        found.append(
+            Factor(
+                kind,
+                factor_of(sum(parts)),
+                dof_of_unsure_variance(float(log_sd)),
+                note=_told_by(float(shares @ assumed[chosen])),
+            )
+        )
+    return tuple(one for one in found if one.columns.shape[1])
+
+
+def _told_by(assumed):
+    """Code of how an amplitude is known, by the share of it that is assumed."""
+    if assumed < LEARNED:
+        return "learned"
+    return "half_learned" if assumed < HALF_LEARNED else "assumed"
+
+
+def _functionals(wall, volume):
+    """`Functionals` of the features of the shell, by the surveyed radii."""
+    return wall.field.functionals(np.array([course.gradients_m for course in volume.courses]))
 
 
 def volume_by_points(job, wall, levels_m):
@@ -289,7 +331,7 @@ def volume_by_points(job, wall, levels_m):
         m3 per m.
     """
     volume = _shell(job, wall, job.switches, False).volume
-    jacobian = _features_by_points(volume, wall.sections, wall.covariance_m2.shape[0])
+    jacobian = _functionals(wall, volume).weights @ wall.radii_by_points
     return volume.weights_m(np.maximum(levels_m, 0.0)) @ jacobian
 
 
@@ -303,22 +345,3 @@ def _bearing(job, switches):
         "expansion": is_warmed(job, switches),
     }
     return tuple(name for name, does in bears.items() if does)
-
-
-def _features_by_points(volume, sections, coordinates):
-    """(f, coordinates) derivative of the features of the shell by the points' coordinates."""
-    jacobians = []
-    for index, course in enumerate(volume.courses):
-        by_parameters = course.upper("by_parameters")
-        jacobian = np.zeros((len(by_parameters), coordinates))
-        start = 0
-        for section in sections:
-            if section.group.course != index:
-                continue
-            columns = coordinates_of(section.group.members)
-            for level in section.levels:
-                part = by_parameters[:, start : start + len(level.by_points)]
-                start += part.shape[1]
-                jacobian[:, columns] += part @ level.by_points
-        jacobians.append(jacobian)
-    return np.vstack(jacobians)

@@ -241,10 +241,6 @@ def _first(names):
 
 
 NEAR_M = 0.05  # of the wall: a station nearer than this stands in it
-WITHOUT_FORM = (
-    "not given: U leaves out how far the wall departs from a circle between its targets, and will "
-    "be larger in the survey; expected its rms departure"
-)
 
 
 def check_plan(plan, given, raw, log):
@@ -261,8 +257,6 @@ def check_plan(plan, given, raw, log):
     _check_fixed_photo(plan, raw, log)
     check_tied(plan, given, log)
     warn_of_places(plan, given, log)
-    if not plan.form.own_m2 and not plan.form.common_m2:
-        pattern.tell(log.warning, "form_mm", message("plan_without_form", WITHOUT_FORM))
 
 
 def _check_fixed_photo(plan, raw, log):

@@ -12,6 +12,7 @@ USEFUL = 0.995  # of U: an input that would change it less is not worth measurin
 UNLIMITED = "∞"  # degrees of freedom
 LEAST_WRITTEN_OUT = 1e-4  # of a sensitivity in the workbook
 SMALL = 5e-4  # share of the variance that prints as 0.0 %
+OF_WALL = ("bulge", "ovality", "seams")  # inputs whose note is a code: how their size is known
 
 
 def top(paper):
@@ -62,7 +63,13 @@ def _estimate(paper, line):
 
 def _note(paper, line):
     """What was declared beside an input, and what it is correlated with."""
-    return "; ".join(filter(None, [line["note"], *correlations(paper, [line])]))
+    return "; ".join(filter(None, [_beside(paper, line), *correlations(paper, [line])]))
+
+
+def _beside(paper, line):
+    """What was declared beside an input, or how the size of a part of the wall is known."""
+    told = paper.words["told_by"] if line["input"] in OF_WALL else {}
+    return told.get(line["note"], line["note"])
 
 
 def _digits_of_sensitivity(line):
@@ -105,7 +112,7 @@ def budget_table(decimals):
 def _notes(paper, lines):
     """What was declared beside the inputs, a sentence each."""
     texts = [
-        paper.word("texts.input_note", input=paper.input_name(line), note=line["note"])
+        paper.word("texts.input_note", input=paper.input_name(line), note=_beside(paper, line))
         for line in lines
         if line["note"] and line["note"] not in paper.input_name(line)
     ]

@@ -4,9 +4,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
+from tankcal.geometry.field.estimate import LEVELS
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.quadrature import height_basis
+from tankcal.tank.courses import gauss_levels
 from tankcal.tank.meshes.checks import closed_mesh
 
 
@@ -24,24 +27,24 @@ class Band:
     centre_m: np.ndarray
 
 
-def shell_bands(volume, levels_m, outlines, *, insets_m=None, scale=1.0, slices=8, azimuths=720):
-    """The bands of a shell, one a course, from what its volume was integrated from.
+def shell_bands(volume, *, slices=8, azimuths=720):
+    """The bands of a shell, one a course, from the outlines that its volume is integrated from.
 
     volume    `tankcal.tank.volumes.ShellVolume`
-    levels_m, outlines, insets_m, scale
-              as given to `course_shape`, all but the scale for each course
     slices    of a course; azimuths of a ring
     """
     azimuth = np.arange(azimuths) * FULL_TURN / azimuths
+    parts = np.linspace(0.0, 1.0, slices + 1)
+    basis = height_basis(gauss_levels(), parts, LEVELS - 1)
     bands = []
-    parts = zip(volume.courses, levels_m, outlines, strict=True)
-    for index, (course, levels, own) in enumerate(parts):
-        heights = np.linspace(course.bottom_m, course.top_m, slices + 1)
-        basis = height_basis(levels, heights, course.degree)
-        inset = insets_m[index] if insets_m else 0.0
-        radii = np.array([scale * (outline.radius_m(azimuth) - inset) for outline in own])
-        centres = np.array([(outline.x_m, outline.y_m) for outline in own])
-        bands.append(Band(heights, basis @ radii, basis @ centres))
+    for course in volume.courses:
+        outlines = basis @ course.outlines_m
+        even = np.linspace(0.0, FULL_TURN, outlines.shape[1] + 1)
+        closed = np.column_stack([outlines, outlines[:, 0]])
+        radii = CubicSpline(even, closed, axis=1, bc_type="periodic")(azimuth)
+        heights = course.bottom_m + parts * course.height_m
+        heights[-1] = course.top_m
+        bands.append(Band(heights, radii, np.zeros((len(parts), 2))))
     return tuple(bands)
 
 

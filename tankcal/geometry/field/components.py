@@ -4,7 +4,8 @@ The radius of a wall at azimuth a and height zeta of a course (-1 at its bottom,
 
     r = rho + x sin a + y cos a + sum over components of f(a, zeta),
 
-rho, x and y free for each course. A component is a random field of covariance
+rho free for each course, x and y for each ring of points. A component is a random field of
+covariance
 
     variance * c(a - a') * h(zeta, zeta'),  c(0) = 1,  the mean of h(zeta, zeta) over a course = 1,
 
@@ -27,6 +28,7 @@ LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
 
 
 _LEVEL = (1.0, 0, 0, 0, 0, 0, 0)
+KINDS = ("bulge", "ovality", "seams")
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,8 @@ class Component:
         exp(-|zeta - zeta'| / LOCAL_LENGTH).
     median_m, log_sd : float
         Median of its amplitude, m, and standard deviation of the logarithm of its variance.
+    declared_as : str
+        Input of an uncertainty budget that stands for it, where somebody declares that.
     """
 
     name: str
@@ -58,9 +62,10 @@ class Component:
     orders: tuple | str
     median_m: float
     log_sd: float
+    declared_as: str = ""
 
     def height_columns(self, zeta):
-        """(n, r) columns whose products are h: of a component that is not local."""
+        """(n, r) columns whose products are h; not of a component that is local."""
         if self.orders == "joints":
             return joint_profile(zeta)[:, None]
         weights = np.array(self.orders, dtype=float)
@@ -80,11 +85,14 @@ class Component:
 
 
 COMPONENTS = (
-    Component("common bulge", "bulge", "mean", True, (0, 0, 1, 0, 0.02, 0, 0.003), 2e-3, 1.0),
     Component(
-        "own bulge", "bulge", "mean", False, (0, *(j**-2.0 for j in range(1, 7))), 1e-3, 1.0
+        "common bulge", "bulge", "mean", True, (0, 0, 1, 0, 0.02, 0, 0.003), 2e-3, 1.0, "barrel"
     ),
-    Component("drawn-in joints", "bulge", "mean", True, "joints", 0.8e-3, 1.5),
+    Component("drawn-in joints", "bulge", "mean", True, "joints", 0.8e-3, 1.5, "barrel"),
+    Component(
+        "own bulge", "bulge", "mean", False, (0, 0, *(j**-2.0 for j in range(2, 7))), 0.7e-3, 1.0
+    ),
+    Component("taper", "bulge", "mean", False, (0, 1, 0, 0, 0, 0, 0), 0.8e-3, 2.0, "taper"),
     Component("common ovality", "ovality", "oval", True, _LEVEL, 4e-3, 3.0),
     Component("own ovality", "ovality", "oval", False, _LEVEL, 2e-3, 3.0),
     Component("common seams", "seams", "seam", True, _LEVEL, 3e-3, 1.5),
@@ -106,16 +114,11 @@ def joint_profile(zeta):
     return (np.exp(-(1 - np.abs(zeta)) / w) - mean) / np.sqrt(square)
 
 
-def oval_correlation(difference_rad):
-    """c of an azimuth difference: mode k has the variance k^-3, k = 2..36."""
-    x = np.cos(difference_rad)
-    # Clenshaw: sum of w_k cos k a
-    later, last = np.zeros_like(x), np.zeros_like(x)
-    for weight in OVALITY_WEIGHTS[::-1]:
-        last, later = 2 * x * last - later + weight, last
-    for _ in range(2):  # modes 1 and 0 have no weight
-        last, later = 2 * x * last - later, last
-    return last - x * later
+def oval_columns(azimuth_rad):
+    """(n, 2 modes) columns whose products are c: mode k has the variance k^-3, k = 2..36."""
+    angles = np.outer(azimuth_rad, OVALITY_MODES)
+    waves = np.hstack([np.cos(angles), np.sin(angles)])
+    return waves * np.tile(np.sqrt(OVALITY_WEIGHTS), 2)
 
 
 def seam_correlation(difference_rad, radius_m):
@@ -145,15 +148,10 @@ def _all_modes(x, b):
 
 
 def azimuth_correlations(azimuth_rad, other_rad, radius_m):
-    """{"mean", "oval", "seam": (n, m) c} between azimuths (n,) and (m,); nan: the mean over a turn.
-
-    The mean over a turn of what has no mode 0 is nothing.
-    """
+    """{"mean", "oval", "seam": (n, m) c} between azimuths (n,) and (m,)."""
     difference = np.subtract.outer(azimuth_rad, other_rad)
-    mean = np.isnan(difference)
-    difference = np.where(mean, 0.0, difference)
     return {
         "mean": np.ones(difference.shape),
-        "oval": np.where(mean, 0.0, oval_correlation(difference)),
-        "seam": np.where(mean, 0.0, seam_correlation(difference, radius_m)),
+        "oval": oval_columns(azimuth_rad) @ oval_columns(other_rad).T,
+        "seam": seam_correlation(difference, radius_m),
     }

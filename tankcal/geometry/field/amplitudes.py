@@ -1,6 +1,7 @@
 """How large the components of a wall are, by the restricted likelihood of what was measured.
 
-Readings y = X beta + sum of components + noise; X the radius and the centre of each course. With N
+Readings y = X beta + sum of components + noise; X the radius of each course, and the centre of each
+ring of points. With N
 an orthonormal basis of what X leaves free in a course, N'y is normal with a covariance
 
     D_c + U_c L L' U_c'
@@ -19,7 +20,7 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from tankcal.geometry.wall_prior import COMPONENTS, azimuth_correlations
+from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations
 
 NOISE_MEDIAN_M, NOISE_LOG_SD = 2e-3, 3.0  # of readings without a given standard deviation
 LEAST_M, MOST_M = 1e-5, 0.3  # amplitudes that are tried
@@ -32,14 +33,49 @@ LOG_STEP = 0.2  # of the differences that give the curvature
 
 @dataclass(frozen=True)
 class Sites:
-    """Where a wall was measured: course (n,) index, zeta (n,), azimuth_rad (n,)."""
+    """Where a wall was measured.
+
+    Attributes
+    ----------
+    course : ndarray of int, shape (n,)
+        From 0 on, each of them with sites.
+    ring : ndarray of int, shape (n,)
+        Sites that have a centre of their own, all of one course.
+    zeta : ndarray, shape (n,)
+        Height within the course, -1 at its bottom to +1 at its top.
+    azimuth_rad : ndarray, shape (n,)
+    leans : ndarray of bool, shape (n,)
+        Whether the ring is not level, and its centre moves with the height.
+    """
 
     course: np.ndarray
+    ring: np.ndarray
     zeta: np.ndarray
     azimuth_rad: np.ndarray
+    leans: np.ndarray
 
     def __len__(self):
         return len(self.course)
+
+    @property
+    def members(self):
+        """For each course the indices of its sites."""
+        return [np.flatnonzero(self.course == c) for c in range(self.course.max() + 1)]
+
+    def free_columns(self, members):
+        """(k, p) derivative of the radii of some sites of a course by what no prior binds.
+
+        Its radius first, then x and y of the centre of each ring, and of its lean.
+        """
+        azimuth, ring = self.azimuth_rad[members], self.ring[members]
+        turn = np.column_stack([np.sin(azimuth), np.cos(azimuth)])
+        columns = [np.ones((len(members), 1))]
+        for one in np.unique(ring):
+            there = turn * (ring == one)[:, None]
+            columns.append(there)
+            if np.any(self.leans[members] & (ring == one)):
+                columns.append(there * self.zeta[members, None])
+        return np.hstack(columns)
 
 
 @dataclass(frozen=True)
@@ -61,6 +97,49 @@ class Amplitudes:
     log_covariance: np.ndarray
     noise: float = 1.0
     noise_log_sd: float = 0.0
+
+    @property
+    def noise_dof(self):
+        """Degrees of freedom of the noise's factor; inf where it was given."""
+        return 2 / self.noise_log_sd**2 if self.noise_log_sd else np.inf
+
+    def assumed_share(self):
+        """(components,) variance of each logarithm over what it was beforehand: 1 of an assumed
+        amplitude, near 0 of one that the survey told.
+        """
+        before = np.array([one.log_sd for one in COMPONENTS])
+        return np.clip(np.diag(self.log_covariance) / before**2, 0.0, 1.0)
+
+    def total_m2(self, *, common):
+        """Variance of the departures from a circle, of those that all courses share or not."""
+        chosen = [one.kind != "bulge" and one.common == common for one in COMPONENTS]
+        return float(np.sum(self.variances_m2[chosen]))
+
+
+def assumed_amplitudes(ovality_m=None, common_ovality_m=None):
+    """`Amplitudes` of a wall that nobody measured yet: the medians, as wide as they are before.
+
+    Parameters
+    ----------
+    ovality_m, common_ovality_m : float, optional
+        Departure from a circle (rms) of a course, and the part of it that runs up the whole shell,
+        where they are known.
+
+    Returns
+    -------
+    Amplitudes
+    """
+    size = np.array([one.median_m for one in COMPONENTS]) ** 2
+    log_sd = np.array([one.log_sd for one in COMPONENTS])
+    if ovality_m is not None:
+        common = min(common_ovality_m or 0.0, ovality_m)
+        for name, given in (
+            ("common ovality", common),
+            ("own ovality", np.sqrt(ovality_m**2 - common**2)),
+        ):
+            place = [one.name for one in COMPONENTS].index(name)
+            size[place], log_sd[place] = max(given, LEAST_M) ** 2, 0.0
+    return Amplitudes(size, np.diag(log_sd**2))
 
 
 def estimate_amplitudes(sites, radius_m, noise_m2, nominal_m, *, estimate_noise=False):
@@ -139,7 +218,7 @@ class _Evidence:
         columns, missed = _common_columns(sites, nominal_m)
         courses = tuple(
             _course(sites, radius_m, noise_m2, nominal_m, members, columns, missed, estimate_noise)
-            for members in (np.flatnonzero(sites.course == c) for c in np.unique(sites.course))
+            for members in sites.members
         )
         own = [i for i, one in enumerate(COMPONENTS) if not one.common] + list(missed)
         common = [i for i, block in columns.items() for _ in range(block.shape[1])]
@@ -219,14 +298,9 @@ def distinct_azimuths(azimuth_rad):
     return place, found * SAME_AZIMUTH_RAD
 
 
-def free_of_course(azimuth_rad):
-    """(n, 3) columns of what is free in a course: radius and centre."""
-    return np.column_stack([np.ones(len(azimuth_rad)), np.sin(azimuth_rad), np.cos(azimuth_rad)])
-
-
 def _course(sites, radius_m, noise_m2, nominal_m, members, columns, missed, estimate_noise):
     azimuth, zeta = sites.azimuth_rad[members], sites.zeta[members]
-    left = scipy.linalg.null_space(free_of_course(azimuth).T)
+    left = scipy.linalg.null_space(sites.free_columns(members).T)
 
     def seen(covariance):
         return left.T @ covariance @ left

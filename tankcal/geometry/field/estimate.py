@@ -1,0 +1,265 @@
+"""The wall of a tank as one random field: its best estimate from what was measured, and its doubt.
+
+With the components of `components` and their amplitudes the wall is a Gaussian field with a free
+radius in each course and a free centre of each ring. What was measured, y = X beta + f + noise,
+gives every linear functional of the wall g = X_g beta + f_g by the best linear unbiased estimate
+
+    g = A y,   A = (K_g - (K_g V^-1 X - X_g) (X' V^-1 X)^-1 X') V^-1,   V = K + C,
+
+K the covariance of the field at the sites, K_g between functionals and sites, C that of the noise.
+The error A y - g consists of A (noise), and of what each component has that the survey did not see,
+
+    variance * (K_gg - A K_g' - K_g A' + A K A').
+
+Source: Robinson 1991 (best linear unbiased prediction).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg
+
+from tankcal.geometry.field.amplitudes import Amplitudes, Sites, distinct_azimuths
+from tankcal.geometry.field.components import COMPONENTS, FULL_TURN, azimuth_correlations
+from tankcal.quadrature import panels
+
+LEVELS = 7  # of a course, at which its outlines are stated: Gauss levels
+GRID_M, FEWEST_OF_GRID = 0.1, 720  # along the arc, and azimuths, of outlines that are integrated
+LEAST_NOISE_M = 1e-6  # what is given as perfect is not quite
+
+
+def gauss_heights():
+    """(LEVELS,) heights within a course, -1 to 1, at which outlines are stated."""
+    return 2 * panels([0.0, 1.0], LEVELS)[0] - 1
+
+
+@dataclass(frozen=True)
+class WallField:
+    """A wall known from radii at sites.
+
+    Attributes
+    ----------
+    sites : Sites
+    radius_m : ndarray, shape (n,)
+        Distances from the centre of the ring, m.
+    noise_m2 : ndarray, shape (n, n)
+        Covariance of the readings, m2.
+    amplitudes : Amplitudes
+    nominal_m : float
+        Radius of the tank, m.
+    """
+
+    sites: Sites
+    radius_m: np.ndarray
+    noise_m2: np.ndarray
+    amplitudes: Amplitudes
+    nominal_m: float
+
+    @property
+    def grid_rad(self):
+        """(g,) azimuths of the outlines, even."""
+        count = max(FEWEST_OF_GRID, int(np.ceil(FULL_TURN * self.nominal_m / GRID_M)))
+        return np.arange(count) * FULL_TURN / count
+
+    @cached_property
+    def outlines_m(self):
+        """(courses, LEVELS, g) the estimated radius at each Gauss level of each course."""
+        return self.outlines_at(gauss_heights())
+
+    def outlines_at(self, zeta):
+        """(courses, k, g) the estimated radius at heights (k,) of each course."""
+        zeta, place = np.asarray(zeta, dtype=float), self._distinct[0]
+        found = np.empty((len(self._members), len(zeta), len(self.grid_rad)))
+        found[:] = self._mean_m[:, None, None] + self._circles[:, None]
+        for i, one in enumerate(COMPONENTS):
+            size, along = self.amplitudes.variances_m2[i], self._to_grid[one.shape]
+            for course, members in enumerate(self._members):
+                chosen = slice(None) if one.common else members
+                height = one.height_covariance(zeta, self.sites.zeta[chosen])
+                pull = size * height * self._explained[chosen]
+                if one.shape == "mean":
+                    found[course] += pull.sum(axis=1)[:, None]
+                else:
+                    sums = [np.bincount(place[chosen], row, along.shape[1]) for row in pull]
+                    found[course] += np.array(sums) @ along.T
+        return found
+
+    def functionals(self, gradients_m):
+        """`Functionals` of the wall: each the integral of a gradient times its radius.
+
+        Parameters
+        ----------
+        gradients_m : ndarray, shape (courses, LEVELS, g)
+            One functional for each course and level, of the outline there.
+
+        Returns
+        -------
+        Functionals
+        """
+        return Functionals(self, FULL_TURN / gradients_m.shape[-1] * gradients_m)
+
+    @cached_property
+    def means(self):
+        """`Functionals`: the mean radius of each course at each Gauss level."""
+        return self.functionals(np.full(self.outlines_m.shape, 1 / FULL_TURN))
+
+    def seen(self, departures_m):
+        """(courses, LEVELS) mean radii that the estimate makes of departures (n,) of the radii."""
+        return (self.means.weights @ departures_m).reshape(len(self._members), LEVELS)
+
+    @cached_property
+    def tests(self):
+        """(n,) each reading less the estimate from all others, over its standard deviation.
+
+        With P = V^-1 - V^-1 X (X' V^-1 X)^-1 X' V^-1 that is (P y)_i / sqrt(P_ii): Baarda's w.
+        """
+        factor, by_columns, normal = self._factored
+        inverse = scipy.linalg.cho_solve(factor, np.eye(len(self.sites)), check_finite=False)
+        free = np.einsum("ij,ji->i", by_columns, scipy.linalg.cho_solve(normal, by_columns.T))
+        return self._explained / np.sqrt(np.maximum(np.diag(inverse) - free, 1e-300))
+
+    # what follows is computed once
+
+    @cached_property
+    def _members(self):
+        return self.sites.members
+
+    @cached_property
+    def _mean_m(self):
+        """(courses,) mean radius of the readings: what is taken off before anything."""
+        return np.array([self.radius_m[members].mean() for members in self._members])
+
+    @cached_property
+    def _distinct(self):
+        return distinct_azimuths(self.sites.azimuth_rad)
+
+    @cached_property
+    def _correlations(self):
+        return azimuth_correlations(self._distinct[1], self._distinct[1], self.nominal_m)
+
+    @cached_property
+    def _to_grid(self):
+        return azimuth_correlations(self.grid_rad, self._distinct[1], self.nominal_m)
+
+    @cached_property
+    def _columns(self):
+        """(n, p) X, and (courses,) which of its columns are the radii."""
+        blocks = [self.sites.free_columns(members) for members in self._members]
+        radii = np.cumsum([0, *(block.shape[1] for block in blocks)])
+        columns = np.zeros((len(self.sites), radii[-1]))
+        for start, members, block in zip(radii, self._members, blocks, strict=False):
+            columns[members, start : start + block.shape[1]] = block
+        return columns, radii[:-1]
+
+    def _covariance(self, index):
+        """(n, n) of one component at the sites."""
+        one, place, zeta = COMPONENTS[index], self._distinct[0], self.sites.zeta
+        along, size = self._correlations[one.shape], self.amplitudes.variances_m2[index]
+        if one.common:
+            return size * along[np.ix_(place, place)] * one.height_covariance(zeta, zeta)
+        found = np.zeros((len(place), len(place)))
+        for members in self._members:
+            height = one.height_covariance(zeta[members], zeta[members])
+            there = along[np.ix_(place[members], place[members])]
+            found[np.ix_(members, members)] = size * there * height
+        return found
+
+    @cached_property
+    def _factored(self):
+        """Cholesky factor of V, V^-1 X, and that of X' V^-1 X."""
+        whole = self.noise_m2 + LEAST_NOISE_M**2 * np.eye(len(self.sites))
+        for index in range(len(COMPONENTS)):
+            whole += self._covariance(index)
+        factor = scipy.linalg.cho_factor(whole, lower=True, overwrite_a=True, check_finite=False)
+        columns = self._columns[0]
+        by_columns = scipy.linalg.cho_solve(factor, columns, check_finite=False)
+        return factor, by_columns, scipy.linalg.cho_factor(columns.T @ by_columns)
+
+    @cached_property
+    def _solved(self):
+        """(p,) beta less the mean radii, and (n,) V^-1 (y - X beta)."""
+        factor, by_columns, normal = self._factored
+        left = self.radius_m - self._mean_m[self.sites.course]
+        free = scipy.linalg.cho_solve(normal, by_columns.T @ left)
+        left = left - self._columns[0] @ free
+        return free, scipy.linalg.cho_solve(factor, left, check_finite=False)
+
+    @property
+    def _explained(self):
+        return self._solved[1]
+
+    @cached_property
+    def _circles(self):
+        """(courses, g) the free radius less the mean, about the mean centre of the rings."""
+        free, radii = self._solved[0], self._columns[1]
+        turn = np.stack([np.sin(self.grid_rad), np.cos(self.grid_rad)])
+        found = []
+        for start, members in zip(radii, self._members, strict=True):
+            _, leaning = np.unique(self.sites.ring[members], return_index=True)
+            widths = np.where(self.sites.leans[members][leaning], 4, 2)
+            at = start + 1 + np.cumsum([0, *widths[:-1]])
+            centre = np.mean([free[i : i + 2] for i in at], axis=0)
+            found.append(free[start] + centre @ turn)
+        return np.array(found)
+
+
+class Functionals:
+    """Linear functionals of a wall, one for each course and Gauss level, estimated.
+
+    Attributes
+    ----------
+    weights : ndarray, shape (f, n)
+        A: derivative by the readings.
+    """
+
+    def __init__(self, field, gradients):
+        self._field, self._gradients = field, gradients
+        self._totals = gradients.sum(axis=2)
+        factor, by_columns, normal = field._factored
+        across = sum(self._across(index) for index in range(len(COMPONENTS)))
+        columns, radii = field._columns
+        free = np.zeros((len(across), columns.shape[1]))
+        courses = np.repeat(np.arange(len(radii)), LEVELS)
+        free[np.arange(len(free)), radii[courses]] = self._totals.ravel()
+        short = free - across @ by_columns
+        across = across + scipy.linalg.cho_solve(normal, short.T).T @ columns.T
+        self.weights = scipy.linalg.cho_solve(factor, across.T, check_finite=False).T
+
+    def unseen(self, index):
+        """(f, f) covariance of the functionals by what was not seen of one component."""
+        seen = self.weights @ self._across(index).T
+        spread = self.weights @ self._field._covariance(index) @ self.weights.T
+        found = self._within(index) - seen - seen.T + spread
+        return (found + found.T) / 2
+
+    def _across(self, index):
+        """(f, n) covariance of the functionals with one component at the sites."""
+        field, one = self._field, COMPONENTS[index]
+        count, sites = len(field._members), field.sites
+        found = np.zeros((count, LEVELS, len(sites)))
+        if one.shape == "mean":
+            along = self._totals[:, :, None] * np.ones(len(sites))
+        else:
+            along = (self._gradients @ field._to_grid[one.shape])[:, :, field._distinct[0]]
+        for course, members in enumerate(field._members):
+            chosen = slice(None) if one.common else members
+            height = one.height_covariance(gauss_heights(), sites.zeta[chosen])
+            found[course][:, chosen] = along[course][:, chosen] * height
+        return field.amplitudes.variances_m2[index] * found.reshape(-1, len(sites))
+
+    def _within(self, index):
+        """(f, f) covariance of the functionals by one component itself."""
+        field, one = self._field, COMPONENTS[index]
+        gradients = self._gradients.reshape(-1, len(field.grid_rad))
+        count = len(field._members)
+        if one.shape == "mean":
+            along = np.outer(self._totals, self._totals)
+        else:
+            kernel = azimuth_correlations(field.grid_rad, np.zeros(1), field.nominal_m)[one.shape]
+            spectrum = np.fft.rfft(kernel[:, 0]).real
+            smooth = np.fft.irfft(np.fft.rfft(gradients) * spectrum, gradients.shape[1])
+            along = smooth @ gradients.T
+        same = np.ones((count, count)) if one.common else np.eye(count)
+        height = one.height_covariance(gauss_heights(), gauss_heights())
+        return field.amplitudes.variances_m2[index] * along * np.kron(same, height)
