@@ -32,7 +32,6 @@ from tankcal.gum.components import (
 from tankcal.gum.inputs import Input, Inputs
 from tankcal.gum.propagation import Propagation, propagate
 from tankcal.gum.sensitivities import sensitivities_of
-from tankcal.gum.unsure_variance import dof_of_unsure_variance
 
 __all__ = [
     "ROUNDING",
@@ -48,7 +47,6 @@ __all__ = [
     "coverage_factor",
     "declared_source",
     "dof_of",
-    "dof_of_unsure_variance",
     "effective_dof",
     "factor_of",
     "group_correlated",

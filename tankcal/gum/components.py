@@ -51,9 +51,6 @@ class Source:
         Of correlated inputs each by itself; else ().
     correlation : ndarray, shape (parts, parts), or None
         Of these.
-    contrasts : float
-        Residuals that a variance was estimated from, beside noise that was taken off it: more than
-        `dof` then; inf where nothing was.
     u_is : str
         What u is of Student's t: "scale", or "sd": then `dof` is the shape of it alone.
     """
@@ -70,7 +67,6 @@ class Source:
     is_default: bool = False
     parts: tuple = ()
     correlation: np.ndarray | None = None
-    contrasts: float = np.inf
     u_is: str = "scale"
 
     @property

@@ -14,17 +14,14 @@ Source: JCGM 100:2008 4.2, 4.3, G.3, G.4; JCGM 101:2008 6.4.
 """
 
 from dataclasses import dataclass, field, fields
-from functools import cached_property
 
 import numpy as np
 from scipy.special import (
-    chdtri,
     gammainc,
     gammaincinv,
     gammaln,
     j0,
     kve,
-    ndtr,
     ndtri,
     sici,
     stdtrit,
@@ -168,89 +165,6 @@ class StudentT(Distribution):
             return _bessel_of_large_order(half, root)
         power = half * np.log(root / 2) - root - gammaln(half)
         return 2 * np.exp(power) * kve(half, root)
-
-
-@dataclass(frozen=True)
-class UnsureNormal(Distribution):
-    """Normal, its variance estimated as what `contrasts` residuals show beyond their noise.
-
-        X = u sqrt(v) z,   v = max(r m/chi2_m - (r - 1), 0),   r = sqrt(m/dof)
-
-    r u^2 is what the m contrasts show, (r - 1) u^2 the noise that is taken off it; 2/dof is the
-    relative variance of what is left. Without noise m is dof and X is Student's t; where most is
-    noise, a variance that is small by chance has no Cauchy tail. The mean over chi-square is taken
-    by Gauss quadrature in the cube root of its probability, dense where it is small and v large.
-
-    Attributes
-    ----------
-    scale : float
-        u, the estimated standard deviation, in the unit of the input.
-    contrasts : float
-        m, number of independent contrasts; above dof.
-
-    Raises
-    ------
-    ValueError
-        For contrasts that are not above dof, or not finite.
-
-    References
-    ----------
-    JCGM 101:2008 6.4.9 for the t that it becomes.
-
-    Examples
-    --------
-    >>> UnsureNormal(2.0, 30.0, dof=10.0).u
-    2.0
-    """
-
-    name = "normal"
-
-    scale: float
-    contrasts: float
-
-    def __post_init__(self):
-        super().__post_init__()
-        if not self.dof < self.contrasts < np.inf:
-            raise ValueError(f"{self.contrasts} contrasts: expected more than dof, {self.dof}")
-
-    @property
-    def u(self):
-        """The scale: the estimated standard deviation."""
-        return self.scale
-
-    @property
-    def sd(self):
-        """scale times the root of the mean of v."""
-        sds, weights = self._mixture
-        return float(self.scale * np.sqrt(sds**2 @ weights))
-
-    @property
-    def _width(self):
-        return self.scale
-
-    @cached_property
-    def _mixture(self):
-        """(NODES,) sqrt(v), and the probability of each."""
-        m, r = self.contrasts, np.sqrt(self.contrasts / self.dof)
-        node, weight = np.polynomial.legendre.leggauss(NODES)
-        root = (node + 1) / 2
-        v = np.maximum(r * m / chdtri(m, 1 - root**3) - (r - 1), 1e-12)
-        return np.sqrt(v), weight / 2 * 3 * root**2
-
-    def _distance(self, tail):
-        """By a table of the cdf, in the logarithm of the tail."""
-        sds, weights = self._mixture
-        tail = np.asarray(tail, dtype=float)
-        reach = sds.max() * -ndtri(1e-300)
-        x = np.concatenate([[0.0], np.geomspace(1e-7, reach, 4000)])
-        beyond = ndtr(-x[:, None] / sds) @ weights
-        with np.errstate(divide="ignore"):
-            found = np.interp(-np.log(tail), -np.log(beyond), x)
-        return np.where(tail > 0, self.scale * found, np.inf)
-
-    def _transform(self, t):
-        sds, weights = self._mixture
-        return np.exp(np.multiply.outer(-np.square(t) / 2, sds**2)) @ weights
 
 
 @dataclass(frozen=True)
@@ -407,7 +321,6 @@ class CurvilinearTrapezoid(Distribution):
         return (sici(t)[0] - sici(inner * t)[0]) / (2 * relative * t)
 
 
-NODES = 40  # of chi-square, in `UnsureNormal`
 FAMILIES = {"rectangular": Rectangular, "triangular": Triangular, "u-shaped": UShaped}
 NAMES = ("normal", *FAMILIES, "t", "curvilinear trapezoid")
 

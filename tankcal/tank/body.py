@@ -30,7 +30,7 @@ class Factor:
         "points", "bulge", "ovality", "seams", or what a named cause is ("instrument_scale").
     columns : ndarray, shape (f, c)
         Factor of the covariance of a shell's features or of a solid's inputs.
-    dof, u, unit, type, note, contrasts
+    dof, u, unit, type, note
         As in `uncertainty.Source`.
     """
 
@@ -41,7 +41,6 @@ class Factor:
     unit: str | None = None
     type: str = "A"
     note: str = ""
-    contrasts: float = np.inf
 
     def source(self, columns_m3):
         """The `Source` of (rows, c) columns that its own columns make in a table."""
@@ -53,7 +52,6 @@ class Factor:
             self.unit,
             type=self.type,
             note=self.note,
-            contrasts=self.contrasts,
         )
 
 

@@ -72,17 +72,17 @@ def barrel(zeta):
 
     Parameters
     ----------
-    zeta : array_like
+    zeta : array_like, shape (n,)
         Heights within the course, -1 to 1.
 
     Returns
     -------
-    ndarray or float
+    ndarray, shape (n,)
 
     Examples
     --------
-    >>> barrel(0.0), barrel(1.0)
-    (1.0, 0.0)
+    >>> barrel(np.array([-1.0, 0.0]))
+    array([0., 1.])
     """
     return 1.0 - np.square(zeta)
 

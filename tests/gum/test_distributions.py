@@ -14,7 +14,6 @@ from tankcal.gum.distributions import (
     Rectangular,
     StudentT,
     Triangular,
-    UnsureNormal,
     UShaped,
     expanded,
     standard,
@@ -234,38 +233,3 @@ def test_no_uncertainty_is_a_constant():
 def test_nonsense_is_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
-
-
-def test_estimated_variance_with_noise_agrees_with_simulation(figure):
-    """Simulation: m residuals of signal and noise, the noise taken off, give back the law of X.
-
-    With a flat prior for the whole variance, chi-square of m says where it may lie.
-    """
-    one = UnsureNormal(2.0, 40.0, dof=4.0, mean=1.0)
-    rng = np.random.default_rng(6)
-    r = np.sqrt(40.0 / 4.0)
-    v = np.maximum(r * 40.0 / rng.chisquare(40.0, 2_000_000) - (r - 1), 0)
-    drawn = 1.0 + 2.0 * np.sqrt(v) * rng.standard_normal(len(v))
-    for p in (0.025, 0.2, 0.975):
-        below = np.mean(drawn < one.quantile(p))
-        assert below == pytest.approx(p, abs=4 * np.sqrt(p * (1 - p) / len(v)) + 1e-4)
-    figure("sd of a normal with unsure variance, drawn over tabulated", drawn.std() / one.sd)
-    assert drawn.std() == pytest.approx(one.sd, rel=5e-3)
-    t = np.array([0.0, 0.3, 1.0])
-    cosines = np.cos(np.outer(t, drawn - 1.0)).mean(axis=1)
-    assert one.characteristic(t) == pytest.approx(cosines, abs=2e-3)
-
-
-def test_unsure_normal_limits_are_student_and_normal():
-    p = np.array([0.001, 0.025, 0.3])
-    t, near = StudentT(1.0, dof=12.0), UnsureNormal(1.0, 12.0001, dof=12.0)
-    assert near.quantile(p) == pytest.approx(t.quantile(p), rel=1e-4)
-    sure = UnsureNormal(1.0, 2e6, dof=1e6)
-    assert sure.quantile(p) == pytest.approx(Normal(1.0).quantile(p), rel=1e-4)
-    assert sure.sd == pytest.approx(1.0, rel=1e-4)
-
-
-def test_contrasts_are_more_than_degrees_of_freedom():
-    for contrasts in (3.0, 5.0, np.inf):
-        with pytest.raises(ValueError, match="contrasts"):
-            UnsureNormal(1.0, contrasts, dof=5.0)

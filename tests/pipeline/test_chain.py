@@ -132,7 +132,7 @@ def test_covariance_equal_to_sds_gives_same_table(tmp_path):
 
 
 def test_fully_correlated_sections_add_linearly(tmp_path):
-    """One common radial error of 1 mm: u = lateral area x 1 mm (closed form)."""
+    """One common radial error of 1 mm: u of the points = lateral area x 1 mm (closed form)."""
     write_job(tmp_path / "a")
     job = tankcal.load(tmp_path / "a")
     xyz = job.points.xyz_m
@@ -140,7 +140,8 @@ def test_fully_correlated_sections_add_linearly(tmp_path):
     common = np.outer(outward.ravel(), outward.ravel()) + 1e-14 * np.eye(360)
     points = replace(job.points, covariance_m2=common)
     found = run(replace(job, points=points, survey=replace(job.survey, side="inside")))
-    assert found.table.u_m3[-1] == pytest.approx(2 * np.pi * 6.5 * 9.5 * 0.001, rel=1e-4)
+    u = np.linalg.norm(found.table.sources[0].columns_m3[-1])
+    assert u == pytest.approx(2 * np.pi * 6.5 * 9.5 * 0.001, rel=1e-4)
 
 
 @pytest.mark.slow

@@ -79,12 +79,15 @@ def test_the_table_is_that_of_the_chain(prediction, filled, figure):
 
 
 def test_a_wall_whose_covariance_is_not_written_out(plan, prediction, monkeypatch):
-    """Second method: a wall of many points, by products with the covariance alone."""
+    """Second method: a wall of many points, by products with the covariance alone.
+
+    Its field weighs the points by their own covariances, so that U differs a little.
+    """
     from tankcal.planning import table
 
     monkeypatch.setattr(table, "MANY", 10)
     other = predicted_table(plan, prediction.predicted)
-    assert other.made.table.U_m3 == pytest.approx(prediction.table.U_m3, rel=1e-7)
+    assert other.made.table.U_m3 == pytest.approx(prediction.table.U_m3, rel=1e-5)
     again = recompute_table(plan, prediction.predicted, prediction.tabled)
     assert again.made.table.U_m3 == pytest.approx(prediction.table.U_m3, rel=1e-9)
 

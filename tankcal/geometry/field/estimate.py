@@ -231,7 +231,8 @@ class Functionals:
         seen = self.weights @ self._across(index).T
         spread = self.weights @ self._field._covariance(index) @ self.weights.T
         found = self._within(index) - seen - seen.T + spread
-        return (found + found.T) / 2
+        values, vectors = np.linalg.eigh((found + found.T) / 2)
+        return (vectors * np.maximum(values, 0.0)) @ vectors.T  # differences: rounding below 0
 
     def _across(self, index):
         """(f, n) covariance of the functionals with one component at the sites."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.gum.distributions import UnsureNormal, standard
+from tankcal.gum.distributions import standard
 from tankcal.gum.monte_carlo import ESTIMATES, QuadraticRows, numerical_tolerance, simulate
 from tankcal.pipeline.simulation.bent import bent_rows, datum_law, simulate_bent
 from tankcal.pipeline.simulation.curvature import curvature
@@ -12,10 +12,10 @@ from tankcal.pipeline.simulation.curvature import curvature
 # The independent coordinates that a table is simulated with, each of them in units of its u.
 #
 # A source of one column is a coordinate with the distribution of its input. The columns of a source
-# that were found together (points, form) have a common scale: whatever one volume says of them is
-# |c| T with T of Student's t for their degrees of freedom, the same as one coordinate of size |c|
-# (multivariate t, JCGM 101:2008 6.4.9); the form, whose variance is what residuals show beyond
-# their noise, is an `UnsureNormal`. Normal sources that were computed are pooled in the same way.
+# that were found together (points) have a common scale: whatever one volume says of them is |c| T
+# with T of Student's t for their degrees of freedom, the same as one coordinate of size |c|
+# (multivariate t, JCGM 101:2008 6.4.9). Normal sources that were computed are pooled in the same
+# way.
 #
 # Correlated inputs are x = L e with R = L L': each e has the shape of its own input. Normal ones
 # are jointly normal then (6.4.8); of others the covariances hold, and the shape of the first.
@@ -65,8 +65,6 @@ def _has_own(source):
 
 def _distribution(source):
     """Of readings Student's t (JCGM 101:2008 6.4.9), normal for infinitely many."""
-    if source.dof < source.contrasts < np.inf:
-        return UnsureNormal(1.0, source.contrasts, dof=source.dof)
     return standard(1.0, source.distribution, dof=source.dof, u_is=source.u_is)
 
 

@@ -18,7 +18,7 @@ from tankcal.tank.liquid_zone import Above, measured_bottom
 from tankcal.tank.parts import Part
 from tankcal.tank.terrain import Footprint
 from tankcal.tank.volumes import ShellVolume
-from tankcal.uncertainty import dof_of_unsure_variance, factor_of
+from tankcal.uncertainty import factor_of
 
 # A bottom whose plan is the shell's own: what widens the shell widens it, too.
 
@@ -274,31 +274,21 @@ def _factors(job, wall, volume):
 def _of_the_unseen(wall, volume, features, declared):
     """A `Factor` of each kind of component that the survey did not see all of.
 
-    Its degrees of freedom are those of the full shell's volume. What was declared, a barrel or a
-    taper, is not counted again.
+    What was declared, a barrel or a taper, is not counted again.
     """
     amplitudes, top = wall.field.amplitudes, volume.weights_m([volume.height_m])[0]
-    assumed, found = amplitudes.assumed_share(), []
+    inflation, assumed, found = amplitudes.inflation(), amplitudes.assumed_share(), []
     for kind in KINDS:
         chosen = [
             index
             for index, one in enumerate(COMPONENTS)
             if one.kind == kind and one.declared_as not in declared
         ]
-        if not chosen:
-            continue
-        parts = [features.unseen(index) for index in chosen]
-        shares = np.maximum([top @ part @ top for part in parts], 1e-30)
-        shares = shares / shares.sum()
-        log_sd = np.sqrt(shares @ amplitudes.log_covariance[np.ix_(chosen, chosen)] @ shares)
-        found.append(
-            Factor(
-                kind,
-                factor_of(sum(parts)),
-                dof_of_unsure_variance(float(log_sd)),
-                note=_told_by(float(shares @ assumed[chosen])),
-            )
-        )
+        if chosen:
+            parts = [inflation[index] * features.unseen(index) for index in chosen]
+            sizes = np.maximum([top @ part @ top for part in parts], 1e-30)
+            known = _told_by(float(sizes @ assumed[chosen] / sizes.sum()))
+            found.append(Factor(kind, factor_of(sum(parts)), note=known))
     return tuple(one for one in found if one.columns.shape[1])
 
 
