@@ -166,7 +166,7 @@ def test_a_declared_sd_is_u_of_the_budget_and_sd_of_the_draws(tmp_path):
 
 
 def test_input_of_three_dof_gives_student_interval(tmp_path):
-    rows = [("scale", 30000, "ppm", "A", "normal", 3), ("plate_thickness", 0, "mm")]
+    rows = [("scale", 10000, "ppm", "A", "normal", 3), ("plate_thickness", 0, "mm")]
     result = run(tmp_path / "job", uncertainty=rows, sd_mm=0.05, settings={"table.step_m": 1.0})
     found = simulated(result)
     half = (found.found.high - found.found.low)[-1] / 2

@@ -28,6 +28,8 @@ LEAST_NOISE_M = 1e-6  # what is given as perfect is not quite
 SAME_AZIMUTH_RAD = 1e-9
 SMALLEST = 1e-9  # of the largest variance of a direction of the common form
 MOST_FOLLOWED = 80  # directions of the common form that are followed through all courses
+ROUNDING = 1e-11  # of the largest variances, that keeps a covariance positive
+MOST_STEPS, SMALL_STEP = 12, 1e-7  # of a logarithm
 LOG_STEP = 0.2  # of the differences that give the curvature
 
 
@@ -174,9 +176,14 @@ def estimate_amplitudes(sites, radius_m, noise_m2, nominal_m, *, estimate_noise=
     bounds = [(2 * np.log(LEAST_M), 2 * np.log(MOST_M))] * len(COMPONENTS)
     bounds += [(-20.0, 20.0)] * estimate_noise
     best = scipy.optimize.minimize(
-        evidence.misfit, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-7}
+        evidence.misfit, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-8}
     ).x
     covariance = np.linalg.inv(_curvature(evidence, best))
+    for _ in range(MOST_STEPS):  # of Newton, so that the order of the readings changes nothing
+        step = np.clip(-covariance @ evidence.misfit(best)[1] / 2, -LOG_STEP, LOG_STEP)
+        best = np.clip(best + step, *np.array(bounds).T)
+        if np.abs(step).max() < SMALL_STEP:
+            break
     count = len(COMPONENTS)
     known = Amplitudes(np.exp(best[:count]), covariance[:count, :count])
     if not estimate_noise:
@@ -246,6 +253,7 @@ class _Evidence:
         inner, right, value, solved = np.eye(len(scale)), 0.0, 0.0, []
         for course in self.courses:
             covariance = course.fixed + np.tensordot(variances[self.own], course.own, 1)
+            covariance.flat[:: len(covariance) + 1] *= 1 + ROUNDING
             root = np.linalg.cholesky(covariance)
             value += 2 * np.sum(np.log(np.diag(root)))
             inverse = scipy.linalg.solve_triangular(
@@ -317,7 +325,7 @@ def _course(sites, radius_m, noise_m2, nominal_m, members, columns, missed, esti
         noise = noise_m2[np.ix_(members, members)]
     else:
         noise = np.diag(noise_m2[members])
-    noise = noise + LEAST_NOISE_M**2 * np.eye(len(members))
+    least = LEAST_NOISE_M**2 * np.eye(left.shape[1])
     there = azimuth_correlations(azimuth, azimuth, nominal_m)
     own = [
         seen(there[one.shape] * one.height_covariance(zeta, zeta))
@@ -332,6 +340,6 @@ def _course(sites, radius_m, noise_m2, nominal_m, members, columns, missed, esti
     return _Course(
         left.T @ radius_m[members],
         np.array(own),
-        seen(noise) * (not estimate_noise),
+        least + seen(noise) * (not estimate_noise),
         left.T @ np.hstack([block[members] for block in columns.values()]),
     )

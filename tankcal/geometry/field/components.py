@@ -88,15 +88,15 @@ _EVEN = (0, 0, 1, 0, 0.02, 0, 0.003)  # barrels and drawn-in joints share their 
 _FREE = (0, 0, *(order**-2.0 for order in range(2, 7)))
 _LINEAR = (0, 1, 0, 0, 0, 0, 0)
 COMPONENTS = (
-    Component("common bulge", "bulge", "mean", True, _EVEN, 2e-3, 1.0, "barrel"),
-    Component("drawn-in joints", "bulge", "mean", True, "joints", 0.8e-3, 1.5, "barrel"),
+    Component("common bulge", "bulge", "mean", True, _EVEN, 1.4e-3, 1.0, "barrel"),
+    Component("drawn-in joints", "bulge", "mean", True, "joints", 0.8e-3, 1.2, "barrel"),
     Component("own bulge", "bulge", "mean", False, _FREE, 0.7e-3, 1.0, "barrel"),
     Component("taper", "bulge", "mean", False, _LINEAR, 0.8e-3, 1.5, "taper"),
     Component("common ovality", "ovality", "oval", True, _LEVEL, 4e-3, 2.0),
     Component("own ovality", "ovality", "oval", False, _LEVEL, 2e-3, 2.0),
-    Component("common seams", "seams", "seam", True, _LEVEL, 3e-3, 1.5),
-    Component("own seams", "seams", "seam", False, _LEVEL, 2e-3, 1.5),
-    Component("dents", "seams", "seam", False, "local", 2e-3, 1.5),
+    Component("common seams", "seams", "seam", True, _LEVEL, 3e-3, 1.2),
+    Component("own seams", "seams", "seam", False, _LEVEL, 2e-3, 1.2),
+    Component("dents", "seams", "seam", False, "local", 2e-3, 1.2),
 )
 
 

@@ -1,0 +1,321 @@
+"""The wall as one random field: closed forms, a dense second method, exact shapes, invariances."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from jacobians import assert_derivative
+
+from tankcal.geometry.field.amplitudes import (
+    Amplitudes,
+    Sites,
+    _Evidence,
+    assumed_amplitudes,
+    estimate_amplitudes,
+)
+from tankcal.geometry.field.components import (
+    COMPONENTS,
+    azimuth_correlations,
+    joint_profile,
+    seam_correlation,
+)
+from tankcal.geometry.field.estimate import LEVELS, WallField, gauss_heights
+
+FULL_TURN, RADIUS_M = 2 * np.pi, 6.5
+
+
+def sites_of(courses, heights, points, rng=None):
+    """Sites of rings at some heights zeta of each course, even or anywhere."""
+    rings = [(course, zeta) for course in range(courses) for zeta in heights]
+    places = []
+    for ring, (course, zeta) in enumerate(rings):
+        even = FULL_TURN * np.arange(points) / points
+        azimuth = even if rng is None else np.sort(rng.uniform(0, FULL_TURN, points))
+        places.append(
+            (np.full(points, course), np.full(points, ring), np.full(points, zeta), azimuth)
+        )
+    course, ring, zeta, azimuth = map(np.concatenate, zip(*places, strict=True))
+    return Sites(course, ring, zeta, azimuth, np.zeros(len(course), dtype=bool))
+
+
+def field_of(sites, radius_m, noise_m=1e-3, amplitudes=None):
+    return WallField(
+        sites,
+        radius_m,
+        noise_m**2 * np.eye(len(sites)),
+        amplitudes or assumed_amplitudes(),
+        RADIUS_M,
+    )
+
+
+def estimated(sites, radius_m, noise_m=1e-6):
+    """The field with the amplitudes that its own radii tell."""
+    noise = np.full(len(sites), noise_m**2)
+    return field_of(sites, radius_m, noise_m, estimate_amplitudes(sites, radius_m, noise, RADIUS_M))
+
+
+def volume(field, course=0):
+    """Mean over a course of the area over pi: an integral by the Gauss levels."""
+    weights = np.polynomial.legendre.leggauss(LEVELS)[1] / 2
+    return weights @ np.mean(field.outlines_m[course] ** 2, axis=1)
+
+
+def test_the_correlation_of_seams_is_the_sum_of_its_modes():
+    """Closed form against 20 000 modes."""
+    difference, k = np.array([0.0, 0.03, 0.5, 3.0]), np.arange(2, 20_000)
+    weights = (1 + (k * 0.4 / RADIUS_M) ** 2) ** -2.0
+    expected = np.cos(np.outer(difference, k)) @ weights / weights.sum()
+    assert seam_correlation(difference, RADIUS_M) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("one", COMPONENTS, ids=lambda one: one.name)
+def test_a_component_of_unit_variance_has_unit_rms(one):
+    node, weight = np.polynomial.legendre.leggauss(200)
+    there = np.array([one.height_covariance(np.array([z]), np.array([z]))[0, 0] for z in node])
+    assert weight @ there / 2 == pytest.approx(1.0, rel=2e-3)
+    same = azimuth_correlations(np.zeros(1), np.zeros(1), RADIUS_M)[one.shape][0, 0]
+    assert same == pytest.approx(1.0)
+    if one.shape == "mean" and one.orders != "joints":
+        assert weight @ one.height_covariance(node, np.array([0.3]))[:, 0] == pytest.approx(0.0)
+
+
+def test_the_profile_of_joints_has_no_mean():
+    node, weight = np.polynomial.legendre.leggauss(400)
+    assert weight @ joint_profile(node) == pytest.approx(0.0, abs=1e-4)
+
+
+def dense(field, zeta):
+    """Mean radii of three courses at heights (k,), and the covariance of their errors.
+
+    The kriging system whole, all covariances written out, modes summed one by one. A mean over the
+    azimuth has nothing of any mode.
+    """
+    sites, k = field.sites, np.arange(2, 30_000)
+    n, many = len(field.sites), 3 * len(zeta)
+    course = np.concatenate([sites.course, np.repeat(range(3), len(zeta))])
+    height = np.concatenate([sites.zeta, np.tile(zeta, 3)])
+    turn = np.subtract.outer(sites.azimuth_rad, sites.azimuth_rad)
+    along = {name: np.zeros((n + many, n + many)) for name in ("oval", "seam")}
+    seam = (1 + (k * 0.4 / field.nominal_m) ** 2) ** -2.0
+    for name, weights in (("oval", k**-3.0 * (k <= 36)), ("seam", seam)):
+        used = weights > 0
+        waves = sum(w * np.cos(m * turn) for m, w in zip(k[used], weights[used], strict=True))
+        along[name][:n, :n] = waves / weights.sum()
+    along["mean"] = np.ones((n + many, n + many))
+    same = course[:, None] == course
+    whole = np.zeros((n + many, n + many))
+    for one, size in zip(COMPONENTS, field.amplitudes.variances_m2, strict=True):
+        part = size * along[one.shape] * one.height_covariance(height, height)
+        whole += part if one.common else part * same
+    free = (course[:, None] == range(3)).astype(float)
+    centre = np.zeros((n + many, 2 * (sites.ring.max() + 1)))
+    centre[np.arange(n), 2 * sites.ring] = np.sin(sites.azimuth_rad)
+    centre[np.arange(n), 2 * sites.ring + 1] = np.cos(sites.azimuth_rad)
+    design = np.hstack([free, centre])
+    noise, p = field.noise_m2 + 1e-12 * np.eye(n), design.shape[1]
+    system = np.block([[whole[:n, :n] + noise, design[:n]], [design[:n].T, np.zeros((p, p))]])
+    right = np.hstack([whole[n:, :n], design[n:]])
+    weights = np.linalg.solve(system, right.T).T[:, :n]
+    error = whole[n:, n:] - weights @ whole[:n, n:] - whole[n:, :n] @ weights.T
+    return weights @ field.radius_m, error + weights @ whole[:n, :n] @ weights.T
+
+
+@pytest.mark.slow
+def test_the_estimate_agrees_with_a_dense_solution(figure):
+    """Second method: mean radii at the Gauss levels to 1e-9, and their doubt."""
+    rng = np.random.default_rng(3)
+    sites = sites_of(3, [-0.6, 0.5], 9, rng)
+    field = field_of(sites, RADIUS_M + 0.004 * rng.normal(size=len(sites)))
+    radius, error = dense(field, gauss_heights())
+    assert field.means.weights @ field.radius_m == pytest.approx(radius, rel=1e-9)
+    unseen = sum(field.means.unseen(index) for index in range(len(COMPONENTS)))
+    worst = np.abs(unseen - error).max() / np.abs(error).max()
+    figure("covariance of mean radii against the dense solution, relative", f"{worst:.1e}")
+    assert worst < 1e-8
+
+
+def test_what_is_not_seen_by_nobody_is_the_prior():
+    """One ring in the middle: the bulge of a course is as it was beforehand (closed form)."""
+    sites = sites_of(1, [0.0], 24)
+    field = field_of(sites, np.full(24, RADIUS_M))
+    taper = [one.name for one in COMPONENTS].index("taper")
+    unseen = field.means.unseen(taper)
+    size = field.amplitudes.variances_m2[taper]
+    assert unseen == pytest.approx(3 * size * np.outer(gauss_heights(), gauss_heights()), abs=1e-12)
+
+
+def test_functionals_are_linear_in_the_readings():
+    rng = np.random.default_rng(5)
+    sites = sites_of(2, [-0.5, 0.5], 12, rng)
+    radius = RADIUS_M + 0.005 * rng.normal(size=len(sites))
+    field = field_of(sites, radius)
+    gradients = 1 + 0.1 * rng.normal(size=field.outlines_m.shape)
+
+    def integrals(moved):
+        outlines = replace(field, radius_m=radius + moved).outlines_m
+        return FULL_TURN * np.mean(gradients * outlines, axis=2).ravel()
+
+    some = np.zeros((len(sites), 4))
+    some[[0, 13, 30, 47], range(4)] = 1.0
+    # the outlines have the mean centre of the rings of a course, the functionals none
+    turns = np.stack([np.sin(field.grid_rad), np.cos(field.grid_rad)])
+    gradients -= (gradients @ turns.T) @ turns * 2 / gradients.shape[2]
+    weights = field.functionals(gradients).weights
+    found = np.column_stack([(integrals(col) - integrals(-col)) / 2 for col in some.T])
+    assert found == pytest.approx(weights @ some, abs=1e-7)
+
+
+def test_the_slope_of_the_likelihood():
+    rng = np.random.default_rng(2)
+    sites = sites_of(3, [-0.6, 0.6], 12, rng)
+    radius = RADIUS_M + 0.004 * rng.normal(size=len(sites))
+    evidence = _Evidence.of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, True)
+    at = evidence.middle + rng.normal(0, 0.5, len(evidence.middle))
+    slope = evidence.misfit(at)[1]
+    assert_derivative(
+        lambda x: np.array([evidence.misfit(x)[0]]), at, slope[None], step=1e-5, tolerance=1e-6
+    )
+
+
+EXACT = {
+    "cylinder": lambda a, z: RADIUS_M + 0 * z,
+    "taper": lambda a, z: RADIUS_M + 0.004 * z,
+    "oval": lambda a, z: RADIUS_M + 0.02 * np.cos(2 * a) + 0.004 * np.sin(3 * a),
+}
+
+
+@pytest.mark.parametrize("shape", EXACT)
+def test_exact_shapes_without_noise(shape, figure):
+    """Closed form: three rings of 24 points a course, volumes of courses within 2 ppm."""
+    sites = sites_of(4, gauss_heights()[[0, 3, 6]], 24)
+    wall = EXACT[shape]
+    field = estimated(sites, wall(sites.azimuth_rad, sites.zeta))
+    node, weight = np.polynomial.legendre.leggauss(9)
+    grid = FULL_TURN * np.arange(360) / 360
+    truth = weight @ np.array([np.mean(wall(grid, z) ** 2) for z in node]) / 2
+    ppm = 1e6 * (volume(field) / truth - 1)
+    figure(f"noise-free {shape}, volume of a course, ppm", f"{ppm:.3f}")
+    assert abs(ppm) < 2.0
+
+
+def test_a_barrel_of_three_rings_is_within_its_doubt(figure):
+    """5 mm, noise-free: what is drawn in at the joints cannot be told from it beyond the rings."""
+    sites = sites_of(4, [-0.7, 0.0, 0.7], 24)
+    field = estimated(sites, RADIUS_M + 0.005 * (1 - sites.zeta**2))
+    truth = RADIUS_M**2 + 2 * RADIUS_M * 0.005 * 2 / 3 + 0.005**2 * 8 / 15  # closed form
+    ppm = 1e6 * (volume(field) / truth - 1)
+    weights = np.polynomial.legendre.leggauss(LEVELS)[1] / 2
+    parts = [field.means.unseen(index)[:LEVELS, :LEVELS] for index in range(len(COMPONENTS))]
+    u = np.sqrt(sum(weights @ part @ weights for part in parts)) * 2e6 / RADIUS_M
+    figure("barrel of 5 mm, three rings, volume off and u, ppm", f"{ppm:.1f} {u:.1f}")
+    assert abs(ppm) < min(2 * u, 100)
+
+
+def test_a_buckle_is_wall(figure):
+    """60 mm over one course, 3 m wide, 24 to 72 points a ring: at most the circle's 18 ppm."""
+    for points in (24, 48, 72):
+        sites = sites_of(5, [-0.6, 0.0, 0.6], points)
+
+        def wall(course, zeta, azimuth):
+            part = np.clip(RADIUS_M * (azimuth - 1.0) / 1.5, -1, 1)
+            cap = np.cos(np.pi / 2 * part) ** 2 * np.cos(np.pi / 2 * zeta) ** 2
+            return RADIUS_M - 0.060 * cap * (course == 2)
+
+        radius = wall(sites.course, sites.zeta, sites.azimuth_rad)
+        field = estimated(
+            sites, radius + 1e-3 * np.random.default_rng(1).normal(size=len(radius)), 1e-3
+        )
+        node, weight = np.polynomial.legendre.leggauss(20)
+        grid = FULL_TURN * np.arange(2000) / 2000
+        truth = 4 * RADIUS_M**2 + weight @ [np.mean(wall(2, z, grid) ** 2) for z in node] / 2
+        ppm = 1e6 * (sum(volume(field, course) for course in range(5)) / truth - 1)
+        figure(f"buckle of 60 mm, {points} points a ring, volume, ppm", f"{ppm:.1f}")
+        assert abs(ppm) < 60
+
+
+def test_order_turn_and_size_change_nothing():
+    rng = np.random.default_rng(8)
+    sites = sites_of(3, [-0.5, 0.5], 12, rng)
+    radius = RADIUS_M + 0.005 * rng.normal(size=len(sites))
+    field = estimated(sites, radius, 1e-3)
+    order = rng.permutation(len(sites))
+    mixed = Sites(
+        *(
+            getattr(sites, name)[order]
+            for name in ("course", "ring", "zeta", "azimuth_rad", "leans")
+        )
+    )
+    turned = replace(sites, azimuth_rad=(sites.azimuth_rad + 1.234) % FULL_TURN)
+    for other in (estimated(mixed, radius[order], 1e-3), estimated(turned, radius, 1e-3)):
+        for course in range(3):
+            assert volume(other, course) == pytest.approx(volume(field, course), rel=1e-8)
+
+
+def test_a_left_out_reading_is_predicted_from_the_others():
+    """Second method: the test of each reading against a fit without it."""
+    rng = np.random.default_rng(4)
+    sites = sites_of(2, [-0.5, 0.5], 12, rng)
+    radius = RADIUS_M + 0.003 * rng.normal(size=len(sites))
+    field = field_of(sites, radius)
+    for one in (0, 17):
+        noise = field.noise_m2.copy()
+        noise[one, one] = 1e6  # as good as left out
+        without = replace(field, noise_m2=noise)
+        outline = np.interp(
+            sites.azimuth_rad[one],
+            field.grid_rad,
+            without.outlines_at(sites.zeta[[one]])[sites.course[one], 0],
+        )
+        sign = np.sign(radius[one] - outline)
+        assert np.sign(field.tests[one]) == sign or abs(field.tests[one]) < 0.3
+
+
+@pytest.mark.slow
+def test_walls_drawn_from_the_components_are_held(figure):
+    """Simulation of the algebra alone: 400 walls of the model, their totals in units of u."""
+    rng = np.random.default_rng(6)
+    sites = sites_of(3, [-0.6, 0.6], 12)
+    course = np.concatenate([sites.course, np.repeat(range(3), LEVELS * 48)])
+    height = np.concatenate([sites.zeta, np.tile(np.repeat(gauss_heights(), 48), 3)])
+    turn = np.concatenate([sites.azimuth_rad, np.tile(FULL_TURN * np.arange(48) / 48, 3 * LEVELS)])
+    along, size = azimuth_correlations(turn, turn, RADIUS_M), assumed_amplitudes().variances_m2
+    whole = np.zeros((len(turn), len(turn)))
+    for one, own in zip(COMPONENTS, size, strict=True):
+        part = own * along[one.shape] * one.height_covariance(height, height)
+        whole += part if one.common else part * (course[:, None] == course)
+    values, vectors = np.linalg.eigh(whole)
+    walls = vectors * np.sqrt(np.maximum(values, 0)) @ rng.normal(size=(len(turn), 2000))
+    n, field = len(sites), field_of(sites, np.full(len(sites), RADIUS_M))
+    weights = np.tile(np.polynomial.legendre.leggauss(LEVELS)[1] / 2, 3) / 3
+    truth = weights @ walls[n:].reshape(3 * LEVELS, 48, -1).mean(axis=1)
+    read = walls[:n] + 1e-3 * rng.normal(size=(n, 2000))
+    error = weights @ field.means.weights @ read - truth
+    variance = sum(weights @ field.means.unseen(i) @ weights for i in range(len(COMPONENTS)))
+    variance += 1e-6 * np.sum((weights @ field.means.weights) ** 2)
+    part = np.mean(np.abs(error) < 1.96 * np.sqrt(variance))
+    figure("held, walls of the model itself, 2000", f"{part:.4f}")
+    assert abs(part - 0.95) < 3 * np.sqrt(0.95 * 0.05 / 2000)
+
+
+def test_more_rings_and_points_narrow_the_doubt():
+    """Monotony: of one wall, in the mean over courses."""
+
+    def doubt(heights, points):
+        field = field_of(sites_of(3, heights, points), np.full(3 * len(heights) * points, RADIUS_M))
+        weights = np.tile(np.polynomial.legendre.leggauss(LEVELS)[1] / 2, 3) / 3
+        parts = [field.means.unseen(index) for index in range(len(COMPONENTS))]
+        return sum(weights @ part @ weights for part in parts)
+
+    assert doubt([-0.6, 0.6], 24) < doubt([0.0], 24)
+    assert doubt([-0.7, 0.0, 0.7], 24) < doubt([-0.6, 0.6], 24)
+    assert doubt([-0.6, 0.6], 48) < doubt([-0.6, 0.6], 24)
+
+
+def test_what_a_plan_says_of_the_ovality_is_not_unsure():
+    known = assumed_amplitudes(0.010, 0.006)
+    names = [one.name for one in COMPONENTS]
+    sizes = dict(zip(names, np.sqrt(known.variances_m2), strict=True))
+    assert sizes["common ovality"] == pytest.approx(0.006)
+    assert sizes["own ovality"] == pytest.approx(0.008)
+    assert known.inflation()[names.index("own ovality")] == 1.0
+    assert isinstance(known, Amplitudes)
