@@ -11,6 +11,7 @@ import numpy as np
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
+from tankcal.geometry.buckles import find_buckles
 from tankcal.geometry.snooping import LEAST_NOISE_M, distances_from_axis, find_form, shell_problem
 from tankcal.messages import message
 
@@ -146,7 +147,8 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
     if not tilt_known:
         upright = np.array([*axis[:2], 0.0, 0.0])
         found = find_form(local, course, zeta, wall, upright, relative, 1e-9, snooping)
-    in_band, wall, axis = wall, found.wall, found.axis
+    in_band, axis = wall, found.axis
+    wall = found.wall | _buckles(local, in_band, found, nominal_radius_m)
     reason[(reason == "") & ~wall] = "snooping"
     if wall.sum() < LEAST_PART * candidates.sum():
         raise SolutionError(
@@ -173,6 +175,18 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
         noise_dof=found.noise_dof,
         tilt_known=bool(tilt_known),
     )
+
+
+def _buckles(local, in_band, found, nominal_radius_m):
+    """(n,) points that were rejected, but belong to a buckle of the wall."""
+    tested, back = np.flatnonzero(in_band), np.zeros(len(local), dtype=bool)
+    offset, _ = distances_from_axis(local[tested], found.axis)
+    turn = np.arctan2(offset[:, 0], offset[:, 1])
+    for start in (0.0, np.pi):  # so that no patch is cut where the turn begins
+        arc = nominal_radius_m * ((turn + start) % (2 * np.pi))
+        place = np.column_stack([arc, local[tested, 2]])
+        back[tested] |= find_buckles(place, found.residual[tested], ~found.wall[tested])
+    return back
 
 
 def _within_course(z_m, course, joints_m):

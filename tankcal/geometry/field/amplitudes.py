@@ -20,13 +20,13 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations
+from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, oval_columns
 
 NOISE_MEDIAN_M, NOISE_LOG_SD = 2e-3, 3.0  # of readings without a given standard deviation
 LEAST_M, MOST_M = 1e-5, 0.3  # amplitudes that are tried
 LEAST_NOISE_M = 1e-6  # what is given as perfect is not quite
 SAME_AZIMUTH_RAD = 1e-9
-SMALLEST = 1e-9  # of the largest variance of a direction of the common form
+SMALLEST = 1e-8  # of the largest variance of a direction of the common form
 MOST_FOLLOWED = 80  # directions of the common form that are followed through all courses
 ROUNDING = 1e-11  # of the largest variances, that keeps a covariance positive
 MOST_STEPS, SMALL_STEP = 12, 1e-7  # of a logarithm
@@ -285,8 +285,9 @@ class _Evidence:
 def _common_columns(sites, nominal_m):
     """{component: (n, k) columns of unit variance}, and a list of those that these miss a part of.
 
-    Of a form B = K_z L_z^-T at some azimuths z, K_z L_z^-T (..)' = K where these are all that the
-    survey has; else z are even, and K - B B', never negative, is taken as each course's own.
+    The modes of ovality are few. Of seams B = K_z L_z^-T at some azimuths z; B B' = K where these
+    are all that the survey has. Else z are even, and K - B B', never negative, is taken as each
+    course's own.
     """
     place, azimuths = distinct_azimuths(sites.azimuth_rad)
     few = len(azimuths) <= MOST_FOLLOWED
@@ -295,9 +296,13 @@ def _common_columns(sites, nominal_m):
     to = azimuth_correlations(azimuths, chosen, nominal_m)
     columns, missed = {}, []
     for i, one in enumerate(COMPONENTS):
-        if one.common and one.shape == "mean":
+        if not one.common:
+            continue
+        if one.shape == "mean":
             columns[i] = one.height_columns(sites.zeta)
-        elif one.common:
+        elif one.shape == "oval" and not few:
+            columns[i] = oval_columns(azimuths)[place]
+        else:
             values, vectors = np.linalg.eigh(among[one.shape])
             keep = values > SMALLEST * values[-1]
             half = to[one.shape] @ (vectors[:, keep] / np.sqrt(values[keep]))
@@ -334,6 +339,7 @@ def _course(sites, radius_m, noise_m2, nominal_m, members, columns, missed, esti
     ]
     own += [
         seen(there[COMPONENTS[i].shape] - columns[i][members] @ columns[i][members].T)
+        + 10 * SMALLEST * np.eye(left.shape[1])
         for i in missed
     ]
     own += [seen(noise)] * estimate_noise
