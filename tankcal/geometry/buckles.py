@@ -19,7 +19,7 @@ def find_buckles(place_m, departure_m, rejected):
     """Mark rejected points that are a buckle of the wall.
 
     Rejected points of one sign that hang together are a buckle when they cover 0.8 m by 0.4 m of
-    the wall at least, in any direction, and no accepted point lies within their convex hull.
+    the wall at least, in any direction, and no other point lies within their convex hull.
 
     Parameters
     ----------
@@ -43,10 +43,10 @@ def find_buckles(place_m, departure_m, rejected):
     >>> int(found.sum())
     9
     """
-    found, accepted = np.zeros(len(rejected), dtype=bool), place_m[~rejected]
+    found = np.zeros(len(rejected), dtype=bool)
     for sign in (-1, 1):
         for patch in _patches(place_m, np.flatnonzero(rejected & (sign * departure_m > 0))):
-            found[patch] = _is_buckle(place_m[patch], accepted)
+            found[patch] = _is_buckle(place_m[patch], np.delete(place_m, patch, axis=0))
     return found
 
 
@@ -60,11 +60,11 @@ def _patches(place_m, members):
     return [members[label == one] for one in range(count)]
 
 
-def _is_buckle(patch_m, accepted_m):
+def _is_buckle(patch_m, others_m):
     if len(patch_m) < FEWEST:
         return False
     axes = np.linalg.svd(patch_m - patch_m.mean(axis=0), full_matrices=False)[2]
     long, wide = np.ptp(patch_m @ axes.T, axis=0)
     if wide < NARROWEST_M or long < SHORTEST_M:
         return False
-    return not np.any(Delaunay(patch_m).find_simplex(accepted_m) >= 0)
+    return not np.any(Delaunay(patch_m).find_simplex(others_m) >= 0)

@@ -3,11 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg
 import scipy.sparse
 
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.geometry.field.amplitudes import Sites, estimate_amplitudes
+from tankcal.geometry.field.cells import MOST_SITES, cells_of, sites_of_cells
 from tankcal.geometry.field.components import OVALITY_MODES
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.outlines import polar
@@ -138,8 +138,11 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     if estimated:  # what is given counts in relation; about as large as the points scatter
         covariance = covariance * (shell.noise_m / _median_sd(sds)) ** 2
     to_fit = _to_fit(job, shell, accepted, groups, covariance)
-    sites, radius, noise = _sites(groups, [sample_of(*one) for one in to_fit])
     nominal = job.tank.nominal_diameter_m / 2
+    samples = [sample_of(*one) for one in to_fit]
+    sites, means = _sites(groups, samples, nominal)
+    radius = means @ np.concatenate([one.radius_m for one in samples])
+    noise = (means @ scipy.sparse.block_diag(_blocks(samples)) @ means.T).toarray()
     if amplitudes is None:
         amplitudes = estimate_amplitudes(sites, radius, noise, nominal, estimate_noise=estimated)
     if amplitudes.noise != 1.0:  # it may be half a gigabyte
@@ -155,7 +158,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         covariance_m2=covariance,
         noise_dof=amplitudes.noise_dof if estimated else dof,
         field=field,
-        radii_by_points=_radii_by_points(sections, len(accepted)),
+        radii_by_points=means @ _radii_by_points(sections, len(accepted)),
         sections=sections,
     )
 
@@ -165,8 +168,8 @@ def _heights(job):
     return np.cumsum([0.0] + [course.height_m for course in job.courses])
 
 
-def _sites(groups, samples):
-    """`Sites` of the field, the radii there, and their covariance: (n,) without correlations."""
+def _sites(groups, samples, nominal_m):
+    """`Sites` of the field, and (sites, points) weights of the points in each: one, or a cell."""
     counts = [len(one.radius_m) for one in samples]
     sites = Sites(
         course=np.repeat([one.course for one in groups], counts),
@@ -175,12 +178,21 @@ def _sites(groups, samples):
         azimuth_rad=np.concatenate([one.azimuth_rad for one in samples]),
         leans=np.repeat([one.degree > 0 for one in groups], counts),
     )
-    noise = [
-        np.diag(one.covariance_m2) if np.ndim(one.covariance_m2) == 1 else one.covariance_m2
+    if len(sites) <= MOST_SITES:
+        return sites, scipy.sparse.eye_array(len(sites), format="csr")
+    variances = np.concatenate([block.diagonal() for block in _blocks(samples)])
+    means = cells_of(sites, variances, nominal_m)
+    return sites_of_cells(sites, means), means
+
+
+def _blocks(samples):
+    """Covariance of the radii of each sample."""
+    return [
+        scipy.sparse.diags_array(one.covariance_m2)
+        if np.ndim(one.covariance_m2) == 1
+        else one.covariance_m2
         for one in samples
     ]
-    radius = np.concatenate([one.radius_m for one in samples])
-    return sites, radius, scipy.linalg.block_diag(*noise)
 
 
 def _form_m2(amplitudes):

@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from generated_walls import job_of, make_wall, survey
 from jacobians import assert_derivative
 
+import tankcal.pipeline.wall as pipeline_wall
 from tankcal.geometry.field.amplitudes import (
     Amplitudes,
     Sites,
@@ -13,6 +15,7 @@ from tankcal.geometry.field.amplitudes import (
     assumed_amplitudes,
     estimate_amplitudes,
 )
+from tankcal.geometry.field.cells import cells_of, sites_of_cells
 from tankcal.geometry.field.components import (
     COMPONENTS,
     azimuth_correlations,
@@ -20,6 +23,8 @@ from tankcal.geometry.field.components import (
     seam_correlation,
 )
 from tankcal.geometry.field.estimate import LEVELS, WallField, gauss_heights
+from tankcal.pipeline.tanks import body_of
+from tankcal.pipeline.wall import find_wall
 
 FULL_TURN, RADIUS_M = 2 * np.pi, 6.5
 
@@ -319,3 +324,44 @@ def test_what_a_plan_says_of_the_ovality_is_not_unsure():
     assert sizes["own ovality"] == pytest.approx(0.008)
     assert known.inflation()[names.index("own ovality")] == 1.0
     assert isinstance(known, Amplitudes)
+
+
+def test_cells_are_means_that_lose_nothing_of_a_circle():
+    """Closed form: 3000 points in 100 cells at most, of a wall that tapers."""
+    rng = np.random.default_rng(9)
+    sites = Sites(
+        np.repeat([0, 1], 1500), np.repeat([0, 1], 1500), rng.uniform(-1, 1, 3000),
+        rng.uniform(0, FULL_TURN, 3000), np.ones(3000, dtype=bool),
+    )  # fmt: skip
+    means = cells_of(sites, rng.uniform(1, 2, 3000), RADIUS_M, most=100)
+    fewer = sites_of_cells(sites, means)
+    assert len(fewer) <= 100
+    assert means.sum(axis=1) == pytest.approx(1.0)
+    assert np.array_equal(np.unique(fewer.course), [0, 1])
+    assert means @ (5.0 + 0.1 * sites.zeta) == pytest.approx(5.0 + 0.1 * fewer.zeta)
+
+
+@pytest.mark.slow
+def test_a_field_of_cells_has_the_volume_of_the_field_of_points(tmp_path, monkeypatch, figure):
+    """Second method: 1200 points, written out whole and in cells."""
+    rng = np.random.default_rng(3)
+    wall = make_wall(rng, "chord", radius_m=5.0, courses=5)
+    measured = survey(rng, wall, rings=3, points=80, noise_m=0.002, layout="free")
+    job = job_of(wall, measured, tmp_path)
+    whole = find_wall(job, lambda text: None)
+    monkeypatch.setattr(pipeline_wall, "MOST_SITES", 100)
+    monkeypatch.setattr(cells_of, "__defaults__", (600,))
+    cells = find_wall(job, lambda text: None)
+    assert len(cells.field.sites) <= 600 < len(whole.field.sites)
+    volumes, u = [], []
+    for one in (whole, cells):
+        body = body_of(job, one)
+        top = np.array([body.highest_m])
+        volumes.append(body.volume_m3(top)[0])
+        u.append(np.sqrt(sum(np.sum(s.columns_m3**2) for s in body.sources(top))))
+    figure(
+        "cells against points, ppm of the volume and ratio of u",
+        f"{1e6 * (volumes[1] / volumes[0] - 1):.1f} {u[1] / u[0]:.3f}",
+    )
+    assert abs(volumes[1] - volumes[0]) < u[0]
+    assert 0.8 < u[1] / u[0] < 1.5  # means tell less of narrow seams
