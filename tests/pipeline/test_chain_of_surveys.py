@@ -13,8 +13,8 @@ from tankcal.job.model import DeclaredInput, Sphere
 from tankcal.pipeline.chain import adjust_job, run
 from tankcal.pipeline.survey_warnings import refuse_undetermined
 from tankcal.pipeline.tanks import body_of, insets_of, shell_volume
-from tankcal.pipeline.wall import find_wall, s_transform
-from tankcal.sections import coordinates_of, covariance_of, fit_section
+from tankcal.pipeline.wall import find_wall, fit_wall, s_transform
+from tankcal.sections import coordinates_of
 from tankcal.survey import Cause, wall_points
 from tankcal.survey.measurements import AdjustmentSettings, Instrument, Measurements
 from tankcal.survey.results import DatumReport
@@ -301,7 +301,7 @@ def surveys_of_one_tank(job, count):
     """What `count` surveys say of the same tank, each with its own noise and its own tape.
 
     Rows: error of the total volume, its u by points and tape; errors and sds of the four radii. The
-    truth is what the same fits make of the true points: the form between the points is the same in
+    truth is what the same fit makes of the true points: the wall between the points is the same in
     all surveys and is left out. Also u over that without covariance between courses, of the last.
     """
     rng, rows = np.random.default_rng(20_26), []
@@ -314,9 +314,9 @@ def surveys_of_one_tank(job, count):
         points = s_transform(wall_points(adjustment, surveyed, "outside"))
         one = replace(job, points=replace(points, causes=()))
         wall = find_wall(one, lambda text: None)
-        true = true_sections(one, wall)
-        error = total(one, wall) - total(one, replace(wall, sections=true))
-        pairs = zip(wall.sections, true, strict=True)
+        true = true_wall(one, wall)
+        error = total(one, wall) - total(one, true)
+        pairs = zip(wall.sections, true.sections, strict=True)
         radii = [found.circle.radius_m - exact.circle.radius_m for found, exact in pairs]
         sds = [np.sqrt(section.circle.cofactor_m2[2, 2]) for section in wall.sections]
         rows.append([error, u_of_points(one, wall), *radii, *sds])
@@ -332,24 +332,16 @@ def u_of_points(job, wall):
 
 
 def total(job, wall):
-    volume = shell_volume(job.courses, wall.joints_m, wall.sections, insets_of(job, job.switches))
+    volume = shell_volume(wall, insets_of(job, job.switches))
     return volume.volume_m3(volume.height_m)[0]
 
 
-def true_sections(job, wall):
-    """The sections of a wall, fitted to the true points with the covariance of the survey."""
-    xyz = tank_points()[_numbers(job.points)][wall.accepted]
-    return tuple(
-        fit_section(
-            one.group,
-            xyz[one.group.members],
-            covariance_of(one.group.members, wall.covariance_m2),
-            wall.shell.slope,
-            job.datum.bottom_z_m + one.group.height_m,
-            wall.form,
-        )
-        for one in wall.sections
-    )
+def true_wall(job, wall):
+    """What the same fit makes of the true points, with the covariance of the survey."""
+    xyz = job.points.xyz_m.copy()
+    xyz[wall.accepted] = tank_points()[_numbers(job.points)][wall.accepted]
+    points = replace(job.points, xyz_m=xyz)
+    return fit_wall(replace(job, points=points), wall.shell, amplitudes=wall.field.amplitudes)
 
 
 def without_covariance_between_courses(wall):

@@ -253,7 +253,7 @@ def check_forms(folder, count, figure):
     """Walls of random form seen at twelve points a course, with the same inputs in common."""
     ways = {
         "form in U": (lambda table: table, FORM),
-        "form left out": (lambda table: without(table, "form", "own_form"), FORM),
+        "form left out": (lambda table: without(table, "bulge", "ovality", "seams"), FORM),
     }
     found = study_of_shells(VerticalTanks(folder, FORM, form_m=0.010), ways, count)
     for name, one in found.items():

@@ -69,7 +69,7 @@ def test_the_table_is_that_of_the_chain(prediction, filled, figure):
     adjustment = adjust_survey(filled)
     points = s_transform(wall_points(adjustment, filled, "outside"))
     job = replace(plan.job, points=points, measurements=None)
-    table = compute_table(job, find_wall(job, lambda text: None, form=plan.form)).table
+    table = compute_table(job, find_wall(job, lambda text: None, amplitudes=plan.amplitudes)).table
     off = np.abs(prediction.table.U_m3 / table.U_m3 - 1).max()
     figure("largest relative difference of a row's U to the chain", off)
     assert prediction.table.U_m3 == pytest.approx(table.U_m3, rel=1e-8)
@@ -211,7 +211,9 @@ def volume_of(plan, measurements):
     adjustment = adjust_survey(measurements)
     points = s_transform(wall_points(adjustment, measurements, "outside"))
     job = replace(plan.job, points=points, measurements=None)
-    return compute_table(job, find_wall(job, lambda text: None, form=plan.form)).table.volume_m3[-1]
+    return compute_table(
+        job, find_wall(job, lambda text: None, amplitudes=plan.amplitudes)
+    ).table.volume_m3[-1]
 
 
 def test_a_bad_point_is_weak_and_a_hidden_one_is_not_determined(plan):

@@ -112,7 +112,8 @@ def test_the_filled_job_is_the_survey_that_was_planned(empty, fill):
         np.sqrt(sum(np.sum(one.columns_m3[-1] ** 2) for one in found))
         for found in (of_points, of_plan)
     )
-    assert top == pytest.approx(planned, rel=1e-4)
+    # the points weigh as the amplitudes have it: here learned from a perfect cylinder
+    assert top == pytest.approx(planned, rel=0.03)
     assert result.table.volume_m3 == pytest.approx(prediction.table.volume_m3, rel=1e-6)
 
 

@@ -134,4 +134,6 @@ def volume_of(plan, measurements):
     adjustment = adjust_survey(measurements)
     points = s_transform(wall_points(adjustment, measurements, "outside"))
     job = replace(plan.job, points=points, measurements=None)
-    return compute_table(job, find_wall(job, lambda text: None, form=plan.form)).table.volume_m3[-1]
+    return compute_table(
+        job, find_wall(job, lambda text: None, amplitudes=plan.amplitudes)
+    ).table.volume_m3[-1]

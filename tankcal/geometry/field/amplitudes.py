@@ -30,7 +30,7 @@ SMALLEST = 1e-8  # of the largest variance of a direction of the common form
 MOST_FOLLOWED = 80  # directions of the common form that are followed through all courses
 ROUNDING = 1e-11  # of the largest variances, that keeps a covariance positive
 MOST_STEPS, SMALL_STEP = 12, 1e-7  # of a logarithm
-LOG_STEP = 0.2  # of the differences that give the curvature
+LOG_STEP = 0.1  # of the differences that give the curvature
 
 
 @dataclass(frozen=True)
@@ -178,12 +178,9 @@ def estimate_amplitudes(sites, radius_m, noise_m2, nominal_m, *, estimate_noise=
     best = scipy.optimize.minimize(
         evidence.misfit, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-8}
     ).x
-    covariance = np.linalg.inv(_curvature(evidence, best))
-    for _ in range(MOST_STEPS):  # of Newton, so that the order of the readings changes nothing
-        step = np.clip(-covariance @ evidence.misfit(best)[1] / 2, -LOG_STEP, LOG_STEP)
-        best = np.clip(best + step, *np.array(bounds).T)
-        if np.abs(step).max() < SMALL_STEP:
-            break
+    for _ in range(2):  # to the very top, so that the order of the readings changes nothing
+        covariance = np.linalg.inv(_curvature(evidence, best))
+        best = np.clip(_climb(evidence, best, covariance), *np.array(bounds).T)
     count = len(COMPONENTS)
     known = Amplitudes(np.exp(best[:count]), covariance[:count, :count])
     if not estimate_noise:
@@ -193,12 +190,21 @@ def estimate_amplitudes(sites, radius_m, noise_m2, nominal_m, *, estimate_noise=
     )
 
 
+def _climb(evidence, best, covariance):
+    """Newton's steps with one curvature."""
+    for _ in range(MOST_STEPS):
+        step = np.clip(-covariance @ evidence.misfit(best)[1] / 2, -LOG_STEP, LOG_STEP)
+        best = best + step
+        if np.abs(step).max() < SMALL_STEP:
+            break
+    return best
+
+
 def _curvature(evidence, best):
-    """Of the misfit's half, by central differences of its derivative; never below the prior's."""
-    count = len(best)
-    steps = LOG_STEP * np.eye(count)
-    rows = [evidence.misfit(best + s)[1] - evidence.misfit(best - s)[1] for s in steps]
-    curvature = np.array(rows) / (4 * LOG_STEP)
+    """Of the misfit's half, by differences of its derivative; never below the prior's."""
+    slope = evidence.misfit(best)[1]
+    rows = [evidence.misfit(best + LOG_STEP * unit)[1] - slope for unit in np.eye(len(best))]
+    curvature = np.array(rows) / (2 * LOG_STEP)
     values, vectors = np.linalg.eigh((curvature + curvature.T) / 2)
     return (vectors * np.maximum(values, 1 / evidence.log_sd.max() ** 2)) @ vectors.T
 

@@ -94,6 +94,7 @@ COMPONENTS = (
     Component("taper", "bulge", "mean", False, _LINEAR, 0.8e-3, 1.5, "taper"),
     Component("common ovality", "ovality", "oval", True, _LEVEL, 4e-3, 2.0),
     Component("own ovality", "ovality", "oval", False, _LEVEL, 2e-3, 2.0),
+    Component("turning ovality", "ovality", "oval", False, _LINEAR, 1e-3, 2.0),
     Component("common seams", "seams", "seam", True, _LEVEL, 3e-3, 1.2),
     Component("own seams", "seams", "seam", False, _LEVEL, 2e-3, 1.2),
     Component("dents", "seams", "seam", False, "local", 2e-3, 1.2),

@@ -288,7 +288,8 @@ def _of_the_unseen(wall, volume, features, declared):
             parts = [inflation[index] * features.unseen(index) for index in chosen]
             sizes = np.maximum([top @ part @ top for part in parts], 1e-30)
             known = _told_by(float(sizes @ assumed[chosen] / sizes.sum()))
-            found.append(Factor(kind, factor_of(sum(parts)), note=known))
+            by = "B" if known == "assumed" else "A"
+            found.append(Factor(kind, factor_of(sum(parts)), type=by, note=known))
     return tuple(one for one in found if one.columns.shape[1])
 
 
