@@ -198,12 +198,13 @@ def test_the_volume_does_not_know_which_photo_is_held(job, survey, figure):
         settings = AdjustmentSettings(datum="inner" if held is None else "control", snooping=False)
         surveyed = without_control(survey, held=held, settings=settings)
         result = run(replace(job, measurements=surveyed))
-        found.append((result.table.volume_m3[-1], result.table.u_m3[-1]))
+        found.append((result.table.volume_m3[-1], u_of_points(result.job, result.wall)))
         sds.append(np.sqrt(np.einsum("nii->ni", result.adjustment.covariance_m2)).max())
     apart = np.ptp(found, axis=0) / found[0]
-    figure("volume and u, whichever of 8 photos is held: largest relative change", apart)
+    figure("volume and u of points, whichever of 8 photos is held: largest relative change", apart)
     figure("largest sd of a coordinate, inner and 8 photos held, mm", np.round(1e3 * np.array(sds)))
-    assert np.all(apart < 1e-8)
+    # the heights of the rings in their courses move with the frame, by millimetres
+    assert np.all(apart < [2e-8, 1e-6])
     assert max(sds) > 2 * min(sds)
 
 

@@ -25,7 +25,7 @@ from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, 
 NOISE_MEDIAN_M, NOISE_LOG_SD = 2e-3, 3.0  # of readings without a given standard deviation
 LEAST_M, MOST_M = 1e-5, 0.3  # amplitudes that are tried
 LEAST_NOISE_M = 1e-6  # what is given as perfect is not quite
-SAME_AZIMUTH_RAD = 1e-9
+SAME_AZIMUTH_RAD = 1e-12
 SMALLEST = 1e-8  # of the largest variance of a direction of the common form
 MOST_FOLLOWED = 80  # directions of the common form that are followed through all courses
 ROUNDING = 1e-11  # of the largest variances, that keeps a covariance positive

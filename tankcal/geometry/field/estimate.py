@@ -140,7 +140,10 @@ class WallField:
 
     @cached_property
     def _to_grid(self):
-        return azimuth_correlations(self.grid_rad, self._distinct[1], self.nominal_m)
+        found = azimuth_correlations(self.grid_rad, self._distinct[1], self.nominal_m)
+        for shape in ("oval", "seam"):  # no mode 0, nor one that the grid takes for it
+            found[shape] -= found[shape].mean(axis=0)
+        return found
 
     @cached_property
     def _columns(self):
@@ -258,7 +261,7 @@ class Functionals:
             along = np.outer(self._totals, self._totals)
         else:
             kernel = azimuth_correlations(field.grid_rad, np.zeros(1), field.nominal_m)[one.shape]
-            spectrum = np.fft.rfft(kernel[:, 0]).real
+            spectrum = np.fft.rfft(kernel[:, 0] - kernel[:, 0].mean()).real
             smooth = np.fft.irfft(np.fft.rfft(gradients) * spectrum, gradients.shape[1])
             along = smooth @ gradients.T
         same = np.ones((count, count)) if one.common else np.eye(count)
