@@ -27,7 +27,19 @@ DOORS = {  # rooms of the reference, in the order in which a job goes through th
     "Solver": ("tankcal.solver",),
     "Geometry": tuple(
         f"tankcal.geometry.{name}"
-        for name in ("circles", "cylinders", "primitives", "outlines", "form", "rings", "rotations")
+        for name in (
+            "circles",
+            "cylinders",
+            "primitives",
+            "outlines",
+            "form",
+            "field.components",
+            "field.amplitudes",
+            "field.estimate",
+            "buckles",
+            "rings",
+            "rotations",
+        )
     ),
     "Distributions and Monte Carlo": ("tankcal.gum.distributions", "tankcal.gum.monte_carlo"),
     "Camera": ("tankcal.camera.model", "tankcal.camera.imaging", "tankcal.camera.comparator"),

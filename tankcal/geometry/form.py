@@ -1,4 +1,4 @@
-"""The form of a shell: what departs from a circle, as a spectrum that its own points are asked for.
+"""The form of a shell: what departs from a circle, by its modes around the turn.
 
 Mode k >= 2 of the outline has the variance amplitude k^-3 (dents, ovality, plates that do not meet
 in a circle).

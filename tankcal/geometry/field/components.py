@@ -78,11 +78,6 @@ class Component:
             return np.exp(-np.abs(np.subtract.outer(zeta, other)) / LOCAL_LENGTH)
         return self.height_columns(zeta) @ self.height_columns(other).T
 
-    @property
-    def is_level(self):
-        """Whether it is the same at all heights of a course."""
-        return self.orders == _LEVEL
-
 
 _EVEN = (0, 0, 1, 0, 0.02, 0, 0.003)  # barrels and drawn-in joints share their sign
 _FREE = (0, 0, *(order**-2.0 for order in range(2, 7)))
