@@ -27,7 +27,7 @@ import tankcal
 from tankcal.survey.points import Points
 
 FAMILIES = ("coil", "brick", "dents", "buckle", "chord")
-FULL_TURN, ARC_M, FEWEST = 2 * np.pi, 0.02, 2048  # of the quadrature of areas
+FULL_TURN, ARC_M, FEWEST = 2 * np.pi, 0.02, 4096  # of the quadrature of areas
 LEAN = (0.001, -0.0007)
 
 
