@@ -257,25 +257,6 @@ def test_order_turn_and_size_change_nothing():
             assert volume(other, course) == pytest.approx(volume(field, course), rel=1e-8)
 
 
-def test_a_left_out_reading_is_predicted_from_the_others():
-    """Second method: the test of each reading against a fit without it."""
-    rng = np.random.default_rng(4)
-    sites = sites_of(2, [-0.5, 0.5], 12, rng)
-    radius = RADIUS_M + 0.003 * rng.normal(size=len(sites))
-    field = field_of(sites, radius)
-    for one in (0, 17):
-        noise = field.noise_m2.copy()
-        noise[one, one] = 1e6  # as good as left out
-        without = replace(field, noise_m2=noise)
-        outline = np.interp(
-            sites.azimuth_rad[one],
-            field.grid_rad,
-            without.outlines_at(sites.zeta[[one]])[sites.course[one], 0],
-        )
-        sign = np.sign(radius[one] - outline)
-        assert np.sign(field.tests[one]) == sign or abs(field.tests[one]) < 0.3
-
-
 @pytest.mark.slow
 def test_walls_drawn_from_the_components_are_held(figure):
     """Simulation of the algebra alone: 400 walls of the model, their totals in units of u."""

@@ -108,17 +108,6 @@ class WallField:
         """(courses, LEVELS) mean radii that the estimate makes of departures (n,) of the radii."""
         return (self.means.weights @ departures_m).reshape(len(self._members), LEVELS)
 
-    @cached_property
-    def tests(self):
-        """(n,) each reading less the estimate from all others, over its standard deviation.
-
-        With P = V^-1 - V^-1 X (X' V^-1 X)^-1 X' V^-1 that is (P y)_i / sqrt(P_ii): Baarda's w.
-        """
-        factor, by_columns, normal = self._factored
-        inverse = scipy.linalg.cho_solve(factor, np.eye(len(self.sites)), check_finite=False)
-        free = np.einsum("ij,ji->i", by_columns, scipy.linalg.cho_solve(normal, by_columns.T))
-        return self._explained / np.sqrt(np.maximum(np.diag(inverse) - free, 1e-300))
-
     # what follows is computed once
 
     @cached_property
