@@ -117,7 +117,6 @@ def body_of(case):
         scale,
         EXPANSION,
         bearing=("plate_thickness", "paint", "shell_temperature", "expansion"),
-        departures=("barrel",),
     )
     declared = [DeclaredInput(name, u, "", u, dof=dof) for name, (_, u, dof) in SHARED.items()]
     declared.append(DeclaredInput("course_heights", HEIGHT_U_M, "m", HEIGHT_U_M))

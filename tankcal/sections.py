@@ -327,7 +327,7 @@ def sample_of(group, xyz_m, covariance_m2, slope, z_m):
     centre = taubin_circle(xy - middle)[:2] + middle
     noise = radial_covariance(xy, centre, by_xyz @ covariance_m2 @ by_xyz.T)
     azimuth, radius = polar(xy, *centre)
-    return Sample(azimuth, radius, noise, group.course, _zeta(group, xyz_m, z_m), group.degree)
+    return Sample(azimuth, radius, noise, _zeta(group, xyz_m, z_m))
 
 
 def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):

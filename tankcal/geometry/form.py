@@ -23,20 +23,14 @@ class Sample:
         About the centre of its circle, rad and m.
     covariance_m2 : ndarray, shape (n, n) or (n,)
         Covariance, or variances, of the radii, m2.
-    course : int
-        Index of the course.
     zeta : ndarray, shape (n,)
         Height within the course, -1 at its bottom to +1 at its top.
-    degree : int
-        Of the polynomial in height that is fitted to them (0: level).
     """
 
     azimuth_rad: np.ndarray
     radius_m: np.ndarray
     covariance_m2: np.ndarray
-    course: int
     zeta: np.ndarray
-    degree: int = 0
 
 
 def harmonics(azimuth_rad, highest, derivative=0):

@@ -147,9 +147,9 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         amplitudes = estimate_amplitudes(sites, radius, noise, nominal, estimate_noise=estimated)
     if amplitudes.noise != 1.0:  # it may be half a gigabyte
         covariance, noise = covariance * amplitudes.noise, noise * amplitudes.noise
+        to_fit = _to_fit(job, shell, accepted, groups, covariance)
     field = WallField(sites, radius, noise, amplitudes, nominal)
     form_m2 = _form_m2(amplitudes)
-    to_fit = _to_fit(job, shell, accepted, groups, covariance)
     sections = tuple(fit_section(*one, form_m2) for one in to_fit)
     return Wall(
         shell=shell,
@@ -197,8 +197,7 @@ def _blocks(samples):
 
 def _form_m2(amplitudes):
     """Amplitude of k^-3 that has all departures from a circle: what smooths an outline."""
-    total = amplitudes.total_m2(common=True) + amplitudes.total_m2(common=False)
-    return total / np.sum(OVALITY_MODES**-3)
+    return amplitudes.form_m2 / np.sum(OVALITY_MODES**-3)
 
 
 def _radii_by_points(sections, count):

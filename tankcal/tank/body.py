@@ -113,8 +113,6 @@ class ShellPart(Part):
         used.
     tilt : float
         Of the axis, m/m.
-    departures : tuple of str
-        Those of "barrel" and "taper" that were declared: the others are in the factor "bulge".
     """
 
     volume: ShellVolume
@@ -124,7 +122,6 @@ class ShellPart(Part):
     stretch: float = 1.0
     bearing: tuple[str, ...] = ()
     tilt: float = 0.0
-    departures: tuple[str, ...] = ()
 
     @property
     def breakpoints_m(self):
@@ -164,7 +161,7 @@ class ShellPart(Part):
             "scale": by_scale,
             "datum": area,
             "offset": loss,
-            **{name: self.volume.by_missed_m2(wet, name) for name in self.departures},
+            **{name: self.volume.by_missed_m2(wet, name) for name in self.volume.departures},
             "course_heights": self.volume.by_course_heights_m2(wet),
             "tilt": volume * self.tilt / (1 + self.tilt**2),
             **{name: of_corrections[name] for name in self.bearing},

@@ -46,6 +46,11 @@ class ShellVolume:
         polynomials = self._by_height(self.features)
         return np.array([below.sum() - above[0] for below, above in pairwise(polynomials)])
 
+    @property
+    def departures(self):
+        """Names of the departures of its courses that were declared: "barrel", "taper"."""
+        return tuple(self.courses[0].missed)
+
     @cached_property
     def features(self):
         """(f,) the areas that every volume is a sum of, m2."""

@@ -1,8 +1,8 @@
 """How large the components of a wall are, by the restricted likelihood of what was measured.
 
 Readings y = X beta + sum of components + noise; X the radius of each course, and the centre of each
-ring of points. With N
-an orthonormal basis of what X leaves free in a course, N'y is normal with a covariance
+ring of points. With N an orthonormal basis of what X leaves free in a course, N'y is normal with a
+covariance
 
     D_c + U_c L L' U_c'
 
@@ -120,9 +120,10 @@ class Amplitudes:
         """
         return np.exp(np.diag(self.log_covariance) / 2)
 
-    def total_m2(self, *, common):
-        """Variance of the departures from a circle, of those that all courses share or not."""
-        chosen = [one.kind != "bulge" and one.common == common for one in COMPONENTS]
+    @property
+    def form_m2(self):
+        """Variance of the departures of a section from a circle."""
+        chosen = [one.kind != "bulge" for one in COMPONENTS]
         return float(np.sum(self.variances_m2[chosen]))
 
 

@@ -72,7 +72,7 @@ def sites_of_cells(sites, weights):
     Sites
     """
     turn = weights @ np.exp(1j * sites.azimuth_rad)
-    first = weights.tocsr().indices[weights.tocsr().indptr[:-1]]
+    first = weights.indices[weights.indptr[:-1]]
     return Sites(
         course=sites.course[first],
         ring=sites.ring[first],

@@ -18,14 +18,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-FULL_TURN = 2 * np.pi
+from tankcal.geometry.outlines import FULL_TURN
+
 OVALITY_MODES = np.arange(2.0, 37.0)
 OVALITY_WEIGHTS = OVALITY_MODES**-3 / np.sum(OVALITY_MODES**-3)
 SEAM_LENGTH_M = 0.4  # along the arc, of a seam's flank
 ORDERS = 6  # of the Legendre polynomials in the height of a course
 JOINT_LENGTH = 0.2  # of half a course: how far a joint draws the plate in
 LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
-
 
 _LEVEL = (1.0, 0, 0, 0, 0, 0, 0)
 KINDS = ("bulge", "ovality", "seams")

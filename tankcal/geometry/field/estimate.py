@@ -15,20 +15,26 @@ Source: Robinson 1991 (best linear unbiased prediction).
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 import scipy.linalg
 
-from tankcal.geometry.field.amplitudes import Amplitudes, Sites, distinct_azimuths
-from tankcal.geometry.field.components import COMPONENTS, FULL_TURN, azimuth_correlations
+from tankcal.geometry.field.amplitudes import (
+    LEAST_NOISE_M,
+    Amplitudes,
+    Sites,
+    distinct_azimuths,
+)
+from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations
+from tankcal.geometry.outlines import FULL_TURN
 from tankcal.quadrature import panels
 
 LEVELS = 7  # of a course, at which its outlines are stated: Gauss levels
 GRID_M, FEWEST_OF_GRID = 0.1, 720  # along the arc, and azimuths, of outlines that are integrated
-LEAST_NOISE_M = 1e-6  # what is given as perfect is not quite
 
 
+@cache
 def gauss_heights():
     """(LEVELS,) heights within a course, -1 to 1, at which outlines are stated."""
     return 2 * panels([0.0, 1.0], LEVELS)[0] - 1

@@ -90,15 +90,17 @@ def insets_of(job, switches):
     ]
 
 
-def shell_volume(wall, insets_m=None, scale=1.0, stretch=1.0):
+def shell_volume(wall, insets_m=None, scale=1.0, stretch=1.0, *, departures=()):
     """The shell of courses as the field of its wall has it.
 
-    insets_m (courses,) off the radii; scale of horizontal lengths, stretch of heights
+    insets_m (courses,) off the radii; scale of horizontal lengths, stretch of heights; departures
+    that were declared, of "barrel" and "taper"
     """
     outlines, sites, levels = wall.field.outlines_m, wall.field.sites, gauss_heights()
     missed = {
         name: departure(levels) - wall.field.seen(departure(sites.zeta))
         for name, departure in DEPARTURES.items()
+        if name in departures
     }
     insets = insets_m or [0.0] * len(outlines)
     return ShellVolume(
@@ -239,6 +241,7 @@ def _shell(job, wall, switches, uncertain):
         insets_of(job, switches),
         scale if switches.tilt else scale / np.sqrt(leaning),
         stretch if switches.tilt else stretch * leaning,
+        departures=_declared(job),
     )
     return ShellPart(
         volume,
@@ -248,7 +251,6 @@ def _shell(job, wall, switches, uncertain):
         stretch,
         _bearing(job, switches),
         wall.shell.tilt if switches.tilt else 0.0,
-        tuple(name for name in DEPARTURES if name in _declared(job)),
     )
 
 
