@@ -12,12 +12,22 @@ import numpy as np
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
 from tankcal.geometry.buckles import find_buckles
-from tankcal.geometry.snooping import LEAST_NOISE_M, distances_from_axis, find_form, shell_problem
+from tankcal.geometry.field.amplitudes import Sites
+from tankcal.geometry.field.blunders import find_blunders
+from tankcal.geometry.field.cells import MOST_SITES
+from tankcal.geometry.snooping import (
+    LEAST_NOISE_M,
+    distances_from_axis,
+    find_form,
+    find_rings,
+    shell_problem,
+)
 from tankcal.messages import message
 
 WIDE_BAND, WALL_BAND = 0.03, 0.01  # of the nominal radius: start, and largest believed deviation
 END_TOLERANCE_M = 0.020  # a point this far above or below the shell still belongs to its edge
 SAMPLES = 1000  # three-point circles tried; with half the points clutter one in eight is sound
+BELIEVED_M = 0.013  # from the smooth form: what departs less is left to the field to judge
 LEAST_PART = 0.5  # of the points between bottom and top that the wall must hold
 WIDEST_SLOPE = 0.05  # sd of the slope before anything is measured: tanks hardly lean by more
 VAGUE_TILT = 2e-3  # sd above which the tilt counts as not determined by the points
@@ -142,13 +152,20 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
     believed = np.ones(len(xyz_m)) if sd_m is None else np.maximum(sd_m, LEAST_NOISE_M)
     relative = believed / np.median(believed)
     zeta = _within_course(xyz_m[:, 2], course, np.asarray(joints_m, dtype=float))
-    found = find_form(local, course, zeta, wall, axis, relative, WIDEST_SLOPE, snooping)
+    by_field = snooping and np.count_nonzero(wall) <= MOST_SITES
+    least = (BELIEVED_M if by_field else 0.0) if snooping else None
+    found = find_form(local, course, zeta, wall, axis, relative, WIDEST_SLOPE, least)
     tilt_known = np.sqrt(np.diag(found.slope_cofactor).max()) < VAGUE_TILT
     if not tilt_known:
         upright = np.array([*axis[:2], 0.0, 0.0])
-        found = find_form(local, course, zeta, wall, upright, relative, 1e-9, snooping)
+        found = find_form(local, course, zeta, wall, upright, relative, 1e-9, least)
     in_band, axis = wall, found.axis
-    wall = found.wall | _buckles(local, in_band, found, nominal_radius_m)
+    w, residual, wall = found.w, found.residual, found.wall
+    wall = wall | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
+    if by_field:
+        tested = _by_field(local, course, zeta, in_band, wall, axis, relative, nominal_radius_m)
+        wall[in_band], w[in_band], residual[in_band] = tested.accepted, tested.w, tested.departure_m
+        wall = wall | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
     reason[(reason == "") & ~wall] = "snooping"
     if wall.sum() < LEAST_PART * candidates.sum():
         raise SolutionError(
@@ -169,23 +186,34 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
         slope=(float(axis[2]), float(axis[3])),
         slope_cofactor=found.slope_cofactor,
         reason=reason,
-        residual_m=np.where(in_band, found.residual, distance - radii[course]),
-        w=found.w,
+        residual_m=np.where(in_band, residual, distance - radii[course]),
+        w=w,
         noise_m=found.noise,
         noise_dof=found.noise_dof,
         tilt_known=bool(tilt_known),
     )
 
 
-def _buckles(local, in_band, found, nominal_radius_m):
+def _by_field(local, course, zeta, in_band, wall, axis, relative, nominal_radius_m):
+    """`Tested` of the points near the wall: each by the field that the accepted others show."""
+    index = np.flatnonzero(in_band)
+    offset, distance = distances_from_axis(local[index], axis)
+    azimuth = np.arctan2(offset[:, 0], offset[:, 1])
+    _, courses = np.unique(course[index], return_inverse=True)
+    ring, leans = find_rings(courses, zeta[index], azimuth)
+    sites = Sites(courses, ring, zeta[index], azimuth, leans)
+    return find_blunders(sites, distance, relative[index] ** 2, nominal_radius_m, wall[index])
+
+
+def _buckles(local, in_band, axis, departure_m, wall, nominal_radius_m):
     """(n,) points that were rejected, but belong to a buckle of the wall."""
     tested, back = np.flatnonzero(in_band), np.zeros(len(local), dtype=bool)
-    offset, _ = distances_from_axis(local[tested], found.axis)
+    offset, _ = distances_from_axis(local[tested], axis)
     turn = np.arctan2(offset[:, 0], offset[:, 1])
     for start in (0.0, np.pi):  # so that no patch is cut where the turn begins
         arc = nominal_radius_m * ((turn + start) % (2 * np.pi))
         place = np.column_stack([arc, local[tested, 2]])
-        back[tested] |= find_buckles(place, found.residual[tested], ~found.wall[tested])
+        back[tested] |= find_buckles(place, departure_m[tested], ~wall[tested])
     return back
 
 

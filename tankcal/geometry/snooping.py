@@ -6,13 +6,14 @@ real shells as its prior. Points that deny that form are rejected, the
 worst first, and those that agree with it after all come back.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tankcal.adjust import CRITICAL, Adjustment, adjust, snoop
 from tankcal.geometry.form import harmonics, mode_variances
 
+FITTED = 800  # points that the form is fitted to, about; twice as many at most
 MODES = 24  # highest mode of the form that the snooping allows for
 TAPER_M, RING_M = 0.010, 0.005  # prior sd of a radius: at the ends of a course; of a ring beside it
 FEWEST_OF_RING, WIDEST_GAP = 8, np.pi / 2  # points, and rad between two: they go round
@@ -34,33 +35,68 @@ class Wall:
     noise_dof: float
 
 
-def find_form(local, course, zeta, candidates, axis, relative, slope_sd, snooping):
+def find_form(local, course, zeta, candidates, axis, relative, slope_sd, least_m):
     """The `Wall`: points about the smooth form of a shell, without those that deny it.
 
     A pass rejects the points within a tenth of the worst and fits anew. When none is left to
-    reject, rejected points that agree with the fit after all come back, each once.
+    reject, rejected points that agree with the fit after all come back, each once. A point that
+    departs by less than `least_m` stays; None: all do.
     """
     index = np.flatnonzero(candidates)
     xyz, of, relative = local[index], course[index], relative[index]
     uneven = unevenness(xyz, of, zeta[index], axis)
+    thin = _thinned(xyz, of, axis)
+    part = xyz[thin], of[thin], Uneven(uneven.columns[thin], uneven.sd_m)
+
+    def fitted(accepted, before):
+        return _fit_form(*part, axis, relative[thin], slope_sd, accepted, before)
 
     def refit(before, goes, comes):
-        accepted = before.accepted & ~goes | comes
-        return _fit_form(xyz, of, uneven, axis, relative, slope_sd, accepted, before)
+        return fitted(before.accepted & ~goes | comes, before)
 
-    everything = np.ones(len(index), dtype=bool)
-    fit = _fit_form(xyz, of, uneven, axis, relative, slope_sd, everything, None)
-    if snooping:
-        fit = snoop(fit, _FormFit.tests, refit, at_once=0.9, returns=1).adjustment
-    return _wall_of(fit, index, len(local))
+    def tests(fit):
+        far = np.abs(fit.residual) > least_m
+        return fit.accepted, np.where(far, np.abs(fit.w), 0.0), CRITICAL
+
+    fit = fitted(np.ones(len(thin), dtype=bool), None)
+    if least_m is not None:
+        fit = snoop(fit, tests, refit, at_once=0.9, returns=1).adjustment
+    everywhere = _predicted(fit, thin, xyz, of, uneven, relative, slope_sd)
+    if least_m is not None:
+        _, statistic, critical = tests(everywhere)
+        rest = np.ones(len(index), dtype=bool)
+        rest[thin] = False
+        everywhere.accepted[rest] = statistic[rest] <= critical
+    return _wall_of(everywhere, index, thin, len(local))
 
 
-def _wall_of(form, index, count):
-    """The `Wall` of all `count` points from the fit of the candidates `index`."""
+def _thinned(xyz, course, axis):
+    """Indices of the points that tell the form: all, or about FITTED, even over the wall."""
+    offset, _ = distances_from_axis(xyz, axis)
+    order = np.lexsort((np.arctan2(offset[:, 0], offset[:, 1]), course))
+    return np.sort(order[:: max(1, len(xyz) // FITTED)])
+
+
+def _predicted(fit, thin, xyz, course, uneven, relative, slope_sd):
+    """The fit to some points as `_FormFit` of all of them."""
+    if len(thin) == len(xyz):
+        return fit
+    start = fit.fit.unknowns
+    model = shell_problem(xyz, course, start[:4], relative, 1.0, slope_sd, uneven)[0]
+    residual, w = model(start, 0.0)[0][: len(xyz)], np.zeros(len(xyz))
+    w = residual / (fit.noise * relative)
+    residual[thin], w[thin] = fit.residual, fit.w
+    accepted = np.ones(len(xyz), dtype=bool)
+    accepted[thin] = fit.accepted
+    return replace(fit, accepted=accepted, residual=residual, w=w)
+
+
+def _wall_of(form, index, thin, count):
+    """The `Wall` of all `count` points: the candidates `index`, fitted to those of `thin`."""
     wall, w, residual = np.zeros(count, dtype=bool), np.full(count, np.nan), np.full(count, np.nan)
     wall[index], w[index], residual[index] = form.accepted, form.w, form.residual
     fit = form.fit
-    dof = float(np.sum(fit.redundancy[: len(index)][form.accepted]))
+    dof = float(np.sum(fit.redundancy[: len(thin)][form.accepted[thin]]))
     return Wall(wall, fit.unknowns[:4], fit.cofactor[2:4, 2:4], w, residual, form.noise, dof)
 
 
@@ -176,6 +212,25 @@ def _rings(members, zeta, azimuth):
     rings = np.split(order, np.flatnonzero(np.diff(zeta[order]) > RING_SPAN) + 1)
     level = [ring for ring in rings if np.ptp(zeta[ring]) <= 2 * RING_SPAN]
     return [ring for ring in level if _goes_round(azimuth[ring])]
+
+
+def find_rings(course, zeta, azimuth):
+    """Ring of each point, and whether the ring is not level.
+
+    The rings of a course are those that `unevenness` sees; what stands between them belongs to the
+    nearest, and where there is none all points of the course are one.
+
+    course (n,) index; zeta (n,) height within it, -1 to +1; azimuth (n,), rad
+    """
+    ring, leans, count = np.zeros(len(course), dtype=int), np.ones(len(course), dtype=bool), 0
+    for one in np.unique(course):
+        own = np.flatnonzero(course == one)
+        levels = [float(np.mean(zeta[members])) for members in _rings(own, zeta, azimuth)]
+        nearest = np.abs(np.subtract.outer(zeta[own], levels or [0.0])).argmin(axis=1)
+        _, nearest = np.unique(nearest, return_inverse=True)
+        ring[own], leans[own] = count + nearest, not levels
+        count += max(len(levels), 1)
+    return ring, leans
 
 
 def _goes_round(azimuth):

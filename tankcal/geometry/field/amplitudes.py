@@ -14,21 +14,24 @@ they are known.
 Source: Patterson & Thompson 1971 (restricted maximum likelihood).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, oval_columns
+from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, mode_shares
+from tankcal.geometry.outlines import FULL_TURN
 
 NOISE_MEDIAN_M, NOISE_LOG_SD = 2e-3, 3.0  # of readings without a given standard deviation
 LEAST_M, MOST_M = 1e-5, 0.3  # amplitudes that are tried
 LEAST_NOISE_M = 1e-6  # what is given as perfect is not quite
 SAME_AZIMUTH_RAD = 1e-12
-SMALLEST = 1e-8  # of the largest variance of a direction of the common form
-MOST_FOLLOWED = 80  # directions of the common form that are followed through all courses
+SMALLEST = 1e-8  # of a variance: what is left of a covariance that is followed is not quite zero
+NEAR_M = 0.02  # along the arc, between azimuths that count as one for the common form
+MOST_FOLLOWED = 80  # values of the common form that are followed through all courses
 ROUNDING = 1e-11  # of the largest variances, that keeps a covariance positive
+ROUGH, FINE = 1e-5, 1e-8  # relative change of the likelihood that ends its search
 MOST_STEPS, SMALL_STEP = 12, 1e-7  # of a logarithm
 LOG_STEP = 0.1  # of the differences that give the curvature
 
@@ -59,6 +62,10 @@ class Sites:
     def __len__(self):
         return len(self.course)
 
+    def take(self, chosen):
+        """Those of the sites that are chosen."""
+        return Sites(*(getattr(self, one.name)[chosen] for one in fields(self)))
+
     @property
     def members(self):
         """For each course the indices of its sites."""
@@ -78,6 +85,16 @@ class Sites:
             if np.any(self.leans[members] & (ring == one)):
                 columns.append(there * self.zeta[members, None])
         return np.hstack(columns)
+
+
+def free_design(sites):
+    """(n, p) derivative of the radii by what no prior binds, and the columns of the radii."""
+    blocks = [(members, sites.free_columns(members)) for members in sites.members]
+    starts = np.cumsum([0, *(block.shape[1] for _, block in blocks)])
+    design = np.zeros((len(sites), starts[-1]))
+    for start, (members, block) in zip(starts, blocks, strict=False):
+        design[members, start : start + block.shape[1]] = block
+    return design, starts[:-1]
 
 
 @dataclass(frozen=True)
@@ -173,15 +190,10 @@ def estimate_amplitudes(sites, radius_m, noise_m2, nominal_m, *, estimate_noise=
     Amplitudes
     """
     evidence = _Evidence.of(sites, radius_m, noise_m2, nominal_m, estimate_noise)
-    start = evidence.middle
-    bounds = [(2 * np.log(LEAST_M), 2 * np.log(MOST_M))] * len(COMPONENTS)
-    bounds += [(-20.0, 20.0)] * estimate_noise
-    best = scipy.optimize.minimize(
-        evidence.misfit, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-8}
-    ).x
+    best, bounds = _likely(evidence, FINE), evidence.bounds
     for _ in range(2):  # to the very top, so that the order of the readings changes nothing
         covariance = np.linalg.inv(_curvature(evidence, best))
-        best = np.clip(_climb(evidence, best, covariance), *np.array(bounds).T)
+        best = np.clip(_climb(evidence, best, covariance), *bounds.T)
     count = len(COMPONENTS)
     known = Amplitudes(np.exp(best[:count]), covariance[:count, :count])
     if not estimate_noise:
@@ -189,6 +201,38 @@ def estimate_amplitudes(sites, radius_m, noise_m2, nominal_m, *, estimate_noise=
     return Amplitudes(
         known.variances_m2, known.log_covariance, float(np.exp(best[-1])), covariance[-1, -1] ** 0.5
     )
+
+
+def likely_variances(sites, radius_m, variance_m2, nominal_m):
+    """Variances of the components, m2, and factor of those of the readings, near the most likely.
+
+    Parameters
+    ----------
+    sites, radius_m, nominal_m
+        As in `estimate_amplitudes`.
+    variance_m2 : ndarray, shape (n,)
+        Of the readings, known up to a factor.
+
+    Returns
+    -------
+    variances_m2 : ndarray, shape (components,)
+    noise : float
+    """
+    evidence = _Evidence.of(sites, radius_m, variance_m2, nominal_m, True)
+    best = np.exp(_likely(evidence, ROUGH))
+    return best[:-1], float(best[-1])
+
+
+def _likely(evidence, tolerance):
+    """Logarithms near the most likely."""
+    return scipy.optimize.minimize(
+        evidence.misfit,
+        evidence.middle,
+        jac=True,
+        method="L-BFGS-B",
+        bounds=evidence.bounds,
+        options={"ftol": tolerance},
+    ).x
 
 
 def _climb(evidence, best, covariance):
@@ -214,36 +258,40 @@ def _curvature(evidence, best):
 class _Course:
     """What one course tells, in the coordinates that radius and centre leave free.
 
-    radius (m,), own (q, m, m) covariances at unit variance: of its own components, of what the
-    common columns miss, and last of the noise where that is estimated; fixed (m, m) the noise that
-    is not; common (m, k) columns of the common components at unit variance
+    radius (m,), own (q, m, m) covariances at unit variance: of its own components, of what is
+    missed of common ones, and last of the noise where that is estimated; fixed (m, m) the noise
+    that is not; values (m, k) derivative of the radii by the values of the common components
     """
 
     radius: np.ndarray
     own: np.ndarray
     fixed: np.ndarray
-    common: np.ndarray
+    values: np.ndarray
 
 
 @dataclass(frozen=True)
 class _Evidence:
-    """courses; own (q,) and common (k,): component of each covariance and of each column."""
+    """courses; own (q,) and common (p,): component of each covariance of a course, and of each of
+    `spread` (p, k, k), those of the common values at unit variance.
+    """
 
     courses: tuple
     own: np.ndarray
     common: np.ndarray
+    spread: np.ndarray
     middle: np.ndarray
     log_sd: np.ndarray
 
     @classmethod
     def of(cls, sites, radius_m, noise_m2, nominal_m, estimate_noise):
-        columns, missed = _common_columns(sites, nominal_m)
+        common = _common_values(sites, nominal_m)
         courses = tuple(
-            _course(sites, radius_m, noise_m2, nominal_m, members, columns, missed, estimate_noise)
+            _course(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise)
             for members in sites.members
         )
-        own = [i for i, one in enumerate(COMPONENTS) if not one.common] + list(missed)
-        common = [i for i, block in columns.items() for _ in range(block.shape[1])]
+        _, spread, missed = common
+        own = [i for i, one in enumerate(COMPONENTS) if not one.common] + missed
+        shared = [i for i, one in enumerate(COMPONENTS) if one.common]
         middle = 2 * np.log([one.median_m for one in COMPONENTS])
         log_sd = np.array([one.log_sd for one in COMPONENTS])
         if estimate_noise:
@@ -251,82 +299,131 @@ class _Evidence:
             typical = np.median(np.diag(noise_m2) if np.ndim(noise_m2) == 2 else noise_m2)
             middle = np.append(middle, 2 * np.log(NOISE_MEDIAN_M) - np.log(typical))
             log_sd = np.append(log_sd, NOISE_LOG_SD)
-        return cls(courses, np.array(own), np.array(common), middle, log_sd)
+        return cls(courses, np.array(own), np.array(shared), spread, middle, log_sd)
+
+    @property
+    def bounds(self):
+        """(parameters, 2) of the logarithms."""
+        bounds = np.tile([-20.0, 20.0], (len(self.middle), 1))
+        bounds[: len(COMPONENTS)] = 2 * np.log([LEAST_M, MOST_M])
+        return bounds
 
     def misfit(self, logs):
-        """Doubled negative logarithm of the density but for a constant, and its derivative."""
+        """Doubled negative logarithm of the density but for a constant, and its derivative.
+
+        With B the covariance of a course's own, E its `values`, C that of the common values,
+        N = sum E' B^-1 E and r = sum E' B^-1 y,
+
+            S = (C^-1 + N)^-1,  y' V^-1 y = sum y' B^-1 y - r' S r,
+            log |V| = sum log |B| + log |I + N C|.
+        """
         variances = np.exp(logs)
-        scale = np.sqrt(variances[self.common])
-        inner, right, value, solved = np.eye(len(scale)), 0.0, 0.0, []
+        before = _rounded(np.tensordot(variances[self.common], self.spread, 1))
+        told, value, solved = 0.0, 0.0, []
         for course in self.courses:
-            covariance = course.fixed + np.tensordot(variances[self.own], course.own, 1)
-            covariance.flat[:: len(covariance) + 1] *= 1 + ROUNDING
-            root = np.linalg.cholesky(covariance)
+            covariance = _rounded(course.fixed + np.tensordot(variances[self.own], course.own, 1))
+            root, inverse = invert(covariance)
+            both = np.column_stack([course.values, course.radius])
+            across = inverse @ both
+            told = told + both.T @ across
             value += 2 * np.sum(np.log(np.diag(root)))
-            inverse = scipy.linalg.solve_triangular(
-                root, np.eye(len(root)), lower=True, check_finite=False
-            )
-            white = inverse @ np.column_stack([course.common * scale, course.radius])
-            inner += white[:, :-1].T @ white[:, :-1]
-            right = right + white[:, :-1].T @ white[:, -1]
-            value += white[:, -1] @ white[:, -1]
-            solved.append((inverse, white))
-        root = np.linalg.cholesky(inner)
-        value += 2 * np.sum(np.log(np.diag(root)))
-        spread = scipy.linalg.cho_solve((root, True), np.eye(len(root)), check_finite=False)
+            solved.append((inverse, across))
+        normal, right = told[:-1, :-1], told[:-1, -1]
+        half = np.linalg.cholesky(before)
+        root, inverse = invert(np.eye(len(half)) + half.T @ normal @ half)
+        spread = half @ inverse @ half.T
         common = spread @ right
-        value -= right @ common
+        value += told[-1, -1] - right @ common + 2 * np.sum(np.log(np.diag(root)))
         slopes = np.zeros(len(logs))
-        for course, (inverse, white) in zip(self.courses, solved, strict=True):
-            across = inverse.T @ white
+        for course, (inverse, across) in zip(self.courses, solved, strict=True):
             left = across[:, -1] - across[:, :-1] @ common
-            outer = inverse.T @ inverse - across[:, :-1] @ spread @ across[:, :-1].T
-            outer -= left[:, None] * left
-            np.add.at(slopes, self.own, np.einsum("qij,ij->q", course.own, outer))
+            outer = inverse - across[:, :-1] @ spread @ across[:, :-1].T
+            outer -= np.outer(left, left)
+            np.add.at(slopes, self.own, np.tensordot(course.own, outer, 2))
+        left = right - normal @ common
+        outer = normal - normal @ spread @ normal - np.outer(left, left)
+        np.add.at(slopes, self.common, np.tensordot(self.spread, outer, 2))
         slopes *= variances
-        np.add.at(slopes, self.common, 1.0 - np.diag(spread) - common**2)
         away = (logs - self.middle) / self.log_sd
         return value + away @ away, slopes + 2 * away / self.log_sd
 
 
-def _common_columns(sites, nominal_m):
-    """{component: (n, k) columns of unit variance}, and a list of those that these miss a part of.
+def _rounded(covariance):
+    """The covariance, positive in spite of rounding."""
+    covariance.flat[:: len(covariance) + 1] *= 1 + ROUNDING
+    return covariance
 
-    The modes of ovality are few. Of seams B = K_z L_z^-T at some azimuths z; B B' = K where these
-    are all that the survey has. Else z are even, and K - B B', never negative, is taken as each
-    course's own.
+
+def invert(covariance):
+    """Cholesky factor and inverse of a covariance."""
+    root = np.linalg.cholesky(covariance)
+    inverse = scipy.linalg.lapack.dpotri(root, lower=True)[0]
+    whole = inverse + inverse.T  # the upper half of `root` is zero, and of its inverse
+    whole.flat[:: len(whole) + 1] /= 2
+    return root, whole
+
+
+def _common_values(sites, nominal_m):
+    """(n, k) derivative of the radii by the values of the common components, (p, k, k) covariances
+    of these, and a list of the components that they miss a part of.
+
+    Values are those at the azimuths that the survey has, or, where these are many, the cosines and
+    sines of the first modes: the rest of the seams is then taken as each course's own. Last come
+    the values of the heights.
     """
-    place, azimuths = distinct_azimuths(sites.azimuth_rad)
-    few = len(azimuths) <= MOST_FOLLOWED
-    chosen = azimuths if few else np.arange(MOST_FOLLOWED) * 2 * np.pi / MOST_FOLLOWED
-    among = azimuth_correlations(chosen, chosen, nominal_m)
-    to = azimuth_correlations(azimuths, chosen, nominal_m)
-    columns, missed = {}, []
-    for i, one in enumerate(COMPONENTS):
-        if not one.common:
-            continue
+    common = [(i, one) for i, one in enumerate(COMPONENTS) if one.common]
+    heights = [one.height_columns(sites.zeta) for _, one in common if one.shape == "mean"]
+    place, azimuths = _gathered(sites.azimuth_rad, NEAR_M / nominal_m)
+    away = np.abs(np.angle(np.exp(1j * (sites.azimuth_rad - azimuths[place])))).max()
+    missed = []
+    if len(azimuths) <= MOST_FOLLOWED and away <= NEAR_M / nominal_m:
+        around = np.eye(len(azimuths))[place]
+        along = azimuth_correlations(azimuths, azimuths, nominal_m)
+    else:
+        modes = np.arange(2.0, MOST_FOLLOWED // 2 + 2)
+        angles = np.outer(sites.azimuth_rad, modes)
+        around = np.hstack([np.cos(angles), np.sin(angles)])
+        along = {
+            shape: np.diag(np.tile(share, 2))
+            for shape, share in mode_shares(modes, nominal_m).items()
+        }
+        missed = [i for i, one in common if one.shape == "seam"]
+    columns = np.hstack([around, *heights])
+    spread, used = np.zeros((len(common), columns.shape[1], columns.shape[1])), around.shape[1]
+    for row, (_, one) in enumerate(common):
         if one.shape == "mean":
-            columns[i] = one.height_columns(sites.zeta)
-        elif one.shape == "oval" and not few:
-            columns[i] = oval_columns(azimuths)[place]
+            width = heights.pop(0).shape[1]
+            spread[row, used : used + width, used : used + width] = np.eye(width)
+            used += width
         else:
-            values, vectors = np.linalg.eigh(among[one.shape])
-            keep = values > SMALLEST * values[-1]
-            half = to[one.shape] @ (vectors[:, keep] / np.sqrt(values[keep]))
-            columns[i] = half[place]
-            if not few:
-                missed.append(i)
-    return columns, missed
+            spread[row, : around.shape[1], : around.shape[1]] = along[one.shape]
+    return columns, spread, missed
+
+
+def _gathered(azimuth_rad, near_rad):
+    """(n,) place of each azimuth among the means of those that follow each other that near."""
+    order = np.argsort(azimuth_rad % FULL_TURN)
+    around = (azimuth_rad % FULL_TURN)[order]
+    gap = np.diff(around, prepend=around[-1] - FULL_TURN)
+    start = int(np.argmax(gap))
+    around = np.roll(around, -start)
+    around[len(around) - start :] += FULL_TURN
+    group = np.cumsum(np.roll(gap, -start) > near_rad) - 1
+    means = np.bincount(group, around) / np.bincount(group)
+    place = np.empty(len(order), dtype=int)
+    place[np.roll(order, -start)] = group
+    return place, means % FULL_TURN
 
 
 def distinct_azimuths(azimuth_rad):
     """(n,) place of each azimuth among the distinct ones, and these."""
-    turns = np.round((np.asarray(azimuth_rad) % (2 * np.pi)) / SAME_AZIMUTH_RAD)
+    turns = np.round((np.asarray(azimuth_rad) % FULL_TURN) / SAME_AZIMUTH_RAD)
     found, place = np.unique(turns, return_inverse=True)
     return place, found * SAME_AZIMUTH_RAD
 
 
-def _course(sites, radius_m, noise_m2, nominal_m, members, columns, missed, estimate_noise):
+def _course(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise):
+    columns, spread, missed = common
     azimuth, zeta = sites.azimuth_rad[members], sites.zeta[members]
     left = scipy.linalg.null_space(sites.free_columns(members).T)
 
@@ -344,15 +441,15 @@ def _course(sites, radius_m, noise_m2, nominal_m, members, columns, missed, esti
         for one in COMPONENTS
         if not one.common
     ]
-    own += [
-        seen(there[COMPONENTS[i].shape] - columns[i][members] @ columns[i][members].T)
-        + 10 * SMALLEST * np.eye(left.shape[1])
-        for i in missed
-    ]
+    for i in missed:
+        index = [one.common for one in COMPONENTS[:i]].count(True)
+        followed = columns[members] @ spread[index] @ columns[members].T
+        rest = there[COMPONENTS[i].shape] - followed
+        own.append(seen(rest) + SMALLEST * np.eye(left.shape[1]))
     own += [seen(noise)] * estimate_noise
     return _Course(
         left.T @ radius_m[members],
         np.array(own),
         least + seen(noise) * (not estimate_noise),
-        left.T @ np.hstack([block[members] for block in columns.values()]),
+        left.T @ columns[members],
     )

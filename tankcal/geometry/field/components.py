@@ -79,7 +79,7 @@ class Component:
         return self.height_columns(zeta) @ self.height_columns(other).T
 
 
-_EVEN = (0, 0, 1, 0, 0.02, 0, 0.003)  # barrels and drawn-in joints share their sign
+_EVEN = (0, 0, 1, 0, 0.1, 0, 0.02)  # barrels and drawn-in joints share their sign
 _FREE = (0, 0, *(order**-2.0 for order in range(2, 7)))
 _LINEAR = (0, 1, 0, 0, 0, 0, 0)
 COMPONENTS = (
@@ -130,16 +130,34 @@ def seam_correlation(difference_rad, radius_m):
     b = radius_m / SEAM_LENGTH_M
     x = np.asarray(difference_rad, dtype=float)
     found = _all_modes(x, b) - b**-4 - 2 * np.cos(x) / (1 + b**2) ** 2
-    at_zero = _all_modes(np.zeros(1), b)[0] - b**-4 - 2 / (1 + b**2) ** 2
-    return found / at_zero
+    return found / _seam_sum(b)
+
+
+def mode_shares(modes, radius_m):
+    """{"oval", "seam": (k,) variance of the cosine and of the sine of each mode, from 2 on}.
+
+    All modes of a shape add up to one.
+    """
+    b = radius_m / SEAM_LENGTH_M
+    return {
+        "oval": np.where(modes <= OVALITY_MODES[-1], modes**-3 / np.sum(OVALITY_MODES**-3), 0.0),
+        "seam": 2 / (modes**2 + b**2) ** 2 / _seam_sum(b),
+    }
+
+
+def _seam_sum(b):
+    """Sum over |k| >= 2 of (k^2 + b^2)^-2."""
+    return _all_modes(np.zeros(1), b)[0] - b**-4 - 2 / (1 + b**2) ** 2
 
 
 def _all_modes(x, b):
-    x = np.abs((x + np.pi) % FULL_TURN - np.pi)
-    near, far, turn = np.exp(-b * x), np.exp(-b * (FULL_TURN - x)), np.exp(-b * FULL_TURN)
-    cosh, sinh = (near + far) / (1 - turn), (near - far) / (1 - turn)
-    coth = (1 + turn) / (1 - turn)
-    return np.pi / (2 * b**2) * (cosh / b - (np.pi - x) * sinh + np.pi * cosh * coth)
+    x = np.abs(x) % FULL_TURN
+    x = np.minimum(x, FULL_TURN - x)
+    turn = np.exp(-b * FULL_TURN)
+    near, far = np.exp(-b * x), np.exp(b * (x - FULL_TURN))
+    coth = np.pi * (1 + turn) / (1 - turn)
+    found = near * (1 / b + coth - np.pi + x) + far * (1 / b + coth + np.pi - x)
+    return np.pi / (2 * b**2 * (1 - turn)) * found
 
 
 def azimuth_correlations(azimuth_rad, other_rad, radius_m):

@@ -20,13 +20,9 @@ from functools import cache, cached_property
 import numpy as np
 import scipy.linalg
 
-from tankcal.geometry.field.amplitudes import (
-    LEAST_NOISE_M,
-    Amplitudes,
-    Sites,
-    distinct_azimuths,
-)
+from tankcal.geometry.field.amplitudes import LEAST_NOISE_M, Amplitudes, Sites, free_design
 from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations
+from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.quadrature import panels
 
@@ -75,7 +71,7 @@ class WallField:
 
     def outlines_at(self, zeta):
         """(courses, k, g) the estimated radius at heights (k,) of each course."""
-        zeta, place = np.asarray(zeta, dtype=float), self._distinct[0]
+        zeta, place = np.asarray(zeta, dtype=float), self._covariances.place
         found = np.empty((len(self._members), len(zeta), len(self.grid_rad)))
         found[:] = self._mean_m[:, None, None] + self._circles[:, None]
         for i, one in enumerate(COMPONENTS):
@@ -118,7 +114,7 @@ class WallField:
 
     @cached_property
     def _members(self):
-        return self.sites.members
+        return self._covariances.members
 
     @cached_property
     def _mean_m(self):
@@ -126,16 +122,12 @@ class WallField:
         return np.array([self.radius_m[members].mean() for members in self._members])
 
     @cached_property
-    def _distinct(self):
-        return distinct_azimuths(self.sites.azimuth_rad)
-
-    @cached_property
-    def _correlations(self):
-        return azimuth_correlations(self._distinct[1], self._distinct[1], self.nominal_m)
+    def _covariances(self):
+        return Covariances(self.sites, self.nominal_m)
 
     @cached_property
     def _to_grid(self):
-        found = azimuth_correlations(self.grid_rad, self._distinct[1], self.nominal_m)
+        found = azimuth_correlations(self.grid_rad, self._covariances.azimuths_rad, self.nominal_m)
         for shape in ("oval", "seam"):  # no mode 0, nor one that the grid takes for it
             found[shape] -= found[shape].mean(axis=0)
         return found
@@ -143,32 +135,13 @@ class WallField:
     @cached_property
     def _columns(self):
         """(n, p) X, and (courses,) which of its columns are the radii."""
-        blocks = [self.sites.free_columns(members) for members in self._members]
-        radii = np.cumsum([0, *(block.shape[1] for block in blocks)])
-        columns = np.zeros((len(self.sites), radii[-1]))
-        for start, members, block in zip(radii, self._members, blocks, strict=False):
-            columns[members, start : start + block.shape[1]] = block
-        return columns, radii[:-1]
-
-    def _covariance(self, index):
-        """(n, n) of one component at the sites."""
-        one, place, zeta = COMPONENTS[index], self._distinct[0], self.sites.zeta
-        along, size = self._correlations[one.shape], self.amplitudes.variances_m2[index]
-        if one.common:
-            return size * along[np.ix_(place, place)] * one.height_covariance(zeta, zeta)
-        found = np.zeros((len(place), len(place)))
-        for members in self._members:
-            height = one.height_covariance(zeta[members], zeta[members])
-            there = along[np.ix_(place[members], place[members])]
-            found[np.ix_(members, members)] = size * there * height
-        return found
+        return free_design(self.sites)
 
     @cached_property
     def _factored(self):
         """Cholesky factor of V, V^-1 X, and that of X' V^-1 X."""
-        whole = self.noise_m2 + LEAST_NOISE_M**2 * np.eye(len(self.sites))
-        for index in range(len(COMPONENTS)):
-            whole += self._covariance(index)
+        whole = self._covariances.total(self.amplitudes.variances_m2) + self.noise_m2
+        whole.flat[:: len(whole) + 1] += LEAST_NOISE_M**2
         factor = scipy.linalg.cho_factor(whole, lower=True, overwrite_a=True, check_finite=False)
         columns = self._columns[0]
         by_columns = scipy.linalg.cho_solve(factor, columns, check_finite=False)
@@ -215,6 +188,12 @@ class Functionals:
         self._field, self._gradients = field, gradients
         self._totals = gradients.sum(axis=2)
         factor, by_columns, normal = field._factored
+        self._along = {
+            shape: (gradients @ to_grid)[:, :, field._covariances.place]
+            for shape, to_grid in field._to_grid.items()
+            if shape != "mean"
+        }
+        self._along["mean"] = self._totals[:, :, None] * np.ones(len(field.sites))
         across = sum(self._across(index) for index in range(len(COMPONENTS)))
         columns, radii = field._columns
         free = np.zeros((len(across), columns.shape[1]))
@@ -227,7 +206,8 @@ class Functionals:
     def unseen(self, index):
         """(f, f) covariance of the functionals by what was not seen of one component."""
         seen = self.weights @ self._across(index).T
-        spread = self.weights @ self._field._covariance(index) @ self.weights.T
+        size = self._field.amplitudes.variances_m2[index]
+        spread = size * self._field._covariances.spread(self.weights, index)
         found = self._within(index) - seen - seen.T + spread
         values, vectors = np.linalg.eigh((found + found.T) / 2)
         return (vectors * np.maximum(values, 0.0)) @ vectors.T  # differences: rounding below 0
@@ -237,10 +217,7 @@ class Functionals:
         field, one = self._field, COMPONENTS[index]
         count, sites = len(field._members), field.sites
         found = np.zeros((count, LEVELS, len(sites)))
-        if one.shape == "mean":
-            along = self._totals[:, :, None] * np.ones(len(sites))
-        else:
-            along = (self._gradients @ field._to_grid[one.shape])[:, :, field._distinct[0]]
+        along = self._along[one.shape]
         for course, members in enumerate(field._members):
             chosen = slice(None) if one.common else members
             height = one.height_covariance(gauss_heights(), sites.zeta[chosen])

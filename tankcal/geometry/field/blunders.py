@@ -1,0 +1,121 @@
+"""Blunders among the readings of a wall: each tested against the wall as all others have it.
+
+With V the covariance of readings (field and noise) and X what no prior binds,
+
+    P = V^-1 - V^-1 X (X' V^-1 X)^-1 X' V^-1,  e = P y:
+
+a reading without which the others predict y_i - e_i / P_ii, with the variance 1 / P_ii of the
+difference, is w_i = e_i / sqrt(P_ii) of its standard deviations off. Readings S that were set aside
+are predicted by the rest: P_SS^-1 e_S, of covariance P_SS^-1. What agrees with its neighbours
+along the wall is wall, however far both depart.
+
+Source: Cook & Weisberg 1982 (deletion residuals); Baarda 1968.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from tankcal.adjust import CRITICAL, snoop
+from tankcal.geometry.field.amplitudes import (
+    LEAST_NOISE_M,
+    free_design,
+    invert,
+    likely_variances,
+)
+from tankcal.geometry.field.covariances import Covariances
+
+MOST_ROUNDS = 4  # of amplitudes from the accepted readings, and tests of all with these
+AT_ONCE = 0.9
+
+
+@dataclass(frozen=True)
+class Tested:
+    """Readings accepted or set aside, and how far each is from what the accepted others predict.
+
+    Attributes
+    ----------
+    accepted : ndarray of bool, shape (n,)
+    departure_m : ndarray, shape (n,)
+        Outwards, from the wall as the others have it, m.
+    w : ndarray, shape (n,)
+        Departure over its standard deviation.
+    """
+
+    accepted: np.ndarray
+    departure_m: np.ndarray
+    w: np.ndarray
+
+
+def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted):
+    """Test every reading of a wall by all others, with amplitudes that the accepted ones tell.
+
+    Parameters
+    ----------
+    sites : Sites
+        Of n readings.
+    radius_m : ndarray, shape (n,)
+        Distances from the axis, m.
+    variance_m2 : ndarray, shape (n,)
+        Of the readings, believed in relation to each other.
+    nominal_m : float
+        Radius of the tank, m.
+    accepted : ndarray of bool, shape (n,)
+        What is believed at first.
+
+    Returns
+    -------
+    Tested
+    """
+    covariances, design = Covariances(sites, nominal_m), free_design(sites)[0]
+    left = radius_m - radius_m.mean()
+    for _ in range(MOST_ROUNDS):
+        known = sites.take(accepted)
+        variances, noise = likely_variances(
+            known, radius_m[accepted], variance_m2[accepted], nominal_m
+        )
+        whole = covariances.total(variances)
+        whole.flat[:: len(whole) + 1] += noise * variance_m2 + LEAST_NOISE_M**2
+        precision = _restricted(whole, design)
+        found = _snoop(precision, precision @ left, accepted)
+        if np.array_equal(found.accepted, accepted):
+            break
+        accepted = found.accepted
+    return found
+
+
+def _restricted(covariance, design):
+    """P of the module's heading."""
+    inverse = invert(covariance)[1]
+    by_design = inverse @ design
+    normal = scipy.linalg.pinvh(design.T @ by_design)  # some points may hardly bear on anything
+    return inverse - by_design @ normal @ by_design.T
+
+
+def _snoop(precision, pull, accepted):
+    def tested(accepted):
+        return _tested(precision, pull, accepted)
+
+    def tests(found):
+        return found.accepted, np.abs(found.w), CRITICAL
+
+    def again(before, goes, comes):
+        return tested(before.accepted & ~goes | comes)
+
+    return snoop(tested(accepted), tests, again, at_once=AT_ONCE, returns=1).adjustment
+
+
+def _tested(precision, pull, accepted):
+    aside = np.flatnonzero(~accepted)
+    departure, weight = pull.copy(), np.diag(precision).copy()
+    if len(aside):
+        among = np.linalg.inv(precision[np.ix_(aside, aside)])
+        to = precision[:, aside] @ among
+        departure -= to @ pull[aside]
+        weight -= np.sum(to * precision[:, aside], axis=1)
+        departure[aside], weight[aside] = among @ pull[aside], 1.0
+        weight[aside] = 1 / np.diag(among)
+        departure[aside] *= weight[aside]
+    weight = np.maximum(weight, 1e-300)
+    return Tested(accepted, departure / weight, departure / np.sqrt(weight))
