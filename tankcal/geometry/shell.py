@@ -1,8 +1,9 @@
 """The shell as one body: its wall told apart from clutter, its axis and its tilt.
 
 A survey hits stairs, pipes and the roof too. A consensus of circles finds the wall, a leaning
-cylinder with one radius a course refines it, and data snooping about the shell's smooth form (dents
-that run up the wall are form, not blunders) rejects what remains, the worst points first.
+cylinder with one radius a course refines it, and data snooping about the shell's smooth form rejects
+what stands clearly before it, the worst points first. Then the field of the wall tests each point
+by all others: what they agree on is wall, not a blunder.
 """
 
 from dataclasses import dataclass
@@ -50,8 +51,9 @@ class Shell:
     reason : ndarray of str, shape (n,)
         "" for points of the wall, else why the point was rejected.
     residual_m : ndarray, shape (n,)
-        Distance outwards to the smooth form of the shell; of points far from the wall to the
-        leaning cylinder of their course, m.
+        Distance outwards from the wall as all other points show it (from the smooth form where
+        these are more than `MOST_SITES`); of points far from the wall, from the leaning cylinder of
+        their course, m.
     w : ndarray, shape (n,)
         Normalised residual of the snooping test, nan where none was made.
     noise_m : float

@@ -1,9 +1,9 @@
 """Data snooping about the smooth form of a shell: what is clutter, and what is a dent.
 
 The radii of the wall are fitted by one radius a course, a taper within it, one radius more for each
-of three rings or more, an axis, and a form of azimuth and height that has the spectrum of
-real shells as its prior. Points that deny that form are rejected, the
-worst first, and those that agree with it after all come back.
+of three rings or more, an axis, and a form of azimuth and height that has the spectrum of real
+shells as its prior. Points that deny that form are rejected, the worst first, and those that agree
+with it after all come back. Of many points some, even over the wall, tell the form.
 """
 
 from dataclasses import dataclass, replace

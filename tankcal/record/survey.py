@@ -53,7 +53,7 @@ class SurveyedPoint(Place):
 class RejectedPoint(Place):
     """A point that is not on the wall."""
 
-    residual_m: float = key("to the smooth form without its vote, or to the leaning cylinder")
+    residual_m: float = key("to the wall as the others show it, or to the leaning cylinder")
     w: float | None = key("over its sd; null far from the wall")
     reason: str = key("a code, see below")
     row: int | None = key("of the file")

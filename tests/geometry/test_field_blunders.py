@@ -1,0 +1,151 @@
+"""Blunders told by the field: second methods, and what is wall beside what is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg
+from test_field import RADIUS_M, sites_of
+
+from tankcal.geometry.field.amplitudes import (
+    LEAST_NOISE_M,
+    _Evidence,
+    assumed_amplitudes,
+    free_design,
+)
+from tankcal.geometry.field.blunders import _restricted, _tested, find_blunders
+from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations
+from tankcal.geometry.field.covariances import Covariances
+from tankcal.geometry.snooping import find_rings
+
+
+def written_out(sites, variances_m2):
+    """The covariance of all components at the sites, component by component."""
+    along = azimuth_correlations(sites.azimuth_rad, sites.azimuth_rad, RADIUS_M)
+    same = np.equal.outer(sites.course, sites.course)
+    whole = np.zeros((len(sites), len(sites)))
+    for one, size in zip(COMPONENTS, variances_m2, strict=True):
+        part = size * along[one.shape] * one.height_covariance(sites.zeta, sites.zeta)
+        whole += part if one.common else part * same
+    return whole
+
+
+def some_sites(seed=4, courses=3, points=9):
+    return sites_of(courses, [-0.6, 0.1, 0.6], points, np.random.default_rng(seed))
+
+
+def test_covariances_are_the_sum_of_the_components():
+    """Second method: each component written out by itself."""
+    sites = some_sites()
+    variances = assumed_amplitudes().variances_m2
+    total = Covariances(sites, RADIUS_M).total(variances)
+    assert total == pytest.approx(written_out(sites, variances), rel=1e-9, abs=1e-15)
+
+
+@pytest.mark.parametrize("index", range(len(COMPONENTS)), ids=[one.name for one in COMPONENTS])
+def test_the_spread_of_functionals_by_one_component(index):
+    sites = some_sites()
+    weights = np.random.default_rng(1).normal(size=(4, len(sites)))
+    unit = np.eye(len(COMPONENTS))[index]
+    expected = weights @ written_out(sites, unit) @ weights.T
+    found = Covariances(sites, RADIUS_M).spread(weights, index)
+    assert found == pytest.approx(expected, rel=1e-10, abs=1e-12)
+
+
+@pytest.mark.parametrize("mixed", [False, True])
+def test_the_likelihood_is_that_of_the_normal_distribution(mixed):
+    """Second method: determinant and square of all readings, in what radii and centres leave free.
+
+    Rings of the same azimuths, or each of its own, 0.6 m apart at least: nothing is approximate.
+    """
+    sites = sites_of(3, [-0.6, 0.6], 12)
+    if mixed:
+        places = np.random.default_rng(6).permutation(len(sites))
+        sites = replace(sites, azimuth_rad=2 * np.pi * places / len(sites))
+    radius = RADIUS_M + 0.004 * np.random.default_rng(2).normal(size=len(sites))
+    evidence = _Evidence.of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, False)
+    whole = written_out(sites, np.exp(evidence.middle))
+    whole += (1e-6 + LEAST_NOISE_M**2) * np.eye(len(sites))
+    order = np.concatenate(sites.members)
+    left = scipy.linalg.null_space(free_design(sites)[0][order].T)
+    whole, free = left.T @ whole[np.ix_(order, order)] @ left, left.T @ radius[order]
+    expected = np.linalg.slogdet(whole)[1] + free @ np.linalg.solve(whole, free)
+    assert evidence.misfit(evidence.middle)[0] == pytest.approx(expected, rel=1e-7)
+
+
+def test_a_departure_is_from_the_wall_that_all_others_show():
+    """Second method: each reading left out, and predicted by the others' own normal equations."""
+    sites = some_sites()
+    radius = RADIUS_M + 0.004 * np.random.default_rng(2).normal(size=len(sites))
+    field = written_out(sites, assumed_amplitudes().variances_m2)
+    whole = field + 1e-6 * np.eye(len(sites))
+    design = free_design(sites)[0]
+    accepted = np.ones(len(sites), dtype=bool)
+    accepted[[3, 4, 40]] = False
+    precision = _restricted(whole.copy(), design)
+    found = _tested(precision, precision @ (radius - RADIUS_M), accepted)
+    for one in (0, 3, 4, 17, 40, 80):
+        others = accepted.copy()
+        others[one] = False
+        system = np.block(
+            [
+                [whole[np.ix_(others, others)], design[others]],
+                [design[others].T, np.zeros((design.shape[1],) * 2)],
+            ]
+        )
+        right = np.concatenate([field[one, others], design[one]])
+        weights = np.linalg.solve(system, right)
+        departure = radius[one] - weights[: others.sum()] @ radius[others]
+        variance = whole[one, one] - weights @ right
+        assert found.departure_m[one] == pytest.approx(departure, rel=1e-7)
+        assert found.w[one] == pytest.approx(departure / np.sqrt(variance), rel=1e-7)
+
+
+def peaked(rng, alone):
+    """Radii of walls with six welds per course that peak by 10 mm, at three rings or at one."""
+    sites = sites_of(5, [-0.6, 0.0, 0.6], 24)
+    radius = RADIUS_M + 1e-3 * rng.normal(size=len(sites))
+    peak = np.zeros(len(sites), dtype=bool)
+    for course in range(5):
+        for place in rng.choice(24, 1 if alone else 6, replace=False):
+            up = (sites.course == course) & np.isclose(
+                sites.azimuth_rad, 2 * np.pi * place / 24, atol=1e-9
+            )
+            peak |= up & (sites.zeta == 0.0) if alone else up
+    return sites, radius + 0.010 * peak, peak
+
+
+def test_peaks_at_welds_are_wall_and_a_point_alone_is_none():
+    """What three rings agree on stays; the same 10 mm at one point of a smooth wall goes."""
+    rng = np.random.default_rng(3)
+    for alone in (False, True):
+        sites, radius, peak = peaked(rng, alone)
+        start = np.ones(len(sites), dtype=bool)
+        found = find_blunders(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, start)
+        assert np.all(found.accepted[peak] != alone)
+        assert np.sum(~found.accepted[~peak]) <= 2
+
+
+def test_what_was_set_aside_comes_back_where_it_agrees():
+    rng = np.random.default_rng(4)
+    sites = sites_of(4, [-0.5, 0.5], 24)
+    radius = RADIUS_M + 1e-3 * rng.normal(size=len(sites))
+    radius[50] += 0.02
+    start = np.ones(len(sites), dtype=bool)
+    start[[3, 50, 100]] = False
+    found = find_blunders(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, start)
+    assert list(np.flatnonzero(~found.accepted)) == [50]
+    assert found.departure_m[50] == pytest.approx(0.02, abs=0.004)
+
+
+def test_rings_of_points_and_what_stands_between_them():
+    even = 2 * np.pi * np.arange(12) / 12
+    azimuth = np.concatenate([even, even, [1.0, 2.0]])
+    zeta = np.concatenate([np.full(12, -0.5), np.full(12, 0.5), [-0.2, 0.9]])
+    ring, leans = find_rings(np.zeros(26, dtype=int), zeta, azimuth)
+    assert list(ring) == [0] * 12 + [1] * 12 + [0, 1]
+    assert not leans.any()
+    scattered = np.random.default_rng(1).uniform(-1, 1, 26)
+    ring, leans = find_rings(np.repeat([0, 1], 13), scattered, azimuth)
+    assert list(ring) == [0] * 13 + [1] * 13
+    assert leans.all()
