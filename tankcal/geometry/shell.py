@@ -1,9 +1,9 @@
 """The shell as one body: its wall told apart from clutter, its axis and its tilt.
 
 A survey hits stairs, pipes and the roof too. A consensus of circles finds the wall, a leaning
-cylinder with one radius a course refines it, and data snooping about the shell's smooth form rejects
-what stands clearly before it, the worst points first. Then the field of the wall tests each point
-by all others: what they agree on is wall, not a blunder.
+cylinder with one radius a course refines it, and data snooping about the shell's smooth form
+rejects what stands clearly before it, the worst points first. Then the field of the wall tests each
+point by all others: what they agree on is wall, not a blunder.
 """
 
 from dataclasses import dataclass
