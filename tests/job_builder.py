@@ -91,6 +91,7 @@ def job_parts(
     bottom=(),
     bottom_volumes=(),
     deadwood=(),
+    welds=(),
     roof=None,
     mesh=None,
 ):
@@ -113,6 +114,7 @@ def job_parts(
     bottom           rows (x_m, y_m, z_m) or (x_m, y_m, z_m, s_mm)
     bottom_volumes   rows (level_m, volume_m3) or (level_m, volume_m3, u_m3)
     deadwood         rows (name, bottom_m, top_m, volume_m3) or with u_m3
+    welds            rows (course, azimuth_deg)
     roof             {key: value} over the keys of ROOF; {}: ROOF as it is
     mesh             bytes of the file tank.stl, for kind "mesh"
     """
@@ -148,6 +150,7 @@ def job_parts(
         ("bottom", "x_m y_m z_m s_mm", bottom),
         ("bottom", "level_m volume_m3 u_m3", bottom_volumes),
         ("deadwood", "name bottom_m top_m volume_m3 u_m3", deadwood),
+        ("welds", "course azimuth_deg", welds),
     ):
         if its_rows:
             tables[name] = _table(columns.split(), its_rows)

@@ -115,7 +115,7 @@ def course_of(z_m, joints_m):
     return np.searchsorted(np.asarray(joints_m)[1:-1], z_m, side="right")
 
 
-def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
+def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, welds_rad=()):
     """Tell the wall from the clutter and find the axis of the shell.
 
     Parameters
@@ -130,6 +130,8 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
         Standard deviations of the radii, m, which are believed in relation to each other.
     snooping : bool, optional
         Whether points are tested by data snooping.
+    welds_rad : sequence of array_like, optional
+        Azimuths of the vertical welds of each course; (): not known.
 
     Returns
     -------
@@ -165,7 +167,9 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
     w, residual, wall = found.w, found.residual, found.wall
     wall = wall | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
     if by_field:
-        tested = _by_field(local, course, zeta, in_band, wall, axis, relative, nominal_radius_m)
+        tested = _by_field(
+            local, course, zeta, in_band, wall, axis, relative, nominal_radius_m, welds_rad
+        )
         wall[in_band], w[in_band], residual[in_band] = tested.accepted, tested.w, tested.departure_m
         wall = wall | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
     reason[(reason == "") & ~wall] = "snooping"
@@ -196,14 +200,15 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True):
     )
 
 
-def _by_field(local, course, zeta, in_band, wall, axis, relative, nominal_radius_m):
+def _by_field(local, course, zeta, in_band, wall, axis, relative, nominal_radius_m, welds_rad):
     """`Tested` of the points near the wall: each by the field that the accepted others show."""
     index = np.flatnonzero(in_band)
     offset, distance = distances_from_axis(local[index], axis)
     azimuth = np.arctan2(offset[:, 0], offset[:, 1])
-    _, courses = np.unique(course[index], return_inverse=True)
+    seen, courses = np.unique(course[index], return_inverse=True)
+    welds = tuple(np.asarray(welds_rad[one]) for one in seen) if welds_rad else ()
     ring, leans = find_rings(courses, zeta[index], azimuth)
-    sites = Sites(courses, ring, zeta[index], azimuth, leans)
+    sites = Sites(courses, ring, zeta[index], azimuth, leans, welds)
     return find_blunders(sites, distance, relative[index] ** 2, nominal_radius_m, wall[index])
 
 

@@ -185,7 +185,7 @@ def make_frame(raw, values, tables, measurements, warnings, has_points=True):
         datum=_datum(values["datum"], kind, has_points),
         table=_table(values["table"]),
         material=_material(values["material"]),
-        courses=_courses(tables["courses"]) if kind == "vertical" else (),
+        courses=_courses(tables["courses"], tables["welds"]) if kind == "vertical" else (),
         points=None,
         certificate=_given(values["certificate"]),
         snooping=adjustment["snooping"] is not False,
@@ -245,12 +245,22 @@ def _material(values):
     return Material(**si, expansion_given="expansion_per_k" in given)
 
 
-def _courses(table):
+def _courses(table, welds):
     if table is None:
         return ()
+    azimuths = {}
+    if welds is not None:
+        for course, azimuth in zip(welds.of("course"), welds.of("azimuth_deg"), strict=True):
+            azimuths.setdefault(course, []).append(float(np.radians(azimuth)))
     columns = (table.of(name) for name in ("course", "height_m", "thickness_mm", "paint_mm"))
     return tuple(
-        Course(name, height_m, thickness_mm / 1000, (paint_mm or 0.0) / 1000)
+        Course(
+            name,
+            height_m,
+            thickness_mm / 1000,
+            (paint_mm or 0.0) / 1000,
+            tuple(sorted(azimuths.get(name, ()))),
+        )
         for name, height_m, thickness_mm, paint_mm in zip(*columns, strict=True)
     )
 

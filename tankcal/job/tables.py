@@ -14,7 +14,7 @@ from tankcal.errors import SHEET, InputError, Problem
 from tankcal.messages import message
 
 TANK_TABLES = (
-    *("points", "courses", "bottom", "deadwood"),
+    *("points", "courses", "welds", "bottom", "deadwood"),
     *("uncertainty", "correlations", "stated"),
 )
 SURVEY_TABLES = (

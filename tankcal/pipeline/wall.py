@@ -140,7 +140,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     to_fit = _to_fit(job, shell, accepted, groups, covariance)
     nominal = job.tank.nominal_diameter_m / 2
     samples = [sample_of(*one) for one in to_fit]
-    sites, means = _sites(groups, samples, nominal)
+    sites, means = _sites(groups, samples, nominal, _welds(job))
     radius = means @ np.concatenate([one.radius_m for one in samples])
     noise = (means @ scipy.sparse.block_diag(_blocks(samples)) @ means.T).toarray()
     if amplitudes is None:
@@ -168,7 +168,13 @@ def _heights(job):
     return np.cumsum([0.0] + [course.height_m for course in job.courses])
 
 
-def _sites(groups, samples, nominal_m):
+def _welds(job):
+    """Azimuths of the welds of each course; (): nobody gave any."""
+    given = tuple(np.array(course.welds_rad) for course in job.courses)
+    return given if any(map(len, given)) else ()
+
+
+def _sites(groups, samples, nominal_m, welds_rad):
     """`Sites` of the field, and (sites, points) weights of the points in each: one, or a cell."""
     counts = [len(one.radius_m) for one in samples]
     sites = Sites(
@@ -177,6 +183,7 @@ def _sites(groups, samples, nominal_m):
         zeta=np.concatenate([one.zeta for one in samples]),
         azimuth_rad=np.concatenate([one.azimuth_rad for one in samples]),
         leans=np.repeat([one.degree > 0 for one in groups], counts),
+        welds_rad=welds_rad,
     )
     if len(sites) <= MOST_SITES:
         return sites, scipy.sparse.eye_array(len(sites), format="csr")
@@ -217,6 +224,7 @@ def _shell(job, heights, sds):
             job.tank.nominal_diameter_m / 2,
             sd_m=sds,
             snooping=job.snooping,
+            welds_rad=_welds(job),
         )
     except SolutionError as error:
         if job.points.from_adjustment:

@@ -181,6 +181,7 @@ TABLES = {
 }
 JOB_TABLES = (
     "courses",
+    "welds",
     "bottom",
     "deadwood",
     "uncertainty",

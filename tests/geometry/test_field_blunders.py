@@ -14,7 +14,11 @@ from tankcal.geometry.field.amplitudes import (
     free_design,
 )
 from tankcal.geometry.field.blunders import _restricted, _tested, find_blunders
-from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations
+from tankcal.geometry.field.components import (
+    COMPONENTS,
+    azimuth_correlations,
+    seam_correlation,
+)
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.snooping import find_rings
 
@@ -25,13 +29,29 @@ def written_out(sites, variances_m2):
     same = np.equal.outer(sites.course, sites.course)
     whole = np.zeros((len(sites), len(sites)))
     for one, size in zip(COMPONENTS, variances_m2, strict=True):
+        if one.shape == "weld":
+            peaks = np.array(
+                [
+                    [
+                        seam_correlation(np.array([azimuth - weld]), RADIUS_M, 0.2)[0]
+                        * (of == course)
+                        for of, welds in enumerate(sites.welds_rad)
+                        for weld in welds
+                    ]
+                    for azimuth, course in zip(sites.azimuth_rad, sites.course, strict=True)
+                ]
+            ).reshape(len(sites), -1)
+            columns = peaks.sum(axis=1, keepdims=True) if one.common else peaks
+            whole += size * columns @ columns.T
+            continue
         part = size * along[one.shape] * one.height_covariance(sites.zeta, sites.zeta)
         whole += part if one.common else part * same
     return whole
 
 
 def some_sites(seed=4, courses=3, points=9):
-    return sites_of(courses, [-0.6, 0.1, 0.6], points, np.random.default_rng(seed))
+    sites = sites_of(courses, [-0.6, 0.1, 0.6], points, np.random.default_rng(seed))
+    return replace(sites, welds_rad=(np.array([0.5, 3.0]), np.array([1.0]), np.array([2.0])))
 
 
 def test_covariances_are_the_sum_of_the_components():
@@ -58,7 +78,7 @@ def test_the_likelihood_is_that_of_the_normal_distribution(mixed):
 
     Rings of the same azimuths, or each of its own, 0.6 m apart at least: nothing is approximate.
     """
-    sites = sites_of(3, [-0.6, 0.6], 12)
+    sites = replace(sites_of(3, [-0.6, 0.6], 12), welds_rad=3 * (np.array([0.5, 3.0]),))
     if mixed:
         places = np.random.default_rng(6).permutation(len(sites))
         sites = replace(sites, azimuth_rad=2 * np.pi * places / len(sites))

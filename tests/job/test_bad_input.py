@@ -274,7 +274,7 @@ def test_missing_tables(tmp_path, form):
     problems = problems_of(write(tmp_path, parts, form))
     expected = [(table_file(form, name), None, None) for name in ("points", "courses")]
     assert places(problems) == expected
-    words = "missing file" if form == "folder" else "the sheets job, points, courses, bottom"
+    words = "missing file" if form == "folder" else "the sheets job, points, courses, welds, bottom"
     assert all(words in problem.expected for problem in problems)
 
 
@@ -387,7 +387,10 @@ def test_decimal_commas_among_separators(tmp_path):
         ("fiducial.csv", "did you mean fiducials.csv?"),
         ("image_pionts.csv", "did you mean image_points.csv?"),
         ("Points.csv", "did you mean points.csv?"),
-        ("notes.csv", "points.csv, courses.csv, bottom.csv, deadwood.csv, uncertainty.csv"),
+        (
+            "notes.csv",
+            "points.csv, courses.csv, welds.csv, bottom.csv, deadwood.csv, uncertainty.csv",
+        ),
     ],
 )
 def test_files_that_do_not_belong(tmp_path, name, words):

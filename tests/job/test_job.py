@@ -161,6 +161,7 @@ def test_order_of_columns_and_names_of_sections(tmp_path):
 VERTICAL = {
     "bottom": [(x, y, -0.01 * abs(x), 2.0) for x in (-4, 0, 4) for y in (-4, 0, 1, 4)],
     "deadwood": [("coil", 0.5, 1.0, -0.25, 0.01), ("manhole", 0.6, 1.2, 0.05)],
+    "welds": [("2", 200.0), ("2", 20.0), ("4", 0.0)],
     "roof": {},
     "settings": {
         "tank.nominal_volume_m3": 1260.0,
@@ -248,6 +249,8 @@ DRY = {"bottom_volumes": [(0.01, 0.0), (0.02, 0.0), (0.2, 15.5), (0.3, 28.5)]}
 def test_parts_of_a_vertical_tank_in_si(tmp_path):
     job = load(write_job(tmp_path / "job", **VERTICAL))
     assert job.tank.nominal_volume_m3 == 1260.0
+    welds = [np.degrees(course.welds_rad).round(9).tolist() for course in job.courses]
+    assert welds == [[], [20.0, 200.0], [], [0.0], []]
     assert (job.survey.liquid_level_m, job.survey.liquid_density_kg_m3) == (2.0, 998.0)
     table = job.table
     assert (table.liquid_density_kg_m3, table.other_densities_kg_m3) == (850.0, (700.0, 1000.0))

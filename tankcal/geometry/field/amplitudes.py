@@ -14,13 +14,18 @@ they are known.
 Source: Patterson & Thompson 1971 (restricted maximum likelihood).
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, mode_shares
+from tankcal.geometry.field.components import (
+    COMPONENTS,
+    azimuth_correlations,
+    mode_shares,
+    weld_columns,
+)
 from tankcal.geometry.outlines import FULL_TURN
 
 NOISE_MEDIAN_M, NOISE_LOG_SD = 2e-3, 3.0  # of readings without a given standard deviation
@@ -51,6 +56,8 @@ class Sites:
     azimuth_rad : ndarray, shape (n,)
     leans : ndarray of bool, shape (n,)
         Whether the ring is not level, and its centre moves with the height.
+    welds_rad : tuple of ndarray
+        Azimuths of the vertical welds of each course; (): not known.
     """
 
     course: np.ndarray
@@ -58,13 +65,27 @@ class Sites:
     zeta: np.ndarray
     azimuth_rad: np.ndarray
     leans: np.ndarray
+    welds_rad: tuple = ()
 
     def __len__(self):
         return len(self.course)
 
     def take(self, chosen):
         """Those of the sites that are chosen."""
-        return Sites(*(getattr(self, one.name)[chosen] for one in fields(self)))
+        given = {one.name: getattr(self, one.name) for one in fields(self)}
+        kept = {name: value[chosen] for name, value in given.items() if name != "welds_rad"}
+        return replace(self, **kept)
+
+    def welds_of(self, course):
+        """Azimuths of the vertical welds of a course."""
+        return self.welds_rad[course] if self.welds_rad else np.zeros(0)
+
+    def welds_at(self, nominal_m):
+        """For each course (k, w) what a peak of one at each of its welds makes of its radii."""
+        return [
+            weld_columns(self.azimuth_rad[members], self.welds_of(course), nominal_m)
+            for course, members in enumerate(self.members)
+        ]
 
     @property
     def members(self):
@@ -140,7 +161,7 @@ class Amplitudes:
     @property
     def form_m2(self):
         """Variance of the departures of a section from a circle."""
-        chosen = [one.kind != "bulge" for one in COMPONENTS]
+        chosen = [one.shape in ("oval", "seam") for one in COMPONENTS]
         return float(np.sum(self.variances_m2[chosen]))
 
 
@@ -369,10 +390,17 @@ def _common_values(sites, nominal_m):
 
     Values are those at the azimuths that the survey has, or, where these are many, the cosines and
     sines of the first modes: the rest of the seams is then taken as each course's own. Last come
-    the values of the heights.
+    the values of the heights, and the peak of all welds.
     """
     common = [(i, one) for i, one in enumerate(COMPONENTS) if one.common]
-    heights = [one.height_columns(sites.zeta) for _, one in common if one.shape == "mean"]
+    welds = np.zeros((len(sites), 1))
+    for members, there in zip(sites.members, sites.welds_at(nominal_m), strict=True):
+        welds[members, 0] = there.sum(axis=1)
+    values = {
+        row: welds if one.shape == "weld" else one.height_columns(sites.zeta)
+        for row, (_, one) in enumerate(common)
+        if one.shape in ("mean", "weld")
+    }
     place, azimuths = _gathered(sites.azimuth_rad, NEAR_M / nominal_m)
     away = np.abs(np.angle(np.exp(1j * (sites.azimuth_rad - azimuths[place])))).max()
     missed = []
@@ -388,11 +416,11 @@ def _common_values(sites, nominal_m):
             for shape, share in mode_shares(modes, nominal_m).items()
         }
         missed = [i for i, one in common if one.shape == "seam"]
-    columns = np.hstack([around, *heights])
+    columns = np.hstack([around, *values.values()])
     spread, used = np.zeros((len(common), columns.shape[1], columns.shape[1])), around.shape[1]
     for row, (_, one) in enumerate(common):
-        if one.shape == "mean":
-            width = heights.pop(0).shape[1]
+        if row in values:
+            width = values[row].shape[1]
             spread[row, used : used + width, used : used + width] = np.eye(width)
             used += width
         else:
@@ -436,6 +464,8 @@ def _course(sites, radius_m, noise_m2, nominal_m, members, common, estimate_nois
         noise = np.diag(noise_m2[members])
     least = LEAST_NOISE_M**2 * np.eye(left.shape[1])
     there = azimuth_correlations(azimuth, azimuth, nominal_m)
+    welds = weld_columns(azimuth, sites.welds_of(sites.course[members[0]]), nominal_m)
+    there["weld"] = welds @ welds.T
     own = [
         seen(there[one.shape] * one.height_covariance(zeta, zeta))
         for one in COMPONENTS

@@ -79,4 +79,5 @@ def sites_of_cells(sites, weights):
         zeta=weights @ sites.zeta,
         azimuth_rad=np.angle(turn) % (2 * np.pi),
         leans=sites.leans[first],
+        welds_rad=sites.welds_rad,
     )

@@ -23,6 +23,7 @@ from tankcal.geometry.outlines import FULL_TURN
 OVALITY_MODES = np.arange(2.0, 37.0)
 OVALITY_WEIGHTS = OVALITY_MODES**-3 / np.sum(OVALITY_MODES**-3)
 SEAM_LENGTH_M = 0.4  # along the arc, of a seam's flank
+WELD_LENGTH_M = 0.2  # the same of a peak at a weld, which is 0.8 m wide in all
 ORDERS = 6  # of the Legendre polynomials in the height of a course
 JOINT_LENGTH = 0.2  # of half a course: how far a joint draws the plate in
 LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
@@ -42,7 +43,8 @@ class Component:
         Its name in a budget.
     shape : str
         Along the azimuth: "mean" (none: the mean radius), "oval" (mode k of variance k^-3, from 2
-        on) or "seam" (the spectrum (1 + (k SEAM_LENGTH_M / R)^2)^-2 from mode 2 on, cusps).
+        on), "seam" (the spectrum (1 + (k SEAM_LENGTH_M / R)^2)^-2 from mode 2 on, cusps) or "weld"
+        (a narrow seam at each vertical weld whose azimuth is known; its amplitude is the peak's).
     common : bool
         The same in all courses.
     orders : tuple of float, str
@@ -93,6 +95,8 @@ COMPONENTS = (
     Component("common seams", "seams", "seam", True, _LEVEL, 3e-3, 1.2),
     Component("own seams", "seams", "seam", False, _LEVEL, 2e-3, 1.2),
     Component("dents", "seams", "seam", False, "local", 2e-3, 1.2),
+    Component("peaking", "seams", "weld", True, _LEVEL, 3e-3, 1.2),
+    Component("own peaks", "seams", "weld", False, _LEVEL, 2e-3, 1.2),
 )
 
 
@@ -116,10 +120,10 @@ def oval_columns(azimuth_rad):
     return waves * np.tile(np.sqrt(OVALITY_WEIGHTS), 2)
 
 
-def seam_correlation(difference_rad, radius_m):
+def seam_correlation(difference_rad, radius_m, length_m=SEAM_LENGTH_M):
     """c of an azimuth difference on a wall of that radius: sum over k >= 2 of (1 + (k/k0)^2)^-2.
 
-    k0 = R / SEAM_LENGTH_M; all modes are summed in closed form,
+    k0 = R / length_m; all modes are summed in closed form,
 
         sum over all k of exp(i k x) / (k^2 + b^2)^2
             = pi / (2 b^2) (C / b - (pi - x) S + pi C coth(pi b)),  0 <= x <= pi,
@@ -127,10 +131,16 @@ def seam_correlation(difference_rad, radius_m):
 
     and modes 0 and 1 are taken off.
     """
-    b = radius_m / SEAM_LENGTH_M
+    b = radius_m / length_m
     x = np.asarray(difference_rad, dtype=float)
     found = _all_modes(x, b) - b**-4 - 2 * np.cos(x) / (1 + b**2) ** 2
     return found / _seam_sum(b)
+
+
+def weld_columns(azimuth_rad, welds_rad, radius_m):
+    """(n, w) a seam of WELD_LENGTH_M at each weld, of peak one: c(a - weld)."""
+    away = np.subtract.outer(azimuth_rad, welds_rad)
+    return seam_correlation(away, radius_m, WELD_LENGTH_M)
 
 
 def mode_shares(modes, radius_m):

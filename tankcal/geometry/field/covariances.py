@@ -10,6 +10,7 @@ so that the sum of all takes five products however many components there are.
 from functools import cached_property
 
 import numpy as np
+import scipy.linalg
 
 from tankcal.geometry.field.amplitudes import distinct_azimuths
 from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations
@@ -59,11 +60,17 @@ class Covariances:
             for members in self.members:
                 there = np.ix_(members, members)
                 found[there] += self._between(shape, members) * self._up(own, variances_m2, members)
+        if self.sites.welds_rad:
+            for index, columns in self.peaks.items():
+                found += variances_m2[index] * columns @ columns.T
         return found
 
     def spread(self, weights, index):
         """(f, f) covariance of functionals (f, n) of the sites, by one component."""
         one, zeta = COMPONENTS[index], self.sites.zeta
+        if index in self.peaks:
+            part = weights @ self.peaks[index]
+            return part @ part.T
         if one.orders == "local":
             found = 0.0
             for members in self.members:
@@ -81,6 +88,17 @@ class Covariances:
                 else:
                     found = found + part @ self._between(one.shape, members) @ part.T
         return found
+
+    @cached_property
+    def peaks(self):
+        """{component: (n, k) derivative of the sites by the peaks of welds}: of all, of each."""
+        alone = scipy.linalg.block_diag(*self.sites.welds_at(self.nominal_m))
+        alone = alone[np.argsort(np.concatenate(self.members), kind="stable")]
+        return {
+            index: alone.sum(axis=1, keepdims=True) if one.common else alone
+            for index, one in enumerate(COMPONENTS)
+            if one.shape == "weld"
+        }
 
     def _up(self, chosen, variances_m2, members=slice(None)):
         """Sum of the variances times h, between the heights of some sites."""

@@ -21,7 +21,7 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.geometry.field.amplitudes import LEAST_NOISE_M, Amplitudes, Sites, free_design
-from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations
+from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, weld_columns
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.quadrature import panels
@@ -75,7 +75,12 @@ class WallField:
         found = np.empty((len(self._members), len(zeta), len(self.grid_rad)))
         found[:] = self._mean_m[:, None, None] + self._circles[:, None]
         for i, one in enumerate(COMPONENTS):
-            size, along = self.amplitudes.variances_m2[i], self._to_grid[one.shape]
+            size = self.amplitudes.variances_m2[i]
+            if one.shape == "weld":
+                peaks = size * self._explained @ self._covariances.peaks[i]
+                found += (self.peaks_at_grid[i] @ peaks)[:, None]
+                continue
+            along = self._to_grid[one.shape]
             for course, members in enumerate(self._members):
                 chosen = slice(None) if one.common else members
                 height = one.height_covariance(zeta, self.sites.zeta[chosen])
@@ -131,6 +136,21 @@ class WallField:
         for shape in ("oval", "seam"):  # no mode 0, nor one that the grid takes for it
             found[shape] -= found[shape].mean(axis=0)
         return found
+
+    @cached_property
+    def peaks_at_grid(self):
+        """{component: (courses, g, k) derivative of the outlines by the peaks of welds}."""
+        welds = [self.sites.welds_of(course) for course in range(len(self._members))]
+        ends = np.cumsum([0, *(len(one) for one in welds)])
+        alone = np.zeros((len(welds), len(self.grid_rad), ends[-1]))
+        for course, azimuths in enumerate(welds):
+            columns = weld_columns(self.grid_rad, azimuths, self.nominal_m)
+            alone[course, :, ends[course] : ends[course + 1]] = columns - columns.mean(axis=0)
+        return {
+            index: alone.sum(axis=2, keepdims=True) if one.common else alone
+            for index, one in enumerate(COMPONENTS)
+            if one.shape == "weld"
+        }
 
     @cached_property
     def _columns(self):
@@ -216,6 +236,9 @@ class Functionals:
         """(f, n) covariance of the functionals with one component at the sites."""
         field, one = self._field, COMPONENTS[index]
         count, sites = len(field._members), field.sites
+        if one.shape == "weld":
+            size = field.amplitudes.variances_m2[index]
+            return size * self._by_peaks(index) @ field._covariances.peaks[index].T
         found = np.zeros((count, LEVELS, len(sites)))
         along = self._along[one.shape]
         for course, members in enumerate(field._members):
@@ -224,9 +247,16 @@ class Functionals:
             found[course][:, chosen] = along[course][:, chosen] * height
         return field.amplitudes.variances_m2[index] * found.reshape(-1, len(sites))
 
+    def _by_peaks(self, index):
+        """(f, k) derivative of the functionals by the peaks of welds of one component."""
+        return (self._gradients @ self._field.peaks_at_grid[index]).reshape(self._totals.size, -1)
+
     def _within(self, index):
         """(f, f) covariance of the functionals by one component itself."""
         field, one = self._field, COMPONENTS[index]
+        if one.shape == "weld":
+            peaks = self._by_peaks(index)
+            return field.amplitudes.variances_m2[index] * peaks @ peaks.T
         gradients = self._gradients.reshape(-1, len(field.grid_rad))
         count = len(field._members)
         if one.shape == "mean":

@@ -20,6 +20,7 @@ from tankcal.job.contract.points import check_points
 from tankcal.job.contract.roof import check_roof
 from tankcal.job.contract.stated import check_stated
 from tankcal.job.contract.uncertainty import check_inputs
+from tankcal.job.contract.welds import check_welds
 from tankcal.job.entries import kind_of
 
 __all__ = ["check_all", "check_tank"]
@@ -71,6 +72,8 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
     if kind == "vertical":
         if courses is not None:
             check_courses(courses, values, log)
+        if tables["welds"] is not None:
+            check_welds(tables["welds"], courses, log)
         if points is not None:
             check_cylinder(points, courses, values, raw, log)
         check_bottom(values, tables["bottom"], points, extent, raw, log)

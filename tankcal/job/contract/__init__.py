@@ -13,6 +13,7 @@ from tankcal.job.contract import (
     roof,
     stated,
     uncertainty,
+    welds,
 )
 from tankcal.job.contract.keys import KEYS as COMMON_KEYS
 from tankcal.job.contract.kinds import KINDS
@@ -29,7 +30,7 @@ SECTIONS = (
     *("corrections", "material", "checks", "adjustment", "adjustment.camera", "certificate"),
     "csv",
 )
-_TABLES = (points, courses, bottom, deadwood, uncertainty, correlations, stated)
+_TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES} | SURVEY_COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | {"bottom": bottom.KEYS, "roof": roof.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
@@ -37,7 +38,7 @@ KEYS = {section: _KEYS[section] for section in SECTIONS}
 REQUIRED_TABLES = {"vertical": ("points", "courses")}
 _OF_ALL = ("uncertainty", "correlations", "stated")
 TABLES_OF_KIND = {
-    "vertical": ("points", "courses", "bottom", "deadwood", *_OF_ALL),
+    "vertical": ("points", "courses", "welds", "bottom", "deadwood", *_OF_ALL),
     "horizontal": ("points", "deadwood", *_OF_ALL),
     "sphere": ("points", "deadwood", *_OF_ALL),
     "mesh": ("deadwood", *_OF_ALL),

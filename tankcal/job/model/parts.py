@@ -7,12 +7,16 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Course:
-    """One ring of plates, from the bottom up: height, plate and paint thickness, m."""
+    """One ring of plates, from the bottom up: height, plate and paint thickness, m.
+
+    welds_rad: azimuths of its vertical welds about the axis, clockwise from +y; (): not known.
+    """
 
     name: str
     height_m: float
     thickness_m: float
     paint_m: float = 0.0
+    welds_rad: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ MEASURED = (
     *("survey.liquid_density_kg_m3", "datum.bottom_z_m", "datum.dip_plate_z_m", "datum.dip_x_m"),
     *("datum.dip_y_m", "datum.reference_height_m"),
 )  # settings that are known on the day of the survey only
-AS_GIVEN = ("courses", "bottom", "deadwood", "uncertainty", "correlations", "stated")
+AS_GIVEN = ("courses", "welds", "bottom", "deadwood", "uncertainty", "correlations", "stated")
 SIGHTS = {"directions": "direction", "zenith_angles": "zenith", "slope_distances": "distance"}
 
 
