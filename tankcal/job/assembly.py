@@ -259,7 +259,7 @@ def _courses(table, welds):
             height_m,
             thickness_mm / 1000,
             (paint_mm or 0.0) / 1000,
-            tuple(sorted(azimuths.get(name, ()))),
+            tuple(sorted(azimuths[name])) if name in azimuths else None,
         )
         for name, height_m, thickness_mm, paint_mm in zip(*columns, strict=True)
     )

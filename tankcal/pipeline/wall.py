@@ -170,7 +170,7 @@ def _heights(job):
 
 def _welds(job):
     """Azimuths of the welds of each course; (): nobody gave any."""
-    given = tuple(np.array(course.welds_rad) for course in job.courses)
+    given = tuple(np.array(course.welds_rad or ()) for course in job.courses)
     return given if any(map(len, given)) else ()
 
 

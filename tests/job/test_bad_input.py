@@ -211,6 +211,7 @@ def full_parts(**changes):
         paint_mm=0.3,
         bottom=BOTTOM,
         deadwood=[("coil", 0.5, 1.0, -0.2, 0.01), ("manhole", 0.6, 1.2, 0.05)],
+        welds=[("5", 20.0), ("5", 200.0)],
         roof={},
         settings=settings,
         **changes,

@@ -249,7 +249,7 @@ DRY = {"bottom_volumes": [(0.01, 0.0), (0.02, 0.0), (0.2, 15.5), (0.3, 28.5)]}
 def test_parts_of_a_vertical_tank_in_si(tmp_path):
     job = load(write_job(tmp_path / "job", **VERTICAL))
     assert job.tank.nominal_volume_m3 == 1260.0
-    welds = [np.degrees(course.welds_rad).round(9).tolist() for course in job.courses]
+    welds = [np.degrees(course.welds_rad or []).round(9).tolist() for course in job.courses]
     assert welds == [[], [20.0, 200.0], [], [0.0], []]
     assert (job.survey.liquid_level_m, job.survey.liquid_density_kg_m3) == (2.0, 998.0)
     table = job.table

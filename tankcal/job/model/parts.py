@@ -7,16 +7,19 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Course:
-    """One ring of plates, from the bottom up: height, plate and paint thickness, m.
-
-    welds_rad: azimuths of its vertical welds about the axis, clockwise from +y; (): not known.
-    """
+    """One ring of plates, from the bottom up: height, plate and paint thickness, m."""
 
     name: str
     height_m: float
     thickness_m: float
     paint_m: float = 0.0
-    welds_rad: tuple[float, ...] = ()
+    welds_rad: tuple[float, ...] | None = field(
+        default=None,
+        metadata={
+            "doc": "azimuths of its vertical welds, clockwise from +y; left out if unknown",
+            "optional": True,
+        },
+    )
 
 
 @dataclass(frozen=True)
