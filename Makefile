@@ -76,6 +76,7 @@ picture: notebooks ## the pictures in the README, of the example's report and th
 	mkdir -p build && pdftoppm -r 55 -png demo-results/report.pdf build/page
 	$(BIN)/python docs/picture.py build docs/images/certificate.png
 	$(BIN)/python docs/notebook_pictures.py build/notebooks docs/images
+	$(BIN)/python docs/wall_pictures.py docs/images
 
 site: notebooks $(VENV)/docs ## these pages, the executed notebooks and the API as a site: build/site/index.html
 	$(BIN)/python docs/stage.py build/site-source build/notebooks

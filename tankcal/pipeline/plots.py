@@ -34,6 +34,7 @@ _DPI_ON_SCREEN = 110
 WORDS = {
     "azimuth": "Azimuth / °",
     "residual": "Residual / mm",
+    "departure": "Departure from the course's mean / mm",
     "height": "Height / m",
     "litres_per_cm": "Capacity / (L/cm)",
     "U_m3": "U / m³",
@@ -274,6 +275,48 @@ def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english_lab
     ax.set_ylabel(words("height"))
     bar = figure.colorbar(shown, ax=ax, pad=0.02, aspect=30)
     bar.set_label(words("residual"))
+    figure.subplots_adjust(left=0.075, right=1.04, bottom=0.14, top=0.98)
+    return figure
+
+
+@styled
+def field_map(azimuth_deg, height_m, departure_m, points, joints_m, words=english_label):
+    """The wall that the table is made of, unrolled: what it departs from the mean of each course.
+
+    Parameters
+    ----------
+    azimuth_deg : ndarray, shape (g,)
+        Even.
+    height_m : ndarray, shape (h,)
+        From the bottom up, m.
+    departure_m : ndarray, shape (h, g)
+        Radius less the mean radius of the course, m.
+    points : tuple of ndarray
+        Azimuths, degrees, and heights, m, of the points.
+    joints_m : ndarray
+        Heights of the joints between courses, m.
+    words : callable, optional
+        words(key, **values) gives the texts at the axes; English by default.
+
+    Returns
+    -------
+    Drawing
+    """
+    departure_mm = 1e3 * np.asarray(departure_m)
+    limit = np.max(np.abs(departure_mm)) or 1.0
+    figure = Drawing(figsize=(WIDTH, 2.6))
+    ax = figure.subplots()
+    shown = ax.pcolormesh(
+        azimuth_deg, height_m, departure_mm, cmap="RdBu_r", vmin=-limit, vmax=limit,
+        shading="gouraud", rasterized=True,
+    )  # fmt: skip
+    ax.plot(*points, ".", color=GREY, markersize=1.2, **rasterize_many(points[0]))
+    ax.hlines(joints_m, 0, 360, color=GREY, linewidth=0.5)
+    ax.set(xlim=(0, 360), xticks=range(0, 361, 45), ylim=(joints_m[0], joints_m[-1]))
+    ax.set_xlabel(words("azimuth"))
+    ax.set_ylabel(words("height"))
+    bar = figure.colorbar(shown, ax=ax, pad=0.02, aspect=30)
+    bar.set_label(words("departure"))
     figure.subplots_adjust(left=0.075, right=1.04, bottom=0.14, top=0.98)
     return figure
 

@@ -6,6 +6,8 @@ import numpy as np
 
 from tankcal.survey import Adjustment
 
+LEVELS_OF_A_COURSE = 21  # at which its wall is drawn
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -17,10 +19,10 @@ def plot(result, what: str | None = None) -> "Figure":
     ----------
     result : Result or Adjustment
         Of an Adjustment its points from above are drawn, with their error ellipses.
-    what : {"capacity", "budget", "sections", "residuals", "wall"}, optional
+    what : {"capacity", "budget", "sections", "residuals", "wall", "field"}, optional
         Of a Result: litres per centimetre and U against the dip (this one without a name); what U
         at the top consists of; of a surveyed wall the sections about their circles, the residuals
-        of their points, the wall unrolled.
+        of their points, these on the wall unrolled, and the wall that the table is made of.
 
     Returns
     -------
@@ -88,6 +90,26 @@ def _wall(plots, result):
     return plots.deviation_map(azimuth, height_m, residual, wall.joints_m)
 
 
+def _field(plots, result):
+    wall, field = result.wall, result.wall.field
+    zeta, joints = np.linspace(-1, 1, LEVELS_OF_A_COURSE), wall.joints_m
+    outlines = field.outlines_at(zeta)
+    departures = outlines - outlines.mean(axis=(1, 2), keepdims=True)
+    middle, half = (joints[1:] + joints[:-1]) / 2, np.diff(joints) / 2
+    heights = middle[:, None] + half[:, None] * zeta
+    sites = field.sites
+    places = middle[sites.course] + half[sites.course] * sites.zeta
+    around = np.append(np.degrees(field.grid_rad), 360.0)
+    flat = departures.reshape(-1, departures.shape[2])
+    return plots.field_map(
+        around,
+        heights.ravel(),
+        np.column_stack([flat, flat[:, 0]]),
+        (np.degrees(sites.azimuth_rad) % 360, places),
+        joints,
+    )
+
+
 def _rings(plots, result):
     every_degree = np.arange(360.0)
     return [
@@ -110,5 +132,6 @@ _DRAWINGS = {
     "sections": _sections,
     "residuals": _residuals,
     "wall": _wall,
+    "field": _field,
 }
-_OF_THE_WALL = ("sections", "residuals", "wall")
+_OF_THE_WALL = ("sections", "residuals", "wall", "field")

@@ -56,7 +56,9 @@ def test_reading_the_table_adds_to_a_budget(example_result):
     }
 
 
-@pytest.mark.parametrize("what", [None, "capacity", "budget", "sections", "residuals", "wall"])
+@pytest.mark.parametrize(
+    "what", [None, "capacity", "budget", "sections", "residuals", "wall", "field"]
+)
 def test_every_drawing_of_a_result_is_a_figure(example_result, what):
     assert isinstance(example_result.plot(what), Figure)
 
