@@ -152,7 +152,7 @@ ROWS_OF_VERTICAL = [
     ("deadwood", [("a", 0, 1, -0.1), ("a", 1, 2, -0.1)], 3, "name", "already in row 2"),
     ("deadwood", [("a", 0, 1, None)], 2, "volume_m3", "blank"),
     ("deadwood", [("a", 0, 1, -0.1, -0.01)], 2, "u_m3", "from 0"),
-    ("welds", [("9", 10.0)], 2, "course", "found '9'; expected a course of courses"),
+    ("welds", [("9", 10.0)], 2, "course", "found '9'; expected a course of "),
     ("welds", [("1", 370.0)], 2, "azimuth_deg", "from 0 to 360"),
     ("welds", [("1", 0.0), ("2", 0.0), ("1", 359.95)], 4, "azimuth_deg", "already in row 2"),
     ("bottom", RINGS[:2], None, None, "2 points; expected 12 or more"),

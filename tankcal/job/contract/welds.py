@@ -32,7 +32,10 @@ def check_welds(table, courses, log):
     ):
         if None not in (course, known) and course not in known:
             expected = message(
-                "weld_of_no_course", "found {course!r}; expected a course of courses", course=course
+                "weld_of_no_course",
+                "found {course!r}; expected a course of {of}",
+                course=course,
+                of=courses.file,
             )
             log.problem(table.file, expected, row, "course")
         elif None not in (course, azimuth):
