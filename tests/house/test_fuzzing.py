@@ -22,7 +22,7 @@ from tankcal.planning.reading import load_plan
 
 pytestmark = pytest.mark.slow
 
-FEW, MANY = 60, draws(300, 3000)  # of each kind: in every run of the tests, in the study
+FEW, MANY = 60, draws(200, 3000)  # of each kind: in every run of the tests, in the study
 FULL = {
     "uncertainty": [("datum", 1.0, "mm", "B", "normal", 50), ("scale", 20, "ppm")],
     "deadwood": [("coil", 0.5, 1.0, -0.2, 0.01), ("manhole", 0.6, 1.2, 0.05, 0.01)],

@@ -34,6 +34,7 @@ from tankcal.tank.deliveries import deliveries
 pytestmark = pytest.mark.slow
 
 TANKS = draws(600, 10_000)  # standard error of a coverage 0.89 %, in full 0.22 %
+TANKS_OF_COURSES = draws(300, 10_000)
 FEW_LYING, FEW_SHELLS = 200, 50
 NARROW, WIDE, NOT_SHORT = (0.945, 0.955), (0.93, 0.97), (0.945, 1.0)
 
@@ -284,7 +285,7 @@ def test_intervals_of_shells(check, tmp_path, figure):
 @pytest.mark.study
 @SHELLS
 def test_intervals_of_shells_study(check, tmp_path, figure):
-    check(tmp_path, TANKS, figure)
+    check(tmp_path, TANKS_OF_COURSES, figure)
 
 
 @pytest.mark.parametrize("form_m", [0.0, 0.010])
