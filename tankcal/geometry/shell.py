@@ -13,9 +13,9 @@ import numpy as np
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
 from tankcal.geometry.buckles import find_buckles
-from tankcal.geometry.field.amplitudes import Sites
 from tankcal.geometry.field.blunders import find_blunders
 from tankcal.geometry.field.cells import MOST_SITES
+from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.snooping import (
     LEAST_NOISE_M,
     distances_from_axis,

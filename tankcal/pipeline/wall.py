@@ -6,10 +6,11 @@ import numpy as np
 import scipy.sparse
 
 from tankcal.errors import InputError, Problem, SolutionError
-from tankcal.geometry.field.amplitudes import Sites, estimate_amplitudes
+from tankcal.geometry.field.amplitudes import estimate_amplitudes
 from tankcal.geometry.field.cells import MOST_SITES, cells_of, sites_of_cells
 from tankcal.geometry.field.components import OVALITY_MODES
 from tankcal.geometry.field.estimate import WallField
+from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.outlines import polar
 from tankcal.geometry.shell import Shell, course_of, find_shell
 from tankcal.messages import message

@@ -8,13 +8,7 @@ from generated_walls import job_of, make_wall, survey
 from jacobians import assert_derivative
 
 import tankcal.pipeline.wall as pipeline_wall
-from tankcal.geometry.field.amplitudes import (
-    Amplitudes,
-    Sites,
-    _Evidence,
-    assumed_amplitudes,
-    estimate_amplitudes,
-)
+from tankcal.geometry.field.amplitudes import Amplitudes, assumed_amplitudes, estimate_amplitudes
 from tankcal.geometry.field.cells import cells_of, sites_of_cells
 from tankcal.geometry.field.components import (
     COMPONENTS,
@@ -23,6 +17,8 @@ from tankcal.geometry.field.components import (
     seam_correlation,
 )
 from tankcal.geometry.field.estimate import LEVELS, WallField, gauss_heights
+from tankcal.geometry.field.likelihood import Likelihood
+from tankcal.geometry.field.sites import Sites
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall import find_wall
 
@@ -192,7 +188,7 @@ def test_the_slope_of_the_likelihood():
     rng = np.random.default_rng(2)
     sites = sites_of(3, [-0.6, 0.6], 12, rng)
     radius = RADIUS_M + 0.004 * rng.normal(size=len(sites))
-    evidence = _Evidence.of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, True)
+    evidence = Likelihood.of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, True)
     at = evidence.middle + rng.normal(0, 0.5, len(evidence.middle))
     slope = evidence.misfit(at)[1]
     assert_derivative(

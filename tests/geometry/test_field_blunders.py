@@ -7,12 +7,7 @@ import pytest
 import scipy.linalg
 from test_field import RADIUS_M, sites_of
 
-from tankcal.geometry.field.amplitudes import (
-    LEAST_NOISE_M,
-    _Evidence,
-    assumed_amplitudes,
-    free_design,
-)
+from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.geometry.field.blunders import _restricted, _tested, find_blunders
 from tankcal.geometry.field.components import (
     COMPONENTS,
@@ -20,6 +15,8 @@ from tankcal.geometry.field.components import (
     seam_correlation,
 )
 from tankcal.geometry.field.covariances import Covariances
+from tankcal.geometry.field.likelihood import LEAST_NOISE_M, Likelihood
+from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.snooping import find_rings
 
 
@@ -83,7 +80,7 @@ def test_the_likelihood_is_that_of_the_normal_distribution(mixed):
         places = np.random.default_rng(6).permutation(len(sites))
         sites = replace(sites, azimuth_rad=2 * np.pi * places / len(sites))
     radius = RADIUS_M + 0.004 * np.random.default_rng(2).normal(size=len(sites))
-    evidence = _Evidence.of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, False)
+    evidence = Likelihood.of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, False)
     whole = written_out(sites, np.exp(evidence.middle))
     whole += (1e-6 + LEAST_NOISE_M**2) * np.eye(len(sites))
     order = np.concatenate(sites.members)

@@ -18,13 +18,10 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.adjust import CRITICAL, snoop
-from tankcal.geometry.field.amplitudes import (
-    LEAST_NOISE_M,
-    free_design,
-    invert,
-    likely_variances,
-)
+from tankcal.geometry.field.amplitudes import likely_variances
 from tankcal.geometry.field.covariances import Covariances
+from tankcal.geometry.field.likelihood import LEAST_NOISE_M, invert
+from tankcal.geometry.field.sites import free_design
 
 MOST_ROUNDS = 4  # of amplitudes from the accepted readings, and tests of all with these
 AT_ONCE = 0.9

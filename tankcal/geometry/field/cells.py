@@ -3,7 +3,7 @@
 import numpy as np
 import scipy.sparse
 
-from tankcal.geometry.field.amplitudes import Sites
+from tankcal.geometry.field.sites import Sites
 
 MOST_SITES = 1600  # of a field: its covariance is written out
 CELL_M, CELL_ZETA, WIDER = 0.1, 0.1, 1.3  # first width and height of a cell, and its growth

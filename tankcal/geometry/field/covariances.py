@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
-from tankcal.geometry.field.amplitudes import distinct_azimuths
 from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations
+from tankcal.geometry.field.sites import distinct_azimuths
 
 
 class Covariances:

@@ -20,9 +20,11 @@ from functools import cache, cached_property
 import numpy as np
 import scipy.linalg
 
-from tankcal.geometry.field.amplitudes import LEAST_NOISE_M, Amplitudes, Sites, free_design
+from tankcal.geometry.field.amplitudes import Amplitudes
 from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, weld_columns
 from tankcal.geometry.field.covariances import Covariances
+from tankcal.geometry.field.likelihood import LEAST_NOISE_M
+from tankcal.geometry.field.sites import Sites, free_design
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.quadrature import panels
 

@@ -1,0 +1,94 @@
+"""Where a wall was measured, and what of its readings no prior binds."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from tankcal.geometry.field.components import weld_columns
+from tankcal.geometry.outlines import FULL_TURN
+
+SAME_AZIMUTH_RAD = 1e-12
+
+
+@dataclass(frozen=True)
+class Sites:
+    """Where a wall was measured.
+
+    Attributes
+    ----------
+    course : ndarray of int, shape (n,)
+        From 0 on, each of them with sites.
+    ring : ndarray of int, shape (n,)
+        Sites that have a centre of their own, all of one course.
+    zeta : ndarray, shape (n,)
+        Height within the course, -1 at its bottom to +1 at its top.
+    azimuth_rad : ndarray, shape (n,)
+    leans : ndarray of bool, shape (n,)
+        Whether the ring is not level, and its centre moves with the height.
+    welds_rad : tuple of ndarray
+        Azimuths of the vertical welds of each course; (): not known.
+    """
+
+    course: np.ndarray
+    ring: np.ndarray
+    zeta: np.ndarray
+    azimuth_rad: np.ndarray
+    leans: np.ndarray
+    welds_rad: tuple = ()
+
+    def __len__(self):
+        return len(self.course)
+
+    def take(self, chosen):
+        """Those of the sites that are chosen."""
+        given = {one.name: getattr(self, one.name) for one in fields(self)}
+        kept = {name: value[chosen] for name, value in given.items() if name != "welds_rad"}
+        return replace(self, **kept)
+
+    def welds_of(self, course):
+        """Azimuths of the vertical welds of a course."""
+        return self.welds_rad[course] if self.welds_rad else np.zeros(0)
+
+    def welds_at(self, nominal_m):
+        """For each course (k, w) what a peak of one at each of its welds makes of its radii."""
+        return [
+            weld_columns(self.azimuth_rad[members], self.welds_of(course), nominal_m)
+            for course, members in enumerate(self.members)
+        ]
+
+    @property
+    def members(self):
+        """For each course the indices of its sites."""
+        return [np.flatnonzero(self.course == c) for c in range(self.course.max() + 1)]
+
+    def free_columns(self, members):
+        """(k, p) derivative of the radii of some sites of a course by what no prior binds.
+
+        Its radius first, then x and y of the centre of each ring, and of its lean.
+        """
+        azimuth, ring = self.azimuth_rad[members], self.ring[members]
+        turn = np.column_stack([np.sin(azimuth), np.cos(azimuth)])
+        columns = [np.ones((len(members), 1))]
+        for one in np.unique(ring):
+            there = turn * (ring == one)[:, None]
+            columns.append(there)
+            if np.any(self.leans[members] & (ring == one)):
+                columns.append(there * self.zeta[members, None])
+        return np.hstack(columns)
+
+
+def free_design(sites):
+    """(n, p) derivative of the radii by what no prior binds, and the columns of the radii."""
+    blocks = [(members, sites.free_columns(members)) for members in sites.members]
+    starts = np.cumsum([0, *(block.shape[1] for _, block in blocks)])
+    design = np.zeros((len(sites), starts[-1]))
+    for start, (members, block) in zip(starts, blocks, strict=False):
+        design[members, start : start + block.shape[1]] = block
+    return design, starts[:-1]
+
+
+def distinct_azimuths(azimuth_rad):
+    """(n,) place of each azimuth among the distinct ones, and these."""
+    turns = np.round((np.asarray(azimuth_rad) % FULL_TURN) / SAME_AZIMUTH_RAD)
+    found, place = np.unique(turns, return_inverse=True)
+    return place, found * SAME_AZIMUTH_RAD
