@@ -77,6 +77,10 @@ class LyingCylinder:
         Covariance of diameter (m) and tilt, for variance factor 1.
     cylinder : FittedCylinder
         The fit they come from.
+    by_cylinder : ndarray, shape (2, 5)
+        Derivative of diameter and tilt by the unknowns of that fit.
+    towards_b : float
+        1 where its direction is that from A to B, else -1.
     """
 
     diameter_m: float
@@ -84,6 +88,8 @@ class LyingCylinder:
     azimuth_rad: float
     cofactor: np.ndarray
     cylinder: FittedCylinder
+    by_cylinder: np.ndarray
+    towards_b: float
 
 
 def fit_cylinder(xyz_m, covariance_m2):
@@ -221,6 +227,8 @@ def lying_cylinder(xyz_m, covariance_m2, azimuth_rad):
         azimuth_rad=float(found),
         cofactor=transform @ cylinder.cofactor @ transform.T,
         cylinder=cylinder,
+        by_cylinder=transform,
+        towards_b=sign,
     )
 
 

@@ -1,4 +1,4 @@
-"""A scanned lying cylinder or sphere: diameter and tilt from its points, without dents."""
+"""A scanned lying cylinder or sphere: the shape that its points have, and the wall about it."""
 
 from dataclasses import dataclass
 
@@ -9,13 +9,15 @@ from tankcal.geometry.cylinders import FittedCylinder, lying_cylinder
 from tankcal.geometry.primitives import fit_sphere
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import refuse_misfit
-from tankcal.pipeline.survey_warnings import noise_is_estimated, origin_of
+from tankcal.pipeline.scanned_wall import SCALE_OF_MEDIAN, Fitted, agreeing, offsets, scanned_wall
+from tankcal.pipeline.survey_warnings import origin_of
 from tankcal.sections import covariance_of
-from tankcal.tank.body import Factor, survey_factors
+from tankcal.tank.body import Factor
+from tankcal.tank.surveyed_form import SurveyedForm
 
 FAR = 5.0  # robust standard deviations: a point further off is not of the wall
 MOST_ROUNDS = 30
-SCALE_OF_MEDIAN = 1.4826  # standard deviation over median absolute deviation, normal noise
+NEVER_PART, NEVER_M = 0.02, 0.01  # of the radius, and more: no point further off is of the wall
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,7 @@ class Scan:
     names        of the inputs that they give: "diameter", and "tilt" of a lying cylinder
     values       (len(names),) of the surface as surveyed
     factors      what the points leave uncertain about them (`body.Factor`)
+    form         how the wall departs from that solid, with what is uncertain of its volumes
     accepted     (m,) indices of the points that were used
     residuals_m  (n,) of all points, outwards positive; noise_m their standard deviation
     fit          the sphere or cylinder; reach_m of the used points along the cylinder's axis
@@ -33,6 +36,7 @@ class Scan:
     names: tuple[str, ...]
     values: np.ndarray
     factors: tuple[Factor, ...]
+    form: SurveyedForm
     accepted: np.ndarray
     residuals_m: np.ndarray
     noise_m: float
@@ -43,7 +47,7 @@ class Scan:
         """(n,) whether places lie within the wall, and between the ends of what was surveyed."""
         along = _along(self.fit, places_m)
         low, high = self.reach_m
-        return (_offsets(self.fit, places_m) < 0) & (along > low) & (along < high)
+        return (offsets(self.fit, places_m) < 0) & (along > low) & (along < high)
 
 
 def fit_scan(job, dof=np.inf):
@@ -56,36 +60,32 @@ def fit_scan(job, dof=np.inf):
     """
     chosen = np.ones(len(job.points.names), dtype=bool)
     for _ in range(MOST_ROUNDS):
-        fit, names, values, cofactor, residuals = _told(job, job.points.xyz_m, chosen)
+        fit, names, values, by_shape, residuals = _told(job, chosen)
         now = _near(residuals, chosen) if job.snooping else chosen
         if np.array_equal(now, chosen):
             break
         chosen = now
-    factor = 1.0
-    if noise_is_estimated(job):
-        factor, dof = fit.variance_factor, float(fit.dof)
-    causes = job.points.causes
-    effects = [_effect(job, chosen, cause.column_m) for cause in causes]
+    if job.snooping:
+        may_be = chosen | (np.abs(residuals) <= NEVER_PART * fit.radius_m + NEVER_M)
+        chosen = agreeing(job, fit, may_be, lambda index: _covariance(job.points, index), FAR)
+        fit, names, values, by_shape, residuals = _told(job, chosen)
+    index = np.flatnonzero(chosen)
     used = residuals[chosen]
     noise = float(np.sqrt(used @ used / max(fit.dof, 1)))
     refuse_misfit(job.points, noise, float(values[0]))
+    fitted = Fitted(fit, names, values, by_shape)
+    wall = scanned_wall(job, fitted, index, _covariance(job.points, index), dof)
     return Scan(
         names,
-        values,
-        survey_factors(cofactor * factor, dof, causes, effects),
-        np.flatnonzero(chosen),
+        wall.values,
+        wall.factors,
+        wall.form,
+        index,
         residuals,
         noise,
         fit,
         _reach(fit, job.points.xyz_m[chosen]),
     )
-
-
-def _offsets(fit, xyz_m):
-    """(n,) distance of points to a fitted sphere or cylinder, outwards positive."""
-    if isinstance(fit, FittedCylinder):
-        return np.hypot(*((xyz_m - fit.point_m) @ fit.tangents.T).T) - fit.radius_m
-    return np.linalg.norm(xyz_m - fit.centre_m, axis=1) - fit.radius_m
 
 
 def _along(fit, xyz_m):
@@ -103,18 +103,9 @@ def _reach(fit, xyz_m):
     return float(along.min()), float(along.max())
 
 
-def _effect(job, chosen, column_m):
-    """Change of the values when all points move by a column: half the difference of two fits."""
-    moved = column_m.reshape(-1, 3)
-    there, back = (
-        np.array(_told(job, job.points.xyz_m + way * moved, chosen)[2]) for way in (1, -1)
-    )
-    return (there - back) / 2
-
-
-def _told(job, xyz_m, chosen):
+def _told(job, chosen):
     try:
-        return _fitted(job, xyz_m, chosen)
+        return _fitted(job, chosen)
     except SolutionError as error:
         problem = Problem(
             origin_of(job.points),
@@ -128,23 +119,22 @@ def _near(residuals, chosen):
     return np.abs(residuals) <= FAR * max(spread, 1e-6)
 
 
-def _covariance(points, chosen):
-    """Of the chosen points: (3m,) variances, or (3m, 3m) and positive definite."""
+def _covariance(points, index):
+    """Of points (m,): (3m,) variances, or (3m, 3m) and positive definite."""
     if points.covariance_m2 is not None:
-        return covariance_of(np.flatnonzero(chosen), points.covariance_m2)
+        return covariance_of(index, points.covariance_m2)
     if points.sd_m is None:
-        return np.ones(3 * chosen.sum())
-    return points.sd_m[chosen].ravel() ** 2
+        return np.ones(3 * len(index))
+    return points.sd_m[index].ravel() ** 2
 
 
-def _fitted(job, xyz, chosen):
-    """Fit, names, values, their cofactor matrix, and the residuals of all points."""
-    own = _covariance(job.points, chosen)
+def _fitted(job, chosen):
+    """Fit, names, values, their derivative by its unknowns, and the residuals of all points."""
+    own, xyz = _covariance(job.points, np.flatnonzero(chosen)), job.points.xyz_m
     if job.sphere is not None:
         ball = fit_sphere(xyz[chosen], own)
-        cofactor = 4 * ball.cofactor_m2[3:, 3:]
-        return ball, ("diameter",), [2 * ball.radius_m], cofactor, _offsets(ball, xyz)
+        by_shape = np.array([[0.0, 0.0, 0.0, 2.0]])
+        return ball, ("diameter",), [2 * ball.radius_m], by_shape, offsets(ball, xyz)
     lying = lying_cylinder(xyz[chosen], own, job.horizontal.azimuth_rad)
-    fit = lying.cylinder
-    values = [lying.diameter_m, lying.tilt]
-    return fit, ("diameter", "tilt"), values, lying.cofactor, _offsets(fit, xyz)
+    fit, values = lying.cylinder, [lying.diameter_m, lying.tilt]
+    return fit, ("diameter", "tilt"), values, lying.by_cylinder, offsets(fit, xyz)

@@ -310,13 +310,13 @@ def solid_of(result):
         return described(
             diameter=(result.body.parts[0].solid.diameter_m, "m"),
             **_of_scan(result),
-            full_capacity=(result.body.parts[0].solid.capacity_m3, "m3"),
+            full_capacity=(result.body.parts[0].capacity_m3, "m3"),
         )
     if job.mesh is not None:
         return described(
             mesh_file=(job.mesh.file, None),
             mesh_faces=(len(result.body.parts[0].solid.plan_m2), ""),
-            full_capacity=(result.body.parts[0].solid.capacity_m3, "m3"),
+            full_capacity=(result.body.parts[0].capacity_m3, "m3"),
         )
     return None
 
@@ -339,7 +339,7 @@ def _of_lying(result):
         dip_from_a=(tank.dip_from_a_m, "m"),
         dip_direction=(tank.dip_direction, None),
         **_of_scan(result),
-        full_capacity=(tank.capacity_m3, "m3"),
+        full_capacity=(result.body.parts[0].capacity_m3, "m3"),
     )
 
 

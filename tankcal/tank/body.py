@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tankcal.tank.parts import Part, sum_derivatives
+from tankcal.tank.surveyed_form import SurveyedForm
 from tankcal.tank.volumes import ShellVolume
 from tankcal.uncertainty import Source, declared_source, factor_of, group_correlated
 
@@ -192,7 +193,9 @@ class SolidPart(Part):
     surveyed : tuple of str
         Names of the inputs of the solid that a survey of its wall gave; () without one.
     factors : tuple of Factor
-        What that survey leaves uncertain about them.
+        What that survey leaves uncertain about them, where no form says it of the volumes.
+    form : SurveyedForm or None
+        How that wall departs from the solid, with what the survey leaves uncertain of its volumes.
     unused : tuple of str
         Names of the solid's inputs that have no meaning in this job.
     """
@@ -203,19 +206,38 @@ class SolidPart(Part):
     warmed: bool = False
     surveyed: tuple[str, ...] = ()
     factors: tuple[Factor, ...] = ()
+    form: SurveyedForm | None = None
     unused: tuple[str, ...] = ()
+
+    @property
+    def top_m(self):
+        """The highest dip."""
+        return self.solid.top_m * self._stretch
+
+    @property
+    def capacity_m3(self):
+        """Volume of the full tank."""
+        full = self.solid.capacity_m3
+        return full if self.form is None else full * (1 + self.form.share)
 
     def volume_m3(self, levels_m):
         """(rows,) volume below each level."""
-        return self.solid.volume_m3(levels_m)
+        volume = self.solid.volume_m3(self._of_solid(levels_m))
+        if self.form is None:
+            return volume
+        return volume * self.form.factor(self._shares(levels_m))
 
     def area_m2(self, levels_m):
         """(rows,) derivative of the volume by the level."""
-        return self.solid.area_m2(levels_m)
+        area = self.solid.area_m2(self._of_solid(levels_m))
+        if self.form is None:
+            return area
+        volume = self.solid.volume_m3(self._of_solid(levels_m))
+        return self._formed_area(levels_m, volume, area)
 
     def derivatives(self, levels_m):
         """{input: (rows,)} m3 per SI unit: those of the solid as measured, and its temperature."""
-        found = self.solid.derivatives(levels_m)
+        found = self._formed(levels_m, self.solid.derivatives(self._of_solid(levels_m)))
         found |= {name: self.scale * found[name] for name in MEASURED if name in found}
         if self.warmed:
             by_length = found["scale"] / self.scale
@@ -228,12 +250,45 @@ class SolidPart(Part):
 
     def sources(self, levels_m):
         """What the survey of the wall leaves uncertain, beside the solid's own sources."""
-        own = tuple(self.solid.sources(levels_m))
+        own = tuple(self.solid.sources(self._of_solid(levels_m)))
         if not self.surveyed:
             return own
-        found = self.solid.derivatives(levels_m)
-        by_survey = np.column_stack([found[name] for name in self.surveyed])
-        return (*(one.source(by_survey @ one.columns) for one in self.factors), *own)
+        if self.form is None:
+            found = self.solid.derivatives(levels_m)
+            by_survey = np.column_stack([found[name] for name in self.surveyed])
+            return (*(one.source(by_survey @ one.columns) for one in self.factors), *own)
+        weights = self.form.at(self._shares(levels_m))
+        return (*(one.source(weights @ one.columns) for one in self.form.factors), *own)
+
+    @property
+    def _stretch(self):
+        return 1.0 if self.form is None else self.form.stretch
+
+    def _of_solid(self, levels_m):
+        return np.asarray(levels_m, dtype=float) / self._stretch
+
+    def _shares(self, levels_m):
+        return np.asarray(levels_m, dtype=float) / self.top_m
+
+    def _formed_area(self, levels_m, volume, area):
+        """Of the wall, from volume and area of the solid at its own levels."""
+        shares = self._shares(levels_m)
+        slope = self.form.factor_slope(shares) / self.top_m
+        return area * self.form.factor(shares) / self._stretch + volume * slope
+
+    def _formed(self, levels_m, found):
+        """Derivatives of the wall from those of the solid at its own levels.
+
+        All lengths times t make the volume t^3 W(d / t): by the scale it is 3 W - d dW/dd.
+        """
+        if self.form is None:
+            return found
+        levels, factor = self._of_solid(levels_m), self.form.factor(self._shares(levels_m))
+        volume = self.solid.volume_m3(levels)
+        area = self._formed_area(levels_m, volume, found["datum"])
+        formed = {name: factor * one for name, one in found.items()}
+        by_scale = 3 * factor * volume - np.asarray(levels_m) * area
+        return formed | {"datum": area, "scale": by_scale}
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,15 @@
 
 from tankcal.tank.fittings import deadwood
 
+LEARNED, HALF_LEARNED = 0.1, 0.5  # share of a variance's logarithm that is assumed, at most
+
+
+def told_by(assumed):
+    """Code of how an amplitude is known, by the share of it that is assumed."""
+    if assumed < LEARNED:
+        return "learned"
+    return "half_learned" if assumed < HALF_LEARNED else "assumed"
+
 
 def estimates_of(job):
     """{name of an input: its value as declared}; 0 of a scale, an offset and the like.

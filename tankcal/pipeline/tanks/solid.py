@@ -42,7 +42,7 @@ def solid_body(job, survey, switches):
         tuple(parts),
         job.inputs,
         lowest_m=0.0,
-        highest_m=solid.top_m,
+        highest_m=part.top_m,
         correlations=job.correlations,
         estimates=estimates_of(job),
     )
@@ -74,11 +74,23 @@ def solid_zero(job):
     return zero
 
 
+def solid_as_surveyed(job, names, values):
+    """The lying tank or sphere inside the plates, of sizes that points gave, at their warmth."""
+    sized = _with_sizes(job, names, values)
+    given = sized.horizontal or sized.sphere
+    plate = given.thickness_m if job.survey.side == "outside" and job.switches.plate else 0.0
+    if sized.sphere is not None:
+        return Sphere(sized.sphere.diameter_m - 2 * plate)
+    return _lying(sized.horizontal, plate, 1.0)
+
+
 def _with_scan(job, scan):
     """The job with the sizes that its points gave."""
-    if job.points is None:
-        return job
-    found = dict(zip(scan.names, map(float, scan.values), strict=True))
+    return job if job.points is None else _with_sizes(job, scan.names, scan.values)
+
+
+def _with_sizes(job, names, values):
+    found = dict(zip(names, map(float, values), strict=True))
     if job.sphere is not None:
         return replace(job, sphere=replace(job.sphere, diameter_m=found["diameter"]))
     width = found["diameter"]
@@ -87,14 +99,9 @@ def _with_scan(job, scan):
 
 
 def _of_scan(scan, scale):
-    """What the survey leaves uncertain, as arguments of `SolidPart`; lengths are to scale."""
-    lengths = np.array([scale if name == "diameter" else 1.0 for name in scan.names])
-    return {
-        "surveyed": scan.names,
-        "factors": tuple(
-            replace(one, columns=lengths[:, None] * one.columns) for one in scan.factors
-        ),
-    }
+    """What the survey gives, as arguments of `SolidPart`; volumes are to scale."""
+    factors = tuple(replace(one, columns=scale**3 * one.columns) for one in scan.form.factors)
+    return {"surveyed": scan.names, "form": replace(scan.form, factors=factors)}
 
 
 def _of_mesh(job, mesh, scale):

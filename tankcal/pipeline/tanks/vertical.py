@@ -7,7 +7,13 @@ import numpy as np
 from tankcal.geometry.field.components import COMPONENTS, KINDS
 from tankcal.geometry.field.estimate import gauss_heights
 from tankcal.geometry.outlines import FULL_TURN
-from tankcal.pipeline.tanks.common import deadwood_part, estimates_of, is_warmed, thermal_scale
+from tankcal.pipeline.tanks.common import (
+    deadwood_part,
+    estimates_of,
+    is_warmed,
+    thermal_scale,
+    told_by,
+)
 from tankcal.sections import coordinates_of
 from tankcal.tank.body import Body, Factor, ShellPart, survey_factors
 from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
@@ -77,7 +83,6 @@ def widen_bottom(part, shell):
     return Widened(part, {name: rate for name, rate in rates.items() if name in bearing})
 
 
-LEARNED, HALF_LEARNED = 0.1, 0.5  # share of a variance's logarithm that is assumed, at most
 FOOTPRINT = 360  # azimuths of the outline that a bottom is computed over
 
 
@@ -289,17 +294,10 @@ def _of_the_unseen(wall, volume, features, declared):
         if chosen:
             parts = [inflation[index] * features.unseen(index) for index in chosen]
             sizes = np.maximum([top @ part @ top for part in parts], 1e-30)
-            known = _told_by(float(sizes @ assumed[chosen] / sizes.sum()))
+            known = told_by(float(sizes @ assumed[chosen] / sizes.sum()))
             by = "B" if known == "assumed" else "A"
             found.append(Factor(kind, factor_of(sum(parts)), type=by, note=known))
     return tuple(one for one in found if one.columns.shape[1])
-
-
-def _told_by(assumed):
-    """Code of how an amplitude is known, by the share of it that is assumed."""
-    if assumed < LEARNED:
-        return "learned"
-    return "half_learned" if assumed < HALF_LEARNED else "assumed"
 
 
 def _functionals(wall, volume):
