@@ -44,7 +44,8 @@ class LyingShell:
 
     def radius_at(self, turn, s):
         """Radii at places that broadcast."""
-        return self.radius_m + sum(one(turn, s) for one in self.departures)
+        found = np.full(np.broadcast(turn, s).shape, self.radius_m)
+        return found + sum(one(turn, s) for one in self.departures)
 
     def volume_below(self, dips_m):
         """(rows,) true volumes below dips from the wall under the dip's place."""
@@ -87,7 +88,9 @@ class Ball:
 
     def radius_at(self, direction):
         """Radii in directions."""
-        return np.full(direction.shape[:-1], self.radius_m) + sum(one(direction) for one in self.departures)
+        return np.full(direction.shape[:-1], self.radius_m) + sum(
+            one(direction) for one in self.departures
+        )
 
     @property
     def height_m(self):
@@ -172,8 +175,7 @@ def _saddles(rng, shell):
         for side in (-1, 1):
             shell.departures.append(
                 lambda t, s, place=place, size=size, at=side * horn, width=width: (
-                    -size
-                    * np.exp(-((_arc(shell, t, at) / 0.25) ** 2) - ((s - place) / width) ** 2)
+                    -size * np.exp(-((_arc(shell, t, at) / 0.25) ** 2) - ((s - place) / width) ** 2)
                 )
             )
 
@@ -374,9 +376,7 @@ def _any_job(folder, kind):
         rows = survey_ball(rng, Ball(10.0), points=60, noise_m=0.001, layout="free")
         settings |= {"sphere.diameter_m": None}
     points = [(f"P{i}", *map(float, row)) for i, row in enumerate(rows)]
-    return tankcal.load(
-        write_job(folder / kind, kind=kind, settings=settings, extra_points=points)
-    )
+    return tankcal.load(write_job(folder / kind, kind=kind, settings=settings, extra_points=points))
 
 
 def job_of(solid, xyz_m, noise_m, folder, *, given=True):

@@ -5,7 +5,7 @@ from the bottom at the dip to the top, and V the volumes of the solid, those of 
 
     W(d) = V(d T / H) (1 + share + g(t) (1 + cos t)^1.5),   d = H (1 - cos t) / 2,
 
-which fills up where the wall does, and as smoothly; g is a spline through levels that are even in t.
+which fills up where the wall does, and as smoothly; g is a spline through levels even in t.
 """
 
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 NODES = 49  # levels from empty to full
+MOST_BEND = 0.14  # of g: at the bottom (1 + cos t)^1.5 is 2.8, and a narrow groove no small change
 LEAST_TURN = 1e-4  # next to the ends, where the derivative is taken beside them
 
 
@@ -72,6 +73,7 @@ class SurveyedForm:
         size = volume_m3 * (1 + np.cos(node_turns())) ** 1.5
         bend = np.zeros(NODES)
         bend[1:-1] = (rest - share * volume_m3)[1:-1] / size[1:-1]
+        bend = np.clip(bend, -MOST_BEND, MOST_BEND)
         bend[0], bend[-1] = bend[1], bend[-2]
         return cls(float(stretch), float(share), bend, factors)
 

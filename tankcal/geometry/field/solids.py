@@ -74,14 +74,14 @@ OF_CYLINDERS = (
     Departure("bulge", "first", 0.0, 4.0, 1.5e-3, 1.5),
     Departure("ovality", "oval", 0.0, np.inf, 3e-3, 2.0),
     Departure("ovality", "oval", 0.0, 2.0, 2e-3, 2.0),
-    Departure("seams", "local", 0.2, np.inf, 1.5e-3, 1.2),
-    Departure("seams", "local", 0.2, 1.5, 1.5e-3, 1.2),
+    Departure("seams", "local", 0.2, np.inf, 2e-3, 1.2),
+    Departure("seams", "local", 0.2, 1.5, 2e-3, 1.2),
     Departure("seams", "local", 0.3, 0.3, 1.5e-3, 1.2),
-    Departure("seams", "bottom", 0.15, 3.0, 3e-3, 1.5),
+    Departure("seams", "bottom", 0.15, 3.0, 4e-3, 1.5),
 )
 OF_SPHERES = (
     Departure("ovality", "oval", 0.0, 0.0, 3e-3, 2.0),
-    Departure("seams", "local", 0.4, 0.0, 3e-3, 1.5),
+    Departure("seams", "local", 0.4, 0.0, 4e-3, 1.5),
     Departure("seams", "local", 1.2, 0.0, 3e-3, 1.5),
 )
 
@@ -149,7 +149,6 @@ class OnCylinder:
         arcs = self.radius_m * (away[..., None] + FULL_TURN * WRAPS)
         at_once = _smooth(self.radius_m * FULL_TURN * WRAPS / one.width_m).sum()
         return _smooth(arcs / one.width_m).sum(axis=-1) / at_once
-
 
     def _of_bottom(self, one, turn):
         """(n,) how much a place has of what departs at the bottom alone."""

@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.pipeline.tanks.common import deadwood_part, estimates_of, is_warmed, thermal_scale
