@@ -15,7 +15,7 @@ from tankcal.sections import covariance_of
 from tankcal.tank.body import Factor
 from tankcal.tank.surveyed_form import SurveyedForm
 
-FAR = 5.0  # robust standard deviations: a point further off is not of the wall
+FAR = 5.0  # standard deviations: a point further off is not of the wall
 MOST_ROUNDS = 30
 NEVER_PART, NEVER_M = 0.02, 0.01  # of the radius, and more: no point further off is of the wall
 
@@ -53,10 +53,12 @@ class Scan:
 def fit_scan(job, dof=np.inf):
     """`Scan` of the points of a lying cylinder or a sphere; points far off are left out.
 
-    Rounds of fit and test: a point over 5 robust standard deviations off is not used, until
-    nothing changes. Without snooping every point is used. dof: degrees of freedom of the points'
-    covariance, where it was given. A full covariance is the fit's weight and its propagation.
-    Raises InputError when the points make no such solid.
+    Rounds of fit and test leave out points over 5 robust standard deviations off, until nothing
+    changes. Of what is within 2 % of the radius and 10 mm of that shape, all points are then held
+    against the wall that the others show (`scanned_wall.agreeing`), so a dent stays in. Without
+    snooping every point is used. dof: degrees of freedom of the points' covariance, where it was
+    given. A full covariance is the fit's weight and its propagation. Raises InputError when the
+    points make no such solid.
     """
     chosen = np.ones(len(job.points.names), dtype=bool)
     for _ in range(MOST_ROUNDS):

@@ -148,6 +148,7 @@ def choices_of(result):
     values = {
         "zero": zero_of(result),
         **(_shell_choices(job, result) if result.wall is not None else {}),
+        **({"form": "learned"} if result.scan is not None and job.horizontal is not None else {}),
         "thickness": _thickness_choice(job),
         "temperature": _temperature_choice(job),
         "height_expansion": "yes" if job.table.height_expansion else "no",
