@@ -73,26 +73,29 @@ class WallField:
 
     def outlines_at(self, zeta):
         """(courses, k, g) the estimated radius at heights (k,) of each course."""
-        zeta, place = np.asarray(zeta, dtype=float), self._covariances.place
+        zeta = np.asarray(zeta, dtype=float)
         found = np.empty((len(self._members), len(zeta), len(self.grid_rad)))
         found[:] = self._mean_m[:, None, None] + self._circles[:, None]
-        for i, one in enumerate(COMPONENTS):
-            size = self.amplitudes.variances_m2[i]
-            if one.shape == "weld":
-                peaks = size * self._explained @ self._covariances.peaks[i]
-                found += (self.peaks_at_grid[i] @ peaks)[:, None]
-                continue
-            along = self._to_grid[one.shape]
+        for shape in self._to_grid:
+            found += self._drawn(shape, zeta, slice(None), common=True)
             for course, members in enumerate(self._members):
-                chosen = slice(None) if one.common else members
-                height = one.height_covariance(zeta, self.sites.zeta[chosen])
-                pull = size * height * self._explained[chosen]
-                if one.shape == "mean":
-                    found[course] += pull.sum(axis=1)[:, None]
-                else:
-                    sums = [np.bincount(place[chosen], row, along.shape[1]) for row in pull]
-                    found[course] += np.array(sums) @ along.T
+                found[course] += self._drawn(shape, zeta, members, common=False)
+        for i, at_grid in self.peaks_at_grid.items():
+            peaks = self._explained @ self._covariances.peaks[i]
+            found += self.amplitudes.variances_m2[i] * (at_grid @ peaks)[:, None]
         return found
+
+    def _drawn(self, shape, zeta, members, *, common):
+        """(k, g or 1) what some sites say of the components of one shape at heights (k,)."""
+        height = sum(
+            size * one.height_covariance(zeta, self.sites.zeta[members])
+            for one, size in zip(COMPONENTS, self.amplitudes.variances_m2, strict=True)
+            if (one.shape, one.common) == (shape, common)
+        )
+        pull = height * self._explained[members]
+        if shape == "mean":
+            return pull.sum(axis=1, keepdims=True)
+        return pull @ self._to_grid[shape][:, self._covariances.place[members]].T
 
     def functionals(self, gradients_m):
         """`Functionals` of the wall: each the integral of a gradient times its radius.
