@@ -67,14 +67,13 @@ def fit_scan(job, dof=np.inf):
         if np.array_equal(now, chosen):
             break
         chosen = now
+    _refuse_scatter(job, fit, values, residuals[chosen])  # before neighbours make up their own wall
     if job.snooping:
         may_be = chosen | (np.abs(residuals) <= NEVER_PART * fit.radius_m + NEVER_M)
         chosen = agreeing(job, fit, may_be, lambda index: _covariance(job.points, index), FAR)
         fit, names, values, by_shape, residuals = _told(job, chosen)
     index = np.flatnonzero(chosen)
-    used = residuals[chosen]
-    noise = float(np.sqrt(used @ used / max(fit.dof, 1)))
-    refuse_misfit(job.points, noise, float(values[0]))
+    noise = _refuse_scatter(job, fit, values, residuals[chosen])
     fitted = Fitted(fit, names, values, by_shape)
     wall = scanned_wall(job, fitted, index, _covariance(job.points, index), dof)
     return Scan(
@@ -88,6 +87,13 @@ def fit_scan(job, dof=np.inf):
         fit,
         _reach(fit, job.points.xyz_m[chosen]),
     )
+
+
+def _refuse_scatter(job, fit, values, used):
+    """Standard deviation of the used points about the shape; refused where it is no wall's."""
+    noise = float(np.sqrt(used @ used / max(fit.dof, 1)))
+    refuse_misfit(job.points, noise, float(values[0]))
+    return noise
 
 
 def _along(fit, xyz_m):

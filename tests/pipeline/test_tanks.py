@@ -455,6 +455,19 @@ SCANNED = {
 }
 
 
+@pytest.mark.parametrize("count", [80, 700])
+def test_a_second_wall_of_half_as_many_points_is_refused(tmp_path, count):
+    """A third of all points 0.12 m within the shell, as many as go to means of neighbours, too."""
+    rng = np.random.default_rng(5)
+    turn, along = rng.uniform(0, 2 * np.pi, count), rng.uniform(0, 10, count)
+    radius = 1.2 * np.where(np.arange(count) < count / 3, 0.9, 1.0) + rng.normal(0, 1e-3, count)
+    xyz = np.column_stack([along, radius * np.sin(turn), radius * np.cos(turn)])
+    points = [(f"P{i}", *map(float, row)) for i, row in enumerate(xyz)]
+    job = write_job(tmp_path / "job", kind="horizontal", settings=SCANNED, extra_points=points)
+    with pytest.raises(InputError, match="the points scatter by"):
+        run(tankcal.load(job))
+
+
 def test_a_scan_gives_diameter_and_tilt_of_a_lying_tank(tmp_path):
     points = scanned_points(2.4, 0.01, np.random.default_rng(3))
     found = result_of(tmp_path / "job", kind="horizontal", settings=SCANNED, extra_points=points)
