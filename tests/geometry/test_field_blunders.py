@@ -90,6 +90,16 @@ def test_the_likelihood_is_that_of_the_normal_distribution(mixed):
     assert evidence.misfit(evidence.middle)[0] == pytest.approx(expected, rel=1e-7)
 
 
+def test_a_course_of_three_points_tells_nothing(capfd):
+    """Its radius and centre take them all; nothing is said of it on the screen, either."""
+    sites = sites_of(2, [0.0], 3)
+    radius = RADIUS_M + 0.004 * np.random.default_rng(2).normal(size=len(sites))
+    likelihood = Likelihood.of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, False)
+    value, slopes = likelihood.misfit(likelihood.middle)
+    assert (value, *slopes) == pytest.approx(np.zeros(1 + len(slopes)), abs=1e-12)
+    assert capfd.readouterr() == ("", "")
+
+
 def test_a_departure_is_from_the_wall_that_all_others_show():
     """Second method: each reading left out, and predicted by the others' own normal equations."""
     sites = some_sites()

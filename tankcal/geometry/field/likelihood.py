@@ -148,6 +148,8 @@ def _rounded(covariance):
 def invert(covariance):
     """Cholesky factor and inverse of a covariance."""
     root = np.linalg.cholesky(covariance)
+    if not len(root):  # of a course whose radius and centres leave nothing free
+        return root, root
     inverse = scipy.linalg.lapack.dpotri(root, lower=True)[0]
     whole = inverse + inverse.T  # the upper half of `root` is zero, and of its inverse
     whole.flat[:: len(whole) + 1] /= 2
