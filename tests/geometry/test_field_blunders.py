@@ -165,6 +165,21 @@ def test_what_was_set_aside_comes_back_where_it_agrees():
     assert found.departure_m[50] == pytest.approx(0.02, abs=0.004)
 
 
+@pytest.mark.parametrize("gone", [0, 1, 2])
+def test_a_course_that_was_set_aside_is_tested_too(gone):
+    """What is left tells the amplitudes; the course's own points agree and come back."""
+    rng = np.random.default_rng(8)
+    welds = tuple(np.array([place]) for place in (0.5, 1.0, 2.0))
+    sites = replace(sites_of(3, [-0.5, 0.5], 12, rng), welds_rad=welds)
+    radius = RADIUS_M + 1e-3 * rng.normal(size=len(sites))
+    start = sites.course != gone
+    left = sites.take(start)
+    assert set(left.course) == {0, 1}
+    assert left.welds_rad == tuple(one for i, one in enumerate(welds) if i != gone)
+    found = find_blunders(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, start)
+    assert np.all(np.bincount(sites.course[found.accepted]) >= 23)
+
+
 def test_rings_of_points_and_what_stands_between_them():
     even = 2 * np.pi * np.arange(12) / 12
     azimuth = np.concatenate([even, even, [1.0, 2.0]])

@@ -1,6 +1,6 @@
 """Where a wall was measured, and what of its readings no prior binds."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -40,10 +40,16 @@ class Sites:
         return len(self.course)
 
     def take(self, chosen):
-        """Those of the sites that are chosen."""
-        given = {one.name: getattr(self, one.name) for one in fields(self)}
-        kept = {name: value[chosen] for name, value in given.items() if name != "welds_rad"}
-        return replace(self, **kept)
+        """Those of the sites that are chosen; courses that lose all of theirs are left out."""
+        seen, course = np.unique(self.course[chosen], return_inverse=True)
+        return Sites(
+            course=course,
+            ring=self.ring[chosen],
+            zeta=self.zeta[chosen],
+            azimuth_rad=self.azimuth_rad[chosen],
+            leans=self.leans[chosen],
+            welds_rad=tuple(self.welds_of(one) for one in seen) if self.welds_rad else (),
+        )
 
     def welds_of(self, course):
         """Azimuths of the vertical welds of a course."""
