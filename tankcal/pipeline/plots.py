@@ -271,12 +271,7 @@ def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english_lab
     )  # fmt: skip
     ax.hlines(joints_m, *_TURN, color=GREY, linewidth=0.5)
     ax.set(xlim=_TURN, xticks=range(0, 361, 45))
-    ax.set_xlabel(words("azimuth"))
-    ax.set_ylabel(words("height"))
-    bar = figure.colorbar(shown, ax=ax, pad=0.02, aspect=30)
-    bar.set_label(words("residual"))
-    figure.subplots_adjust(left=0.075, right=1.04, bottom=0.14, top=0.98)
-    return figure
+    return _unrolled(figure, ax, shown, words, "residual")
 
 
 @styled
@@ -313,10 +308,15 @@ def field_map(azimuth_deg, height_m, departure_m, points, joints_m, words=englis
     ax.plot(*points, ".", color=GREY, markersize=1.2, **rasterize_many(points[0]))
     ax.hlines(joints_m, 0, 360, color=GREY, linewidth=0.5)
     ax.set(xlim=(0, 360), xticks=range(0, 361, 45), ylim=(joints_m[0], joints_m[-1]))
+    return _unrolled(figure, ax, shown, words, "departure")
+
+
+def _unrolled(figure, ax, shown, words, colours):
+    """The figure of a wall unrolled, with its axes and its bar of colours named."""
     ax.set_xlabel(words("azimuth"))
     ax.set_ylabel(words("height"))
     bar = figure.colorbar(shown, ax=ax, pad=0.02, aspect=30)
-    bar.set_label(words("departure"))
+    bar.set_label(words(colours))
     figure.subplots_adjust(left=0.075, right=1.04, bottom=0.14, top=0.98)
     return figure
 

@@ -16,6 +16,12 @@ from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations
 from tankcal.geometry.field.sites import distinct_azimuths
 
 
+def without_rounding(covariance):
+    """The nearest covariance: differences leave rounding below zero."""
+    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T
+
+
 class Covariances:
     """Of the components of unit variance at sites.
 

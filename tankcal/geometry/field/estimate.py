@@ -22,7 +22,7 @@ import scipy.linalg
 
 from tankcal.geometry.field.amplitudes import Amplitudes
 from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, weld_columns
-from tankcal.geometry.field.covariances import Covariances
+from tankcal.geometry.field.covariances import Covariances, without_rounding
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
 from tankcal.geometry.field.sites import Sites, free_design
 from tankcal.geometry.outlines import FULL_TURN
@@ -233,9 +233,7 @@ class Functionals:
         seen = self.weights @ self._across(index).T
         size = self._field.amplitudes.variances_m2[index]
         spread = size * self._field._covariances.spread(self.weights, index)
-        found = self._within(index) - seen - seen.T + spread
-        values, vectors = np.linalg.eigh((found + found.T) / 2)
-        return (vectors * np.maximum(values, 0.0)) @ vectors.T  # differences: rounding below 0
+        return without_rounding(self._within(index) - seen - seen.T + spread)
 
     def _across(self, index):
         """(f, n) covariance of the functionals with one component at the sites."""

@@ -109,10 +109,10 @@ class Likelihood:
             log |V| = sum log |B| + log |I + N C|.
         """
         variances = np.exp(logs)
-        before = _rounded(np.tensordot(variances[self.common], self.spread, 1))
+        before = rounded(np.tensordot(variances[self.common], self.spread, 1))
         told, value, solved = 0.0, 0.0, []
         for course in self.courses:
-            covariance = _rounded(course.fixed + np.tensordot(variances[self.own], course.own, 1))
+            covariance = rounded(course.fixed + np.tensordot(variances[self.own], course.own, 1))
             root, inverse = invert(covariance)
             both = np.column_stack([course.values, course.radius])
             across = inverse @ both
@@ -139,7 +139,7 @@ class Likelihood:
         return value + away @ away, slopes + 2 * away / self.log_sd
 
 
-def _rounded(covariance):
+def rounded(covariance):
     """The covariance, positive in spite of rounding."""
     covariance.flat[:: len(covariance) + 1] *= 1 + ROUNDING
     return covariance

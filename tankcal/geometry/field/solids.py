@@ -27,11 +27,18 @@ import scipy.optimize
 import scipy.sparse
 
 from tankcal.geometry.field.components import oval_columns
+from tankcal.geometry.field.covariances import without_rounding
+from tankcal.geometry.field.likelihood import (
+    LEAST_M,
+    LEAST_NOISE_M,
+    MOST_M,
+    NOISE_LOG_SD,
+    NOISE_MEDIAN_M,
+    invert,
+    rounded,
+)
 from tankcal.geometry.outlines import FULL_TURN
 
-LEAST_M, MOST_M = 1e-5, 0.3  # sizes that are tried
-NOISE_MEDIAN_M, NOISE_LOG_SD = 2e-3, 3.0  # of points without a given standard deviation
-LEAST_NOISE_M = 1e-6  # what is given as perfect is not quite
 FINE, LOG_STEP = 1e-9, 0.1  # change of the likelihood that ends its search; for its curvature
 WRAPS = np.arange(-2, 3)  # turns of a circumference that a short covariance is summed over
 CELL_M, LARGEST_CELL_M = 0.15, 120  # along the axis; cells of it at most
@@ -374,11 +381,7 @@ def estimate_sizes(places, design, distance_m, noise_m2, *, estimate_noise=False
 def _misfit(logs, parts, fixed, reading, middle, log_sd):
     """-2 log density of the readings and the logarithms, and its derivative."""
     variances = np.exp(logs)
-    whole = fixed + np.tensordot(variances, parts, 1)
-    whole.flat[:: len(whole) + 1] *= 1 + 1e-11
-    root = scipy.linalg.cholesky(whole, lower=True, check_finite=False)
-    inverse = scipy.linalg.lapack.dpotri(root, lower=True)[0]
-    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    root, inverse = invert(rounded(fixed + np.tensordot(variances, parts, 1)))
     solved = inverse @ reading
     away = (logs - middle) / log_sd
     value = 2 * np.sum(np.log(np.diag(root))) + reading @ solved + away @ away
@@ -484,7 +487,7 @@ class SolidField:
         for (size, one), part, here in zip(each, self._parts, across, strict=True):
             seen = weights @ here.T
             whole = size * self.places.within(one, functionals) - seen - seen.T
-            unseen.append(_positive(whole + weights @ part @ weights.T))
+            unseen.append(without_rounding(whole + weights @ part @ weights.T))
         return Estimated(beta, together @ pull, weights, unseen)
 
 
@@ -508,9 +511,3 @@ class Estimated:
     departing: np.ndarray
     weights: np.ndarray
     unseen: list
-
-
-def _positive(covariance):
-    """The nearest covariance: differences leave rounding below zero."""
-    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
-    return (vectors * np.maximum(values, 0.0)) @ vectors.T
