@@ -82,7 +82,7 @@ def once(size):
     times.append(time.perf_counter())
     body_of(job, wall).rows(np.linspace(0.0, 19.9, 2000))
     times.append(time.perf_counter())
-    matrix = np.eye(1600) + 0.1 * np.exp(-np.abs(np.subtract.outer(*2 * [np.arange(1600.0)])))
+    matrix = np.eye(1600) + 0.1 * np.exp(-np.abs(np.subtract.outer(*2 * [np.arange(1600.0)])) / 100)
     scipy.linalg.cholesky(matrix)
     start = time.perf_counter()
     scipy.linalg.cholesky(matrix)

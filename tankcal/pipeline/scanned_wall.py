@@ -16,20 +16,19 @@ import scipy.sparse
 from scipy.spatial import KDTree
 
 from tankcal.geometry.cylinders import FittedCylinder, cylinder_distances
-from tankcal.geometry.field.solids import (
+from tankcal.geometry.field.places import (
     DEGREES,
     MOST_SITES,
     CylinderFunctionals,
     OnCylinder,
     OnSphere,
-    SolidField,
     cap_integrals,
     cells_along,
     cells_around,
-    estimate_sizes,
     means_of_neighbours,
     wet_cells,
 )
+from tankcal.geometry.field.solids import SolidField, estimate_sizes
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.primitives import sphere_distances, unit_vectors
 from tankcal.pipeline.survey_warnings import noise_is_estimated
@@ -92,7 +91,7 @@ def scanned_wall(job, fitted, chosen, covariance_m2, dof):
     readings = _readings(job, fitted.fit, chosen, covariance_m2)
     estimated = noise_is_estimated(job)
     field = _field(readings, estimated)
-    sizes = field.sizes
+    amplitudes = field.amplitudes
     levels = node_levels(solid.top_m)
     derivatives = solid.derivatives(levels)
     area = solid.area_m2(levels)
@@ -107,11 +106,11 @@ def scanned_wall(job, fitted, chosen, covariance_m2, dof):
     wider = found.departing[own]
     causes, index = job.points.causes, coordinates_of(chosen)
     moves = [readings.by_points @ cause.column_m[index] for cause in causes]
-    dof = sizes.noise_dof if estimated else dof
+    dof = amplitudes.noise_dof if estimated else dof
 
     def of_points(part):
         weights = found.weights[part]
-        covariance = sizes.noise * weights @ readings.noise_m2 @ weights.T
+        covariance = amplitudes.noise * weights @ readings.noise_m2 @ weights.T
         return survey_factors(covariance, dof, causes, [weights @ one for one in moves])
 
     factors = (*of_points(rows), *_of_the_unseen(field, found, rows))
@@ -170,7 +169,7 @@ def offsets(fit, xyz_m):
 
 def _of_the_unseen(field, found, rows):
     """A `Factor` of each kind of departure that the points did not see all of."""
-    inflation, assumed, factors = field.sizes.inflation(), field.sizes.assumed_share(), []
+    inflation, assumed, factors = field.amplitudes.inflation(), field.amplitudes.assumed_share(), []
     for kind in KINDS:
         chosen = [i for i, one in enumerate(field.places.departures) if one.kind == kind]
         if not chosen:

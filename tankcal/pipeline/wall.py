@@ -8,7 +8,7 @@ import scipy.sparse
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.geometry.field.amplitudes import estimate_amplitudes
 from tankcal.geometry.field.cells import MOST_SITES, cells_of, sites_of_cells
-from tankcal.geometry.field.components import OVALITY_MODES
+from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.outlines import polar
@@ -205,7 +205,8 @@ def _blocks(samples):
 
 def _form_m2(amplitudes):
     """Amplitude of k^-3 that has all departures from a circle: what smooths an outline."""
-    return amplitudes.form_m2 / np.sum(OVALITY_MODES**-3)
+    chosen = [one.shape in ("oval", "seam") for one in COMPONENTS]
+    return float(np.sum(amplitudes.variances_m2[chosen])) / np.sum(OVALITY_MODES**-3)
 
 
 def _radii_by_points(sections, count):

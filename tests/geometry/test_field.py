@@ -17,7 +17,7 @@ from tankcal.geometry.field.components import (
     seam_correlation,
 )
 from tankcal.geometry.field.estimate import LEVELS, WallField, gauss_heights
-from tankcal.geometry.field.likelihood import Likelihood
+from tankcal.geometry.field.evidence import likelihood_of
 from tankcal.geometry.field.sites import Sites
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall import find_wall
@@ -188,7 +188,7 @@ def test_the_slope_of_the_likelihood():
     rng = np.random.default_rng(2)
     sites = sites_of(3, [-0.6, 0.6], 12, rng)
     radius = RADIUS_M + 0.004 * rng.normal(size=len(sites))
-    evidence = Likelihood.of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, True)
+    evidence = likelihood_of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, True)
     at = evidence.middle + rng.normal(0, 0.5, len(evidence.middle))
     slope = evidence.misfit(at)[1]
     assert_derivative(

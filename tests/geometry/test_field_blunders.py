@@ -8,14 +8,15 @@ import scipy.linalg
 from test_field import RADIUS_M, sites_of
 
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
-from tankcal.geometry.field.blunders import _restricted, _tested, find_blunders
+from tankcal.geometry.field.blunders import against_others, find_blunders, restricted_precision
 from tankcal.geometry.field.components import (
     COMPONENTS,
     azimuth_correlations,
     seam_correlation,
 )
 from tankcal.geometry.field.covariances import Covariances
-from tankcal.geometry.field.likelihood import LEAST_NOISE_M, Likelihood
+from tankcal.geometry.field.evidence import likelihood_of
+from tankcal.geometry.field.likelihood import LEAST_NOISE_M
 from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.snooping import find_rings
 
@@ -80,7 +81,7 @@ def test_the_likelihood_is_that_of_the_normal_distribution(mixed):
         places = np.random.default_rng(6).permutation(len(sites))
         sites = replace(sites, azimuth_rad=2 * np.pi * places / len(sites))
     radius = RADIUS_M + 0.004 * np.random.default_rng(2).normal(size=len(sites))
-    evidence = Likelihood.of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, False)
+    evidence = likelihood_of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, False)
     whole = written_out(sites, np.exp(evidence.middle))
     whole += (1e-6 + LEAST_NOISE_M**2) * np.eye(len(sites))
     order = np.concatenate(sites.members)
@@ -94,7 +95,7 @@ def test_a_course_of_three_points_tells_nothing(capfd):
     """Its radius and centre take them all; nothing is said of it on the screen, either."""
     sites = sites_of(2, [0.0], 3)
     radius = RADIUS_M + 0.004 * np.random.default_rng(2).normal(size=len(sites))
-    likelihood = Likelihood.of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, False)
+    likelihood = likelihood_of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, False)
     value, slopes = likelihood.misfit(likelihood.middle)
     assert (value, *slopes) == pytest.approx(np.zeros(1 + len(slopes)), abs=1e-12)
     assert capfd.readouterr() == ("", "")
@@ -109,8 +110,8 @@ def test_a_departure_is_from_the_wall_that_all_others_show():
     design = free_design(sites)[0]
     accepted = np.ones(len(sites), dtype=bool)
     accepted[[3, 4, 40]] = False
-    precision = _restricted(whole.copy(), design)
-    found = _tested(precision, precision @ (radius - RADIUS_M), accepted)
+    precision = restricted_precision(whole.copy(), design)
+    found = against_others(precision, precision @ (radius - RADIUS_M), accepted)
     for one in (0, 3, 4, 17, 40, 80):
         others = accepted.copy()
         others[one] = False
@@ -166,7 +167,7 @@ def test_what_was_set_aside_comes_back_where_it_agrees():
 
 
 @pytest.mark.parametrize("gone", [0, 1, 2])
-def test_a_course_that_was_set_aside_is_tested_too(gone):
+def test_a_course_that_was_set_aside_istested_too(gone):
     """What is left tells the amplitudes; the course's own points agree and come back."""
     rng = np.random.default_rng(8)
     welds = tuple(np.array([place]) for place in (0.5, 1.0, 2.0))

@@ -75,7 +75,7 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted):
         )
         whole = covariances.total(variances)
         whole.flat[:: len(whole) + 1] += noise * variance_m2 + LEAST_NOISE_M**2
-        precision = _restricted(whole, design)
+        precision = restricted_precision(whole, design)
         found = _snoop(precision, precision @ left, accepted)
         changed, accepted = np.mean(found.accepted != accepted), found.accepted
         if changed <= FEW:
@@ -83,7 +83,7 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted):
     return found
 
 
-def _restricted(covariance, design):
+def restricted_precision(covariance, design):
     """P of the module's heading."""
     inverse = invert(covariance)[1]
     by_design = inverse @ design
@@ -92,19 +92,18 @@ def _restricted(covariance, design):
 
 
 def _snoop(precision, pull, accepted):
-    def tested(accepted):
-        return _tested(precision, pull, accepted)
-
     def tests(found):
         return found.accepted, np.abs(found.w), CRITICAL
 
     def again(before, goes, comes):
-        return tested(before.accepted & ~goes | comes)
+        return against_others(precision, pull, before.accepted & ~goes | comes)
 
-    return snoop(tested(accepted), tests, again, at_once=AT_ONCE, returns=1).adjustment
+    start = against_others(precision, pull, accepted)
+    return snoop(start, tests, again, at_once=AT_ONCE, returns=1).adjustment
 
 
-def _tested(precision, pull, accepted):
+def against_others(precision, pull, accepted):
+    """`Tested` with P and P y of the module's heading."""
     aside = np.flatnonzero(~accepted)
     departure, weight = pull.copy(), np.diag(precision).copy()
     if len(aside):

@@ -1,0 +1,137 @@
+"""What the readings of a wall tell of the amplitudes of its components: their likelihood.
+
+Readings y = X beta + sum of components + noise; X the radius of each course, and the centre of each
+ring of points. With N an orthonormal basis of what X leaves free in a course, N'y is one part of
+the likelihood; what is common to all courses are values at the azimuths that the survey has, and at
+the heights of the bulge.
+"""
+
+import numpy as np
+import scipy.linalg
+
+from tankcal.geometry.field.components import (
+    COMPONENTS,
+    azimuth_correlations,
+    mode_shares,
+    weld_columns,
+)
+from tankcal.geometry.field.likelihood import LEAST_NOISE_M, Likelihood, Part, prior_of
+from tankcal.geometry.outlines import FULL_TURN
+
+SMALLEST = 1e-8  # of a variance: what is left of a covariance that is followed is not quite zero
+NEAR_M = 0.02  # along the arc, between azimuths that count as one for the common form
+MOST_FOLLOWED = 80  # values of the common form that are followed through all courses
+
+
+def likelihood_of(sites, radius_m, noise_m2, nominal_m, estimate_noise):
+    """`Likelihood` of radii at sites, as `amplitudes.estimate_amplitudes` takes them."""
+    common = _common_values(sites, nominal_m)
+    parts = tuple(
+        _part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise)
+        for members in sites.members
+    )
+    _, spread, missed = common
+    shared, own = _shown(sites)
+    own = own + missed + [len(COMPONENTS)] * estimate_noise
+    variances = np.diag(noise_m2) if np.ndim(noise_m2) == 2 else noise_m2
+    prior = prior_of(COMPONENTS, variances if estimate_noise else None)
+    return Likelihood(parts, np.array(own), np.array(shared), spread, *prior)
+
+
+def _shown(sites):
+    """Indices of the common components and of those of each course: of welds where any is known."""
+    used = [i for i, one in enumerate(COMPONENTS) if sites.welds_rad or one.shape != "weld"]
+    return [i for i in used if COMPONENTS[i].common], [i for i in used if not COMPONENTS[i].common]
+
+
+def _common_values(sites, nominal_m):
+    """(n, k) derivative of the radii by the values of the common components, (p, k, k) covariances
+    of these, and a list of the components that they miss a part of.
+
+    Values are those at the azimuths that the survey has, or, where these are many, the cosines and
+    sines of the first modes: the rest of the seams is then taken as each course's own. Last come
+    the values of the heights, and the peak of all welds.
+    """
+    common = [(i, COMPONENTS[i]) for i in _shown(sites)[0]]
+    welds = np.zeros((len(sites), 1))
+    for members, there in zip(sites.members, sites.welds_at(nominal_m), strict=True):
+        welds[members, 0] = there.sum(axis=1)
+    values = {
+        row: welds if one.shape == "weld" else one.height_columns(sites.zeta)
+        for row, (_, one) in enumerate(common)
+        if one.shape in ("mean", "weld")
+    }
+    place, azimuths = _gathered(sites.azimuth_rad, NEAR_M / nominal_m)
+    away = np.abs(np.angle(np.exp(1j * (sites.azimuth_rad - azimuths[place])))).max()
+    missed = []
+    if len(azimuths) <= MOST_FOLLOWED and away <= NEAR_M / nominal_m:
+        around = np.eye(len(azimuths))[place]
+        along = azimuth_correlations(azimuths, azimuths, nominal_m)
+    else:
+        modes = np.arange(2.0, MOST_FOLLOWED // 2 + 2)
+        angles = np.outer(sites.azimuth_rad, modes)
+        around = np.hstack([np.cos(angles), np.sin(angles)])
+        along = {
+            shape: np.diag(np.tile(share, 2))
+            for shape, share in mode_shares(modes, nominal_m).items()
+        }
+        missed = [i for i, one in common if one.shape == "seam"]
+    columns = np.hstack([around, *values.values()])
+    spread, used = np.zeros((len(common), columns.shape[1], columns.shape[1])), around.shape[1]
+    for row, (_, one) in enumerate(common):
+        if row in values:
+            width = values[row].shape[1]
+            spread[row, used : used + width, used : used + width] = np.eye(width)
+            used += width
+        else:
+            spread[row, : around.shape[1], : around.shape[1]] = along[one.shape]
+    return columns, spread, missed
+
+
+def _gathered(azimuth_rad, near_rad):
+    """(n,) place of each azimuth among the means of those that follow each other that near."""
+    order = np.argsort(azimuth_rad % FULL_TURN)
+    around = (azimuth_rad % FULL_TURN)[order]
+    gap = np.diff(around, prepend=around[-1] - FULL_TURN)
+    start = int(np.argmax(gap))
+    around = np.roll(around, -start)
+    around[len(around) - start :] += FULL_TURN
+    group = np.cumsum(np.roll(gap, -start) > near_rad) - 1
+    means = np.bincount(group, around) / np.bincount(group)
+    place = np.empty(len(order), dtype=int)
+    place[np.roll(order, -start)] = group
+    return place, means % FULL_TURN
+
+
+def _part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise):
+    columns, spread, missed = common
+    common_ones, own_ones = _shown(sites)
+    azimuth, zeta = sites.azimuth_rad[members], sites.zeta[members]
+    left = scipy.linalg.null_space(sites.free_columns(members).T)
+
+    def seen(covariance):
+        return left.T @ covariance @ left
+
+    if np.ndim(noise_m2) == 2:
+        noise = noise_m2[np.ix_(members, members)]
+    else:
+        noise = np.diag(noise_m2[members])
+    least = LEAST_NOISE_M**2 * np.eye(left.shape[1])
+    there = azimuth_correlations(azimuth, azimuth, nominal_m)
+    welds = weld_columns(azimuth, sites.welds_of(sites.course[members[0]]), nominal_m)
+    there["weld"] = welds @ welds.T
+    own = [
+        seen(there[one.shape] * one.height_covariance(zeta, zeta))
+        for one in (COMPONENTS[i] for i in own_ones)
+    ]
+    for i in missed:
+        followed = columns[members] @ spread[common_ones.index(i)] @ columns[members].T
+        rest = there[COMPONENTS[i].shape] - followed
+        own.append(seen(rest) + SMALLEST * np.eye(left.shape[1]))
+    own += [seen(noise)] * estimate_noise
+    return Part(
+        left.T @ radius_m[members],
+        np.array(own),
+        least + seen(noise) * (not estimate_noise),
+        left.T @ columns[members],
+    )
