@@ -231,6 +231,68 @@ def write_workbook(path, **changes):
     return write_book(path, job_parts(**changes))
 
 
+S_1 = (  # course: height, plate mm, readings at 20 and 80 % of it
+    (1.8, 9.0, 45.3184, 45.3176),
+    (1.8, 8.0, 45.3094, 45.3101),
+    (1.8, 7.0, 45.3042, 45.3036),
+    (1.5, 6.0, 45.2981, 45.2989),
+    (1.5, 6.0, 45.2963, 45.2957),
+)
+TAPE = {
+    "kind": "tape",
+    "certificate": "T 12/2026",
+    "certified_temperature_c": 20.0,
+    "tension_n": 50.0,
+    "expansion_per_k": 1.15e-5,
+    "correction": 35e-6,
+    "u_scale_ppm": 20.0,
+    "thickness_mm": 0.2,
+    "section_mm2": 2.5,
+    "e_gpa": 206.0,
+}
+
+
+def strapped_parts(**settings):
+    """Parts of tank S-1, strapped at two levels of each course; settings with dots for "__"."""
+    heights = [row[0] for row in S_1]
+    given = {
+        **SETTINGS,
+        "tank.id": "S-1",
+        "tank.nominal_diameter_m": 14.4,
+        "tank.nominal_height_m": 8.4,
+        "survey.side": "outside",
+        "survey.shell_temperature_c": 31.0,
+        "table.reference_temperature_c": 20.0,
+        "material.e_gpa": 206.0,
+        "material.expansion_per_k": 1.1e-5,
+        "shell.shape_sd_mm": 0.0,
+    } | {key.replace("__", "."): value for key, value in settings.items()}
+    bottoms = np.concatenate([[0.0], np.cumsum(heights)])
+    straps = [["circumference", "course", "level_m", "reading_m", "s_mm", "tension_n"]]
+    for number, (height, _, *readings) in enumerate(S_1, 1):
+        for letter, part, reading in zip("ab", (0.2, 0.8), readings, strict=True):
+            level = round(float(bottoms[number - 1]) + part * height, 6)
+            straps.append([f"{number}{letter}", str(number), level, reading, 0.5, 60.0])
+    obstructions = [
+        ["circumference", "kind", "count", "thickness_mm", "width_mm", "excess_mm"],
+        ["1a", "butt_strap", 4.0, 9.0, 120.0, None],
+        ["1b", "butt_strap", 4.0, 9.0, 120.0, None],
+        ["2b", "measured", None, None, None, 2.3],
+    ]
+    tables = {
+        "courses": _courses(heights, [row[1] for row in S_1], 0.25),
+        "circumferences": straps,
+        "obstructions": obstructions,
+    }
+    given = {key: value for key, value in given.items() if value is not None}
+    return Parts(given, tables, registers={"instruments": {"T-12": dict(TAPE)}})
+
+
+def write_strapped_job(folder, **settings):
+    """Write tank S-1 as a job folder; returns its path."""
+    return write_folder(folder, strapped_parts(**settings))
+
+
 def write_folder(folder, parts):
     """Write Parts as a job folder, in the separator and decimal mark of its [csv] settings."""
     folder = Path(folder)

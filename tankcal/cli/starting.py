@@ -33,8 +33,9 @@ def add(commands):
     )
     new.add_argument(
         "--survey",
-        choices=("photos", "total-station"),
-        help="with files for photographs or total-station readings, in place of surveyed points",
+        choices=("photos", "total-station", "strapping"),
+        help="with files for photographs, total-station readings or circumferences by tape, in "
+        "place of surveyed points",
     )
     new.set_defaults(command=_new)
 

@@ -31,6 +31,7 @@ from tankcal.job.model import (
     TableSpec,
     Tank,
 )
+from tankcal.job.strapping import gauged
 from tankcal.job.tables import fingerprint, read_bytes
 from tankcal.messages import message
 from tankcal.tank.rules.model import Rule
@@ -148,10 +149,11 @@ def _input(name, u, unit, **more):
     return DeclaredInput(name, float(u / INPUTS[name].per_si), unit, float(u), **more)
 
 
-def make_job(raw, values, tables, attached, measurements, warnings):
+def make_job(raw, values, tables, attached, measurements, warnings, strapping=None):
     """The Job of values and tables without problems.
 
     attached  attached.Attached        measurements  Measurements or None
+    strapping  Strapping or None
     """
     kind = values["tank"]["kind"]
     points = _points(tables["points"], attached.covariance_m2)
@@ -173,6 +175,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         circumference_m=values["checks"]["circumference_m"],
         diameter_is=values["checks"]["diameter_is"],
         mesh=_mesh(values["mesh"], attached.mesh[1]) if kind == "mesh" else None,
+        strapping=strapping,
     )
 
 
@@ -185,7 +188,7 @@ def make_frame(raw, values, tables, measurements, warnings, has_points=True):
         datum=_datum(values["datum"], kind, has_points),
         table=_table(values["table"]),
         material=_material(values["material"]),
-        courses=_courses(tables["courses"], tables["welds"]) if kind == "vertical" else (),
+        courses=_courses(tables) if kind == "vertical" else (),
         points=None,
         certificate=_given(values["certificate"]),
         snooping=adjustment["snooping"] is not False,
@@ -245,7 +248,8 @@ def _material(values):
     return Material(**si, expansion_given="expansion_per_k" in given)
 
 
-def _courses(table, welds):
+def _courses(tables):
+    table, welds, read = tables["courses"], tables["welds"], gauged(tables["thickness"])
     if table is None:
         return ()
     azimuths = {}
@@ -257,12 +261,18 @@ def _courses(table, welds):
         Course(
             name,
             height_m,
-            thickness_mm / 1000,
-            (paint_mm or 0.0) / 1000,
+            *_plate(thickness_mm / 1000, (paint_mm or 0.0) / 1000, read.get(name)),
             tuple(sorted(azimuths[name])) if name in azimuths else None,
         )
         for name, height_m, thickness_mm, paint_mm in zip(*columns, strict=True)
     )
+
+
+def _plate(thickness_m, paint_m, read):
+    """Plate and paint of a course; the means of a gauge's readings (`gauged`) replace them."""
+    if read is None:
+        return thickness_m, paint_m
+    return read[0], paint_m if read[2] is None else read[2]
 
 
 def _points(table, covariance):

@@ -63,6 +63,14 @@ def missing_beside(other):
     return message("missing_beside", "missing; expected together with {other}", other=other)
 
 
+def temperature_missing():
+    """What is said of a tape that expands from a temperature that nobody gives."""
+    return message(
+        "certified_temperature_missing",
+        "missing, but expansion_per_k is given; expected the temperature of the certificate",
+    )
+
+
 def same_parameter(other):
     """What is said of a key that stands beside another name of the same parameter."""
     return message(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
 from tankcal.job.checks import check_all
-from tankcal.job.checks.extent import has_survey
+from tankcal.job.checks.extent import has_survey, is_strapped
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.covariance import read_covariance
 from tankcal.job.entries import kind_of, read_columns, read_register, read_settings
@@ -14,10 +14,12 @@ from tankcal.job.measuring import make_measurements
 from tankcal.job.model import Job
 from tankcal.job.rule_files import find_rule
 from tankcal.job.sheets import missing_sheet, read_workbook
+from tankcal.job.strapping import make_strapping
 from tankcal.job.tables import (
     COVARIANCE_FILE,
     REGISTERS,
     SETTINGS_FILE,
+    STRAPPING_TABLES,
     SURVEY_TABLES,
     TABLES,
     TANK_TABLES,
@@ -77,7 +79,8 @@ def load(path: str | PathLike, only: str | None = None) -> Job:
         measurements = make_measurements(values, tables, registers)
     if not is_whole:
         return make_frame(raw, values, tables, measurements, tuple(log.warnings))
-    return make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
+    strapping = make_strapping(values, tables, registers)
+    return make_job(raw, values, tables, attached, measurements, tuple(log.warnings), strapping)
 
 
 def _read(path, log):
@@ -117,6 +120,8 @@ def _read_tables(raw, is_whole, log):
     allowed = None if kind is None else TABLES_OF_KIND[kind]
     if kind is not None and "points" in allowed:
         allowed += SURVEY_TABLES
+    if kind == "vertical":
+        allowed += STRAPPING_TABLES
     tables = {}
     for name in TABLES:
         table = raw.tables.get(name)
@@ -144,7 +149,16 @@ def _read_tables(raw, is_whole, log):
 
 def _tell_missing_tables(raw, tables, kind, log):
     for name in REQUIRED_TABLES.get(kind, ()):
-        if name not in raw.tables and not (name == "points" and has_survey(tables)):
+        elsewhere = name == "points" and (has_survey(tables) or is_strapped(tables))
+        if name in raw.tables or elsewhere:
+            continue
+        if name == "points" and raw.tables.get("circumferences") is not None:
+            expected = message(
+                "no_circumferences",
+                "no rows; expected a reading of the tape on each course at least",
+            )
+            log.problem(raw.tables["circumferences"].file, expected)
+        else:
             log.problem(raw.file_of(name), _missing(raw, name))
 
 

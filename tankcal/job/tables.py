@@ -23,7 +23,8 @@ SURVEY_TABLES = (
     *("horizontal_angles", "vertical_angles", "height_differences", "plumb_lines"),
     *("vectors", "correlated_readings"),
 )
-TABLES = TANK_TABLES + SURVEY_TABLES
+STRAPPING_TABLES = ("circumferences", "obstructions", "thickness", "tape_checks")
+TABLES = TANK_TABLES + STRAPPING_TABLES + SURVEY_TABLES
 REGISTERS = {"cameras": "camera", "instruments": "instrument"}  # and what each one lists
 SETTINGS_FILE = "job.toml"
 REFUSED_FILE = "image_points_refused.csv"  # written beside image_points.csv, never read

@@ -27,6 +27,7 @@ from tankcal.pipeline.statements import (
     statements,
     verdict_of,
 )
+from tankcal.pipeline.strapped_wall import StrappedWall, find_strapped_wall
 from tankcal.pipeline.survey_warnings import (
     incomplete_certificate,
     open_questions,
@@ -71,6 +72,8 @@ class Result:
         The surveyed wall of a vertical tank; None for other kinds.
     scan : scan.Scan or None
         What points say of a lying cylinder or a sphere.
+    strapped : strapped_wall.StrappedWall or None
+        The wall of a vertical tank that a tape was put round.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -122,6 +125,7 @@ class Result:
     rule: RuleVerdict | None
     warnings: tuple[Problem, ...]
     adjustment: Adjustment | None = None
+    strapped: StrappedWall | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -182,9 +186,8 @@ class Result:
     @property
     def gross(self) -> ShellVolume | None:
         """The shell as surveyed, without any correction (`volumes.ShellVolume`); else None."""
-        if self.wall is None:
-            return None
-        return shell_volume(self.wall)
+        wall = self.wall or self.strapped
+        return None if wall is None else shell_volume(wall)
 
     @property
     def capacity(self) -> pd.DataFrame:
@@ -342,7 +345,7 @@ def _run(job, progress, part_progress, simulated):
         zero_m=zero,
         table=table,
         straightness=made.straightness,
-        proportional_parts=() if wall is None else _parts(job.table, made, intervals.U_m3),
+        proportional_parts=_parts(job, made, intervals.U_m3),
         corrections=corrections_of(job, survey, made.over_m),
         by_density=_by_density(job, survey, made.levels_m, zero),
         stated=stated,
@@ -351,6 +354,7 @@ def _run(job, progress, part_progress, simulated):
         rule=verdict_of(job, body, table, intervals, simulation),
         warnings=_warnings(job, adjustment, survey, made),
         adjustment=adjustment,
+        strapped=survey if isinstance(survey, StrappedWall) else None,
     )
 
 
@@ -451,6 +455,8 @@ def _adjusted(job, progress):
 
 def _survey(job, progress, dof):
     """What was surveyed: a wall of courses, a mesh, the scan of another wall; None: sizes alone."""
+    if job.strapping is not None:
+        return find_strapped_wall(job, progress)
     if job.tank.kind == "vertical":
         return find_wall(job, progress, dof)
     if job.mesh is not None:
@@ -466,9 +472,11 @@ def _survey(job, progress, dof):
     return None
 
 
-def _parts(spec, made, U_m3):
+def _parts(job, made, U_m3):
     """Proportional parts of a centimetre table where their error is a small part of U."""
-    if spec.step_m is None or abs(spec.step_m - PARTS * MILLIMETRE) > 1e-9:
+    spec = job.table
+    is_centimetres = spec.step_m is not None and abs(spec.step_m - PARTS * MILLIMETRE) <= 1e-9
+    if job.tank.kind != "vertical" or not is_centimetres:
         return ()
     edges = np.unique(np.round([0.0, *made.breakpoints_m, made.top_m], 3))
     allowed = np.maximum(PARTS_OF_U * np.minimum(U_m3, VAST_M3), PARTS_M3)

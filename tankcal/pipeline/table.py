@@ -10,6 +10,8 @@ import numpy as np
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
 from tankcal.pipeline.scan import Scan
+from tankcal.pipeline.strapped_wall import StrappedWall
+from tankcal.pipeline.strapping_checks import check_strapped
 from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
 from tankcal.pipeline.wall import Wall, warnings_of
@@ -140,6 +142,8 @@ def check_table(job, survey, made):
 def _doubts_of_survey(job, survey, top_m):
     if isinstance(survey, Wall):
         return (*warnings_of(job, survey), *check_wall(job, survey))
+    if isinstance(survey, StrappedWall):
+        return check_strapped(job, survey)
     if isinstance(survey, Scan):
         return check_scan(job, survey, top_m)
     return () if survey is None else check_mesh(job, top_m)

@@ -33,6 +33,7 @@ from tankcal.sections import (
     group_by_name,
     sample_of,
 )
+from tankcal.tank.body import survey_factors
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,25 @@ class Wall:
     field: WallField
     radii_by_points: scipy.sparse.csr_array
     sections: tuple[Section, ...]
+    without_inputs = ()  # that have no meaning for points
+
+    def lowest_outline(self, azimuth_rad):
+        """(x, y) of the axis at the bottom, and (n,) radii of the lowest section, m."""
+        outline, height = self.sections[0].outline, self.sections[0].group.height_m
+        x, y = np.array([outline.x_m, outline.y_m]) - height * np.array(self.shell.slope)
+        return x, y, outline.radius_m(azimuth_rad)
+
+    def factors(self, job, weights):
+        """`Factor`s of what the points leave uncertain about features, (f, m) by the readings."""
+        jacobian = weights @ self.radii_by_points
+        covariance = jacobian @ (self.covariance_m2 @ jacobian.T)
+        causes, index = job.points.causes, coordinates_of(self.accepted)
+        effects = [jacobian @ cause.column_m[index] for cause in causes]
+        return survey_factors(covariance, self.noise_dof, causes, effects)
+
+    def read_with(self, weights):
+        """{input: (f,) derivative of features}: none bears on the coordinates of points."""
+        return {}
 
 
 def find_wall(job, progress, dof=np.inf, amplitudes=None):

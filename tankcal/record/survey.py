@@ -279,34 +279,25 @@ def _area_sd(result, section):
 
 def courses_of(result):
     """The `CourseOfShell` of each course."""
-    if result.wall is None:
-        return []
     job, rows = result.job, []
-    rejected = np.flatnonzero(np.isin(result.wall.shell.reason, ("consensus", "snooping")))
-    bottom = job.datum.bottom_z_m
+    if job.tank.kind != "vertical":
+        return []
+    measured = _of_sections if result.strapped is None else _of_straps
     for index, (course, shape) in enumerate(
         zip(job.courses, result.body.shell.volume.courses, strict=True)
     ):
-        own = [section for section in result.wall.sections if section.group.course == index]
         is_last = index == len(job.courses) - 1
         top_m = result.zero_m + result.table.height_m[-1] if is_last else shape.top_m
         height = top_m - shape.bottom_m
         volume, u = _partial(result, shape.bottom_m, top_m)
-        in_course = [
-            bottom + shape.bottom_m <= job.points.xyz_m[i, 2] < bottom + shape.top_m
-            for i in rejected
-        ]
         rows.append(
             filled_from(
                 CourseOfShell,
                 course,
                 bottom_m=shape.bottom_m,
                 top_m=top_m,
-                sections=[section.group.name for section in own],
-                points=sum(len(section.group.members) for section in own),
-                rejected=sum(in_course),
-                radius_m=np.mean([section.circle.radius_m for section in own]),
-                radius_sd_m=_radius_sd(result, shape),
+                **measured(result, index, shape),
+                radius_sd_m=radius_sd(result, shape),
                 inside_radius_m=np.sqrt(volume / height / np.pi),
                 area_m2=volume / height,
                 area_sd_m2=u / height,
@@ -317,7 +308,36 @@ def courses_of(result):
     return rows
 
 
-def _radius_sd(result, shape):
+def _of_sections(result, index, shape):
+    """What the sections of a course give."""
+    job, bottom = result.job, result.job.datum.bottom_z_m
+    own = [section for section in result.wall.sections if section.group.course == index]
+    rejected = np.flatnonzero(np.isin(result.wall.shell.reason, ("consensus", "snooping")))
+    in_course = [
+        bottom + shape.bottom_m <= job.points.xyz_m[i, 2] < bottom + shape.top_m for i in rejected
+    ]
+    return {
+        "sections": [section.group.name for section in own],
+        "points": sum(len(section.group.members) for section in own),
+        "rejected": sum(in_course),
+        "radius_m": np.mean([section.circle.radius_m for section in own]),
+    }
+
+
+def _of_straps(result, index, shape):
+    """What the straps of a course give: circumferences in place of sections and points."""
+    wall, name = result.strapped, result.job.courses[index].name
+    own = [wall.reduced[i].strap.name for i in wall.adjusted
+           if wall.reduced[i].strap.course == name]  # fmt: skip
+    return {
+        "sections": list(dict.fromkeys(own)),
+        "points": len(own),
+        "rejected": 0,
+        "radius_m": wall.radius_m[index],
+    }
+
+
+def radius_sd(result, shape):
     """Of the mean radius of a course, from points and form: their part of sd(V) / (2 pi r h)."""
     sources = result.body.shell.sources([shape.bottom_m, shape.top_m])
     variance = sum(np.sum(np.diff(source.columns_m3, axis=0) ** 2) for source in sources)

@@ -127,7 +127,7 @@ def zero_of(result):
     """What heights of the table count from, as a code."""
     if result.job.datum.dip_plate_z_m is not None:
         return "dip_plate"
-    return "bottom" if result.wall is not None else f"{result.job.tank.kind}_bottom"
+    return "bottom" if result.job.tank.kind == "vertical" else f"{result.job.tank.kind}_bottom"
 
 
 def gross_of(result):
@@ -148,6 +148,7 @@ def choices_of(result):
     values = {
         "zero": zero_of(result),
         **(_shell_choices(job, result) if result.wall is not None else {}),
+        **(_strapped_choices(job) if result.strapped is not None else {}),
         **({"form": "learned"} if result.scan is not None and job.horizontal is not None else {}),
         "thickness": _thickness_choice(job),
         "temperature": _temperature_choice(job),
@@ -206,6 +207,21 @@ def _shell_choices(job, result):
         "snooping": CRITICAL if job.snooping else "off",
         "form": "learned",
         "covariance_sd_mm": 1000 * np.sqrt(np.median(wall.covariance_m2.diagonal())),
+    }
+
+
+def _strapped_choices(job):
+    """What was assumed about a shell that a tape was put round."""
+    roof = job.roof and job.roof.weighing
+    return {
+        "bottom": job.bottom.form if job.switches.bottom else "off",
+        "survey": "strapping",
+        "area_term": "none" if job.strapping.shape_sd_m == 0 else 1000 * job.strapping.shape_sd_m,
+        "between_sections": "cylinders",
+        "tilt": "not_measured",
+        "course_heights": "along_axis",
+        "roof": _fitting_choice(job.switches.roof, roof, roof),
+        "form": "learned",
     }
 
 
@@ -269,7 +285,7 @@ def bottom_of(result):
     """How the bottom was taken, and what it adds; None where it is flat or there is none."""
     job = result.job
     bottom = job.bottom
-    if result.wall is None or bottom.form == "flat" or not job.switches.bottom:
+    if job.tank.kind != "vertical" or bottom.form == "flat" or not job.switches.bottom:
         return None
     depth = None if bottom.centre_z_m is None else job.datum.bottom_z_m - bottom.centre_z_m
     surveyed = None if bottom.xyz_m is None else len(bottom.xyz_m)

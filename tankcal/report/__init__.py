@@ -10,7 +10,7 @@ FILES = (
     *("report.pdf", "report.html"),
 )
 LETTERHEAD = "letterhead.json"  # there when a letterhead was given
-_SINCE_UNCERTAINTY = ("budgets", "deliveries", "rule", "monte_carlo")
+_NOT_IN_ALL = ("budgets", "deliveries", "rule", "monte_carlo", "strapping")
 _PARTS = (
     ("certificate.pdf", "certificate"),
     ("working-papers.pdf", "working-papers"),
@@ -78,7 +78,7 @@ def missing(record):
     -------
     list of str
     """
-    known = dict.fromkeys(_SINCE_UNCERTAINTY) | record
+    known = dict.fromkeys(_NOT_IN_ALL) | record
     return [part for part, value in known.items() if not value]
 
 

@@ -82,16 +82,22 @@ def calibration(paper):
 
 
 def _instruments(paper):
-    """The instruments of the adjusted survey with their certificates, or None."""
-    adjustment = paper.record["adjustment"]
+    """The instruments of an adjusted survey, or tapes, with their certificates, or None."""
+    adjustment, strapping = paper.record["adjustment"], paper.record.get("strapping")
+    used = {}
+    for one in adjustment["instruments"] if adjustment else ():
+        used[one["instrument"]] = one["details"].get("certificate")
+    for one in strapping["tapes"] if strapping else ():
+        used[one["tape"]] = one["certificate"]
+        if one["master"]:
+            used[one["master"]] = one["master_certificate"]
     return "; ".join(
         paper.word(
             "certificate.instrument",
-            name=one["instrument"],
-            certificate=one["details"].get("certificate")
-            or paper.word("certificate.no_certificate"),
+            name=name,
+            certificate=certificate or paper.word("certificate.no_certificate"),
         )
-        for one in (adjustment["instruments"] if adjustment else ())
+        for name, certificate in used.items()
     )
 
 

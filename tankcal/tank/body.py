@@ -114,6 +114,11 @@ class ShellPart(Part):
         used.
     tilt : float
         Of the axis, m/m.
+    read_with : dict
+        {input: (f,) derivative of the shell's features by it}, of inputs that the readings of the
+        survey depend on: the temperature of a tape that has that of the shell.
+    unused : tuple of str
+        Names of inputs that have no meaning for the survey.
     """
 
     volume: ShellVolume
@@ -123,6 +128,8 @@ class ShellPart(Part):
     stretch: float = 1.0
     bearing: tuple[str, ...] = ()
     tilt: float = 0.0
+    read_with: dict = field(default_factory=dict)
+    unused: tuple[str, ...] = ()
 
     @property
     def breakpoints_m(self):
@@ -158,7 +165,10 @@ class ShellPart(Part):
             "shell_temperature": -self.expansion_per_k * by_length,
             "expansion": (self.scale - 1) / self.expansion_per_k * by_length,
         }
-        return {
+        for name, column in self.read_with.items():
+            by_readings = self.volume.integrated(wet, column[:, None])[:, 0]
+            of_corrections[name] = of_corrections.get(name, 0.0) + by_readings
+        found = {
             "scale": by_scale,
             "datum": area,
             "offset": loss,
@@ -167,6 +177,7 @@ class ShellPart(Part):
             "tilt": volume * self.tilt / (1 + self.tilt**2),
             **{name: of_corrections[name] for name in self.bearing},
         }
+        return {name: one for name, one in found.items() if name not in self.unused}
 
     def sources(self, levels_m):
         """What the survey itself leaves uncertain: the points, and the form between them."""

@@ -169,7 +169,10 @@ def _notes(words):
 _DECLARED = ("head",)  # choices whose number the job gave: it is not rounded
 
 
-NAMED_INPUTS = ("deadwood", "instrument_scale", "instrument_offset")
+NAMED_INPUTS = (
+    *("deadwood", "instrument_scale", "instrument_offset", "plate_readings"),
+    *("tape_comparison", "tape_temperature", "tape_tension", "tape_friction"),
+)
 
 
 def input_name(words, row):

@@ -67,7 +67,10 @@ def assert_written(starter, kind):
     assert f'\nkind = "{kind}"' in text
     settings = tomllib.loads(text)
     for section, fields in KEYS.items():
-        suiting = [field for field in fields if field.suits(kind) and not field.of_survey]
+        strapped = section in ("shell", "strapping")  # of a form for strapping alone
+        suiting = [
+            field for field in fields if field.suits(kind) and not field.of_survey and not strapped
+        ]
         assert list(settings.get(section, {})) == [field.name for field in suiting]
         assert all(field.note in text for field in suiting)
     for table in TABLES_OF_KIND[kind]:
@@ -96,10 +99,14 @@ def test_a_starter_for_a_survey(tmp_path, survey):
     names += [f"{register}.toml" for register in registers]
     assert sorted(path.name for path in starter.iterdir()) == sorted(names)
     settings = tomllib.loads((starter / "job.toml").read_text(encoding="utf-8"))
-    assert {"datum", "datum_points", "refraction"} <= settings["adjustment"].keys()
-    has_photos = survey == "photos"
-    assert ("camera" in settings["adjustment"]) == has_photos
-    assert ("fixed_photo" in settings["adjustment"]) == has_photos
+    if survey == "strapping":
+        assert "adjustment" not in settings
+        assert settings["shell"] == {"shape_sd_mm": ""}
+    else:
+        assert {"datum", "datum_points", "refraction"} <= settings["adjustment"].keys()
+        has_photos = survey == "photos"
+        assert ("camera" in settings["adjustment"]) == has_photos
+        assert ("fixed_photo" in settings["adjustment"]) == has_photos
     for register in registers:
         text = (starter / f"{register}.toml").read_text(encoding="utf-8")
         fields = [field.name.partition(".")[0] for field in REGISTER_KEYS[register]]
@@ -116,14 +123,15 @@ def test_a_starter_for_a_survey(tmp_path, survey):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["", "job.xlsx"])
 @pytest.mark.parametrize("survey", SURVEYS)
-def test_empty_survey_is_reported_as_missing_points(tmp_path, survey, name):
+def test_empty_survey_is_reported_as_missing(tmp_path, survey, name):
     write_starter(tmp_path / "starter", survey=survey)
     with pytest.raises(InputError) as caught:
         load(tmp_path / "starter" / name)
     told = [problem for problem in caught.value.problems if problem.column not in BLANKS]
-    assert sorted(problem.file.split()[-1] for problem in told) == sorted(
-        ["points.csv", "courses.csv"] if name == "" else ["points", "courses"]
-    )
+    expected = ["courses", "circumferences" if survey == "strapping" else "points"]
+    suffix = ".csv" if name == "" else ""
+    found = sorted(problem.file.split()[-1] for problem in told)
+    assert found == sorted(table + suffix for table in expected)
 
 
 @pytest.mark.slow
@@ -277,7 +285,7 @@ def test_a_new_column_gets_a_row_and_an_old_one_loses_it(monkeypatch):
     monkeypatch.setitem(COLUMNS, "courses", fields)
     text = filled_page(DOCS.read_text(encoding="utf-8"))
     assert "\n| **`ladder_m`** | width of the ladder | 0 to 2 |\n| **`height_m`** |" in text
-    assert "`paint_mm`" not in text
+    assert "`paint_mm` | paint thickness" not in text
     assert filled_page(text) == text
 
 

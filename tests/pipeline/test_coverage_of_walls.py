@@ -45,7 +45,11 @@ def found_of(rng, family, rings, folder):
         layout=str(rng.choice(["even", "even", "free", "gap"])),
     )
     job = job_of(wall, measured, folder, given=bool(rng.random() < 0.6))
-    body = body_of(job, find_wall(job, lambda text: None))
+    return judged(wall, body_of(job, find_wall(job, lambda text: None)), family, rings)
+
+
+def judged(wall, body, family, rings):
+    """`Found` of a body that was made of a survey of a wall."""
     low = np.linspace(0, wall.height_m - DELIVERED_M, DELIVERIES)
     rows = np.linspace(0, wall.height_m, ROWS + 1)[1:]
     heights = np.concatenate([rows, low, low + DELIVERED_M])
@@ -60,7 +64,7 @@ def found_of(rng, family, rings, folder):
     return Found(family, rings, (table.volume_m3 - truth) / total, table.U_m3 / total)
 
 
-def study(walls, folder, figure, rings=(1, 2, 3)):
+def study(walls, folder, figure, rings=(1, 2, 3), found_of=found_of):
     """Held shares over all, of totals by class, and how wide U is."""
     rng = np.random.default_rng(2026)
     found = [

@@ -138,9 +138,9 @@ def seam_correlation(difference_rad, radius_m, length_m=SEAM_LENGTH_M):
 
 
 def weld_columns(azimuth_rad, welds_rad, radius_m):
-    """(n, w) a seam of WELD_LENGTH_M at each weld, of peak one: c(a - weld)."""
+    """(n, w) a seam of WELD_LENGTH_M at each weld, of peak one: c(a - weld); 0 of a whole turn."""
     away = np.subtract.outer(azimuth_rad, welds_rad)
-    return seam_correlation(away, radius_m, WELD_LENGTH_M)
+    return np.nan_to_num(seam_correlation(away, radius_m, WELD_LENGTH_M))
 
 
 def mode_shares(modes, radius_m):
@@ -171,10 +171,13 @@ def _all_modes(x, b):
 
 
 def azimuth_correlations(azimuth_rad, other_rad, radius_m):
-    """{"mean", "oval", "seam": (n, m) c} between azimuths (n,) and (m,)."""
+    """{"mean", "oval", "seam": (n, m) c} between azimuths (n,) and (m,); nan: a whole turn.
+
+    The mean of a whole turn has none of the waves around it.
+    """
     difference = np.subtract.outer(azimuth_rad, other_rad)
     return {
         "mean": np.ones(difference.shape),
-        "oval": oval_columns(azimuth_rad) @ oval_columns(other_rad).T,
-        "seam": seam_correlation(difference, radius_m),
+        "oval": np.nan_to_num(oval_columns(azimuth_rad)) @ np.nan_to_num(oval_columns(other_rad)).T,
+        "seam": np.nan_to_num(seam_correlation(difference, radius_m)),
     }

@@ -52,6 +52,9 @@ class WallField:
     amplitudes : Amplitudes
     nominal_m : float
         Radius of the tank, m.
+    cylinders : bool
+        Whether each course is stated as a cylinder of its mean radius, as standards of strapping
+        do: what a course does between its readings is in the doubt alone.
     """
 
     sites: Sites
@@ -59,6 +62,7 @@ class WallField:
     noise_m2: np.ndarray
     amplitudes: Amplitudes
     nominal_m: float
+    cylinders: bool = False
 
     @property
     def grid_rad(self):
@@ -76,6 +80,8 @@ class WallField:
         zeta = np.asarray(zeta, dtype=float)
         found = np.empty((len(self._members), len(zeta), len(self.grid_rad)))
         found[:] = self._mean_m[:, None, None] + self._circles[:, None]
+        if self.cylinders:
+            return found
         for shape in self._to_grid:
             found += self._drawn(shape, zeta, slice(None), common=True)
             for course, members in enumerate(self._members):
@@ -192,6 +198,10 @@ class WallField:
         turn = np.stack([np.sin(self.grid_rad), np.cos(self.grid_rad)])
         found = []
         for start, members in zip(radii, self._members, strict=True):
+            members = members[np.isfinite(self.sites.azimuth_rad[members])]
+            if not len(members):
+                found.append(np.full(len(self.grid_rad), free[start]))
+                continue
             _, leaning = np.unique(self.sites.ring[members], return_index=True)
             widths = np.where(self.sites.leans[members][leaning], 4, 2)
             at = start + 1 + np.cumsum([0, *widths[:-1]])
@@ -220,6 +230,7 @@ class Functionals:
         }
         self._along["mean"] = self._totals[:, :, None] * np.ones(len(field.sites))
         across = sum(self._across(index) for index in range(len(COMPONENTS)))
+        across = across * (not field.cylinders)
         columns, radii = field._columns
         free = np.zeros((len(across), columns.shape[1]))
         courses = np.repeat(np.arange(len(radii)), LEVELS)

@@ -61,16 +61,19 @@ def _common_values(sites, nominal_m):
         for row, (_, one) in enumerate(common)
         if one.shape in ("mean", "weld")
     }
-    place, azimuths = _gathered(sites.azimuth_rad, NEAR_M / nominal_m)
-    away = np.abs(np.angle(np.exp(1j * (sites.azimuth_rad - azimuths[place])))).max()
+    there = np.isfinite(sites.azimuth_rad)
+    place, azimuths = _gathered(sites.azimuth_rad[there], NEAR_M / nominal_m)
+    apart = np.angle(np.exp(1j * (sites.azimuth_rad[there] - azimuths[place])))
+    away = np.abs(apart).max(initial=0.0)
     missed = []
     if len(azimuths) <= MOST_FOLLOWED and away <= NEAR_M / nominal_m:
-        around = np.eye(len(azimuths))[place]
+        around = np.zeros((len(sites), len(azimuths)))
+        around[there, place] = 1.0
         along = azimuth_correlations(azimuths, azimuths, nominal_m)
     else:
         modes = np.arange(2.0, MOST_FOLLOWED // 2 + 2)
         angles = np.outer(sites.azimuth_rad, modes)
-        around = np.hstack([np.cos(angles), np.sin(angles)])
+        around = np.nan_to_num(np.hstack([np.cos(angles), np.sin(angles)]))
         along = {
             shape: np.diag(np.tile(share, 2))
             for shape, share in mode_shares(modes, nominal_m).items()
@@ -90,6 +93,8 @@ def _common_values(sites, nominal_m):
 
 def _gathered(azimuth_rad, near_rad):
     """(n,) place of each azimuth among the means of those that follow each other that near."""
+    if not len(azimuth_rad):
+        return np.zeros(0, dtype=int), np.zeros(0)
     order = np.argsort(azimuth_rad % FULL_TURN)
     around = (azimuth_rad % FULL_TURN)[order]
     gap = np.diff(around, prepend=around[-1] - FULL_TURN)

@@ -23,6 +23,7 @@ class Sites:
     zeta : ndarray, shape (n,)
         Height within the course, -1 at its bottom to +1 at its top.
     azimuth_rad : ndarray, shape (n,)
+        nan: the mean of a whole turn, as a tape measures it; it has no ring.
     leans : ndarray of bool, shape (n,)
         Whether the ring is not level, and its centre moves with the height.
     welds_rad : tuple of ndarray
@@ -73,9 +74,9 @@ class Sites:
         Its radius first, then x and y of the centre of each ring, and of its lean.
         """
         azimuth, ring = self.azimuth_rad[members], self.ring[members]
-        turn = np.column_stack([np.sin(azimuth), np.cos(azimuth)])
+        turn = np.nan_to_num(np.column_stack([np.sin(azimuth), np.cos(azimuth)]))
         columns = [np.ones((len(members), 1))]
-        for one in np.unique(ring):
+        for one in np.unique(ring[np.isfinite(azimuth)]):
             there = turn * (ring == one)[:, None]
             columns.append(there)
             if np.any(self.leans[members] & (ring == one)):

@@ -6,10 +6,17 @@ missing or bad stays silent: what is wrong with them has been told already.
 
 from tankcal.job.checking import has_rows
 from tankcal.job.checks.bearing import useless_inputs
-from tankcal.job.checks.extent import Extent, extent_of, has_survey, has_wall_points
+from tankcal.job.checks.extent import (
+    Extent,
+    extent_of,
+    has_survey,
+    has_wall_points,
+    is_strapped,
+)
 from tankcal.job.checks.geometry import check_cylinder, check_scan
 from tankcal.job.checks.plausible import check_plausible
 from tankcal.job.checks.settings import check_settings, check_steps
+from tankcal.job.checks.strapping import check_strapping
 from tankcal.job.checks.survey import check_survey
 from tankcal.job.contract.bottom import check_bottom
 from tankcal.job.contract.correlations import check_correlations
@@ -36,6 +43,8 @@ def check_all(values, tables, registers, raw, is_whole, log):
     """
     if is_whole:
         check_tank(values, tables, raw, log)
+        if kind_of(raw) == "vertical":
+            check_strapping(values, tables, registers, raw, log)
     check_survey(values, tables, registers, raw, is_whole, log)
 
 
@@ -48,7 +57,8 @@ def check_tank(values, tables, raw, log):
         check_steps(values["table"], extent, raw, log)
         check_settings(values, tables, extent, kind, raw, log)
         check_plausible(values, tables, extent, kind, raw, log)
-    needs_points = kind == "vertical" and not has_survey(tables)
+    elsewhere = has_survey(tables) or is_strapped(tables)
+    needs_points = kind == "vertical" and not elsewhere
     if points is not None and (needs_points or has_rows(points)):
         check_points(points, log)
     if values is not None:

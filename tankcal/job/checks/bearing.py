@@ -1,6 +1,6 @@
 """Which inputs of uncertainty.csv have an effect on a job, and why the others have none."""
 
-from tankcal.job.checks.extent import has_wall_points
+from tankcal.job.checks.extent import has_wall_points, is_strapped
 from tankcal.job.contract import INPUTS
 from tankcal.job.contract.bottom import bottom_form
 from tankcal.messages import message
@@ -72,7 +72,11 @@ def _of_vertical(values, tables):
         "no_survey_liquid", "expected only with survey.liquid_level_m above 0"
     )
     no_roof = values["roof"]["mass_kg"] is None or switches["roof"] is False
+    of_points = message(
+        "offset_of_points", "expected only with points: a tape has its own in instruments.toml"
+    )
     return _of_plates(values, tables["courses"], head or not no_liquid) | {
+        "offset": of_points if is_strapped(tables) else "",
         "course_heights": _of_heights(tables["courses"]),
         "youngs_modulus": no_head if not head and no_liquid else "",
         "liquid_density": "" if head else no_head,

@@ -13,6 +13,11 @@ def has_survey(tables):
     return any(has_rows(tables[name]) for name in ("image_points", *READINGS))
 
 
+def is_strapped(tables):
+    """Was a tape put round the tank?"""
+    return has_rows(tables["circumferences"])
+
+
 def has_wall_points(tables):
     """Does the wall come from points, handed in or to be adjusted?"""
     return has_rows(tables["points"]) or has_survey(tables)

@@ -12,6 +12,7 @@ from tankcal.job.contract import (
     points,
     roof,
     stated,
+    strapping,
     uncertainty,
     welds,
 )
@@ -19,7 +20,7 @@ from tankcal.job.contract.keys import KEYS as COMMON_KEYS
 from tankcal.job.contract.kinds import KINDS
 from tankcal.job.contract.lying import KEYS as LYING_KEYS
 from tankcal.job.contract.observations import COLUMNS as SURVEY_COLUMNS
-from tankcal.job.contract.observations import SURVEYS
+from tankcal.job.contract.observations import SURVEYS as ADJUSTED_SURVEYS
 from tankcal.job.contract.parts import KEYS as PART_KEYS
 from tankcal.job.contract.registers import OF_PHOTOS, REGISTER_KEYS, REGISTERS_OF_SURVEY
 from tankcal.job.contract.uncertainty import INPUTS
@@ -27,13 +28,18 @@ from tankcal.text.form_words import NOTES
 
 SECTIONS = (
     *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "bottom", "roof"),
-    *("corrections", "material", "checks", "adjustment", "adjustment.camera", "certificate"),
+    *("shell", "strapping", "corrections", "material", "checks"),
+    *("adjustment", "adjustment.camera", "certificate"),
     "csv",
 )
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
-COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES} | SURVEY_COLUMNS
-_KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | {"bottom": bottom.KEYS, "roof": roof.KEYS}
+COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES}
+COLUMNS |= strapping.COLUMNS | SURVEY_COLUMNS
+_KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS
+_KEYS |= {"bottom": bottom.KEYS, "roof": roof.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
+
+SURVEYS = ADJUSTED_SURVEYS | {"strapping": tuple(strapping.COLUMNS)}
 
 REQUIRED_TABLES = {"vertical": ("points", "courses")}
 _OF_ALL = ("uncertainty", "correlations", "stated")

@@ -24,6 +24,7 @@ from tankcal.job.model.settings import (
 )
 from tankcal.survey.measurements import Measurements
 from tankcal.survey.points import Points
+from tankcal.survey.strapping import Strapping
 from tankcal.tank.rules.model import Rule
 
 __all__ = [
@@ -95,6 +96,8 @@ class Job:
         Of the first course by tape, outside; only compared.
     diameter_is : {"inside", "middle", "outside"} or None
         What the nominal diameter is; only compared.
+    strapping : Strapping or None
+        Circumferences by tape, in place of points.
     """
 
     tank: Tank | None
@@ -124,3 +127,4 @@ class Job:
     rule: Rule | None = None
     circumference_m: float | None = None
     diameter_is: str | None = None
+    strapping: Strapping | None = None

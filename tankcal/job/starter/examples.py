@@ -39,6 +39,8 @@ EXAMPLES_OF_KEYS = {
     "mesh.unit": "m",
     "bottom.form": "cone",
     "bottom.centre_z_m": -0.15,
+    "shell.shape_sd_mm": 5.0,
+    "strapping.wave_mm": 20.0,
     "roof.mass_kg": 9000.0,
     "roof.critical_bottom_m": 1.0,
     "roof.critical_top_m": 1.3,
@@ -82,6 +84,42 @@ EXAMPLES_OF_TABLES = {
     ],
     "correlations": [{"input": "scale", "with": "datum", "r": 0.5}],
     "stated": [{"high_m": 9.0, "low_m": 2.0}],
+    "circumferences": [
+        {
+            "circumference": "1-20",
+            "course": "1",
+            "level_m": 0.38,
+            "reading_m": 40.8925,
+            "s_mm": 0.5,
+        },
+        {
+            "circumference": "1-80",
+            "course": "1",
+            "level_m": 1.52,
+            "reading_m": 40.8931,
+            "s_mm": 0.5,
+        },
+    ],
+    "obstructions": [
+        {
+            "circumference": "1-20",
+            "kind": "butt_strap",
+            "count": 6,
+            "thickness_mm": 8,
+            "width_mm": 100,
+        },
+        {
+            "circumference": "1-80",
+            "kind": "step_over",
+            "over_mm": 1022.0,
+            "arc_mm": 1000.0,
+            "s_mm": 0.5,
+        },
+    ],
+    "thickness": [{"course": "1", "thickness_mm": 7.92, "azimuth_deg": 90, "paint_mm": 0.3}],
+    "tape_checks": [
+        {"level": "1", "master_m": 40.8930, "working_m": 40.8921, "s_mm": 0.3, "when": "before"}
+    ],
     "targets": [
         {"point": "P101", "section": "1", "generatrix": "A", "z_m": 0.95, "offset_mm": 0.2}
     ],

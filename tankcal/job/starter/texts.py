@@ -27,6 +27,7 @@ _UNITS = {
     "_ppm": "ppm",
     "_gpa": "GPa",
     "_m3": "m³",
+    "_mm2": "mm²",
     "_mm": "mm",
     "_um": "µm",
     "_px": "px",
@@ -68,6 +69,8 @@ SECTION_NOTES = {
     "roof": "the floating roof: all of it, or nothing when there is none",
     "corrections": "false switches a correction off, and the report says so",
     "material": "the shell's steel",
+    "shell": "how far the wall is from a circle",
+    "strapping": "how the tape lay",
     "checks": "only compared, to tell a slip of the hand: nothing here changes a number",
     "adjustment": "how bad points are treated, and what holds the frame of a survey",
     "adjustment.camera": "what of the cameras is adjusted: off, camera free, camera weighted,"
@@ -87,6 +90,12 @@ TABLE_NOTES = {
     " empty",
     "stated": "one row for each dip, or pair of dips, whose volume is to be reported with its"
     " budget; may stay empty",
+    "circumferences": "one row for each reading of the tape round the tank",
+    "obstructions": "one row for each kind of obstacle on the way of a circumference; may stay"
+    " empty",
+    "thickness": "one row for each reading of a gauge of plates; may stay empty",
+    "tape_checks": "one row for each comparison of the working tape with its master; may stay"
+    " empty",
     "targets": "one row for each target of the wall; may stay empty: the wall is then searched",
     "photos": "one row for each photo; orientations may stay blank, they are found",
     "image_points": "one row for each image of a point; a repeated row is a repeated reading",

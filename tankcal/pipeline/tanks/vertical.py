@@ -14,8 +14,7 @@ from tankcal.pipeline.tanks.common import (
     thermal_scale,
     told_by,
 )
-from tankcal.sections import coordinates_of
-from tankcal.tank.body import Body, Factor, ShellPart, survey_factors
+from tankcal.tank.body import Body, Factor, ShellPart
 from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
 from tankcal.tank.courses import DEPARTURES, CourseShape
 from tankcal.tank.fittings import floating_roof
@@ -198,11 +197,8 @@ def _footprint(wall, shell):
 
     As large as the shell is there.
     """
-    lowest = wall.sections[0]
-    outline, height = lowest.outline, lowest.group.height_m
-    radius = outline.radius_m(np.arange(FOOTPRINT) * FULL_TURN / FOOTPRINT)
+    x, y, radius = wall.lowest_outline(np.arange(FOOTPRINT) * FULL_TURN / FOOTPRINT)
     larger = shell.volume.area_m2([0.0])[0] / (np.pi * np.mean(radius**2))
-    x, y = np.array([outline.x_m, outline.y_m]) - height * np.array(wall.shell.slope)
     return Footprint(float(x), float(y), radius * np.sqrt(larger))
 
 
@@ -248,14 +244,17 @@ def _shell(job, wall, switches, uncertain):
         stretch if switches.tilt else stretch * leaning,
         departures=_declared(job),
     )
+    features = _functionals(wall, volume) if uncertain else None
     return ShellPart(
         volume,
-        _factors(job, wall, volume) if uncertain else (),
+        _factors(job, wall, volume, features) if uncertain else (),
         scale,
         job.material.expansion_per_k,
         stretch,
         _bearing(job, switches),
         wall.shell.tilt if switches.tilt else 0.0,
+        wall.read_with(features.weights) if uncertain else {},
+        wall.without_inputs,
     )
 
 
@@ -263,17 +262,12 @@ def _declared(job):
     return {one.name for one in job.inputs}
 
 
-def _factors(job, wall, volume):
-    """What the survey leaves uncertain about the features of the shell: the points, and the wall
+def _factors(job, wall, volume, features):
+    """What the survey leaves uncertain about the features of the shell: its readings, and the wall
     between them by the kinds of its components.
     """
-    features = _functionals(wall, volume)
-    jacobian = features.weights @ wall.radii_by_points
-    covariance = jacobian @ (wall.covariance_m2 @ jacobian.T)
-    causes, index = job.points.causes, coordinates_of(wall.accepted)
-    effects = [jacobian @ cause.column_m[index] for cause in causes]
     return (
-        *survey_factors(covariance, wall.noise_dof, causes, effects),
+        *wall.factors(job, features.weights),
         *_of_the_unseen(wall, volume, features, _declared(job)),
     )
 
@@ -289,7 +283,9 @@ def _of_the_unseen(wall, volume, features, declared):
         chosen = [
             index
             for index, one in enumerate(COMPONENTS)
-            if one.kind == kind and one.declared_as not in declared
+            if one.kind == kind
+            and one.declared_as not in declared
+            and (one.shape == "mean" or not wall.field.cylinders)
         ]
         if chosen:
             parts = [inflation[index] * features.unseen(index) for index in chosen]

@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.job.covariance import MAX_POINTS
 from tankcal.report.outputs.csv_files import write_table
-from tankcal.report.tables import capacity, survey, tank
+from tankcal.report.tables import capacity, strapping, survey, tank
 from tankcal.text.digits import PROGRAM, decimals_of_rows, fixed
 
 LEAST_DECIMALS = 6  # micrometres, square millimetres, millilitres
@@ -12,6 +12,7 @@ FILES = (
     "points.csv",
     "points_cov.npz",
     "sections.csv",
+    "strapping.csv",
     "capacity.csv",
     "photos.csv",
     "cameras.csv",
@@ -23,6 +24,8 @@ FILES = (
 def write_tables(record, directory):
     """Write every table of the record that has rows, as CSV."""
     tables = {"points": (survey.POINTS, None), "sections": (tank.SECTIONS, None)}
+    if record.get("strapping"):
+        tables["strapping"] = strapping.STRAPS, None
     if record["capacity"]:
         tables["capacity"] = capacity.capacity_table(record), _capacity(record)
     if record["adjustment"]:

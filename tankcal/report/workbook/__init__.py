@@ -9,7 +9,12 @@ from tankcal.report.workbook.calculator import calculator_sheets, factor_sheet
 from tankcal.report.workbook.capacity import capacity_sheet
 from tankcal.report.workbook.certificate import certificate_sheet
 from tankcal.report.workbook.charts import charts_sheets
-from tankcal.report.workbook.papers import corrections_sheet, courses_sheet, provenance_sheet
+from tankcal.report.workbook.papers import (
+    corrections_sheet,
+    courses_sheet,
+    provenance_sheet,
+    strapping_sheet,
+)
 from tankcal.report.workbook.parts import (
     densities_sheet,
     inside_sheet,
@@ -70,6 +75,8 @@ def _sheets_of_tank(book, record):
     factor_sheet(book, record)
     if record["courses"]:
         courses_sheet(book, record)
+    if record.get("strapping"):
+        strapping_sheet(book, record)
     corrections_sheet(book, record)
     inside_sheet(book, record)
     budget_sheet(book, record)

@@ -1,6 +1,6 @@
 """The working papers: courses, corrections, choices and provenance."""
 
-from tankcal.report.tables import tank
+from tankcal.report.tables import strapping, tank
 from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
@@ -11,12 +11,25 @@ _HEAD_ROW = 3
 def courses_sheet(book, record):
     """Courses, from the bottom up, and the horizontal sections in them."""
     sheet = book.sheet("courses", book.word("texts.courses_subtitle"), landscape=True)
+    tables = [(book.word("headings.courses"), "courses", columns_of(book, tank.COURSES))]
+    if record["sections"]:
+        tables += [
+            (book.word("headings.sections"), "sections", columns_of(book, tank.SECTIONS)),
+            (book.word("headings.modes"), "modes", columns_of(book, tank.modes_table(record))),
+            (book.word("headings.shell"), "shell", columns_of(book, tank.SHELL)),
+        ]
+    write_tables(book, sheet, _HEAD_ROW, tables)
+
+
+def strapping_sheet(book, record):
+    """Every reading of the tape with its corrections, the tapes, and what they make of courses."""
+    sheet = book.sheet("strapping", book.word("texts.strapping_subtitle"), landscape=True)
     tables = [
-        (book.word("headings.courses"), "courses", columns_of(book, tank.COURSES)),
-        (book.word("headings.sections"), "sections", columns_of(book, tank.SECTIONS)),
-        (book.word("headings.modes"), "modes", columns_of(book, tank.modes_table(record))),
-        (book.word("headings.shell"), "shell", columns_of(book, tank.SHELL)),
-    ]
+        (book.word("headings.straps"), "straps", columns_of(book, strapping.STRAPS)),
+        (book.word("headings.strapped_courses"), "strapped_courses",
+         columns_of(book, strapping.STRAPPED_COURSES)),
+        (book.word("headings.tapes"), "tapes", columns_of(book, strapping.TAPES)),
+    ]  # fmt: skip
     write_tables(book, sheet, _HEAD_ROW, tables)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.job.checking import has_rows, refuse_repeated
+from tankcal.job.checking import has_rows, refuse_repeated, temperature_missing
 from tankcal.job.checks.survey.files import refuse_undefined
 from tankcal.messages import message
 
@@ -39,11 +39,8 @@ def _check_instrument(files, name, given):
         )
         files.tell_key(files.log.warning, "instruments", name, "correction", expected)
     if expansion and not files.is_given("instruments", name, "certified_temperature_c"):
-        expected = message(
-            "certified_temperature_missing",
-            "missing, but expansion_per_k is given; expected the temperature of the certificate",
-        )
-        files.tell_key(files.log.problem, "instruments", name, "certified_temperature_c", expected)
+        key = "certified_temperature_c"
+        files.tell_key(files.log.problem, "instruments", name, key, temperature_missing())
 
 
 def _check_temperatures(files, distances, instruments):

@@ -1,0 +1,279 @@
+"""Does a strapping make sense as a whole? What its tables say of each other, and of the shell."""
+
+import numpy as np
+
+from tankcal.job.checking import (
+    course_heights,
+    has_rows,
+    is_not_given,
+    tell,
+    temperature_missing,
+)
+from tankcal.job.checks.extent import is_strapped
+from tankcal.job.contract.strapping import NEEDED
+from tankcal.job.tables import nearest
+from tankcal.messages import message
+
+END_M = 0.02  # so far beyond its course a level may stand
+
+
+def check_strapping(values, tables, registers, raw, log):
+    """Circumferences with a tape, on courses that are there; obstructions and checks that fit."""
+    straps = tables["circumferences"]
+    if not is_strapped(tables):
+        _tell_without_effect(tables, log)
+        return
+    tapes = {
+        name: given
+        for name, given in registers["instruments"].items()
+        if (given["kind"] or "").lower() == "tape"
+    }
+    courses = tables["courses"]
+    known = () if courses is None else tuple(courses.of("course"))
+    _check_courses(straps, courses, known, log)
+    _check_tapes(straps, registers["instruments"], tapes, raw, log)
+    _check_obstructions(tables["obstructions"], set(straps.of("circumference")), log)
+    if has_rows(tables["thickness"]):
+        _refuse_others(tables["thickness"], "course", known, log)
+    _check_comparisons(tables["tape_checks"], tapes, raw, log)
+    if values is not None:
+        _check_settings(values, tables, raw, log)
+        _check_levels(straps, courses, values, log)
+
+
+def tapes_read(straps, tapes):
+    """(n,) name of the tape of each reading: the only one that is no master where it is blank."""
+    masters = {given["master"] for given in tapes.values()}
+    read = [name for name in tapes if name not in masters]
+    usual = read[0] if len(read) == 1 else None
+    return [name or usual for name in straps.of("instrument")]
+
+
+def _tell_without_effect(tables, log):
+    for name in ("obstructions", "thickness", "tape_checks"):
+        if has_rows(tables[name]):
+            expected = message(
+                "not_strapped", "without effect: the job has no circumferences by tape"
+            )
+            log.warning(tables[name].file, expected)
+
+
+def _check_courses(straps, courses, known, log):
+    _refuse_others(straps, "course", known, log)
+    reached = {
+        course
+        for course, use in zip(straps.of("course"), straps.of("use"), strict=True)
+        if use != "check"
+    }
+    if straps.skipped or courses is None or courses.skipped or None in reached:
+        return
+    for row, name in zip(courses.rows, known, strict=True):
+        if name is not None and name not in reached:
+            expected = message(
+                "course_not_strapped",
+                "no circumference was measured on course {course!r}; expected one at least in"
+                " {file}",
+                course=name,
+                file=straps.file,
+            )
+            log.problem(courses.file, expected, row, "course")
+    places = {}
+    names = zip(straps.rows, straps.of("circumference"), straps.of("course"),
+                straps.of("level_m"), strict=True)  # fmt: skip
+    for row, name, *place in names:
+        if None in (name, *place):
+            continue
+        first = places.setdefault(name, (place, row))
+        if first[0] != place:
+            expected = message(
+                "repeat_elsewhere",
+                "circumference {name!r} is at another level in row {row}; expected repeats at one"
+                " level, or another name",
+                name=name,
+                row=first[1],
+            )
+            log.problem(straps.file, expected, row, "level_m")
+
+
+def _refuse_others(table, column, known, log):
+    """A problem for each name that is not among the known; none where these cannot be read."""
+    if not known or None in known:
+        return
+    for row, name in zip(table.rows, table.of(column), strict=True):
+        if name is not None and name not in known:
+            expected = message(
+                "no_such_name",
+                "found {name!r}; expected one of those that are there{hint}",
+                name=name,
+                hint=nearest(name, known),
+            )
+            log.problem(table.file, expected, row, column)
+
+
+def _check_tapes(straps, instruments, tapes, raw, log):
+    file = raw.file_of("instruments")
+    for row, name, tape in zip(
+        straps.rows, straps.of("instrument"), tapes_read(straps, tapes), strict=True
+    ):
+        if name is None and tape is None:
+            expected = message("tape_not_named", "blank; expected a tape of {file}", file=file)
+            log.problem(straps.file, expected, row, "instrument")
+            if not tapes:
+                return
+        elif tape not in tapes:
+            found = instruments.get(tape)
+            expected = message(
+                "no_such_tape",
+                "found {name!r}; expected a tape of {file}{hint}",
+                name=tape,
+                file=file,
+                hint=nearest(tape, tapes) if found is None else "",
+            )
+            log.problem(straps.file, expected, row, "instrument")
+    if "instruments" not in raw.registers or raw.registers["instruments"] is None:
+        return
+    rows = raw.registers["instruments"].rows
+    for name in dict.fromkeys(tapes_read(straps, tapes)):
+        given = tapes.get(name)
+        if given is None:
+            continue
+        for key, expected in _missing_of(given, tapes, straps, name):
+            log.problem(file, expected, rows.get(name), f"{name}.{key}")
+
+
+def _missing_of(given, tapes, straps, name):
+    if given["thickness_mm"] is None:
+        yield (
+            "thickness_mm",
+            message(
+                "tape_thickness_missing",
+                "missing; expected the thickness of the tape: half of it lies between the paint"
+                " and the line that is read",
+            ),
+        )
+    if (given["section_mm2"] is None) != (given["e_gpa"] is None):
+        key = "e_gpa" if given["e_gpa"] is None else "section_mm2"
+        yield key, message("stretch_incomplete", "missing; expected both section_mm2 and e_gpa")
+    master = given["master"]
+    if master is not None and master not in tapes:
+        expected = message(
+            "no_such_master",
+            "found {master!r}; expected another tape that is described here",
+            master=master,
+        )
+        yield "master", expected
+    certificate = tapes.get(master, given)
+    if given["expansion_per_k"] and certificate["certified_temperature_c"] is None:
+        yield "certified_temperature_c", temperature_missing()
+    if given["section_mm2"] and certificate["tension_n"] is None:
+        yield (
+            "tension_n",
+            message(
+                "certified_tension_missing",
+                "missing, but section_mm2 is given; expected the tension of the certificate",
+            ),
+        )
+
+
+def _check_obstructions(table, names, log):
+    if not has_rows(table):
+        return
+    _refuse_others(table, "circumference", names, log)
+    for place, (row, kind) in enumerate(zip(table.rows, table.of("kind"), strict=True)):
+        for column in NEEDED.get(kind, ()):
+            if table.of(column)[place] is None:
+                expected = message(
+                    "obstruction_incomplete",
+                    "blank; expected it of an obstruction of kind {of_kind}",
+                    of_kind=kind,
+                )
+                log.problem(table.file, expected, row, column)
+        over, arc = table.of("over_mm")[place], table.of("arc_mm")[place]
+        if kind == "step_over" and None not in (over, arc) and over < arc:
+            expected = message(
+                "step_over_too_short",
+                "found {over:g}; expected at least the arc of the shell, {arc:g}: over an"
+                " obstruction the way is longer",
+                over=over,
+                arc=arc,
+            )
+            log.problem(table.file, expected, row, "over_mm")
+
+
+def _check_comparisons(table, tapes, raw, log):
+    working = [name for name, given in tapes.items() if given["master"] is not None]
+    if has_rows(table) and len(working) != 1:
+        expected = message(
+            "comparison_of_no_tape",
+            "found {count} tapes with a master in {file}; expected one: these readings are its own",
+            count=len(working),
+            file=raw.file_of("instruments"),
+        )
+        log.problem(table.file, expected)
+    if working and not has_rows(table):
+        expected = message(
+            "master_not_compared",
+            "found a master, but no comparison with it; expected readings in tape_checks.csv",
+        )
+        rows = raw.registers["instruments"].rows
+        file = raw.file_of("instruments")
+        log.problem(file, expected, rows.get(working[0]), f"{working[0]}.master")
+
+
+def _check_settings(values, tables, raw, log):
+    if values["shell"]["shape_sd_mm"] is None and is_not_given(raw, "shell", "shape_sd_mm"):
+        expected = message(
+            "shape_not_declared",
+            "missing; expected how far the wall is from a circle (0: it is one): a tape measures a"
+            " perimeter, and the same perimeter has less area the more the wall departs from a"
+            " circle",
+        )
+        tell(log.problem, raw, "shell", "shape_sd_mm", expected)
+    if values["survey"]["side"] == "inside":
+        expected = message(
+            "strapped_inside", "found inside; expected outside: a tape lies on the outside"
+        )
+        tell(log.problem, raw, "survey", "side", expected)
+    for name in ("points", "targets"):
+        if has_rows(tables[name]):
+            expected = message(
+                "points_beside_straps",
+                "given together with circumferences; expected only one of them: tankcal does not"
+                " join points and straps yet",
+            )
+            log.problem(tables[name].file, expected)
+    if values["bottom"]["form"] in ("leaning", "points"):
+        expected = message(
+            "bottom_needs_axis",
+            "found {form}; expected another form: strapping does not measure the axis of the shell",
+            form=values["bottom"]["form"],
+        )
+        tell(log.problem, raw, "bottom", "form", expected)
+
+
+def _check_levels(straps, courses, values, log):
+    heights = course_heights(courses)
+    if heights is None:
+        return
+    plate, bottom = values["datum"]["dip_plate_z_m"], values["datum"]["bottom_z_m"]
+    zero = 0.0 if plate is None else plate - (bottom or 0.0)
+    ends = np.concatenate([[0.0], np.cumsum(heights)])
+    names = courses.of("course")
+    for row, course, level in zip(
+        straps.rows, straps.of("course"), straps.of("level_m"), strict=True
+    ):
+        if level is None or course not in names:
+            continue
+        index = names.index(course)
+        low, high = ends[index] - zero, ends[index + 1] - zero
+        if not low - END_M <= level <= high + END_M:
+            expected = message(
+                "level_outside_course",
+                "found {level:g}; expected a level of course {course!r}, from {low:.3f} to"
+                " {high:.3f} m",
+                level=level,
+                course=course,
+                low=low,
+                high=high,
+            )
+            log.problem(straps.file, expected, row, "level_m")

@@ -1,0 +1,121 @@
+"""From the checked tables of a strapping to `Strapping`: SI units, one object for each reading."""
+
+import numpy as np
+
+from tankcal.job.checks.strapping import tapes_read
+from tankcal.survey.strapping import Comparison, Obstruction, Strap, Strapping, Tape
+
+LEAST_GAUGE_SD_M = 5e-5  # of a mean of gauge readings that nobody gave a standard deviation
+
+
+def make_strapping(values, tables, registers):
+    """Strapping of settings, tables and registers without problems; None: nothing was strapped."""
+    table = tables["circumferences"]
+    if table is None or not table.rows:
+        return None
+    tapes = {
+        name: given
+        for name, given in registers["instruments"].items()
+        if given["kind"].lower() == "tape"
+    }
+    keys = values["strapping"]
+    return Strapping(
+        straps=_straps(table, tapes),
+        tapes=tuple(_tape(name, given) for name, given in tapes.items()),
+        obstructions=_obstructions(tables["obstructions"]),
+        comparisons=_comparisons(tables["tape_checks"]),
+        shape_sd_m=values["shell"]["shape_sd_mm"] / 1000,
+        wave_m=_metres(keys["wave_mm"]),
+        helix_m=_metres(keys["helix_mm"]),
+        plate_sd_m={name: one[1] for name, one in gauged(tables["thickness"]).items()},
+    )
+
+
+def gauged(table):
+    """{course: (mean plate, its sd, mean paint or None)} of the readings of a gauge, m."""
+    if table is None:
+        return {}
+    courses, found = table.of("course"), {}
+    plates, sds, paints = (
+        table.numbers(f"{name}_mm") / 1000 for name in ("thickness", "s", "paint")
+    )
+    for name in dict.fromkeys(courses):
+        rows = np.array([one == name for one in courses])
+        given = plates[rows]
+        if np.all(np.isfinite(sds[rows])):
+            sd = np.sqrt(np.mean(sds[rows] ** 2) / len(given))
+        else:
+            sd = np.std(given, ddof=1) / np.sqrt(len(given)) if len(given) > 1 else 0.0
+        painted = paints[rows & np.isfinite(paints)]
+        paint = float(np.mean(painted)) if len(painted) else None
+        found[name] = (float(np.mean(given)), float(max(sd, LEAST_GAUGE_SD_M)), paint)
+    return found
+
+
+def _metres(millimetres):
+    return None if millimetres is None else millimetres / 1000
+
+
+def _straps(table, tapes):
+    columns = (
+        *map(table.of, ("circumference", "course", "level_m", "reading_m", "s_mm")),
+        tapes_read(table, tapes),
+        *map(table.of, ("temperature_c", "tension_n", "pulls", "use")),
+    )
+    return tuple(
+        Strap(
+            *(name, course, level, reading, s_mm / 1000, tape, temperature, tension),
+            pulls=int(pulls or 1),
+            check=use == "check",
+            row=row,
+        )
+        for row, name, course, level, reading, s_mm, tape, temperature, tension, pulls, use in zip(
+            table.rows, *columns, strict=True
+        )
+    )
+
+
+def _tape(name, given):
+    stretches = given["section_mm2"] and given["e_gpa"]
+    return Tape(
+        name,
+        correction=given["correction"] or 0.0,
+        correction_m=(given["correction_mm"] or 0.0) / 1000,
+        temperature_c=given["certified_temperature_c"],
+        tension_n=given["tension_n"],
+        expansion_per_k=given["expansion_per_k"] or 0.0,
+        thickness_m=(given["thickness_mm"] or 0.0) / 1000,
+        friction=given["friction"] or 0.0,
+        stiffness_n=1e3 * given["section_mm2"] * given["e_gpa"] if stretches else np.inf,
+        u_scale=_sd(given["u_scale_ppm"]) / 1e6,
+        u_offset_m=_sd(given["u_offset_mm"]) / 1000,
+        laying_m=(given["laying_mm"] or 0.0) / 1000,
+        master=given["master"] or "",
+        certificate=given["certificate"] or "",
+    )
+
+
+def _sd(given):
+    return 0.0 if given is None or isinstance(given, str) else given
+
+
+def _obstructions(table):
+    if table is None:
+        return {}
+    found = {}
+    lengths = [f"{name}_mm" for name in ("thickness", "width", "over", "arc", "excess")]
+    columns = map(table.of, ("circumference", "kind", "count", *lengths, "s_mm"))
+    for name, kind, count, *sizes, s_mm in zip(*columns, strict=True):
+        one = Obstruction(kind, count or 1.0, *map(_metres, sizes), sd_m=(s_mm or 0.0) / 1000)
+        found.setdefault(name, []).append(one)
+    return {name: tuple(those) for name, those in found.items()}
+
+
+def _comparisons(table):
+    if table is None:
+        return ()
+    columns = map(table.of, ("level", "master_m", "working_m", "s_mm", "when"))
+    return tuple(
+        Comparison(level, master, working, (s_mm or 0.0) / 1000, when or "")
+        for level, master, working, s_mm, when in zip(*columns, strict=True)
+    )

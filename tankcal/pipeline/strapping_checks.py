@@ -1,0 +1,218 @@
+"""Warnings of a strapping: what a sound crew on a sound tank hardly brings home.
+
+Causes are named where one fits: courses exchanged, a temperature in Fahrenheit, a reading copied,
+a reading of the inside, a strap that is off by itself.
+"""
+
+import tomllib
+from importlib.resources import files
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from tankcal.errors import Problem
+from tankcal.messages import message
+
+FILE = "circumferences.csv"
+FAHRENHEIT_K = 8.0  # from the shell's: so near a temperature in Fahrenheit is that of the shell
+UNLIKE_K = 20.0  # a tape that is warmer or colder than its shell by more
+NOMINAL_SHARE = 1 / 500  # of the radius: a course that departs by more from the nominal one
+EXCHANGED_SHARE, EXCHANGED_M = 0.5, 1.5e-3  # of the steps between courses: left, and saved
+APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
+
+
+def limits_of_repeats():
+    """((up to a circumference, limit), ...) m, of the rule file; its last holds without end."""
+    text = files("tankcal.pipeline").joinpath("limits/strapping.toml").read_text("utf-8")
+    rows = tomllib.loads(text)["repeats"]
+    return tuple((row.get("up_to_m", np.inf), row["limit_mm"] / 1000) for row in rows)
+
+
+def limit_of_repeats(circumference_m):
+    """By how much repeats of such a circumference may differ, m."""
+    return next(limit for up_to, limit in limits_of_repeats() if circumference_m <= up_to)
+
+
+def check_strapped(job, wall):
+    """`Problem`s of a strapped wall."""
+    return (
+        *_of_temperatures(job, wall),
+        *_of_repeats(wall),
+        *_of_pairs(job, wall),
+        *_of_courses(job, wall),
+        *_uncontrolled(job, wall),
+    )
+
+
+def _problem(text, strap=None, column="reading_m"):
+    return Problem(FILE, text, row=None if strap is None else strap.row, column=column)
+
+
+def _of_temperatures(job, wall):
+    shell = job.survey.shell_temperature_c
+    for one in wall.reduced:
+        tape = one.strap.temperature_c
+        if tape is None or shell is None or abs(tape - shell) <= UNLIKE_K:
+            continue
+        celsius = (tape - 32) / 1.8
+        if abs(celsius - shell) <= FAHRENHEIT_K:
+            text = message(
+                "tape_in_fahrenheit",
+                "{tape:g} degrees Celsius of the tape, and {shell:g} of the shell: {celsius:.0f}"
+                " would be near it; is it in Fahrenheit?",
+                tape=tape,
+                shell=shell,
+                celsius=celsius,
+            )
+        else:
+            text = message(
+                "tape_unlike_shell",
+                "{tape:g} degrees Celsius of the tape, and {shell:g} of the shell: a tape that"
+                " lies on the shell has its temperature",
+                tape=tape,
+                shell=shell,
+            )
+        yield _problem(text, one.strap, "temperature_c")
+
+
+def _of_repeats(wall):
+    """Repeats that differ by more than they may, and repeats that are equal to the last digit."""
+    by_name = {}
+    for one in wall.reduced:
+        by_name.setdefault(one.strap.name, []).append(one)
+    for name, several in by_name.items():
+        if len(several) < 2:
+            continue
+        found = [one.circumference_m for one in several]
+        limit = limit_of_repeats(found[0])
+        if max(found) - min(found) > limit:
+            text = message(
+                "repeats_apart",
+                "the readings of circumference {name!r} differ by {apart_mm:.1f} mm; expected at"
+                " most {limit_mm:g} mm",
+                name=name,
+                apart_mm=1000 * (max(found) - min(found)),
+                limit_mm=1000 * limit,
+            )
+            yield _problem(text, several[int(np.argmax(found))].strap)
+    copied = _copied([one.strap for one in wall.reduced])
+    for first, second in copied:
+        text = message(
+            "reading_copied",
+            "{reading_m:g} m again, as in row {row}, to the last digit: was it copied?",
+            reading_m=second.reading_m,
+            row=first.row,
+        )
+        yield _problem(text, second)
+
+
+def _copied(straps):
+    """Pairs of readings that are equal to the last digit: of four digits a metre that is rare."""
+    seen, found = {}, []
+    for strap in straps:
+        first = seen.setdefault((strap.reading_m, strap.course), strap)
+        if first is not strap:
+            found.append((first, strap))
+    return found
+
+
+def _of_pairs(job, wall):
+    """A strap that stands far from the others of its course, further than courses taper."""
+    adjusted = [wall.reduced[i] for i in wall.adjusted]
+    apart = []
+    for course in job.courses:
+        own = [one for one in adjusted if one.strap.course == course.name]
+        levels = {one.strap.level_m for one in own}
+        if len(levels) > 1:
+            found = np.array([one.circumference_m for one in own])
+            away = found - np.median(found)
+            apart.append((np.ptp(found), own[int(np.argmax(np.abs(away)))], len(levels)))
+    if len(apart) < 3:
+        return
+    usual = SCALE_OF_MEDIAN * float(np.median([size for size, _, _ in apart]))
+    for size, one, count in apart:
+        if size > max(APART_SDS * usual, 2 * limit_of_repeats(one.circumference_m)):
+            text = message(
+                "strap_apart",
+                "the {count} straps of course {course!r} differ by {apart_mm:.1f} mm, those of"
+                " other courses by {usual_mm:.1f} mm: is one of them misread, over an obstruction"
+                " or not level?",
+                count=count,
+                course=one.strap.course,
+                apart_mm=1000 * size,
+                usual_mm=1000 * usual,
+            )
+            yield _problem(text, one.strap)
+
+
+def _of_courses(job, wall):
+    """Inside radii against the nominal one, and pairs of courses that fit better exchanged."""
+    plates = np.array([course.thickness_m + course.paint_m for course in job.courses])
+    inside, names = wall.radius_m - plates, [course.name for course in job.courses]
+    nominal = job.tank.nominal_diameter_m / 2
+    median = float(np.median(inside))
+    if abs(median - nominal) > NOMINAL_SHARE * nominal:
+        if abs(median + np.median(plates) - nominal) < abs(median - nominal) / 4:
+            text = message(
+                "circumference_of_inside",
+                "the courses come out {miss_mm:+.0f} mm of radius from the nominal one, about"
+                " their plates: is the nominal diameter that of the outside, or are the"
+                " circumferences those of the inside?",
+                miss_mm=1000 * (median - nominal),
+            )
+        else:
+            text = message(
+                "strapped_unlike_nominal",
+                "the courses come out {miss_mm:+.0f} mm of radius from the nominal one",
+                miss_mm=1000 * (median - nominal),
+            )
+        yield _problem(text)
+    for name, radius in zip(names, inside, strict=True):
+        if abs(radius - median) > NOMINAL_SHARE * nominal:
+            text = message(
+                "strapped_course_apart",
+                "course {name!r} comes out {miss_mm:+.1f} mm of radius from the others",
+                name=name,
+                miss_mm=1000 * (radius - median),
+            )
+            yield _problem(text, column="course")
+    outside, saved = wall.radius_m, []
+    steps = _steps(inside)
+    for i, k in combinations(range(len(inside)), 2):
+        turned = outside.copy()
+        turned[[i, k]] = outside[[k, i]]
+        saved.append((_steps(turned - plates), i, k))
+    if saved:
+        left, i, k = min(saved)
+        if left < EXCHANGED_SHARE * steps and steps - left > EXCHANGED_M:
+            text = message(
+                "courses_exchanged",
+                "with the readings of courses {one!r} and {other!r} exchanged the steps between"
+                " courses would add up to {left_mm:.1f} mm in place of {steps_mm:.1f} mm: are"
+                " they mixed up?",
+                one=names[i],
+                other=names[k],
+                left_mm=1000 * left,
+                steps_mm=1000 * steps,
+            )
+            yield _problem(text, column="course")
+
+
+def _steps(radii_m):
+    """Sum of the steps between neighbouring courses."""
+    return float(sum(abs(high - low) for low, high in pairwise(radii_m)))
+
+
+def _uncontrolled(job, wall):
+    """Courses of one reading alone: a blunder in it nothing would show."""
+    counts = np.bincount(wall.field.sites.course, minlength=len(job.courses))
+    alone = [course.name for course, count in zip(job.courses, counts, strict=True) if count == 1]
+    if alone:
+        yield _problem(
+            message(
+                "controlled_by_nothing",
+                "courses {courses}: a single reading, which nothing controls; a second strap would",
+                courses=", ".join(alone),
+            ),
+            column="course",
+        )

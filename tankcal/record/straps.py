@@ -1,0 +1,137 @@
+"""The part of the record that says what a tape measured: readings, their corrections, tapes."""
+
+from tankcal.geometry.outlines import FULL_TURN
+from tankcal.record.schema import Saved, key
+from tankcal.record.survey import radius_sd
+
+
+class StrapReading(Saved):
+    """A reading of a tape round the tank, and the circumference that it gives."""
+
+    circumference: str = key("name; repeats share it")
+    course: str = key("that it is on")
+    level_m: float = key("above the table's zero")
+    tape: str = key("name")
+    reading_m: float = key("as read")
+    certificate_m: float = key("correction by the certificate of the tape, or by its master")
+    temperature_m: float = key("correction for the temperature of the tape")
+    tension_m: float = key("correction for its pull")
+    tape_thickness_m: float = key("correction for half the thickness of the tape")
+    rise_m: float = key("correction for what keeps it off the shell")
+    out_of_level_m: float = key("correction for a tape that is not level")
+    circumference_m: float = key("of the painted shell, after these corrections")
+    sd_m: float = key("of it, of what no other reading shares")
+    difference_m: float = key("from the circumference of its course")
+    used: bool = key("false: only compared")
+    row: int | None = key("of the file")
+
+
+class TapeUsed(Saved):
+    """A tape, as its readings were corrected."""
+
+    tape: str = key("name")
+    certificate: str = key('its number; "": not given')
+    correction: float = key("true = reading (1 + correction)")
+    u_scale: float = key("standard uncertainty of its scale, relative")
+    u_comparison: float = key("the same, by the comparison with its master; 0: none")
+    master: str = key('tape that it was compared with; ""')
+    master_certificate: str = key('number of its certificate; "": not given, or no master')
+    comparisons: int = key("readings of both")
+
+
+class StrapOfCourse(Saved):
+    """What the straps of a course give."""
+
+    course: str = key("name")
+    circumference_m: float = key("mean, of the painted shell")
+    area_term_m: float = key("what the area term takes off it")
+    radius_m: float = key("of the circle of equal area, outside")
+    radius_sd_m: float = key("its standard deviation, as the mean of the course")
+    thickness_m: float = key("of the plates")
+    plate_sd_m: float | None = key("standard uncertainty of that by a gauge; null: none was read")
+    paint_m: float = key("thickness")
+    inside_radius_m: float = key("at the temperature of the survey")
+
+
+class StrappingRecord(Saved):
+    """Circumferences by tape: every reading with its corrections, tapes, courses."""
+
+    readings: list[StrapReading] = key("in the order of the file")
+    tapes: list[TapeUsed] = key("those that were read")
+    courses: list[StrapOfCourse] = key("from the bottom up")
+    shape_sd_m: float = key("declared: standard deviation of the radius round the wall")
+    area_term: float = key("by how much the circle of a perimeter is too large, relative")
+    area_term_sd: float = key("its standard deviation")
+    wave_m: float | None = key("bound of how far a tape was out of level; null: not given")
+    helix_m: float | None = key("bound of how far its ends stood apart; null: not given")
+
+
+def strapping_of(result):
+    """`StrappingRecord` of a result; None where no tape was put round."""
+    wall, given = result.strapped, result.job.strapping
+    if wall is None:
+        return None
+    return StrappingRecord(
+        readings=[_reading(result, index) for index in range(len(wall.reduced))],
+        tapes=[_tape(*one, given) for one in wall.tapes],
+        courses=_courses(result),
+        shape_sd_m=given.shape_sd_m,
+        area_term=wall.area_term.mean,
+        area_term_sd=wall.area_term.sd,
+        wave_m=given.wave_m,
+        helix_m=given.helix_m,
+    )
+
+
+def _reading(result, index):
+    wall = result.strapped
+    one = wall.reduced[index]
+    names = [course.name for course in result.job.courses]
+    of_course = wall.circumference_m[names.index(one.strap.course)]
+    return StrapReading(
+        circumference=one.strap.name,
+        course=one.strap.course,
+        level_m=one.strap.level_m,
+        tape=one.strap.tape,
+        reading_m=one.strap.reading_m,
+        **{f"{step}_m": size for step, size in one.steps_m.items()},
+        circumference_m=one.circumference_m,
+        sd_m=one.sd_m,
+        difference_m=one.circumference_m - of_course,
+        used=not one.strap.check,
+        row=one.strap.row,
+    )
+
+
+def _tape(tape, sd, given):
+    certificates = {one.name: one.certificate for one in given.tapes}
+    return TapeUsed(
+        tape=tape.name,
+        certificate=tape.certificate,
+        correction=tape.correction,
+        u_scale=tape.u_scale,
+        u_comparison=sd,
+        master=tape.master,
+        master_certificate=certificates.get(tape.master, ""),
+        comparisons=len(given.comparisons) if tape.master else 0,
+    )
+
+
+def _courses(result):
+    wall, found = result.strapped, []
+    for index, course in enumerate(result.job.courses):
+        radius, whole = wall.radius_m[index], wall.circumference_m[index]
+        found.append(
+            StrapOfCourse(
+                course=course.name,
+                circumference_m=whole,
+                area_term_m=FULL_TURN * radius - whole,
+                radius_m=radius,
+                radius_sd_m=radius_sd(result, result.body.shell.volume.courses[index]),
+                thickness_m=course.thickness_m,
+                plate_sd_m=wall.plate_sd_m.get(index),
+                paint_m=course.paint_m,
+                inside_radius_m=radius - course.thickness_m - course.paint_m,
+            )
+        )
+    return found

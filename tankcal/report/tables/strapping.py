@@ -1,0 +1,72 @@
+"""Tables of a strapped tank: readings and corrections, tapes, courses."""
+
+from tankcal.report.tables.table import Column, Table
+
+_STEPS = ("certificate", "temperature", "tension", "tape_thickness", "rise", "out_of_level")
+_BOTH = "straps strap_corrections"
+
+STRAPS = Table(
+    "straps",
+    (
+        Column("circumference", sheet="circumference", width=14, csv="circumference"),
+        Column("course", on="straps", sheet="course", width=9, csv="course"),
+        Column("level_m", "m", decimals=3, on="straps", sheet="strap_level_m", csv="level_m"),
+        Column("tape", on="straps", sheet="tape", width=12, csv="tape"),
+        Column("reading_m", "m", decimals=4, on=_BOTH, sheet="strap_reading_m", csv="reading_m"),
+        *(
+            Column(f"{step}_m", "mm", decimals=2, heading=f"strap_{step}", on="strap_corrections",
+                   sheet=f"strap_{step}_mm", csv=f"{step}_mm", csv_unit="mm")
+            for step in _STEPS
+        ),
+        Column("circumference_m", "m", decimals=4, heading="strap_circumference_m", on=_BOTH,
+               sheet="strap_circumference_m", csv="circumference_m"),
+        Column("sd_m", "mm", decimals=2, heading="strap_sd", on="straps", sheet="strap_sd_mm",
+               csv="s_mm", csv_unit="mm"),
+        Column("difference_m", "mm", decimals=1, heading="strap_difference", on="straps",
+               sheet="strap_difference_mm", csv="difference_mm", csv_unit="mm"),
+        Column("used", sheet="used", width=8, csv="used", on="straps"),
+    ),
+    rows=lambda record: record["strapping"]["readings"],
+    csv_style="%.6f",
+)  # fmt: skip
+
+
+def in_ppm(tape):
+    """A tape with its scale in ppm."""
+    shown = {key: 1e6 * tape[key] for key in ("correction", "u_scale", "u_comparison")}
+    return tape | shown | {"certificate": tape["certificate"] or None}
+
+
+TAPES = Table(
+    "tapes",
+    (
+        Column("tape", sheet="tape", width=12),
+        Column("certificate", heading="tape_certificate", sheet="tape_certificate", width=18),
+        Column("correction", "ppm", decimals=1, heading="tape_correction",
+               sheet="tape_correction_ppm"),
+        Column("u_scale", "ppm", decimals=1, heading="tape_u_scale", sheet="tape_u_scale_ppm"),
+        Column("u_comparison", "ppm", decimals=1, heading="tape_u_comparison",
+               sheet="tape_u_comparison_ppm"),
+        Column("master", heading="tape_master", sheet="tape_master"),
+        Column("comparisons", decimals=0, heading="tape_comparisons", sheet="tape_comparisons"),
+    ),
+    rows=lambda record: [in_ppm(one) for one in record["strapping"]["tapes"]],
+)  # fmt: skip
+
+STRAPPED_COURSES = Table(
+    "strapped_courses",
+    (
+        Column("course", sheet="course", width=9),
+        Column("circumference_m", "m", decimals=4, heading="strap_circumference_m",
+               sheet="strap_circumference_m"),
+        Column("area_term_m", "mm", decimals=2, heading="strap_area_term",
+               sheet="strap_area_term_mm"),
+        Column("radius_m", "m", decimals=5, heading="outside_radius_m", sheet="outside_radius_m"),
+        Column("radius_sd_m", "mm", decimals=2, sheet="u_radius_mm", width=10),
+        Column("thickness_m", "mm", decimals=2, sheet="plate_mm", width=9),
+        Column("paint_m", "mm", decimals=2, sheet="paint_mm", width=9),
+        Column("inside_radius_m", "m", decimals=5, heading="strap_inside_radius_m",
+               sheet="strap_inside_radius_m"),
+    ),
+    rows=lambda record: record["strapping"]["courses"],
+)  # fmt: skip

@@ -1,0 +1,303 @@
+"""From a strapped tank to its table: worked numbers, second methods, and what is told of a crew."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from generated_strapping import girth_of, strapped_job
+from generated_walls import GeneratedWall, make_wall
+from job_builder import S_1, strapped_parts, write_book, write_folder, write_strapped_job
+
+import tankcal
+from tankcal.errors import InputError
+from tankcal.pipeline.strapped_wall import find_strapped_wall
+from tankcal.pipeline.strapping_checks import limit_of_repeats
+
+OPEN = {0.9: 146.70404, 1.8: 293.40807, 3.6: 586.81461, 6.0: 978.05449, 8.4: 1369.27879}
+HEAD_850 = {0.9: 0.00428, 1.8: 0.01710, 3.6: 0.07056, 6.0: 0.20700, 8.4: 0.43102}
+
+
+def result_of(parts, folder):
+    return tankcal.run(tankcal.load(write_folder(folder, parts)), simulated=False)
+
+
+def codes(result):
+    return {one.expected.code for one in result.warnings if one.file == "circumferences.csv"}
+
+
+@pytest.mark.parametrize("density", [0, 850])
+def test_tank_s_1(tmp_path, density):
+    """Worked numbers: volumes to 1e-5 m3, with and without the head."""
+    result = result_of(strapped_parts(table__liquid_density_kg_m3=density), tmp_path)
+    expected = {h: volume + (HEAD_850[h] if density else 0.0) for h, volume in OPEN.items()}
+    found = {height: result.at(height).value_m3 for height in OPEN}
+    assert found == pytest.approx(expected, abs=1.6e-5)  # of two rounded figures
+    assert codes(result) == set()
+
+
+def test_folder_and_workbook_give_the_same(tmp_path):
+    parts = strapped_parts()
+    parts.tables["thickness"] = [["course", "thickness_mm", "paint_mm"], ["1", 8.9, 0.2],
+                                 ["1", 9.0, 0.3]]  # fmt: skip
+    folder = tankcal.load(write_folder(tmp_path / "folder", parts))
+    book = tankcal.load(write_book(tmp_path / "job.xlsx", parts))
+    assert [replace(one, row=None) for one in folder.strapping.straps] == [
+        replace(one, row=None) for one in book.strapping.straps
+    ]
+    assert folder.strapping.tapes == book.strapping.tapes
+    assert folder.strapping.obstructions == book.strapping.obstructions
+    for job in (folder, book):
+        assert job.courses[0].thickness_m == pytest.approx(0.00895)
+        assert job.courses[0].paint_m == pytest.approx(0.00025)
+        assert job.courses[1].thickness_m == pytest.approx(0.008)
+        sd = np.std([8.9e-3, 9e-3], ddof=1) / np.sqrt(2)
+        assert job.strapping.plate_sd_m == {"1": pytest.approx(max(sd, 5e-5))}
+
+
+def test_every_cause_stands_in_the_budget(tmp_path):
+    parts = strapped_parts(shell__shape_sd_mm=5.0, strapping__wave_mm=50.0)
+    parts.tables["thickness"] = [["course", "thickness_mm"], ["1", 8.9], ["1", 9.1]]
+    header, *rows = parts.tables["circumferences"]
+    rows = [[*row, 29.0 if i % 2 else None] for i, row in enumerate(rows)]
+    parts.tables["circumferences"] = [[*header, "temperature_c"], *rows]
+    parts.registers["instruments"]["T-12"] |= {"friction": 0.2, "laying_mm": 0.3}
+    names = {one.kind for one in result_of(parts, tmp_path).table.sources}
+    assert names >= {
+        *("straps", "instrument_scale", "tape_tension", "tape_friction", "tape_level"),
+        *("tape_temperature", "area_term", "plate_readings", "bulge", "shell_temperature"),
+    }
+
+
+def test_the_radius_of_a_course_is_the_best_linear_estimate(tmp_path):
+    """Second method: generalised least squares with every covariance written out."""
+    job = tankcal.load(write_strapped_job(tmp_path, shell__shape_sd_mm=5.0))
+    wall = find_strapped_wall(job, lambda text: None)
+    sites, size = wall.field.sites, wall.field.amplitudes.variances_m2
+    z = sites.zeta
+    same = np.equal.outer(sites.course, sites.course)
+    node, weight = np.polynomial.legendre.leggauss(400)
+    names = ["common bulge", "drawn-in joints", "own bulge", "taper"]
+    profiles = {
+        "common bulge": ((2, 4, 6), (1, 0.1, 0.02)),
+        "own bulge": (range(2, 7), [k**-2.0 for k in range(2, 7)]),
+        "taper": ((1,), (1.0,)),
+    }
+    whole = wall.field.noise_m2 + 1e-12 * np.eye(len(z))
+    for place, name in enumerate(names):
+        if name == "drawn-in joints":
+            drawn = np.exp(-(1 - np.abs(z)) / 0.2) - weight @ np.exp(-(1 - np.abs(node)) / 0.2) / 2
+            over = np.exp(-(1 - np.abs(node)) / 0.2)
+            square = weight @ (over - weight @ over / 2) ** 2 / 2
+            part = np.outer(drawn, drawn) / square
+        else:
+            orders, shares = profiles[name]
+            unit = [np.polynomial.legendre.Legendre.basis(k) for k in orders]
+            norm = sum(s / (2 * k + 1) for k, s in zip(orders, shares, strict=True))
+            part = sum(s * np.outer(p(z), p(z)) for s, p in zip(shares, unit, strict=True)) / norm
+        whole += size[place] * (part * same if name in ("own bulge", "taper") else part)
+    design = np.equal.outer(sites.course, range(5)).astype(float)
+    inverse = np.linalg.inv(whole)
+    found = np.linalg.solve(design.T @ inverse @ design, design.T @ inverse @ wall.field.radius_m)
+    assert wall.radius_m == pytest.approx(found, rel=1e-9)
+
+
+def test_a_tape_on_the_shell_expands_with_it(tmp_path):
+    """Differences: what a warmer shell does to the volumes, the tape's own expansion in it."""
+    jobs = [
+        tankcal.load(write_strapped_job(tmp_path / str(warm), survey__shell_temperature_c=warm))
+        for warm in (31.0, 32.0)
+    ]
+    cooler, warmer = (tankcal.run(job, simulated=False) for job in jobs)
+    by = cooler.body.derivatives(np.array([8.4]))["shell_temperature"][0]
+    change = warmer.at(8.4).value_m3 - cooler.at(8.4).value_m3
+    assert by == pytest.approx(change, rel=1e-2)  # of a difference of 340 such changes
+    assert abs(by) < 2e-6 * cooler.at(8.4).value_m3  # two expansions that nearly cancel
+
+
+def test_a_wall_of_waves_has_the_area_that_the_tape_is_corrected_to(tmp_path, figure):
+    """Simulation: strapped walls with seams; without the area term their areas are too large."""
+    rng = np.random.default_rng(5)
+    away, uncorrected = [], []
+    for _ in range(12):
+        wall = make_wall(rng, "coil", radius_m=6.0, courses=5, bulge=False)
+        job = strapped_job(rng, wall, straps=2, folder=tmp_path / "job")
+        warmer = job.survey.shell_temperature_c - job.table.reference_temperature_c
+        for shape, found in ((job.strapping.shape_sd_m, away), (0.0, uncorrected)):
+            one = replace(job, strapping=replace(job.strapping, shape_sd_m=shape))
+            radius = find_strapped_wall(one, lambda text: None).radius_m - 0.008
+            radius = radius * (1 - 1.1e-5 * warmer)
+            area = [wall.areas(course, np.array([-0.6, 0.6])).mean() for course in range(5)]
+            found.append(np.mean(np.pi * radius**2 / area - 1))
+    figure("area of strapped walls of waves, mean ppm off with and without the area term",
+           f"{1e6 * np.mean(away):.0f} {1e6 * np.mean(uncorrected):.0f}")  # fmt: skip
+    assert abs(np.mean(away)) < 0.6 * np.mean(uncorrected)
+    assert np.mean(uncorrected) > 4e-5
+
+
+def test_girth_of_a_circle():
+    wall = GeneratedWall(6.5, 1, 2.0)
+    assert girth_of(wall, 0, 0.0, 0.008) == pytest.approx(2 * np.pi * 6.508, rel=1e-9)
+
+
+# ---- what is told of a crew
+
+
+def straps_with(change):
+    """Parts of tank S-1 whose circumferences were changed by change(rows, columns)."""
+    parts = strapped_parts()
+    header, *rows = (list(row) for row in parts.tables["circumferences"])
+    place = {name: i for i, name in enumerate(header)}
+    rows = change(rows, place) or rows
+    parts.tables["circumferences"] = [header, *rows]
+    return parts
+
+
+def exchanged(rows, place):
+    at = place["reading_m"]
+    for low, high in ((0, 8), (1, 9)):  # courses 1 and 5
+        rows[low][at], rows[high][at] = rows[high][at], rows[low][at]
+
+
+def one_off(rows, place):
+    rows[5][place["reading_m"]] += 0.010
+
+
+def copied(rows, place):
+    rows[3][place["reading_m"]] = rows[2][place["reading_m"]]
+
+
+def repeat_apart(rows, place):
+    again = list(rows[2])
+    again[place["reading_m"]] += 0.009
+    return [*rows, again]
+
+
+def single(rows, place):
+    return [row for row in rows if row[place["circumference"]] != "3b"]
+
+
+def of_inside(rows, place):
+    for row, plate in zip(rows, np.repeat([course[1] for course in S_1], 2), strict=True):
+        row[place["reading_m"]] -= 2 * np.pi * (4 * plate + 0.25) / 1000
+
+
+PLANTED = {
+    "courses_exchanged": exchanged,
+    "strap_apart": one_off,
+    "reading_copied": copied,
+    "repeats_apart": repeat_apart,
+    "controlled_by_nothing": single,
+    "strapped_unlike_nominal": of_inside,
+}
+
+
+@pytest.mark.parametrize("code", PLANTED)
+def test_planted_errors_are_named(tmp_path, code):
+    assert code in codes(result_of(straps_with(PLANTED[code]), tmp_path))
+
+
+def test_a_temperature_in_fahrenheit_is_named(tmp_path):
+    parts = strapped_parts()
+    header, *rows = parts.tables["circumferences"]
+    parts.tables["circumferences"] = [[*header, "temperature_c"], *([*row, 88.0] for row in rows)]
+    assert codes(result_of(parts, tmp_path)) == {"tape_in_fahrenheit"}
+
+
+def test_limits_of_repeats():
+    assert [limit_of_repeats(girth) for girth in (20, 40, 80, 150, 300)] == [
+        0.002, 0.003, 0.005, 0.006, 0.008,
+    ]  # fmt: skip
+
+
+# ---- bad input
+
+
+def bad_course(parts):
+    parts.tables["circumferences"][1][1] = "9"
+
+
+def bad_level(parts):
+    parts.tables["circumferences"][1][2] = 7.0
+
+
+def no_shape(parts):
+    del parts.settings["shell.shape_sd_mm"]
+
+
+def inside(parts):
+    parts.settings["survey.side"] = "inside"
+
+
+def no_thickness(parts):
+    del parts.registers["instruments"]["T-12"]["thickness_mm"]
+
+
+def half_stretch(parts):
+    del parts.registers["instruments"]["T-12"]["e_gpa"]
+
+
+def no_course(parts):
+    parts.tables["circumferences"] = parts.tables["circumferences"][:-2]
+
+
+def other_place(parts):
+    parts.tables["circumferences"][2][0] = "1a"
+
+
+def no_excess(parts):
+    parts.tables["obstructions"][3][5] = None
+
+
+def no_circumference(parts):
+    parts.tables["obstructions"][1][0] = "7z"
+
+
+def no_master(parts):
+    parts.registers["instruments"]["T-12"]["master"] = "M"
+
+
+def no_comparison(parts):
+    parts.registers["instruments"]["M"] = parts.registers["instruments"]["T-12"] | {}
+    parts.registers["instruments"]["T-12"] |= {"master": "M"}
+
+
+def both(parts):
+    parts.tables["points"] = [["point", "x_m", "y_m", "z_m"], ["P", 7.2, 0.0, 1.0]]
+
+
+def leaning(parts):
+    parts.settings["bottom.form"] = "leaning"
+
+
+def no_tape(parts):
+    parts.registers["instruments"]["T-12"]["kind"] = "edm"
+
+
+BAD = {
+    "no_such_name": bad_course,
+    "level_outside_course": bad_level,
+    "shape_not_declared": no_shape,
+    "strapped_inside": inside,
+    "tape_thickness_missing": no_thickness,
+    "stretch_incomplete": half_stretch,
+    "course_not_strapped": no_course,
+    "repeat_elsewhere": other_place,
+    "obstruction_incomplete": no_excess,
+    "no_such_name in obstructions": no_circumference,
+    "no_such_master": no_master,
+    "master_not_compared": no_comparison,
+    "points_beside_straps": both,
+    "bottom_needs_axis": leaning,
+    "tape_not_named": no_tape,
+}
+
+
+@pytest.mark.parametrize("code", BAD)
+def test_bad_input_is_told(tmp_path, code):
+    parts = strapped_parts()
+    BAD[code](parts)
+    with pytest.raises(InputError) as refused:
+        tankcal.load(write_folder(tmp_path, parts))
+    found = {one.expected.code for one in refused.value.problems}
+    assert code.split()[0] in found, refused.value
+    assert all("\n" not in str(one) for one in refused.value.problems)
