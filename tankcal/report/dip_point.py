@@ -31,7 +31,8 @@ def dip_point(record):
         return DipPoint(min(max(share, 0.0), 1.0), along_m=along)
     if kind != "vertical" or datum.get("dip_x_m") is None:
         return None
-    east, north = (datum[f"dip_{axis}_m"] - record["shell"][f"{axis}_m"] for axis in "xy")
+    axis_m = record["shell"] or {"x_m": 0.0, "y_m": 0.0}  # a strapped tank: from its own axis
+    east, north = (datum[f"dip_{axis}_m"] - axis_m[f"{axis}_m"] for axis in "xy")
     off = hypot(east, north)
     share = min(off / record["courses"][0]["inside_radius_m"], 1.0)
     return DipPoint(share, off, degrees(atan2(east, north)) % 360)

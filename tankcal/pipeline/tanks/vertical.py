@@ -78,7 +78,7 @@ def widen_bottom(part, shell):
         "shell_temperature": -shell.expansion_per_k / shell.scale,
         "expansion": (shell.scale - 1) / shell.expansion_per_k / shell.scale,
     }
-    bearing = ("offset", *shell.bearing)
+    bearing = [name for name in ("offset", *shell.bearing) if name not in shell.unused]
     return Widened(part, {name: rate for name, rate in rates.items() if name in bearing})
 
 

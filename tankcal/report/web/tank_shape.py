@@ -28,7 +28,8 @@ def tank_view(paper):
     elif kind in _PROFILES and record["solid"]:
         found["solid"] = _PROFILES[kind]({one["code"]: one["value"] for one in record["solid"]})
     else:
-        found["reason"] = paper.word("web.no_view")
+        code = "no_view_of_straps" if record.get("strapping") else "no_view"
+        found["reason"] = paper.word(f"web.{code}")
     return Block({"kind": "tank_view", "text": paper.word("web.view_here"), **found})
 
 
