@@ -14,6 +14,7 @@ from tankcal.job.contract.strapping import NEEDED
 from tankcal.job.tables import nearest
 from tankcal.messages import message
 
+MOST_STRAPS = 1000  # readings round one tank
 END_M = 0.02  # so far beyond its course a level may stand
 
 
@@ -22,6 +23,15 @@ def check_strapping(values, tables, registers, raw, log):
     straps = tables["circumferences"]
     if not is_strapped(tables):
         _tell_without_effect(tables, log)
+        return
+    if len(straps.rows) > MOST_STRAPS:
+        expected = message(
+            "too_many_straps",
+            "{count} readings; expected at most {most}",
+            count=len(straps.rows),
+            most=MOST_STRAPS,
+        )
+        log.problem(straps.file, expected)
         return
     tapes = {
         name: given
