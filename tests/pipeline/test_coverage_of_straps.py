@@ -4,14 +4,20 @@ The tape of `generated_strapping` lies on the hull of the outside of `generated_
 declares the size of the shape, off by some 30 %.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from draws import draws
 from generated_strapping import shape_of, strapped_job
 from generated_walls import make_wall
-from test_coverage_of_walls import judged, study
+from test_coverage_of_walls import ROWS, judged, study
 
+from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.tanks import body_of
+
+TOTAL, BULGES = ROWS - 1, ("barrel", "taper")
 
 
 def found_of(rng, family, straps, folder, declared=1.0):
@@ -34,3 +40,40 @@ def found_of(rng, family, straps, folder, declared=1.0):
 def test_intervals_hold_on_walls_that_are_not_the_model(tmp_path, figure):
     parts, _, _ = study(1, tmp_path, figure, found_of=found_of)
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / 15)
+
+
+@pytest.mark.study
+def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
+    walls = draws(4, 200)
+    parts, wide, classes = study(walls, tmp_path, figure, found_of=found_of)
+    count = walls * len(classes)
+    assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)
+    assert min(classes) > 0.92 - 3 * np.sqrt(0.95 * 0.05 / walls)
+    assert wide < 1.6
+
+
+@pytest.mark.study
+def test_without_the_area_term_intervals_hold_less_study(tmp_path, figure):
+    """Walls with seams that do not bulge, as is said of them: what is left is the area term."""
+    found = {1.0: [], 0.0: []}
+    for seed in range(draws(30, 1000)):
+        rng = np.random.default_rng(seed)
+        radius = rng.uniform(3.5, 5.5)
+        wall = make_wall(rng, "coil", radius_m=radius, courses=6, bulge=False)
+        job = strapped_job(rng, wall, straps=2, folder=tmp_path / "job", laying_m=3e-4)
+        declared = (DeclaredInput(name, 1e-4, "mm", 0.1) for name in BULGES)
+        job = replace(job, inputs=(*job.inputs, *declared))
+        for part, those in found.items():
+            shape = part * job.strapping.shape_sd_m
+            one = replace(job, strapping=replace(job.strapping, shape_sd_m=shape))
+            body = body_of(one, find_strapped_wall(one, lambda text: None))
+            those.append(judged(wall, body, "coil", 2))
+    held, away = {}, {}
+    for part, those in found.items():
+        error = np.array([one.error[TOTAL] for one in those])
+        held[part] = np.mean(np.abs(error) <= [one.expanded[TOTAL] for one in those])
+        away[part] = 1e6 * np.mean(error)
+    figure("held totals with and without the area term", f"{held[1.0]:.3f} {held[0.0]:.3f}")
+    figure("totals off, mean ppm, with and without it", f"{away[1.0]:.0f} {away[0.0]:.0f}")
+    assert held[1.0] > held[0.0] + 0.1
+    assert abs(away[1.0]) < 0.7 * away[0.0]
