@@ -6,6 +6,7 @@ import numpy as np
 
 from tankcal.gum.distributions import within
 from tankcal.job.checks.bearing import useless_inputs
+from tankcal.job.checks.extent import is_strapped
 from tankcal.job.contract import INPUTS
 from tankcal.job.contract.bottom import bottom_form
 from tankcal.job.contract.parts import MESH_UNITS_M
@@ -249,7 +250,8 @@ def _material(values):
 
 
 def _courses(tables):
-    table, welds, read = tables["courses"], tables["welds"], gauged(tables["thickness"])
+    table, welds = tables["courses"], tables["welds"]
+    read = gauged(tables["thickness"]) if is_strapped(tables) else {}
     if table is None:
         return ()
     azimuths = {}

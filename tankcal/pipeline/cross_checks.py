@@ -49,7 +49,7 @@ def check_scan(job, scan, top_m):
     given = job.horizontal or job.sphere
     plate = given.thickness_m if job.survey.side == "outside" else 0.0
     inside = diameter - 2 * plate
-    problems = [*_against_drawing(job, diameter), *_of_side(job, inside, plate, 0.0)]
+    problems = [*_against_drawing(job, diameter), *check_side(job, inside, plate, 0.0)]
     if scan.noise_m > MISFIT * diameter + MISFIT_M:
         text = message(
             "points_misfit",
@@ -110,10 +110,11 @@ def _first_course(wall, course):
 def _against_plates(job, wall):
     radius, sd, plate = _first_course(wall, job.courses[0])
     inside = 2 * (radius - (plate if job.survey.side == "outside" else 0.0))
-    return _of_side(job, inside, plate, 2 * sd)
+    return check_side(job, inside, plate, 2 * sd)
 
 
-def _of_side(job, inside_m, plate_m, sd_m):
+def check_side(job, inside_m, plate_m, sd_m):
+    """Warnings of an inside diameter of the first course against the drawing's, to the plate."""
     nominal, side = job.tank.nominal_diameter_m, job.survey.side
     text = side_doubt(inside_m, nominal, job.diameter_is, plate_m, side, sd_m)
     return [] if text is None else [Problem("job.toml", text, column="checks.diameter_is")]

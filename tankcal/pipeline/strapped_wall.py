@@ -16,13 +16,17 @@ from functools import cached_property
 import numpy as np
 
 from tankcal.geometry.field.amplitudes import estimate_amplitudes
+from tankcal.geometry.field.blunders import against_others, restricted_precision
 from tankcal.geometry.field.estimate import WallField
-from tankcal.geometry.field.sites import Sites
+from tankcal.geometry.field.sites import Sites, free_design
 from tankcal.geometry.girth import perimeter_excess
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
+from tankcal.survey.network.reliability import noncentrality
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 from tankcal.tank.body import Factor
+
+UNCONTROLLED = 1e-9  # of a reading's variance: what the others leave of it where there are none
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,21 @@ class StrappedWall:
     def radius_m(self):
         """(courses,) radius of each course as measured, of the circle of equal area."""
         return self.field.outlines_m[:, 0, 0]
+
+    @cached_property
+    def tests(self):
+        """(w, mdb_m) of each adjusted reading, (n,) each: its departure from what all others show
+        over its sd, and the smallest blunder of it, m of circumference, that the test finds; nan
+        and inf of a reading that no other one controls.
+        """
+        whole = self.field.covariance_m2
+        precision = restricted_precision(whole, free_design(self.field.sites)[0])
+        radius = self.field.radius_m - self.field.radius_m.mean()
+        found = against_others(precision, precision @ radius, np.ones(len(radius), dtype=bool))
+        size = np.diag(precision)
+        controlled = size * np.diag(whole) > UNCONTROLLED
+        mdb = noncentrality() / np.sqrt(np.where(controlled, size, 1.0)) / self._per_m
+        return np.where(controlled, found.w, np.nan), np.where(controlled, mdb, np.inf)
 
     @property
     def circumference_m(self):

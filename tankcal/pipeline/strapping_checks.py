@@ -12,6 +12,7 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
+from tankcal.pipeline.cross_checks import check_side
 
 FILE = "circumferences.csv"
 FAHRENHEIT_K = 8.0  # from the shell's: so near a temperature in Fahrenheit is that of the shell
@@ -40,6 +41,7 @@ def check_strapped(job, wall):
         *_of_repeats(wall),
         *_of_pairs(job, wall),
         *_of_courses(job, wall),
+        *_of_first_course(job, wall),
         *_uncontrolled(job, wall),
     )
 
@@ -196,6 +198,27 @@ def _of_courses(job, wall):
                 steps_mm=1000 * steps,
             )
             yield _problem(text, column="course")
+
+
+def _of_first_course(job, wall):
+    """Its inside diameter against the drawing's, and its circumference against the one declared."""
+    course = job.courses[0]
+    plate = course.thickness_m + course.paint_m
+    yield from check_side(job, 2 * (wall.radius_m[0] - plate), plate, 0.0)
+    found, declared = wall.circumference_m[0], job.circumference_m
+    if declared is not None and abs(found - declared) > limit_of_repeats(found):
+        yield Problem(
+            "job.toml",
+            message(
+                "strapped_unlike_declared",
+                "{declared_m:.4f} m, and {found_m:.4f} m by circumferences.csv: they differ by"
+                " {miss_mm:+.0f} mm",
+                declared_m=declared,
+                found_m=found,
+                miss_mm=1000 * (found - declared),
+            ),
+            column="checks.circumference_m",
+        )
 
 
 def _steps(radii_m):

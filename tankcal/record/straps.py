@@ -1,5 +1,7 @@
 """The part of the record that says what a tape measured: readings, their corrections, tapes."""
 
+import numpy as np
+
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.record.schema import Saved, key
 from tankcal.record.survey import radius_sd
@@ -22,6 +24,8 @@ class StrapReading(Saved):
     circumference_m: float = key("of the painted shell, after these corrections")
     sd_m: float = key("of it, of what no other reading shares")
     difference_m: float = key("from the circumference of its course")
+    w: float | None = key("departure from what all others show over its sd; null: uncontrolled")
+    mdb_m: float | None = key("smallest blunder that this test finds; null: no other controls it")
     used: bool = key("false: only compared")
     row: int | None = key("of the file")
 
@@ -88,6 +92,7 @@ def _reading(result, index):
     one = wall.reduced[index]
     names = [course.name for course in result.job.courses]
     of_course = wall.circumference_m[names.index(one.strap.course)]
+    w, mdb = (dict(zip(wall.adjusted.tolist(), test, strict=True)) for test in wall.tests)
     return StrapReading(
         circumference=one.strap.name,
         course=one.strap.course,
@@ -98,9 +103,15 @@ def _reading(result, index):
         circumference_m=one.circumference_m,
         sd_m=one.sd_m,
         difference_m=one.circumference_m - of_course,
+        w=_finite(w.get(index)),
+        mdb_m=_finite(mdb.get(index)),
         used=not one.strap.check,
         row=one.strap.row,
     )
+
+
+def _finite(value):
+    return None if value is None or not np.isfinite(value) else value
 
 
 def _tape(tape, sd, given):

@@ -101,6 +101,31 @@ def test_the_radius_of_a_course_is_the_best_linear_estimate(tmp_path):
     assert wall.radius_m == pytest.approx(found, rel=1e-9)
 
 
+def test_a_reading_is_tested_against_all_others(tmp_path):
+    """Second method: each reading left out, its course predicted by the others, w by their sds."""
+    job = tankcal.load(write_strapped_job(tmp_path))
+    wall = find_strapped_wall(job, lambda text: None)
+    w, mdb = wall.tests
+    whole, course = wall.field.covariance_m2, wall.field.sites.course
+    design = np.equal.outer(course, range(5)).astype(float)
+    for one in (0, 5):
+        others = np.arange(len(course)) != one
+        system = np.block([[whole[np.ix_(others, others)], design[others]],
+                           [design[others].T, np.zeros((5, 5))]])  # fmt: skip
+        right = np.concatenate([whole[one, others], design[one]])
+        weights = np.linalg.solve(system, right)
+        away = wall.field.radius_m[one] - weights[: others.sum()] @ wall.field.radius_m[others]
+        sd = np.sqrt(whole[one, one] - weights @ right)
+        assert w[one] == pytest.approx(away / sd, rel=1e-6)
+        assert mdb[one] == pytest.approx(4.13 * sd * 2 * np.pi, rel=1e-3)
+    straps = tuple(strap for strap in job.strapping.straps if strap.name != "3b")
+    alone = replace(job, strapping=replace(job.strapping, straps=straps))
+    w, mdb = find_strapped_wall(alone, lambda text: None).tests
+    assert np.isnan(w[4])
+    assert np.isinf(mdb[4])
+    assert np.all(np.isfinite(np.delete(w, 4)))
+
+
 def test_a_tape_on_the_shell_expands_with_it(tmp_path):
     """Differences: what a warmer shell does to the volumes, the tape's own expansion in it."""
     jobs = [
@@ -203,6 +228,14 @@ def test_a_temperature_in_fahrenheit_is_named(tmp_path):
     assert codes(result_of(parts, tmp_path)) == {"tape_in_fahrenheit"}
 
 
+def test_what_was_declared_of_the_first_course_is_compared(tmp_path):
+    """The drawing's diameter to the plate, and a circumference under [checks]."""
+    given = {"checks__circumference_m": 45.40, "checks__diameter_is": "outside"}
+    result = result_of(strapped_parts(**given), tmp_path)
+    found = {one.expected.code for one in result.warnings if one.file == "job.toml"}
+    assert found >= {"strapped_unlike_declared", "inside_unlike_drawing"}
+
+
 def test_limits_of_repeats():
     assert [limit_of_repeats(girth) for girth in (20, 40, 80, 150, 300)] == [
         0.002, 0.003, 0.005, 0.006, 0.008,
@@ -273,7 +306,18 @@ def no_tape(parts):
     parts.registers["instruments"]["T-12"]["kind"] = "edm"
 
 
+def free_scale(parts):
+    parts.registers["instruments"]["T-12"]["u_scale_ppm"] = "free"
+
+
+def too_many(parts):
+    header, *rows = parts.tables["circumferences"]
+    parts.tables["circumferences"] = [header, *(rows * 101)]
+
+
 BAD = {
+    "tape_scale_free": free_scale,
+    "too_many_straps": too_many,
     "no_such_name": bad_course,
     "level_outside_course": bad_level,
     "shape_not_declared": no_shape,

@@ -137,7 +137,7 @@ def whole(job):
     result = tankcal.run(tankcal.load(job))
 
     def build(record_path, folder, *_):
-        lacks = [part for part, value in records.load(record_path).items() if not value]
+        lacks = report.missing(records.load(record_path))
         notebook = execute(joined(record_path.name, lacks), folder)
         for part in ("certificate", "working-papers"):
             text = json.dumps(blocks_of(notebook, part), ensure_ascii=False)

@@ -168,11 +168,17 @@ class WallField:
         """(n, p) X, and (courses,) which of its columns are the radii."""
         return free_design(self.sites)
 
+    @property
+    def covariance_m2(self):
+        """(n, n) V: of the readings, by the wall and by their noise."""
+        whole = self._covariances.total(self.amplitudes.variances_m2) + self.noise_m2
+        whole.flat[:: len(whole) + 1] += LEAST_NOISE_M**2
+        return whole
+
     @cached_property
     def _factored(self):
         """Cholesky factor of V, V^-1 X, and that of X' V^-1 X."""
-        whole = self._covariances.total(self.amplitudes.variances_m2) + self.noise_m2
-        whole.flat[:: len(whole) + 1] += LEAST_NOISE_M**2
+        whole = self.covariance_m2
         factor = scipy.linalg.cho_factor(whole, lower=True, overwrite_a=True, check_finite=False)
         columns = self._columns[0]
         by_columns = scipy.linalg.cho_solve(factor, columns, check_finite=False)

@@ -10,6 +10,7 @@ from tankcal.job.checking import (
     temperature_missing,
 )
 from tankcal.job.checks.extent import is_strapped
+from tankcal.job.contract.registers import FREE
 from tankcal.job.contract.strapping import NEEDED
 from tankcal.job.tables import nearest
 from tankcal.messages import message
@@ -147,11 +148,21 @@ def _check_tapes(straps, instruments, tapes, raw, log):
         given = tapes.get(name)
         if given is None:
             continue
-        for key, expected in _missing_of(given, tapes, straps, name):
+        for key, expected in _missing_of(given, tapes):
             log.problem(file, expected, rows.get(name), f"{name}.{key}")
 
 
-def _missing_of(given, tapes, straps, name):
+def _missing_of(given, tapes):
+    for key in ("u_scale_ppm", "u_offset_mm"):
+        if given[key] == FREE:
+            yield (
+                key,
+                message(
+                    "tape_scale_free",
+                    "found free; expected its standard uncertainty: nothing else in a strapping"
+                    " tells it",
+                ),
+            )
     if given["thickness_mm"] is None:
         yield (
             "thickness_mm",
