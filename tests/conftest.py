@@ -6,6 +6,8 @@ import shutil
 from collections import Counter
 from pathlib import Path
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: two workers share two cores
+
 import pytest
 from hypothesis import settings
 

@@ -266,6 +266,7 @@ def strapped_parts(**settings):
         "material.e_gpa": 206.0,
         "material.expansion_per_k": 1.1e-5,
         "shell.shape_sd_mm": 0.0,
+        "table.step_m": 0.1,
     } | {key.replace("__", "."): value for key, value in settings.items()}
     bottoms = np.concatenate([[0.0], np.cumsum(heights)])
     straps = [["circumference", "course", "level_m", "reading_m", "s_mm", "tension_n"]]

@@ -139,6 +139,7 @@ def test_a_tape_on_the_shell_expands_with_it(tmp_path):
     assert abs(by) < 2e-6 * cooler.at(8.4).value_m3  # two expansions that nearly cancel
 
 
+@pytest.mark.slow
 def test_a_wall_of_waves_has_the_area_that_the_tape_is_corrected_to(tmp_path, figure):
     """Simulation: strapped walls with seams; without the area term their areas are too large."""
     rng = np.random.default_rng(5)
@@ -216,6 +217,7 @@ PLANTED = {
 }
 
 
+@pytest.mark.slow(after=3)
 @pytest.mark.parametrize("code", PLANTED)
 def test_planted_errors_are_named(tmp_path, code):
     assert code in codes(result_of(straps_with(PLANTED[code]), tmp_path))
@@ -336,6 +338,7 @@ BAD = {
 }
 
 
+@pytest.mark.slow(after=6)
 @pytest.mark.parametrize("code", BAD)
 def test_bad_input_is_told(tmp_path, code):
     parts = strapped_parts()
