@@ -317,7 +317,12 @@ def too_many(parts):
     parts.tables["circumferences"] = [header, *(rows * 101)]
 
 
+def no_temperature(parts):
+    del parts.settings["survey.shell_temperature_c"]
+
+
 BAD = {
+    "tape_of_no_temperature": no_temperature,
     "tape_scale_free": free_scale,
     "too_many_straps": too_many,
     "no_such_name": bad_course,

@@ -48,7 +48,7 @@ def check_strapping(values, tables, registers, raw, log):
         _refuse_others(tables["thickness"], "course", known, log)
     _check_comparisons(tables["tape_checks"], tapes, raw, log)
     if values is not None:
-        _check_settings(values, tables, raw, log)
+        _check_settings(values, tables, tapes, raw, log)
         _check_levels(straps, courses, values, log)
 
 
@@ -241,7 +241,7 @@ def _check_comparisons(table, tapes, raw, log):
         log.problem(file, expected, rows.get(working[0]), f"{working[0]}.master")
 
 
-def _check_settings(values, tables, raw, log):
+def _check_settings(values, tables, tapes, raw, log):
     if values["shell"]["shape_sd_mm"] is None and is_not_given(raw, "shell", "shape_sd_mm"):
         expected = message(
             "shape_not_declared",
@@ -250,6 +250,14 @@ def _check_settings(values, tables, raw, log):
             " circle",
         )
         tell(log.problem, raw, "shell", "shape_sd_mm", expected)
+    expands = any(given["expansion_per_k"] for given in tapes.values())
+    read = None not in tables["circumferences"].of("temperature_c")
+    if expands and not read and is_not_given(raw, "survey", "shell_temperature_c"):
+        expected = message(
+            "tape_of_no_temperature",
+            "missing; expected it, or temperature_c of every reading: the tape expands",
+        )
+        tell(log.problem, raw, "survey", "shell_temperature_c", expected)
     if values["survey"]["side"] == "inside":
         expected = message(
             "strapped_inside", "found inside; expected outside: a tape lies on the outside"
