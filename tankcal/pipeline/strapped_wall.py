@@ -22,6 +22,7 @@ from tankcal.geometry.field.sites import Sites, free_design
 from tankcal.geometry.girth import perimeter_excess
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
+from tankcal.pipeline.tanks import shell_zero
 from tankcal.survey.network.reliability import noncentrality
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 from tankcal.tank.body import Factor
@@ -168,41 +169,40 @@ def find_strapped_wall(job, progress):
     nominal = job.tank.nominal_diameter_m / 2
     reduced = reduce_straps(straps, job.survey.shell_temperature_c, 2 * nominal)
     adjusted = np.array([i for i, one in enumerate(reduced) if not one.strap.check])
-    term = AreaTerm(*perimeter_excess(straps.shape_sd_m, nominal))
     used = [reduced[i] for i in adjusted]
     joints = np.cumsum([0.0] + [course.height_m for course in job.courses])
+    sites = _sites(job, used, joints)
+    term = AreaTerm(*perimeter_excess(straps.shape_sd_m, nominal))
+    per_m = np.full(len(used), 1 / (FULL_TURN * np.sqrt(1 + term.mean)))
+    radius = per_m * [one.circumference_m for one in used]
+    noise = _noise(used, radius, per_m, term)
+    amplitudes = estimate_amplitudes(sites, radius, noise, nominal)
+    plates = {
+        index: straps.plate_sd_m[course.name]
+        for index, course in enumerate(job.courses)
+        if course.name in straps.plate_sd_m
+    }
+    field = WallField(sites, radius, noise, amplitudes, nominal, cylinders=True)
+    return StrappedWall(joints, reduced, adjusted, term, field, plates, tapes_used(straps))
+
+
+def _sites(job, used, joints_m):
+    """`Sites` of readings: each the mean of a whole turn."""
     names = [course.name for course in job.courses]
     course = np.array([names.index(one.strap.course) for one in used])
-    level = np.array([one.strap.level_m for one in used]) + _zero_m(job)
-    low, high = joints[course], joints[course + 1]
-    sites = Sites(
+    level = np.array([one.strap.level_m for one in used]) + shell_zero(job, None)
+    low, high = joints_m[course], joints_m[course + 1]
+    return Sites(
         course=course,
         ring=np.arange(len(used)),
         zeta=2 * (level - low) / (high - low) - 1,
         azimuth_rad=np.full(len(used), np.nan),
         leans=np.zeros(len(used), dtype=bool),
     )
-    circumference = np.array([one.circumference_m for one in used])
-    per_m = np.full(len(used), 1 / (FULL_TURN * np.sqrt(1 + term.mean)))
-    radius = circumference * per_m
+
+
+def _noise(used, radius_m, per_m, term):
+    """(n, n) covariance of the radii: what each reading has of its own, and what they share."""
     columns = [column for _, column in shared_effects(used, per_m).values()]
-    columns.append(radius * term.sd / 2)
-    common = np.column_stack(columns)
-    own = np.array([one.sd_m for one in used]) * per_m
-    noise = np.diag(own**2) + common @ common.T
-    amplitudes = estimate_amplitudes(sites, radius, noise, nominal)
-    plates = {
-        index: straps.plate_sd_m[name]
-        for index, name in enumerate(names)
-        if name in straps.plate_sd_m
-    }
-    field = WallField(sites, radius, noise, amplitudes, nominal, cylinders=True)
-    return StrappedWall(joints, reduced, adjusted, term, field, plates, tapes_used(straps))
-
-
-def _zero_m(job):
-    """Height of the table's zero above the bottom of the first course."""
-    datum = job.datum
-    if datum.dip_plate_z_m is None:
-        return 0.0
-    return datum.dip_plate_z_m - (datum.bottom_z_m or 0.0)
+    common = np.column_stack([*columns, radius_m * term.sd / 2])
+    return np.diag((per_m * [one.sd_m for one in used]) ** 2) + common @ common.T

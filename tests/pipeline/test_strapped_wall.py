@@ -321,7 +321,13 @@ def no_temperature(parts):
     del parts.settings["survey.shell_temperature_c"]
 
 
+def half_a_pull(parts):
+    header, *rows = parts.tables["circumferences"]
+    parts.tables["circumferences"] = [[*header, "pulls"], *([*row, 2.5] for row in rows)]
+
+
 BAD = {
+    "part_of_a_pull": half_a_pull,
     "tape_of_no_temperature": no_temperature,
     "tape_scale_free": free_scale,
     "too_many_straps": too_many,

@@ -141,6 +141,12 @@ def _check_tapes(straps, instruments, tapes, raw, log):
                 hint=nearest(tape, tapes) if found is None else "",
             )
             log.problem(straps.file, expected, row, "instrument")
+    for row, pulls in zip(straps.rows, straps.of("pulls"), strict=True):
+        if pulls is not None and pulls != int(pulls):
+            expected = message(
+                "part_of_a_pull", "found {pulls:g}; expected a whole number", pulls=pulls
+            )
+            log.problem(straps.file, expected, row, "pulls")
     if "instruments" not in raw.registers or raw.registers["instruments"] is None:
         return
     rows = raw.registers["instruments"].rows

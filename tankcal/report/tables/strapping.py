@@ -35,9 +35,12 @@ STRAPS = Table(
 
 
 def in_ppm(tape):
-    """A tape with its scale in ppm."""
+    """A tape with its scale in ppm; nothing of a comparison where there was none."""
     shown = {key: 1e6 * tape[key] for key in ("correction", "u_scale", "u_comparison")}
-    return tape | shown | {"certificate": tape["certificate"] or None}
+    shown["certificate"] = tape["certificate"] or None
+    if not tape["master"]:
+        shown |= dict.fromkeys(("u_comparison", "master", "comparisons"))
+    return tape | shown
 
 
 TAPES = Table(
