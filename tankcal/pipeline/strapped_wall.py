@@ -15,6 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
+from tankcal.errors import SolutionError
 from tankcal.geometry.field.amplitudes import estimate_amplitudes
 from tankcal.geometry.field.blunders import against_others, restricted_precision
 from tankcal.geometry.field.estimate import WallField
@@ -176,14 +177,32 @@ def find_strapped_wall(job, progress):
     per_m = np.full(len(used), 1 / (FULL_TURN * np.sqrt(1 + term.mean)))
     radius = per_m * [one.circumference_m for one in used]
     noise = _noise(used, radius, per_m, term)
-    amplitudes = estimate_amplitudes(sites, radius, noise, nominal)
+    field = field_of_straps(sites, radius, noise, nominal)
     plates = {
         index: straps.plate_sd_m[course.name]
         for index, course in enumerate(job.courses)
         if course.name in straps.plate_sd_m
     }
-    field = WallField(sites, radius, noise, amplitudes, nominal, cylinders=True)
     return StrappedWall(joints, reduced, adjusted, term, field, plates, tapes_used(straps))
+
+
+def field_of_straps(sites, radius_m, noise_m2, nominal_m):
+    """`WallField` of the courses as cylinders; SolutionError where the readings tell nothing."""
+    try:
+        amplitudes = estimate_amplitudes(sites, radius_m, noise_m2, nominal_m)
+        field = WallField(sites, radius_m, noise_m2, amplitudes, nominal_m, cylinders=True)
+        sound = np.all(np.isfinite(field.outlines_m))
+    except np.linalg.LinAlgError:
+        sound = False
+    if not sound:
+        raise SolutionError(
+            message(
+                "straps_tell_nothing",
+                "the readings of the tape tell nothing beside its uncertainty: check u_scale_ppm,"
+                " u_offset_mm, section_mm2 and e_gpa in instruments.toml",
+            )
+        )
+    return field
 
 
 def _sites(job, used, joints_m):

@@ -9,8 +9,8 @@ from generated_walls import GeneratedWall, make_wall
 from job_builder import S_1, strapped_parts, write_book, write_folder, write_strapped_job
 
 import tankcal
-from tankcal.errors import InputError
-from tankcal.pipeline.strapped_wall import find_strapped_wall
+from tankcal.errors import InputError, SolutionError
+from tankcal.pipeline.strapped_wall import field_of_straps, find_strapped_wall
 from tankcal.pipeline.strapping_checks import limit_of_repeats
 
 OPEN = {0.9: 146.70404, 1.8: 293.40807, 3.6: 586.81461, 6.0: 978.05449, 8.4: 1369.27879}
@@ -319,6 +319,25 @@ def too_many(parts):
 
 def no_temperature(parts):
     del parts.settings["survey.shell_temperature_c"]
+
+
+def test_a_tape_that_is_hardly_known_makes_a_wide_table(tmp_path):
+    """A scale that is unsure by 10 %, an offset by 10 m, beside readings to a micrometre."""
+    parts = strapped_parts()
+    parts.registers["instruments"]["T-12"] |= {"u_scale_ppm": 1e5, "u_offset_mm": 1e4}
+    header, *rows = parts.tables["circumferences"]
+    parts.tables["circumferences"] = [header, *([*row[:4], 1e-3, row[5]] for row in rows)]
+    result = result_of(parts, tmp_path)
+    assert result.table.U_m3[-1] > 0.5 * result.table.volume_m3[-1]
+
+
+def test_readings_that_tell_nothing_are_refused(tmp_path):
+    """A covariance that rounding has spoilt is told in words."""
+    wall = find_strapped_wall(tankcal.load(write_strapped_job(tmp_path)), lambda text: None)
+    field = wall.field
+    spoilt = field.noise_m2 - 1e-3 * np.ones_like(field.noise_m2)
+    with pytest.raises(SolutionError, match="tell nothing"):
+        field_of_straps(field.sites, field.radius_m, spoilt, field.nominal_m)
 
 
 def half_a_pull(parts):

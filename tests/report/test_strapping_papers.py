@@ -64,7 +64,7 @@ def test_the_csv_file_has_every_reading(strapped):
     assert {row["used"] for row in rows} == {"yes"}
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("language", ["en", "es", "pt-BR"])
 def test_the_workbook_has_a_sheet_of_it(strapped, tmp_path, language):
     from tankcal.report.workbook import write as write_workbook

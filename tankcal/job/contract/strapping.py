@@ -138,8 +138,8 @@ KEYS = {
 }
 TAPE = (  # keys of instruments.toml
     _number("thickness_mm", "thickness of a tape that straps a tank, millimetres", 0, 5),
-    _number("section_mm2", "section of a tape, mm²; with e_gpa it stretches", 0, 100),
-    _number("e_gpa", "Young's modulus of a tape, GPa", 0, 500),
+    _number("section_mm2", "section of a tape, mm²; with e_gpa it stretches", 0.1, 100),
+    _number("e_gpa", "Young's modulus of a tape, GPa", 1, 500),
     _number(
         "friction",
         "coefficient between tape and shell; blank: a tension is the mean round the tank",
