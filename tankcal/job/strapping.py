@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.job.checks.strapping import tapes_read
+from tankcal.job.checks.strapping import tapes_of, tapes_read
 from tankcal.survey.strapping import Comparison, Obstruction, Strap, Strapping, Tape
 
 LEAST_GAUGE_SD_M = 5e-5  # of a mean of gauge readings that nobody gave a standard deviation
@@ -13,12 +13,7 @@ def make_strapping(values, tables, registers):
     table = tables["circumferences"]
     if table is None or not table.rows:
         return None
-    tapes = {
-        name: given
-        for name, given in registers["instruments"].items()
-        if given["kind"].lower() == "tape"
-    }
-    keys = values["strapping"]
+    tapes, keys = tapes_of(registers), values["strapping"]
     return Strapping(
         straps=_straps(table, tapes),
         tapes=tuple(_tape(name, given) for name, given in tapes.items()),

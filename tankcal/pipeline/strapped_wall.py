@@ -24,6 +24,7 @@ from tankcal.geometry.girth import perimeter_excess
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 from tankcal.pipeline.tanks import shell_zero
+from tankcal.pipeline.wall import joints_of
 from tankcal.survey.network.reliability import noncentrality
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 from tankcal.tank.body import Factor
@@ -171,7 +172,7 @@ def find_strapped_wall(job, progress):
     reduced = reduce_straps(straps, job.survey.shell_temperature_c, 2 * nominal)
     adjusted = np.array([i for i, one in enumerate(reduced) if not one.strap.check])
     used = [reduced[i] for i in adjusted]
-    joints = np.cumsum([0.0] + [course.height_m for course in job.courses])
+    joints = joints_of(job)
     sites = _sites(job, used, joints)
     term = AreaTerm(*perimeter_excess(straps.shape_sd_m, nominal))
     per_m = np.full(len(used), 1 / (FULL_TURN * np.sqrt(1 + term.mean)))

@@ -5,6 +5,7 @@ a reading of the inside, a strap that is off by itself.
 """
 
 import tomllib
+from functools import cache
 from importlib.resources import files
 from itertools import combinations, pairwise
 
@@ -22,6 +23,7 @@ EXCHANGED_SHARE, EXCHANGED_M = 0.5, 1.5e-3  # of the steps between courses: left
 APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
 
 
+@cache
 def limits_of_repeats():
     """((up to a circumference, limit), ...) m, of the rule file; its last holds without end."""
     text = files("tankcal.pipeline").joinpath("limits/strapping.toml").read_text("utf-8")

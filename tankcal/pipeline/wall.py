@@ -120,7 +120,7 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None):
             count=len(job.points.names),
         )
     )
-    shell = _shell(job, _heights(job), radial_sds(job.points))
+    shell = _shell(job, joints_of(job), radial_sds(job.points))
     progress(
         message(
             "fitting_sections",
@@ -152,7 +152,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         When a course is left with too few points.
     """
     accepted = np.flatnonzero(shell.reason == "")
-    joints = _heights(job) / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
+    joints = joints_of(job) / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
     groups = _groups(job, shell, accepted, joints)
     sds, estimated = radial_sds(job.points), noise_is_estimated(job)
     covariance = _given_covariance(job.points, accepted)
@@ -184,7 +184,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     )
 
 
-def _heights(job):
+def joints_of(job):
     """(courses + 1,) heights of the joints above the bottom, along the shell."""
     return np.cumsum([0.0] + [course.height_m for course in job.courses])
 

@@ -76,7 +76,7 @@ def strapping_of(result):
     if wall is None:
         return None
     return StrappingRecord(
-        readings=[_reading(result, index) for index in range(len(wall.reduced))],
+        readings=_readings(result),
         tapes=[_tape(*one, given) for one in wall.tapes],
         courses=_courses(result),
         shape_sd_m=given.shape_sd_m,
@@ -87,31 +87,34 @@ def strapping_of(result):
     )
 
 
-def _reading(result, index):
+def _readings(result):
     wall = result.strapped
-    one = wall.reduced[index]
     names = [course.name for course in result.job.courses]
-    of_course = wall.circumference_m[names.index(one.strap.course)]
-    w, mdb = (dict(zip(wall.adjusted.tolist(), test, strict=True)) for test in wall.tests)
-    return StrapReading(
-        circumference=one.strap.name,
-        course=one.strap.course,
-        level_m=one.strap.level_m,
-        tape=one.strap.tape,
-        reading_m=one.strap.reading_m,
-        **{f"{step}_m": size for step, size in one.steps_m.items()},
-        circumference_m=one.circumference_m,
-        sd_m=one.sd_m,
-        difference_m=one.circumference_m - of_course,
-        w=_finite(w.get(index)),
-        mdb_m=_finite(mdb.get(index)),
-        used=not one.strap.check,
-        row=one.strap.row,
-    )
+    of_course = dict(zip(names, wall.circumference_m, strict=True))
+    w, mdb = np.full((2, len(wall.reduced)), np.nan)
+    w[wall.adjusted], mdb[wall.adjusted] = wall.tests
+    return [
+        StrapReading(
+            circumference=one.strap.name,
+            course=one.strap.course,
+            level_m=one.strap.level_m,
+            tape=one.strap.tape,
+            reading_m=one.strap.reading_m,
+            **{f"{step}_m": size for step, size in one.steps_m.items()},
+            circumference_m=one.circumference_m,
+            sd_m=one.sd_m,
+            difference_m=one.circumference_m - of_course[one.strap.course],
+            w=_finite(w[index]),
+            mdb_m=_finite(mdb[index]),
+            used=not one.strap.check,
+            row=one.strap.row,
+        )
+        for index, one in enumerate(wall.reduced)
+    ]
 
 
 def _finite(value):
-    return None if value is None or not np.isfinite(value) else value
+    return value if np.isfinite(value) else None
 
 
 def _tape(tape, sd, given):

@@ -1,6 +1,7 @@
 """The part of the record that says what was measured: wall, points, sections, courses."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -282,7 +283,9 @@ def courses_of(result):
     job, rows = result.job, []
     if job.tank.kind != "vertical":
         return []
-    measured = _of_sections if result.strapped is None else _of_straps
+    measured = _of_straps
+    if result.strapped is None:
+        measured = partial(_of_sections, _rejected_z_m(result))
     for index, (course, shape) in enumerate(
         zip(job.courses, result.body.shell.volume.courses, strict=True)
     ):
@@ -308,18 +311,22 @@ def courses_of(result):
     return rows
 
 
-def _of_sections(result, index, shape):
+def _rejected_z_m(result):
+    """(k,) heights of the points near the wall that were rejected, in the survey's frame."""
+    rejected = np.isin(result.wall.shell.reason, ("consensus", "snooping"))
+    return result.job.points.xyz_m[rejected, 2]
+
+
+def _of_sections(rejected_z_m, result, index, shape):
     """What the sections of a course give."""
-    job, bottom = result.job, result.job.datum.bottom_z_m
+    bottom = result.job.datum.bottom_z_m
     own = [section for section in result.wall.sections if section.group.course == index]
-    rejected = np.flatnonzero(np.isin(result.wall.shell.reason, ("consensus", "snooping")))
-    in_course = [
-        bottom + shape.bottom_m <= job.points.xyz_m[i, 2] < bottom + shape.top_m for i in rejected
-    ]
+    above = bottom + shape.bottom_m <= rejected_z_m
+    in_course = above & (rejected_z_m < bottom + shape.top_m)
     return {
         "sections": [section.group.name for section in own],
         "points": sum(len(section.group.members) for section in own),
-        "rejected": sum(in_course),
+        "rejected": np.count_nonzero(in_course),
         "radius_m": np.mean([section.circle.radius_m for section in own]),
     }
 

@@ -196,7 +196,7 @@ def _shell_choices(job, result):
     wall = result.wall
     roof = job.roof and job.roof.weighing
     return {
-        "bottom": job.bottom.form if job.switches.bottom else "off",
+        "bottom": _bottom_choice(job),
         "covariance": _covariance_choice(job) if result.adjustment is None else "adjusted",
         "course_of_points": "section" if any(job.points.section) else "height",
         "shape": _one_or_mixed(section.outline.kind for section in wall.sections),
@@ -214,7 +214,7 @@ def _strapped_choices(job):
     """What was assumed about a shell that a tape was put round."""
     roof = job.roof and job.roof.weighing
     return {
-        "bottom": job.bottom.form if job.switches.bottom else "off",
+        "bottom": _bottom_choice(job),
         "survey": "strapping",
         "area_term": "none" if job.strapping.shape_sd_m == 0 else 1000 * job.strapping.shape_sd_m,
         "between_sections": "cylinders",
@@ -223,6 +223,10 @@ def _strapped_choices(job):
         "roof": _fitting_choice(job.switches.roof, roof, roof),
         "form": "learned",
     }
+
+
+def _bottom_choice(job):
+    return job.bottom.form if job.switches.bottom else "off"
 
 
 def _tilt_choice(job, shell):

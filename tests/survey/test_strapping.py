@@ -122,6 +122,9 @@ def test_effects_are_what_another_input_does():
     moved("instrument_offset", Tape("T", correction_m=1e-4, **given))
     moved("tape_temperature", temperature_c=31.0 + 2 / np.sqrt(3))
     moved("tape_tension", tension_n=60.0 * (1 + 0.1 / np.sqrt(3)))
+    slightly = Tape("T", **(given | {"friction": 0.2 * (1 + 1e-4)}))
+    change = (reduced(slightly, **strap).circumference_m - base.circumference_m) / 1e-4
+    assert effects["tape_friction"].by_m == pytest.approx(change * 0.5 / np.sqrt(3), rel=1e-3)
     on_shell = reduced(tape, shell_c=31.0, tension_n=60.0)
     warmer = reduced(tape, shell_c=32.0, tension_n=60.0)
     assert on_shell.by_shell_temperature_m == pytest.approx(

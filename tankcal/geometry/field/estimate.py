@@ -236,7 +236,8 @@ class Functionals:
         }
         self._along["mean"] = self._totals[:, :, None] * np.ones(len(field.sites))
         across = sum(self._across(index) for index in range(len(COMPONENTS)))
-        across = across * (not field.cylinders)
+        if field.cylinders:  # nothing but the free radii is stated
+            across = np.zeros_like(across)
         columns, radii = field._columns
         free = np.zeros((len(across), columns.shape[1]))
         courses = np.repeat(np.arange(len(radii)), LEVELS)

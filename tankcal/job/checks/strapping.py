@@ -34,11 +34,7 @@ def check_strapping(values, tables, registers, raw, log):
         )
         log.problem(straps.file, expected)
         return
-    tapes = {
-        name: given
-        for name, given in registers["instruments"].items()
-        if (given["kind"] or "").lower() == "tape"
-    }
+    tapes = tapes_of(registers)
     courses = tables["courses"]
     known = () if courses is None else tuple(courses.of("course"))
     _check_courses(straps, courses, known, log)
@@ -50,6 +46,15 @@ def check_strapping(values, tables, registers, raw, log):
     if values is not None:
         _check_settings(values, tables, tapes, raw, log)
         _check_levels(straps, courses, values, log)
+
+
+def tapes_of(registers):
+    """{name: {key: value}} of the instruments that are tapes."""
+    return {
+        name: given
+        for name, given in registers["instruments"].items()
+        if (given["kind"] or "").lower() == "tape"
+    }
 
 
 def tapes_read(straps, tapes):

@@ -146,6 +146,6 @@ TAPE = (  # keys of instruments.toml
         0,
         1,
     ),
-    _number("laying_mm", "standard deviation of each pull's lying, millimetres", 0, 50),
+    _number("laying_mm", "standard deviation of how each pull lies, millimetres", 0, 50),
     _name("master", "tape that this one was compared with in tape_checks.csv"),
 )
