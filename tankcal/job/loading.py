@@ -152,14 +152,14 @@ def _tell_missing_tables(raw, tables, kind, log):
         elsewhere = name == "points" and (has_survey(tables) or is_strapped(tables))
         if name in raw.tables or elsewhere:
             continue
-        if name == "points" and raw.tables.get("circumferences") is not None:
+        if name != "points" or "circumferences" not in raw.tables:
+            log.problem(raw.file_of(name), _missing(raw, name))
+        elif raw.tables["circumferences"] is not None:  # else it is told already
             expected = message(
                 "no_circumferences",
                 "no rows; expected a reading of the tape on each course at least",
             )
             log.problem(raw.tables["circumferences"].file, expected)
-        else:
-            log.problem(raw.file_of(name), _missing(raw, name))
 
 
 def _missing(raw, name):

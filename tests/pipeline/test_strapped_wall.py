@@ -247,6 +247,14 @@ def test_limits_of_repeats():
 # ---- bad input
 
 
+def test_an_empty_file_is_told_once(tmp_path):
+    write_strapped_job(tmp_path)
+    (tmp_path / "circumferences.csv").write_text("")
+    with pytest.raises(InputError) as refused:
+        tankcal.load(tmp_path)
+    assert [one.file for one in refused.value.problems] == ["circumferences.csv"]
+
+
 def bad_course(parts):
     parts.tables["circumferences"][1][1] = "9"
 
