@@ -289,6 +289,54 @@ def strapped_parts(**settings):
     return Parts(given, tables, registers={"instruments": {"T-12": dict(TAPE)}})
 
 
+LEVELS_B = {0.45: ["201.0 203.2 202.2 197.8 198.4 203.0 196.0 202.6 202.4 199.7"],
+            1.9: ["195.3 199.0 205.3 203.0 202.6 208.7 199.5 201.0 200.6 197.9",
+                  "195.1 198.9 205.2 202.8 202.5 208.6 199.4 200.8 200.5 197.8"],
+            3.6: ["189.1 195.3 207.4 209.8 209.9 213.4 201.8 201.9 199.5 193.6",
+                  "188.8 195.1 207.1 209.5 209.6 213.1 201.5 201.7 199.3 193.3"],
+            5.2: ["183.1 190.2 209.2 216.4 216.2 218.2 204.0 201.0 198.0 191.0",
+                  "182.6 189.8 208.8 216.0 215.8 217.8 203.6 200.6 197.6 190.6"],
+            7.0: ["175.3 183.9 211.7 224.5 222.8 222.1 206.0 200.8 196.7 187.4",
+                  "174.7 183.3 211.1 223.9 222.3 221.5 205.4 200.3 196.1 186.8"]}  # fmt: skip
+
+
+def plumbed_parts(**settings):
+    """Parts of a tank of five courses strapped on the first one, and plumbed on ten lines."""
+    parts = strapped_parts(
+        **{
+            "tank__id": "B-2",
+            "tank__nominal_diameter_m": 10.45,
+            "tank__nominal_height_m": 8.0,
+            "survey__shell_temperature_c": 20.0,
+        }
+        | settings
+    )
+    offsets = [["line", "course", "level_m", "offset_mm", "s_mm", "face"]]
+    for number, (level, faces) in enumerate(LEVELS_B.items(), 1):
+        for face, text in enumerate(faces, 1):
+            offsets += [
+                [f"L{line}", str(number), level, float(reading), 0.5, face]
+                for line, reading in enumerate(text.split(), 1)
+            ]
+    heights, thicknesses = [1.2, 1.7, 1.5, 1.7, 1.9], [7.0, 6.0, 6.0, 5.0, 5.0]
+    parts.tables = {
+        "courses": _courses(heights, thicknesses, 0.25),
+        "circumferences": [
+            ["circumference", "course", "level_m", "reading_m", "s_mm", "instrument"],
+            *([name, "1", 0.45, 32.8673 + np.pi * 2e-4, 0.3, "T-12"] for name in ("1a", "1a")),
+        ],
+        "lines": [["line"], *([f"L{line}"] for line in range(1, 11))],
+        "offsets": offsets,
+    }
+    parts.registers["instruments"]["T-12"] = {
+        "kind": "tape",
+        "thickness_mm": 0.2,
+        "u_scale_ppm": 10.0,
+    }
+    parts.registers["instruments"]["ZL"] = {"kind": "plummet"}
+    return parts
+
+
 def write_strapped_job(folder, **settings):
     """Write tank S-1 as a job folder; returns its path."""
     return write_folder(folder, strapped_parts(**settings))

@@ -33,9 +33,9 @@ def add(commands):
     )
     new.add_argument(
         "--survey",
-        choices=("photos", "total-station", "strapping"),
-        help="with files for photographs, total-station readings or circumferences by tape, in "
-        "place of surveyed points",
+        choices=("photos", "total-station", "strapping", "reference-line"),
+        help="with files for photographs, total-station readings, circumferences by tape or "
+        "offsets from reference lines, in place of surveyed points",
     )
     new.set_defaults(command=_new)
 

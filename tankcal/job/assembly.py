@@ -150,11 +150,10 @@ def _input(name, u, unit, **more):
     return DeclaredInput(name, float(u / INPUTS[name].per_si), unit, float(u), **more)
 
 
-def make_job(raw, values, tables, attached, measurements, warnings, strapping=None):
+def make_job(raw, values, tables, attached, measurements, warnings):
     """The Job of values and tables without problems.
 
     attached  attached.Attached        measurements  Measurements or None
-    strapping  Strapping or None
     """
     kind = values["tank"]["kind"]
     points = _points(tables["points"], attached.covariance_m2)
@@ -176,7 +175,6 @@ def make_job(raw, values, tables, attached, measurements, warnings, strapping=No
         circumference_m=values["checks"]["circumference_m"],
         diameter_is=values["checks"]["diameter_is"],
         mesh=_mesh(values["mesh"], attached.mesh[1]) if kind == "mesh" else None,
-        strapping=strapping,
     )
 
 

@@ -1,5 +1,6 @@
 """From a folder or a workbook to a checked `Job`, or to every problem that it has."""
 
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.covariance import read_covariance
 from tankcal.job.entries import kind_of, read_columns, read_register, read_settings
 from tankcal.job.folder import read_folder
+from tankcal.job.lines import make_lines
 from tankcal.job.measuring import make_measurements
 from tankcal.job.model import Job
 from tankcal.job.rule_files import find_rule
@@ -80,7 +82,8 @@ def load(path: str | PathLike, only: str | None = None) -> Job:
     if not is_whole:
         return make_frame(raw, values, tables, measurements, tuple(log.warnings))
     strapping = make_strapping(values, tables, registers)
-    return make_job(raw, values, tables, attached, measurements, tuple(log.warnings), strapping)
+    made = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
+    return replace(made, strapping=strapping, lines=make_lines(tables, registers))
 
 
 def _read(path, log):

@@ -23,7 +23,10 @@ SURVEY_TABLES = (
     *("horizontal_angles", "vertical_angles", "height_differences", "plumb_lines"),
     *("vectors", "correlated_readings"),
 )
-STRAPPING_TABLES = ("circumferences", "obstructions", "thickness", "tape_checks")
+STRAPPING_TABLES = (
+    *("circumferences", "obstructions", "thickness", "tape_checks"),
+    *("lines", "offsets"),
+)
 TABLES = TANK_TABLES + STRAPPING_TABLES + SURVEY_TABLES
 REGISTERS = {"cameras": "camera", "instruments": "instrument"}  # and what each one lists
 SETTINGS_FILE = "job.toml"

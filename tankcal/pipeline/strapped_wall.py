@@ -1,35 +1,48 @@
-"""A wall that a tape was put round: circumferences, the radii of its courses, and their doubt.
+"""A wall that a tape was put round, with lines of sight beside it or without.
 
 A circumference is the mean radius of one level but for the area term (`geometry.girth`): the circle
 of its perimeter has a larger area than the wall. So each reading counts as the radius of the circle
-of equal area,
-
-    r = C / (2 pi sqrt(1 + excess)),
-
-and the courses are cylinders of such radii, as the standards of strapping have them. What a course
-does between its straps (bulge, taper) is in the doubt: the field of the wall says how much it may.
+of equal area. Where straps alone were read, the courses are cylinders of such radii, as the
+standards of strapping have them: what a course does between its straps (bulge, taper) is in the
+doubt, and the field of the wall says how much it may. Offsets from reference lines carry the radius
+of the strapped course to all others; then the wall is a surface of revolution.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.geometry.field.amplitudes import estimate_amplitudes
-from tankcal.geometry.field.blunders import against_others, restricted_precision
-from tankcal.geometry.field.estimate import WallField
-from tankcal.geometry.field.sites import Sites, free_design
+from tankcal.geometry.field.blunders import (
+    MOST_ROUNDS,
+    Tested,
+    restricted_precision,
+    snoop_wall,
+)
+from tankcal.geometry.field.estimate import LEVELS, WallField
+from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.girth import perimeter_excess
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
-from tankcal.pipeline.tanks import shell_zero
+from tankcal.pipeline.tanks import insets_of, shell_zero
 from tankcal.pipeline.wall import joints_of
+from tankcal.pipeline.wall_readings import (
+    columns_of,
+    noise_of,
+    readings_of_offsets,
+    readings_of_straps,
+    shared_effects,
+    sites_of,
+)
+from tankcal.quadrature import panels
 from tankcal.survey.network.reliability import noncentrality
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 from tankcal.tank.body import Factor
 
 UNCONTROLLED = 1e-9  # of a reading's variance: what the others leave of it where there are none
+STATED_BY_STRAPS, STATED_BY_LINES = (), ("mean",)
 
 
 @dataclass(frozen=True)
@@ -59,13 +72,20 @@ class StrappedWall:
     ----------
     joints_m : ndarray, shape (courses + 1,)
         Heights of the joints above the bottom, m.
+    zero_m : float
+        Of the table's zero above it.
     reduced : tuple of Reduced
-        Of every reading, in the order of the file.
-    adjusted : ndarray of int
-        Which of these the wall was taken from.
+        Of every reading of the tape, in the order of the file.
+    readings : tuple of WallReading
+        That the wall was asked for: straps, then offsets; those that are only compared are not
+        among them.
+    places : ndarray of int, shape (n,)
+        Of each of these among the readings of its file.
+    tested : Tested
+        What became of each; an infinite sd_m of those that no other reading controls.
     area_term : AreaTerm
     field : WallField
-        Known from the radii of these.
+        Known from those that were accepted.
     plate_sd_m : dict
         {course index: standard uncertainty of its plate by a gauge}.
     tapes : tuple of (Tape, float)
@@ -74,8 +94,11 @@ class StrappedWall:
     """
 
     joints_m: np.ndarray
+    zero_m: float
     reduced: tuple[Reduced, ...]
-    adjusted: np.ndarray
+    readings: tuple
+    places: np.ndarray
+    tested: Tested
     area_term: AreaTerm
     field: WallField
     plate_sd_m: dict
@@ -83,84 +106,112 @@ class StrappedWall:
     shell = UprightAxis()
     without_inputs = ("offset",)  # of points; a tape has one of its own
 
-    @cached_property
-    def radius_m(self):
-        """(courses,) radius of each course as measured, of the circle of equal area."""
-        return self.field.outlines_m[:, 0, 0]
+    @property
+    def adjusted(self):
+        """Which of `reduced` the wall was taken from."""
+        return self.places[self._are("straps")]
 
     @cached_property
-    def tests(self):
-        """(w, mdb_m) of each adjusted reading, (n,) each: its departure from what all others show
-        over its sd, and the smallest blunder of it, m of circumference, that the test finds; nan
-        and inf of a reading that no other one controls.
+    def radius_m(self):
+        """(courses,) mean radius of each course as measured, of the circle of equal area."""
+        return self.field.outlines_m[:, :, 0] @ panels([0.0, 1.0], LEVELS)[1]
+
+    def radius_at(self, course, level_m):
+        """Mean radius at a height above the table's zero of a course, m."""
+        low, high = self.joints_m[course], self.joints_m[course + 1]
+        zeta = 2 * (level_m + self.zero_m - low) / (high - low) - 1
+        return float(self.field.outlines_at([zeta])[course, 0, 0])
+
+    def tests_of(self, kind):
+        """(w, mdb_m, accepted) of each reading of a kind.
+
+        w         its departure from what all others show over its sd; nan: no other controls it
+        mdb_m     the smallest blunder of its radius, m, that this test finds; inf of such
         """
-        whole = self.field.covariance_m2
-        precision = restricted_precision(whole, free_design(self.field.sites)[0])
-        radius = self.field.radius_m - self.field.radius_m.mean()
-        found = against_others(precision, precision @ radius, np.ones(len(radius), dtype=bool))
-        size = np.diag(precision)
-        controlled = size * np.diag(whole) > UNCONTROLLED
-        mdb = noncentrality() / np.sqrt(np.where(controlled, size, 1.0)) / self._per_m
-        return np.where(controlled, found.w, np.nan), np.where(controlled, mdb, np.inf)
+        chosen, tested = self._are(kind), self.tested
+        w = np.where(np.isfinite(tested.sd_m), tested.w, np.nan)
+        return w[chosen], noncentrality() * tested.sd_m[chosen], tested.accepted[chosen]
+
+    @property
+    def tests(self):
+        """(w, mdb_m) of each strap that was adjusted; mdb_m of its circumference."""
+        w, mdb, _ = self.tests_of("straps")
+        per_m = FULL_TURN * np.sqrt(1 + self.area_term.mean)
+        return w, mdb * per_m
+
+    @property
+    def accepted(self):
+        """The readings that the field is known from."""
+        return [one for one, kept in zip(self.readings, self.tested.accepted, strict=True) if kept]
 
     @property
     def circumference_m(self):
         """(courses,) mean circumference of each, of the painted shell."""
         return FULL_TURN * self.radius_m * np.sqrt(1 + self.area_term.mean)
 
+    @cached_property
+    def collimations(self):
+        """{plummet: (kappa, its standard uncertainty), rad}, as adjusted with the wall.
+
+        One that nothing bound is an unknown; of one with a given uncertainty u, of column c,
+
+            kappa = u^2 c' P y,   variance u^2 - u^4 c' P c.
+        """
+        found, used = {}, self.accepted
+        columns = list(columns_of([one.free for one in used]))
+        for place, (kind, name) in enumerate(columns):
+            if kind == "collimation":
+                values, covariance = self.field.shared
+                found[name] = values[place], float(np.sqrt(covariance[place, place]))
+        precision = None
+        for (kind, name), (_, _, column) in shared_effects(used).items():
+            if kind != "collimation":
+                continue
+            if precision is None:
+                design = free_design(self.field.sites)[0]
+                precision = restricted_precision(self.field.covariance_m2, design)
+            u = next(one.effects[kind, name][0] for one in used if (kind, name) in one.effects)
+            u = np.radians(u / 3600)
+            share = column @ precision @ column
+            found[name] = (
+                float(u * (column @ precision @ self.field.radius_m)),
+                float(u * np.sqrt(max(1 - share, 0.0))),
+            )
+        return found
+
     def lowest_outline(self, azimuth_rad):
         """(x, y) of the axis, and (n,) radii of the first course, m."""
         return 0.0, 0.0, np.full(len(azimuth_rad), self.radius_m[0])
 
     def factors(self, job, weights):
-        """`Factor`s of what the straps leave uncertain about features, (f, n) by their radii."""
-        used = [self.reduced[i] for i in self.adjusted]
-        own = weights * (np.array([one.sd_m for one in used]) * self._per_m)
-        found = [Factor("straps", own)]
-        for (kind, name), (effect, column) in self.shared.items():
+        """`Factor`s of what the readings leave uncertain about features, (f, n) by their radii."""
+        used, found = self.accepted, []
+        for kind in dict.fromkeys(one.of for one in used):
+            own = weights * np.array([one.sd_m * (one.of == kind) for one in used])
+            found.append(Factor(kind, own))
+        for (kind, name), (u, unit, column) in shared_effects(used).items():
             by = (weights @ column)[:, None]
-            found.append(Factor(kind, by, u=effect.u, unit=effect.unit, type="B", note=name))
+            found.append(Factor(kind, by, u=u, unit=unit, type="B", note=name))
+        inside = np.array([one.by_inputs.get("plate_thickness", 0.0) for one in used])
         for course, sd in self.plate_sd_m.items():
-            by = weights @ (sd * (self.field.sites.course == course))
+            by = weights @ (sd * (self.field.sites.course == course) * (1 - inside))
             found.append(Factor("plate_readings", by[:, None], note=job.courses[course].name))
-        excess = -self.field.radius_m / (2 * (1 + self.area_term.mean)) * self.area_term.sd
-        found.append(
-            Factor("area_term", (weights @ excess)[:, None], u=1e6 * self.area_term.sd,
-                   unit="ppm", type="B")
-        )  # fmt: skip
         return tuple(one for one in found if np.any(one.columns))
 
     def read_with(self, weights):
-        """{input: (f,) derivative of features}: the shell's temperature is that of the tape."""
-        per_k = [self.reduced[i].by_shell_temperature_m for i in self.adjusted]
-        if not any(per_k):
-            return {}
-        return {"shell_temperature": weights @ (np.array(per_k) * self._per_m)}
+        """{input: (f,) derivative of features}: a tape that has the shell's temperature, plates
+        that lines inside do not see.
+        """
+        rows = columns_of([one.by_inputs for one in self.accepted])
+        return {name: weights @ column for name, column in rows.items()}
 
-    @cached_property
-    def shared(self):
-        """{(kind, name): (Effect, (n,) what one u of it does to the radii)} of common causes."""
-        return shared_effects([self.reduced[i] for i in self.adjusted], self._per_m)
-
-    @property
-    def _per_m(self):
-        """(n,) m of radius per m of circumference."""
-        return self.field.radius_m / [self.reduced[i].circumference_m for i in self.adjusted]
-
-
-def shared_effects(used, per_m):
-    """{(kind, name): (Effect, (n,) columns)} of readings, times per_m."""
-    found = {}
-    for place, one in enumerate(used):
-        for effect in one.effects:
-            kept = found.setdefault((effect.kind, effect.name), (effect, np.zeros(len(used))))
-            kept[1][place] = effect.by_m * per_m[place]
-    return found
+    def _are(self, kind):
+        return np.array([one.of == kind for one in self.readings], dtype=bool)
 
 
 def find_strapped_wall(job, progress):
     """`StrappedWall` of a job whose circumferences were measured by tape."""
-    straps = job.strapping
+    straps, lines = job.strapping, job.lines
     progress(
         message(
             "strapping",
@@ -168,30 +219,101 @@ def find_strapped_wall(job, progress):
             count=len(straps.straps),
         )
     )
-    nominal = job.tank.nominal_diameter_m / 2
+    nominal, courses = job.tank.nominal_diameter_m / 2, [one.name for one in job.courses]
     reduced = reduce_straps(straps, job.survey.shell_temperature_c, 2 * nominal)
-    adjusted = np.array([i for i, one in enumerate(reduced) if not one.strap.check])
-    used = [reduced[i] for i in adjusted]
-    joints = joints_of(job)
-    sites = _sites(job, used, joints)
+    places = [i for i, one in enumerate(reduced) if not one.strap.check]
     term = AreaTerm(*perimeter_excess(straps.shape_sd_m, nominal))
-    per_m = np.full(len(used), 1 / (FULL_TURN * np.sqrt(1 + term.mean)))
-    radius = per_m * [one.circumference_m for one in used]
-    noise = _noise(used, radius, per_m, term)
-    field = field_of_straps(sites, radius, noise, nominal)
+    readings = readings_of_straps([reduced[i] for i in places], courses, term)
+    if lines is not None:
+        progress(
+            message(
+                "plumbing",
+                "adjusting {count} offsets from {lines} reference lines",
+                count=len(lines.offsets),
+                lines=len(lines.lines),
+            )
+        )
+        kept = [i for i, one in enumerate(lines.offsets) if not one.check]
+        used = [lines.offsets[i] for i in kept]
+        insets = insets_of(job, job.switches)
+        readings += readings_of_offsets(lines, used, courses, insets)
+        places += kept
+    joints, zero = joints_of(job), shell_zero(job, None)
+    readings, tested, field = _adjusted(readings, joints, zero, nominal, job.snooping)
     plates = {
         index: straps.plate_sd_m[course.name]
         for index, course in enumerate(job.courses)
         if course.name in straps.plate_sd_m
     }
-    return StrappedWall(joints, reduced, adjusted, term, field, plates, tapes_used(straps))
+    return StrappedWall(
+        joints,
+        zero,
+        reduced,
+        tuple(readings),
+        np.array(places),
+        tested,
+        term,
+        field,
+        plates,
+        tapes_used(straps),
+    )
 
 
-def field_of_straps(sites, radius_m, noise_m2, nominal_m):
-    """`WallField` of the courses as cylinders; SolutionError where the readings tell nothing."""
+def _adjusted(readings, joints_m, zero_m, nominal_m, snooping):
+    """Readings with the eccentricity of their rings, what became of each, and `WallField`."""
+    sites, noise = sites_of(readings, joints_m, zero_m), noise_of(readings)
+    may_go = snooping * np.array([one.of == "offsets" for one in readings])
+
+    def field_of(accepted):
+        some = np.flatnonzero(accepted)
+        kept, own = [readings[i] for i in some], noise[np.ix_(some, some)]
+        return field_of_readings(sites.take(accepted), kept, own, nominal_m)
+
+    accepted = np.ones(len(readings), dtype=bool)
+    field = field_of(accepted)
+    if np.any(sites.ring >= 0):
+        readings = _off_centre(readings, field)
+        field = field_of(accepted)
+    for _ in range(MOST_ROUNDS):
+        tested, whole = _tested(field, sites, readings, noise, accepted, may_go)
+        if np.all(tested.accepted == accepted):
+            break
+        accepted = tested.accepted
+        field = field_of(accepted)
+    controlled = tested.sd_m**-2.0 * np.diag(whole) > UNCONTROLLED
+    return readings, replace(tested, sd_m=np.where(controlled, tested.sd_m, np.inf)), field
+
+
+def _tested(field, sites, readings, noise_m2, accepted, may_go):
+    """`Tested` readings, with the amplitudes of a field of the accepted; their covariance."""
+    radius = np.array([one.radius_m for one in readings])
+    whole = replace(field, sites=sites, radius_m=radius, noise_m2=noise_m2).covariance_m2
+    precision = restricted_precision(whole, free_design(sites)[0])
+    pull = precision @ (radius - radius.mean())
+    return snoop_wall(precision, pull, accepted, may_go), whole
+
+
+def _off_centre(readings, field):
+    """The readings as from the centre of their level: R lacks (e x n)^2 / (2 rho) of a circle."""
+    centres, found = field.centres_m, []
+    for one in readings:
+        if one.ring < 0:
+            found.append(one)
+            continue
+        x, y = centres[one.ring]
+        across = x * np.cos(one.azimuth_rad) - y * np.sin(one.azimuth_rad)
+        found.append(replace(one, radius_m=one.radius_m + across**2 / (2 * field.nominal_m)))
+    return found
+
+
+def field_of_readings(sites, readings, noise_m2, nominal_m):
+    """`WallField` of readings; SolutionError where they tell nothing."""
+    radius = np.array([one.radius_m for one in readings])
+    by_lines = any(one.of == "offsets" for one in readings)
+    stated = STATED_BY_LINES if by_lines else STATED_BY_STRAPS
     try:
-        amplitudes = estimate_amplitudes(sites, radius_m, noise_m2, nominal_m)
-        field = WallField(sites, radius_m, noise_m2, amplitudes, nominal_m, cylinders=True)
+        amplitudes = estimate_amplitudes(sites, radius, noise_m2, nominal_m)
+        field = WallField(sites, radius, noise_m2, amplitudes, nominal_m, stated=stated)
         sound = np.all(np.isfinite(field.outlines_m))
     except np.linalg.LinAlgError:
         sound = False
@@ -204,25 +326,3 @@ def field_of_straps(sites, radius_m, noise_m2, nominal_m):
             )
         )
     return field
-
-
-def _sites(job, used, joints_m):
-    """`Sites` of readings: each the mean of a whole turn."""
-    names = [course.name for course in job.courses]
-    course = np.array([names.index(one.strap.course) for one in used])
-    level = np.array([one.strap.level_m for one in used]) + shell_zero(job, None)
-    low, high = joints_m[course], joints_m[course + 1]
-    return Sites(
-        course=course,
-        ring=np.arange(len(used)),
-        zeta=2 * (level - low) / (high - low) - 1,
-        azimuth_rad=np.full(len(used), np.nan),
-        leans=np.zeros(len(used), dtype=bool),
-    )
-
-
-def _noise(used, radius_m, per_m, term):
-    """(n, n) covariance of the radii: what each reading has of its own, and what they share."""
-    columns = [column for _, column in shared_effects(used, per_m).values()]
-    common = np.column_stack([*columns, radius_m * term.sd / 2])
-    return np.diag((per_m * [one.sd_m for one in used]) ** 2) + common @ common.T

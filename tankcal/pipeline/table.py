@@ -9,6 +9,7 @@ import numpy as np
 
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
+from tankcal.pipeline.line_checks import check_lines
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.strapping_checks import check_strapped
@@ -143,7 +144,7 @@ def _doubts_of_survey(job, survey, top_m):
     if isinstance(survey, Wall):
         return (*warnings_of(job, survey), *check_wall(job, survey))
     if isinstance(survey, StrappedWall):
-        return check_strapped(job, survey)
+        return (*check_strapped(job, survey), *check_lines(job, survey))
     if isinstance(survey, Scan):
         return check_scan(job, survey, top_m)
     return () if survey is None else check_mesh(job, top_m)

@@ -215,10 +215,10 @@ def _strapped_choices(job):
     roof = job.roof and job.roof.weighing
     return {
         "bottom": _bottom_choice(job),
-        "survey": "strapping",
+        "survey": "strapping" if job.lines is None else "reference_line",
         "area_term": "none" if job.strapping.shape_sd_m == 0 else 1000 * job.strapping.shape_sd_m,
-        "between_sections": "cylinders",
-        "tilt": "not_measured",
+        "between_sections": "cylinders" if job.lines is None else "revolution",
+        "tilt": "not_measured" if job.lines is None else "not_applied",
         "course_heights": "along_axis",
         "roof": _fitting_choice(job.switches.roof, roof, roof),
         "form": "learned",

@@ -48,7 +48,10 @@ GLOSSARY = {
         "anillo": (r"\bvirola", r"\bcurso"),
         "envolvente": (r"\bcasco\b", r"\bcoraza"),
         "placa de medición": (r"(mesa|plato) de medición",),
-        "línea de plomada": (r"(sin la|una|cintas, desniveles y) plomadas?\b", r"^plomadas?$"),
+        "línea de plomada": (
+            r"(sin la|una|cintas, desniveles y) plomadas?\b(?! óptica)",
+            r"^plomadas?$",
+        ),
         "diana": (r"\bblancos\b",),
         "acimut": (r"\bazimut",),
         "gon": (r"\bgones\b",),

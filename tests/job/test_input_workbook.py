@@ -25,7 +25,7 @@ from tankcal.job.fields import read_value
 from tankcal.job.sheets import is_read
 from tankcal.job.starter import write_input_workbook
 from tankcal.job.starter.examples import EXAMPLES_OF_KEYS, EXAMPLES_OF_TABLES
-from tankcal.job.starter.form import Form
+from tankcal.job.starter.form import STRAPPED, Form
 from tankcal.job.starter.texts import TABLE_NOTES, english_notes, parted, texts_in
 from tankcal.job.starter.validation import LONGEST_LIST, LONGEST_MESSAGE, LONGEST_TITLE, rule_of
 from tankcal.record import record_of
@@ -155,7 +155,7 @@ def test_empty_form_reports_only_what_is_missing(tmp_path, kind, survey, languag
     others = {one.file: one.expected.split(";")[0] for one in problems if one.file != "sheet job"}
     empty = {"points": "no rows" if survey is None else "missing sheet", "courses": "no rows"}
     empty = {f"sheet {name}": empty[name] for name in REQUIRED_TABLES.get(kind, ())}
-    if survey == "strapping":  # in place of the points
+    if survey in STRAPPED:  # in place of the points
         empty["sheet circumferences"] = empty.pop("sheet points") and "no rows"
     assert others == empty
 

@@ -25,6 +25,7 @@ from tankcal.job.contract import (
 from tankcal.job.fields import Field
 from tankcal.job.rule_files import LIMITS, RULE, parse_rule, shipped_names
 from tankcal.job.starter import write_starter
+from tankcal.job.starter.form import STRAPPED
 from tankcal.job.starter.page import filled_page
 from tankcal.job.tables import Log
 from tankcal.tank.rules import TANKS
@@ -99,7 +100,7 @@ def test_a_starter_for_a_survey(tmp_path, survey):
     names += [f"{register}.toml" for register in registers]
     assert sorted(path.name for path in starter.iterdir()) == sorted(names)
     settings = tomllib.loads((starter / "job.toml").read_text(encoding="utf-8"))
-    if survey == "strapping":
+    if survey in STRAPPED:
         assert "adjustment" not in settings
         assert settings["shell"] == {"shape_sd_mm": ""}
     else:
@@ -128,7 +129,7 @@ def test_empty_survey_is_reported_as_missing(tmp_path, survey, name):
     with pytest.raises(InputError) as caught:
         load(tmp_path / "starter" / name)
     told = [problem for problem in caught.value.problems if problem.column not in BLANKS]
-    expected = ["courses", "circumferences" if survey == "strapping" else "points"]
+    expected = ["courses", "circumferences" if survey in STRAPPED else "points"]
     suffix = ".csv" if name == "" else ""
     found = sorted(problem.file.split()[-1] for problem in told)
     assert found == sorted(table + suffix for table in expected)

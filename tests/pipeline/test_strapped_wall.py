@@ -10,7 +10,7 @@ from job_builder import S_1, strapped_parts, write_book, write_folder, write_str
 
 import tankcal
 from tankcal.errors import InputError, SolutionError
-from tankcal.pipeline.strapped_wall import field_of_straps, find_strapped_wall
+from tankcal.pipeline.strapped_wall import field_of_readings, find_strapped_wall
 from tankcal.pipeline.strapping_checks import limit_of_repeats
 
 OPEN = {0.9: 146.70404, 1.8: 293.40807, 3.6: 586.81461, 6.0: 978.05449, 8.4: 1369.27879}
@@ -345,7 +345,7 @@ def test_readings_that_tell_nothing_are_refused(tmp_path):
     field = wall.field
     spoilt = field.noise_m2 - 1e-3 * np.ones_like(field.noise_m2)
     with pytest.raises(SolutionError, match="tell nothing"):
-        field_of_straps(field.sites, field.radius_m, spoilt, field.nominal_m)
+        field_of_readings(field.sites, wall.readings, spoilt, field.nominal_m)
 
 
 def half_a_pull(parts):

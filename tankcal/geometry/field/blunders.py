@@ -39,11 +39,14 @@ class Tested:
         Outwards, from the wall as the others have it, m.
     w : ndarray, shape (n,)
         Departure over its standard deviation.
+    sd_m : ndarray, shape (n,)
+        That; vast of a reading that no other one controls.
     """
 
     accepted: np.ndarray
     departure_m: np.ndarray
     w: np.ndarray
+    sd_m: np.ndarray
 
 
 def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted):
@@ -76,7 +79,7 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted):
         whole = covariances.total(variances)
         whole.flat[:: len(whole) + 1] += noise * variance_m2 + LEAST_NOISE_M**2
         precision = restricted_precision(whole, design)
-        found = _snoop(precision, precision @ left, accepted)
+        found = snoop_wall(precision, precision @ left, accepted)
         changed, accepted = np.mean(found.accepted != accepted), found.accepted
         if changed <= FEW:
             break
@@ -91,9 +94,11 @@ def restricted_precision(covariance, design):
     return inverse - by_design @ normal @ by_design.T
 
 
-def _snoop(precision, pull, accepted):
+def snoop_wall(precision, pull, accepted, may_go=True):
+    """`Tested` after setting aside one reading after another, of those that may go."""
+
     def tests(found):
-        return found.accepted, np.abs(found.w), CRITICAL
+        return found.accepted, np.abs(found.w) * may_go, CRITICAL
 
     def again(before, goes, comes):
         return against_others(precision, pull, before.accepted & ~goes | comes)
@@ -115,4 +120,4 @@ def against_others(precision, pull, accepted):
         weight[aside] = 1 / np.diag(among)
         departure[aside] *= weight[aside]
     weight = np.maximum(weight, 1e-300)
-    return Tested(accepted, departure / weight, departure / np.sqrt(weight))
+    return Tested(accepted, departure / weight, departure / np.sqrt(weight), weight**-0.5)

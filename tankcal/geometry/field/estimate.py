@@ -29,6 +29,7 @@ from tankcal.geometry.outlines import FULL_TURN
 from tankcal.quadrature import panels
 
 LEVELS = 7  # of a course, at which its outlines are stated: Gauss levels
+SHAPES = ("mean", "oval", "seam", "weld")
 GRID_M, FEWEST_OF_GRID = 0.1, 720  # along the arc, and azimuths, of outlines that are integrated
 
 
@@ -52,9 +53,10 @@ class WallField:
     amplitudes : Amplitudes
     nominal_m : float
         Radius of the tank, m.
-    cylinders : bool
-        Whether each course is stated as a cylinder of its mean radius, as standards of strapping
-        do: what a course does between its readings is in the doubt alone.
+    stated : tuple of str
+        Shapes of components that the estimate states; the others are in the doubt alone. Without
+        any each course is a cylinder of its mean radius, as standards of strapping have it; with
+        "mean" alone a surface of revolution.
     """
 
     sites: Sites
@@ -62,7 +64,7 @@ class WallField:
     noise_m2: np.ndarray
     amplitudes: Amplitudes
     nominal_m: float
-    cylinders: bool = False
+    stated: tuple = SHAPES
 
     @property
     def grid_rad(self):
@@ -80,15 +82,16 @@ class WallField:
         zeta = np.asarray(zeta, dtype=float)
         found = np.empty((len(self._members), len(zeta), len(self.grid_rad)))
         found[:] = self._mean_m[:, None, None] + self._circles[:, None]
-        if self.cylinders:
-            return found
         for shape in self._to_grid:
+            if shape not in self.stated:
+                continue
             found += self._drawn(shape, zeta, slice(None), common=True)
             for course, members in enumerate(self._members):
                 found[course] += self._drawn(shape, zeta, members, common=False)
-        for i, at_grid in self.peaks_at_grid.items():
-            peaks = self._explained @ self._covariances.peaks[i]
-            found += self.amplitudes.variances_m2[i] * (at_grid @ peaks)[:, None]
+        if "weld" in self.stated:
+            for i, at_grid in self.peaks_at_grid.items():
+                peaks = self._explained @ self._covariances.peaks[i]
+                found += self.amplitudes.variances_m2[i] * (at_grid @ peaks)[:, None]
         return found
 
     def _drawn(self, shape, zeta, members, *, common):
@@ -125,6 +128,26 @@ class WallField:
     def seen(self, departures_m):
         """(courses, LEVELS) mean radii that the estimate makes of departures (n,) of the radii."""
         return (self.means.weights @ departures_m).reshape(len(self._members), LEVELS)
+
+    @property
+    def centres_m(self):
+        """{ring: (x, y) of its centre}, of rings that are level."""
+        free, starts = self._solved[0], self._columns[1]
+        found = {}
+        for start, members in zip(starts, self._members, strict=True):
+            rings = np.unique(self.sites.ring[members])
+            for place, ring in enumerate(rings[rings >= 0]):
+                at = start + 1 + 2 * place
+                found[int(ring)] = free[at : at + 2]
+        return found
+
+    @property
+    def shared(self):
+        """(s,) what courses share without a prior, and (s, s) its covariance."""
+        free, normal = self._solved[0], self._factored[2]
+        count = self.sites.shared.shape[1]
+        covariance = scipy.linalg.cho_solve(normal, np.eye(len(free))[:, -count:])
+        return free[-count:], covariance[-count:]
 
     # what follows is computed once
 
@@ -204,8 +227,8 @@ class WallField:
         turn = np.stack([np.sin(self.grid_rad), np.cos(self.grid_rad)])
         found = []
         for start, members in zip(radii, self._members, strict=True):
-            members = members[np.isfinite(self.sites.azimuth_rad[members])]
-            if not len(members):
+            members = members[self.sites.ring[members] >= 0]
+            if not len(members) or "oval" not in self.stated:
                 found.append(np.full(len(self.grid_rad), free[start]))
                 continue
             _, leaning = np.unique(self.sites.ring[members], return_index=True)
@@ -235,9 +258,10 @@ class Functionals:
             if shape != "mean"
         }
         self._along["mean"] = self._totals[:, :, None] * np.ones(len(field.sites))
-        across = sum(self._across(index) for index in range(len(COMPONENTS)))
-        if field.cylinders:  # nothing but the free radii is stated
-            across = np.zeros_like(across)
+        across = np.zeros((len(field._members) * LEVELS, len(field.sites)))
+        for index, one in enumerate(COMPONENTS):
+            if one.shape in field.stated:
+                across += self._across(index)
         columns, radii = field._columns
         free = np.zeros((len(across), columns.shape[1]))
         courses = np.repeat(np.arange(len(radii)), LEVELS)

@@ -16,26 +16,39 @@ from tankcal.geometry.field.components import (
     weld_columns,
 )
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, Likelihood, Part, prior_of
+from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.outlines import FULL_TURN
 
 SMALLEST = 1e-8  # of a variance: what is left of a covariance that is followed is not quite zero
 NEAR_M = 0.02  # along the arc, between azimuths that count as one for the common form
+WIDE_M = 0.1  # of a shared unknown that no prior binds, beside its first estimate
 MOST_FOLLOWED = 80  # values of the common form that are followed through all courses
 
 
 def likelihood_of(sites, radius_m, noise_m2, nominal_m, estimate_noise):
     """`Likelihood` of radii at sites, as `amplitudes.estimate_amplitudes` takes them."""
     common = _common_values(sites, nominal_m)
+    if sites.shared is not None:
+        radius_m = radius_m - _by_free(sites, radius_m)
     parts = tuple(
         _part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise)
         for members in sites.members
     )
-    _, spread, missed = common
+    columns, spread, missed = common
+    wide = np.zeros(columns.shape[1])
+    if sites.shared is not None:
+        wide[-sites.shared.shape[1] :] = WIDE_M**2
     shared, own = _shown(sites)
     own = own + missed + [len(COMPONENTS)] * estimate_noise
     variances = np.diag(noise_m2) if np.ndim(noise_m2) == 2 else noise_m2
     prior = prior_of(COMPONENTS, variances if estimate_noise else None)
-    return Likelihood(parts, np.array(own), np.array(shared), spread, *prior)
+    return Likelihood(parts, np.array(own), np.array(shared), spread, wide, *prior)
+
+
+def _by_free(sites, radius_m):
+    """(n,) of the radii what the unknowns without a prior alone make of them."""
+    design = free_design(sites)[0]
+    return design @ np.linalg.lstsq(design, radius_m, rcond=None)[0]
 
 
 def _shown(sites):
@@ -50,7 +63,7 @@ def _common_values(sites, nominal_m):
 
     Values are those at the azimuths that the survey has, or, where these are many, the cosines and
     sines of the first modes: the rest of the seams is then taken as each course's own. Last come
-    the values of the heights, and the peak of all welds.
+    the values of the heights, the peak of all welds, and what courses share without a prior.
     """
     common = [(i, COMPONENTS[i]) for i in _shown(sites)[0]]
     welds = np.zeros((len(sites), 1))
@@ -80,6 +93,8 @@ def _common_values(sites, nominal_m):
         }
         missed = [i for i, one in common if one.shape == "seam"]
     columns = np.hstack([around, *values.values()])
+    if sites.shared is not None:
+        columns = np.hstack([columns, sites.shared / np.abs(sites.shared).max(axis=0)])
     spread, used = np.zeros((len(common), columns.shape[1], columns.shape[1])), around.shape[1]
     for row, (_, one) in enumerate(common):
         if row in values:

@@ -55,6 +55,8 @@ class Likelihood:
         Variance that scales each covariance of a part, and each of `spread`.
     spread : ndarray, shape (p, k, k)
         Covariances of the common values at unit variance.
+    wide : ndarray, shape (k,)
+        Variances of the common values that no variance scales: of those that no prior binds.
     middle, log_sd : ndarray, shape (variances,)
         Of the logarithms beforehand.
     bounds : ndarray, shape (variances, 2)
@@ -65,6 +67,7 @@ class Likelihood:
     own: np.ndarray
     common: np.ndarray
     spread: np.ndarray
+    wide: np.ndarray
     middle: np.ndarray
     log_sd: np.ndarray
     bounds: np.ndarray
@@ -79,7 +82,8 @@ class Likelihood:
             log |V| = sum log |B| + log |I + N C|.
         """
         variances = np.exp(logs)
-        before = rounded(np.tensordot(variances[self.common], self.spread, 1))
+        before = np.diag(self.wide) + np.tensordot(variances[self.common], self.spread, 1)
+        before = rounded(before)
         told, value, solved = 0.0, 0.0, []
         for part in self.parts:
             covariance = rounded(part.fixed + np.tensordot(variances[self.own], part.own, 1))

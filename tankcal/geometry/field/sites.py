@@ -19,15 +19,17 @@ class Sites:
     course : ndarray of int, shape (n,)
         From 0 on, each of them with sites.
     ring : ndarray of int, shape (n,)
-        Sites that have a centre of their own, all of one course.
+        Sites that have a centre of their own, all of one course; below 0: they have none.
     zeta : ndarray, shape (n,)
         Height within the course, -1 at its bottom to +1 at its top.
     azimuth_rad : ndarray, shape (n,)
-        nan: the mean of a whole turn, as a tape measures it; it has no ring.
+        nan: the mean of a whole turn, as a tape measures it; it has no ring, either.
     leans : ndarray of bool, shape (n,)
         Whether the ring is not level, and its centre moves with the height.
     welds_rad : tuple of ndarray
         Azimuths of the vertical welds of each course; (): not known.
+    shared : ndarray, shape (n, s), optional
+        Derivative of the radii by unknowns that courses share: the constant of a plumb line.
     """
 
     course: np.ndarray
@@ -36,6 +38,7 @@ class Sites:
     azimuth_rad: np.ndarray
     leans: np.ndarray
     welds_rad: tuple = ()
+    shared: np.ndarray | None = None
 
     def __len__(self):
         return len(self.course)
@@ -50,6 +53,7 @@ class Sites:
             azimuth_rad=self.azimuth_rad[chosen],
             leans=self.leans[chosen],
             welds_rad=tuple(self.welds_of(one) for one in seen) if self.welds_rad else (),
+            shared=None if self.shared is None else self.shared[chosen],
         )
 
     def welds_of(self, course):
@@ -76,7 +80,7 @@ class Sites:
         azimuth, ring = self.azimuth_rad[members], self.ring[members]
         turn = np.nan_to_num(np.column_stack([np.sin(azimuth), np.cos(azimuth)]))
         columns = [np.ones((len(members), 1))]
-        for one in np.unique(ring[np.isfinite(azimuth)]):
+        for one in np.unique(ring[ring >= 0]):
             there = turn * (ring == one)[:, None]
             columns.append(there)
             if np.any(self.leans[members] & (ring == one)):
@@ -85,12 +89,17 @@ class Sites:
 
 
 def free_design(sites):
-    """(n, p) derivative of the radii by what no prior binds, and the columns of the radii."""
+    """(n, p) derivative of the radii by what no prior binds, and the columns of the radii.
+
+    Course by course as in `Sites.free_columns`, then what they share.
+    """
     blocks = [(members, sites.free_columns(members)) for members in sites.members]
     starts = np.cumsum([0, *(block.shape[1] for _, block in blocks)])
     design = np.zeros((len(sites), starts[-1]))
     for start, (members, block) in zip(starts, blocks, strict=False):
         design[members, start : start + block.shape[1]] = block
+    if sites.shared is not None:
+        design = np.hstack([design, sites.shared])
     return design, starts[:-1]
 
 

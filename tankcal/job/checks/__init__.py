@@ -14,6 +14,7 @@ from tankcal.job.checks.extent import (
     is_strapped,
 )
 from tankcal.job.checks.geometry import check_cylinder, check_scan
+from tankcal.job.checks.lines import check_lines
 from tankcal.job.checks.plausible import check_plausible
 from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.strapping import check_strapping
@@ -45,6 +46,7 @@ def check_all(values, tables, registers, raw, is_whole, log):
         check_tank(values, tables, raw, log)
         if kind_of(raw) == "vertical":
             check_strapping(values, tables, registers, raw, log)
+            check_lines(values, tables, registers, raw, log)
     check_survey(values, tables, registers, raw, is_whole, log)
 
 

@@ -37,15 +37,15 @@ def check_strapping(values, tables, registers, raw, log):
     tapes = tapes_of(registers)
     courses = tables["courses"]
     known = () if courses is None else tuple(courses.of("course"))
-    _check_courses(straps, courses, known, log)
+    _check_courses(straps, tables["offsets"], courses, known, log)
     _check_tapes(straps, registers["instruments"], tapes, raw, log)
     _check_obstructions(tables["obstructions"], set(straps.of("circumference")), log)
     if has_rows(tables["thickness"]):
-        _refuse_others(tables["thickness"], "course", known, log)
+        refuse_others(tables["thickness"], "course", known, log)
     _check_comparisons(tables["tape_checks"], tapes, raw, log)
     if values is not None:
         _check_settings(values, tables, tapes, raw, log)
-        _check_levels(straps, courses, values, log)
+        check_levels(straps, courses, values, log)
 
 
 def tapes_of(registers):
@@ -74,11 +74,13 @@ def _tell_without_effect(tables, log):
             log.warning(tables[name].file, expected)
 
 
-def _check_courses(straps, courses, known, log):
-    _refuse_others(straps, "course", known, log)
+def _check_courses(straps, offsets, courses, known, log):
+    refuse_others(straps, "course", known, log)
     reached = {
         course
-        for course, use in zip(straps.of("course"), straps.of("use"), strict=True)
+        for table in (straps, offsets)
+        if has_rows(table)
+        for course, use in zip(table.of("course"), table.of("use"), strict=True)
         if use != "check"
     }
     if straps.skipped or courses is None or courses.skipped or None in reached:
@@ -111,7 +113,7 @@ def _check_courses(straps, courses, known, log):
             log.problem(straps.file, expected, row, "level_m")
 
 
-def _refuse_others(table, column, known, log):
+def refuse_others(table, column, known, log):
     """A problem for each name that is not among the known; none where these cannot be read."""
     if not known or None in known:
         return
@@ -159,21 +161,24 @@ def _check_tapes(straps, instruments, tapes, raw, log):
         given = tapes.get(name)
         if given is None:
             continue
+        refuse_free_scale(given, file, rows.get(name), name, log)
         for key, expected in _missing_of(given, tapes):
             log.problem(file, expected, rows.get(name), f"{name}.{key}")
 
 
-def _missing_of(given, tapes):
+def refuse_free_scale(given, file, row, name, log):
+    """A problem for each of scale and offset of an instrument that is to be an unknown."""
     for key in ("u_scale_ppm", "u_offset_mm"):
         if given[key] == FREE:
-            yield (
-                key,
-                message(
-                    "tape_scale_free",
-                    "found free; expected its standard uncertainty: nothing else in a strapping"
-                    " tells it",
-                ),
+            expected = message(
+                "tape_scale_free",
+                "found free; expected its standard uncertainty: nothing else in a strapping"
+                " tells it",
             )
+            log.problem(file, expected, row, f"{name}.{key}")
+
+
+def _missing_of(given, tapes):
     if given["thickness_mm"] is None:
         yield (
             "thickness_mm",
@@ -210,7 +215,7 @@ def _missing_of(given, tapes):
 def _check_obstructions(table, names, log):
     if not has_rows(table):
         return
-    _refuse_others(table, "circumference", names, log)
+    refuse_others(table, "circumference", names, log)
     for place, (row, kind) in enumerate(zip(table.rows, table.of("kind"), strict=True)):
         for column in NEEDED.get(kind, ()):
             if table.of(column)[place] is None:
@@ -291,7 +296,8 @@ def _check_settings(values, tables, tapes, raw, log):
         tell(log.problem, raw, "bottom", "form", expected)
 
 
-def _check_levels(straps, courses, values, log):
+def check_levels(straps, courses, values, log):
+    """A problem for each level that is not of the course that its row names."""
     heights = course_heights(courses)
     if heights is None:
         return

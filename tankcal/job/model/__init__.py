@@ -24,6 +24,7 @@ from tankcal.job.model.settings import (
 )
 from tankcal.survey.measurements import Measurements
 from tankcal.survey.points import Points
+from tankcal.survey.reference_line import ReferenceLines
 from tankcal.survey.strapping import Strapping
 from tankcal.tank.rules.model import Rule
 
@@ -98,6 +99,8 @@ class Job:
         What the nominal diameter is; only compared.
     strapping : Strapping or None
         Circumferences by tape, in place of points.
+    lines : ReferenceLines or None
+        Offsets from lines of sight, beside them.
     """
 
     tank: Tank | None
@@ -128,3 +131,4 @@ class Job:
     circumference_m: float | None = None
     diameter_is: str | None = None
     strapping: Strapping | None = None
+    lines: ReferenceLines | None = None

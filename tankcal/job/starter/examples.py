@@ -120,6 +120,26 @@ EXAMPLES_OF_TABLES = {
     "tape_checks": [
         {"level": "1", "master_m": 40.8930, "working_m": 40.8921, "s_mm": 0.3, "when": "before"}
     ],
+    "lines": [{"line": "A", "azimuth_deg": 0}, {"line": "B", "azimuth_deg": 30}],
+    "offsets": [
+        {
+            "line": "A",
+            "course": "1",
+            "level_m": 0.45,
+            "offset_mm": 201.0,
+            "s_mm": 0.5,
+            "face": 1,
+            "reference": True,
+        },
+        {
+            "line": "A",
+            "course": "1",
+            "level_m": 1.35,
+            "offset_mm": 198.5,
+            "s_mm": 0.5,
+            "face": 1,
+        },
+    ],
     "targets": [
         {"point": "P101", "section": "1", "generatrix": "A", "z_m": 0.95, "offset_mm": 0.2}
     ],

@@ -15,7 +15,7 @@ from tankcal.job.contract.uncertainty import UNITS
 from tankcal.job.fields import Field
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
-STRAPPED = "strapping"  # the survey that is not adjusted as points
+STRAPPED = ("strapping", "reference-line")  # surveys that are not adjusted as points
 STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
 PLACEHOLDER = "NAME"  # of a camera or an instrument
 
@@ -37,7 +37,7 @@ class Form:
         if self.survey is not None:
             _refuse_others(self.survey, SURVEYS)
             if "points" not in TABLES_OF_KIND[self.kind] or (
-                self.survey == STRAPPED and self.kind != "vertical"
+                self.survey in STRAPPED and self.kind != "vertical"
             ):
                 raise ValueError(f"a tank of kind {self.kind} has no survey; expected another kind")
 
@@ -74,7 +74,7 @@ class Form:
             return self.kind
         if (section, field.name) == ("table", "language") and self.language != DEFAULT:
             return self.language
-        if self.survey == STRAPPED:
+        if self.survey in STRAPPED:
             return STARTS_OF_STRAPPING.get(f"{section}.{field.name}", field.start)
         return field.start
 
@@ -110,7 +110,7 @@ class Form:
             return False
         of_straps = section in ("shell", "strapping")
         of_points = section.startswith("adjustment")
-        if of_points if self.survey == STRAPPED else of_straps:
+        if of_points if self.survey in STRAPPED else of_straps:
             return False
         of_photos = section == "adjustment.camera" or field.name in OF_PHOTOS
         return field.suits(self.kind) and (self.survey == "photos" or not of_photos)

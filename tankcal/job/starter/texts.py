@@ -110,6 +110,8 @@ TABLE_NOTES = {
     "plumb_lines": "one row for each pair of points on one vertical line; may stay empty",
     "vectors": "one row for each vector between two points (GNSS); may stay empty",
     "correlated_readings": "one row for each pair of values that are correlated; may stay empty",
+    "lines": "one row for each vertical line of sight round the tank",
+    "offsets": "one row for each reading of the wall's offset; repeated readings are repeated rows",
 }
 REGISTER_NOTES = {
     "cameras": "one section for each camera; put its name, as in photos.csv, in place of NAME",

@@ -285,7 +285,7 @@ def _of_the_unseen(wall, volume, features, declared):
             for index, one in enumerate(COMPONENTS)
             if one.kind == kind
             and one.declared_as not in declared
-            and (one.shape == "mean" or not wall.field.cylinders)
+            and (one.shape == "mean" or wall.field.stated)
         ]
         if chosen:
             parts = [inflation[index] * features.unseen(index) for index in chosen]

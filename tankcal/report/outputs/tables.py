@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.job.covariance import MAX_POINTS
 from tankcal.report.outputs.csv_files import write_table
-from tankcal.report.tables import capacity, strapping, survey, tank
+from tankcal.report.tables import capacity, lines, strapping, survey, tank
 from tankcal.text.digits import PROGRAM, decimals_of_rows, fixed
 
 LEAST_DECIMALS = 6  # micrometres, square millimetres, millilitres
@@ -13,6 +13,7 @@ FILES = (
     "points_cov.npz",
     "sections.csv",
     "strapping.csv",
+    "offsets.csv",
     "capacity.csv",
     "photos.csv",
     "cameras.csv",
@@ -26,6 +27,8 @@ def write_tables(record, directory):
     tables = {"points": (survey.POINTS, None), "sections": (tank.SECTIONS, None)}
     if record.get("strapping"):
         tables["strapping"] = strapping.STRAPS, None
+    if record.get("lines"):
+        tables["offsets"] = lines.OFFSETS, None
     if record["capacity"]:
         tables["capacity"] = capacity.capacity_table(record), _capacity(record)
     if record["adjustment"]:

@@ -12,6 +12,8 @@ FROM_SURVEY = (
     "instrument_offset",
     "points",
     "straps",
+    "offsets",
+    "collimation",
     "tape_comparison",
     "tape_temperature",
     "tape_tension",

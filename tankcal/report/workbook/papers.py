@@ -1,6 +1,6 @@
 """The working papers: courses, corrections, choices and provenance."""
 
-from tankcal.report.tables import strapping, tank
+from tankcal.report.tables import lines, strapping, tank
 from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
@@ -30,6 +30,18 @@ def strapping_sheet(book, record):
          columns_of(book, strapping.STRAPPED_COURSES)),
         (book.word("headings.tapes"), "tapes", columns_of(book, strapping.TAPES)),
     ]  # fmt: skip
+    write_tables(book, sheet, _HEAD_ROW, tables)
+
+
+def lines_sheet(book, record):
+    """Every offset from a reference line, the lines, the levels and the plummets."""
+    sheet = book.sheet("lines", book.word("texts.lines_subtitle"), landscape=True)
+    tables = [
+        (book.word("headings.levels"), "levels", columns_of(book, lines.LEVELS)),
+        (book.word("headings.plummets"), "plummets", columns_of(book, lines.PLUMMETS)),
+        (book.word("headings.lines"), "lines", columns_of(book, lines.LINES)),
+        (book.word("headings.offsets"), "offsets", columns_of(book, lines.OFFSETS)),
+    ]
     write_tables(book, sheet, _HEAD_ROW, tables)
 
 

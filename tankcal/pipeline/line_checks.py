@@ -1,0 +1,248 @@
+"""Warnings of reference lines: offsets that were set aside, lines that moved, too few of them."""
+
+import tomllib
+from functools import cache
+from importlib.resources import files
+from itertools import combinations
+
+import numpy as np
+
+from tankcal.errors import Problem
+from tankcal.messages import message
+from tankcal.survey.reference_line import (
+    ARCSEC,
+    collimation_by_faces,
+    lean_of,
+    level_names,
+    levels_of,
+)
+
+FILE = "offsets.csv"
+UNLIKE_SDS = 3.0  # of a collimation, from what its certificate says
+OFF_AXIS_M, OFF_AXIS_SDS = 0.01, 6.0  # of a level's centre, from the straight axis
+OFF_LEVEL_M = 0.003  # of a strap's radius, from the levels of its course
+SCALE_OF_MEDIAN = 1.4826
+FEWEST_LEVELS, FEWEST_ALIKE = 5, 4  # to tell a level, or a copied line, from the others
+
+
+@cache
+def limits():
+    """The figures of the rule file."""
+    text = files("tankcal.pipeline").joinpath("limits/reference_line.toml").read_text("utf-8")
+    return tomllib.loads(text)
+
+
+def least_lines(circumference_m):
+    """How many lines a tank of that circumference should have."""
+    rows = limits()["lines"]
+    return next(row["least"] for row in rows if circumference_m <= row.get("up_to_m", np.inf))
+
+
+def accepted_offsets(job, wall):
+    """Offsets that the wall was taken from."""
+    places = wall.places[[one.of == "offsets" for one in wall.readings]]
+    _, _, accepted = wall.tests_of("offsets")
+    return [job.lines.offsets[i] for i in places[accepted]]
+
+
+def levels_and_lean(job, wall):
+    """`Level`s and `Lean` of the accepted offsets, with the adjusted collimations."""
+    kappa = {name: one[0] for name, one in wall.collimations.items()}
+    levels = levels_of(job.lines, accepted_offsets(job, wall), kappa)
+    return levels, lean_of(job.lines, levels)
+
+
+def check_lines(job, wall):
+    """`Problem`s of the reference lines of a wall; none where there are no lines."""
+    if job.lines is None:
+        return ()
+    levels, lean = levels_and_lean(job, wall)
+    return (
+        *_set_aside(job, wall),
+        *_moved(job),
+        *_copied(job),
+        *_too_few(job, wall),
+        *_off_axis(job, levels, lean),
+        *_of_scope(job, lean),
+        *_of_plummets(job),
+        *_of_straps(job, wall, levels),
+    )
+
+
+def _set_aside(job, wall):
+    places = wall.places[[one.of == "offsets" for one in wall.readings]]
+    w, _, accepted = wall.tests_of("offsets")
+    away = wall.tested.departure_m[[one.of == "offsets" for one in wall.readings]]
+    for place, of_w, kept, by_m in zip(places, w, accepted, away, strict=True):
+        if not kept:
+            one = job.lines.offsets[place]
+            text = message(
+                "offset_set_aside",
+                "line {line!r} at {level_m:g} m: {away_mm:+.1f} mm of radius from what all others"
+                " show, w = {w:.1f}; it was set aside",
+                line=one.line,
+                level_m=one.level_m,
+                away_mm=1000 * by_m,
+                w=of_w,
+            )
+            yield Problem(FILE, text, row=one.row, column="offset_mm")
+
+
+def _moved(job):
+    """Lines whose readings at the reference level differ: the instrument was moved between."""
+    limit, seen = limits()["reference_repeats_mm"] / 1000, {}
+    for one in job.lines.offsets:
+        if one.reference:
+            seen.setdefault((one.line, one.face), []).append(one)
+    for (line, _), several in seen.items():
+        found = [one.offset_m for one in several]
+        if max(found) - min(found) > limit:
+            text = message(
+                "line_moved",
+                "the readings of line {line!r} at the reference level differ by {apart_mm:.1f} mm;"
+                " expected at most {limit_mm:g} mm: did the instrument move?",
+                line=line,
+                apart_mm=1000 * (max(found) - min(found)),
+                limit_mm=1000 * limit,
+            )
+            yield Problem(FILE, text, row=several[-1].row, column="offset_mm")
+
+
+def _copied(job):
+    """Lines of equal readings, to the last digit."""
+    read = {}
+    for one in job.lines.offsets:
+        read.setdefault(one.line, {})[round(one.level_m, 3), one.face, one.reference] = one
+    for (first, before), (second, after) in combinations(read.items(), 2):
+        both = before.keys() & after.keys()
+        alike = all(before[place].offset_m == after[place].offset_m for place in both)
+        if len(both) >= FEWEST_ALIKE and alike:
+            text = message(
+                "line_copied",
+                "all {count} readings of line {second!r} are those of line {first!r}, to the last"
+                " digit: were they copied?",
+                count=len(both),
+                second=second,
+                first=first,
+            )
+            row = min(one.row or 0 for one in after.values()) or None
+            yield Problem(FILE, text, row=row, column="line")
+
+
+def _too_few(job, wall):
+    least = least_lines(float(wall.circumference_m[0]))
+    if len(job.lines.lines) < least:
+        text = message(
+            "few_lines",
+            "{count} lines round {circumference_m:.0f} m; {least} or more are advised",
+            count=len(job.lines.lines),
+            circumference_m=wall.circumference_m[0],
+            least=least,
+        )
+        yield Problem("lines.csv", text, column="line")
+    used = accepted_offsets(job, wall)
+    levels = {}
+    for one, level in zip(used, level_names(used), strict=True):
+        levels.setdefault(one.course, set()).add(int(level))
+    few = [name for name, those in levels.items() if len(those) < limits()["levels_a_course"]]
+    if few:
+        text = message(
+            "few_levels",
+            "courses {courses}: one level; two are advised, else nothing shows how they taper",
+            courses=", ".join(few),
+        )
+        yield Problem(FILE, text, column="level_m")
+
+
+def _off_axis(job, levels, lean):
+    """A level whose centre stands far off the axis through those of the others."""
+    if len(levels) < FEWEST_LEVELS or not np.isfinite(lean.x):
+        return
+    from scipy.stats import theilslopes  # takes long to load
+
+    heights = np.array([one.level_m for one in levels])
+    centres = np.array([one.centre_m for one in levels])
+    fits = [theilslopes(each, heights) for each in centres.T]
+    axis = np.column_stack([one.intercept + one.slope * heights for one in fits])
+    away = np.linalg.norm(centres - axis, axis=1)
+    usual = SCALE_OF_MEDIAN * float(np.median(away))
+    worst = int(np.argmax(away))
+    if away[worst] > max(OFF_AXIS_M, OFF_AXIS_SDS * usual):
+        one = levels[worst]
+        text = message(
+            "level_off_axis",
+            "the centre of {level_m:g} m on course {course!r} stands {away_mm:.0f} mm off the axis"
+            " through the others: are its readings those of another level?",
+            level_m=one.level_m,
+            course=one.course,
+            away_mm=1000 * away[worst],
+        )
+        yield Problem(FILE, text, column="level_m")
+
+
+def _of_scope(job, lean):
+    size, most = float(np.hypot(lean.x, lean.y)), limits()["most_lean"]
+    if size > most:
+        text = message(
+            "leans_too_much",
+            "the shell leans by {lean:.1f} %; the method is meant for at most {most:g} %",
+            lean=100 * size,
+            most=100 * most,
+        )
+        yield Problem(FILE, text, column="offset_mm")
+    diameter, least = job.tank.nominal_diameter_m, limits()["least_diameter_m"]
+    if diameter < least:
+        text = message(
+            "too_small_for_lines",
+            "a diameter of {diameter:g} m; the method is meant for {least:g} m or more",
+            diameter=diameter,
+            least=least,
+        )
+        yield Problem("lines.csv", text)
+
+
+def _of_plummets(job):
+    """Collimations by both faces that are not what the certificate says."""
+    used = [one for one in job.lines.offsets if not one.check]
+    for name, plummet in job.lines.plummets.items():
+        found = collimation_by_faces(job.lines, used, name)
+        u = plummet.u_collimation_rad
+        if found is None or u is None:
+            continue
+        kappa, sd = found
+        if abs(kappa) > UNLIKE_SDS * np.hypot(u, sd):
+            text = message(
+                "collimation_unlike_certificate",
+                "its two faces tell a collimation of {kappa:+.1f} arcsec; its standard uncertainty"
+                " is said to be {u:g}",
+                kappa=kappa / ARCSEC,
+                u=u / ARCSEC,
+            )
+            yield Problem("instruments.toml", text, column=f"{name}.u_collimation_arcsec")
+
+
+def _of_straps(job, wall, levels):
+    """Straps that the lines contradict: unlike the levels of their course by more than a bulge."""
+    reference = next(one.course for one in job.lines.offsets if one.reference)
+    radii = {}
+    for place, reading in zip(wall.adjusted, wall.readings, strict=False):  # straps come first
+        radii.setdefault(wall.reduced[place].strap.course, []).append((reading.radius_m, place))
+    if reference not in radii:
+        return
+    zero = np.mean([radius for radius, _ in radii[reference]])
+    for course, those in radii.items():
+        risen = [one.rise_m for one in levels if one.course == course]
+        for radius, place in those if risen and course != reference else ():
+            away = radius - zero - np.mean(risen)
+            if abs(away) > OFF_LEVEL_M:
+                strap = wall.reduced[place].strap
+                text = message(
+                    "strap_against_lines",
+                    "circumference {name!r} gives a radius that is {away_mm:+.1f} mm off what the"
+                    " lines carry up from course {course!r}: is it misread, or is the side of the"
+                    " lines the other one?",
+                    name=strap.name,
+                    away_mm=1000 * away,
+                    course=reference,
+                )
+                yield Problem("circumferences.csv", text, row=strap.row, column="reading_m")

@@ -1,0 +1,166 @@
+"""Readings of a wall that name no point: each a radius of it, somewhere, with what it shares.
+
+Straps are the mean of a whole turn. Offsets are radii at the azimuth of their line, but for a
+constant of that line. What readings share is a column: an effect of a known standard uncertainty,
+or an unknown that nothing binds beforehand.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tankcal.geometry.field.sites import Sites
+from tankcal.survey.reference_line import level_names
+
+
+@dataclass(frozen=True)
+class WallReading:
+    """A radius of the wall as one reading has it.
+
+    Attributes
+    ----------
+    of : str
+        "straps" or "offsets": its name in a budget.
+    course : int
+    level_m : float
+        Above the table's zero.
+    radius_m, sd_m : float
+        Of the painted shell outside; the sd is of what it shares with none.
+    azimuth_rad : float
+        nan: of a whole turn.
+    ring : int
+        Readings that have a centre of their own; below 0: none.
+    effects : dict
+        {(kind, name): (u, unit, what one u of it does, m)}.
+    free : dict
+        {name: derivative by an unknown that nothing binds beforehand}.
+    by_inputs : dict
+        {input of an uncertainty budget: derivative by it}.
+    """
+
+    of: str
+    course: int
+    level_m: float
+    radius_m: float
+    sd_m: float
+    azimuth_rad: float = np.nan
+    ring: int = -1
+    effects: dict = field(default_factory=dict)
+    free: dict = field(default_factory=dict)
+    by_inputs: dict = field(default_factory=dict)
+
+
+def readings_of_straps(used, courses, term):
+    """`WallReading` of each reduced circumference: of the circle of equal area.
+
+        r = C / (2 pi sqrt(1 + excess))
+
+    used     Reduced circumferences
+    courses  names of the courses
+    term     `AreaTerm`
+    """
+    found = []
+    for one in used:
+        per_m = 1 / (2 * np.pi * np.sqrt(1 + term.mean))
+        radius = per_m * one.circumference_m
+        effects = {
+            (effect.kind, effect.name): (effect.u, effect.unit, effect.by_m * per_m)
+            for effect in one.effects
+        }
+        if term.sd:
+            by_m = -radius / (2 * (1 + term.mean)) * term.sd
+            effects["area_term", ""] = (1e6 * term.sd, "ppm", by_m)
+        by = {"shell_temperature": one.by_shell_temperature_m * per_m}
+        found.append(
+            WallReading(
+                "straps",
+                courses.index(one.strap.course),
+                one.strap.level_m,
+                radius,
+                one.sd_m * per_m,
+                effects=effects,
+                by_inputs={name: value for name, value in by.items() if value},
+            )
+        )
+    return found
+
+
+def readings_of_offsets(given, used, courses, insets_m):
+    """`WallReading` of each offset from a reference line.
+
+    given     `ReferenceLines`
+    used      offsets that count
+    courses   names of the courses
+    insets_m  (courses,) of plate and paint: an inside line sees the radius without them
+
+    The reference level has no centre of its own: the constants of the lines take it up.
+    """
+    found, levels = [], level_names(used)
+    reference = {int(level) for level, one in zip(levels, used, strict=True) if one.reference}
+    for level, one in zip(levels, used, strict=True):
+        line, plummet = given.of(one)
+        course, radial = courses.index(one.course), given.radial_m(one)
+        effects, free = {}, {("line", one.line): 1.0}
+        by_angle = given.by_collimation_m(one)
+        if plummet.u_scale:
+            by_m = radial * plummet.u_scale
+            effects["instrument_scale", plummet.name] = (1e6 * plummet.u_scale, "ppm", by_m)
+        if plummet.u_collimation_rad is None:
+            free["collimation", plummet.name] = by_angle
+        elif plummet.u_collimation_rad:
+            u = plummet.u_collimation_rad
+            effects["collimation", plummet.name] = (np.degrees(u) * 3600, "arcsec", by_angle * u)
+        found.append(
+            WallReading(
+                "offsets",
+                course,
+                one.level_m,
+                radial + line.inside * insets_m[course],
+                one.sd_m,
+                line.azimuth_rad,
+                -1 if int(level) in reference else int(level),
+                effects,
+                free,
+                {"plate_thickness": 1.0, "paint": 1.0} if line.inside else {},
+            )
+        )
+    return found
+
+
+def sites_of(readings, joints_m, zero_m):
+    """`Sites` of readings; zero_m is the height of the table's zero above the bottom."""
+    course = np.array([one.course for one in readings])
+    level = np.array([one.level_m for one in readings]) + zero_m
+    low, high = joints_m[course], joints_m[course + 1]
+    free = columns_of([one.free for one in readings])
+    return Sites(
+        course=course,
+        ring=np.array([one.ring for one in readings]),
+        zeta=2 * (level - low) / (high - low) - 1,
+        azimuth_rad=np.array([one.azimuth_rad for one in readings]),
+        leans=np.zeros(len(readings), dtype=bool),
+        shared=np.column_stack(list(free.values())) if free else None,
+    )
+
+
+def noise_of(readings):
+    """(n, n) covariance of the radii: what each reading has of its own, and what they share."""
+    shared = shared_effects(readings).values()
+    common = np.column_stack([np.zeros(len(readings)), *(column for *_, column in shared)])
+    return np.diag([one.sd_m**2 for one in readings]) + common @ common.T
+
+
+def shared_effects(readings):
+    """{(kind, name): (u, unit, (n,) what one u of it does to the radii)} of common causes."""
+    columns = columns_of([{key: one[2] for key, one in each.effects.items()} for each in readings])
+    told = {key: one[:2] for each in readings for key, one in each.effects.items()}
+    return {key: (*told[key], column) for key, column in columns.items()}
+
+
+def columns_of(rows):
+    """{name: (n,) its values} of n dicts; 0 where one has none."""
+    found = {}
+    for place, row in enumerate(rows):
+        for name, value in row.items():
+            found.setdefault(name, np.zeros(len(rows)))[place] = value
+    return found
