@@ -158,11 +158,11 @@ class StrappedWall:
             kappa = u^2 c' P y,   variance u^2 - u^4 c' P c.
         """
         found, used = {}, self.accepted
-        columns = list(columns_of([one.free for one in used]))
-        for place, (kind, name) in enumerate(columns):
+        unknowns = columns_of([one.free for one in self.readings])  # the order of `Sites.shared`
+        for place, (kind, name) in enumerate(unknowns):
             if kind == "collimation":
                 values, covariance = self.field.shared
-                found[name] = values[place], float(np.sqrt(covariance[place, place]))
+                found[name] = float(values[place]), float(np.sqrt(covariance[place, place]))
         precision = None
         for (kind, name), (_, _, column) in shared_effects(used).items():
             if kind != "collimation":

@@ -117,6 +117,25 @@ def test_a_given_collimation_is_weighted_with_both_faces(tmp_path):
     assert kappa == pytest.approx(free[0] * free[1] ** -2 / weight, rel=1e-6)
 
 
+def test_two_plummets_and_a_misread_first_offset(tmp_path):
+    """Each plummet keeps its own collimation, whichever reading is set aside."""
+    parts = cones()
+    parts.registers["instruments"]["ZM"] = {"kind": "plummet"}
+    parts.tables["lines"][0].append("instrument")
+    for place, row in enumerate(parts.tables["lines"][1:]):
+        row.append("ZM" if place % 3 == 1 else "ZL")
+    rows_of(parts)[0][3] += 40.0
+    for row in rows_of(parts):
+        if row[0] in ("L1", "L4", "L7", "L10"):
+            row[3] += 1000 * (row[2] - 0.3) * KAPPA * (1 if row[5] == 1 else -1)
+    wall = wall_of(parts, tmp_path)
+    assert not wall.tested.accepted[2]
+    assert wall.tested.accepted.sum() == len(wall.readings) - 1
+    found = wall.collimations
+    assert found["ZL"][0] == pytest.approx(KAPPA, rel=1e-2)
+    assert found["ZM"][0] == pytest.approx(2 * KAPPA, rel=1e-2)
+
+
 def test_unknowns_that_nothing_binds_are_as_wide_ones(tmp_path):
     """Second method: constants of lines and collimation as inputs of a vast uncertainty."""
     field = wall_of(cones(sd_m=5e-4), tmp_path).field
