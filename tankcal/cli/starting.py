@@ -42,6 +42,7 @@ def add(commands):
 
 def _new(options):
     from tankcal.job.starter import write_input_workbook, write_starter
+    from tankcal.report.field_forms import FILE, is_filled_by_pen, write_field_sheets
 
     if options.language != DEFAULT:
         speak(options.language)
@@ -53,6 +54,10 @@ def _new(options):
         print(f"  tankcal run {path}")
         return
     write_starter(directory, *form)
+    if is_filled_by_pen(options.survey):
+        sheets = directory / FILE
+        write_field_sheets(sheets, options.survey, options.language)
+        say(message("wrote_field_sheets", "wrote {file}: print it for the crew", file=str(sheets)))
     say(
         message(
             "wrote_folder",

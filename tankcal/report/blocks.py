@@ -142,6 +142,19 @@ def table(columns, rows=None, caption="", align=None, decimal_mark=".", formulas
     return _table("table", columns, rows, caption, align, decimal_mark, **more)
 
 
+def form(columns, rows):
+    """A table that is filled in by pen.
+
+    columns   (heading, unit, share of the width) of each
+    rows      how many empty ones
+    """
+    heads = [
+        {"heading": _text(heading), "unit": _text(unit), "share": share}
+        for heading, unit, share in columns
+    ]
+    return Block({"kind": "form", "columns": heads, "rows": int(rows)})
+
+
 def columns_table(columns, rows=None, caption="", align=None, across=4, decimal_mark="."):
     """A long narrow table, set in `across` columns on each page, the headings over each of them."""
     across = int(across)
