@@ -91,6 +91,31 @@ def test_the_likelihood_is_that_of_the_normal_distribution(mixed):
     assert evidence.misfit(evidence.middle)[0] == pytest.approx(expected, rel=1e-7)
 
 
+def test_the_likelihood_leaves_out_what_courses_share():
+    """Second method: as above, with the constants of twelve lines among the unknowns.
+
+    They are large against the walls, and no prior binds them: by how much the likelihoods of two
+    sets of amplitudes differ does not hang on how wide they are taken.
+    """
+    sites = sites_of(3, [-0.6, 0.6], 12)
+    lines = np.equal.outer(np.arange(len(sites)) % 12, range(12)).astype(float)
+    ring = np.where(sites.ring == 0, -1, sites.ring)
+    sites = replace(sites, ring=ring, shared=lines[:, 1:])  # the first holds the mean of all
+    rng = np.random.default_rng(2)
+    radius = RADIUS_M + 0.004 * rng.normal(size=len(sites)) + lines @ rng.normal(size=12)
+    evidence = likelihood_of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, False)
+    order = np.concatenate(sites.members)
+    left = scipy.linalg.null_space(free_design(sites)[0][order].T)
+    found, expected = [], []
+    for logs in (evidence.middle, evidence.middle + rng.normal(size=len(evidence.middle))):
+        whole = written_out(sites, np.exp(logs)) + (1e-6 + LEAST_NOISE_M**2) * np.eye(len(sites))
+        whole, free = left.T @ whole[np.ix_(order, order)] @ left, left.T @ radius[order]
+        expected.append(np.linalg.slogdet(whole)[1] + free @ np.linalg.solve(whole, free))
+        away = (logs - evidence.middle) / evidence.log_sd
+        found.append(evidence.misfit(logs)[0] - away @ away)
+    assert found[1] - found[0] == pytest.approx(expected[1] - expected[0], rel=2e-4)
+
+
 def test_a_course_of_three_points_tells_nothing(capfd):
     """Its radius and centre take them all; nothing is said of it on the screen, either."""
     sites = sites_of(2, [0.0], 3)

@@ -21,7 +21,7 @@ from tankcal.geometry.outlines import FULL_TURN
 
 SMALLEST = 1e-8  # of a variance: what is left of a covariance that is followed is not quite zero
 NEAR_M = 0.02  # along the arc, between azimuths that count as one for the common form
-WIDE_M = 0.1  # of a shared unknown that no prior binds, beside its first estimate
+WIDE_M = 1.0  # of a shared unknown that no prior binds, beside its first estimate
 MOST_FOLLOWED = 80  # values of the common form that are followed through all courses
 
 
