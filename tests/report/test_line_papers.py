@@ -59,6 +59,33 @@ def test_the_csv_file_has_every_offset(plumbed):
     assert [row["reference"] for row in rows[:10]] == ["yes"] * 10
 
 
+def test_paper_has_every_offset_by_its_level(plumbed):
+    from tankcal.report.tables.offsets import largest_departures, offsets_by_level
+
+    result, folder = plumbed
+    paper = Paper(load_record(folder / "record.json"))
+    (table,) = offsets_by_level(paper)
+    assert [one["heading"] for one in table.data["columns"]][3:] == list(result.job.lines.lines)
+    cells = [cell for row in table.data["rows"] for cell in row[3:]]
+    given = [f"{1000 * one.offset_m:.1f}" for one in result.job.lines.offsets]
+    assert sorted(cell.strip("()*") for cell in cells) == sorted(given)
+    assert [cell for cell in cells if not cell[-1].isdigit()] == [f"({given[20]})", f"{given[70]}*"]
+    shown = paper.show(largest_departures(paper.record)).data["rows"]
+    assert shown[0][-1] == "rejected"
+    assert [row[-1] for row in shown[1:]] == ["used"] * 19
+
+
+def test_many_lines_stand_in_several_tables(plumbed):
+    from tankcal.report.tables.offsets import offsets_by_level
+
+    record = load_record(plumbed[1] / "record.json")
+    record["lines"]["lines"] *= 3
+    assert len(offsets_by_level(Paper(record))) == 3
+    for one in record["lines"]["lines"]:
+        one["line"] = "a line with a long name"
+    assert len(offsets_by_level(Paper(record))) == 10
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("language", ["en", "es", "pt-BR"])
 def test_the_workbook_has_a_sheet_of_it(plumbed, tmp_path, language):
