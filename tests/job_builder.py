@@ -468,3 +468,27 @@ def _assert_same(one, other, name):
             _assert_same(a, b, name)
     else:
         assert one == other, name
+
+
+def hit_parts(rows, **settings):
+    """Parts of a tank of four courses of 2 m, R 6.5 m, hit from one set-up in it.
+
+    rows  of wall_hits.csv, {column: value} each
+    """
+    given = {
+        **SETTINGS,
+        "tank.id": "E-1",
+        "tank.nominal_diameter_m": 13.0,
+        "tank.nominal_height_m": 8.0,
+        "survey.side": "inside",
+        "table.step_m": 0.1,
+    } | {key.replace("__", "."): value for key, value in settings.items()}
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    tables = {
+        "courses": _courses([2.0] * 4, 8.0, None),
+        "setups": [["setup", "station", "instrument_height_m"], ["I", "SI", 1.5]],
+        "wall_hits": [columns, *([row.get(name) for name in columns] for row in rows)],
+    }
+    tool = {"kind": "total_station", "s_mm": 1.0, "s_arcsec": 5.0, "u_offset_mm": 0.5}
+    given = {key: value for key, value in given.items() if value is not None}
+    return Parts(given, tables, registers={"instruments": {"TS": tool}})

@@ -33,9 +33,9 @@ def add(commands):
     )
     new.add_argument(
         "--survey",
-        choices=("photos", "total-station", "strapping", "reference-line"),
-        help="with files for photographs, total-station readings, circumferences by tape or "
-        "offsets from reference lines, in place of surveyed points",
+        choices=("photos", "total-station", "strapping", "reference-line", "wall-hits"),
+        help="with files for photographs, total-station readings, circumferences by tape, "
+        "offsets from reference lines or bare hits of the wall, in place of surveyed points",
     )
     new.set_defaults(command=_new)
 

@@ -31,6 +31,10 @@ _DMS = re.compile(
     r"(?:[ \t]*['′’][ \t]*|[ \t]+|-)([0-9]{1,2}(?:[.,][0-9]{0,9})?)[ \t]*(?:\"|″|”|''|′′)?|['′’]?)"
 )
 _PAIR = re.compile(r"\s*([0-9.]+)\s*[-–]\s*([0-9.]+)\s*")
+_ISO_TIME = re.compile(
+    r"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ][0-9]{2}:[0-9]{2}(:[0-9]{2}(\.[0-9]{1,6})?)?"
+)
+_EPOCH = datetime.datetime(2000, 1, 1)
 _ISO_DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 
 
@@ -47,7 +51,8 @@ class Field:
     """One key or column.
 
     name       as written in the file, with its unit
-    kind       "number", "text", "name", "tank id", "choice", "flag", "date", "mesh file",
+    kind       "number", "text", "name", "tank id", "choice", "flag", "date", "time" (date and time
+               of day; read as seconds since 2000), "mesh file",
                "rule name", "numbers" (several of them), "ranges" (pairs of numbers), "names"
                (several of them) or "dms" (degrees, minutes and seconds; read as degrees)
     note       one line for the person who fills it in
@@ -157,6 +162,7 @@ _EXPECTED = {
     ),
     "flag": message("a_flag", "true or false"),
     "date": message("a_date", "a date such as 2024-05-31"),
+    "time": message("a_time", "a date with its time of day, such as 2024-05-31T14:30"),
     "ranges": message(
         "some_ranges",
         "pairs such as 0-0.3; 2.1-2.4 (in a .toml file also [[0, 0.3], [2.1, 2.4]])",
@@ -205,6 +211,7 @@ def read_value(field, raw, decimal=None):
         "choice": _read_choice,
         "flag": _read_flag,
         "date": _read_date,
+        "time": _read_time,
         "numbers": _read_numbers,
         "ranges": _read_ranges,
         "names": _read_names,
@@ -370,6 +377,22 @@ def _read_date(field, raw, _decimal):
     except ValueError:
         pass
     raise _refused(field, shown(raw), hint_of_date(raw))
+
+
+def _read_time(field, raw, _decimal):
+    text = raw.strip() if isinstance(raw, str) else ""
+    try:
+        if isinstance(raw, datetime.datetime):
+            moment = raw
+        elif _ISO_TIME.fullmatch(text):
+            moment = datetime.datetime.fromisoformat(text)
+        else:
+            raise _refused(field, shown(raw), hint_of_date(raw))
+    except ValueError as error:
+        if isinstance(error, Refused):
+            raise
+        raise _refused(field, shown(raw)) from error
+    return (moment.replace(tzinfo=None) - _EPOCH).total_seconds()
 
 
 def _read_numbers(field, raw, decimal):

@@ -6,11 +6,12 @@ from pathlib import Path
 
 from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
 from tankcal.job.checks import check_all
-from tankcal.job.checks.extent import has_survey, is_strapped
+from tankcal.job.checks.extent import has_hits, has_survey, is_strapped
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.covariance import read_covariance
 from tankcal.job.entries import kind_of, read_columns, read_register, read_settings
 from tankcal.job.folder import read_folder
+from tankcal.job.hits import make_hits
 from tankcal.job.lines import make_lines
 from tankcal.job.measuring import make_measurements
 from tankcal.job.model import Job
@@ -19,6 +20,7 @@ from tankcal.job.sheets import missing_sheet, read_workbook
 from tankcal.job.strapping import make_strapping
 from tankcal.job.tables import (
     COVARIANCE_FILE,
+    HITS_TABLES,
     REGISTERS,
     SETTINGS_FILE,
     STRAPPING_TABLES,
@@ -83,7 +85,8 @@ def load(path: str | PathLike, only: str | None = None) -> Job:
         return make_frame(raw, values, tables, measurements, tuple(log.warnings))
     strapping = make_strapping(values, tables, registers)
     made = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
-    return replace(made, strapping=strapping, lines=make_lines(tables, registers))
+    lines, hits = make_lines(tables, registers), make_hits(tables, registers)
+    return replace(made, strapping=strapping, lines=lines, hits=hits)
 
 
 def _read(path, log):
@@ -124,7 +127,7 @@ def _read_tables(raw, is_whole, log):
     if kind is not None and "points" in allowed:
         allowed += SURVEY_TABLES
     if kind == "vertical":
-        allowed += STRAPPING_TABLES
+        allowed += STRAPPING_TABLES + HITS_TABLES
     tables = {}
     for name in TABLES:
         table = raw.tables.get(name)
@@ -152,17 +155,23 @@ def _read_tables(raw, is_whole, log):
 
 def _tell_missing_tables(raw, tables, kind, log):
     for name in REQUIRED_TABLES.get(kind, ()):
-        elsewhere = name == "points" and (has_survey(tables) or is_strapped(tables))
+        measured = has_survey(tables) or is_strapped(tables) or has_hits(tables)
+        elsewhere = name == "points" and measured
         if name in raw.tables or elsewhere:
             continue
-        if name != "points" or "circumferences" not in raw.tables:
+        instead = [one for one in _IN_PLACE_OF_POINTS if one in raw.tables]
+        if name != "points" or not instead:
             log.problem(raw.file_of(name), _missing(raw, name))
-        elif raw.tables["circumferences"] is not None:  # else it is told already
-            expected = message(
-                "no_circumferences",
-                "no rows; expected a reading of the tape on each course at least",
-            )
-            log.problem(raw.tables["circumferences"].file, expected)
+        elif raw.tables[instead[0]] is not None:  # else it is told already
+            log.problem(raw.tables[instead[0]].file, _IN_PLACE_OF_POINTS[instead[0]])
+
+
+_IN_PLACE_OF_POINTS = {
+    "wall_hits": message("no_rows_of_hits", "no rows; expected a sight to the wall in each"),
+    "circumferences": message(
+        "no_circumferences", "no rows; expected a reading of the tape on each course at least"
+    ),
+}
 
 
 def _missing(raw, name):

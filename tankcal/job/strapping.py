@@ -19,7 +19,7 @@ def make_strapping(values, tables, registers):
         tapes=tuple(_tape(name, given) for name, given in tapes.items()),
         obstructions=_obstructions(tables["obstructions"]),
         comparisons=_comparisons(tables["tape_checks"]),
-        shape_sd_m=values["shell"]["shape_sd_mm"] / 1000,
+        shape_sd_m=_metres(values["shell"]["shape_sd_mm"]),
         wave_m=_metres(keys["wave_mm"]),
         helix_m=_metres(keys["helix_mm"]),
         plate_sd_m={name: one[1] for name, one in gauged(tables["thickness"]).items()},

@@ -17,6 +17,7 @@ from tankcal.messages import message
 from tankcal.pipeline.corrections import Correction, corrections_of
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
 from tankcal.pipeline.scan import Scan, fit_scan
+from tankcal.pipeline.sighted import sight_wall, told_offsets
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
 from tankcal.pipeline.statements import (
@@ -37,7 +38,9 @@ from tankcal.pipeline.table import check_table, compute_table
 from tankcal.pipeline.tanks import body_of, shell_volume
 from tankcal.pipeline.views import plot
 from tankcal.pipeline.wall import Wall, find_wall, s_transform
+from tankcal.pipeline.wall_straps import Straps
 from tankcal.survey import Adjustment, adjust_survey, wall_points
+from tankcal.survey.sighting import Sighting
 from tankcal.tank import dips
 from tankcal.tank.body import Body
 from tankcal.tank.budgets import Budget, budget, reading_sources
@@ -74,6 +77,8 @@ class Result:
         What points say of a lying cylinder or a sphere.
     strapped : strapped_wall.StrappedWall or None
         The wall of a vertical tank that a tape was put round.
+    sighting : sighting.Sighting or None
+        Bare hits of the wall as points, and where they were taken from.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -126,6 +131,7 @@ class Result:
     warnings: tuple[Problem, ...]
     adjustment: Adjustment | None = None
     strapped: StrappedWall | None = None
+    sighting: Sighting | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -188,6 +194,12 @@ class Result:
         """The shell as surveyed, without any correction (`volumes.ShellVolume`); else None."""
         wall = self.wall or self.strapped
         return None if wall is None else shell_volume(wall)
+
+    @property
+    def straps(self) -> Straps | None:
+        """Circumferences by tape, and what the wall says of them; None where none were read."""
+        wall = self.wall or self.strapped
+        return None if wall is None else wall.straps
 
     @property
     def capacity(self) -> pd.DataFrame:
@@ -310,18 +322,28 @@ def _run(job, progress, part_progress, simulated):
                 message("no_tank", "the job has no tank: only its survey can be adjusted"),
             )
         )
-    adjustment = None
+    adjustment = sighting = None
     if job.measurements is not None:
-        job, adjustment = _adjusted(job, progress)
+        adjustment = _adjusted(job, progress)
+    if job.hits is not None:
+        job, sighting = sight_wall(job, adjustment, progress)
+    elif adjustment is not None:
+        points = wall_points(adjustment, job.measurements, job.survey.side)
+        job = replace(job, points=s_transform(points))
+    dof = np.inf if adjustment is None else adjustment.dof
     try:
-        survey = _survey(job, progress, np.inf if adjustment is None else adjustment.dof)
+        survey = _survey(job, progress, dof)
+        told = told_offsets(job, survey) if sighting is not None else {}
+        if told:  # once more, from where the hits are without them
+            job, sighting = sight_wall(job, adjustment, progress, told)
+            survey = _survey(job, progress, dof)
     except SolutionError as error:
         if adjustment is None or not adjustment.warnings:
             raise
         told = (one.text for one in _placed(job, adjustment.warnings[:TOLD]))
         raise SolutionError(*error.args, *told) from error
     wall = survey if isinstance(survey, Wall) else None
-    if adjustment is not None and wall is not None:
+    if adjustment is not None and sighting is None and wall is not None:
         refuse_other_side(job, partial(is_within_wall, wall), adjustment)
     elif adjustment is not None and isinstance(survey, Scan):
         refuse_other_side(job, survey.is_within, adjustment)
@@ -352,13 +374,14 @@ def _run(job, progress, part_progress, simulated):
         simulation=simulation,
         intervals=intervals,
         rule=verdict_of(job, body, table, intervals, simulation),
-        warnings=_warnings(job, adjustment, survey, made),
+        warnings=_warnings(job, adjustment, sighting, survey, made),
         adjustment=adjustment,
         strapped=survey if isinstance(survey, StrappedWall) else None,
+        sighting=sighting,
     )
 
 
-def _warnings(job, adjustment, survey, made):
+def _warnings(job, adjustment, sighting, survey, made):
     of_survey = ()
     if adjustment is not None:
         left_open = open_questions(job, adjustment.datum, adjustment.causes)
@@ -366,7 +389,7 @@ def _warnings(job, adjustment, survey, made):
     warnings = (
         *job.warnings,
         *of_survey,
-        *check_table(job, survey, made),
+        *check_table(job, survey, made, sighting),
         *incomplete_certificate(job),
     )
     return _placed(job, warnings)
@@ -439,7 +462,7 @@ def _refuse_other(job, name):
 
 
 def _adjusted(job, progress):
-    """The job with the points of its adjusted survey, and the adjustment."""
+    """The adjusted survey of a job; SolutionError where it leaves the vertical or a scale open."""
     if job.points is not None and not job.points.from_adjustment:
         expected = message(
             "points_beside_survey",
@@ -449,13 +472,12 @@ def _adjusted(job, progress):
         raise InputError(Problem("points.csv", expected))
     adjustment = adjust_survey(job.measurements, progress)
     refuse_undetermined(adjustment.datum)
-    points = wall_points(adjustment, job.measurements, job.survey.side)
-    return replace(job, points=s_transform(points)), adjustment
+    return adjustment
 
 
 def _survey(job, progress, dof):
     """What was surveyed: a wall of courses, a mesh, the scan of another wall; None: sizes alone."""
-    if job.strapping is not None:
+    if job.strapping is not None and job.points is None:
         return find_strapped_wall(job, progress)
     if job.tank.kind == "vertical":
         return find_wall(job, progress, dof)

@@ -1,14 +1,12 @@
 """Warnings of reference lines: offsets that were set aside, lines that moved, too few of them."""
 
-import tomllib
-from functools import cache
-from importlib.resources import files
 from itertools import combinations
 
 import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
+from tankcal.pipeline.rule_limits import limit_at, limits_of
 from tankcal.survey.reference_line import (
     ARCSEC,
     collimation_by_faces,
@@ -17,7 +15,7 @@ from tankcal.survey.reference_line import (
     levels_of,
 )
 
-FILE = "offsets.csv"
+FILE, RULES = "offsets.csv", "reference_line"
 UNLIKE_SDS = 3.0  # of a collimation, from what its certificate says
 OFF_AXIS_M, OFF_AXIS_SDS = 0.01, 6.0  # of a level's centre, from the straight axis
 OFF_LEVEL_M = 0.003  # of a strap's radius, from the levels of its course
@@ -25,17 +23,9 @@ SCALE_OF_MEDIAN = 1.4826
 FEWEST_LEVELS, FEWEST_ALIKE = 5, 4  # to tell a level, or a copied line, from the others
 
 
-@cache
-def limits():
-    """The figures of the rule file."""
-    text = files("tankcal.pipeline").joinpath("limits/reference_line.toml").read_text("utf-8")
-    return tomllib.loads(text)
-
-
 def least_lines(circumference_m):
     """How many lines a tank of that circumference should have."""
-    rows = limits()["lines"]
-    return next(row["least"] for row in rows if circumference_m <= row.get("up_to_m", np.inf))
+    return limit_at(RULES, "lines", "least", circumference_m)
 
 
 def accepted_offsets(job, wall):
@@ -90,7 +80,7 @@ def _set_aside(job, wall):
 
 def _moved(job):
     """Lines whose readings at the reference level differ: the instrument was moved between."""
-    limit, seen = limits()["reference_repeats_mm"] / 1000, {}
+    limit, seen = limits_of(RULES)["reference_repeats_mm"] / 1000, {}
     for one in job.lines.offsets:
         if one.reference:
             seen.setdefault((one.line, one.face), []).append(one)
@@ -130,13 +120,13 @@ def _copied(job):
 
 
 def _too_few(job, wall):
-    least = least_lines(float(wall.circumference_m[0]))
+    least = least_lines(float(wall.straps.circumference_m[0]))
     if len(job.lines.lines) < least:
         text = message(
             "few_lines",
             "{count} lines round {circumference_m:.0f} m; {least} or more are advised",
             count=len(job.lines.lines),
-            circumference_m=wall.circumference_m[0],
+            circumference_m=wall.straps.circumference_m[0],
             least=least,
         )
         yield Problem("lines.csv", text, column="line")
@@ -144,7 +134,9 @@ def _too_few(job, wall):
     levels = {}
     for one, level in zip(used, level_names(used), strict=True):
         levels.setdefault(one.course, set()).add(int(level))
-    few = [name for name, those in levels.items() if len(those) < limits()["levels_a_course"]]
+    few = [
+        name for name, those in levels.items() if len(those) < limits_of(RULES)["levels_a_course"]
+    ]
     if few:
         text = message(
             "few_levels",
@@ -181,7 +173,7 @@ def _off_axis(job, levels, lean):
 
 
 def _of_scope(job, lean):
-    size, most = float(np.hypot(lean.x, lean.y)), limits()["most_lean"]
+    size, most = float(np.hypot(lean.x, lean.y)), limits_of(RULES)["most_lean"]
     if size > most:
         text = message(
             "leans_too_much",
@@ -190,7 +182,7 @@ def _of_scope(job, lean):
             most=100 * most,
         )
         yield Problem(FILE, text, column="offset_mm")
-    diameter, least = job.tank.nominal_diameter_m, limits()["least_diameter_m"]
+    diameter, least = job.tank.nominal_diameter_m, limits_of(RULES)["least_diameter_m"]
     if diameter < least:
         text = message(
             "too_small_for_lines",
@@ -225,7 +217,9 @@ def _of_straps(job, wall, levels):
     """Straps that the lines contradict: unlike the levels of their course by more than a bulge."""
     reference = next(one.course for one in job.lines.offsets if one.reference)
     radii = {}
-    for place, reading in zip(wall.adjusted, wall.readings, strict=False):  # straps come first
+    for place, reading in zip(
+        wall.straps.adjusted, wall.readings, strict=False
+    ):  # straps come first
         radii.setdefault(wall.reduced[place].strap.course, []).append((reading.radius_m, place))
     if reference not in radii:
         return

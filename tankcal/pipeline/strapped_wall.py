@@ -21,27 +21,33 @@ from tankcal.geometry.field.blunders import (
     restricted_precision,
     snoop_wall,
 )
-from tankcal.geometry.field.estimate import LEVELS, WallField
+from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.girth import perimeter_excess
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 from tankcal.pipeline.tanks import insets_of, shell_zero
 from tankcal.pipeline.wall import joints_of
 from tankcal.pipeline.wall_readings import (
     columns_of,
+    factors_of_plates,
+    factors_of_readings,
+    inputs_read_with,
     noise_of,
     readings_of_offsets,
     readings_of_straps,
     shared_effects,
     sites_of,
 )
-from tankcal.quadrature import panels
+from tankcal.pipeline.wall_straps import (
+    UNCONTROLLED,
+    AreaTerm,
+    Straps,
+    gauged_plates,
+    mean_radii,
+)
 from tankcal.survey.network.reliability import noncentrality
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
-from tankcal.tank.body import Factor
 
-UNCONTROLLED = 1e-9  # of a reading's variance: what the others leave of it where there are none
 STATED_BY_STRAPS, STATED_BY_LINES = (), ("mean",)
 
 
@@ -54,14 +60,6 @@ class UprightAxis:
     z_m: float = 0.0
     tilt: float = 0.0
     tilt_known: bool = False
-
-
-@dataclass(frozen=True)
-class AreaTerm:
-    """By how much the circle of a perimeter is larger than the wall: mean and sd, relative."""
-
-    mean: float
-    sd: float
 
 
 @dataclass(frozen=True)
@@ -91,6 +89,8 @@ class StrappedWall:
     tapes : tuple of (Tape, float)
         Those that were read, as they were corrected, and the standard uncertainty of their scale by
         the comparison with a master.
+    shape_sd_m : float
+        Declared: standard deviation of the radius round the wall.
     """
 
     joints_m: np.ndarray
@@ -103,18 +103,14 @@ class StrappedWall:
     field: WallField
     plate_sd_m: dict
     tapes: tuple
+    shape_sd_m: float
     shell = UprightAxis()
     without_inputs = ("offset",)  # of points; a tape has one of its own
-
-    @property
-    def adjusted(self):
-        """Which of `reduced` the wall was taken from."""
-        return self.places[self._are("straps")]
 
     @cached_property
     def radius_m(self):
         """(courses,) mean radius of each course as measured, of the circle of equal area."""
-        return self.field.outlines_m[:, :, 0] @ panels([0.0, 1.0], LEVELS)[1]
+        return mean_radii(self.field)
 
     def radius_at(self, course, level_m):
         """Mean radius at a height above the table's zero of a course, m."""
@@ -132,22 +128,28 @@ class StrappedWall:
         w = np.where(np.isfinite(tested.sd_m), tested.w, np.nan)
         return w[chosen], noncentrality() * tested.sd_m[chosen], tested.accepted[chosen]
 
-    @property
-    def tests(self):
-        """(w, mdb_m) of each strap that was adjusted; mdb_m of its circumference."""
-        w, mdb, _ = self.tests_of("straps")
-        per_m = FULL_TURN * np.sqrt(1 + self.area_term.mean)
-        return w, mdb * per_m
+    @cached_property
+    def straps(self):
+        """`Straps`: the circumferences, and what the wall says of them."""
+        mine, tested = self._are("straps"), self.tested
+        return Straps(
+            reduced=self.reduced,
+            adjusted=self.places[mine],
+            accepted=tested.accepted[mine],
+            w=self.tests_of("straps")[0],
+            sd_m=tested.sd_m[mine],
+            departure_m=tested.departure_m[mine],
+            area_term=self.area_term,
+            shape_sd_m=self.shape_sd_m,
+            radius_m=self.radius_m,
+            plate_sd_m=self.plate_sd_m,
+            tapes=self.tapes,
+        )
 
     @property
     def accepted(self):
         """The readings that the field is known from."""
         return [one for one, kept in zip(self.readings, self.tested.accepted, strict=True) if kept]
-
-    @property
-    def circumference_m(self):
-        """(courses,) mean circumference of each, of the painted shell."""
-        return FULL_TURN * self.radius_m * np.sqrt(1 + self.area_term.mean)
 
     @cached_property
     def collimations(self):
@@ -185,25 +187,16 @@ class StrappedWall:
 
     def factors(self, job, weights):
         """`Factor`s of what the readings leave uncertain about features, (f, n) by their radii."""
-        used, found = self.accepted, []
-        for kind in dict.fromkeys(one.of for one in used):
-            own = weights * np.array([one.sd_m * (one.of == kind) for one in used])
-            found.append(Factor(kind, own))
-        for (kind, name), (u, unit, column) in shared_effects(used).items():
-            by = (weights @ column)[:, None]
-            found.append(Factor(kind, by, u=u, unit=unit, type="B", note=name))
-        inside = np.array([one.by_inputs.get("plate_thickness", 0.0) for one in used])
-        for course, sd in self.plate_sd_m.items():
-            by = weights @ (sd * (self.field.sites.course == course) * (1 - inside))
-            found.append(Factor("plate_readings", by[:, None], note=job.courses[course].name))
-        return tuple(one for one in found if np.any(one.columns))
+        used = self.accepted
+        sees = 1 - np.array([one.by_inputs.get("plate_thickness", 0.0) for one in used])
+        plates = factors_of_plates(job, self.field, weights * sees, self.plate_sd_m)
+        return (*factors_of_readings(used, weights), *plates)
 
     def read_with(self, weights):
         """{input: (f,) derivative of features}: a tape that has the shell's temperature, plates
         that lines inside do not see.
         """
-        rows = columns_of([one.by_inputs for one in self.accepted])
-        return {name: weights @ column for name, column in rows.items()}
+        return inputs_read_with(self.accepted, weights)
 
     def _are(self, kind):
         return np.array([one.of == kind for one in self.readings], dtype=bool)
@@ -240,11 +233,6 @@ def find_strapped_wall(job, progress):
         places += kept
     joints, zero = joints_of(job), shell_zero(job, None)
     readings, tested, field = _adjusted(readings, joints, zero, nominal, job.snooping)
-    plates = {
-        index: straps.plate_sd_m[course.name]
-        for index, course in enumerate(job.courses)
-        if course.name in straps.plate_sd_m
-    }
     return StrappedWall(
         joints,
         zero,
@@ -254,8 +242,9 @@ def find_strapped_wall(job, progress):
         tested,
         term,
         field,
-        plates,
+        gauged_plates(job),
         tapes_used(straps),
+        straps.shape_sd_m,
     )
 
 

@@ -4,16 +4,15 @@ Causes are named where one fits: courses exchanged, a temperature in Fahrenheit,
 a reading of the inside, a strap that is off by itself.
 """
 
-import tomllib
-from functools import cache
-from importlib.resources import files
 from itertools import combinations, pairwise
 
 import numpy as np
 
+from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import check_side
+from tankcal.pipeline.rule_limits import limit_at
 
 FILE = "circumferences.csv"
 FAHRENHEIT_K = 8.0  # from the shell's: so near a temperature in Fahrenheit is that of the shell
@@ -23,38 +22,70 @@ EXCHANGED_SHARE, EXCHANGED_M = 0.5, 1.5e-3  # of the steps between courses: left
 APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
 
 
-@cache
-def limits_of_repeats():
-    """((up to a circumference, limit), ...) m, of the rule file; its last holds without end."""
-    text = files("tankcal.pipeline").joinpath("limits/strapping.toml").read_text("utf-8")
-    rows = tomllib.loads(text)["repeats"]
-    return tuple((row.get("up_to_m", np.inf), row["limit_mm"] / 1000) for row in rows)
-
-
 def limit_of_repeats(circumference_m):
     """By how much repeats of such a circumference may differ, m."""
-    return next(limit for up_to, limit in limits_of_repeats() if circumference_m <= up_to)
+    return limit_at("strapping", "repeats", "limit_mm", circumference_m) / 1000
 
 
 def check_strapped(job, wall):
-    """`Problem`s of a strapped wall."""
+    """`Problem`s of a wall that straps alone, or straps and lines, show."""
+    straps = wall.straps
     return (
-        *_of_temperatures(job, wall),
-        *_of_repeats(wall),
-        *_of_pairs(job, wall),
-        *_of_courses(job, wall),
-        *_of_first_course(job, wall),
+        *_of_temperatures(job, straps),
+        *_of_repeats(straps),
+        *_of_pairs(job, straps),
+        *_of_courses(job, straps),
+        *_of_first_course(job, straps),
         *_uncontrolled(job, wall),
     )
+
+
+def check_straps_beside_points(job, straps):
+    """`Problem`s of straps round a wall that points show."""
+    return (
+        *_of_temperatures(job, straps),
+        *_of_repeats(straps),
+        *_of_contradicted(straps),
+    )
+
+
+def _of_contradicted(straps):
+    """Straps that depart from what the points and all other straps show."""
+    tests = zip(straps.adjusted, straps.accepted, straps.w, straps.departure_m, strict=True)
+    for place, accepted, w, departure in tests:
+        if not abs(w) > CRITICAL:
+            continue
+        one = straps.reduced[place]
+        named = {
+            "name": one.strap.name,
+            "course": one.strap.course,
+            "miss_mm": 1000 * departure * straps.per_radius,
+            "w": abs(w),
+        }
+        if accepted:
+            text = message(
+                "strap_contradicts",
+                "circumference {name!r} of course {course!r} is {miss_mm:+.1f} mm from what the"
+                " points and all other straps show (w = {w:.1f}): which of them is wrong?",
+                **named,
+            )
+        else:
+            text = message(
+                "strap_set_aside",
+                "circumference {name!r} of course {course!r} is {miss_mm:+.1f} mm from what the"
+                " points and all other straps show (w = {w:.1f}) and was set aside",
+                **named,
+            )
+        yield _problem(text, one.strap)
 
 
 def _problem(text, strap=None, column="reading_m"):
     return Problem(FILE, text, row=None if strap is None else strap.row, column=column)
 
 
-def _of_temperatures(job, wall):
+def _of_temperatures(job, straps):
     shell = job.survey.shell_temperature_c
-    for one in wall.reduced:
+    for one in straps.reduced:
         tape = one.strap.temperature_c
         if tape is None or shell is None or abs(tape - shell) <= UNLIKE_K:
             continue
@@ -79,10 +110,10 @@ def _of_temperatures(job, wall):
         yield _problem(text, one.strap, "temperature_c")
 
 
-def _of_repeats(wall):
+def _of_repeats(straps):
     """Repeats that differ by more than they may, and repeats that are equal to the last digit."""
     by_name = {}
-    for one in wall.reduced:
+    for one in straps.reduced:
         by_name.setdefault(one.strap.name, []).append(one)
     for name, several in by_name.items():
         if len(several) < 2:
@@ -99,7 +130,7 @@ def _of_repeats(wall):
                 limit_mm=1000 * limit,
             )
             yield _problem(text, several[int(np.argmax(found))].strap)
-    copied = _copied([one.strap for one in wall.reduced])
+    copied = _copied([one.strap for one in straps.reduced])
     for first, second in copied:
         text = message(
             "reading_copied",
@@ -120,9 +151,9 @@ def _copied(straps):
     return found
 
 
-def _of_pairs(job, wall):
+def _of_pairs(job, straps):
     """A strap that stands far from the others of its course, further than courses taper."""
-    adjusted = [wall.reduced[i] for i in wall.adjusted]
+    adjusted = [straps.reduced[i] for i in straps.adjusted]
     apart = []
     for course in job.courses:
         own = [one for one in adjusted if one.strap.course == course.name]
@@ -149,10 +180,10 @@ def _of_pairs(job, wall):
             yield _problem(text, one.strap)
 
 
-def _of_courses(job, wall):
+def _of_courses(job, straps):
     """Inside radii against the nominal one, and pairs of courses that fit better exchanged."""
     plates = np.array([course.thickness_m + course.paint_m for course in job.courses])
-    inside, names = wall.radius_m - plates, [course.name for course in job.courses]
+    inside, names = straps.radius_m - plates, [course.name for course in job.courses]
     nominal = job.tank.nominal_diameter_m / 2
     median = float(np.median(inside))
     if abs(median - nominal) > NOMINAL_SHARE * nominal:
@@ -180,7 +211,7 @@ def _of_courses(job, wall):
                 miss_mm=1000 * (radius - median),
             )
             yield _problem(text, column="course")
-    outside, saved = wall.radius_m, []
+    outside, saved = straps.radius_m, []
     steps = _steps(inside)
     for i, k in combinations(range(len(inside)), 2):
         turned = outside.copy()
@@ -202,12 +233,12 @@ def _of_courses(job, wall):
             yield _problem(text, column="course")
 
 
-def _of_first_course(job, wall):
+def _of_first_course(job, straps):
     """Its inside diameter against the drawing's, and its circumference against the one declared."""
     course = job.courses[0]
     plate = course.thickness_m + course.paint_m
-    yield from check_side(job, 2 * (wall.radius_m[0] - plate), plate, 0.0)
-    found, declared = wall.circumference_m[0], job.circumference_m
+    yield from check_side(job, 2 * (straps.radius_m[0] - plate), plate, 0.0)
+    found, declared = straps.circumference_m[0], job.circumference_m
     if declared is not None and abs(found - declared) > limit_of_repeats(found):
         yield Problem(
             "job.toml",

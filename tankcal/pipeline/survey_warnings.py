@@ -37,6 +37,8 @@ def noise_is_estimated(job):
 
 def origin_of(points):
     """Where points come from, as messages name it."""
+    if points.file:
+        return points.file
     return "adjusted points" if points.from_adjustment else "points.csv"
 
 

@@ -9,10 +9,11 @@ import numpy as np
 
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
+from tankcal.pipeline.hit_checks import check_hits
 from tankcal.pipeline.line_checks import check_lines
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.strapped_wall import StrappedWall
-from tankcal.pipeline.strapping_checks import check_strapped
+from tankcal.pipeline.strapping_checks import check_strapped, check_straps_beside_points
 from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
 from tankcal.pipeline.wall import Wall, warnings_of
@@ -119,7 +120,7 @@ def compute_table(job, survey, progress=lambda text: None):
     return ComputedTable(body, zero, levels, breakpoints, table, straightness)
 
 
-def check_table(job, survey, made):
+def check_table(job, survey, made, sighting=None):
     """Warnings about a survey and the capacity table that was computed from it.
 
     Parameters
@@ -128,6 +129,8 @@ def check_table(job, survey, made):
     survey : Wall, Scan, mesh or None
         As `compute_table` was given it.
     made : ComputedTable
+    sighting : Sighting, optional
+        Of a wall that was hit without targets.
 
     Returns
     -------
@@ -135,6 +138,7 @@ def check_table(job, survey, made):
     """
     return (
         *_doubts_of_survey(job, survey, made.top_m),
+        *(() if sighting is None else check_hits(job, survey, sighting)),
         *warn_of_undeclared(made.body.undeclared()),
         *against_nominal(job.tank, made.table.volume_m3[-1]),
     )
@@ -142,7 +146,9 @@ def check_table(job, survey, made):
 
 def _doubts_of_survey(job, survey, top_m):
     if isinstance(survey, Wall):
-        return (*warnings_of(job, survey), *check_wall(job, survey))
+        straps = survey.straps
+        beside = () if straps is None else check_straps_beside_points(job, straps)
+        return (*warnings_of(job, survey), *check_wall(job, survey), *beside)
     if isinstance(survey, StrappedWall):
         return (*check_strapped(job, survey), *check_lines(job, survey))
     if isinstance(survey, Scan):

@@ -11,9 +11,10 @@ from tankcal.geometry.field.cells import MOST_SITES, cells_of, sites_of_cells
 from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import Sites
-from tankcal.geometry.outlines import polar
+from tankcal.geometry.outlines import FULL_TURN, polar
 from tankcal.geometry.shell import Shell, course_of, find_shell
 from tankcal.messages import message
+from tankcal.pipeline.rule_limits import limits_of
 from tankcal.pipeline.survey_warnings import (
     ADVISED_POINTS,
     FEWEST_POINTS,
@@ -24,6 +25,13 @@ from tankcal.pipeline.survey_warnings import (
     warn_of_vague_vertical,
     weak_sections,
 )
+from tankcal.pipeline.unbound import unbound_of
+from tankcal.pipeline.wall_readings import (
+    factors_of_plates,
+    factors_of_readings,
+    inputs_read_with,
+)
+from tankcal.pipeline.wall_straps import PointsOfWall, Straps, join_straps
 from tankcal.sections import (
     Section,
     coordinates_of,
@@ -54,10 +62,16 @@ class Wall:
         Degrees of freedom of that covariance's scale.
     field : WallField
         The wall itself, between the points too: what the table is made of.
-    radii_by_points : sparse array, shape (m, 3 m)
+    radii_by_points : sparse array, shape (n, 3 m)
         Derivative of the field's readings, in their order, by x, y, z of the accepted points.
     sections : tuple of Section
         Circles and outlines through the points, from the bottom up.
+    straps : Straps or None
+        Circumferences by tape that are among the readings, after the points.
+    readings : tuple of WallReading
+        Those of them that were accepted.
+    without_inputs : tuple of str
+        Inputs that have no meaning for these points.
     """
 
     shell: Shell
@@ -68,7 +82,9 @@ class Wall:
     field: WallField
     radii_by_points: scipy.sparse.csr_array
     sections: tuple[Section, ...]
-    without_inputs = ()  # that have no meaning for points
+    straps: Straps | None = None
+    readings: tuple = ()
+    without_inputs: tuple = ()
 
     def lowest_outline(self, azimuth_rad):
         """(x, y) of the axis at the bottom, and (n,) radii of the lowest section, m."""
@@ -82,11 +98,23 @@ class Wall:
         covariance = jacobian @ (self.covariance_m2 @ jacobian.T)
         causes, index = job.points.causes, coordinates_of(self.accepted)
         effects = [jacobian @ cause.column_m[index] for cause in causes]
-        return survey_factors(covariance, self.noise_dof, causes, effects)
+        found = survey_factors(covariance, self.noise_dof, causes, effects)
+        if self.straps is None:
+            return found
+        outside = job.survey.side == "outside"
+        sees = np.append(np.full(self._points, outside), np.ones(len(self.readings)))
+        plates = factors_of_plates(job, self.field, weights * sees, self.straps.plate_sd_m)
+        return (*found, *factors_of_readings(self.readings, weights[:, self._points :]), *plates)
 
     def read_with(self, weights):
-        """{input: (f,) derivative of features}: none bears on the coordinates of points."""
-        return {}
+        """{input: (f,) derivative of features}: none bears on the coordinates of points; a tape
+        that has the shell's temperature, plates that points inside do not see.
+        """
+        return inputs_read_with(self.readings, weights[:, self._points :])
+
+    @property
+    def _points(self):
+        return len(self.field.radius_m) - len(self.readings)
 
 
 def find_wall(job, progress, dof=np.inf, amplitudes=None):
@@ -121,6 +149,8 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None):
         )
     )
     shell = _shell(job, joints_of(job), radial_sds(job.points))
+    if job.hits is not None:
+        shell = _clear_of_welds(job, shell)
     progress(
         message(
             "fitting_sections",
@@ -169,9 +199,20 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     if amplitudes.noise != 1.0:  # it may be half a gigabyte
         covariance, noise = covariance * amplitudes.noise, noise * amplitudes.noise
         to_fit = _to_fit(job, shell, accepted, groups, covariance)
-    field = WallField(sites, radius, noise, amplitudes, nominal)
     form_m2 = _form_m2(amplitudes)
     sections = tuple(fit_section(*one, form_m2) for one in to_fit)
+    by_points = means @ _radii_by_points(sections, len(accepted))
+    if job.strapping is not None or job.points.unbound:
+        unbound = unbound_of(job.points, by_points, accepted)
+        noise = by_points @ (covariance @ by_points.T)  # between sections, too
+        noise = noise.toarray() if scipy.sparse.issparse(noise) else noise
+    if job.strapping is None:
+        sites = unbound.shared_by(sites) if job.points.unbound else sites
+        field, readings, straps = WallField(sites, radius, noise, amplitudes, nominal), (), None
+    else:
+        points = PointsOfWall(sites, radius, noise, unbound)
+        field, readings, straps = join_straps(job, points, amplitudes, joints)
+        by_points = _padded(by_points, len(readings))
     return Wall(
         shell=shell,
         joints_m=joints,
@@ -179,9 +220,31 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         covariance_m2=covariance,
         noise_dof=amplitudes.noise_dof if estimated else dof,
         field=field,
-        radii_by_points=means @ _radii_by_points(sections, len(accepted)),
+        radii_by_points=by_points,
         sections=sections,
+        straps=straps,
+        readings=tuple(readings),
+        without_inputs=() if job.hits is None else ("offset",),  # the instrument has one of its own
     )
+
+
+def _padded(by_points, more):
+    """Derivatives by points (n, 3 m) of readings, and of some more that no point moves."""
+    empty = scipy.sparse.csr_array((more, by_points.shape[1]))
+    return scipy.sparse.vstack([by_points, empty], format="csr")
+
+
+def _clear_of_welds(job, shell):
+    """The shell without the hits beside vertical welds: there the plate is drawn in or out."""
+    points, least = job.points, limits_of("wall_hits")["weld_distance_m"]
+    every, reason = np.arange(len(points.names)), shell.reason.copy()
+    azimuth = _azimuths(job, shell, every)
+    course = course_of(points.xyz_m[:, 2] - job.datum.bottom_z_m, joints_of(job))
+    for index, welds in enumerate(_welds(job)):
+        away = np.abs((azimuth[:, None] - welds + np.pi) % FULL_TURN - np.pi)
+        near = away.min(axis=1, initial=np.inf) * job.tank.nominal_diameter_m / 2 < least
+        reason[near & (course == index) & (reason == "")] = "weld"
+    return replace(shell, reason=reason)
 
 
 def joints_of(job):

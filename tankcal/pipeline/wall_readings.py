@@ -11,6 +11,7 @@ import numpy as np
 
 from tankcal.geometry.field.sites import Sites
 from tankcal.survey.reference_line import level_names
+from tankcal.tank.body import Factor
 
 
 @dataclass(frozen=True)
@@ -155,6 +156,39 @@ def shared_effects(readings):
     columns = columns_of([{key: one[2] for key, one in each.effects.items()} for each in readings])
     told = {key: one[:2] for each in readings for key, one in each.effects.items()}
     return {key: (*told[key], column) for key, column in columns.items()}
+
+
+def factors_of_readings(readings, weights):
+    """`Factor`s of what readings leave uncertain about features: of their own, and what they share.
+
+    weights  (f, n) derivative of the features by their radii
+    """
+    found = []
+    for kind in dict.fromkeys(one.of for one in readings):
+        own = weights * np.array([one.sd_m * (one.of == kind) for one in readings])
+        found.append(Factor(kind, own))
+    for (kind, name), (u, unit, column) in shared_effects(readings).items():
+        by = (weights @ column)[:, None]
+        found.append(Factor(kind, by, u=u, unit=unit, type="B", note=name))
+    return tuple(one for one in found if np.any(one.columns))
+
+
+def factors_of_plates(job, field, weights, plate_sd_m):
+    """`Factor`s of plates that a gauge read, (f, n) weights being of readings that see them.
+
+    plate_sd_m  {course index: standard uncertainty}
+    """
+    found = []
+    for course, sd in plate_sd_m.items():
+        by = weights @ (sd * (field.sites.course == course))
+        found.append(Factor("plate_readings", by[:, None], note=job.courses[course].name))
+    return tuple(one for one in found if np.any(one.columns))
+
+
+def inputs_read_with(readings, weights):
+    """{input of a budget: (f,) derivative of features}, of inputs that readings depend on."""
+    rows = columns_of([one.by_inputs for one in readings])
+    return {name: weights @ column for name, column in rows.items()}
 
 
 def columns_of(rows):

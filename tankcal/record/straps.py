@@ -26,7 +26,7 @@ class StrapReading(Saved):
     difference_m: float = key("from the circumference of its course")
     w: float | None = key("departure from what all others show over its sd; null: uncontrolled")
     mdb_m: float | None = key("smallest blunder that this test finds; null: no other controls it")
-    used: bool = key("false: only compared")
+    used: bool = key("false: only compared, or set aside")
     row: int | None = key("of the file")
 
 
@@ -63,7 +63,9 @@ class StrappingRecord(Saved):
     readings: list[StrapReading] = key("in the order of the file")
     tapes: list[TapeUsed] = key("those that were read")
     courses: list[StrapOfCourse] = key("from the bottom up")
-    shape_sd_m: float = key("declared: standard deviation of the radius round the wall")
+    shape_sd_m: float = key(
+        "standard deviation of the radius round the wall: declared, or by the points"
+    )
     area_term: float = key("by how much the circle of a perimeter is too large, relative")
     area_term_sd: float = key("its standard deviation")
     wave_m: float | None = key("bound of how far a tape was out of level; null: not given")
@@ -72,27 +74,28 @@ class StrappingRecord(Saved):
 
 def strapping_of(result):
     """`StrappingRecord` of a result; None where no tape was put round."""
-    wall, given = result.strapped, result.job.strapping
-    if wall is None:
+    straps, given = result.straps, result.job.strapping
+    if straps is None:
         return None
     return StrappingRecord(
         readings=_readings(result),
-        tapes=[_tape(*one, given) for one in wall.tapes],
+        tapes=[_tape(*one, given) for one in straps.tapes],
         courses=_courses(result),
-        shape_sd_m=given.shape_sd_m,
-        area_term=wall.area_term.mean,
-        area_term_sd=wall.area_term.sd,
+        shape_sd_m=straps.shape_sd_m,
+        area_term=straps.area_term.mean,
+        area_term_sd=straps.area_term.sd,
         wave_m=given.wave_m,
         helix_m=given.helix_m,
     )
 
 
 def _readings(result):
-    wall = result.strapped
+    straps = result.straps
     names = [course.name for course in result.job.courses]
-    of_course = dict(zip(names, wall.circumference_m, strict=True))
-    w, mdb = np.full((2, len(wall.reduced)), np.nan)
-    w[wall.adjusted], mdb[wall.adjusted] = wall.tests
+    of_course = dict(zip(names, straps.circumference_m, strict=True))
+    w, mdb = np.full((2, len(straps.reduced)), np.nan)
+    w[straps.adjusted], mdb[straps.adjusted] = straps.w, straps.mdb_m
+    set_aside = set(straps.adjusted[~straps.accepted].tolist())
     return [
         StrapReading(
             circumference=one.strap.name,
@@ -106,10 +109,10 @@ def _readings(result):
             difference_m=one.circumference_m - of_course[one.strap.course],
             w=_finite(w[index]),
             mdb_m=_finite(mdb[index]),
-            used=not one.strap.check,
+            used=not one.strap.check and index not in set_aside,
             row=one.strap.row,
         )
-        for index, one in enumerate(wall.reduced)
+        for index, one in enumerate(straps.reduced)
     ]
 
 
@@ -132,9 +135,9 @@ def _tape(tape, sd, given):
 
 
 def _courses(result):
-    wall, found = result.strapped, []
+    straps, found = result.straps, []
     for index, course in enumerate(result.job.courses):
-        radius, whole = wall.radius_m[index], wall.circumference_m[index]
+        radius, whole = straps.radius_m[index], straps.circumference_m[index]
         found.append(
             StrapOfCourse(
                 course=course.name,
@@ -143,7 +146,7 @@ def _courses(result):
                 radius_m=radius,
                 radius_sd_m=radius_sd(result, result.body.shell.volume.courses[index]),
                 thickness_m=course.thickness_m,
-                plate_sd_m=wall.plate_sd_m.get(index),
+                plate_sd_m=straps.plate_sd_m.get(index),
                 paint_m=course.paint_m,
                 inside_radius_m=radius - course.thickness_m - course.paint_m,
             )

@@ -334,8 +334,9 @@ def _of_sections(rejected_z_m, result, index, shape):
 def _of_straps(result, index, shape):
     """What the straps of a course give: circumferences in place of sections and points."""
     wall, name = result.strapped, result.job.courses[index].name
-    own = [wall.reduced[i].strap.name for i in wall.adjusted
-           if wall.reduced[i].strap.course == name]  # fmt: skip
+    straps = wall.straps
+    own = [straps.reduced[i].strap.name for i in straps.adjusted
+           if straps.reduced[i].strap.course == name]  # fmt: skip
     return {
         "sections": list(dict.fromkeys(own)),
         "points": len(own),

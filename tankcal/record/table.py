@@ -197,7 +197,7 @@ def _shell_choices(job, result):
     roof = job.roof and job.roof.weighing
     return {
         "bottom": _bottom_choice(job),
-        "covariance": _covariance_choice(job) if result.adjustment is None else "adjusted",
+        **_measured_by(job, result),
         "course_of_points": "section" if any(job.points.section) else "height",
         "shape": _one_or_mixed(section.outline.kind for section in wall.sections),
         "between_sections": "field",
@@ -208,6 +208,16 @@ def _shell_choices(job, result):
         "form": "learned",
         "covariance_sd_mm": 1000 * np.sqrt(np.median(wall.covariance_m2.diagonal())),
     }
+
+
+def _measured_by(job, result):
+    """How the points came about, and what is known of them."""
+    found = {"covariance": _covariance_choice(job) if result.adjustment is None else "adjusted"}
+    if job.hits is not None:
+        found = {"survey": "wall_hits", "covariance": "hits"}
+    if result.straps is not None:
+        found["straps"] = "beside_points"
+    return found
 
 
 def _strapped_choices(job):

@@ -10,7 +10,7 @@ FILES = (
     *("report.pdf", "report.html"),
 )
 LETTERHEAD = "letterhead.json"  # there when a letterhead was given
-_NOT_IN_ALL = ("budgets", "deliveries", "rule", "monte_carlo", "strapping", "lines")
+_NOT_IN_ALL = ("budgets", "deliveries", "rule", "monte_carlo", "strapping", "lines", "hits")
 _PARTS = (
     ("certificate.pdf", "certificate"),
     ("working-papers.pdf", "working-papers"),

@@ -1,7 +1,7 @@
 """Field sheets of a starter job: its tables of readings as a crew fills them in by pen."""
 
 from tankcal.job.contract import COLUMNS, SURVEYS
-from tankcal.job.starter.form import STRAPPED
+from tankcal.job.starter.form import OF_SHELLS
 from tankcal.job.starter.texts import parted, texts_in
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
@@ -14,15 +14,20 @@ ROWS = {  # that a sheet has room for
     "obstructions": 10,
     "thickness": 12,
     "tape_checks": 6,
+    "setups": 6,
+    "control_readings": 24,
+    "wall_hits": 30,
 }
-IN_THE_OFFICE = ("use", "s_mm", "note")  # columns that nobody fills in on site
+IN_THE_OFFICE = ("use", "s_mm", "s_arcsec", "note")  # columns that nobody fills in on site
+UNIT_OF_CIRCLE = "_deg"  # of three columns of one angle the one that stands for all
+OTHER_UNITS = ("_gon", "_dms")
 WIDE = {"name": 1.5, "text": 2.0}  # shares of the width, beside one of a number
 FACTS = ("tank", "date", "crew", "weather", "shell_temperature", "instruments", "masters")
 
 
 def is_filled_by_pen(survey):
     """Are there field sheets for that kind of survey?"""
-    return survey in STRAPPED
+    return survey in OF_SHELLS
 
 
 def write_field_sheets(path, survey, language):
@@ -33,7 +38,7 @@ def write_field_sheets(path, survey, language):
     path : Path
         Of the new file.
     survey : str
-        "strapping" or "reference-line".
+        "strapping", "reference-line" or "wall-hits".
     language : str
         One of `languages.LANGUAGES`.
     """
@@ -72,9 +77,15 @@ def _code(survey):
 
 
 def _columns(table):
-    return [field for field in COLUMNS[table] if field.name not in IN_THE_OFFICE]
+    return [
+        field
+        for field in COLUMNS[table]
+        if field.name not in IN_THE_OFFICE and not field.name.endswith(OTHER_UNITS)
+    ]
 
 
 def _column(texts, field):
     heading, (_, unit) = texts.heading(field), parted(field.name)
+    if field.name.removesuffix(UNIT_OF_CIRCLE) in ("direction", "zenith"):
+        unit = ""  # as the circle shows it
     return heading, unit, WIDE.get(field.kind, 1.0)

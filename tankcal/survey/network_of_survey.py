@@ -160,7 +160,7 @@ def _gathered(measurements, excluded):
         fixed=fixed, image_points=images, photos=photos, cameras=cameras,
         observations=tuple(observations), sets=np.full(len(numbers.sets), np.nan),
         instruments=_instruments(measurements, numbers), systems=systems,
-        correlated=blocks_of(measurements, observations),
+        correlated=blocks_of(measurements, observations), set_names=tuple(numbers.sets),
     )  # fmt: skip
     return Gathered(survey, tuple(checks), known, None, {}, (), tuple(warnings))
 

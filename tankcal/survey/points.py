@@ -17,6 +17,9 @@ class Points:
     causes      named causes that the covariance contains (`surveys.Cause`): covariance = the rest
                 + sum of column column', their columns over the coordinates of these points
     from_adjustment  True: adjusted from a survey; the covariance has the scale that it should have
+    unbound     causes that nothing has told yet (a free offset): not in the covariance, their
+                columns are derivatives
+    file        where messages say they come from; "": of the rows
     """
 
     names: tuple
@@ -28,3 +31,5 @@ class Points:
     rows: tuple
     causes: tuple = ()
     from_adjustment: bool = False
+    unbound: tuple = ()
+    file: str = ""

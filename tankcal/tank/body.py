@@ -119,6 +119,8 @@ class ShellPart(Part):
         survey depend on: the temperature of a tape that has that of the shell.
     unused : tuple of str
         Names of inputs that have no meaning for the survey.
+    subtracts : bool
+        Whether plate and paint were taken off the surveyed radii.
     """
 
     volume: ShellVolume
@@ -130,6 +132,7 @@ class ShellPart(Part):
     tilt: float = 0.0
     read_with: dict = field(default_factory=dict)
     unused: tuple[str, ...] = ()
+    subtracts: bool = True
 
     @property
     def breakpoints_m(self):
@@ -160,8 +163,8 @@ class ShellPart(Part):
         if self.stretch != 1.0:
             by_length = by_length + (volume - area * wet) / self.stretch
         of_corrections = {
-            "plate_thickness": -loss,
-            "paint": -loss,
+            "plate_thickness": -loss * self.subtracts,
+            "paint": -loss * self.subtracts,
             "shell_temperature": -self.expansion_per_k * by_length,
             "expansion": (self.scale - 1) / self.expansion_per_k * by_length,
         }

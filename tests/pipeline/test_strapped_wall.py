@@ -105,7 +105,7 @@ def test_a_reading_is_tested_against_all_others(tmp_path):
     """Second method: each reading left out, its course predicted by the others, w by their sds."""
     job = tankcal.load(write_strapped_job(tmp_path))
     wall = find_strapped_wall(job, lambda text: None)
-    w, mdb = wall.tests
+    w, mdb = wall.straps.w, wall.straps.mdb_m
     whole, course = wall.field.covariance_m2, wall.field.sites.course
     design = np.equal.outer(course, range(5)).astype(float)
     for one in (0, 5):
@@ -120,7 +120,8 @@ def test_a_reading_is_tested_against_all_others(tmp_path):
         assert mdb[one] == pytest.approx(4.13 * sd * 2 * np.pi, rel=1e-3)
     straps = tuple(strap for strap in job.strapping.straps if strap.name != "3b")
     alone = replace(job, strapping=replace(job.strapping, straps=straps))
-    w, mdb = find_strapped_wall(alone, lambda text: None).tests
+    straps = find_strapped_wall(alone, lambda text: None).straps
+    w, mdb = straps.w, straps.mdb_m
     assert np.isnan(w[4])
     assert np.isinf(mdb[4])
     assert np.all(np.isfinite(np.delete(w, 4)))
@@ -304,10 +305,6 @@ def no_comparison(parts):
     parts.registers["instruments"]["T-12"] |= {"master": "M"}
 
 
-def both(parts):
-    parts.tables["points"] = [["point", "x_m", "y_m", "z_m"], ["P", 7.2, 0.0, 1.0]]
-
-
 def leaning(parts):
     parts.settings["bottom.form"] = "leaning"
 
@@ -370,7 +367,6 @@ BAD = {
     "no_such_name in obstructions": no_circumference,
     "no_such_master": no_master,
     "master_not_compared": no_comparison,
-    "points_beside_straps": both,
     "bottom_needs_axis": leaning,
     "tape_not_named": no_tape,
 }

@@ -246,6 +246,8 @@ class Functionals:
     ----------
     weights : ndarray, shape (f, n)
         A: derivative by the readings.
+    with_free : ndarray, shape (f, p)
+        Covariance of their errors with those of beta, (X_g - K_g V^-1 X) (X' V^-1 X)^-1.
     """
 
     def __init__(self, field, gradients):
@@ -267,7 +269,8 @@ class Functionals:
         courses = np.repeat(np.arange(len(radii)), LEVELS)
         free[np.arange(len(free)), radii[courses]] = self._totals.ravel()
         short = free - across @ by_columns
-        across = across + scipy.linalg.cho_solve(normal, short.T).T @ columns.T
+        self.with_free = scipy.linalg.cho_solve(normal, short.T).T
+        across = across + self.with_free @ columns.T
         self.weights = scipy.linalg.cho_solve(factor, across.T, check_finite=False).T
 
     def unseen(self, index):

@@ -9,11 +9,13 @@ from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.extent import (
     Extent,
     extent_of,
+    has_hits,
     has_survey,
     has_wall_points,
     is_strapped,
 )
 from tankcal.job.checks.geometry import check_cylinder, check_scan
+from tankcal.job.checks.hits import check_hits
 from tankcal.job.checks.lines import check_lines
 from tankcal.job.checks.plausible import check_plausible
 from tankcal.job.checks.settings import check_settings, check_steps
@@ -47,6 +49,7 @@ def check_all(values, tables, registers, raw, is_whole, log):
         if kind_of(raw) == "vertical":
             check_strapping(values, tables, registers, raw, log)
             check_lines(values, tables, registers, raw, log)
+            check_hits(values, tables, registers, raw, log)
     check_survey(values, tables, registers, raw, is_whole, log)
 
 
@@ -59,7 +62,7 @@ def check_tank(values, tables, raw, log):
         check_steps(values["table"], extent, raw, log)
         check_settings(values, tables, extent, kind, raw, log)
         check_plausible(values, tables, extent, kind, raw, log)
-    elsewhere = has_survey(tables) or is_strapped(tables)
+    elsewhere = has_survey(tables) or is_strapped(tables) or has_hits(tables)
     needs_points = kind == "vertical" and not elsewhere
     if points is not None and (needs_points or has_rows(points)):
         check_points(points, log)

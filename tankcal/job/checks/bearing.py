@@ -1,6 +1,6 @@
 """Which inputs of uncertainty.csv have an effect on a job, and why the others have none."""
 
-from tankcal.job.checks.extent import has_wall_points, is_strapped
+from tankcal.job.checks.extent import has_hits, has_wall_points, is_strapped
 from tankcal.job.contract import INPUTS
 from tankcal.job.contract.bottom import bottom_form
 from tankcal.messages import message
@@ -73,10 +73,12 @@ def _of_vertical(values, tables):
     )
     no_roof = values["roof"]["mass_kg"] is None or switches["roof"] is False
     of_points = message(
-        "offset_of_points", "expected only with points: a tape has its own in instruments.toml"
+        "offset_of_points",
+        "expected only with points: tapes and instruments of wall hits have their own in"
+        " instruments.toml",
     )
-    return _of_plates(values, tables["courses"], head or not no_liquid) | {
-        "offset": of_points if is_strapped(tables) else "",
+    return _of_plates(values, tables, head or not no_liquid) | {
+        "offset": of_points if _has_own_offset(tables) else "",
         "course_heights": _of_heights(tables["courses"]),
         "youngs_modulus": no_head if not head and no_liquid else "",
         "liquid_density": "" if head else no_head,
@@ -88,6 +90,11 @@ def _of_vertical(values, tables):
         else "",
         "tilt": _switched_off("tilt") if switches["tilt"] is False else "",
     }
+
+
+def _has_own_offset(tables):
+    """Is what the wall was measured by free of an offset that all radii share?"""
+    return has_hits(tables) or (is_strapped(tables) and not has_wall_points(tables))
 
 
 def _of_bottom(values, bottom):
@@ -103,9 +110,13 @@ def _of_bottom(values, bottom):
     }.get(bottom_form(values, bottom), "")
 
 
-def _of_plates(values, courses, is_loaded):
-    """Plates count where they are subtracted or loaded, paint where it is subtracted."""
-    switches, inside = values["corrections"], values["survey"]["side"] == "inside"
+def _of_plates(values, tables, is_loaded):
+    """Plates count where they are subtracted or loaded, paint where it is subtracted.
+
+    A tape sees both, also where the points are inside.
+    """
+    switches, courses = values["corrections"], tables["courses"]
+    inside = values["survey"]["side"] == "inside" and not is_strapped(tables)
     why = {"plate_thickness": "", "paint": ""}
     if (inside or switches["plate"] is False) and not is_loaded:
         why["plate_thickness"] = NOT_SUBTRACTED

@@ -18,9 +18,14 @@ def is_strapped(tables):
     return has_rows(tables["circumferences"])
 
 
+def has_hits(tables):
+    """Was the bare wall hit by a total station?"""
+    return has_rows(tables["wall_hits"])
+
+
 def has_wall_points(tables):
-    """Does the wall come from points, handed in or to be adjusted?"""
-    return has_rows(tables["points"]) or has_survey(tables)
+    """Does the wall come from points, handed in, hit or to be adjusted?"""
+    return has_rows(tables["points"]) or has_survey(tables) or has_hits(tables)
 
 
 @dataclass(frozen=True)

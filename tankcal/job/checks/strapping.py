@@ -9,7 +9,7 @@ from tankcal.job.checking import (
     tell,
     temperature_missing,
 )
-from tankcal.job.checks.extent import is_strapped
+from tankcal.job.checks.extent import has_wall_points, is_strapped
 from tankcal.job.contract.registers import FREE
 from tankcal.job.contract.strapping import NEEDED
 from tankcal.job.tables import nearest
@@ -37,7 +37,7 @@ def check_strapping(values, tables, registers, raw, log):
     tapes = tapes_of(registers)
     courses = tables["courses"]
     known = () if courses is None else tuple(courses.of("course"))
-    _check_courses(straps, tables["offsets"], courses, known, log)
+    _check_courses(straps, tables, courses, known, log)
     _check_tapes(straps, registers["instruments"], tapes, raw, log)
     _check_obstructions(tables["obstructions"], set(straps.of("circumference")), log)
     if has_rows(tables["thickness"]):
@@ -74,11 +74,11 @@ def _tell_without_effect(tables, log):
             log.warning(tables[name].file, expected)
 
 
-def _check_courses(straps, offsets, courses, known, log):
+def _check_courses(straps, tables, courses, known, log):
     refuse_others(straps, "course", known, log)
     reached = {
         course
-        for table in (straps, offsets)
+        for table in (straps, tables["offsets"])
         if has_rows(table)
         for course, use in zip(table.of("course"), table.of("use"), strict=True)
         if use != "check"
@@ -86,7 +86,7 @@ def _check_courses(straps, offsets, courses, known, log):
     if straps.skipped or courses is None or courses.skipped or None in reached:
         return
     for row, name in zip(courses.rows, known, strict=True):
-        if name is not None and name not in reached:
+        if name is not None and name not in reached and not has_wall_points(tables):
             expected = message(
                 "course_not_strapped",
                 "no circumference was measured on course {course!r}; expected one at least in"
@@ -258,7 +258,9 @@ def _check_comparisons(table, tapes, raw, log):
 
 
 def _check_settings(values, tables, tapes, raw, log):
-    if values["shell"]["shape_sd_mm"] is None and is_not_given(raw, "shell", "shape_sd_mm"):
+    alone = not has_wall_points(tables)
+    unknown = values["shell"]["shape_sd_mm"] is None
+    if alone and unknown and is_not_given(raw, "shell", "shape_sd_mm"):
         expected = message(
             "shape_not_declared",
             "missing; expected how far the wall is from a circle (0: it is one): a tape measures a"
@@ -274,20 +276,19 @@ def _check_settings(values, tables, tapes, raw, log):
             "missing; expected it, or temperature_c of every reading: the tape expands",
         )
         tell(log.problem, raw, "survey", "shell_temperature_c", expected)
-    if values["survey"]["side"] == "inside":
+    if alone and values["survey"]["side"] == "inside":
         expected = message(
             "strapped_inside", "found inside; expected outside: a tape lies on the outside"
         )
         tell(log.problem, raw, "survey", "side", expected)
-    for name in ("points", "targets"):
-        if has_rows(tables[name]):
-            expected = message(
-                "points_beside_straps",
-                "given together with circumferences; expected only one of them: tankcal does not"
-                " join points and straps yet",
-            )
-            log.problem(tables[name].file, expected)
-    if values["bottom"]["form"] in ("leaning", "points"):
+    if not alone and has_rows(tables["offsets"]):
+        expected = message(
+            "points_beside_lines",
+            "given together with points of the wall; expected only one of them: tankcal does not"
+            " join points and reference lines yet",
+        )
+        log.problem(tables["offsets"].file, expected)
+    if alone and values["bottom"]["form"] in ("leaning", "points"):
         expected = message(
             "bottom_needs_axis",
             "found {form}; expected another form: strapping does not measure the axis of the shell",

@@ -9,6 +9,7 @@ from tankcal.job.contract import (
     correlations,
     courses,
     deadwood,
+    hits,
     lines,
     points,
     roof,
@@ -35,7 +36,7 @@ SECTIONS = (
 )
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES}
-COLUMNS |= strapping.COLUMNS | lines.COLUMNS | SURVEY_COLUMNS
+COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | SURVEY_COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "roof": roof.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
@@ -43,6 +44,7 @@ KEYS = {section: _KEYS[section] for section in SECTIONS}
 SURVEYS = ADJUSTED_SURVEYS | {
     "strapping": tuple(strapping.COLUMNS),
     "reference-line": (*lines.COLUMNS, *strapping.COLUMNS),
+    "wall-hits": (*hits.COLUMNS, *hits.BESIDE),
 }
 
 REQUIRED_TABLES = {"vertical": ("points", "courses")}

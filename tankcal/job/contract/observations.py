@@ -35,7 +35,7 @@ def _coordinates(required=False):
     )
 
 
-def _angle(name, note, circles=(0, 1)):
+def angle_fields(name, note, circles=(0, 1)):
     """One angle in three units; circles: its bounds, in parts of the full circle."""
     words = {
         "deg": "degrees",
@@ -102,7 +102,7 @@ PHOTOS = (
     *(
         field
         for angle in ("omega", "phi", "kappa")
-        for field in _angle(angle, f"rotation {angle}; blank: not known", (-1, 1))
+        for field in angle_fields(angle, f"rotation {angle}; blank: not known", (-1, 1))
     ),
     *(
         _number(
@@ -201,7 +201,7 @@ DIRECTIONS = (
     _SETUP,
     _name("set", "set of directions within the set-up, with a zero of its own", False),
     _name("to", "the point"),
-    *_angle("direction", "as read, clockwise", (-1, 1)),
+    *angle_fields("direction", "as read, clockwise", (-1, 1)),
     _S_ARCSEC,
     _TARGET_HEIGHT,
     USE,
@@ -209,7 +209,7 @@ DIRECTIONS = (
 ZENITH_ANGLES = (
     _SETUP,
     _name("to", "the point"),
-    *_angle("zenith", "from the zenith down", (0, 0.5)),
+    *angle_fields("zenith", "from the zenith down", (0, 0.5)),
     _S_ARCSEC,
     _TARGET_HEIGHT,
     USE,
@@ -217,7 +217,7 @@ ZENITH_ANGLES = (
 AZIMUTHS = (
     _name("from", "where it was observed"),
     _name("to", "the point"),
-    *_angle("azimuth", "clockwise from +y", (-1, 1)),
+    *angle_fields("azimuth", "clockwise from +y", (-1, 1)),
     _S_ARCSEC,
     USE,
 )
@@ -225,14 +225,14 @@ HORIZONTAL_ANGLES = (
     _name("at", "where it was observed"),
     _name("from", "the point that it counts from"),
     _name("to", "the point that it counts to, clockwise"),
-    *_angle("angle", "from one to the other, clockwise", (-1, 1)),
+    *angle_fields("angle", "from one to the other, clockwise", (-1, 1)),
     _S_ARCSEC,
     USE,
 )
 VERTICAL_ANGLES = (
     _name("from", "where it was observed"),
     _name("to", "the point"),
-    *_angle("angle", "above the horizon", (-0.25, 0.25)),
+    *angle_fields("angle", "above the horizon", (-0.25, 0.25)),
     _S_ARCSEC,
     USE,
 )

@@ -2,6 +2,7 @@
 
 from tankcal.camera.comparator import KINDS as TRANSFORMATIONS
 from tankcal.camera.model import AFFINITIES, CONVENTIONS
+from tankcal.job.contract.hits import RANGING
 from tankcal.job.contract.lines import PLUMMET
 from tankcal.job.contract.strapping import TAPE
 from tankcal.job.fields import Field
@@ -240,12 +241,13 @@ SHORT_KEYS = {
     | {sd_key(name): f"s_{name}" for name in ("c", "x0", "y0")},
     "instruments": {},
 }
-REGISTER_KEYS = {"cameras": CAMERA, "instruments": (*INSTRUMENT, *TAPE, *PLUMMET)}
+REGISTER_KEYS = {"cameras": CAMERA, "instruments": (*INSTRUMENT, *TAPE, *PLUMMET, *RANGING)}
 REGISTERS_OF_SURVEY = {
     "photos": ("cameras", "instruments"),
     "total-station": ("instruments",),
     "strapping": ("instruments",),
     "reference-line": ("instruments",),
+    "wall-hits": ("instruments",),
 }
 # keys of [adjustment] that need photographs
 OF_PHOTOS = ("fixed_photo", "image_sd_um", "reading_limit_um", "depth_of_field", "image_weights")

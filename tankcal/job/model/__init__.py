@@ -26,6 +26,7 @@ from tankcal.survey.measurements import Measurements
 from tankcal.survey.points import Points
 from tankcal.survey.reference_line import ReferenceLines
 from tankcal.survey.strapping import Strapping
+from tankcal.survey.wall_hits import WallHits
 from tankcal.tank.rules.model import Rule
 
 __all__ = [
@@ -101,6 +102,8 @@ class Job:
         Circumferences by tape, in place of points.
     lines : ReferenceLines or None
         Offsets from lines of sight, beside them.
+    hits : WallHits or None
+        Bare hits of the wall, in place of points.
     """
 
     tank: Tank | None
@@ -132,3 +135,4 @@ class Job:
     diameter_is: str | None = None
     strapping: Strapping | None = None
     lines: ReferenceLines | None = None
+    hits: WallHits | None = None

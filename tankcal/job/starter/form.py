@@ -16,6 +16,7 @@ from tankcal.job.fields import Field
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
 STRAPPED = ("strapping", "reference-line")  # surveys that are not adjusted as points
+OF_SHELLS = (*STRAPPED, "wall-hits")  # surveys of upright tanks alone
 STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
 PLACEHOLDER = "NAME"  # of a camera or an instrument
 
@@ -37,7 +38,7 @@ class Form:
         if self.survey is not None:
             _refuse_others(self.survey, SURVEYS)
             if "points" not in TABLES_OF_KIND[self.kind] or (
-                self.survey in STRAPPED and self.kind != "vertical"
+                self.survey in OF_SHELLS and self.kind != "vertical"
             ):
                 raise ValueError(f"a tank of kind {self.kind} has no survey; expected another kind")
 

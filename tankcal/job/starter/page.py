@@ -28,6 +28,7 @@ _OF_KIND = {
     "dms": "angle",
     "flag": "`true`, `false`",
     "date": "date",
+    "time": "date and time",
     "mesh file": "file",
     "rule name": "rule",
     "ranges": "pairs of numbers",

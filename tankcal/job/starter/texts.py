@@ -112,6 +112,9 @@ TABLE_NOTES = {
     "correlated_readings": "one row for each pair of values that are correlated; may stay empty",
     "lines": "one row for each vertical line of sight round the tank",
     "offsets": "one row for each reading of the wall's offset; repeated readings are repeated rows",
+    "wall_hits": "one row for each sight to the bare wall, without a target",
+    "control_readings": "one row for each reading of a control target: at the start, every half"
+    " hour and at the end; may stay empty",
 }
 REGISTER_NOTES = {
     "cameras": "one section for each camera; put its name, as in photos.csv, in place of NAME",

@@ -73,8 +73,8 @@ def widen_bottom(part, shell):
     radius = np.sqrt(shell.volume.area_m2([0.0])[0] / np.pi) / shell.scale
     rates = {
         "offset": 1 / radius,
-        "plate_thickness": -1 / radius,
-        "paint": -1 / radius,
+        "plate_thickness": -shell.subtracts / radius,
+        "paint": -shell.subtracts / radius,
         "shell_temperature": -shell.expansion_per_k / shell.scale,
         "expansion": (shell.scale - 1) / shell.expansion_per_k / shell.scale,
     }
@@ -255,6 +255,7 @@ def _shell(job, wall, switches, uncertain):
         wall.shell.tilt if switches.tilt else 0.0,
         wall.read_with(features.weights) if uncertain else {},
         wall.without_inputs,
+        job.survey.side == "outside",
     )
 
 
@@ -324,7 +325,7 @@ def volume_by_points(job, wall, levels_m):
 
 def _bearing(job, switches):
     """Declared inputs that the corrections of the shell use."""
-    outside = job.survey.side == "outside"
+    outside = job.survey.side == "outside" or job.strapping is not None
     bears = {
         "plate_thickness": outside and switches.plate and any(c.thickness_m for c in job.courses),
         "paint": outside and switches.paint and any(c.paint_m for c in job.courses),

@@ -10,6 +10,7 @@ from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 FROM_SURVEY = (
     "instrument_scale",
     "instrument_offset",
+    "incidence",
     "points",
     "straps",
     "offsets",

@@ -12,6 +12,7 @@ from tankcal.report.workbook.charts import charts_sheets
 from tankcal.report.workbook.papers import (
     corrections_sheet,
     courses_sheet,
+    hits_sheet,
     lines_sheet,
     provenance_sheet,
     strapping_sheet,
@@ -80,6 +81,8 @@ def _sheets_of_tank(book, record):
         strapping_sheet(book, record)
     if record.get("lines"):
         lines_sheet(book, record)
+    if record.get("hits"):
+        hits_sheet(book, record)
     corrections_sheet(book, record)
     inside_sheet(book, record)
     budget_sheet(book, record)

@@ -1,6 +1,6 @@
 """The working papers: courses, corrections, choices and provenance."""
 
-from tankcal.report.tables import lines, strapping, tank
+from tankcal.report.tables import hits, lines, strapping, tank
 from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
@@ -41,6 +41,29 @@ def lines_sheet(book, record):
         (book.word("headings.plummets"), "plummets", columns_of(book, lines.PLUMMETS)),
         (book.word("headings.lines"), "lines", columns_of(book, lines.LINES)),
         (book.word("headings.offsets"), "offsets", columns_of(book, lines.OFFSETS)),
+    ]
+    write_tables(book, sheet, _HEAD_ROW, tables)
+
+
+def hits_sheet(book, record):
+    """Set-ups of bare hits, what their hits share, the rings, control targets, incidence."""
+    sheet = book.sheet("hits", book.word("texts.hits_subtitle"), landscape=True)
+    chosen = [
+        table
+        for table in (
+            hits.SETUPS,
+            hits.SHARED,
+            hits.RINGS,
+            hits.CONTROL,
+            hits.DRIFTS,
+            hits.COMPARED,
+            hits.INCIDENCE,
+        )
+        if table.rows(record)
+    ]
+    tables = [
+        (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
+        for table in chosen
     ]
     write_tables(book, sheet, _HEAD_ROW, tables)
 

@@ -147,6 +147,23 @@ class Adjusted:
         columns = self.problem.layout.points
         return self._cofactors((columns if points is None else columns[np.asarray(points)]).ravel())
 
+    def joint_covariance(self, points, **nuisances):
+        """Covariance of points and of unknowns that observations share; fixed ones: 0.
+
+        points     numbers (k,)
+        nuisances  numbers of each wanted name of NUISANCES, in the order of the keywords
+
+        First x, y, z of each point, then the others.
+        """
+        layout = self.problem.layout
+        columns = [layout.points[np.asarray(points, dtype=int)].ravel()]
+        columns += [layout.nuisance[of][np.asarray(at, dtype=int)] for of, at in nuisances.items()]
+        return self._cofactors(np.concatenate(columns))
+
+    def nuisance(self, of):
+        """(k,) values of the unknowns of a name of NUISANCES."""
+        return self._state.nuisance[of]
+
     def _cofactors(self, columns):
         """Cofactors (k, k) of unknowns, 0 for those that are fixed."""
         if (columns >= 0).all():

@@ -113,6 +113,7 @@ class Survey:
     cameras       tuple of Camera
     observations  tuple of tankcal.survey.observations (with coordinates in the survey's frame)
     sets          (s,) start azimuths of the zeros of the direction sets, rad
+    set_names     (s,) (set-up, set or None) of each; (): not named
     instruments   tuple of Instrument
     systems       tuple of System
     correlated    tuple of tankcal.survey.observations.Block: values of the observations (none of
@@ -130,6 +131,7 @@ class Survey:
     instruments: tuple = ()
     systems: tuple = ()
     correlated: tuple = ()
+    set_names: tuple = ()
 
     @property
     def nuisances(self):

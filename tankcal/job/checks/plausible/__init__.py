@@ -13,7 +13,7 @@ def check_plausible(values, tables, extent, kind, raw, log):
     check_dates(values, raw, log)
     check_material(values, kind, raw, log)
     check_sizes(values, kind, raw, log)
-    check_plates(values, tables["courses"], kind, raw, log)
+    check_plates(values, tables, kind, raw, log)
     check_levels(values, tables, extent, kind, raw, log)
     if kind == "vertical":
         check_rings(values, tables["points"], tables["courses"], log)

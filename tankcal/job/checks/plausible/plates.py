@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.job.checking import course_heights, tell
+from tankcal.job.checks.extent import is_strapped
 from tankcal.job.plausibility import (
     CARBON_STEEL,
     HEAVY,
@@ -20,10 +21,12 @@ from tankcal.messages import message
 WATER_KG_M3 = 1000.0
 
 
-def check_plates(values, courses, kind, raw, log):
+def check_plates(values, tables, kind, raw, log):
     """Plates of courses, or of a lying cylinder or a sphere."""
+    courses = tables["courses"]
     if kind == "vertical" and courses is not None:
         _check_courses(values, courses, log)
+        _check_paint(values, courses, is_strapped(tables), log)
     elif kind in SOLID_PLATES_MM:
         _check_solid(values, kind, raw, log)
 
@@ -69,14 +72,13 @@ def _check_courses(values, courses, log):
             last_mm=thickness[-1],
         )
         log.warning(courses.file, text, courses.rows[0], "thickness_mm")
-    _check_paint(values, courses, log)
 
 
 def _of_course(plate, limit, head, diameter):
     return {"found_mm": plate, "limit_mm": limit, "head_m": head, "diameter_m": diameter}
 
 
-def _check_paint(values, courses, log):
+def _check_paint(values, courses, strapped, log):
     paints = courses.of("paint_mm")
     for row, paint in zip(courses.rows, paints, strict=True):
         if paint is not None and paint > PAINT_MM:
@@ -87,7 +89,8 @@ def _check_paint(values, courses, log):
                 most_mm=PAINT_MM,
             )
             log.warning(courses.file, text, row, "paint_mm")
-    if values["survey"]["side"] == "inside" and any(paints):
+    outside = values["survey"]["side"] != "inside" or strapped
+    if not outside and any(paints):
         text = message(
             "paint_of_inside",
             "paint is given, which is subtracted only from what was measured outside, but "

@@ -123,7 +123,7 @@ def check_readings(files):
         if not has_rows(table):
             continue
         if name in ANGLES:
-            _check_angle(files, table, ANGLES[name])
+            check_angle(files, table, ANGLES[name])
         _refuse_same_ends(files, name, table)
         _warn_copies(files, table)
     if has_rows(files.tables["directions"]):
@@ -132,12 +132,14 @@ def check_readings(files):
         _warn_copies(files, files.tables["image_points"])
 
 
-def _check_angle(files, table, angle):
-    """One of the units in each row; a column of one unit at least."""
+def check_angle(files, table, angle, *, is_needed=True):
+    """One of the units in each row, a column of one unit at least; not needed: at most one."""
     columns = [f"{angle}_{unit}" for unit in ANGLE_UNITS]
     wanted = join_with_or(columns)
     headings = files.raw.tables[files_name(table)].headings
     if not any(column in headings for column in columns):
+        if not is_needed:
+            return
         expected = message(
             "angle_column_missing", "missing column; expected {wanted}", wanted=wanted
         )
@@ -147,7 +149,7 @@ def _check_angle(files, table, angle):
     count = sum(~np.isnan(table.numbers(column)) for column in columns)
     first = next(column for column in columns if column in headings)
     expected = message("angle_blank", "blank; expected {wanted}", wanted=wanted)
-    tell_rows(files.log.problem, table, sound & (count == 0), first, expected)
+    tell_rows(files.log.problem, table, is_needed & sound & (count == 0), first, expected)
     twice = sound & (count > 1)
     expected = message(
         "angle_in_two_units", "in two units; expected one of {wanted}", wanted=wanted

@@ -1,0 +1,141 @@
+"""Do bare wall hits make sense as a whole? Set-ups, instruments, angles, and what else is given."""
+
+import numpy as np
+
+from tankcal.job.checking import has_rows, refuse_repeated
+from tankcal.job.checks.extent import has_hits, has_survey, is_strapped
+from tankcal.job.checks.strapping import refuse_others, tapes_of
+from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
+from tankcal.job.checks.survey.readings import check_angle
+from tankcal.job.contract.registers import FREE
+from tankcal.messages import message
+
+MOST_HITS = 2500  # whose full covariance is kept
+RANGES = ("slope_distances", "distances")  # tables by which a network tells an offset
+
+
+def check_hits(values, tables, registers, raw, log):
+    """Hits from set-ups that are there, by instruments that say how well they range."""
+    hits, control = tables["wall_hits"], tables["control_readings"]
+    if not has_hits(tables):
+        if has_rows(control):
+            expected = message("no_hits", "without effect: the job has no wall hits")
+            log.warning(control.file, expected)
+        return
+    if len(hits.rows) > MOST_HITS:
+        expected = message(
+            "too_many_hits",
+            "{count} hits; expected at most {most}: with more, take every second one or hand them"
+            " in as points.csv",
+            count=len(hits.rows),
+            most=MOST_HITS,
+        )
+        log.problem(hits.file, expected)
+        return
+    for name in ("points", "targets"):
+        if has_rows(tables[name]):
+            expected = message(
+                "beside_hits",
+                "given together with wall hits; expected only one of them: tankcal does not join"
+                " them yet",
+            )
+            log.problem(tables[name].file, expected)
+    told = frozenset((problem.file, problem.row) for problem in log.problems)
+    files = SurveyFiles(values, tables, registers, raw, log, told)
+    for table in (hits, control):
+        if has_rows(table):
+            _check_readings(files, table, is_needed=table is hits)
+    courses = tables["courses"]
+    if courses is not None:
+        refuse_others(hits, "course", tuple(courses.of("course")), log)
+    if has_rows(tables["setups"]) and not has_survey(tables):
+        refuse_repeated(tables["setups"], "setup", log)
+        refuse_undefined(
+            files, tables["setups"], "instrument", registers["instruments"], "instruments"
+        )
+    _check_instruments(files, hits)
+
+
+def _check_readings(files, table, *, is_needed):
+    setups = files.tables["setups"]
+    defined = () if setups is None else dict.fromkeys(setups.of("setup"))
+    refuse_undefined(files, table, "setup", defined, "setups")
+    for angle in ("direction", "zenith"):
+        check_angle(files, table, angle, is_needed=is_needed)
+
+
+def ranging_of(registers):
+    """{name: {key: value}} of the instruments that may range: all but tapes."""
+    instruments, tapes = registers["instruments"], tapes_of(registers)
+    return {name: given for name, given in instruments.items() if name not in tapes}
+
+
+def instruments_used(setups, ranging):
+    """{set-up: name of its instrument}: the only one where it is blank; None: there are more."""
+    usual = next(iter(ranging)) if len(ranging) == 1 else None
+    pairs = zip(setups.of("setup"), setups.of("instrument"), strict=True)
+    return {setup: name or usual for setup, name in pairs}
+
+
+def _check_instruments(files, hits):
+    tables, log, raw = files.tables, files.log, files.raw
+    setups, ranging = tables["setups"], ranging_of(files.registers)
+    if setups is None or raw.registers.get("instruments", 0) is None:
+        return
+    used = instruments_used(setups, ranging)
+    file, told = raw.file_of("instruments"), set()
+    rows = dict(zip(setups.of("setup"), setups.rows, strict=True))
+    for name in dict.fromkeys(hits.of("setup")):
+        if name in used and used[name] not in ranging and name not in told:
+            told.add(name)
+            expected = message(
+                "setup_of_no_instrument",
+                "found {name!r}; expected the instrument of {file} that took the hits: a total"
+                " station with s_mm, s_arcsec and u_offset_mm",
+                name=used[name] or "",
+                file=file,
+            )
+            log.problem(setups.file, expected, rows[name], "instrument")
+    places = {}
+    for place, name in enumerate(hits.of("setup")):
+        if used.get(name) in ranging:
+            places.setdefault(used[name], []).append(place)
+    for name, mine in places.items():
+        _check_instrument(files, hits, name, ranging[name], np.array(mine))
+
+
+def _check_instrument(files, hits, name, given, mine):
+    for key in ("s_mm", "s_arcsec"):
+        blank = np.isnan(hits.numbers(key)[mine])
+        if given[key] is None and blank.any():
+            expected = message(
+                "sd_of_hits_missing",
+                "missing; expected it here, or in each row of wall_hits.csv",
+            )
+            files.tell_key(files.log.problem, "instruments", name, key, expected)
+    if given["u_scale_ppm"] == FREE and not _told_by_network(files, name):
+        expected = message(
+            "scale_of_hits_free",
+            "found free; expected its standard uncertainty: no distance of a network tells it",
+        )
+        files.tell_key(files.log.problem, "instruments", name, "u_scale_ppm", expected)
+    offset = given["u_offset_mm"]
+    is_known = offset is not None and (offset != FREE or _told_by_network(files, name))
+    if not is_known and not is_strapped(files.tables):
+        expected = message(
+            "offset_of_hits_unknown",
+            "found {found}; expected the standard uncertainty of the offset without reflector, or a"
+            " circumference by tape: an offset goes wholly into every radius, and nothing in the"
+            " job tells it",
+            found=offset or message("nothing", "nothing"),
+        )
+        files.tell_key(files.log.problem, "instruments", name, "u_offset_mm", expected)
+
+
+def _told_by_network(files, name):
+    """Does a network range with the instrument, so that its free scale or offset is an unknown?"""
+    setups, distances = files.tables["setups"], files.tables["distances"]
+    slopes = files.tables["slope_distances"]
+    used = instruments_used(setups, ranging_of(files.registers))
+    by_setup = has_rows(slopes) and any(used.get(one) == name for one in slopes.of("setup"))
+    return by_setup or (has_rows(distances) and name in distances.of("instrument"))

@@ -1,0 +1,84 @@
+"""From the checked tables of wall hits to `WallHits`, all in SI."""
+
+import numpy as np
+
+from tankcal.job.checks.extent import has_hits
+from tankcal.job.checks.hits import instruments_used, ranging_of
+from tankcal.job.contract.registers import FREE
+from tankcal.job.measuring import ARCSEC, angle_in_rad
+from tankcal.survey.wall_hits import ControlReading, HitSetup, RangingInstrument, WallHits
+
+USUAL_INCIDENCE_MM = 1.0  # u of the bias at 60 degrees that nobody gave
+AXES = "xyz"
+
+
+def make_hits(tables, registers):
+    """WallHits of tables and registers without problems; None: the wall was not hit."""
+    if not has_hits(tables):
+        return None
+    table, setups = tables["wall_hits"], _setups(tables["setups"], registers)
+    names = tuple(table.of("setup"))
+    used = dict.fromkeys(setups[name].instrument for name in names)
+    ranging = ranging_of(registers)
+    own = [ranging[setups[name].instrument] for name in names]
+    sd_mm, sd_arcsec = (
+        np.where(np.isnan(table.numbers(key)), [one[key] or 0.0 for one in own], table.numbers(key))
+        for key in ("s_mm", "s_arcsec")
+    )
+    return WallHits(
+        setup=names,
+        set=tuple(table.of("set")),
+        course=tuple(table.of("course")),
+        direction_rad=angle_in_rad(table, "direction"),
+        zenith_rad=angle_in_rad(table, "zenith"),
+        distance_m=table.numbers("distance_m"),
+        sd_m=sd_mm / 1000,
+        sd_rad=sd_arcsec * ARCSEC,
+        surface=tuple(one or "" for one in table.of("surface")),
+        check=np.array([use == "check" for use in table.of("use")], dtype=bool),
+        setups=setups,
+        instruments={name: _instrument(name, ranging[name]) for name in used},
+        stations=_stations(tables["control"]),
+        control=_control(tables["control_readings"]),
+        rows=table.rows,
+        file=table.file,
+    )
+
+
+def _setups(table, registers):
+    used = instruments_used(table, ranging_of(registers))
+    names = ("setup", "station", "instrument_height_m")
+    columns = zip(*map(table.of, names), table.rows, strict=True)
+    return {
+        name: HitSetup(name, station, used[name], height or 0.0, row)
+        for name, station, height, row in columns
+    }
+
+
+def _instrument(name, given):
+    offset, scale, bias = (given[key] for key in ("u_offset_mm", "u_scale_ppm", "u_incidence_mm"))
+    return RangingInstrument(
+        name,
+        correction=given["correction"] or 0.0,
+        correction_m=(given["correction_mm"] or 0.0) / 1000,
+        u_scale=np.nan if scale == FREE else (scale or 0.0) / 1e6,
+        u_offset_m=np.nan if offset in (None, FREE) else offset / 1000,
+        u_incidence_m=(USUAL_INCIDENCE_MM if bias is None else bias) / 1000,
+        certificate=given["certificate"] or "",
+    )
+
+
+def _stations(table):
+    if table is None:
+        return {}
+    xyz = np.column_stack([table.numbers(f"{axis}_m") for axis in AXES])
+    return dict(zip(table.of("point"), xyz, strict=True))
+
+
+def _control(table):
+    if table is None:
+        return ()
+    angles = (angle_in_rad(table, name) for name in ("direction", "zenith"))
+    columns = zip(table.of("setup"), table.of("target"), *angles, table.numbers("distance_m"),
+                  table.numbers("time"), table.rows, strict=True)  # fmt: skip
+    return tuple(ControlReading(*row) for row in columns)

@@ -1,0 +1,163 @@
+"""Warnings of bare wall hits: what a sound crew with a sound instrument hardly brings home."""
+
+import numpy as np
+
+from tankcal.errors import Problem
+from tankcal.geometry.outlines import FULL_TURN
+from tankcal.geometry.shell import course_of
+from tankcal.messages import list_some, message
+from tankcal.pipeline.rule_limits import limit_at, limits_of
+from tankcal.pipeline.told_causes import told_causes
+from tankcal.survey.control_drift import repeats_of
+
+RULES, CONTROL = "wall_hits", "control_readings.csv"
+UNLIKE_SDS = 3.0  # of an offset or a scale, from what its certificate says
+OVER_JOINT_M = 0.02  # a hit of a course may lie so far beyond it
+SHOWN = 5
+GON = FULL_TURN / 400
+
+
+def check_hits(job, wall, sighting):
+    """`Problem`s of the hits of a wall."""
+    return (
+        *_of_control(job),
+        *_of_levels(job, wall),
+        *_of_courses(job, sighting),
+        *_of_incidence(sighting),
+        *_of_causes(job, wall),
+    )
+
+
+def _of_control(job):
+    limits = limits_of(RULES)
+    if not job.hits.control:
+        text = message(
+            "no_control_readings",
+            "no control target was read again: a tripod or an instrument that moved would not show",
+        )
+        yield Problem(CONTROL, text)
+        return
+    for one in repeats_of(job.hits.control):
+        angle = limits["control_angle_gon"] * GON
+        for name, values, limit, per, unit in (
+            ("direction", one.direction_rad, angle, GON / 1000, "mgon"),
+            ("zenith", one.zenith_rad, angle, GON / 1000, "mgon"),
+            ("distance_m", one.distance_m, limits["control_distance_mm"] / 1000, 1e-3, "mm"),
+        ):
+            size = np.nan_to_num(np.abs(values))
+            worst = int(np.argmax(size))
+            if size[worst] > limit * (1 + 1e-6):
+                text = message(
+                    "control_moved",
+                    "set-up {setup!r} reads target {target!r} {apart:+.1f} {unit} from its first"
+                    " reading, over the limit of {limit:g} {unit}: did the instrument move?",
+                    setup=one.setup,
+                    target=one.target,
+                    apart=values[worst] / per,
+                    limit=limit / per,
+                    unit=unit,
+                )
+                yield Problem(CONTROL, text, one.rows[worst], name)
+
+
+def _of_levels(job, wall):
+    girth = np.pi * job.tank.nominal_diameter_m
+    least, few = limit_at(RULES, "hits", "least", girth), []
+    for section in wall.sections:
+        if len(section.group.members) < least:
+            few.append(section.group.name)
+    if few:
+        text = message(
+            "few_hits",
+            "sections {sections} have fewer than {least} hits, as many as a circumference of"
+            " {girth_m:.0f} m asks for",
+            sections=list_some(few, SHOWN),
+            least=least,
+            girth_m=girth,
+        )
+        yield Problem(job.hits.file, text)
+    courses = [section.group.course for section in wall.sections]
+    least = limits_of(RULES)["sets_a_course"]
+    short = [
+        course.name
+        for index, course in enumerate(job.courses)
+        if courses.count(index) < least
+        and not any(one.group.degree for one in wall.sections if one.group.course == index)
+    ]
+    if short:
+        text = message(
+            "few_levels_of_hits",
+            "courses {courses} were hit at fewer than {least} levels: nothing shows a taper there",
+            courses=list_some(short, SHOWN),
+            least=least,
+        )
+        yield Problem(job.hits.file, text)
+
+
+def _of_courses(job, sighting):
+    """Hits that are said to be of another course than the one at their height."""
+    names = [course.name for course in job.courses]
+    joints = job.datum.bottom_z_m + np.cumsum([0.0] + [one.height_m for one in job.courses])
+    z = sighting.points.xyz_m[:, 2]
+    wrong = {}
+    for place, name in enumerate(job.hits.course):
+        if name is None:
+            continue
+        index = names.index(name)
+        if not joints[index] - OVER_JOINT_M <= z[place] <= joints[index + 1] + OVER_JOINT_M:
+            there = names[int(course_of(z[place], joints))]
+            wrong.setdefault((name, there), []).append(place)
+    for (name, there), places in wrong.items():
+        text = message(
+            "hits_of_other_course",
+            "{count} hits are said to be of course {course!r}, but lie at the height of course"
+            " {there!r}: is the name wrong, or bottom_z_m, or the height of the instrument?",
+            count=len(places),
+            course=name,
+            there=there,
+        )
+        yield Problem(job.hits.file, text, job.hits.rows[places[0]], "course")
+
+
+def _of_incidence(sighting):
+    most = limits_of(RULES)["most_incidence_deg"]
+    flat = np.flatnonzero(np.degrees(sighting.incidence_rad) > most)
+    if len(flat):
+        text = message(
+            "hits_too_flat",
+            "{count} hits meet the wall at more than {most:g} degrees from its normal: what such"
+            " ranging is worth nobody knows",
+            count=len(flat),
+            most=most,
+        )
+        yield Problem(sighting.points.file, text, sighting.points.rows[flat[0]])
+
+
+def _of_causes(job, wall):
+    """Offsets and scales that straps make out to be unlike their certificates."""
+    if wall.straps is None:
+        return
+    for one in told_causes(job, wall):
+        if not np.isfinite(one.u_before) or abs(one.value) <= UNLIKE_SDS * one.u_before:
+            continue
+        values = {"name": one.name, "factor": UNLIKE_SDS}
+        if one.what == "instrument_offset":
+            text = message(
+                "offset_unlike_certificate",
+                "the straps make the offset of {name} {value_mm:+.2f} mm, {ratio:.1f} times its"
+                " u_offset_mm: is that of another reflector, or a strap wrong?",
+                value_mm=1000 * one.value,
+                ratio=abs(one.value) / one.u_before,
+                **values,
+            )
+            yield Problem("instruments.toml", text, None, f"{one.name}.u_offset_mm")
+        else:
+            text = message(
+                "scale_unlike_certificate",
+                "the straps make the scale of {name} {value_ppm:+.0f} ppm, {ratio:.1f} times its"
+                " u_scale_ppm",
+                value_ppm=1e6 * one.value,
+                ratio=abs(one.value) / one.u_before,
+                **values,
+            )
+            yield Problem("instruments.toml", text, None, f"{one.name}.u_scale_ppm")

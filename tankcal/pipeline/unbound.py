@@ -1,0 +1,80 @@
+"""What the readings of a wall share that nothing binds beforehand: free offsets, poses of set-ups.
+
+They are unknowns of the wall beside its radii and the centres of its rings. A pose moves radii in
+ways that these can take up (all lines outwards is a larger tank) and in ways that hardly move any:
+only the rest of its ways are unknowns.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tankcal.errors import SolutionError
+from tankcal.geometry.field.sites import free_design
+from tankcal.messages import message
+from tankcal.sections import coordinates_of
+
+MOVED_M, TURNED_RAD = 0.3, 0.05  # how far off a pose that the wall alone ties may be
+LEAST_MOTION_M = 0.005  # of all its radii together by that: less is no unknown of the wall
+
+
+@dataclass(frozen=True)
+class Unbound:
+    """Derivatives of n radii by what nothing binds.
+
+    Attributes
+    ----------
+    offsets : ndarray, shape (n, k)
+        By free offsets and scales, in their order.
+    poses : ndarray, shape (n, m)
+        By x, y and orientation of set-ups, each as far as it may be off.
+    """
+
+    offsets: np.ndarray
+    poses: np.ndarray
+
+    def padded(self, more):
+        """The same with more readings, which nothing of it moves."""
+        return Unbound(*(np.pad(one, ((0, more), (0, 0))) for one in (self.offsets, self.poses)))
+
+    def shared_by(self, sites):
+        """The `Sites` with it as what their readings share, offsets first.
+
+        Raises SolutionError where set-ups may move as all radii do, and nothing tells them apart.
+        """
+        if not self.offsets.shape[1] + self.poses.shape[1]:
+            return sites
+        design, radii = free_design(replace(sites, shared=None))
+        others = np.hstack([design, self.offsets])
+        taken = np.linalg.lstsq(others, self.poses, rcond=None)[0]
+        _, size, ways = np.linalg.svd(self.poses - others @ taken, full_matrices=False)
+        alike = taken[radii] @ ways[size <= LEAST_MOTION_M].T
+        if np.abs(alike).max(initial=0.0) > LEAST_MOTION_M:
+            raise SolutionError(
+                message(
+                    "radius_of_lines",
+                    "no capacity: the set-ups are tied to nothing but the wall and see lines of it"
+                    " alone, which tell differences of radii; strap a course"
+                    " (circumferences.csv), or tie them by targets",
+                )
+            )
+        chosen = self.poses @ ways[size > LEAST_MOTION_M].T  # not `left`: radii stay what they are
+        return replace(sites, shared=np.hstack([self.offsets, chosen]))
+
+
+def unbound_of(points, by_points, accepted):
+    """`Unbound` of the radii of a wall.
+
+    by_points  (n, 3 m) their derivative by the coordinates of the accepted points (m,)
+    """
+    index = coordinates_of(accepted)
+    columns = {False: [], True: []}
+    for one in points.unbound:
+        is_pose = one.what == "pose"
+        size = 1.0 if not is_pose else MOVED_M if one.unit == "m" else TURNED_RAD
+        columns[is_pose].append(size * (by_points @ one.column_m[index]))
+    return Unbound(*(_stacked(columns[is_pose], by_points.shape[0]) for is_pose in (False, True)))
+
+
+def _stacked(columns, count):
+    return np.column_stack(columns) if columns else np.zeros((count, 0))

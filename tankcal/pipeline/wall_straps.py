@@ -1,0 +1,224 @@
+"""Straps round a wall that points show, too: readings of the same field, each tested by all others.
+
+A circumference is the mean radius of its level but for the area term, whose size the points tell:
+the ovality and the seams that they were found to have. Inside points see the shell without plate
+and paint, which a tape outside does not.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+
+from tankcal.geometry.field.blunders import MOST_ROUNDS, restricted_precision, snoop_wall
+from tankcal.geometry.field.components import COMPONENTS
+from tankcal.geometry.field.estimate import LEVELS, WallField
+from tankcal.geometry.field.sites import Sites, free_design
+from tankcal.geometry.girth import perimeter_excess
+from tankcal.geometry.outlines import FULL_TURN
+from tankcal.pipeline.unbound import Unbound
+from tankcal.pipeline.wall_readings import columns_of, noise_of, readings_of_straps, sites_of
+from tankcal.quadrature import panels
+from tankcal.survey.network.reliability import noncentrality
+from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
+
+UNCONTROLLED = 1e-6  # of a reading's variance: what the others leave of it where there are none
+
+
+@dataclass(frozen=True)
+class AreaTerm:
+    """By how much the circle of a perimeter is larger than the wall: mean and sd, relative."""
+
+    mean: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class Straps:
+    """Circumferences by tape, and what the wall that they are readings of says of them.
+
+    Attributes
+    ----------
+    reduced : tuple of Reduced
+        Of every reading, in the order of the file.
+    adjusted : ndarray of int, shape (k,)
+        Which of these are readings of the wall; the others are only compared.
+    accepted : ndarray of bool, shape (k,)
+        False: set aside, for all others contradict it.
+    w : ndarray, shape (k,)
+        Departure from what all others show over its sd; nan: no other controls it.
+    sd_m : ndarray, shape (k,)
+        That, of its radius; inf of such.
+    departure_m : ndarray, shape (k,)
+        Of its radius from what all others show.
+    area_term : AreaTerm
+    shape_sd_m : float
+        Standard deviation of the radius round the wall, which that follows from.
+    radius_m : ndarray, shape (courses,)
+        Mean radius of the painted shell, of the circle of equal area.
+    plate_sd_m : dict
+        {course index: standard uncertainty of its plate by a gauge}.
+    tapes : tuple of (Tape, float)
+        Those that were read, and the standard uncertainty of their scale by a master.
+    """
+
+    reduced: tuple[Reduced, ...]
+    adjusted: np.ndarray
+    accepted: np.ndarray
+    w: np.ndarray
+    sd_m: np.ndarray
+    departure_m: np.ndarray
+    area_term: AreaTerm
+    shape_sd_m: float
+    radius_m: np.ndarray
+    plate_sd_m: dict
+    tapes: tuple
+
+    @property
+    def per_radius(self):
+        """Circumference over the radius of equal area."""
+        return FULL_TURN * np.sqrt(1 + self.area_term.mean)
+
+    @property
+    def mdb_m(self):
+        """(k,) smallest blunder of each circumference that its test finds; inf: no test."""
+        return noncentrality() * self.sd_m * self.per_radius
+
+    @property
+    def circumference_m(self):
+        """(courses,) mean circumference of each, of the painted shell."""
+        return self.radius_m * self.per_radius
+
+
+def gauged_plates(job):
+    """{course index: standard uncertainty of its plate by a gauge} of a strapped job."""
+    read = job.strapping.plate_sd_m
+    return {i: read[one.name] for i, one in enumerate(job.courses) if one.name in read}
+
+
+def mean_radii(field):
+    """(courses,) mean radius of each course as measured."""
+    return field.outlines_m.mean(axis=2) @ panels([0.0, 1.0], LEVELS)[1]
+
+
+@dataclass(frozen=True)
+class PointsOfWall:
+    """What points say of a wall.
+
+    Attributes
+    ----------
+    sites : Sites
+    radius_m : ndarray, shape (n,)
+    noise_m2 : ndarray, shape (n, n)
+    unbound : Unbound
+        What of them nothing binds.
+    """
+
+    sites: Sites
+    radius_m: np.ndarray
+    noise_m2: np.ndarray
+    unbound: Unbound
+
+
+def join_straps(job, points, amplitudes, joints_m):
+    """The field of a wall from its points and its straps.
+
+    Parameters
+    ----------
+    job : Job
+        Whose wall was strapped.
+    points : PointsOfWall
+    amplitudes : Amplitudes
+        Of the wall, as its points tell them.
+    joints_m : ndarray, shape (courses + 1,)
+
+    Returns
+    -------
+    field : WallField
+        Of the points, then of the accepted straps.
+    readings : list of WallReading
+        These straps, on the surface that the points are on.
+    straps : Straps
+    """
+    radius, noise = points.radius_m, points.noise_m2
+    nominal, names = job.tank.nominal_diameter_m / 2, [one.name for one in job.courses]
+    given = job.strapping
+    reduced = reduce_straps(given, job.survey.shell_temperature_c, 2 * nominal)
+    places = np.array([i for i, one in enumerate(reduced) if not one.strap.check], dtype=int)
+    shape = given.shape_sd_m
+    if shape is None:
+        waves = [one.shape in ("oval", "seam") for one in COMPONENTS]
+        shape = float(np.sqrt(amplitudes.variances_m2[waves].sum()))
+    term = AreaTerm(*perimeter_excess(shape, nominal))
+    readings = readings_of_straps([reduced[i] for i in places], names, term)
+    inner = np.array([one.thickness_m + one.paint_m for one in job.courses])
+    inner *= job.survey.side == "inside"
+    readings = [_on_surface(one, inner[one.course], job.survey.side) for one in readings]
+    n, k = len(radius), len(readings)
+    plate, bottom = job.datum.dip_plate_z_m, job.datum.bottom_z_m
+    zero = 0.0 if plate is None else plate - bottom
+    both = _joined(points.sites, sites_of(readings, joints_m, zero))
+    both = points.unbound.padded(k).shared_by(both)
+    radius = np.append(radius, [one.radius_m for one in readings])
+    noise = scipy.linalg.block_diag(noise, noise_of(readings) + _by_inputs(job, readings))
+    may_go = np.append(np.zeros(n), np.full(k, job.snooping and both.shared is None))
+    accepted = np.ones(n + k, dtype=bool)
+    for _ in range(MOST_ROUNDS):
+        field = _field(both, radius, noise, amplitudes, nominal, accepted)
+        whole = replace(field, sites=both, radius_m=radius, noise_m2=noise).covariance_m2
+        precision = restricted_precision(whole, free_design(both)[0])
+        tested = snoop_wall(precision, precision @ (radius - radius.mean()), accepted, may_go)
+        if np.all(tested.accepted == accepted):
+            break
+        accepted = tested.accepted
+    controlled = (tested.sd_m**-2.0 * np.diag(whole) > UNCONTROLLED)[n:]
+    kept = accepted[n:]
+    straps = Straps(
+        reduced=reduced,
+        adjusted=places,
+        accepted=kept,
+        w=np.where(controlled, tested.w[n:], np.nan),
+        sd_m=np.where(controlled, tested.sd_m[n:], np.inf),
+        departure_m=tested.departure_m[n:],
+        area_term=term,
+        shape_sd_m=shape,
+        radius_m=mean_radii(field) + inner,
+        plate_sd_m=gauged_plates(job),
+        tapes=tapes_used(given),
+    )
+    return field, [one for one, used in zip(readings, kept, strict=True) if used], straps
+
+
+def _by_inputs(job, readings):
+    """(k, k) covariance of the radii by declared inputs that they depend on, so that they weigh no
+    more than plates and temperature let them.
+    """
+    known = {one.name: one.u for one in job.inputs}
+    columns = columns_of([one.by_inputs for one in readings])
+    found = np.zeros((len(readings), len(readings)))
+    for name, column in columns.items():
+        found += known.get(name, 0.0) ** 2 * np.outer(column, column)
+    return found
+
+
+def _field(sites, radius_m, noise_m2, amplitudes, nominal_m, accepted):
+    some = np.flatnonzero(accepted)
+    own = noise_m2[np.ix_(some, some)]
+    return WallField(sites.take(accepted), radius_m[some], own, amplitudes, nominal_m)
+
+
+def _on_surface(reading, inner_m, side):
+    """A strap's radius on the surface that the points are on: inside without plate and paint."""
+    if side == "outside":
+        return reading
+    by = {"plate_thickness": -1.0, "paint": -1.0}
+    return replace(reading, radius_m=reading.radius_m - inner_m, by_inputs=reading.by_inputs | by)
+
+
+def _joined(points, straps):
+    """`Sites` of points, then of straps, without what they share."""
+    names = ("course", "ring", "zeta", "azimuth_rad", "leans")
+    return Sites(
+        **{name: np.concatenate([getattr(points, name), getattr(straps, name)]) for name in names},
+        welds_rad=points.welds_rad,
+    )

@@ -1,0 +1,102 @@
+"""Tables of bare wall hits: set-ups, what their hits share, rings, control targets, incidence."""
+
+from tankcal.report.tables.table import Column, Table
+
+SETUPS = Table(
+    "hit_setups",
+    (
+        Column("setup", heading="hit_setup", sheet="hit_setup", width=10),
+        Column("station", heading="hit_station", sheet="hit_station", width=10),
+        Column("instrument", heading="hit_instrument", sheet="hit_instrument", width=14),
+        Column("x_m", "m", decimals=3, heading="hit_x", sheet="hit_x_m"),
+        Column("y_m", "m", decimals=3, heading="hit_y", sheet="hit_y_m"),
+        Column("z_m", "m", decimals=3, heading="hit_z", sheet="hit_z_m"),
+        Column("tie", words="ties_of_setups", heading="hit_tie", sheet="hit_tie", width=16),
+        Column("hits", decimals=0, heading="hits_used", sheet="hits_used"),
+        Column("rejected", decimals=0, heading="hits_rejected", sheet="hits_rejected"),
+        Column("checks", decimals=0, heading="hits_compared", sheet="hits_compared"),
+    ),
+    rows=lambda record: record["hits"]["setups"],
+)  # fmt: skip
+
+SHARED = Table(
+    "hit_shared",
+    (
+        Column("instrument", heading="hit_instrument", sheet="hit_instrument", width=14),
+        Column("certificate", heading="tape_certificate", sheet="tape_certificate", width=14),
+        Column("what", words="inputs", heading="hit_shared_what", sheet="hit_shared_what",
+               width=22),
+        Column("unit", heading="hit_shared_unit", sheet="hit_shared_unit", width=7),
+        Column("u_before", decimals=2, heading="hit_u_before", sheet="hit_u_before"),
+        Column("value", decimals=2, heading="hit_value", sheet="hit_value"),
+        Column("u_after", decimals=2, heading="hit_u_after", sheet="hit_u_after"),
+        Column("correlation", decimals=2, heading="hit_correlation", sheet="hit_correlation"),
+    ),
+    rows=lambda record: [
+        {**one, "certificate": one["certificate"] or None} for one in record["hits"]["shared"]
+    ],
+)  # fmt: skip
+
+RINGS = Table(
+    "hit_rings",
+    (
+        Column("section", sheet="section", width=10),
+        Column("course", sheet="course", width=9),
+        Column("level_m", "m", decimals=3, sheet="strap_level_m"),
+        Column("hits", decimals=0, heading="hits_used", sheet="hits_used"),
+        Column("rejected", decimals=0, heading="hits_rejected", sheet="hits_rejected"),
+        Column("least", decimals=0, heading="hits_least", sheet="hits_least"),
+    ),
+    rows=lambda record: record["hits"]["rings"],
+)  # fmt: skip
+
+INCIDENCE = Table(
+    "hit_incidence",
+    (
+        Column("low_deg", decimals=0, heading="incidence_low", sheet="incidence_low_deg"),
+        Column("high_deg", decimals=0, heading="incidence_high", sheet="incidence_high_deg"),
+        Column("hits", decimals=0, heading="hits_read", sheet="hits_read"),
+    ),
+    rows=lambda record: record["hits"]["incidence"],
+)  # fmt: skip
+
+CONTROL = Table(
+    "hit_control",
+    (
+        Column("setup", heading="hit_setup", sheet="hit_setup", width=10),
+        Column("target", heading="hit_target", sheet="hit_target", width=10),
+        Column("elapsed_h", decimals=2, heading="control_hours", sheet="control_hours"),
+        Column("direction_rad", "rad arcsec", decimals=1, heading="control_direction",
+               sheet="control_direction_arcsec"),
+        Column("zenith_rad", "rad arcsec", decimals=1, heading="control_zenith",
+               sheet="control_zenith_arcsec"),
+        Column("distance_m", "mm", decimals=1, heading="control_distance",
+               sheet="control_distance_mm"),
+    ),
+    rows=lambda record: record["hits"]["control"],
+)  # fmt: skip
+
+DRIFTS = Table(
+    "hit_drifts",
+    (
+        Column("setup", heading="hit_setup", sheet="hit_setup", width=10),
+        Column("hours", decimals=2, heading="drift_hours", sheet="drift_hours"),
+        Column("direction_rad_h", "rad arcsec", decimals=2, heading="drift_direction",
+               sheet="drift_direction_arcsec"),
+        Column("zenith_rad_h", "rad arcsec", decimals=2, heading="drift_zenith",
+               sheet="drift_zenith_arcsec"),
+    ),
+    rows=lambda record: record["hits"]["drifts"],
+)  # fmt: skip
+
+COMPARED = Table(
+    "hit_compared",
+    (
+        Column("setup", heading="hit_setup", sheet="hit_setup", width=10),
+        Column("row", decimals=0, heading="hit_row", sheet="hit_row", width=8),
+        Column("section", sheet="section", width=10),
+        Column("departure_m", "mm", decimals=2, heading="line_departure",
+               sheet="line_departure_mm"),
+    ),
+    rows=lambda record: record["hits"]["compared"],
+)  # fmt: skip

@@ -1,0 +1,181 @@
+"""Set-ups that are tied to nothing but the wall: where they stood, well enough to start from.
+
+Each sees a part of the wall, a generatrix at least. From its own hits it has the axis of the tank
+at some distance and direction; its azimuth round the tank is that of its station, or even in the
+order of the set-ups. Then all untied poses are fitted together to a leaning surface of revolution
+with a radius of its own at each level,
+
+    |hit - axis(z)| = R_level,   axis(z) = (x, y) + (mx, my) z,
+
+what nothing determines staying where it is. The wall itself then has them as unknowns.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tankcal.geometry.circles import taubin_circle
+from tankcal.geometry.outlines import FULL_TURN
+
+LEVEL_GAP_M = 0.15  # between heights that are fitted with radii of their own
+NARROW_RAD = 0.1  # directions of a set-up that sees a line of the wall, and looks along its normal
+START_SDS = (0.3, 0.3, 0.1)  # away from the axis, across, m, and turn, rad: of a pose at first
+START_OF_LINE = (0.3, 1e-3, 1e-3)  # of one that sees a line
+AXIS_SDS = (0.3, 0.3, 0.02, 0.02)  # m, and m/m of its lean
+WALL_SD_M, FAR_SDS = 0.005, 3.0  # of a hit from that surface; further ones weigh less
+ROUNDS, CENTRE_ROUNDS = 15, 20
+
+
+def place_untied(hits, poses, untied, *, nominal_m, is_inside):
+    """The `Poses` with those of untied set-ups placed.
+
+    Parameters
+    ----------
+    hits : WallHits
+    poses : Poses
+        z of all; x, y and orientation of those that are tied.
+    untied : ndarray of int
+        Which of them are not.
+    nominal_m : float
+        Radius of the tank, m.
+    is_inside : bool
+        Whether the set-ups stand in the tank.
+
+    Returns
+    -------
+    Poses
+    """
+    of = {key: i for i, key in enumerate(poses.keys)}
+    pose = np.array([of[key] for key in zip(hits.setup, hits.set, strict=True)])
+    own = _own_places(hits)
+    tied = ~np.isin(pose, untied)
+    axis = _axis(hits, poses, own, pose, tied, untied)
+    xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
+    for number, one in enumerate(untied):
+        station = hits.stations.get(hits.setups[poses.keys[one][0]].station)
+        away = None if station is None else station[:2] - axis
+        known = away is not None and np.all(np.isfinite(away)) and np.hypot(*away) > 0
+        azimuth = np.arctan2(*away) if known else FULL_TURN * number / len(untied)
+        centre = _centre(own[pose == one], nominal_m, is_inside)
+        distance = np.hypot(*centre)
+        xyz[one, :2] = axis + distance * np.array([np.sin(azimuth), np.cos(azimuth)])
+        zero[one] = azimuth + np.pi - np.arctan2(*centre)
+    return _fitted(replace(poses, xyz_m=xyz, orientation_rad=zero), own, pose, untied, axis)
+
+
+def _own_places(hits):
+    """(n, 3) hits from their set-up, the zero of its circle along +y."""
+    flat = hits.distance_m * np.sin(hits.zenith_rad)
+    return np.column_stack(
+        [
+            flat * np.sin(hits.direction_rad),
+            flat * np.cos(hits.direction_rad),
+            hits.distance_m * np.cos(hits.zenith_rad),
+        ]
+    )
+
+
+def _turned(own, zero):
+    sin, cos = np.sin(zero), np.cos(zero)
+    x, y = own[:, 0], own[:, 1]
+    return np.column_stack([x * cos + y * sin, -x * sin + y * cos])
+
+
+def _axis(hits, poses, own, pose, tied, untied):
+    """(2,) of the tank in the frame: by tied hits, else amid the stations, else its origin."""
+    if tied.any():
+        places = _turned(own[tied], poses.orientation_rad[pose[tied]])
+        places += poses.xyz_m[pose[tied], :2]
+        middle = places.mean(axis=0)
+        return middle + taubin_circle(places - middle)[:2]
+    stations = [hits.stations.get(hits.setups[poses.keys[one][0]].station) for one in untied]
+    known = [one[:2] for one in stations if one is not None and np.all(np.isfinite(one[:2]))]
+    return np.mean(known, axis=0) if len(known) == len(untied) else np.zeros(2)
+
+
+def _centre(own, nominal_m, is_inside):
+    """(2,) of the tank as one set-up sees it, of the nominal radius."""
+    places = own[:, :2]
+    ray = places.mean(axis=0)
+    size = np.hypot(*ray)
+    if is_inside:
+        return taubin_circle(places - ray)[:2] + ray if len(places) > 4 else ray * 0
+    nearest = np.hypot(*places.T).min()
+    start = ray / size * (nearest + nominal_m)
+    centre = start.copy()
+    for _ in range(CENTRE_ROUNDS):
+        away = places - centre
+        distance = np.hypot(*away.T)
+        by = -away / distance[:, None]
+        weight = np.diag([1e-4 * len(places)] * 2)
+        change = np.linalg.solve(
+            by.T @ by + weight, by.T @ (nominal_m - distance) + weight @ (start - centre)
+        )
+        centre = centre + change
+        if np.hypot(*change) < 1e-9:
+            break
+    return centre
+
+
+def _fitted(poses, own, pose, untied, axis):
+    """The poses after least squares on a leaning surface of revolution."""
+    z = poses.xyz_m[pose, 2] + own[:, 2]
+    middle = z.mean()
+    order = np.argsort(z, kind="stable")
+    level = np.empty(len(z), dtype=int)
+    level[order] = np.cumsum(np.diff(z[order], prepend=z[order[0]]) > LEVEL_GAP_M)
+    place = {one: i for i, one in enumerate(untied)}
+    free, levels = 3 * len(untied), level.max() + 1
+    prior = np.diag(np.concatenate([np.ones(free), AXIS_SDS]) ** -2.0)
+    for one, i in place.items():
+        prior[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = _start(
+            poses.xyz_m[one, :2] - axis, own[pose == one]
+        )
+    shift, lean = np.zeros(2), np.zeros(2)
+    xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
+    moved = np.zeros(free + 4)
+    for _ in range(ROUNDS):
+        turned = _turned(own, zero[pose])
+        away = xyz[pose, :2] + turned - axis - shift - np.outer(z - middle, lean)
+        distance = np.hypot(*away.T)
+        normal = away / distance[:, None]
+        by = np.zeros((len(z), free + 4 + levels))
+        for one, i in place.items():
+            mine = pose == one
+            by[mine, 3 * i : 3 * i + 2] = normal[mine]
+            across = np.column_stack([turned[mine, 1], -turned[mine, 0]])
+            by[mine, 3 * i + 2] = np.sum(normal[mine] * across, axis=1)
+        by[:, free : free + 2] = -normal
+        by[:, free + 2 : free + 4] = -normal * (z - middle)[:, None]
+        by[np.arange(len(z)), free + 4 + level] = -1.0
+        radii = np.array([np.median(distance[level == one]) for one in range(levels)])
+        off = distance - radii[level]
+        spread = max(WALL_SD_M, 1.4826 * float(np.median(np.abs(off))))
+        weight = np.minimum(1.0, FAR_SDS * spread / np.maximum(np.abs(off), 1e-12)) / spread**2
+        normals = by.T @ (weight[:, None] * by)
+        normals[: free + 4, : free + 4] += prior
+        right = -by.T @ (weight * off)
+        right[: free + 4] -= prior @ moved
+        change = np.linalg.solve(normals, right)
+        for one, i in place.items():
+            xyz[one, :2] += change[3 * i : 3 * i + 2]
+            zero[one] += change[3 * i + 2]
+        shift += change[free : free + 2]
+        lean += change[free + 2 : free + 4]
+        moved += change[: free + 4]
+        if np.abs(change[: free + 4]).max() < 1e-7:
+            break
+    return replace(poses, xyz_m=xyz, orientation_rad=zero)
+
+
+def _start(away, own):
+    """(3, 3) weight of x, y and turn of a pose, which stands there from the axis, as it is known
+    at first: a set-up whose sights are a line of the wall looks along its normal.
+    """
+    middle = np.arctan2(*own[:, :2].mean(axis=0))
+    turn = np.arctan2(own[:, 0], own[:, 1]) - middle
+    wide = np.ptp(turn - FULL_TURN * np.round(turn / FULL_TURN))
+    sds = START_SDS if wide > NARROW_RAD else START_OF_LINE
+    x, y = away / np.hypot(*away)
+    axes = np.array([[x, -y, 0], [y, x, 0], [0, 0, 1]])
+    return axes @ np.diag(np.array(sds) ** -2.0) @ axes.T

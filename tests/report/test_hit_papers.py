@@ -1,0 +1,94 @@
+"""What record, papers and workbook say of bare wall hits, of the shipped example."""
+
+import numpy as np
+import openpyxl
+import pytest
+
+import tankcal
+from tankcal.record import record_of
+from tankcal.report import workbook
+from tankcal.report.plain import PlainPaper
+from tankcal.report.tables import hits
+from tankcal.text.languages import LANGUAGES
+from tankcal.text.words import load_words, translate_record
+
+
+@pytest.fixture(scope="module")
+def result():
+    return tankcal.run(tankcal.load("examples/wall-hits"), simulated=False)
+
+
+@pytest.fixture(scope="module")
+def record(result):
+    return record_of(result)
+
+
+def test_the_record_has_set_ups_rings_and_what_is_shared(result, record):
+    (setup,) = record["hits"]["setups"]
+    assert (setup["hits"], setup["rejected"], setup["checks"]) == (197, 3, 6)
+    assert setup["tie"] == "frame"
+    rings = record["hits"]["rings"]
+    assert sum(one["hits"] for one in rings) == 197
+    assert sum(one["rejected"] for one in rings) == 3
+    assert [one["level_m"] for one in rings] == sorted(one["level_m"] for one in rings)
+    assert sum(one["hits"] for one in record["hits"]["incidence"]) == 206
+    offset = next(one for one in record["hits"]["shared"] if one["what"] == "instrument_offset")
+    assert offset["u_before"] is None
+    assert offset["value"] == pytest.approx(-2.1, abs=2 * offset["u_after"])
+    assert offset["value"] == pytest.approx(1000 * result.sighting.told_m["TS-4"], abs=1e-3)
+    assert -1 < offset["correlation"] < 0
+
+
+def test_the_two_hits_of_the_ladder_are_rejected(record):
+    rejected = {one["point"] for one in record["rejected"]}
+    assert {"I 57", "I 117"} <= rejected
+
+
+def test_control_targets_count_from_their_first_reading(record):
+    control = record["hits"]["control"]
+    assert [one["elapsed_h"] for one in control[:3]] == pytest.approx([0, 0.5, 62 / 60])
+    assert control[0]["direction_rad"] == 0
+    (drift,) = record["hits"]["drifts"]
+    per_hour = np.degrees(drift["direction_rad_h"]) * 3600
+    assert 0 < per_hour < 4  # drawn: 1.2 and 1.7 arcsec after 30 and 62 minutes
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_table_has_words(record, language):
+    words = load_words(language)
+    paper, said = PlainPaper(words), translate_record(words, record)
+    tables = (
+        *(hits.SETUPS, hits.SHARED, hits.RINGS, hits.INCIDENCE),
+        *(hits.CONTROL, hits.DRIFTS, hits.COMPARED),
+    )
+    for table in tables:
+        assert table.rows(said)
+        assert paper.word(f"captions.{table.name}")
+        for column in table.columns:
+            assert paper.word(f"table_headings.{column.heading or column.key}")
+
+
+def test_the_workbook_has_a_sheet(record, tmp_path):
+    workbook.write(record, tmp_path / "capacity.xlsx")
+    book = openpyxl.load_workbook(tmp_path / "capacity.xlsx")
+    sheet = book["Wall hits"]
+    cells = [cell.value for row in sheet.iter_rows() for cell in row if cell.value is not None]
+    assert "TS-4" in cells
+    assert "Offset of the instrument" in cells
+    assert cells.count("I") == 1 + 9 + 1 + 6
+
+
+def test_straps_beside_hits_are_on_the_certificate(record):
+    from tankcal.report.certificate import _instruments
+
+    class Paper:
+        def __init__(self):
+            self.record, self.words = record, load_words("en")
+
+        def word(self, key, **values):
+            return PlainPaper(self.words).word(key, **values)
+
+    said = _instruments(Paper())
+    assert "TS 4/2026" in said
+    assert "T 12/2026" in said
+    assert {one["code"]: one["value"] for one in record["choices"]}["straps"] == "beside_points"
