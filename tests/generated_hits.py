@@ -141,7 +141,7 @@ PLATE_M, TAPE_M, TAPE_SCALE, LAID_M = 0.008, 2e-4, 10e-6, 5e-4
 @cache
 def _any_job(folder):
     rows = [{"setup": "I", "direction_deg": 1.0, "zenith_deg": 90.0, "distance_m": 6.0}]
-    return tankcal.load(write_folder(folder, hit_parts(rows)))
+    return tankcal.load(write_folder(folder, hit_parts(rows * 5)))
 
 
 def hit_job(rng, wall, *, folder, hits, levels=2, straps=False, sd_m=1.5e-3, lean=2e-3):

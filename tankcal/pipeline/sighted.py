@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.errors import InputError, Problem
+from tankcal.geometry.shell import course_of
+from tankcal.job.checks.hits import offset_unknown
 from tankcal.messages import message
+from tankcal.pipeline.misread_hits import refuse_other_units
 from tankcal.pipeline.told_causes import told_causes
-from tankcal.pipeline.wall import s_transform
+from tankcal.pipeline.wall import joints_of, s_transform
 from tankcal.sections import coordinates_of
 from tankcal.survey.poses import poses_of
 from tankcal.survey.sighting import sight
@@ -34,7 +37,10 @@ def sight_wall(job, adjustment, progress, told_m=None):
         is_inside=job.survey.side == "inside",
     )
     sighting = sight(job.hits, poses, told_m)
+    refuse_other_units(job.hits)
     _refuse_side(job, sighting)
+    sighting = _on_one_side(job, sighting)
+    _refuse_unknown_offset(job, sighting)
     used = take_points(sighting.points, np.flatnonzero(~job.hits.check))
     return replace(job, points=s_transform(used)), sighting
 
@@ -70,30 +76,58 @@ def take_points(points, chosen):
         rows=of(points.rows),
         causes=columns(points.causes),
         unbound=columns(points.unbound),
+        by_inputs={name: column[index] for name, column in points.by_inputs.items()},
     )
 
 
 def _refuse_side(job, sighting):
-    """Raise InputError where set-ups stand on the other side of the wall than was said."""
-    other = "inside" if job.survey.side == "outside" else "outside"
-    wrong = sighting.is_inside != (job.survey.side == "inside")
-    if not wrong.any():
+    """Raise InputError where all set-ups stand on the other side of the wall than was said."""
+    if np.any(sighting.is_inside == (job.survey.side == "inside")):
         return
-    setups = tuple(dict.fromkeys(np.array(job.hits.setup)[wrong].tolist()))
-    if wrong.all():
-        text = message(
-            "hits_on_other_side",
-            "found {side}, but all set-ups of the hits stand {other} the tank; expected {other}",
-            side=job.survey.side,
-            other=other,
-        )
-    else:
-        text = message(
-            "hits_on_both_sides",
-            "found {side}, but the set-ups {setups} stand {other} the tank; expected hits from one"
-            " side: tankcal does not join both sides yet",
-            side=job.survey.side,
-            other=other,
-            setups=list(setups),
-        )
+    text = message(
+        "hits_on_other_side",
+        "found {side}, but all set-ups of the hits stand {other} the tank; expected {other}",
+        side=job.survey.side,
+        other="inside" if job.survey.side == "outside" else "outside",
+    )
     raise InputError(Problem("job.toml", text, column="survey.side"))
+
+
+def _on_one_side(job, sighting):
+    """The sighting with the hits of the other side than `survey.side` moved through the wall.
+
+    Outside is the inside plus plate and paint of the course, along the wall's normal.
+    """
+    moved = sighting.is_inside != (job.survey.side == "inside")
+    if not moved.any():
+        return sighting
+    points, joints = sighting.points, job.datum.bottom_z_m + joints_of(job)
+    course = course_of(points.xyz_m[:, 2], joints)
+    outwards = 1.0 if job.survey.side == "outside" else -1.0
+    normal = (outwards * moved)[:, None] * sighting.normal
+    switches = {"plate_thickness": job.switches.plate, "paint": job.switches.paint}
+    sizes = {
+        "plate_thickness": np.array([one.thickness_m for one in job.courses])[course],
+        "paint": np.array([one.paint_m for one in job.courses])[course],
+    }
+    size = sum(switches[name] * one for name, one in sizes.items())
+    xyz = points.xyz_m + size[:, None] * normal
+    by = {name: normal.ravel() for name, one in sizes.items() if switches[name] and one.any()}
+    return replace(sighting, points=replace(points, xyz_m=xyz, by_inputs=by))
+
+
+def _refuse_unknown_offset(job, sighting):
+    """Raise InputError for an offset that nobody gave, and that neither a tape nor hits from both
+    sides of the wall tell.
+    """
+    taped = job.strapping is not None and any(not one.check for one in job.strapping.straps)
+    if taped or len(set(sighting.is_inside.tolist())) == 2:
+        return
+    names = [one.name for one in sighting.points.unbound if one.what == "instrument_offset"]
+    if names:
+        raise InputError(
+            [
+                Problem("instruments.toml", offset_unknown(), None, f"{name}.u_offset_mm")
+                for name in names
+            ]
+        )

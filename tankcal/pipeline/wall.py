@@ -1,6 +1,6 @@
 """From surveyed points to the wall: told from clutter, its axis, covariance, field and sections."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse
@@ -30,6 +30,7 @@ from tankcal.pipeline.wall_readings import (
     factors_of_plates,
     factors_of_readings,
     inputs_read_with,
+    noise_by_inputs,
 )
 from tankcal.pipeline.wall_straps import PointsOfWall, Straps, join_straps
 from tankcal.sections import (
@@ -70,6 +71,8 @@ class Wall:
         Circumferences by tape that are among the readings, after the points.
     readings : tuple of WallReading
         Those of them that were accepted.
+    by_inputs : dict
+        {input of the budget: (n,) derivative of the field's readings}, of what points depend on.
     without_inputs : tuple of str
         Inputs that have no meaning for these points.
     """
@@ -84,6 +87,7 @@ class Wall:
     sections: tuple[Section, ...]
     straps: Straps | None = None
     readings: tuple = ()
+    by_inputs: dict = field(default_factory=dict)
     without_inputs: tuple = ()
 
     def lowest_outline(self, azimuth_rad):
@@ -107,10 +111,13 @@ class Wall:
         return (*found, *factors_of_readings(self.readings, weights[:, self._points :]), *plates)
 
     def read_with(self, weights):
-        """{input: (f,) derivative of features}: none bears on the coordinates of points; a tape
-        that has the shell's temperature, plates that points inside do not see.
+        """{input: (f,) derivative of features}: plates that points on the other side were moved
+        through; the temperature that a tape has of the shell, plates that points inside do not see.
         """
-        return inputs_read_with(self.readings, weights[:, self._points :])
+        found = inputs_read_with(self.readings, weights[:, self._points :])
+        for name, column in self.by_inputs.items():
+            found[name] = found.get(name, 0.0) + weights @ column
+        return found
 
     @property
     def _points(self):
@@ -202,17 +209,20 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     form_m2 = _form_m2(amplitudes)
     sections = tuple(fit_section(*one, form_m2) for one in to_fit)
     by_points = means @ _radii_by_points(sections, len(accepted))
-    if job.strapping is not None or job.points.unbound:
+    by_inputs = _by_inputs(job.points, by_points, accepted)
+    if job.strapping is not None or job.points.unbound or by_inputs:
         unbound = unbound_of(job.points, by_points, accepted)
         noise = by_points @ (covariance @ by_points.T)  # between sections, too
         noise = noise.toarray() if scipy.sparse.issparse(noise) else noise
     if job.strapping is None:
         sites = unbound.shared_by(sites) if job.points.unbound else sites
+        noise = noise + noise_by_inputs(job.inputs, by_inputs, len(radius))
         field, readings, straps = WallField(sites, radius, noise, amplitudes, nominal), (), None
     else:
-        points = PointsOfWall(sites, radius, noise, unbound)
+        points = PointsOfWall(sites, radius, noise, unbound, by_inputs)
         field, readings, straps = join_straps(job, points, amplitudes, joints)
         by_points = _padded(by_points, len(readings))
+        by_inputs = {name: np.pad(one, (0, len(readings))) for name, one in by_inputs.items()}
     return Wall(
         shell=shell,
         joints_m=joints,
@@ -224,8 +234,15 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         sections=sections,
         straps=straps,
         readings=tuple(readings),
+        by_inputs=by_inputs,
         without_inputs=() if job.hits is None else ("offset",),  # the instrument has one of its own
     )
+
+
+def _by_inputs(points, by_points, accepted):
+    """{input of the budget: (n,) derivative of the radii by it}, of what the points depend on."""
+    index = coordinates_of(accepted)
+    return {name: by_points @ column[index] for name, column in points.by_inputs.items()}
 
 
 def _padded(by_points, more):
@@ -312,6 +329,13 @@ def _shell(job, heights, sds):
             welds_rad=_welds(job),
         )
     except SolutionError as error:
+        if job.hits is not None:
+            hint = message(
+                "told_by_heights",
+                "{error}, bottom_z_m, the heights of the instruments and the units of the angles",
+                error=error.args[0],
+            )
+            raise SolutionError(hint) from error
         if job.points.from_adjustment:
             hint = message(
                 "told_by_targets",

@@ -130,13 +130,13 @@ def readings_of_offsets(given, used, courses, insets_m):
 
 def sites_of(readings, joints_m, zero_m):
     """`Sites` of readings; zero_m is the height of the table's zero above the bottom."""
-    course = np.array([one.course for one in readings])
+    course = np.array([one.course for one in readings], dtype=int)
     level = np.array([one.level_m for one in readings]) + zero_m
     low, high = joints_m[course], joints_m[course + 1]
     free = columns_of([one.free for one in readings])
     return Sites(
         course=course,
-        ring=np.array([one.ring for one in readings]),
+        ring=np.array([one.ring for one in readings], dtype=int),
         zeta=2 * (level - low) / (high - low) - 1,
         azimuth_rad=np.array([one.azimuth_rad for one in readings]),
         leans=np.zeros(len(readings), dtype=bool),
@@ -149,6 +149,20 @@ def noise_of(readings):
     shared = shared_effects(readings).values()
     common = np.column_stack([np.zeros(len(readings)), *(column for *_, column in shared)])
     return np.diag([one.sd_m**2 for one in readings]) + common @ common.T
+
+
+def noise_by_inputs(inputs, columns, count):
+    """(n, n) covariance of n radii by declared inputs that they depend on, so that readings weigh
+    no more than plates and temperature let them.
+
+    inputs   with name and u, SI
+    columns  {input: (n,) derivative of the radii}
+    """
+    known = {one.name: one.u for one in inputs}
+    found = np.zeros((count, count))
+    for name, column in columns.items():
+        found += known.get(name, 0.0) ** 2 * np.outer(column, column)
+    return found
 
 
 def shared_effects(readings):

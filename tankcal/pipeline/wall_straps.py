@@ -5,7 +5,7 @@ the ovality and the seams that they were found to have. Inside points see the sh
 and paint, which a tape outside does not.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.linalg
@@ -17,7 +17,13 @@ from tankcal.geometry.field.sites import Sites, free_design
 from tankcal.geometry.girth import perimeter_excess
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.unbound import Unbound
-from tankcal.pipeline.wall_readings import columns_of, noise_of, readings_of_straps, sites_of
+from tankcal.pipeline.wall_readings import (
+    columns_of,
+    noise_by_inputs,
+    noise_of,
+    readings_of_straps,
+    sites_of,
+)
 from tankcal.quadrature import panels
 from tankcal.survey.network.reliability import noncentrality
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
@@ -112,12 +118,15 @@ class PointsOfWall:
     noise_m2 : ndarray, shape (n, n)
     unbound : Unbound
         What of them nothing binds.
+    by_inputs : dict
+        {input of the budget: (n,) derivative of the radii}.
     """
 
     sites: Sites
     radius_m: np.ndarray
     noise_m2: np.ndarray
     unbound: Unbound
+    by_inputs: dict = field(default_factory=dict)
 
 
 def join_straps(job, points, amplitudes, joints_m):
@@ -160,7 +169,13 @@ def join_straps(job, points, amplitudes, joints_m):
     both = _joined(points.sites, sites_of(readings, joints_m, zero))
     both = points.unbound.padded(k).shared_by(both)
     radius = np.append(radius, [one.radius_m for one in readings])
-    noise = scipy.linalg.block_diag(noise, noise_of(readings) + _by_inputs(job, readings))
+    columns = columns_of([one.by_inputs for one in readings])
+    columns = {
+        name: np.append(points.by_inputs.get(name, np.zeros(n)), columns.get(name, np.zeros(k)))
+        for name in dict.fromkeys((*points.by_inputs, *columns))
+    }
+    noise = scipy.linalg.block_diag(noise, noise_of(readings))
+    noise += noise_by_inputs(job.inputs, columns, n + k)
     may_go = np.append(np.zeros(n), np.full(k, job.snooping and both.shared is None))
     accepted = np.ones(n + k, dtype=bool)
     for _ in range(MOST_ROUNDS):
@@ -187,18 +202,6 @@ def join_straps(job, points, amplitudes, joints_m):
         tapes=tapes_used(given),
     )
     return field, [one for one, used in zip(readings, kept, strict=True) if used], straps
-
-
-def _by_inputs(job, readings):
-    """(k, k) covariance of the radii by declared inputs that they depend on, so that they weigh no
-    more than plates and temperature let them.
-    """
-    known = {one.name: one.u for one in job.inputs}
-    columns = columns_of([one.by_inputs for one in readings])
-    found = np.zeros((len(readings), len(readings)))
-    for name, column in columns.items():
-        found += known.get(name, 0.0) ** 2 * np.outer(column, column)
-    return found
 
 
 def _field(sites, radius_m, noise_m2, amplitudes, nominal_m, accepted):

@@ -1,6 +1,6 @@
 """Surveyed points of a wall: read from a file, or adjusted from a survey."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,6 +19,7 @@ class Points:
     from_adjustment  True: adjusted from a survey; the covariance has the scale that it should have
     unbound     causes that nothing has told yet (a free offset): not in the covariance, their
                 columns are derivatives
+    by_inputs   {input of an uncertainty budget: (3n,) derivative of the coordinates by it}
     file        where messages say they come from; "": of the rows
     """
 
@@ -32,4 +33,5 @@ class Points:
     causes: tuple = ()
     from_adjustment: bool = False
     unbound: tuple = ()
+    by_inputs: dict = field(default_factory=dict)
     file: str = ""

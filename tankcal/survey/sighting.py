@@ -72,6 +72,8 @@ class Sighting:
         Between the sight and the wall's normal, from the circle through all hits in plan.
     is_inside : ndarray of bool, shape (n,)
         Whether its set-up stands within that circle.
+    normal : ndarray, shape (n, 3)
+        Of that circle, outwards.
     told_m : dict
         {instrument: offset that the wall told of it}, m, as it was taken off.
     """
@@ -81,6 +83,7 @@ class Sighting:
     pose: np.ndarray
     incidence_rad: np.ndarray
     is_inside: np.ndarray
+    normal: np.ndarray
     told_m: dict = field(default_factory=dict)
 
 
@@ -110,7 +113,7 @@ def sight(hits, poses, told_m=None):
     azimuth = poses.orientation_rad[pose] + hits.direction_rad
     ray, by_azimuth, by_zenith = _rays(azimuth, hits.zenith_rad)
     xyz = poses.xyz_m[pose] + distance[:, None] * ray
-    cosine, inside = _incidence(xyz, poses.xyz_m[pose], ray)
+    cosine, inside, normal = _incidence(xyz, poses.xyz_m[pose], ray)
     # by x, y, z, orientation of each pose, then by scale and offset of each instrument
     n, p, k = len(hits), len(poses.keys), len(poses.instruments)
     by = np.zeros((n, 3, 4 * p + 2 * k))
@@ -150,7 +153,7 @@ def sight(hits, poses, told_m=None):
         unbound=tuple(unbound),
         file=hits.file,
     )
-    return Sighting(points, poses, pose, np.arccos(cosine), inside, told_m)
+    return Sighting(points, poses, pose, np.arccos(cosine), inside, normal, told_m)
 
 
 def _rows(hits):
@@ -176,14 +179,17 @@ def _rays(azimuth_rad, zenith_rad):
 
 
 def _incidence(xyz, station, ray):
-    """(n,) cosine of the incidence, and whether the station is within the circle through all."""
+    """(n,) cosine of the incidence, whether the station is within the circle through all, and
+    (n, 3) its normal.
+    """
     middle = np.median(xyz[:, :2], axis=0)
     x, y, radius = taubin_circle(xyz[:, :2] - middle)
     centre = middle + [x, y]
     normal = xyz[:, :2] - centre
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
     cosine = np.abs(np.sum(ray[:, :2] * normal, axis=1))
-    return np.clip(cosine, 0, 1), np.linalg.norm(station[:, :2] - centre, axis=1) < radius
+    inside = np.linalg.norm(station[:, :2] - centre, axis=1) < radius
+    return np.clip(cosine, 0, 1), inside, np.pad(normal, ((0, 0), (0, 1)))
 
 
 def _causes(hits, poses, by, tool, ray, cosine):

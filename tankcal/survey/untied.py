@@ -39,7 +39,8 @@ def place_untied(hits, poses, untied, *, nominal_m, is_inside):
     nominal_m : float
         Radius of the tank, m.
     is_inside : bool
-        Whether the set-ups stand in the tank.
+        Whether the set-ups are said to stand in the tank; those that see the wall all around do,
+        and where there are any, no others.
 
     Returns
     -------
@@ -47,23 +48,31 @@ def place_untied(hits, poses, untied, *, nominal_m, is_inside):
     """
     of = {key: i for i, key in enumerate(poses.keys)}
     pose = np.array([of[key] for key in zip(hits.setup, hits.set, strict=True)])
-    own = _own_places(hits)
+    own = own_places(hits)
     tied = ~np.isin(pose, untied)
     axis = _axis(hits, poses, own, pose, tied, untied)
     xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
+    around = np.array([sees_all_around(own[pose == one]) for one in untied])
     for number, one in enumerate(untied):
         station = hits.stations.get(hits.setups[poses.keys[one][0]].station)
         away = None if station is None else station[:2] - axis
         known = away is not None and np.all(np.isfinite(away)) and np.hypot(*away) > 0
         azimuth = np.arctan2(*away) if known else FULL_TURN * number / len(untied)
-        centre = _centre(own[pose == one], nominal_m, is_inside)
+        in_tank = around[number] if around.any() else is_inside
+        centre = _centre(own[pose == one], nominal_m, in_tank)
         distance = np.hypot(*centre)
         xyz[one, :2] = axis + distance * np.array([np.sin(azimuth), np.cos(azimuth)])
         zero[one] = azimuth + np.pi - np.arctan2(*centre)
     return _fitted(replace(poses, xyz_m=xyz, orientation_rad=zero), own, pose, untied, axis)
 
 
-def _own_places(hits):
+def sees_all_around(own):
+    """Are the sights of a set-up nowhere half a turn apart?"""
+    turn = np.sort(np.arctan2(own[:, 0], own[:, 1]))
+    return np.max(np.diff(turn, append=turn[0] + FULL_TURN)) < np.pi
+
+
+def own_places(hits):
     """(n, 3) hits from their set-up, the zero of its circle along +y."""
     flat = hits.distance_m * np.sin(hits.zenith_rad)
     return np.column_stack(

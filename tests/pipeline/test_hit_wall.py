@@ -429,6 +429,86 @@ def test_the_frame_of_untied_set_ups_is_a_choice(tmp_path):
     assert second.table.U_m3[-1] == pytest.approx(first.table.U_m3[-1], rel=1e-3)
 
 
+# both sides of the wall
+
+
+def both_parts(seed=None, offset_m=0.0):
+    """Parts of a tank hit from one set-up in it and four round it, of one instrument; all read
+    three targets whose places are known.
+    """
+    rng = None if seed is None else np.random.default_rng(seed)
+    reader, tool = Tool() if rng is None else NOISY, replace(NOISY, offset_m=offset_m)
+    tool = replace(Tool(), offset_m=offset_m) if rng is None else tool
+    rough = np.array([[20.0, 3.0, 1.0], [-15.0, 12.0, 2.0], [2.0, -19.0, 4.0]])
+    targets, names = rough, ["A", "B", "C"]
+    stations = {"I": STATION}
+    for number in range(4):
+        away = 13.5 * np.array([np.sin(np.pi / 2 * number), np.cos(np.pi / 2 * number)])
+        stations[f"S{number}"] = np.array([*(away + FOOT), 1.6])
+    rows, readings, known = [], {}, [["point", "x_m", "y_m", "z_m", "sx_mm", "sy_mm", "sz_mm"]]
+    for number, (name, at) in enumerate(stations.items()):
+        zero, inside = 0.3 * number, name == "I"
+        surface = Surface(lambda a, z, more=0 if inside else PLATE: oval(a, z) + more, FOOT, SLOPE)
+        aims = even_aims(surface, LEVELS, 24)
+        if not inside:
+            arc = np.pi / 2 * (number - 1) + np.linspace(-0.8, 0.8, 8)
+            aims = np.vstack([surface.at(arc, np.full(8, z)) for z in LEVELS])
+        rows += rows_of(name, take_hits(surface, at, aims, tool, rng, zero))
+        readings[name] = names, observe(at, targets, reader, rng, zero)
+        known.append([f"P{name}", *at.tolist(), None, None, None])
+    known += [[name, *at.tolist(), 0.0, 0.0, 0.0] for name, at in zip(names, targets, strict=True)]
+    parts = hit_parts(rows)
+    reflector = {"kind": "total_station", "s_mm": 1.0, "s_arcsec": 5.0}
+    parts.registers["instruments"]["TS"] |= {"u_scale_ppm": 1.0}
+    parts.registers["instruments"]["prism"] = reflector
+    parts.tables |= network_tables(readings)
+    ranges = parts.tables.pop("slope_distances")
+    distances = [["from", "to", "distance_m", "s_mm", "instrument"]]
+    parts.tables["distances"] = distances + [
+        [f"P{a}", b, d, s, "prism"] for a, b, d, s in ranges[1:]
+    ]
+    parts.tables["control"] = known
+    setups = [[name, f"P{name}", "TS", 0.0] for name in stations]
+    parts.tables["setups"] = [["setup", "station", "instrument", "instrument_height_m"], *setups]
+    return parts
+
+
+@pytest.mark.parametrize("side", ["inside", "outside"])
+def test_one_offset_inside_and_outside(tmp_path, side):
+    """Nobody knows the offset, no tape: inside it makes the tank smaller, outside larger."""
+    parts = both_parts(offset_m=0.002)
+    parts.settings["survey.side"] = side
+    del parts.registers["instruments"]["TS"]["u_offset_mm"]
+    result = run(tmp_path, parts)
+    assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=1e-5)
+    assert result.sighting.told_m["TS"] == pytest.approx(0.002, abs=1e-5)
+    noisy = both_parts(seed=6, offset_m=0.002)
+    del noisy.registers["instruments"]["TS"]["u_offset_mm"]
+    found = run(tmp_path / "noisy", noisy)
+    assert abs(found.table.volume_m3[-1] - volume_of(oval)) < found.table.U_m3[-1]
+
+
+def test_plates_between_the_sides(tmp_path):
+    """1 mm less plate goes into the radius as far as the hits outside tell it, and U knows it."""
+    parts = both_parts(seed=5)
+    parts.registers["instruments"]["TS"]["u_offset_mm"] = 0.5
+    first = run(tmp_path / "a", parts)
+    assert abs(first.table.volume_m3[-1] - volume_of(oval)) < first.table.U_m3[-1]
+    for row in parts.tables["courses"][1:]:
+        row[2] = 7.0
+    second = run(tmp_path / "b", parts)
+    grown = second.table.volume_m3[-1] - first.table.volume_m3[-1]
+    lines = {one.name: one for one in first.budget().lines}
+    assert 0.1 < grown / (2 * 0.001 / 6.5 * first.table.volume_m3[-1]) < 0.9
+    assert -lines["plate_thickness"].sensitivity == pytest.approx(grown, rel=0.02)
+
+
+def test_an_offset_that_one_side_cannot_tell_is_refused(tmp_path):
+    parts = arc_parts()
+    del parts.registers["instruments"]["TS"]["u_offset_mm"]
+    assert problems_of(tmp_path, parts) == [("instruments.toml", None, "TS.u_offset_mm")]
+
+
 # slips of a crew, each named
 
 
@@ -485,6 +565,35 @@ def test_hits_of_another_course_are_named(tmp_path):
     ]
     said = [one for one in run(tmp_path, parts).warnings if one.column == "course"]
     assert [(one.file, one.row) for one in said] == [("wall_hits.csv", 2), ("wall_hits.csv", 50)]
+
+
+@pytest.mark.parametrize(("column", "factor"), [("direction", 0.9), ("zenith", 1 / 0.9)])
+def test_angles_in_another_unit_are_named(tmp_path, column, factor):
+    """Degrees that stand as gon would be 0.9 of them, and the other way round."""
+    parts = parts_of(tool=NOISY, seed=1)
+    place = parts.tables["wall_hits"][0].index(f"{column}_deg")
+    for row in parts.tables["wall_hits"][1:]:
+        row[place] *= factor
+    assert problems_of(tmp_path, parts) == [("wall_hits.csv", 2, column)]
+
+
+def test_straps_that_are_only_compared(tmp_path):
+    parts = strapped(parts_of(tool=NOISY, seed=1))
+    headings, *rows = parts.tables["circumferences"]
+    checks = [[*row, "check"] for row in rows]
+    parts.tables["circumferences"] = [[*headings, "use"], *checks]
+    result = run(tmp_path / "a", parts)
+    del parts.tables["circumferences"]
+    alone = run(tmp_path / "b", parts)
+    assert result.table.volume_m3[-1] == pytest.approx(alone.table.volume_m3[-1], rel=1e-5)
+    from tankcal.record import record_of
+
+    read = record_of(result)["strapping"]["readings"]
+    assert [one["used"] for one in read] == [False, False]
+    assert max(abs(one["difference_m"]) for one in read) < 0.01
+    parts.tables["circumferences"] = [[*headings, "use"], *checks]
+    del parts.registers["instruments"]["TS"]["u_offset_mm"]
+    assert problems_of(tmp_path / "a", parts) == [("instruments.toml", 1, "TS.u_offset_mm")]
 
 
 def test_few_hits_and_levels_are_named(tmp_path):
@@ -548,6 +657,12 @@ def _unknown_course(parts):
 def _no_direction(parts):
     parts.tables["wall_hits"][5][1] = None
     return [("wall_hits.csv", "direction_deg")]
+
+
+def _all_compared(parts):
+    headings, *rows = parts.tables["wall_hits"]
+    parts.tables["wall_hits"] = [[*headings, "use"], *([*row, "check"] for row in rows)]
+    return [("wall_hits.csv", None)]
 
 
 def _second_face(parts):

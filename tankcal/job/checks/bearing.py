@@ -1,6 +1,11 @@
 """Which inputs of uncertainty.csv have an effect on a job, and why the others have none."""
 
-from tankcal.job.checks.extent import has_hits, has_wall_points, is_strapped
+from tankcal.job.checks.extent import (
+    has_hits,
+    has_wall_points,
+    is_strapped,
+    may_be_hit_from_both_sides,
+)
 from tankcal.job.contract import INPUTS
 from tankcal.job.contract.bottom import bottom_form
 from tankcal.messages import message
@@ -113,10 +118,11 @@ def _of_bottom(values, bottom):
 def _of_plates(values, tables, is_loaded):
     """Plates count where they are subtracted or loaded, paint where it is subtracted.
 
-    A tape sees both, also where the points are inside.
+    A tape sees both, also where the points are inside, and so do hits from outside beside them.
     """
     switches, courses = values["corrections"], tables["courses"]
-    inside = values["survey"]["side"] == "inside" and not is_strapped(tables)
+    seen = is_strapped(tables) or may_be_hit_from_both_sides(tables)
+    inside = values["survey"]["side"] == "inside" and not seen
     why = {"plate_thickness": "", "paint": ""}
     if (inside or switches["plate"] is False) and not is_loaded:
         why["plate_thickness"] = NOT_SUBTRACTED

@@ -18,9 +18,19 @@ def is_strapped(tables):
     return has_rows(tables["circumferences"])
 
 
+def tells_by_tape(tables):
+    """Does a tape tell something of the wall, other than to be compared with it?"""
+    return is_strapped(tables) and any(use != "check" for use in tables["circumferences"].of("use"))
+
+
 def has_hits(tables):
     """Was the bare wall hit by a total station?"""
     return has_rows(tables["wall_hits"])
+
+
+def may_be_hit_from_both_sides(tables):
+    """Are there hits from more set-ups than one, which may stand in and round the tank?"""
+    return has_hits(tables) and len(set(tables["wall_hits"].of("setup"))) > 1
 
 
 def has_wall_points(tables):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.job.checking import has_rows, refuse_repeated
-from tankcal.job.checks.extent import has_hits, has_survey, is_strapped
+from tankcal.job.checks.extent import has_hits, has_survey, tells_by_tape
 from tankcal.job.checks.strapping import refuse_others, tapes_of
 from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
 from tankcal.job.checks.survey.readings import check_angle
@@ -11,6 +11,7 @@ from tankcal.job.contract.registers import FREE
 from tankcal.messages import message
 
 MOST_HITS = 2500  # whose full covariance is kept
+FEWEST_HITS = 5  # of a section of the wall
 RANGES = ("slope_distances", "distances")  # tables by which a network tells an offset
 
 
@@ -32,6 +33,15 @@ def check_hits(values, tables, registers, raw, log):
         )
         log.problem(hits.file, expected)
         return
+    count = sum(use != "check" for use in hits.of("use"))
+    if count < FEWEST_HITS and not hits.skipped:
+        expected = message(
+            "too_few_hits",
+            "{count} hits that are not only compared; expected at least {fewest} on each course",
+            count=count,
+            fewest=FEWEST_HITS,
+        )
+        log.problem(hits.file, expected)
     for name in ("points", "targets"):
         if has_rows(tables[name]):
             expected = message(
@@ -121,15 +131,19 @@ def _check_instrument(files, hits, name, given, mine):
         files.tell_key(files.log.problem, "instruments", name, "u_scale_ppm", expected)
     offset = given["u_offset_mm"]
     is_known = offset is not None and (offset != FREE or _told_by_network(files, name))
-    if not is_known and not is_strapped(files.tables):
-        expected = message(
-            "offset_of_hits_unknown",
-            "found {found}; expected the standard uncertainty of the offset without reflector, or a"
-            " circumference by tape: an offset goes wholly into every radius, and nothing in the"
-            " job tells it",
-            found=offset or message("nothing", "nothing"),
-        )
-        files.tell_key(files.log.problem, "instruments", name, "u_offset_mm", expected)
+    told = tells_by_tape(files.tables) or len(set(hits.of("setup"))) > 1  # from both sides, perhaps
+    if not is_known and not told:
+        files.tell_key(files.log.problem, "instruments", name, "u_offset_mm", offset_unknown())
+
+
+def offset_unknown():
+    """What is said of an offset that nobody gave, and that nothing tells."""
+    return message(
+        "offset_of_hits_unknown",
+        "not given; expected the standard uncertainty of the offset without reflector, a"
+        " circumference by tape, or hits from both sides of the wall: an offset goes wholly into"
+        " every radius, and nothing in the job tells it",
+    )
 
 
 def _told_by_network(files, name):

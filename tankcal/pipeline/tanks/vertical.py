@@ -325,7 +325,8 @@ def volume_by_points(job, wall, levels_m):
 
 def _bearing(job, switches):
     """Declared inputs that the corrections of the shell use."""
-    outside = job.survey.side == "outside" or job.strapping is not None
+    seen = job.strapping is not None or (job.points is not None and job.points.by_inputs)
+    outside = job.survey.side == "outside" or bool(seen)
     bears = {
         "plate_thickness": outside and switches.plate and any(c.thickness_m for c in job.courses),
         "paint": outside and switches.paint and any(c.paint_m for c in job.courses),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.job.checking import course_heights, tell
-from tankcal.job.checks.extent import is_strapped
+from tankcal.job.checks.extent import is_strapped, may_be_hit_from_both_sides
 from tankcal.job.plausibility import (
     CARBON_STEEL,
     HEAVY,
@@ -26,7 +26,8 @@ def check_plates(values, tables, kind, raw, log):
     courses = tables["courses"]
     if kind == "vertical" and courses is not None:
         _check_courses(values, courses, log)
-        _check_paint(values, courses, is_strapped(tables), log)
+        seen = is_strapped(tables) or may_be_hit_from_both_sides(tables)
+        _check_paint(values, courses, seen, log)
     elif kind in SOLID_PLATES_MM:
         _check_solid(values, kind, raw, log)
 
@@ -78,7 +79,7 @@ def _of_course(plate, limit, head, diameter):
     return {"found_mm": plate, "limit_mm": limit, "head_m": head, "diameter_m": diameter}
 
 
-def _check_paint(values, courses, strapped, log):
+def _check_paint(values, courses, seen, log):
     paints = courses.of("paint_mm")
     for row, paint in zip(courses.rows, paints, strict=True):
         if paint is not None and paint > PAINT_MM:
@@ -89,7 +90,7 @@ def _check_paint(values, courses, strapped, log):
                 most_mm=PAINT_MM,
             )
             log.warning(courses.file, text, row, "paint_mm")
-    outside = values["survey"]["side"] != "inside" or strapped
+    outside = values["survey"]["side"] != "inside" or seen
     if not outside and any(paints):
         text = message(
             "paint_of_inside",

@@ -1,0 +1,69 @@
+"""Angles of wall hits in another unit than their column says: they show no circle then."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+from tankcal.geometry.circles import taubin_circle
+from tankcal.messages import message
+from tankcal.survey.untied import own_places, sees_all_around
+
+GON_IN_DEG, DEG_IN_GON = 0.9, 1 / 0.9  # what turns a value that is read so into what was meant
+CLOSER = 0.2  # scatter about a circle, of that as it is read, from which on another unit is told
+LEAST_M, FEWEST = 0.01, 12  # scatter that no unit explains; hits of a set-up
+
+
+def refuse_other_units(hits):
+    """Raise InputError where directions or zenith angles of a set-up fit a circle in another unit.
+
+    hits  WallHits
+    """
+    problems = []
+    setup = np.array(hits.setup)
+    for name in dict.fromkeys(hits.setup):
+        mine = setup == name
+        if mine.sum() < FEWEST:
+            continue
+        factors = product((1.0, GON_IN_DEG, DEG_IN_GON), repeat=2)
+        found = {pair: _scatter(hits, mine, *pair) for pair in factors}
+        usual, best = found[1.0, 1.0], min(found, key=found.get)
+        if usual < LEAST_M or found[best] > CLOSER * usual:
+            continue
+        places = np.flatnonzero(mine)
+        row = hits.rows[places[0]] if hits.rows else None
+        problems += [
+            Problem(hits.file, _text(factor), row, column)
+            for factor, column in zip(best, ("direction", "zenith"), strict=True)
+            if factor != 1.0
+        ]
+    if problems:
+        raise InputError(problems)
+
+
+def _scatter(hits, mine, of_direction, of_zenith):
+    """Median distance of the hits of a set-up from their circle, m; inf: it sees no whole turn."""
+    chosen = np.flatnonzero(mine)
+    some = replace(
+        hits,
+        direction_rad=of_direction * hits.direction_rad[chosen],
+        zenith_rad=of_zenith * hits.zenith_rad[chosen],
+        distance_m=hits.distance_m[chosen],
+    )
+    places = own_places(some)
+    if not sees_all_around(places) or np.ptp(places[:, :2], axis=0).min() == 0:
+        return np.inf
+    local = places[:, :2] - places[:, :2].mean(axis=0)
+    x, y, radius = taubin_circle(local)
+    return float(np.median(np.abs(np.hypot(local[:, 0] - x, local[:, 1] - y) - radius)))
+
+
+def _text(factor):
+    if factor == GON_IN_DEG:
+        return message(
+            "hits_in_gon", "the hits of the set-up fit a circle if these are gon: is it so?"
+        )
+    return message(
+        "hits_in_degrees", "the hits of the set-up fit a circle if these are degrees: is it so?"
+    )

@@ -1,0 +1,80 @@
+"""The same tank by every method: within U of the truth, and of each other.
+
+Walls that are no model of the package, surveyed by points, tape, reference lines, bare hits, and
+bare hits with a tape, each with the errors of its crew and its instruments.
+"""
+
+from functools import partial
+from itertools import combinations
+
+import numpy as np
+import pytest
+from generated_hits import hit_job
+from generated_lines import plumbed_job
+from generated_strapping import shape_of, strapped_job
+from generated_walls import FAMILIES, job_of, make_wall, survey
+from test_coverage_of_walls import judged
+
+from tankcal.pipeline.sighted import sight_wall
+from tankcal.pipeline.strapped_wall import find_strapped_wall
+from tankcal.pipeline.tanks import body_of
+from tankcal.pipeline.wall import find_wall
+
+TOP = 9  # of the rows that `judged` states: the full tank
+
+
+def quiet(text):
+    """Progress that nobody sees."""
+
+
+def by_points(rng, wall, folder):
+    job = job_of(wall, survey(rng, wall, rings=2, points=24, noise_m=1e-3), folder)
+    return body_of(job, find_wall(job, quiet))
+
+
+def by_tape(rng, wall, folder):
+    job = strapped_job(rng, wall, straps=2, folder=folder, shape_sd_m=shape_of(wall))
+    return body_of(job, find_strapped_wall(job, quiet))
+
+
+def by_lines(rng, wall, folder):
+    job, _ = plumbed_job(rng, wall, lines=16, folder=folder)
+    return body_of(job, find_strapped_wall(job, quiet))
+
+
+def by_hits(rng, wall, folder, straps):
+    job = hit_job(rng, wall, folder=folder, hits=20, straps=straps)
+    job, _ = sight_wall(job, None, quiet)
+    return body_of(job, find_wall(job, quiet))
+
+
+METHODS = {
+    "points": by_points,
+    "tape": by_tape,
+    "lines": by_lines,
+    "hits": partial(by_hits, straps=False),
+    "hits and tape": partial(by_hits, straps=True),
+}
+
+
+@pytest.mark.slow
+def test_every_method_agrees_with_the_truth_and_the_others(tmp_path, figure):
+    rng, held, agreed = np.random.default_rng(18), [], []
+    for family in FAMILIES:
+        wall = make_wall(rng, family, radius_m=7.5, courses=5)
+        found = {
+            name: judged(wall, method(rng, wall, tmp_path / name), family, name)
+            for name, method in METHODS.items()
+        }
+        error = {name: one.error[TOP] for name, one in found.items()}
+        expanded = {name: one.expanded[TOP] for name, one in found.items()}
+        held += [abs(error[name]) <= expanded[name] for name in METHODS]
+        agreed += [
+            abs(error[a] - error[b]) <= np.hypot(expanded[a], expanded[b])
+            for a, b in combinations(METHODS, 2)
+        ]
+        for name in METHODS:
+            text = f"{1e6 * error[name]:+.0f} ppm, U {1e6 * expanded[name]:.0f}"
+            figure(f"{family} wall by {name}", text)
+    assert np.mean(held) >= 0.92
+    assert np.mean(agreed) >= 0.92
