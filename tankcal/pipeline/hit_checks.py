@@ -134,8 +134,10 @@ def _of_incidence(sighting):
 
 
 def _of_causes(job, wall):
-    """Offsets and scales that straps make out to be unlike their certificates."""
-    if wall.straps is None:
+    """Offsets and scales that straps, or hits from the other side, make out to be unlike their
+    certificates.
+    """
+    if wall.straps is None and not wall.by_inputs:
         return
     for one in told_causes(job, wall):
         if not np.isfinite(one.u_before) or abs(one.value) <= UNLIKE_SDS * one.u_before:
@@ -144,8 +146,8 @@ def _of_causes(job, wall):
         if one.what == "instrument_offset":
             text = message(
                 "offset_unlike_certificate",
-                "the straps make the offset of {name} {value_mm:+.2f} mm, {ratio:.1f} times its"
-                " u_offset_mm: is that of another reflector, or a strap wrong?",
+                "the wall makes the offset of {name} {value_mm:+.2f} mm, {ratio:.1f} times its"
+                " u_offset_mm: is that of another reflector, or a strap or a plate wrong?",
                 value_mm=1000 * one.value,
                 ratio=abs(one.value) / one.u_before,
                 **values,
@@ -154,7 +156,7 @@ def _of_causes(job, wall):
         else:
             text = message(
                 "scale_unlike_certificate",
-                "the straps make the scale of {name} {value_ppm:+.0f} ppm, {ratio:.1f} times its"
+                "the wall makes the scale of {name} {value_ppm:+.0f} ppm, {ratio:.1f} times its"
                 " u_scale_ppm",
                 value_ppm=1e6 * one.value,
                 ratio=abs(one.value) / one.u_before,

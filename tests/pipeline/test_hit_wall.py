@@ -503,6 +503,13 @@ def test_plates_between_the_sides(tmp_path):
     assert -lines["plate_thickness"].sensitivity == pytest.approx(grown, rel=0.02)
 
 
+def test_an_offset_that_both_sides_deny_is_named(tmp_path):
+    parts = both_parts(seed=7, offset_m=0.004)
+    result = run(tmp_path, parts)
+    assert ("instruments.toml", "TS.u_offset_mm") in codes_of(result)
+    assert ("instruments.toml", "TS.u_offset_mm") not in codes_of(run(tmp_path, both_parts(seed=7)))
+
+
 def test_an_offset_that_one_side_cannot_tell_is_refused(tmp_path):
     parts = arc_parts()
     del parts.registers["instruments"]["TS"]["u_offset_mm"]
