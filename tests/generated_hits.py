@@ -15,8 +15,9 @@ from generated_strapping import girth_of
 from job_builder import hit_parts, write_folder
 
 import tankcal
+from tankcal.survey.measurements import Setup
 from tankcal.survey.strapping import Strap, Strapping, Tape
-from tankcal.survey.wall_hits import HitSetup, RangingInstrument, WallHits
+from tankcal.survey.wall_hits import RangingInstrument, WallHits
 
 STEP = 1e-6
 
@@ -166,7 +167,7 @@ def hit_job(rng, wall, *, folder, hits, levels=2, straps=False, sd_m=1.5e-3, lea
     nothing, job = (None,) * n, _any_job(folder)
     given = WallHits(
         *(("I",) * n, nothing, nothing, *read.T, np.full(n, sd_m), np.full(n, 3e-5), ("",) * n),
-        *(np.zeros(n, dtype=bool), {"I": HitSetup("I", "SI", "TS", 1.6)}, {"TS": known}),
+        *(np.zeros(n, dtype=bool), {"I": Setup("I", "SI", "TS", 1.6)}, {"TS": known}),
         rows=tuple(range(2, n + 2)),
     )
     along = wall.course_m * np.hypot(1, np.hypot(*slope))

@@ -1,12 +1,14 @@
 """From the checked tables of wall hits to `WallHits`, all in SI."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from tankcal.job.checks.extent import has_hits
 from tankcal.job.checks.hits import instruments_used, ranging_of
 from tankcal.job.contract.registers import FREE
-from tankcal.job.measuring import ARCSEC, angle_in_rad
-from tankcal.survey.wall_hits import ControlReading, HitSetup, RangingInstrument, WallHits
+from tankcal.job.measuring import ARCSEC, angle_in_rad, setups_of
+from tankcal.survey.wall_hits import ControlReading, RangingInstrument, WallHits
 
 USUAL_INCIDENCE_MM = 1.0  # u of the bias at 60 degrees that nobody gave
 AXES = "xyz"
@@ -47,12 +49,7 @@ def make_hits(tables, registers):
 
 def _setups(table, registers):
     used = instruments_used(table, ranging_of(registers))
-    names = ("setup", "station", "instrument_height_m")
-    columns = zip(*map(table.of, names), table.rows, strict=True)
-    return {
-        name: HitSetup(name, station, used[name], height or 0.0, row)
-        for name, station, height, row in columns
-    }
+    return {one.name: replace(one, instrument=used[one.name]) for one in setups_of(table)}
 
 
 def _instrument(name, given):

@@ -49,7 +49,7 @@ def make_measurements(values, tables, registers):
         instruments=tuple(
             _instrument(name, given) for name, given in registers["instruments"].items()
         ),
-        setups=_setups(tables["setups"]),
+        setups=setups_of(tables["setups"]),
         readings=tuple(
             _readings(name, tables[name]) for name in READINGS if _has_rows(tables[name])
         ),
@@ -183,7 +183,8 @@ def _instrument(name, given):
     )
 
 
-def _setups(table):
+def setups_of(table):
+    """The `Setup`s of setups.csv, in their order."""
     if not _has_rows(table):
         return ()
     names = ("setup", "station", "instrument", "instrument_height_m")

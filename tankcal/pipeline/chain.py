@@ -17,7 +17,7 @@ from tankcal.messages import message
 from tankcal.pipeline.corrections import Correction, corrections_of
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
 from tankcal.pipeline.scan import Scan, fit_scan
-from tankcal.pipeline.sighted import sight_wall, told_offsets
+from tankcal.pipeline.sighted import find_hit_wall
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
 from tankcal.pipeline.statements import (
@@ -325,18 +325,15 @@ def _run(job, progress, part_progress, simulated):
     adjustment = sighting = None
     if job.measurements is not None:
         adjustment = _adjusted(job, progress)
-    if job.hits is not None:
-        job, sighting = sight_wall(job, adjustment, progress)
-    elif adjustment is not None:
+    if job.hits is None and adjustment is not None:
         points = wall_points(adjustment, job.measurements, job.survey.side)
         job = replace(job, points=s_transform(points))
     dof = np.inf if adjustment is None else adjustment.dof
     try:
-        survey = _survey(job, progress, dof)
-        told = told_offsets(job, survey) if sighting is not None else {}
-        if told:  # once more, from where the hits are without them
-            job, sighting = sight_wall(job, adjustment, progress, told)
+        if job.hits is None:
             survey = _survey(job, progress, dof)
+        else:
+            job, sighting, survey = find_hit_wall(job, adjustment, progress, dof)
     except SolutionError as error:
         if adjustment is None or not adjustment.warnings:
             raise

@@ -7,7 +7,7 @@ from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.shell import course_of
 from tankcal.messages import list_some, message
 from tankcal.pipeline.rule_limits import limit_at, limits_of
-from tankcal.pipeline.told_causes import told_causes
+from tankcal.pipeline.wall import joints_of
 from tankcal.survey.control_drift import repeats_of
 
 RULES, CONTROL = "wall_hits", "control_readings.csv"
@@ -17,6 +17,11 @@ SHOWN = 5
 GON = FULL_TURN / 400
 
 
+def least_hits(job):
+    """How many hits a section of a tank of that circumference should have."""
+    return limit_at(RULES, "hits", "least", np.pi * job.tank.nominal_diameter_m)
+
+
 def check_hits(job, wall, sighting):
     """`Problem`s of the hits of a wall."""
     return (
@@ -24,7 +29,7 @@ def check_hits(job, wall, sighting):
         *_of_levels(job, wall),
         *_of_courses(job, sighting),
         *_of_incidence(sighting),
-        *_of_causes(job, wall),
+        *_of_causes(wall, sighting.told),
     )
 
 
@@ -61,11 +66,8 @@ def _of_control(job):
 
 
 def _of_levels(job, wall):
-    girth = np.pi * job.tank.nominal_diameter_m
-    least, few = limit_at(RULES, "hits", "least", girth), []
-    for section in wall.sections:
-        if len(section.group.members) < least:
-            few.append(section.group.name)
+    least = least_hits(job)
+    few = [one.group.name for one in wall.sections if len(one.group.members) < least]
     if few:
         text = message(
             "few_hits",
@@ -73,7 +75,7 @@ def _of_levels(job, wall):
             " {girth_m:.0f} m asks for",
             sections=list_some(few, SHOWN),
             least=least,
-            girth_m=girth,
+            girth_m=np.pi * job.tank.nominal_diameter_m,
         )
         yield Problem(job.hits.file, text)
     courses = [section.group.course for section in wall.sections]
@@ -97,7 +99,7 @@ def _of_levels(job, wall):
 def _of_courses(job, sighting):
     """Hits that are said to be of another course than the one at their height."""
     names = [course.name for course in job.courses]
-    joints = job.datum.bottom_z_m + np.cumsum([0.0] + [one.height_m for one in job.courses])
+    joints = job.datum.bottom_z_m + joints_of(job)
     z = sighting.points.xyz_m[:, 2]
     wrong = {}
     for place, name in enumerate(job.hits.course):
@@ -133,33 +135,38 @@ def _of_incidence(sighting):
         yield Problem(sighting.points.file, text, sighting.points.rows[flat[0]])
 
 
-def _of_causes(job, wall):
+def _of_causes(wall, told):
     """Offsets and scales that straps, or hits from the other side, make out to be unlike their
     certificates.
     """
     if wall.straps is None and not wall.by_inputs:
         return
-    for one in told_causes(job, wall):
+    for one in told:
         if not np.isfinite(one.u_before) or abs(one.value) <= UNLIKE_SDS * one.u_before:
             continue
-        values = {"name": one.name, "factor": UNLIKE_SDS}
+        ratio = abs(one.value) / one.u_before
         if one.what == "instrument_offset":
-            text = message(
-                "offset_unlike_certificate",
-                "the wall makes the offset of {name} {value_mm:+.2f} mm, {ratio:.1f} times its"
-                " u_offset_mm: is that of another reflector, or a strap or a plate wrong?",
-                value_mm=1000 * one.value,
-                ratio=abs(one.value) / one.u_before,
-                **values,
+            key, text = (
+                "u_offset_mm",
+                message(
+                    "offset_unlike_certificate",
+                    "the wall makes the offset of {name} {value_mm:+.2f} mm, {ratio:.1f} times its"
+                    " u_offset_mm: is that of another reflector, or a strap or a plate wrong?",
+                    name=one.name,
+                    value_mm=1000 * one.value,
+                    ratio=ratio,
+                ),
             )
-            yield Problem("instruments.toml", text, None, f"{one.name}.u_offset_mm")
         else:
-            text = message(
-                "scale_unlike_certificate",
-                "the wall makes the scale of {name} {value_ppm:+.0f} ppm, {ratio:.1f} times its"
-                " u_scale_ppm",
-                value_ppm=1e6 * one.value,
-                ratio=abs(one.value) / one.u_before,
-                **values,
+            key, text = (
+                "u_scale_ppm",
+                message(
+                    "scale_unlike_certificate",
+                    "the wall makes the scale of {name} {value_ppm:+.0f} ppm, {ratio:.1f} times its"
+                    " u_scale_ppm",
+                    name=one.name,
+                    value_ppm=1e6 * one.value,
+                    ratio=ratio,
+                ),
             )
-            yield Problem("instruments.toml", text, None, f"{one.name}.u_scale_ppm")
+        yield Problem("instruments.toml", text, None, f"{one.name}.{key}")

@@ -10,17 +10,35 @@ from tankcal.job.checks.hits import offset_unknown
 from tankcal.messages import message
 from tankcal.pipeline.misread_hits import refuse_other_units
 from tankcal.pipeline.told_causes import told_causes
-from tankcal.pipeline.wall import joints_of, s_transform
+from tankcal.pipeline.wall import find_wall, joints_of, s_transform
 from tankcal.sections import coordinates_of
 from tankcal.survey.poses import poses_of
 from tankcal.survey.sighting import sight
 
 
-def sight_wall(job, adjustment, progress, told_m=None):
+def find_hit_wall(job, adjustment, progress, dof=np.inf):
+    """The job with its hits as points, their `Sighting`, and the `Wall` that they show.
+
+    Offsets that nothing but the wall tells are taken off, and it is found once more.
+
+    adjustment  of the network that the set-ups belong to; None: there is none
+    dof         as in `find_wall`
+    """
+    job, sighting = sight_wall(job, adjustment, progress)
+    wall = find_wall(job, progress, dof)
+    told = told_causes(job, wall)
+    free = {one.name: one.value for one in told if np.isinf(one.u_before)}
+    if free:
+        job, sighting = _as_points(job, sight(job.hits, sighting.poses, free))
+        wall = find_wall(job, progress, dof)
+        told = told_causes(job, wall)
+    return job, replace(sighting, told=told), wall
+
+
+def sight_wall(job, adjustment, progress):
     """The job with the hits that count as its points, and the `Sighting` of all of them.
 
     adjustment  of the network that the set-ups belong to; None: there is none
-    told_m      {instrument: offset that the wall told of it}, m
     """
     progress(
         message(
@@ -30,30 +48,24 @@ def sight_wall(job, adjustment, progress, told_m=None):
             setups=len(set(job.hits.setup)),
         )
     )
+    refuse_other_units(job.hits)
     poses = poses_of(
         job.hits,
         adjustment,
         nominal_m=job.tank.nominal_diameter_m / 2,
         is_inside=job.survey.side == "inside",
     )
-    sighting = sight(job.hits, poses, told_m)
-    refuse_other_units(job.hits)
+    sighting = sight(job.hits, poses)
     _refuse_side(job, sighting)
-    sighting = _on_one_side(job, sighting)
     _refuse_unknown_offset(job, sighting)
+    return _as_points(job, sighting)
+
+
+def _as_points(job, sighting):
+    """The job with the hits that count as its points, all on one side of the wall."""
+    sighting = _on_one_side(job, sighting)
     used = take_points(sighting.points, np.flatnonzero(~job.hits.check))
     return replace(job, points=s_transform(used)), sighting
-
-
-def told_offsets(job, wall):
-    """{instrument: m} of offsets that nothing told but the wall."""
-    if not any(one.what == "instrument_offset" for one in job.points.unbound):
-        return {}
-    return {
-        one.name: one.value
-        for one in told_causes(job, wall)
-        if one.what == "instrument_offset" and np.isinf(one.u_before)
-    }
 
 
 def take_points(points, chosen):

@@ -15,12 +15,7 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.geometry.field.amplitudes import estimate_amplitudes
-from tankcal.geometry.field.blunders import (
-    MOST_ROUNDS,
-    Tested,
-    restricted_precision,
-    snoop_wall,
-)
+from tankcal.geometry.field.blunders import Tested, restricted_precision
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.girth import perimeter_excess
@@ -35,16 +30,11 @@ from tankcal.pipeline.wall_readings import (
     noise_of,
     readings_of_offsets,
     readings_of_straps,
+    settle_readings,
     shared_effects,
     sites_of,
 )
-from tankcal.pipeline.wall_straps import (
-    UNCONTROLLED,
-    AreaTerm,
-    Straps,
-    gauged_plates,
-    mean_radii,
-)
+from tankcal.pipeline.wall_straps import AreaTerm, Straps, gauged_plates, mean_radii
 from tankcal.survey.network.reliability import noncentrality
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 
@@ -263,23 +253,9 @@ def _adjusted(readings, joints_m, zero_m, nominal_m, snooping):
     if np.any(sites.ring >= 0):
         readings = _off_centre(readings, field)
         field = field_of(accepted)
-    for _ in range(MOST_ROUNDS):
-        tested, whole = _tested(field, sites, readings, noise, accepted, may_go)
-        if np.all(tested.accepted == accepted):
-            break
-        accepted = tested.accepted
-        field = field_of(accepted)
-    controlled = tested.sd_m**-2.0 * np.diag(whole) > UNCONTROLLED
-    return readings, replace(tested, sd_m=np.where(controlled, tested.sd_m, np.inf)), field
-
-
-def _tested(field, sites, readings, noise_m2, accepted, may_go):
-    """`Tested` readings, with the amplitudes of a field of the accepted; their covariance."""
     radius = np.array([one.radius_m for one in readings])
-    whole = replace(field, sites=sites, radius_m=radius, noise_m2=noise_m2).covariance_m2
-    precision = restricted_precision(whole, free_design(sites)[0])
-    pull = precision @ (radius - radius.mean())
-    return snoop_wall(precision, pull, accepted, may_go), whole
+    field, tested = settle_readings(field, field_of, (sites, radius, noise), may_go)
+    return readings, tested, field
 
 
 def _off_centre(readings, field):

@@ -216,7 +216,8 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         noise = noise.toarray() if scipy.sparse.issparse(noise) else noise
     if job.strapping is None:
         sites = unbound.shared_by(sites) if job.points.unbound else sites
-        noise = noise + noise_by_inputs(job.inputs, by_inputs, len(radius))
+        if by_inputs:
+            noise = noise + noise_by_inputs(job.inputs, by_inputs, len(radius))
         field, readings, straps = WallField(sites, radius, noise, amplitudes, nominal), (), None
     else:
         points = PointsOfWall(sites, radius, noise, unbound, by_inputs)

@@ -5,13 +5,16 @@ constant of that line. What readings share is a column: an effect of a known sta
 or an unknown that nothing binds beforehand.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tankcal.geometry.field.sites import Sites
+from tankcal.geometry.field.blunders import MOST_ROUNDS, restricted_precision, snoop_wall
+from tankcal.geometry.field.sites import Sites, free_design
 from tankcal.survey.reference_line import level_names
 from tankcal.tank.body import Factor
+
+UNCONTROLLED = 1e-6  # of a reading's variance: what the others leave of it where there are none
 
 
 @dataclass(frozen=True)
@@ -170,6 +173,42 @@ def shared_effects(readings):
     columns = columns_of([{key: one[2] for key, one in each.effects.items()} for each in readings])
     told = {key: one[:2] for each in readings for key, one in each.effects.items()}
     return {key: (*told[key], column) for key, column in columns.items()}
+
+
+def settle_readings(field, field_of, given, may_go):
+    """The field of a wall and what became of its readings: each tested by all others, and the field
+    found again, until none changes sides.
+
+    Parameters
+    ----------
+    field : WallField
+        Of all readings.
+    field_of : callable
+        field_of(accepted) -> WallField of some.
+    given : tuple
+        Sites, (n,) radii and (n, n) noise of all.
+    may_go : ndarray, shape (n,)
+        Which of them may be set aside.
+
+    Returns
+    -------
+    field : WallField
+        Of those that are accepted.
+    tested : Tested
+        An infinite sd_m of those that no other reading controls.
+    """
+    sites, radius, noise = given
+    accepted = np.ones(len(radius), dtype=bool)
+    for _ in range(MOST_ROUNDS):
+        whole = replace(field, sites=sites, radius_m=radius, noise_m2=noise).covariance_m2
+        precision = restricted_precision(whole, free_design(sites)[0])
+        tested = snoop_wall(precision, precision @ (radius - radius.mean()), accepted, may_go)
+        if np.all(tested.accepted == accepted):
+            break
+        accepted = tested.accepted
+        field = field_of(accepted)
+    controlled = tested.sd_m**-2.0 * np.diag(whole) > UNCONTROLLED
+    return field, replace(tested, sd_m=np.where(controlled, tested.sd_m, np.inf))
 
 
 def factors_of_readings(readings, weights):

@@ -10,10 +10,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.linalg
 
-from tankcal.geometry.field.blunders import MOST_ROUNDS, restricted_precision, snoop_wall
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.estimate import LEVELS, WallField
-from tankcal.geometry.field.sites import Sites, free_design
+from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.girth import perimeter_excess
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.unbound import Unbound
@@ -22,13 +21,12 @@ from tankcal.pipeline.wall_readings import (
     noise_by_inputs,
     noise_of,
     readings_of_straps,
+    settle_readings,
     sites_of,
 )
 from tankcal.quadrature import panels
 from tankcal.survey.network.reliability import noncentrality
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
-
-UNCONTROLLED = 1e-6  # of a reading's variance: what the others leave of it where there are none
 
 
 @dataclass(frozen=True)
@@ -164,9 +162,7 @@ def join_straps(job, points, amplitudes, joints_m):
     inner *= job.survey.side == "inside"
     readings = [_on_surface(one, inner[one.course], job.survey.side) for one in readings]
     n, k = len(radius), len(readings)
-    plate, bottom = job.datum.dip_plate_z_m, job.datum.bottom_z_m
-    zero = 0.0 if plate is None else plate - bottom
-    both = _joined(points.sites, sites_of(readings, joints_m, zero))
+    both = _joined(points.sites, sites_of(readings, joints_m, job.datum.plate_level_m))
     both = points.unbound.padded(k).shared_by(both)
     radius = np.append(radius, [one.radius_m for one in readings])
     columns = columns_of([one.by_inputs for one in readings])
@@ -177,23 +173,22 @@ def join_straps(job, points, amplitudes, joints_m):
     noise = scipy.linalg.block_diag(noise, noise_of(readings))
     noise += noise_by_inputs(job.inputs, columns, n + k)
     may_go = np.append(np.zeros(n), np.full(k, job.snooping and both.shared is None))
-    accepted = np.ones(n + k, dtype=bool)
-    for _ in range(MOST_ROUNDS):
-        field = _field(both, radius, noise, amplitudes, nominal, accepted)
-        whole = replace(field, sites=both, radius_m=radius, noise_m2=noise).covariance_m2
-        precision = restricted_precision(whole, free_design(both)[0])
-        tested = snoop_wall(precision, precision @ (radius - radius.mean()), accepted, may_go)
-        if np.all(tested.accepted == accepted):
-            break
-        accepted = tested.accepted
-    controlled = (tested.sd_m**-2.0 * np.diag(whole) > UNCONTROLLED)[n:]
-    kept = accepted[n:]
+
+    def field_of(accepted):
+        some = np.flatnonzero(accepted)
+        own = noise[np.ix_(some, some)]
+        return WallField(both.take(accepted), radius[some], own, amplitudes, nominal)
+
+    field, tested = settle_readings(
+        field_of(np.ones(n + k, dtype=bool)), field_of, (both, radius, noise), may_go
+    )
+    kept, sd = tested.accepted[n:], tested.sd_m[n:]
     straps = Straps(
         reduced=reduced,
         adjusted=places,
         accepted=kept,
-        w=np.where(controlled, tested.w[n:], np.nan),
-        sd_m=np.where(controlled, tested.sd_m[n:], np.inf),
+        w=np.where(np.isfinite(sd), tested.w[n:], np.nan),
+        sd_m=sd,
         departure_m=tested.departure_m[n:],
         area_term=term,
         shape_sd_m=shape,
@@ -202,12 +197,6 @@ def join_straps(job, points, amplitudes, joints_m):
         tapes=tapes_used(given),
     )
     return field, [one for one, used in zip(readings, kept, strict=True) if used], straps
-
-
-def _field(sites, radius_m, noise_m2, amplitudes, nominal_m, accepted):
-    some = np.flatnonzero(accepted)
-    own = noise_m2[np.ix_(some, some)]
-    return WallField(sites.take(accepted), radius_m[some], own, amplitudes, nominal_m)
 
 
 def _on_surface(reading, inner_m, side):

@@ -100,15 +100,11 @@ def lines_of(result):
         plummets=_plummets(result),
         reference_level_m=given.reference_m,
         reference_course=next(one.course for one in given.offsets if one.reference),
-        lean_x=_finite(lean.x),
-        lean_y=_finite(lean.y),
-        lean_azimuth_rad=_finite(np.arctan2(lean.x, lean.y) % FULL_TURN),
-        lean_sd=_finite(lean.sd),
+        lean_x=lean.x,
+        lean_y=lean.y,
+        lean_azimuth_rad=np.arctan2(lean.x, lean.y) % FULL_TURN,
+        lean_sd=lean.sd,
     )
-
-
-def _finite(value):
-    return float(value) if np.isfinite(value) else None
 
 
 def _offsets(result):
@@ -132,9 +128,9 @@ def _offsets(result):
                 reference=one.reference,
                 offset_m=one.offset_m,
                 sd_m=one.sd_m,
-                departure_m=_finite(away) if np.isfinite(of_w) else None,
-                w=_finite(of_w),
-                mdb_m=_finite(least),
+                departure_m=away if np.isfinite(of_w) else None,
+                w=of_w,
+                mdb_m=least,
                 state=state,
                 row=one.row,
             )

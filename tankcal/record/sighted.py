@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from tankcal.pipeline.rule_limits import limit_at
-from tankcal.pipeline.told_causes import told_causes
+from tankcal.pipeline.hit_checks import least_hits
 from tankcal.record.schema import Saved, key
 from tankcal.survey.control_drift import HOUR_S, drifts_of, repeats_of
 
@@ -115,17 +114,13 @@ def hits_of(result):
             DriftOfSetup(
                 setup=one.setup,
                 hours=one.hours,
-                direction_rad_h=_finite(HOUR_S * one.direction_rad_s),
-                zenith_rad_h=_finite(HOUR_S * one.zenith_rad_s),
+                direction_rad_h=HOUR_S * one.direction_rad_s,
+                zenith_rad_h=HOUR_S * one.zenith_rad_s,
             )
             for one in drifts_of(repeats)
         ],
         compared=_compared(result),
     )
-
-
-def _finite(value):
-    return float(value) if np.isfinite(value) else None
 
 
 def _setups(result):
@@ -157,7 +152,7 @@ def _setups(result):
 
 def _shared(result):
     tools, found = result.job.hits.instruments, []
-    for one in told_causes(result.job, result.wall):
+    for one in result.sighting.told:
         unit, per = ("mm", 1e3) if one.what == "instrument_offset" else ("ppm", 1e6)
         certificate = tools[one.name].certificate if one.name in tools else ""
         found.append(
@@ -166,7 +161,7 @@ def _shared(result):
                 certificate=certificate,
                 what=one.what,
                 unit=unit,
-                u_before=_finite(per * one.u_before),
+                u_before=per * one.u_before,
                 value=per * (one.value + _taken_off(result.sighting, one)),
                 u_after=per * one.u_after,
                 correlation=one.correlation,
@@ -182,7 +177,7 @@ def _taken_off(sighting, one):
 
 def _rings(result):
     job, wall = result.job, result.wall
-    least = limit_at("wall_hits", "hits", "least", np.pi * job.tank.nominal_diameter_m)
+    least = least_hits(job)
     heights = np.array([section.group.height_m for section in wall.sections])
     z = job.points.xyz_m[wall.shell.reason != "", 2] - job.datum.bottom_z_m
     nearest = np.argmin(np.abs(z[:, None] - heights), axis=1) if len(z) else np.zeros(0, dtype=int)
@@ -216,9 +211,9 @@ def _control(repeats):
             setup=one.setup,
             target=one.target,
             elapsed_h=one.elapsed_s[i] / HOUR_S,
-            direction_rad=_finite(one.direction_rad[i]),
-            zenith_rad=_finite(one.zenith_rad[i]),
-            distance_m=_finite(one.distance_m[i]),
+            direction_rad=one.direction_rad[i],
+            zenith_rad=one.zenith_rad[i],
+            distance_m=one.distance_m[i],
             row=one.rows[i],
         )
         for one in repeats

@@ -107,17 +107,13 @@ def _readings(result):
             circumference_m=one.circumference_m,
             sd_m=one.sd_m,
             difference_m=one.circumference_m - of_course[one.strap.course],
-            w=_finite(w[index]),
-            mdb_m=_finite(mdb[index]),
+            w=w[index],
+            mdb_m=mdb[index],
             used=not one.strap.check and index not in set_aside,
             row=one.strap.row,
         )
         for index, one in enumerate(straps.reduced)
     ]
-
-
-def _finite(value):
-    return value if np.isfinite(value) else None
 
 
 def _tape(tape, sd, given):

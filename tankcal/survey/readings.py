@@ -31,6 +31,11 @@ def bend_per_m(refraction):
     return 0.0 if refraction is None else (1.0 - refraction) / (2.0 * EARTH_RADIUS_M)
 
 
+def certified_distance_m(reading_m, tool):
+    """Distance after an instrument's certificate: (reading + correction_m) (1 + correction)."""
+    return (np.asarray(reading_m) + tool.correction_m) * (1.0 + tool.correction)
+
+
 def true_distance_m(reading_m, tool, temperature_c):
     """Distance after the certificate of an instrument and its temperature.
 
@@ -38,7 +43,7 @@ def true_distance_m(reading_m, tool, temperature_c):
 
     reading_m, temperature_c  (n,), nan: not given        tool  job.Instrument
     """
-    found = (np.asarray(reading_m) + tool.correction_m) * (1.0 + tool.correction)
+    found = certified_distance_m(reading_m, tool)
     if tool.certified_temperature_c is None or not tool.expansion_per_k:
         return found
     warmer = np.nan_to_num(np.asarray(temperature_c) - tool.certified_temperature_c)

@@ -19,6 +19,7 @@ import scipy.linalg
 
 from tankcal.geometry.circles import taubin_circle
 from tankcal.survey.points import Points
+from tankcal.survey.readings import certified_distance_m
 from tankcal.survey.results import Cause
 
 NETWORK, FRAME, WALL = "network", "frame", "wall"  # what ties a set-up
@@ -56,6 +57,11 @@ class Poses:
     covariance: np.ndarray
     ties: tuple
 
+    def place_of(self, hits):
+        """(n,) place of the pose of each hit among these."""
+        place = {key: i for i, key in enumerate(self.keys)}
+        return np.array([place[key] for key in zip(hits.setup, hits.set, strict=True)])
+
 
 @dataclass(frozen=True)
 class Sighting:
@@ -76,6 +82,8 @@ class Sighting:
         Of that circle, outwards.
     told_m : dict
         {instrument: offset that the wall told of it}, m, as it was taken off.
+    told : tuple of ToldCause
+        What the wall says of offsets and scales; (): it was not asked yet.
     """
 
     points: Points
@@ -85,6 +93,7 @@ class Sighting:
     is_inside: np.ndarray
     normal: np.ndarray
     told_m: dict = field(default_factory=dict)
+    told: tuple = ()
 
 
 def sight(hits, poses, told_m=None):
@@ -106,12 +115,17 @@ def sight(hits, poses, told_m=None):
     told_m = told_m or {}
     told = np.array([told_m.get(name, 0.0) for name in poses.instruments])
     poses = replace(poses, offset_m=poses.offset_m + told)
-    place = {key: i for i, key in enumerate(poses.keys)}
-    pose = np.array([place[key] for key in zip(hits.setup, hits.set, strict=True)])
+    pose = poses.place_of(hits)
     tool = np.array([poses.instruments.index(name) for name in hits.instrument])
-    distance = _distances(hits, poses, tool)
+    certified = np.array(
+        [
+            certified_distance_m(distance, hits.instruments[name])
+            for distance, name in zip(hits.distance_m, hits.instrument, strict=True)
+        ]
+    )
+    distance = (certified - poses.offset_m[tool]) / (1 + poses.scale[tool])
     azimuth = poses.orientation_rad[pose] + hits.direction_rad
-    ray, by_azimuth, by_zenith = _rays(azimuth, hits.zenith_rad)
+    ray, by_azimuth, by_zenith = rays(azimuth, hits.zenith_rad)
     xyz = poses.xyz_m[pose] + distance[:, None] * ray
     cosine, inside, normal = _incidence(xyz, poses.xyz_m[pose], ray)
     # by x, y, z, orientation of each pose, then by scale and offset of each instrument
@@ -160,16 +174,7 @@ def _rows(hits):
     return hits.rows or range(1, len(hits) + 1)
 
 
-def _distances(hits, poses, tool):
-    """(n,) distances as certificate and survey have them."""
-    known = [hits.instruments[name] for name in poses.instruments]
-    added = np.array([one.correction_m for one in known])[tool]
-    factor = 1 + np.array([one.correction for one in known])[tool]
-    certified = (hits.distance_m + added) * factor
-    return (certified - poses.offset_m[tool]) / (1 + poses.scale[tool])
-
-
-def _rays(azimuth_rad, zenith_rad):
+def rays(azimuth_rad, zenith_rad):
     """(n, 3) direction of each sight, and its derivatives by azimuth and zenith angle."""
     sin, cos = np.sin(azimuth_rad), np.cos(azimuth_rad)
     down, up = np.sin(zenith_rad), np.cos(zenith_rad)

@@ -16,6 +16,7 @@ import numpy as np
 
 from tankcal.geometry.circles import taubin_circle
 from tankcal.geometry.outlines import FULL_TURN
+from tankcal.survey.sighting import rays
 
 LEVEL_GAP_M = 0.15  # between heights that are fitted with radii of their own
 NARROW_RAD = 0.1  # directions of a set-up that sees a line of the wall, and looks along its normal
@@ -46,9 +47,7 @@ def place_untied(hits, poses, untied, *, nominal_m, is_inside):
     -------
     Poses
     """
-    of = {key: i for i, key in enumerate(poses.keys)}
-    pose = np.array([of[key] for key in zip(hits.setup, hits.set, strict=True)])
-    own = own_places(hits)
+    pose, own = poses.place_of(hits), own_places(hits)
     tied = ~np.isin(pose, untied)
     axis = _axis(hits, poses, own, pose, tied, untied)
     xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
@@ -74,14 +73,7 @@ def sees_all_around(own):
 
 def own_places(hits):
     """(n, 3) hits from their set-up, the zero of its circle along +y."""
-    flat = hits.distance_m * np.sin(hits.zenith_rad)
-    return np.column_stack(
-        [
-            flat * np.sin(hits.direction_rad),
-            flat * np.cos(hits.direction_rad),
-            hits.distance_m * np.cos(hits.zenith_rad),
-        ]
-    )
+    return hits.distance_m[:, None] * rays(hits.direction_rad, hits.zenith_rad)[0]
 
 
 def _turned(own, zero):

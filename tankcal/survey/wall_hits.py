@@ -37,26 +37,6 @@ class RangingInstrument:
 
 
 @dataclass(frozen=True)
-class HitSetup:
-    """A set-up that hits were taken from.
-
-    Attributes
-    ----------
-    name, station, instrument : str
-    height_m : float
-        Of the instrument above the station's mark.
-    row : int or None
-        In setups.csv.
-    """
-
-    name: str
-    station: str
-    instrument: str
-    height_m: float = 0.0
-    row: int | None = None
-
-
-@dataclass(frozen=True)
 class ControlReading:
     """A control target as a set-up read it at some time; nan: this was not read.
 
@@ -98,7 +78,7 @@ class WallHits:
     check : ndarray of bool, shape (n,)
         Only compared.
     setups : dict
-        {name: HitSetup}.
+        {name: measurements.Setup}, each with its instrument.
     instruments : dict
         {name: RangingInstrument}.
     stations : dict

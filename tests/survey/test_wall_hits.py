@@ -18,10 +18,11 @@ from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import Sites
 from tankcal.pipeline.told_causes import told_causes
 from tankcal.survey.control_drift import drifts_of, repeats_of
+from tankcal.survey.measurements import Setup
 from tankcal.survey.points import Points
 from tankcal.survey.results import Cause
 from tankcal.survey.sighting import Poses, sight
-from tankcal.survey.wall_hits import ControlReading, HitSetup, RangingInstrument, WallHits
+from tankcal.survey.wall_hits import ControlReading, RangingInstrument, WallHits
 
 STATION, ZERO = np.array([0.7, -0.4, 1.5]), 0.3
 ROUND = Surface(lambda a, z: 6.5 + 0.01 * np.sin(2 * a) + 0.001 * z, (1.0, -0.5), (0.002, -0.001))
@@ -38,7 +39,7 @@ def hits_of(read, instrument, surface=""):
         np.full(n, 2e-5),
         (surface,) * n,
         np.zeros(n, dtype=bool),
-        {"I": HitSetup("I", "S", instrument.name)},
+        {"I": Setup("I", "S", instrument.name)},
         {instrument.name: instrument},
     )
 

@@ -3,6 +3,15 @@
 from tankcal.job.contract.observations import USE, angle_fields
 from tankcal.job.fields import Field
 
+
+def _time(required=False):
+    return Field("time", "time", "when, such as 2026-01-05T14:30", required=required)
+
+
+def _distance(note, required=False):
+    return Field("distance_m", "number", note, required=required, low=0, high=1e4, above_low=True)
+
+
 SURFACES = ("paint", "rust", "tape")
 _SETUP = Field("setup", "name", "the set-up, as in setups.csv", required=True)
 _DIRECTION = angle_fields("direction", "as read, clockwise", (-1, 1))
@@ -17,15 +26,7 @@ WALL_HITS = (
     ),
     *_DIRECTION,
     *_ZENITH,
-    Field(
-        "distance_m",
-        "number",
-        "slope distance to the bare wall as read, metres",
-        required=True,
-        low=0,
-        high=1e4,
-        above_low=True,
-    ),
+    _distance("slope distance to the bare wall as read, metres", required=True),
     Field(
         "s_mm",
         "number",
@@ -48,7 +49,7 @@ WALL_HITS = (
         "what was hit: each has a bias by incidence of its own; blank: all the same",
         choices=SURFACES,
     ),
-    Field("time", "time", "when, such as 2026-01-05T14:30"),
+    _time(),
     USE,
 )
 CONTROL_READINGS = (
@@ -56,10 +57,8 @@ CONTROL_READINGS = (
     Field("target", "name", "the control target; read again to see a drift", required=True),
     *_DIRECTION,
     *_ZENITH,
-    Field(
-        "distance_m", "number", "slope distance as read, metres", low=0, high=1e4, above_low=True
-    ),
-    Field("time", "time", "when, such as 2026-01-05T14:30", required=True),
+    _distance("slope distance as read, metres"),
+    _time(required=True),
 )
 BESIDE = (  # what ties set-ups, and what tells an offset
     *("setups", "control", "directions", "zenith_angles", "slope_distances"),

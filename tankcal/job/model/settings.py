@@ -95,6 +95,11 @@ class Datum:
     dip_y_m: float | None = None
     reference_height_m: float | None = None
 
+    @property
+    def plate_level_m(self):
+        """Level of the dip plate above the bottom of the first course, m; 0 where none is given."""
+        return 0.0 if self.dip_plate_z_m is None else self.dip_plate_z_m - self.bottom_z_m
+
 
 @dataclass(frozen=True)
 class TableSpec:

@@ -130,7 +130,7 @@ def shell_zero(job, wall):
     """
     datum = job.datum
     if datum.dip_plate_z_m is not None:
-        return datum.dip_plate_z_m - datum.bottom_z_m
+        return datum.plate_level_m
     if job.bottom.form == "leaning" and job.switches.bottom and datum.dip_x_m is not None:
         offset = np.array([datum.dip_x_m, datum.dip_y_m]) - _axis_at_bottom(job, wall)
         return -float(offset @ wall.shell.slope)

@@ -2,18 +2,25 @@
 
 from tankcal.report.tables.table import Column, Table
 
+_SETUP = Column("setup", heading="hit_setup", sheet="hit_setup", width=10)
+_INSTRUMENT = Column("instrument", heading="hit_instrument", sheet="hit_instrument", width=14)
+_SECTION = Column("section", sheet="section", width=10)
+_COUNTS = (
+    Column("hits", decimals=0, heading="hits_used", sheet="hits_used"),
+    Column("rejected", decimals=0, heading="hits_rejected", sheet="hits_rejected"),
+)
+
 SETUPS = Table(
     "hit_setups",
     (
-        Column("setup", heading="hit_setup", sheet="hit_setup", width=10),
+        _SETUP,
         Column("station", heading="hit_station", sheet="hit_station", width=10),
-        Column("instrument", heading="hit_instrument", sheet="hit_instrument", width=14),
+        _INSTRUMENT,
         Column("x_m", "m", decimals=3, heading="hit_x", sheet="hit_x_m"),
         Column("y_m", "m", decimals=3, heading="hit_y", sheet="hit_y_m"),
         Column("z_m", "m", decimals=3, heading="hit_z", sheet="hit_z_m"),
         Column("tie", words="ties_of_setups", heading="hit_tie", sheet="hit_tie", width=16),
-        Column("hits", decimals=0, heading="hits_used", sheet="hits_used"),
-        Column("rejected", decimals=0, heading="hits_rejected", sheet="hits_rejected"),
+        *_COUNTS,
         Column("checks", decimals=0, heading="hits_compared", sheet="hits_compared"),
     ),
     rows=lambda record: record["hits"]["setups"],
@@ -22,7 +29,7 @@ SETUPS = Table(
 SHARED = Table(
     "hit_shared",
     (
-        Column("instrument", heading="hit_instrument", sheet="hit_instrument", width=14),
+        _INSTRUMENT,
         Column("certificate", heading="tape_certificate", sheet="tape_certificate", width=14),
         Column("what", words="inputs", heading="hit_shared_what", sheet="hit_shared_what",
                width=22),
@@ -40,11 +47,10 @@ SHARED = Table(
 RINGS = Table(
     "hit_rings",
     (
-        Column("section", sheet="section", width=10),
+        _SECTION,
         Column("course", sheet="course", width=9),
         Column("level_m", "m", decimals=3, sheet="strap_level_m"),
-        Column("hits", decimals=0, heading="hits_used", sheet="hits_used"),
-        Column("rejected", decimals=0, heading="hits_rejected", sheet="hits_rejected"),
+        *_COUNTS,
         Column("least", decimals=0, heading="hits_least", sheet="hits_least"),
     ),
     rows=lambda record: record["hits"]["rings"],
@@ -63,7 +69,7 @@ INCIDENCE = Table(
 CONTROL = Table(
     "hit_control",
     (
-        Column("setup", heading="hit_setup", sheet="hit_setup", width=10),
+        _SETUP,
         Column("target", heading="hit_target", sheet="hit_target", width=10),
         Column("elapsed_h", decimals=2, heading="control_hours", sheet="control_hours"),
         Column("direction_rad", "rad arcsec", decimals=1, heading="control_direction",
@@ -79,7 +85,7 @@ CONTROL = Table(
 DRIFTS = Table(
     "hit_drifts",
     (
-        Column("setup", heading="hit_setup", sheet="hit_setup", width=10),
+        _SETUP,
         Column("hours", decimals=2, heading="drift_hours", sheet="drift_hours"),
         Column("direction_rad_h", "rad arcsec", decimals=2, heading="drift_direction",
                sheet="drift_direction_arcsec"),
@@ -92,9 +98,9 @@ DRIFTS = Table(
 COMPARED = Table(
     "hit_compared",
     (
-        Column("setup", heading="hit_setup", sheet="hit_setup", width=10),
+        _SETUP,
         Column("row", decimals=0, heading="hit_row", sheet="hit_row", width=8),
-        Column("section", sheet="section", width=10),
+        _SECTION,
         Column("departure_m", "mm", decimals=2, heading="line_departure",
                sheet="line_departure_mm"),
     ),
