@@ -1,6 +1,5 @@
 """Angles of wall hits in another unit than their column says: they show no circle then."""
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -8,7 +7,8 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.geometry.circles import taubin_circle
 from tankcal.messages import message
-from tankcal.survey.untied import own_places, sees_all_around
+from tankcal.survey.sighting import rays
+from tankcal.survey.untied import sees_all_around
 
 GON_IN_DEG, DEG_IN_GON = 0.9, 1 / 0.9  # what turns a value that is read so into what was meant
 CLOSER = 0.2  # scatter about a circle, of that as it is read, from which on another unit is told
@@ -44,14 +44,8 @@ def refuse_other_units(hits):
 
 def _scatter(hits, mine, of_direction, of_zenith):
     """Median distance of the hits of a set-up from their circle, m; inf: it sees no whole turn."""
-    chosen = np.flatnonzero(mine)
-    some = replace(
-        hits,
-        direction_rad=of_direction * hits.direction_rad[chosen],
-        zenith_rad=of_zenith * hits.zenith_rad[chosen],
-        distance_m=hits.distance_m[chosen],
-    )
-    places = own_places(some)
+    ray = rays(of_direction * hits.direction_rad[mine], of_zenith * hits.zenith_rad[mine])[0]
+    places = hits.distance_m[mine, None] * ray
     if not sees_all_around(places) or np.ptp(places[:, :2], axis=0).min() == 0:
         return np.inf
     local = places[:, :2] - places[:, :2].mean(axis=0)

@@ -117,13 +117,7 @@ def sight(hits, poses, told_m=None):
     poses = replace(poses, offset_m=poses.offset_m + told)
     pose = poses.place_of(hits)
     tool = np.array([poses.instruments.index(name) for name in hits.instrument])
-    certified = np.array(
-        [
-            certified_distance_m(distance, hits.instruments[name])
-            for distance, name in zip(hits.distance_m, hits.instrument, strict=True)
-        ]
-    )
-    distance = (certified - poses.offset_m[tool]) / (1 + poses.scale[tool])
+    distance = (certified_m(hits) - poses.offset_m[tool]) / (1 + poses.scale[tool])
     azimuth = poses.orientation_rad[pose] + hits.direction_rad
     ray, by_azimuth, by_zenith = rays(azimuth, hits.zenith_rad)
     xyz = poses.xyz_m[pose] + distance[:, None] * ray
@@ -172,6 +166,12 @@ def sight(hits, poses, told_m=None):
 
 def _rows(hits):
     return hits.rows or range(1, len(hits) + 1)
+
+
+def certified_m(hits):
+    """(n,) distances of hits after the certificates of their instruments."""
+    read = zip(hits.distance_m, hits.instrument, strict=True)
+    return np.array([certified_distance_m(one, hits.instruments[name]) for one, name in read])
 
 
 def rays(azimuth_rad, zenith_rad):

@@ -16,7 +16,7 @@ import numpy as np
 
 from tankcal.geometry.circles import taubin_circle
 from tankcal.geometry.outlines import FULL_TURN
-from tankcal.survey.sighting import rays
+from tankcal.survey.sighting import certified_m, rays
 
 LEVEL_GAP_M = 0.15  # between heights that are fitted with radii of their own
 NARROW_RAD = 0.1  # directions of a set-up that sees a line of the wall, and looks along its normal
@@ -47,7 +47,8 @@ def place_untied(hits, poses, untied, *, nominal_m, is_inside):
     -------
     Poses
     """
-    pose, own = poses.place_of(hits), own_places(hits)
+    pose = poses.place_of(hits)
+    own = certified_m(hits)[:, None] * rays(hits.direction_rad, hits.zenith_rad)[0]
     tied = ~np.isin(pose, untied)
     axis = _axis(hits, poses, own, pose, tied, untied)
     xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
@@ -66,14 +67,9 @@ def place_untied(hits, poses, untied, *, nominal_m, is_inside):
 
 
 def sees_all_around(own):
-    """Are the sights of a set-up nowhere half a turn apart?"""
+    """Are the sights of a set-up to (n, 3) places from it nowhere half a turn apart?"""
     turn = np.sort(np.arctan2(own[:, 0], own[:, 1]))
     return np.max(np.diff(turn, append=turn[0] + FULL_TURN)) < np.pi
-
-
-def own_places(hits):
-    """(n, 3) hits from their set-up, the zero of its circle along +y."""
-    return hits.distance_m[:, None] * rays(hits.direction_rad, hits.zenith_rad)[0]
 
 
 def _turned(own, zero):

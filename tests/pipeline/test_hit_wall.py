@@ -274,6 +274,21 @@ def test_a_thinner_plate_moves_a_strap_inside_once(tmp_path):
     assert -lines["plate_thickness"].sensitivity == pytest.approx(grown, rel=5e-3)
 
 
+def test_a_gauge_of_plates_bears_on_the_straps_alone(tmp_path):
+    """Inside hits do not see the plate: only that of the strapped course counts, and by its sd."""
+    parts = strapped(parts_of())
+    del parts.registers["instruments"]["TS"]["u_offset_mm"]
+    parts.tables["thickness"] = [
+        ["course", "thickness_mm", "s_mm"],
+        *([course, 8.0, 0.1] for course in ("1", "2")),
+    ]
+    lines = run(tmp_path, parts).budget().lines
+    (gauge,) = (one for one in lines if one.name == "plate_readings")
+    (plate,) = (one for one in lines if one.name == "plate_thickness")
+    assert gauge.note == "1"
+    assert abs(gauge.contribution) == pytest.approx(0.1 * abs(plate.sensitivity), rel=1e-6)
+
+
 def test_hits_beside_welds_are_left_out(tmp_path):
     parts = parts_of()
     clear = run(tmp_path, parts)
@@ -415,6 +430,19 @@ def test_set_ups_that_the_wall_alone_ties(tmp_path, control):
     assert result.wall.shell.slope == pytest.approx(SLOPE, abs=1e-5)
     noisy = run(tmp_path, arc_parts(seed=1, control=control))
     assert abs(noisy.table.volume_m3[-1] - volume_of(oval)) < noisy.table.U_m3[-1]
+
+
+def test_untied_set_ups_start_from_certified_distances(tmp_path):
+    """A constant of the certificate, such as that of a reflector that was set: the same tank."""
+    first = run(tmp_path / "a", arc_parts(seed=3))
+    parts = arc_parts(seed=3)
+    place = parts.tables["wall_hits"][0].index("distance_m")
+    for row in parts.tables["wall_hits"][1:]:
+        row[place] -= 0.030
+    parts.registers["instruments"]["TS"]["correction_mm"] = 30.0
+    second = run(tmp_path / "b", parts)
+    assert second.table.volume_m3[-1] == pytest.approx(first.table.volume_m3[-1], rel=1e-7)
+    assert second.table.U_m3[-1] == pytest.approx(first.table.U_m3[-1], rel=1e-5)
 
 
 def test_the_frame_of_untied_set_ups_is_a_choice(tmp_path):
