@@ -742,6 +742,12 @@ def _strap_without_thickness(parts):
     return [("instruments.toml", "T.thickness_mm")]
 
 
+def _empty_beside_straps(parts):
+    strapped(parts)
+    parts.tables["wall_hits"] = []
+    return [("wall_hits.csv", None)]
+
+
 BAD = [one for name, one in list(globals().items()) if name.startswith("_") and callable(one)]
 
 

@@ -10,6 +10,7 @@ from tankcal.job.checking import (
     temperature_missing,
 )
 from tankcal.job.checks.extent import has_wall_points, is_strapped
+from tankcal.job.contract.observations import READINGS
 from tankcal.job.contract.registers import FREE
 from tankcal.job.contract.strapping import NEEDED
 from tankcal.job.tables import nearest
@@ -37,15 +38,22 @@ def check_strapping(values, tables, registers, raw, log):
     tapes = tapes_of(registers)
     courses = tables["courses"]
     known = () if courses is None else tuple(courses.of("course"))
-    _check_courses(straps, tables, courses, known, log)
+    alone = _stands_alone(tables, raw)
+    _check_courses(straps, tables, courses, known, alone, log)
     _check_tapes(straps, registers["instruments"], tapes, raw, log)
     _check_obstructions(tables["obstructions"], set(straps.of("circumference")), log)
     if has_rows(tables["thickness"]):
         refuse_others(tables["thickness"], "course", known, log)
     _check_comparisons(tables["tape_checks"], tapes, raw, log)
     if values is not None:
-        _check_settings(values, tables, tapes, raw, log)
+        _check_settings(values, tables, tapes, alone, raw, log)
         check_levels(straps, courses, values, log)
+
+
+def _stands_alone(tables, raw):
+    """Was the wall strapped and nothing else? A table of its points that cannot be read is one."""
+    unreadable = (raw.tables.get(name, ()) is None for name in ("points", "wall_hits", *READINGS))
+    return not has_wall_points(tables) and not any(unreadable)
 
 
 def tapes_of(registers):
@@ -74,7 +82,7 @@ def _tell_without_effect(tables, log):
             log.warning(tables[name].file, expected)
 
 
-def _check_courses(straps, tables, courses, known, log):
+def _check_courses(straps, tables, courses, known, alone, log):
     refuse_others(straps, "course", known, log)
     reached = {
         course
@@ -86,7 +94,7 @@ def _check_courses(straps, tables, courses, known, log):
     if straps.skipped or courses is None or courses.skipped or None in reached:
         return
     for row, name in zip(courses.rows, known, strict=True):
-        if name is not None and name not in reached and not has_wall_points(tables):
+        if name is not None and name not in reached and alone:
             expected = message(
                 "course_not_strapped",
                 "no circumference was measured on course {course!r}; expected one at least in"
@@ -257,8 +265,7 @@ def _check_comparisons(table, tapes, raw, log):
         log.problem(file, expected, rows.get(working[0]), f"{working[0]}.master")
 
 
-def _check_settings(values, tables, tapes, raw, log):
-    alone = not has_wall_points(tables)
+def _check_settings(values, tables, tapes, alone, raw, log):
     unknown = values["shell"]["shape_sd_mm"] is None
     if alone and unknown and is_not_given(raw, "shell", "shape_sd_mm"):
         expected = message(
