@@ -192,7 +192,7 @@ def test_what_was_set_aside_comes_back_where_it_agrees():
 
 
 @pytest.mark.parametrize("gone", [0, 1, 2])
-def test_a_course_that_was_set_aside_istested_too(gone):
+def test_a_course_that_was_set_aside_is_tested_too(gone):
     """What is left tells the amplitudes; the course's own points agree and come back."""
     rng = np.random.default_rng(8)
     welds = tuple(np.array([place]) for place in (0.5, 1.0, 2.0))
@@ -204,6 +204,22 @@ def test_a_course_that_was_set_aside_istested_too(gone):
     assert left.welds_rad == tuple(one for i, one in enumerate(welds) if i != gone)
     found = find_blunders(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, start)
     assert np.all(np.bincount(sites.course[found.accepted]) >= 23)
+
+
+def test_points_of_a_course_that_was_set_aside_are_compared_with_each_other():
+    """Invariance: its radius and the centres of its rings, which nothing tells, change nothing."""
+    rng = np.random.default_rng(9)
+    sites = sites_of(3, [-0.5, 0.5], 12, rng)
+    gone = sites.course == 1
+    covariance = Covariances(sites, RADIUS_M).total(assumed_amplitudes().variances_m2)
+    covariance.flat[:: len(sites) + 1] += 1e-6
+    precision = restricted_precision(covariance, free_design(sites)[0])
+    radius = 1e-3 * rng.normal(size=len(sites))
+    moved = radius + gone * (0.3 + 0.02 * np.sin(sites.azimuth_rad))
+    found, other = (against_others(precision, precision @ one, ~gone) for one in (radius, moved))
+    assert other.departure_m == pytest.approx(found.departure_m, abs=1e-8)
+    assert np.all(np.abs(found.w[gone]) < 4)
+    assert np.all(found.sd_m[gone] < 0.01)
 
 
 def test_rings_of_points_and_what_stands_between_them():

@@ -1,10 +1,8 @@
 """A real vertical tank, surveyed from outside by total station (read in place, see its NOTE)."""
 
-import csv
-from itertools import pairwise
-
 import numpy as np
 import pytest
+from real_tank import write_real_job
 
 import tankcal
 from tankcal.job.plausibility import CODES
@@ -18,39 +16,7 @@ GROSS_M3, HEIGHT_M = 2152.1, 11.906
 
 @pytest.fixture(scope="module")
 def real_job(shared, tmp_path_factory):
-    """The survey as a job: courses from the marks p0..p8, thickness zero, all rows as points."""
-    source = shared / "data" / "real-vertical-tank" / "scan.csv"
-    with open(source, newline="") as file:
-        rows = [row[:4] for row in csv.reader(file)]
-    marks = {row[0]: float(row[3]) for row in rows}
-    joints = [marks[f"p{i}"] for i in range(9)]
-    folder = tmp_path_factory.mktemp("real")
-    (folder / "job.toml").write_text(
-        f"""
-        [tank]
-        id = "REAL-1"
-        kind = "vertical"
-        nominal_diameter_m = 15.17
-        nominal_height_m = {joints[-1] - joints[0]:.3f}
-        [survey]
-        side = "outside"
-        date = "2020-01-01"
-        [datum]
-        bottom_z_m = {joints[0]}
-        [table]
-        step_m = 0.01
-        reference_temperature_c = 15
-        """
-    )
-    _write(folder / "points.csv", ["point", "x_m", "y_m", "z_m"], rows)
-    courses = [[i + 1, f"{top - low:.3f}", 0] for i, (low, top) in enumerate(pairwise(joints))]
-    _write(folder / "courses.csv", ["course", "height_m", "thickness_mm"], courses)
-    return folder
-
-
-def _write(path, heading, rows):
-    with open(path, "w", newline="") as file:
-        csv.writer(file).writerows([heading, *rows])
+    return write_real_job(shared, tmp_path_factory.mktemp("real"))
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,10 @@ With V the covariance of readings (field and noise) and X what no prior binds,
 
 a reading without which the others predict y_i - e_i / P_ii, with the variance 1 / P_ii of the
 difference, is w_i = e_i / sqrt(P_ii) of its standard deviations off. Readings S that were set aside
-are predicted by the rest: P_SS^-1 e_S, of covariance P_SS^-1. What agrees with its neighbours
-along the wall is wall, however far both depart.
+are predicted by the rest: P_SS^-1 e_S, of covariance P_SS^-1. Where the rest does not tell what no
+prior binds (all points of a course, or of a ring, were set aside) P_SS is singular; its pseudo-
+inverse compares them with each other, that much free. What agrees with its neighbours along the
+wall is wall, however far both depart.
 
 Source: Cook & Weisberg 1982 (deletion residuals); Baarda 1968.
 """
@@ -26,6 +28,7 @@ from tankcal.geometry.field.sites import free_design
 MOST_ROUNDS = 4  # of amplitudes from the accepted readings, and tests of all with these
 FEW = 0.005  # of the readings: when no more of them change sides, the amplitudes stay
 AT_ONCE = 0.9
+NOTHING_LEFT = 1e-9  # of the largest eigenvalue of P_SS: what is smaller is zero but for rounding
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,7 @@ def against_others(precision, pull, accepted):
     aside = np.flatnonzero(~accepted)
     departure, weight = pull.copy(), np.diag(precision).copy()
     if len(aside):
-        among = np.linalg.inv(precision[np.ix_(aside, aside)])
+        among = scipy.linalg.pinvh(precision[np.ix_(aside, aside)], rtol=NOTHING_LEFT)
         to = precision[:, aside] @ among
         departure -= to @ pull[aside]
         weight -= np.sum(to * precision[:, aside], axis=1)

@@ -30,6 +30,7 @@ LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
 
 _LEVEL = (1.0, 0, 0, 0, 0, 0, 0)
 KINDS = ("bulge", "ovality", "seams")
+NOT_AROUND = 15.0  # exp(-15 pi) is rounding: of a seam that short nothing is left half a turn away
 
 
 @dataclass(frozen=True)
@@ -161,12 +162,17 @@ def _seam_sum(b):
 
 
 def _all_modes(x, b):
-    x = np.abs(x) % FULL_TURN
+    x = np.abs(x)
+    if np.max(x, initial=0.0) > FULL_TURN:
+        x = x % FULL_TURN
     x = np.minimum(x, FULL_TURN - x)
     turn = np.exp(-b * FULL_TURN)
-    near, far = np.exp(-b * x), np.exp(b * (x - FULL_TURN))
     coth = np.pi * (1 + turn) / (1 - turn)
-    found = near * (1 / b + coth - np.pi + x) + far * (1 / b + coth + np.pi - x)
+    near = np.exp(-b * x)
+    found = near * (1 / b + coth - np.pi + x)
+    if b < NOT_AROUND:  # else nothing comes from the other way around
+        far = turn / near
+        found += far * (1 / b + coth + np.pi - x)
     return np.pi / (2 * b**2 * (1 - turn)) * found
 
 

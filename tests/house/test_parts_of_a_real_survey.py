@@ -1,0 +1,123 @@
+"""Parts of the survey of a real tank against each other and against all of it: does U hold there?
+
+Halves of the points share no point; a half may be short of azimuths, heights or both. The wall is
+what it is: no generator, and no model of it.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from draws import draws
+from real_tank import write_real_job
+
+import tankcal
+from tankcal.pipeline.tanks import body_of
+from tankcal.pipeline.wall import find_wall, joints_of
+from tankcal.tank.capacity import Capacity
+
+ROWS, DELIVERIES, DELIVERED_M = 10, 5, 2.0
+TOTAL = ROWS - 1
+
+pytestmark = pytest.mark.study
+
+
+@dataclass
+class Survey:
+    """The job, the table of all its points, and where these stand: course, zeta, azimuth, place."""
+
+    job: tankcal.Job
+    wall: object
+    heights_m: np.ndarray
+
+    def table_of(self, chosen):
+        """(15,) volumes of ten rows and five deliveries of 2 m, and their U, by some points."""
+        points, index = self.job.points, np.flatnonzero(chosen)
+
+        def some(values):
+            return tuple(values[i] for i in index)
+
+        fewer = replace(
+            points,
+            names=some(points.names),
+            xyz_m=points.xyz_m[index],
+            section=some(points.section),
+            generatrix=some(points.generatrix),
+            rows=some(points.rows),
+        )
+        job = replace(self.job, points=fewer)
+        body = body_of(job, find_wall(job, lambda text: None))
+        volumes, areas, sources = body.rows(np.minimum(self.heights_m, body.highest_m))
+        weights = np.zeros((ROWS + DELIVERIES, len(volumes)))
+        weights[:ROWS, :ROWS] = np.eye(ROWS)
+        weights[ROWS:, ROWS:] = np.hstack([-np.eye(DELIVERIES), np.eye(DELIVERIES)])
+        sources = tuple(one.weighted(weights) for one in sources)
+        table = Capacity(np.zeros(15), weights @ volumes, weights @ areas, sources, 0.95)
+        return table.volume_m3, table.U_m3
+
+
+@pytest.fixture(scope="module")
+def survey(shared, tmp_path_factory):
+    job = tankcal.load(write_real_job(shared, tmp_path_factory.mktemp("real")))
+    wall = find_wall(job, lambda text: None)
+    top = body_of(job, wall).highest_m
+    low = np.linspace(0, top - DELIVERED_M, DELIVERIES)
+    rows = np.linspace(0, top, ROWS + 1)[1:]
+    return Survey(job, wall, np.concatenate([rows, low, low + DELIVERED_M]))
+
+
+@pytest.fixture(scope="module")
+def whole(survey):
+    return survey.table_of(np.ones(len(survey.job.points.names), dtype=bool))
+
+
+@pytest.fixture(scope="module")
+def zeta(survey):
+    """(n,) height of each point within its course, -1 to 1; nan of points off the wall."""
+    z = survey.job.points.xyz_m[:, 2] - survey.job.datum.bottom_z_m
+    joints = joints_of(survey.job)
+    course = np.clip(np.searchsorted(joints, z) - 1, 0, len(joints) - 2)
+    found = 2 * (z - joints[course]) / np.diff(joints)[course] - 1
+    return np.where(survey.wall.shell.reason == "", found, np.nan)
+
+
+def test_halves_agree_within_their_u(survey, figure):
+    """E_n of one half against the other: rms of 2 E_n is 1 where U is right."""
+    rng, count = np.random.default_rng(1), len(survey.job.points.names)
+    en = []
+    for _ in range(draws(13, 26)):
+        half = rng.permutation(count) < count // 2
+        (one, one_u), (other, other_u) = survey.table_of(half), survey.table_of(~half)
+        en.append((one - other) / np.hypot(one_u, other_u))
+    for name, part in (("rows", np.array(en)[:, :ROWS]), ("deliveries", np.array(en)[:, ROWS:])):
+        beyond, scatter = np.mean(np.abs(part) > 1), np.sqrt(np.mean((2 * part) ** 2))
+        figure(f"halves, {name}: part with |E_n| > 1, rms of 2 E_n", f"{beyond:.3f} {scatter:.2f}")
+        assert 0.8 < scatter < 1.3
+        assert beyond < 0.10
+
+
+def test_rings_at_one_height_are_within_u(survey, whole, zeta, figure):
+    for name, chosen in (
+        ("middle", np.abs(zeta) < 0.2),
+        ("ends", np.abs(zeta) > 0.76),
+        ("three", (np.abs(zeta) < 0.12) | (np.abs(np.abs(zeta) - 0.7) < 0.1)),
+    ):
+        volume, expanded = survey.table_of(chosen)
+        off = (volume - whole[0]) / expanded
+        ppm = 1e6 * np.array([volume[TOTAL] - whole[0][TOTAL], expanded[TOTAL]]) / whole[0][TOTAL]
+        figure(f"rings at the {name}: ppm off, U, worst row in U",
+               f"{ppm[0]:.0f} {ppm[1]:.0f} {np.abs(off[:ROWS]).max():.2f}")  # fmt: skip
+        assert abs(off[TOTAL]) < 1
+
+
+def test_a_station_less_is_within_u(survey, whole, figure):
+    """What each of the four stations is nearest to is left out."""
+    names, xy = np.array(survey.job.points.names), survey.job.points.xyz_m[:, :2]
+    stations = xy[[bool(name.startswith("st")) for name in names]]
+    nearest = np.hypot(*(xy[:, None] - stations).transpose(2, 0, 1)).argmin(axis=1)
+    for station in range(len(stations)):
+        volume, expanded = survey.table_of(nearest != station)
+        off = volume - whole[0]
+        ppm = 1e6 * np.array([off[TOTAL], expanded[TOTAL]]) / whole[0][TOTAL]
+        figure(f"without station {station + 1}: ppm off, U", f"{ppm[0]:.0f} {ppm[1]:.0f}")
+        assert np.all(np.abs(off) < expanded)
