@@ -14,7 +14,6 @@ from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
 from tankcal.geometry.buckles import find_buckles
 from tankcal.geometry.field.blunders import find_blunders
-from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.snooping import (
     LEAST_NOISE_M,
@@ -51,9 +50,8 @@ class Shell:
     reason : ndarray of str, shape (n,)
         "" for points of the wall, else why the point was rejected.
     residual_m : ndarray, shape (n,)
-        Distance outwards from the wall as all other points show it (from the smooth form where
-        these are more than `MOST_SITES`); of points far from the wall, from the leaning cylinder of
-        their course, m.
+        Distance outwards from the wall as all other points show it; of points far from the wall,
+        from the leaning cylinder of their course, m.
     w : ndarray, shape (n,)
         Normalised residual of the snooping test, nan where none was made.
     noise_m : float
@@ -156,8 +154,7 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
     believed = np.ones(len(xyz_m)) if sd_m is None else np.maximum(sd_m, LEAST_NOISE_M)
     relative = believed / np.median(believed)
     zeta = _within_course(xyz_m[:, 2], course, np.asarray(joints_m, dtype=float))
-    by_field = snooping and np.count_nonzero(wall) <= MOST_SITES
-    least = (BELIEVED_M if by_field else 0.0) if snooping else None
+    least = BELIEVED_M if snooping else None
     found = find_form(local, course, zeta, wall, axis, relative, WIDEST_SLOPE, least)
     tilt_known = np.sqrt(np.diag(found.slope_cofactor).max()) < VAGUE_TILT
     if not tilt_known:
@@ -166,7 +163,7 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
     in_band, axis = wall, found.axis
     w, residual, wall = found.w, found.residual, found.wall
     wall = wall | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
-    if by_field:
+    if snooping:
         tested = _by_field(
             local, course, zeta, in_band, wall, axis, relative, nominal_radius_m, welds_rad
         )

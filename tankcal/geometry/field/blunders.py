@@ -21,13 +21,16 @@ import scipy.linalg
 
 from tankcal.adjust import CRITICAL, snoop
 from tankcal.geometry.field.amplitudes import likely_variances
+from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, invert
 from tankcal.geometry.field.sites import free_design
+from tankcal.geometry.outlines import FULL_TURN
 
 MOST_ROUNDS = 4  # of amplitudes from the accepted readings, and tests of all with these
 FEW = 0.005  # of the readings: when no more of them change sides, the amplitudes stay
 AT_ONCE = 0.9
+PIECE = 200  # readings that are tested together, about, where all are more than a field takes
 NOTHING_LEFT = 1e-9  # of the largest eigenvalue of P_SS: what is smaller is zero but for rounding
 
 
@@ -52,6 +55,12 @@ class Tested:
     sd_m: np.ndarray
 
 
+def nothing_tested(accepted):
+    """`Tested` to be filled."""
+    nothing = np.zeros((3, len(accepted)))
+    return Tested(accepted.copy(), *nothing)
+
+
 def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted):
     """Test every reading of a wall by all others, with amplitudes that the accepted ones tell.
 
@@ -72,21 +81,58 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted):
     -------
     Tested
     """
-    covariances, design = Covariances(sites, nominal_m), free_design(sites)[0]
-    left = radius_m - radius_m.mean()
+    pieces = [_Piece(sites, members, nominal_m) for members in _pieces(sites)]
+    left, found = radius_m - radius_m.mean(), nothing_tested(accepted)
     for _ in range(MOST_ROUNDS):
         known = sites.take(accepted)
         variances, noise = likely_variances(
             known, radius_m[accepted], variance_m2[accepted], nominal_m
         )
-        whole = covariances.total(variances)
-        whole.flat[:: len(whole) + 1] += noise * variance_m2 + LEAST_NOISE_M**2
-        precision = restricted_precision(whole, design)
-        found = snoop_wall(precision, precision @ left, accepted)
-        changed, accepted = np.mean(found.accepted != accepted), found.accepted
+        for piece in pieces:
+            own = piece.members
+            precision = piece.precision(variances, noise * variance_m2[own] + LEAST_NOISE_M**2)
+            tested = snoop_wall(precision, precision @ left[own], accepted[own])
+            for name in ("accepted", "departure_m", "w", "sd_m"):
+                getattr(found, name)[own] = getattr(tested, name)
+        changed, accepted = np.mean(found.accepted != accepted), found.accepted.copy()
         if changed <= FEW:
             break
     return found
+
+
+def _pieces(sites):
+    """Lists of readings that are tested together: all, or of many those of sectors of courses.
+
+    A piece is about as many courses high as there are pieces around them.
+    """
+    count = 1 if len(sites) <= MOST_SITES else len(sites) / PIECE
+    every = np.argsort(sites.course, kind="stable")
+    found = []
+    for belt in np.array_split(np.arange(sites.course.max() + 1), _belts(count, sites)):
+        members = every[np.isin(sites.course[every], belt)]
+        order = members[np.argsort(sites.azimuth_rad[members] % FULL_TURN, kind="stable")]
+        found += np.array_split(order, max(round(count * len(order) / len(sites)), 1))
+    return found
+
+
+def _belts(count, sites):
+    """Number of belts of courses for that many pieces."""
+    return int(np.clip(round(np.sqrt(count)), 1, sites.course.max() + 1))
+
+
+class _Piece:
+    """Some of the readings, and their covariance by the wall."""
+
+    def __init__(self, sites, members, nominal_m):
+        self.members, chosen = members, sites.take(members)
+        self._covariances = Covariances(chosen, nominal_m)
+        self._design = free_design(chosen)[0]
+
+    def precision(self, variances_m2, noise_m2):
+        """P of the module's heading, with variances (n,) of the noise."""
+        whole = self._covariances.total(variances_m2)
+        whole.flat[:: len(whole) + 1] += noise_m2
+        return restricted_precision(whole, self._design)
 
 
 def restricted_precision(covariance, design):

@@ -4,9 +4,11 @@ import numpy as np
 import scipy.sparse
 
 from tankcal.geometry.field.sites import Sites
+from tankcal.geometry.outlines import FULL_TURN
 
 MOST_SITES = 1600  # of a field: its covariance is written out
 CELL_M, CELL_ZETA, WIDER = 0.1, 0.1, 1.3  # first width and height of a cell, and its growth
+TALLEST = 0.2  # of half a course: a mean over w of a bulge b (1 - zeta^2) is b w^2 / 12 too low
 
 
 def cells_of(sites, variance_m2, nominal_m, most=MOST_SITES):
@@ -40,18 +42,16 @@ def cells_of(sites, variance_m2, nominal_m, most=MOST_SITES):
     array([0.5, 0.5, 0. , 0. ])
     """
     wide, tall = CELL_M / nominal_m, CELL_ZETA
+    turn, ring = sites.azimuth_rad % FULL_TURN, np.unique(sites.ring, return_inverse=True)[1]
     while True:
-        keys = np.column_stack(
-            [
-                sites.ring,
-                np.floor((sites.azimuth_rad % (2 * np.pi)) / wide),
-                np.floor((sites.zeta + 1) / tall),
-            ]
-        )
-        place = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
-        if place.max() < most:
+        columns, rows = int(FULL_TURN / wide) + 1, int(2 / tall) + 2
+        height = np.clip(((sites.zeta + 1) / tall).astype(int), 0, rows - 1)
+        cell = (ring * rows + height) * columns + (turn / wide).astype(int)
+        place = np.unique(cell, return_inverse=True)[1]
+        around = wide > FULL_TURN
+        if place.max() < most or (around and tall > 2):  # there may be more rings than that
             break
-        wide, tall = WIDER * wide, WIDER * tall
+        wide, tall = WIDER * wide, WIDER * tall if around else min(WIDER * tall, TALLEST)
     weight = 1 / variance_m2
     weight = weight / np.bincount(place, weight)[place]
     return scipy.sparse.csr_array((weight, (place, np.arange(len(place)))))
@@ -77,7 +77,7 @@ def sites_of_cells(sites, weights):
         course=sites.course[first],
         ring=sites.ring[first],
         zeta=weights @ sites.zeta,
-        azimuth_rad=np.angle(turn) % (2 * np.pi),
+        azimuth_rad=np.angle(turn) % FULL_TURN,
         leans=sites.leans[first],
         welds_rad=sites.welds_rad,
     )

@@ -23,10 +23,18 @@ SMALLEST = 1e-8  # of a variance: what is left of a covariance that is followed 
 NEAR_M = 0.02  # along the arc, between azimuths that count as one for the common form
 WIDE_M = 1.0  # of a shared unknown that no prior binds, beside its first estimate
 MOST_FOLLOWED = 80  # values of the common form that are followed through all courses
+MOST_ASKED = 200  # readings of a course, whose covariance is inverted at every step of a search
 
 
 def likelihood_of(sites, radius_m, noise_m2, nominal_m, estimate_noise):
-    """`Likelihood` of radii at sites, as `amplitudes.estimate_amplitudes` takes them."""
+    """`Likelihood` of radii at sites, as `amplitudes.estimate_amplitudes` takes them.
+
+    Of a course with more than `MOST_ASKED` readings a part of them is asked.
+    """
+    asked = _asked(sites)
+    if len(asked) < len(sites):
+        there = np.ix_(asked, asked) if np.ndim(noise_m2) == 2 else asked
+        sites, radius_m, noise_m2 = sites.take(asked), radius_m[asked], noise_m2[there]
     common = _common_values(sites, nominal_m)
     if sites.shared is not None:
         radius_m = radius_m - _by_free(sites, radius_m)
@@ -43,6 +51,19 @@ def likelihood_of(sites, radius_m, noise_m2, nominal_m, estimate_noise):
     variances = np.diag(noise_m2) if np.ndim(noise_m2) == 2 else noise_m2
     prior = prior_of(COMPONENTS, variances if estimate_noise else None)
     return Likelihood(parts, np.array(own), np.array(shared), spread, wide, *prior)
+
+
+def _asked(sites):
+    """Indices of the readings that are asked: of a course with many some pairs of neighbours.
+
+    Pairs, for what near points have in common tells the form from their noise.
+    """
+    found = []
+    for members in sites.members:
+        every = -(-len(members) // MOST_ASKED)
+        keys = sites.zeta[members], sites.azimuth_rad[members], sites.ring[members]
+        found.append(members[np.lexsort(keys)][np.arange(len(members)) // 2 % every == 0])
+    return np.sort(np.concatenate(found))
 
 
 def _by_free(sites, radius_m):
