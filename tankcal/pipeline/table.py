@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
 from tankcal.pipeline.hit_checks import check_hits
@@ -17,6 +18,7 @@ from tankcal.pipeline.strapping_checks import check_strapped, check_straps_besid
 from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
 from tankcal.pipeline.wall import Wall, warnings_of
+from tankcal.solver.threads import threads_for
 from tankcal.tank.body import Body
 from tankcal.tank.capacity import Capacity
 from tankcal.tank.dips import (
@@ -96,7 +98,8 @@ def compute_table(job, survey, progress=lambda text: None):
         When the capacity falls with rising dips: see `refuse_falling`.
     """
     progress(message("integrating", "integrating volumes"))
-    body = body_of(job, survey)
+    with threads_for(MOST_SITES):
+        body = body_of(job, survey)
     zero = zero_height(job, survey)
     progress(message("propagating", "propagating the covariance to every row of the table"))
     spec = job.table

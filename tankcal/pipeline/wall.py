@@ -42,6 +42,7 @@ from tankcal.sections import (
     group_by_name,
     sample_of,
 )
+from tankcal.solver.threads import threads_for
 from tankcal.tank.body import survey_factors
 
 
@@ -148,24 +149,25 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None):
     SolutionError
         When the points show no wall.
     """
-    progress(
-        message(
-            "separating",
-            "separating the wall from clutter in {count} points",
-            count=len(job.points.names),
+    with threads_for(MOST_SITES):
+        progress(
+            message(
+                "separating",
+                "separating the wall from clutter in {count} points",
+                count=len(job.points.names),
+            )
         )
-    )
-    shell = _shell(job, joints_of(job), radial_sds(job.points))
-    if job.hits is not None:
-        shell = _clear_of_welds(job, shell)
-    progress(
-        message(
-            "fitting_sections",
-            "fitting sections through {count} points of the wall",
-            count=np.count_nonzero(shell.reason == ""),
+        shell = _shell(job, joints_of(job), radial_sds(job.points))
+        if job.hits is not None:
+            shell = _clear_of_welds(job, shell)
+        progress(
+            message(
+                "fitting_sections",
+                "fitting sections through {count} points of the wall",
+                count=np.count_nonzero(shell.reason == ""),
+            )
         )
-    )
-    return fit_wall(job, shell, dof, amplitudes=amplitudes)
+        return fit_wall(job, shell, dof, amplitudes=amplitudes)
 
 
 def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
