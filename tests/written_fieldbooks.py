@@ -98,11 +98,9 @@ def gsi(survey, *, width=16, angle="2", length="8", newline="\r\n"):
                               (("84", x), ("85", y), ("86", z), ("88", stand.height))])  # fmt: skip
         for one in stand.aims:
             more = [word("71....", one.code, text=True)] if one.code else []
-            clock = [word("18....", f"{one.time:%y%S}000".rjust(8, "0")[-8:], text=True),
+            clock = [word("17....", f"{one.time:%d%m%Y}", text=True),
                      word("19....", f"{one.time:%m%d%H%M}", text=True)]  # fmt: skip
             constants = "51....+" + "0".zfill(width - 4) + "+000"
-            if width == 8:
-                clock[0] = word("18....", f"0{one.time:%y%S}000"[-8:], text=True)
             block(one.point, [of_angle("21", one.direction), of_angle("22", one.zenith),
                               of_length("31", one.distance), constants,
                               of_length("87", one.height), *more, *clock])  # fmt: skip
@@ -137,7 +135,8 @@ def jobxml(survey, *, prism=-0.034, ppm=12.0, declared="true"):
     rows = ['<?xml version="1.0" encoding="UTF-8"?>', '<JOBFile jobName="TANK" version="5.72">',
             "<Environment/>", "<FieldBook>",
             f'<AtmosphereRecord ID="a"><PPM>{ppm}</PPM>'
-            f"<ApplyPPMToRawDistances>{declared}</ApplyPPMToRawDistances></AtmosphereRecord>"]  # fmt: skip
+            f"<ApplyPPMToRawDistances>{declared}</ApplyPPMToRawDistances>"
+            "</AtmosphereRecord>"]  # fmt: skip
     if declared != "true":
         ppm = 0.0
     number = 0

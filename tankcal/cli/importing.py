@@ -38,6 +38,7 @@ def add(commands):
          "HIT, PAREDE or PARED)"),
         ("control", "names or codes of control targets (default: targets read again)"),
         ("leave", "names or codes that are not used"),
+        ("check", "names or codes of hits that are only compared (use = check)"),
     ):  # fmt: skip
         parser.add_argument(f"--{name}", metavar="PATTERN", action="append", default=[], help=text)
     parser.add_argument("--no-hits", action="store_true", help="there are no hits, only targets")
@@ -91,6 +92,7 @@ def _import(options):
         hits=tuple(options.hits),
         control=tuple(options.control),
         leave=tuple(options.leave),
+        check=tuple(options.check),
         no_hits=options.no_hits,
         format=options.format,
         profile=options.profile,

@@ -26,8 +26,9 @@ class Choices:
 
     Attributes
     ----------
-    hits, control, leave : tuple of str
-        Patterns of names or codes: bare hits of the wall, control targets, what is not used.
+    hits, control, leave, check : tuple of str
+        Patterns of names or codes: bare hits of the wall, control targets, what is not used, and
+        of the hits those that are only compared.
         Without `hits` the names and codes that begin with WALL, HIT, PAREDE or PARED.
     no_hits : bool
         There are no hits: only targets.
@@ -48,6 +49,7 @@ class Choices:
     hits: tuple = ()
     control: tuple = ()
     leave: tuple = ()
+    check: tuple = ()
     no_hits: bool = False
     format: str | None = None
     profile: object = None
@@ -112,12 +114,15 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
               for place, (one, file) in enumerate(stands) if place in names}  # fmt: skip
     unused = {}
     chosen = sort_readings(
-        readings, choices, known, log,
+        readings, choices, {*known, *(one.station for one, _ in stands.values())}, log,
         lambda what, one: unused.setdefault(what, []).append(one.shot),
     )  # fmt: skip
+    _tell_empty_setups(books)
     chosen = _control_with_times(chosen, choices, unused, log)
     _check_ties(chosen, choices, log)
     stations = {} if choices.no_control else _stations(known, stands, chosen)
+    used = {one.shot.setup for one in (*chosen.hits, *chosen.control, *chosen.ties)}
+    names = {place: name for place, name in names.items() if place in used}
     tables = make_rows(stands, names, stations, chosen, choices)
     check_rows(tables, log)
     if not tables.keys() - {"setups", "control"} and not log.problems:
@@ -154,6 +159,15 @@ def _joined(books):
         shots += [replace(one, setup=one.setup + len(stands)) for one in book.shots]
         stands += [(one, book.file) for one in book.setups]
     return stands, shots
+
+
+def _tell_empty_setups(books):
+    for book in books:
+        used = {one.setup for one in book.shots}
+        for place, stand in enumerate(book.setups):
+            if place not in used:
+                what = message("setups_without_readings", "set-ups without readings")
+                book.leave_out(what, stand.row)
 
 
 def _names_of_setups(stands, places):
@@ -195,7 +209,7 @@ def _known_points(books, stands, places, names, log):
         pairs = [(a, b) for a, b in zip(before[0], xyz, strict=True) if None not in (a, b)]
         if any(abs(a - b) > SAME_M for a, b in pairs):
             text = message(
-                "known_twice",
+                "imported_known_twice",
                 "point {point!r} has other coordinates than in row {row} of {file}; expected one"
                 " place of each known point (--no-control leaves coordinates out)",
                 point=point[:40],

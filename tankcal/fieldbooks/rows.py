@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from tankcal.fieldbooks.sorting import is_meant
 from tankcal.job.contract.hits import CONTROL_READINGS, WALL_HITS
 from tankcal.job.contract.observations import (
     CONTROL,
@@ -52,8 +53,10 @@ def make_rows(stands, names, stations, sorted_readings, choices):
         }
         tables["setups"].append(Row(cells, file, given.row))
     for one in sorted_readings.hits:
-        tables["wall_hits"].append(_row(one, names, _both_angles(one.shot), distance=True,
-                                        time=True))  # fmt: skip
+        cells = _both_angles(one.shot)
+        if is_meant(one.shot, choices.check):
+            cells["use"] = "check"
+        tables["wall_hits"].append(_row(one, names, cells, distance=True, time=True))
     for one in sorted_readings.control:
         cells = {"target": one.shot.point} | _both_angles(one.shot)
         tables["control_readings"].append(_row(one, names, cells, distance=True, time=True))

@@ -57,7 +57,9 @@ def sort_readings(readings, choices, known, log, leave_out):
             leave_out(message("left_by_choice", "left out by choice"), one)
         elif is_meant(shot, choices.control):
             control.append(one)
-        elif is_meant(shot, choices.hits) if choices.hits else says_hit(shot):
+        elif is_meant(shot, choices.check) or (
+            is_meant(shot, choices.hits) if choices.hits else says_hit(shot)
+        ):
             hits.append(one)
         else:
             others.append(one)
@@ -68,23 +70,28 @@ def sort_readings(readings, choices, known, log, leave_out):
         if None in _values(one.shot):
             leave_out(message("hit_not_whole", "hits without direction, zenith angle or distance"),
                       one)  # fmt: skip
-    return Sorted(tuple(whole), *_targets(control, others, choices, known, leave_out))
+    return Sorted(tuple(whole), *_targets(control, others, {one.shot.setup for one in whole},
+                                           choices, known, leave_out))  # fmt: skip
 
 
 def _values(shot):
     return shot.direction_deg, shot.zenith_deg, shot.distance_m
 
 
-def _targets(control, others, choices, known, leave_out):
-    """(control readings, ties): of targets that nobody called so, by how often they were read."""
+def _targets(control, others, of_hits, choices, known, leave_out):
+    """(control readings, ties): of targets that nobody called so, by how often they were read.
+
+    of_hits  places of the set-ups of hits; one set-up alone needs no tie
+    """
     setups = {}
     for one in others:
         setups.setdefault(one.shot.point, set()).add(one.shot.setup)
     times = Counter((one.shot.setup, one.shot.point) for one in others)
     ties = []
+    are_several = len({one.shot.setup for one in (*others, *control)} | of_hits) > 1
     for one in others:
         name = one.shot.point
-        is_tie = len(setups[name]) > 1 or name in known
+        is_tie = are_several and (len(setups[name]) > 1 or name in known)
         is_again = times[one.shot.setup, name] > 1 and not choices.control
         if is_tie:
             ties.append(one)
@@ -94,8 +101,7 @@ def _targets(control, others, choices, known, leave_out):
             leave_out(
                 message(
                     "ties_nothing",
-                    "targets read once, from one set-up, without known coordinates: they tie"
-                    " nothing",
+                    "targets that tie nothing: read once, and from one set-up, or the only one",
                 ),
                 one,
             )

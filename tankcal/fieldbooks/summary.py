@@ -20,25 +20,19 @@ def summarise(books, chosen, unused, names, stands, reports, coordinates, standi
     lines = []
     for book in books:
         lines += _of_book(book)
-    lines.append(
-        message(
-            "import_setups",
-            "{count} set-ups: {names}",
-            count=len(names),
-            names=list_some([f"{one} ({stands[place][0].station})" for place, one in
-                             names.items()], SHOWN),
-        )
-    )  # fmt: skip
+    shown = [_of_setup(name, stands[place][0].station) for place, name in names.items()]
+    lines.append(message("import_setups", "set-ups: {names}", names=list_some(shown, SHOWN)))
+    reports = [one for one in reports if one.setup in names]
     for report in reports:
         lines += _of_faces(names[report.setup], report)
-    lines.append(message("import_hits", "{count} hits of the wall", count=len(chosen.hits)))
+    lines.append(message("import_hits", "hits of the wall: {count}", count=len(chosen.hits)))
     lines += _of_targets(chosen)
     known, stations = coordinates
     if known:
         lines.append(
             message(
                 "import_known",
-                "{count} points with coordinates; in control.csv, without standard deviations:"
+                "points with coordinates: {count}; in control.csv, without standard deviations:"
                 " {names}",
                 count=len(known),
                 names=list_some(list(stations), SHOWN) or ["-"],
@@ -64,6 +58,10 @@ def summarise(books, chosen, unused, names, stands, reports, coordinates, standi
             )
         )
     return lines
+
+
+def _of_setup(name, station):
+    return name if name == station else f"{name} ({station})"
 
 
 def _of_book(book):
@@ -121,10 +119,10 @@ def _of_targets(chosen):
     for readings, is_control in ((chosen.control, True), (chosen.ties, False)):
         points = list(dict.fromkeys(one.shot.point for one in readings))
         if points and is_control:
-            yield message("import_control", "{count} readings of control targets: {names}",
+            yield message("import_control", "readings of control targets: {count} ({names})",
                           count=len(readings), names=list_some(points, SHOWN))  # fmt: skip
         elif points:
-            yield message("import_ties", "{count} readings of targets that tie set-ups: {names}",
+            yield message("import_ties", "readings of targets that tie set-ups: {count} ({names})",
                           count=len(readings), names=list_some(points, SHOWN))  # fmt: skip
 
 
@@ -137,7 +135,7 @@ def warn_of(chosen, names, stands, reports):
             text = message("no_instrument_height", "set-up {setup}: no height of the instrument in"
                            " the file: it is left blank (0)", setup=name)  # fmt: skip
             found.append(Problem(file, text, stand.row))
-    for report in reports:
+    for report in (one for one in reports if one.setup in names):
         name, file = names[report.setup], stands[report.setup][1]
         for what in (report.collimation, report.index):
             if what is not None and max(abs(what[0]), what[1]) > LARGE_DEG:
@@ -162,6 +160,13 @@ def warn_of(chosen, names, stands, reports):
             )
             found.append(Problem(file, text))
     found += _of_constants(chosen)
+    if chosen.ties:
+        text = message(
+            "frame_not_held",
+            "targets tie set-ups, and no file has standard deviations of coordinates: give those of"
+            " known points here, or [adjustment] datum = 'minimal' in job.toml",
+        )
+        found.append(Problem("control.csv", text))
     return found
 
 
