@@ -1,4 +1,4 @@
-"""A survey of a generated tank as Stands of `written_fieldbooks`, and the job that it belongs to."""
+"""A survey of a generated tank as Stands of `written_fieldbooks`, and the job that it is of."""
 
 import datetime
 

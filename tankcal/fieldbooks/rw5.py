@@ -39,6 +39,7 @@ class _State:
     """What holds from line to line."""
 
     length = angle = None  # of MO
+    units_told = False  # that they are not known
     station = back = height = rod = None
     azimuth = circle = None  # of the backsight
     key = None  # of the set-up
@@ -130,6 +131,7 @@ def _take_mode(book, log, row, fields, state):
             au=fields.get("AU", ""),
         )
         log.problem(book.file, text, row)
+        state.units_told = True
         return
     state.length, state.angle = UNITS[length], "gon" if angle else "packed_dms"
     book.say_units(length=state.length, angle=state.angle)
@@ -173,8 +175,12 @@ def _take_point(book, log, row, name, fields, state):
 
 def _take_shot(book, log, row, kind, fields, code, state):
     if state.length is None:
-        text = message("units_unknown", "no units before it; expected a record MO with UN and AU")
-        log.problem(book.file, text, row)
+        if not state.units_told:
+            state.units_told = True
+            text = message(
+                "units_unknown", "no units before it; expected a record MO with UN and AU"
+            )
+            log.problem(book.file, text, row)
         return
     if "OP" in fields and plain_name(fields["OP"]) != state.station:
         text = message(
