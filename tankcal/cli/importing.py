@@ -2,6 +2,7 @@
 
 import datetime
 import shlex
+from pathlib import Path
 
 from tankcal.cli.arguments import add_language, positive, refuse_argument
 from tankcal.cli.machine import add_json, print_json, problem_of
@@ -83,9 +84,16 @@ def _time(text):
         ) from None
 
 
+def _asked_of_folder(folder):
+    """The language of the job that the tables go to; None: there is none yet."""
+    from tankcal.cli.asked_language import asked_language
+
+    return asked_language(folder) if (folder / "job.toml").is_file() else None
+
+
 def _import(options):
     prepare_for_small_work()
-    speak(options.language)
+    speak(options.language or _asked_of_folder(Path(options.out)))
     from tankcal.fieldbooks import Choices, import_fieldbooks
 
     choices = Choices(

@@ -208,7 +208,7 @@ def unpacked(value):
     text = f"{abs(value):.10f}"
     whole, _, behind = text.partition(".")
     minutes, seconds = int(behind[:2]), float(f"{behind[2:4]}.{behind[4:]}")
-    if minutes >= 60 or seconds >= 60:
+    if minutes >= 60 or seconds > 60:  # 60 is how some round 59.99
         return None
     return math.copysign(int(whole) + minutes / 60 + seconds / 3600, value)
 

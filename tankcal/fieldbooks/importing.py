@@ -145,9 +145,15 @@ def _read_all(files, choices, log):
         described = read_profile(Path(choices.profile), log)
         if described is None:
             return []
-    books = []
+    books, seen = [], {}
     for path in map(Path, files):
         data = read_bytes(path, log, MAX_BYTES)
+        if data is not None and data in seen:
+            text = message("file_twice", "the same as {other}; expected each file once",
+                           other=seen[data])  # fmt: skip
+            log.problem(path.name, text)
+            continue
+        seen[data] = path.name
         book = None if data is None else read_book(path.name, data, log, choices.format, described)
         if book is not None:
             books.append(book)

@@ -120,7 +120,8 @@ def _plain(value, decimals):
 
 
 def check_rows(tables, log):
-    """Tell each cell that the job's contract would refuse, with the row that it comes from."""
+    """Tell what the job's contract would refuse, each text once, with the row it comes from."""
+    told = set()
     for table, rows in tables.items():
         for field in CONTRACT[table]:
             for row in rows:
@@ -132,7 +133,9 @@ def check_rows(tables, log):
                 try:
                     read_value(field, text, ".")
                 except Refused as error:
-                    log.problem(row.file, error.text, row.row, f"{table}.{field.name}")
+                    if (field.name, text) not in told:
+                        log.problem(row.file, error.text, row.row, f"{table}.{field.name}")
+                    told.add((field.name, text))
 
 
 def _refuse(log, row, table, field):

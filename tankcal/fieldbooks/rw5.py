@@ -15,7 +15,6 @@ from tankcal.fieldbooks.book import (
     FieldBook,
     KnownPoint,
     number_of,
-    plain_name,
     refuse_minutes,
     refuse_number,
     unpacked,
@@ -66,7 +65,7 @@ def _take(book, log, row, line, state):
     elif kind == "MO":
         _take_mode(book, log, row, fields, state)
     elif kind == "OC":
-        state.station = plain_name(fields.get("OP", fields.get("PN", "")))
+        state.station = fields.get("OP", fields.get("PN", ""))
         state.back = state.azimuth = state.circle = None
         _take_point(book, log, row, state.station, fields, state)
     elif kind == "BK":
@@ -78,7 +77,7 @@ def _take(book, log, row, line, state):
         if "HR" in fields:
             state.rod = _length(book, log, row, fields["HR"], state)
     elif kind == "SP":
-        _take_point(book, log, row, plain_name(fields.get("PN", "")), fields, state)
+        _take_point(book, log, row, fields.get("PN", ""), fields, state)
     elif kind not in ("JB", "TE", "AH"):
         book.leave_out(message("records_of_kind", "records {kind}", kind=kind[:12]), row)
 
@@ -182,7 +181,9 @@ def _take_shot(book, log, row, kind, fields, code, state):
             )
             log.problem(book.file, text, row)
         return
-    if "OP" in fields and plain_name(fields["OP"]) != state.station:
+    if state.station is None:  # no record OC: the reading itself names its station
+        state.station = fields.get("OP")
+    if "OP" in fields and fields["OP"] != state.station:
         text = message(
             "other_station",
             "read from {found!r}, but the set-up is over {station!r}; expected the same",
@@ -208,7 +209,7 @@ def _take_shot(book, log, row, kind, fields, code, state):
         log.problem(book.file, text, row)
         return
     _add(book, log, row, kind, {one: given[one] for one in codes}, code, state,
-         plain_name(fields.get("FP", "")))  # fmt: skip
+         fields.get("FP", ""))  # fmt: skip
 
 
 def _add(book, log, row, kind, given, code, state, name):

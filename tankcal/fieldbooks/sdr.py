@@ -182,7 +182,9 @@ def _take_shot(book, log, row, line, state):
         book.leave_out(message("sdr_observations", "observations {kind}", kind=line[:4]), row)
         return
     station, point, distance, vertical, direction, code = _fields(line, state, 2, 3)
-    if book.setups and plain_name(station) != book.setups[-1].station:
+    if not book.setups:  # no record 02: the reading itself names its station
+        book.stand(plain_name(station), None, None, row)
+    if plain_name(station) != book.setups[-1].station:
         text = message(
             "sdr_station",
             "read from {found!r}, but the last record 02 is of {station!r}; expected the same",

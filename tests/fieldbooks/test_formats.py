@@ -268,6 +268,7 @@ def test_times_that_no_file_has_are_said(tmp_path):
     assert [one["time"][11:] for one in tables["control_readings"]] == ["09:00:00", "09:03:00"]
 
 
+@pytest.mark.slow
 def test_an_empty_table_is_filled_in_and_one_with_rows_is_not(tmp_path, capsys):
     job = tmp_path / "job"
     assert main(["new", str(job), "--survey", "wall-hits", "--language", "pt-BR"]) == 0

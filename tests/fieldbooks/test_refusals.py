@@ -143,6 +143,22 @@ def test_all_problems_of_all_files_in_one_run(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_file_twice_and_a_name_that_no_job_takes(tmp_path, capsys):
+    text = WRITERS["rw5"](one_stand())
+    for name in ("a.rw5", "b.rw5"):
+        (tmp_path / name).write_text(text)
+    files = [str(tmp_path / name) for name in ("a.rw5", "b.rw5")]
+    assert main(["import", *files, "--out", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err == "tankcal: b.rw5: the same as a.rw5; expected each file once\n"
+    (tmp_path / "a.rw5").write_text(text.replace("OP1", "OP+1"))
+    assert main(["import", files[0], "--out", str(tmp_path / "out")]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    places = [line.split(": ")[1] for line in lines]
+    assert places == [
+        "a.rw5, row 3, control.point", "a.rw5, row 6, setups.setup", "a.rw5, row 6, setups.station"
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize("data", WHOLE)
 def test_what_is_no_field_book_is_refused(tmp_path, data):
     (tmp_path / "profile.toml").write_text(PROFILE, encoding="utf-8")
@@ -196,6 +212,7 @@ def assert_told(tmp_path, seeds):
             assert time.perf_counter() - start < 60
 
 
+@pytest.mark.slow
 def test_spoilt_field_books_are_told(tmp_path):
     assert_told(tmp_path, range(FEW))
 

@@ -186,3 +186,20 @@ def test_the_example_comes_back(tmp_path):
                      "--instrument", "TS-4"]) == 0  # fmt: skip
         volume = tankcal.run(tankcal.load(job)).at(9.0).value_m3
         assert volume == pytest.approx(truth, rel=2e-6)
+
+
+def test_the_field_book_of_the_example(tmp_path):
+    """What the example has as CSV files, its field book has too."""
+    from conftest import EXAMPLE
+
+    source = EXAMPLE.parent / "wall-hits"
+    import_fieldbooks([source / "field-book.gsi"], tmp_path / "job", Choices(check=("CHECK",)))
+    for table in ("wall_hits", "control_readings"):
+        both = [
+            list(csv.DictReader((folder / f"{table}.csv").open(encoding="utf-8")))
+            for folder in (source, tmp_path / "job")
+        ]
+        read, found = (numbers(one, "direction_deg", "zenith_deg", "distance_m") for one in both)
+        np.testing.assert_allclose(found, read, rtol=0, atol=6e-6)
+        read, found = ([(row.get("use"), row["time"][:16]) for row in rows] for rows in both)
+        assert found == read
