@@ -102,6 +102,7 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
         With every problem of every file; nothing is written then.
     """
     log, found = Log(), Imported()
+    _check_times(choices, log)
     books = _read_all(files, choices, log)
     log.stop_if_problems()
     stands, shots = _joined(books)
@@ -137,6 +138,12 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
                               standing)  # fmt: skip
     found.warnings = warn_of(chosen, names, stands, reports)
     return found
+
+
+def _check_times(choices, log):
+    begin, end = choices.begin, choices.end
+    if end is not None and (begin is None or end <= begin):
+        log.problem("--end", message("end_before_begin", "expected a time after that of --begin"))
 
 
 def _read_all(files, choices, log):

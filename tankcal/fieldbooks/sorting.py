@@ -83,29 +83,30 @@ def _targets(control, others, of_hits, choices, known, leave_out):
 
     of_hits  places of the set-ups of hits; one set-up alone needs no tie
     """
-    setups = {}
-    for one in others:
+    targets = sorted((*others, *control), key=lambda one: (one.shot.setup, one.shot.row))
+    setups, asked = {}, {id(one) for one in control}
+    for one in targets:
         setups.setdefault(one.shot.point, set()).add(one.shot.setup)
-    times = Counter((one.shot.setup, one.shot.point) for one in others)
-    ties = []
-    are_several = len({one.shot.setup for one in (*others, *control)} | of_hits) > 1
-    for one in others:
+    times = Counter((one.shot.setup, one.shot.point) for one in targets)
+    are_several = len({one.shot.setup for one in targets} | of_hits) > 1
+    again, ties = [], []
+    for one in targets:
         name = one.shot.point
-        is_tie = are_several and (len(setups[name]) > 1 or name in known)
-        is_again = times[one.shot.setup, name] > 1 and not choices.control
+        is_tie = choices.no_hits or (are_several and (len(setups[name]) > 1 or name in known))
+        is_again = id(one) in asked or (
+            times[one.shot.setup, name] > 1 and not (choices.control or choices.no_hits)
+        )
         if is_tie:
             ties.append(one)
         if is_again:
-            control.append(one)
+            again.append(one)
         if not is_tie and not is_again:
-            leave_out(
-                message(
-                    "ties_nothing",
-                    "targets that tie nothing: read once, and from one set-up, or the only one",
-                ),
-                one,
+            what = message(
+                "ties_nothing",
+                "targets that tie nothing: read once, and from one set-up, or the only one",
             )
-    return tuple(control), tuple(ties)
+            leave_out(what, one)
+    return tuple(again), tuple(ties)
 
 
 def _refuse_without_hits(readings, choices, log):

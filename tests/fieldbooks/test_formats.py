@@ -256,6 +256,30 @@ def test_hits_control_and_what_is_left_are_chosen(tmp_path):
     assert "left_by_choice" in codes(found.summary)
 
 
+def test_control_targets_may_tie_and_without_hits_all_targets_count(tmp_path):
+    from simulated_fieldbooks import one_stand, two_stands
+    from written_fieldbooks import rw5
+
+    _, tables = read(tmp_path, rw5(two_stands()), control=("T1",), **TIES)
+    assert [(one["setup"], one["target"]) for one in tables["control_readings"]] == [
+        ("1", "T1"), ("2", "T1")
+    ]  # fmt: skip
+    assert len(tables["directions"]) == 8
+    _, tables = read(tmp_path, rw5(one_stand()), no_hits=True, leave=("WALL",), **TIES)
+    assert len(tables["slope_distances"]) == 8
+    assert not {"wall_hits", "control_readings"} & set(tables)
+
+
+def test_an_end_needs_a_beginning_before_it(tmp_path, capsys):
+    book = tmp_path / "book.rw5"
+    book.write_text(RW5)
+    for times in (["--end", "2026-07-14"], ["--begin", "2026-07-14T09:00", "--end", "2026-07-13"]):
+        assert main(["import", str(book), "--out", str(tmp_path / "job"), *times]) == 2
+        assert capsys.readouterr().err.startswith("tankcal: --end: expected a time after")
+    with pytest.raises(SystemExit):
+        main(["import", str(book), "--out", str(tmp_path / "job"), "--begin", "soon"])
+
+
 def test_times_that_no_file_has_are_said(tmp_path):
     text = RW5 + "BD,OP1,FP2,AR0.0000,ZE90.0000,SD5.000,--BS\n"
     found, tables = read(tmp_path, text)
