@@ -123,7 +123,7 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
     chosen = _control_with_times(chosen, choices, unused, log)
     _check_ties(chosen, choices, log)
     log.stop_if_problems()
-    stations = {} if choices.no_control else _stations(known, stands, chosen)
+    stations = {} if choices.no_control else _stations(known, stands, chosen, log)
     used = {one.shot.setup for one in (*chosen.hits, *chosen.control, *chosen.ties)}
     names = {place: name for place, name in names.items() if place in used}
     tables = make_rows(stands, names, stations, chosen, choices)
@@ -205,33 +205,22 @@ def _station(stand, name):
 
 
 def _known_points(books, stands, places, names, log):
-    """{name: (xyz, file, row)} of all coordinates that the files give."""
+    """{name: list of (xyz, file, row)} of all coordinates that the files give."""
     given = [(names[place], *stands[place]) for place in places]
-    found = {}
     items = [
         (one.station or name, one.xyz_m, file, one.row)
         for name, one, file in given
         if one.xyz_m is not None
     ]
     items += [(one.point, one.xyz_m, book.file, one.row) for book in books for one in book.known]
+    found = {}
     for point, xyz, file, row in items:
         if any(abs(one) > MOST_M for one in xyz if one is not None):
             text = message("coordinate_too_large", "coordinates of {point!r} beyond {most:g} m",
                            point=point[:40], most=MOST_M)  # fmt: skip
             log.problem(file, text, row)
-            continue
-        before = found.setdefault(point, (xyz, file, row))
-        pairs = [(a, b) for a, b in zip(before[0], xyz, strict=True) if None not in (a, b)]
-        if any(abs(a - b) > SAME_M for a, b in pairs):
-            text = message(
-                "imported_known_twice",
-                "point {point!r} has other coordinates than in row {row} of {file}; expected one"
-                " place of each known point (--no-control leaves coordinates out)",
-                point=point[:40],
-                row=str(before[2]),
-                file=before[1],
-            )
-            log.problem(file, text, row)
+        else:
+            found.setdefault(point, []).append((xyz, file, row))
     return found
 
 
@@ -301,7 +290,22 @@ def _check_ties(chosen, choices, log):
             log.problem(key, text)
 
 
-def _stations(known, stands, chosen):
+def _stations(known, stands, chosen, log):
     """{point: (xyz, file, row)} that the job needs: stations, and targets that tie."""
     used = [one.station for one, _ in stands.values()] + [one.shot.point for one in chosen.ties]
-    return {name: known[name] for name in dict.fromkeys(used) if name in known}
+    found = {}
+    for point in dict.fromkeys(used):
+        for xyz, file, row in known.get(point, ()):
+            before = found.setdefault(point, (xyz, file, row))
+            pairs = [(a, b) for a, b in zip(before[0], xyz, strict=True) if None not in (a, b)]
+            if any(abs(a - b) > SAME_M for a, b in pairs):
+                text = message(
+                    "imported_known_twice",
+                    "point {point!r} has other coordinates than in row {row} of {file}; expected"
+                    " one place of each known point (--no-control leaves coordinates out)",
+                    point=point[:40],
+                    row=str(before[2]),
+                    file=before[1],
+                )
+                log.problem(file, text, row)
+    return found

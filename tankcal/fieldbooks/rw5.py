@@ -43,6 +43,7 @@ class _State:
     azimuth = circle = None  # of the backsight
     key = None  # of the set-up
     date = None  # of the last note that has one
+    follows_shot = False  # is a time that stands here that of the last reading?
     kind = None  # of horizontal angle in this set-up: "turned" or "azimuth"
 
 
@@ -60,6 +61,7 @@ def read(text, file, log):
 
 def _take(book, log, row, line, state):
     kind, fields, code = _fields(line)
+    before = len(book.shots)
     if kind in RECORDS:
         _take_shot(book, log, row, kind, fields, code, state)
     elif kind == "MO":
@@ -80,6 +82,7 @@ def _take(book, log, row, line, state):
         _take_point(book, log, row, fields.get("PN", ""), fields, state)
     elif kind not in ("JB", "TE", "AH"):
         book.leave_out(message("records_of_kind", "records {kind}", kind=kind[:12]), row)
+    state.follows_shot = len(book.shots) > before
 
 
 def _fields(line):
@@ -105,17 +108,11 @@ def _take_note(book, row, line, state):
             when = datetime.datetime(*state.date, *(int(one) for one in time.groups()))
         except ValueError:
             return
-        _put_time(book, when)
+        if state.follows_shot:
+            book.shots[-1] = replace(book.shots[-1], time=when)
+            state.follows_shot = False
     elif not date and not time:
         book.leave_out(message("notes", "notes"), row)
-
-
-def _put_time(book, when):
-    """The time of the shots that stand before it and have none."""
-    for place in range(len(book.shots) - 1, -1, -1):
-        if book.shots[place].time is not None:
-            return
-        book.shots[place] = replace(book.shots[place], time=when)
 
 
 def _take_mode(book, log, row, fields, state):
@@ -166,6 +163,9 @@ def _take_point(book, log, row, name, fields, state):
     if state.length is None:
         return
     given = [number_of(fields.get(one, "")) for one in ("E", "N", "EL")]
+    for one, code in zip(given, ("E", "N", "EL"), strict=True):
+        if one is None and fields.get(code):
+            refuse_number(log, book.file, row, fields[code])
     if name and None not in given[:2]:
         scale = METRES[state.length]
         xyz = tuple(None if one is None else one * scale for one in given)

@@ -132,6 +132,24 @@ def test_azimuths_beside_angles_of_rw5_are_brought_to_one_zero(tmp_path):
     assert float(third["distance_m"]) == pytest.approx(5 / 0.984807753, abs=1e-6)
 
 
+def test_coordinates_that_differ_matter_where_they_are_needed(tmp_path):
+    other = "SP,PN77,N 1.0,E 2.0,EL3.0\nSP,PN77,N 1.5,E 2.0,EL3.0\n"
+    _, tables = read(tmp_path, RW5 + other)
+    assert len(tables["control"]) == 1
+    with pytest.raises(InputError) as told:
+        read(tmp_path, RW5 + other.replace("77", "1"))
+    assert codes(told.value.problems) == {"imported_known_twice"}
+    assert [one.row for one in told.value.problems] == [10, 11]
+    _, tables = read(tmp_path, RW5 + other.replace("77", "1"), no_control=True)
+    assert "control" not in tables
+
+
+def test_a_time_belongs_to_the_reading_before_it_alone(tmp_path):
+    text = RW5 + "--DT07-14-2026\n--TM09:00:00\n--DT07-14-2026\n--TM12:00:00\n"
+    _, tables = read(tmp_path, text.replace("FP102", "FP103").replace("237.1650,ZE270", "3,ZE70"))
+    assert [one["time"] for one in tables["wall_hits"]] == ["", "2026-07-14T09:00:00"]
+
+
 def test_a_new_backsight_or_height_is_a_new_set_up_of_rw5(tmp_path):
     again = RW5.split("SF1.0")[1].split("\n", 2)[2]
     _, tables = read(tmp_path, RW5 + again.replace("FP10", "FP20"))
