@@ -100,6 +100,16 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
     ------
     InputError
         With every problem of every file; nothing is written then.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     found = import_fieldbooks(["examples/wall-hits/field-book.gsi"], folder)
+    >>> [path.name for path in found.paths]
+    ['setups.csv', 'wall_hits.csv', 'control_readings.csv', 'control.csv']
+    >>> print(found.summary[4])
+    hits of the wall: 200
     """
     log, found = Log(), Imported()
     _check_times(choices, log)

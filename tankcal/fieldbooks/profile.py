@@ -2,6 +2,7 @@
 
 import csv
 import datetime
+import re
 from dataclasses import dataclass
 
 from tankcal.fieldbooks.book import (
@@ -32,6 +33,7 @@ USUAL = {"separator": ",", "decimal": ".", "vertical": "zenith"}
 TEXTS = ("time_format", "station")
 NUMBERS = ("first_row", "instrument_height_m")
 MAX_PROFILE = 100_000
+MOST = 1e6
 _MARKS = str.maketrans({mark: " " for mark in "°º'’′\"″-:"})
 
 
@@ -92,7 +94,7 @@ def _check_values(file, values, rows, log):
             log.problem(file, message("profile_text", "expected a text"), rows.get(key), key)
     for key in NUMBERS:
         value = values.get(key, 1)
-        if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > 1e6:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= MOST:
             log.problem(file, message("profile_number", "expected a number"), rows.get(key), key)
 
 
@@ -223,5 +225,5 @@ def _time(text, values):
         if values.get("time_format"):
             return datetime.datetime.strptime(text, values["time_format"]).replace(tzinfo=None)
         return datetime.datetime.fromisoformat(text).replace(tzinfo=None)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError, re.error):
         return False

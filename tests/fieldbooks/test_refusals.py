@@ -1,6 +1,4 @@
-"""Whatever is handed in, it is read, or refused in plain lines with file and row, fast."""
-
-import time
+"""Whatever is handed in, it is read, or refused in plain lines with file and row."""
 
 import numpy as np
 import pytest
@@ -97,6 +95,9 @@ def test_a_table_without_a_profile(tmp_path):
         ('point = "Ponto"', "point = 0", "profile_place"),
         ('point = "Ponto"', "", "profile_column"),
         ("time_format = ", "time_format = 5 #", "profile_text"),
+        ('decimal = ","', 'decimal = ","\nfirst_row = nan', "profile_number"),
+        ('decimal = ","', 'decimal = ["x"]', "profile_choice"),
+        ("%d/%m/%Y", "%", "csv_face_or_time"),
         ("[columns]", "[columns", "toml_cannot_be_read"),
     ],
 )
@@ -206,10 +207,8 @@ def assert_told(tmp_path, seeds):
         for seed in seeds:
             path, out = tmp_path / f"book.{name}", tmp_path / f"{name}-{seed}"
             path.write_bytes(spoilt(data, np.random.default_rng([len(name), ord(name[0]), seed])))
-            start = time.perf_counter()
             told(path, out, hits=("*",) if seed % 2 else (), format=name if seed % 3 else None,
                  profile=tmp_path / "profile.toml" if name == "csv" else None)  # fmt: skip
-            assert time.perf_counter() - start < 60
 
 
 @pytest.mark.slow
