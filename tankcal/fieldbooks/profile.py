@@ -182,8 +182,9 @@ def _number(book, log, row, text, values):
     """A number, None: blank, False: none, after telling the log."""
     if not text:
         return None
-    plain = text.replace(",", ".") if values["decimal"] == "," and "." not in text else text
-    value = number_of(plain)
+    mark = values["decimal"]
+    is_other = mark == "," and "." in text  # 1.234 is a thousand there
+    value = None if is_other else number_of(text.replace(mark, "."))
     if value is None:
         refuse_number(log, book.file, row, text)
         return False

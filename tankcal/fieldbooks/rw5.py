@@ -231,7 +231,8 @@ def _add(book, log, row, kind, given, code, state, name):
                 )
                 log.problem(book.file, text, row)
                 return
-            direction += state.azimuth if is_turned else -state.azimuth
+            zero = state.azimuth - (state.circle or 0.0)  # azimuth of the zero of the circle
+            direction += zero if is_turned else -zero
         state.kind = state.kind or wanted
     zenith = angles.get("ZE")
     if zenith is None and "VA" in angles:

@@ -3,6 +3,7 @@
 from tankcal.errors import Problem
 from tankcal.fieldbooks.detection import NAMES
 from tankcal.fieldbooks.faces import LARGE_DEG, LARGE_M
+from tankcal.job.checks.hits import MOST_HITS
 from tankcal.messages import list_some, message
 
 SHOWN = 8
@@ -159,6 +160,15 @@ def warn_of(chosen, names, stands, reports):
                 limit_mm=1000 * LARGE_M,
             )
             found.append(Problem(file, text))
+    if len(chosen.hits) > MOST_HITS:
+        shot = chosen.hits[0].shot
+        text = message(
+            "more_hits_than_a_job_takes",
+            "{count} hits, and a job takes at most {most}: leave some out with --leave",
+            count=len(chosen.hits),
+            most=MOST_HITS,
+        )
+        found.append(Problem(shot.file, text, shot.row))
     found += _of_constants(chosen)
     if chosen.ties:
         text = message(

@@ -124,7 +124,8 @@ def test_horizontal_angles_of_rw5(tmp_path, field, direction):
 
 
 def test_azimuths_beside_angles_of_rw5_are_brought_to_one_zero(tmp_path):
-    text = RW5.replace("BS0.0000", "BS10.0000") + "SS,OP1,FP103,AZ40.0000,VA10.0000,HD5,--WALL\n"
+    text = RW5.replace("BS0.0000,BC0.0000", "BS12.0000,BC2.0000")
+    text += "SS,OP1,FP103,AZ40.0000,VA10.0000,HD5,--WALL\n"
     _, tables = read(tmp_path, text)
     third = tables["wall_hits"][2]
     assert float(third["direction_deg"]) == pytest.approx(30.0, abs=1e-7)

@@ -67,6 +67,7 @@ def problems_of(tmp_path, text, name="book.txt", **choices):
         ("sdr", "09F1               1", "09F1               7", [("sdr_station", 7)]),
         ("sdr", "18.48767", "18.x8767", [("sdr_number", 7)]),
         ("csv", "Ponto", "Pontos", [("no_such_heading", 1)]),
+        ("csv", ";4,88467;", ";4.88467;", [("no_plain_number", 2)]),
         ("csv", "18° 29'", "18° 99'", [("impossible_minutes", 2)]),
         ("csv", "14/07/2026", "14-07-2026", [("csv_face_or_time", 2)]),
     ],
