@@ -36,6 +36,7 @@ TEXTS = ("11", *(f"7{digit}" for digit in range(1, 10)))
 LENGTH_WORDS = ("31", "32", "33", *OF_TARGET, *OF_STATION, "87", "88")
 KNOWN = (*TEXTS, *LENGTH_WORDS, "12", "13", "17", "19", "21", "22", "51", "58", "59")
 EARLIEST, LATEST = 1980, 2200  # years
+SAME_M = 0.001  # heights of an instrument, coordinates of a station
 UNLIKE_M = 0.003  # between the horizontal distance of the file and that of slope and angle
 
 
@@ -210,8 +211,8 @@ def _take_station(book, row, name, values, is_reading, state):
     if book.setups:
         now = book.setups[-1]
         same_name = is_reading or name == now.station  # a block of a reading names its target
-        same_place = None in (xyz, now.xyz_m) or xyz == now.xyz_m
-        same_height = None in (height, now.height_m) or height == now.height_m
+        same_place = None in (xyz, now.xyz_m) or all(map(_are_same, xyz, now.xyz_m))
+        same_height = _are_same(height, now.height_m)
         if same_name and same_place and (same_height or not book.has_shots):
             book.setups[-1] = replace(
                 now,
@@ -227,6 +228,11 @@ def _take_station(book, row, name, values, is_reading, state):
         name = ""
     book.stand(name, height, xyz, row)
     state.height = state.height if is_reading else None
+
+
+def _are_same(first, second):
+    """Whether two lengths may be one, though their units have other last digits."""
+    return None in (first, second) or abs(first - second) <= SAME_M
 
 
 def _take_shot(book, log, row, name, values, code, state):
