@@ -60,6 +60,7 @@ DOORS = {  # rooms of the reference, in the order in which a job goes through th
     "Record and papers": ("tankcal.record", "tankcal.report", "tankcal.report.tables"),
     "Calibrations of cameras": ("tankcal.calibration",),
     "Planning": ("tankcal.planning",),
+    "Field books": ("tankcal.fieldbooks",),
     "Linter": ("tankcal.linter",),
 }
 TWICE = {"tankcal.survey": "Adjustment", "tankcal.linter": "lint"}  # told with `tankcal`

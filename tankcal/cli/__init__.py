@@ -5,7 +5,7 @@ import os
 import sys
 
 import tankcal
-from tankcal.cli import camera, linting, planning, reporting, running, starting
+from tankcal.cli import camera, importing, linting, planning, reporting, running, starting
 from tankcal.cli.help_words import argparse_in, put_in_words
 from tankcal.cli.machine import failure, print_json
 from tankcal.cli.showing import complain, speak, words_of_run
@@ -29,6 +29,7 @@ a new tank, step by step:
 photographs, distances, angles and levels instead of surveyed points:
   tankcal new my-tank --survey photos          (or total-station) write such a job
   tankcal run my-tank --only adjustment        adjust the survey; no tank is needed
+  tankcal import book.gsi --out my-tank        read the field book of a total station
   tankcal plan my-plan                         what a survey will be worth, before it is made
 
 exit status: 0 done; 2 the input must be mended (one line per problem: file, row, column, what was
@@ -96,7 +97,7 @@ def _parser():
     parser.set_defaults(command=None, shown=parser)
     commands = parser.add_subparsers(metavar="COMMAND")
 
-    for room in (running, reporting, starting, planning, linting, camera):
+    for room in (running, reporting, starting, importing, planning, linting, camera):
         room.add(commands)
     if words_of_run():
         put_in_words(parser, words_of_run())

@@ -1,0 +1,130 @@
+"""`tankcal import`: field books of instruments become the CSV files of a job."""
+
+import datetime
+import shlex
+from pathlib import Path
+
+from tankcal.cli.arguments import add_language, positive, refuse_argument
+from tankcal.cli.machine import add_json, print_json, problem_of
+from tankcal.cli.showing import prepare_for_small_work, say, speak, warn
+from tankcal.messages import message
+
+
+def add(commands):
+    """The parser of `tankcal import`."""
+    parser = commands.add_parser(
+        "import",
+        help="read field books of total stations into a job",
+        description="Read the files that total stations export (Leica GSI, RW5, Trimble JobXML, "
+        "Sokkia SDR33, plain tables) and write the tables of a job: set-ups, bare hits of the "
+        "wall, control targets, readings that tie set-ups, all or nothing. docs/import.md says "
+        "what is read of each format.",
+        epilog="exit status: 0 done; 2 the files or the choices must be mended (one line per "
+        "problem: file, row, what was expected; nothing is written then).",
+    )
+    parser.add_argument(
+        "names", metavar="FILE", nargs="+", help="the files, in the order of the measurement"
+    )
+    parser.add_argument("--out", metavar="DIR", required=True, help="the folder of the job")
+    parser.add_argument(
+        "--format",
+        choices=("gsi", "rw5", "jxl", "sdr", "csv"),
+        help="of all files (default: by their content)",
+    )
+    parser.add_argument(
+        "--profile", metavar="FILE.toml", help="which column of a plain table is what"
+    )
+    for name, text in (
+        ("hits", "names or codes of bare hits, 1-200 or W* (default: those that begin with WALL, "
+         "HIT, PAREDE or PARED)"),
+        ("control", "names or codes of control targets (default: targets read again)"),
+        ("leave", "names or codes that are not used"),
+        ("check", "names or codes of hits that are only compared (use = check)"),
+    ):  # fmt: skip
+        parser.add_argument(f"--{name}", metavar="PATTERN", action="append", default=[], help=text)
+    parser.add_argument("--no-hits", action="store_true", help="there are no hits, only targets")
+    parser.add_argument(
+        "--instrument", metavar="NAME", default="", help="its name in instruments.toml"
+    )
+    for name, what in (("mm", "distances"), ("arcsec", "angles")):
+        parser.add_argument(
+            f"--targets-{name}",
+            metavar=name.upper(),
+            type=positive,
+            help=f"standard deviation of {what} to targets that tie set-ups",
+        )
+    for name, what in (("begin", "first"), ("end", "last")):
+        parser.add_argument(
+            f"--{name}",
+            metavar="TIME",
+            type=_time,
+            help=f"time of the {what} reading, such as 2026-07-14T09:00, for files without times",
+        )
+    parser.add_argument(
+        "--no-control", action="store_true", help="write no known coordinates to control.csv"
+    )
+    parser.add_argument(
+        "--replace", action="store_true", help="replace tables that have rows already"
+    )
+    add_language(parser)
+    add_json(parser)
+    parser.set_defaults(command=_import)
+
+
+def _time(text):
+    try:
+        return datetime.datetime.fromisoformat(text).replace(tzinfo=None)
+    except ValueError:
+        raise refuse_argument(
+            message(
+                "option_time",
+                "found {text!r}; expected a date with its time, such as 2026-07-14T09:00",
+                text=text,
+            )
+        ) from None
+
+
+def _asked_of_folder(folder):
+    """The language of the job that the tables go to; None: there is none yet."""
+    from tankcal.cli.asked_language import asked_language
+
+    return asked_language(folder) if (folder / "job.toml").is_file() else None
+
+
+def _import(options):
+    prepare_for_small_work()
+    speak(options.language or _asked_of_folder(Path(options.out)))
+    from tankcal.fieldbooks import Choices, import_fieldbooks
+
+    choices = Choices(
+        hits=tuple(options.hits),
+        control=tuple(options.control),
+        leave=tuple(options.leave),
+        check=tuple(options.check),
+        no_hits=options.no_hits,
+        format=options.format,
+        profile=options.profile,
+        instrument=options.instrument,
+        targets_mm=options.targets_mm,
+        targets_arcsec=options.targets_arcsec,
+        begin=options.begin,
+        end=options.end,
+        no_control=options.no_control,
+    )
+    found = import_fieldbooks(options.names, options.out, choices, replace_tables=options.replace)
+    if options.machine:
+        print_json(
+            exit_status=0,
+            summary=list(map(str, found.summary)),
+            warnings=[problem_of(one) for one in found.warnings],
+            files=list(map(str, found.paths)),
+        )
+        return
+    for line in found.summary:
+        say(line)
+    warn(found.warnings)
+    say(message("import_wrote", "wrote into {folder}:", folder=str(options.out)))
+    for path in found.paths:
+        print(f"  {path}")
+    say(message("import_next", "then"))
+    print(f"  tankcal run {shlex.quote(str(options.out))}")

@@ -1,0 +1,255 @@
+"""Leica GSI-8 and GSI-16: words of a two-figure index, a unit and a signed value.
+
+Each line is a block; digit 6 of a word is its unit. Slope distances are what the instrument made of
+them: its prism constant and ppm are in them already (words 51, 58, 59 only say which).
+"""
+
+import datetime
+import math
+import re
+from dataclasses import replace
+
+from tankcal.fieldbooks.book import (
+    DEGREES,
+    METRES,
+    NO_YEAR,
+    FieldBook,
+    KnownPoint,
+    plain_name,
+    refuse_minutes,
+)
+from tankcal.messages import message
+
+LINE = re.compile(r"\s*\*?\d\d[0-9. ]{4}[+-]")
+_WORD = re.compile(r"(\d\d)(.)(.)(.)(.)([+-])(.+)", re.DOTALL)
+_TWO_VALUES = re.compile(r"([+-]\d+)([+-]\d+)")
+LENGTHS = {  # digit 6: unit, how many of the last digit are one of it
+    "0": ("m", 1e3),
+    "1": ("ft", 1e3),
+    "6": ("m", 1e4),
+    "7": ("ft", 1e4),
+    "8": ("m", 1e5),
+}
+ANGLES = {"2": ("gon", 1e5), "3": ("deg", 1e5), "4": ("dms", 1e5), "5": ("mil", 1e4)}
+OF_TARGET, OF_STATION = ("81", "82", "83"), ("84", "85", "86")
+TEXTS = ("11", *(f"7{digit}" for digit in range(1, 10)))
+LENGTH_WORDS = ("31", "32", "33", *OF_TARGET, *OF_STATION, "87", "88")
+KNOWN = (*TEXTS, *LENGTH_WORDS, "12", "13", "17", "19", "21", "22", "51", "58", "59")
+EARLIEST, LATEST = 1980, 2200  # years
+SAME_M = 0.001  # heights of an instrument, coordinates of a station
+UNLIKE_M = 0.003  # between the horizontal distance of the file and that of slope and angle
+
+
+def read(text, file, log):
+    """FieldBook of the text of a GSI file."""
+    book, state = FieldBook(file, "gsi"), _State()
+    for row, line in enumerate(text.split("\n"), 1):
+        line = line.strip("\r\x1a \t")
+        if not line:
+            continue
+        words = _words(line)
+        if words is None:
+            expected = message(
+                "no_gsi_line",
+                "not a block of GSI; expected words such as 21.102+07567500, each as long as the"
+                " others",
+            )
+            log.problem(file, expected, row)
+        elif words[0][0] == "41":
+            book.leave_out(message("gsi_code_blocks", "code blocks (words 41 to 49)"), row)
+        else:
+            _take(book, log, row, words, state)
+    return book
+
+
+class _State:
+    """What holds from line to line."""
+
+    height = prism = None
+    year = time = None
+
+
+def _words(line):
+    """[(index, digit 3, unit, sign and value)] of a line, or None."""
+    width = 16 if line.startswith("*") else 8
+    body = line.lstrip("*")
+    step = 7 + width + 1
+    parts = [body[start : start + step].rstrip() for start in range(0, len(body), step)]
+    if not all(len(one) == 7 + width and _WORD.fullmatch(one) for one in parts):
+        parts = body.split()
+        if not all(len(one) == 7 + width and _WORD.fullmatch(one) for one in parts):
+            return None
+    matches = [_WORD.fullmatch(one) for one in parts]
+    return [(one[1], one[2], one[5], one[6] + one[7]) for one in matches]
+
+
+def _take(book, log, row, words, state):
+    given = _known_words(book, log, row, words)
+    if given is None:
+        return
+    values = {}
+    for index in given:
+        if index in ("21", "22") or index in LENGTH_WORDS:
+            values[index] = _value(book, log, row, index, *given[index])
+            if values[index] is None:
+                return
+    _take_times(given, state)
+    _take_constants(book, given, state)
+    if "12" in given or "13" in given:
+        named = [_text(given[one]) for one in ("13", "12") if one in given]
+        book.instrument = " ".join(named)
+    name = _text(given["11"]) if "11" in given else ""
+    is_reading = any(index in values for index in ("21", "22", "31", "32"))
+    _take_station(book, row, name, values, is_reading, state)
+    if "87" in values:
+        state.height = values["87"]
+    if is_reading:
+        code = " ".join(_text(given[one]) for one in TEXTS[1:] if one in given)
+        _take_shot(book, log, row, name, values, code, state)
+    elif all(one in values for one in OF_TARGET[:2]):
+        xyz = tuple(values.get(one) for one in OF_TARGET)
+        book.known.append(KnownPoint(name, xyz, row))
+    elif not any(one in values for one in (*OF_STATION, "87", "88")):
+        book.leave_out(message("gsi_without_reading", "blocks without a reading"), row)
+
+
+def _known_words(book, log, row, words):
+    """{index: (unit, signed value)} of the words that are read; None: one stands twice (told)."""
+    given = {}
+    for index, digit, unit, value in words:
+        if digit.isdigit() and index != "11":
+            what = message("gsi_level_word", "words {word} of a level", word=index + digit)
+            book.leave_out(what, row)
+        elif index not in KNOWN:
+            book.leave_out(message("gsi_word", "words {word}", word=index), row)
+        elif index in given:
+            text = message("gsi_word_twice", "word {word} stands twice in a block", word=index)
+            log.problem(book.file, text, row)
+            return None
+        else:
+            given[index] = unit, value
+    return given
+
+
+def _text(word):
+    return plain_name(word[1][1:])
+
+
+def _value(book, log, row, index, unit, text):
+    """Degrees or metres of a word, or None after telling the log."""
+    digits, is_angle = text[1:], index in ("21", "22")
+    known = (ANGLES if is_angle else LENGTHS).get(unit)
+    if known is None or not (digits.isascii() and digits.isdigit()):
+        expected = message(
+            "gsi_value",
+            "word {word}: found unit {unit!r} and {text!r}; expected digits and a unit of {units}",
+            word=index,
+            unit=unit,
+            text=text,
+            units=", ".join(ANGLES if is_angle else LENGTHS),
+        )
+        log.problem(book.file, expected, row)
+        return None
+    name, parts = known
+    sign, number = (-1.0 if text[0] == "-" else 1.0), int(digits)
+    if not is_angle:
+        _say_length(book, name, parts)
+        return sign * number / parts * METRES[name]
+    book.say_units(angle=name)
+    if name != "dms":
+        return sign * number / parts * DEGREES[name]
+    degrees, rest = divmod(number, 100000)  # dddmmsss: the last one is a tenth of a second
+    minutes, tenths = divmod(rest, 1000)
+    if minutes >= 60 or tenths >= 600:
+        refuse_minutes(log, book.file, row, text)
+        return None
+    return sign * (degrees + minutes / 60 + tenths / 36000)
+
+
+def _say_length(book, name, parts):
+    last = f"{1000 / parts:g} mm" if name == "m" else f"1/{parts:.0f} ft"
+    book.say_units(length=name, last=last)
+
+
+def _take_times(given, state):
+    """Words 17 (day, month, year: ddmmyyyy) and 19 (month, day, hour, minute)."""
+    date, clock = (given[one][1][-8:] if one in given else "" for one in ("17", "19"))
+    if date.isdigit() and EARLIEST <= int(date[-4:]) <= LATEST:
+        state.year = int(date[-4:])
+    if clock.isdigit():
+        month, day, hour, minute = (int(clock[place : place + 2]) for place in (0, 2, 4, 6))
+        try:  # without a year, that of the reader's choice: NO_YEAR stands for it
+            state.time = datetime.datetime(state.year or NO_YEAR, month, day, hour, minute)
+        except ValueError:
+            state.time = None
+
+
+def _take_constants(book, given, state):
+    """Prism constant and ppm: only said, for the instrument applied them."""
+    ppm = None
+    if "51" in given:
+        both = _TWO_VALUES.fullmatch(given["51"][1])
+        if both:
+            ppm, state.prism = float(both[1]), float(both[2])
+    if "58" in given and given["58"][1][1:].isdigit():
+        state.prism = float(given["58"][1]) / (10 if given["58"][0] == "6" else 1)
+    if "59" in given and given["59"][1][1:].isdigit():
+        ppm = float(given["59"][1]) / 1e4
+    if ppm:
+        text = message(
+            "ppm_in_distances", "ppm {ppm:g}: in the distances already, not applied", ppm=ppm
+        )
+        book.note(text)
+
+
+def _take_station(book, row, name, values, is_reading, state):
+    """Begin a set-up where name, coordinates or height of the station change."""
+    xyz = tuple(values.get(one) for one in OF_STATION)
+    xyz, height = None if None in xyz[:2] else xyz, values.get("88")
+    if xyz is None and height is None:
+        return
+    if book.setups:
+        now = book.setups[-1]
+        same_name = is_reading or name == now.station  # a block of a reading names its target
+        same_place = None in (xyz, now.xyz_m) or all(map(_are_same, xyz, now.xyz_m))
+        same_height = _are_same(height, now.height_m)
+        if same_name and same_place and (same_height or not book.has_shots):
+            book.setups[-1] = replace(
+                now,
+                xyz_m=xyz or now.xyz_m,
+                height_m=now.height_m if height is None else height,
+            )
+            return
+        if same_name and same_place:
+            name, xyz = now.station, xyz or now.xyz_m
+        elif is_reading:
+            name = ""
+    elif is_reading:
+        name = ""
+    book.stand(name, height, xyz, row)
+    state.height = state.height if is_reading else None
+
+
+def _are_same(first, second):
+    """Whether two lengths may be one, though their units have other last digits."""
+    return None in (first, second) or abs(first - second) <= SAME_M
+
+
+def _take_shot(book, log, row, name, values, code, state):
+    zenith, distance, level = (values.get(one) for one in ("22", "31", "32"))
+    sine = None if zenith is None else abs(math.sin(math.radians(zenith)))
+    if distance is None and level and sine:
+        distance = level / sine
+    elif distance and level and sine and abs(distance * sine - level) > UNLIKE_M:
+        text = message(
+            "horizontal_unlike_slope",
+            "horizontal distance {level_m:.3f} m, but slope distance and vertical circle make"
+            " {made_m:.3f} m: is the circle read from the zenith, in that unit?",
+            level_m=level,
+            made_m=distance * sine,
+        )
+        log.problem(book.file, text, row)
+        return
+    book.add_shot(log, row, point=name, direction=values.get("21"), zenith=zenith,
+                  distance=distance, height=state.height, code=code, time=state.time,
+                  prism=state.prism)  # fmt: skip

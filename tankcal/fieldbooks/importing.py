@@ -1,0 +1,321 @@
+"""From files of instruments to the tables of a job: the door of the room."""
+
+import datetime
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from tankcal.fieldbooks.book import MOST_M, NO_YEAR
+from tankcal.fieldbooks.detection import MAX_BYTES, read_book
+from tankcal.fieldbooks.faces import reduce_faces
+from tankcal.fieldbooks.profile import read_profile
+from tankcal.fieldbooks.rows import check_rows, make_rows
+from tankcal.fieldbooks.sorting import sort_readings
+from tankcal.fieldbooks.summary import summarise, warn_of
+from tankcal.fieldbooks.writing import write_tables
+from tankcal.job.tables import Log, read_bytes
+from tankcal.messages import list_some, message
+
+SAME_M = 0.001  # coordinates of one point that are given twice
+SHOWN = 6
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What the user says of the files.
+
+    Attributes
+    ----------
+    hits, control, leave, check : tuple of str
+        Patterns of names or codes: bare hits of the wall, control targets, what is not used, and
+        of the hits those that are only compared.
+        Without `hits` the names and codes that begin with WALL, HIT, PAREDE or PARED.
+    no_hits : bool
+        There are no hits: only targets.
+    format : str or None
+        One of "gsi", "rw5", "jxl", "sdr", "csv"; None: by the content.
+    profile : str or Path or None
+        What the columns of a plain table are (TOML).
+    instrument : str
+        Name of the instrument in instruments.toml; "": blank.
+    targets_mm, targets_arcsec : float or None
+        Standard deviations of distances and angles to targets that tie set-ups.
+    begin, end : datetime or None
+        Times of the first and the last reading, for files without times.
+    no_control : bool
+        Known coordinates are not written.
+    """
+
+    hits: tuple = ()
+    control: tuple = ()
+    leave: tuple = ()
+    check: tuple = ()
+    no_hits: bool = False
+    format: str | None = None
+    profile: object = None
+    instrument: str = ""
+    targets_mm: float | None = None
+    targets_arcsec: float | None = None
+    begin: datetime.datetime | None = None
+    end: datetime.datetime | None = None
+    no_control: bool = False
+
+
+@dataclass
+class Imported:
+    """What an import made.
+
+    Attributes
+    ----------
+    summary : list of str
+        Lines: set-ups, hits, named points, units, what was applied, what was left out.
+    warnings : list of Problem
+    paths : list of Path
+        Files that were written.
+    """
+
+    summary: list = field(default_factory=list)
+    warnings: list = field(default_factory=list)
+    paths: list = field(default_factory=list)
+
+
+def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False):
+    """Read field books of instruments and write them as tables of a job.
+
+    Parameters
+    ----------
+    files : sequence of str or Path
+        In the order in which they were measured.
+    folder : str or Path
+        Of the job; made when missing.
+    choices : Choices
+    replace_tables : bool
+        Tables that have rows already are replaced.
+
+    Returns
+    -------
+    Imported
+
+    Raises
+    ------
+    InputError
+        With every problem of every file; nothing is written then.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     found = import_fieldbooks(["examples/wall-hits/field-book.gsi"], folder)
+    >>> [path.name for path in found.paths]
+    ['setups.csv', 'wall_hits.csv', 'control_readings.csv', 'control.csv']
+    >>> print(found.summary[4])
+    hits of the wall: 200
+    """
+    log, found = Log(), Imported()
+    _check_times(choices, log)
+    books = _read_all(files, choices, log)
+    log.stop_if_problems()
+    stands, shots = _joined(books)
+    shots = _with_times(shots, choices)
+    readings, reports = reduce_faces(shots, log)
+    log.stop_if_problems()
+    places = sorted({one.setup for one in shots})
+    names = _names_of_setups(stands, places)
+    known = _known_points(books, stands, places, names, log)
+    stands = {place: (replace(one, station=_station(one, names[place])), file)
+              for place, (one, file) in enumerate(stands) if place in names}  # fmt: skip
+    unused = {}
+    chosen = sort_readings(
+        readings, choices, {*known, *(one.station for one, _ in stands.values())}, log,
+        lambda what, one: unused.setdefault(what, []).append(one.shot),
+    )  # fmt: skip
+    _tell_empty_setups(books)
+    chosen = _control_with_times(chosen, choices, unused, log)
+    _check_ties(chosen, choices, log)
+    log.stop_if_problems()
+    stations = {} if choices.no_control else _stations(known, stands, chosen, log)
+    used = {one.shot.setup for one in (*chosen.hits, *chosen.control, *chosen.ties)}
+    names = {place: name for place, name in names.items() if place in used}
+    tables = make_rows(stands, names, stations, chosen, choices)
+    check_rows(tables, log)
+    if not tables.keys() - {"setups", "control"} and not log.problems:
+        text = message("nothing_read", "no reading that a job can use; expected shots of hits or"
+                       " of targets")  # fmt: skip
+        log.problem(Path(files[0]).name, text)
+    log.stop_if_problems()
+    found.paths, standing = write_tables(folder, tables, replace=replace_tables)
+    found.summary = summarise(books, chosen, unused, names, stands, reports, (known, stations),
+                              standing)  # fmt: skip
+    found.warnings = warn_of(chosen, names, stands, reports)
+    return found
+
+
+def _check_times(choices, log):
+    begin, end = choices.begin, choices.end
+    if end is not None and (begin is None or end <= begin):
+        log.problem("--end", message("end_before_begin", "expected a time after that of --begin"))
+
+
+def _read_all(files, choices, log):
+    described = None
+    if choices.profile is not None:
+        described = read_profile(Path(choices.profile), log)
+        if described is None:
+            return []
+    books, seen = [], {}
+    for path in map(Path, files):
+        data = read_bytes(path, log, MAX_BYTES)
+        if data is not None and data in seen:
+            text = message("file_twice", "the same as {other}; expected each file once",
+                           other=seen[data])  # fmt: skip
+            log.problem(path.name, text)
+            continue
+        seen[data] = path.name
+        book = None if data is None else read_book(path.name, data, log, choices.format, described)
+        if book is not None:
+            books.append(book)
+    return books
+
+
+def _joined(books):
+    """([(SetUp, file)], shots) of all books, the places of set-ups counted on."""
+    stands, shots = [], []
+    for book in books:
+        shots += [replace(one, setup=one.setup + len(stands)) for one in book.shots]
+        stands += [(one, book.file) for one in book.setups]
+    return stands, shots
+
+
+def _tell_empty_setups(books):
+    for book in books:
+        used = {one.setup for one in book.shots}
+        for place, stand in enumerate(book.setups):
+            if place not in used:
+                what = message("setups_without_readings", "set-ups without readings")
+                book.leave_out(what, stand.row)
+
+
+def _names_of_setups(stands, places):
+    """{place: name}: that of the station, or S1, S2, ...; a second one of a station gets -2."""
+    named = {stands[place][0].station for place in places} - {""}
+    free = (f"S{number}" for number in range(1, len(places) + len(named) + 2))
+    free = (one for one in free if one not in named)
+    found, counts = {}, Counter()
+    for place in places:
+        name = stands[place][0].station or next(free)
+        counts[name] += 1
+        while counts[name] > 1 and f"{name}-{counts[name]}" in (*named, *found.values()):
+            counts[name] += 1
+        found[place] = name if counts[name] == 1 else f"{name}-{counts[name]}"
+    return found
+
+
+def _station(stand, name):
+    return stand.station or name
+
+
+def _known_points(books, stands, places, names, log):
+    """{name: list of (xyz, file, row)} of all coordinates that the files give."""
+    given = [(names[place], *stands[place]) for place in places]
+    items = [
+        (one.station or name, one.xyz_m, file, one.row)
+        for name, one, file in given
+        if one.xyz_m is not None
+    ]
+    items += [(one.point, one.xyz_m, book.file, one.row) for book in books for one in book.known]
+    found = {}
+    for point, xyz, file, row in items:
+        if any(abs(one) > MOST_M for one in xyz if one is not None):
+            text = message("coordinate_too_large", "coordinates of {point!r} beyond {most:g} m",
+                           point=point[:40], most=MOST_M)  # fmt: skip
+            log.problem(file, text, row)
+        else:
+            found.setdefault(point, []).append((xyz, file, row))
+    return found
+
+
+def _with_times(shots, choices):
+    """Shots with the year that times lack; those without a time get one of begin to end."""
+    begin, end = choices.begin, choices.end
+    found = []
+    for one in shots:
+        time = one.time
+        if time is not None and time.year == NO_YEAR:
+            time = None if begin is None else _in_year(time, begin.year)
+        found.append(replace(one, time=time))
+    if begin is None or end is None or len(found) < 2:
+        return found
+    step = (end - begin) / (len(found) - 1)
+    return [
+        replace(one, time=(begin + place * step).replace(microsecond=0)) if one.time is None
+        else one
+        for place, one in enumerate(found)
+    ]  # fmt: skip
+
+
+def _in_year(time, year):
+    """The same day in another year; None: there is no 29 February."""
+    try:
+        return time.replace(year=year)
+    except ValueError:
+        return None
+
+
+def _control_with_times(chosen, choices, unused, log):
+    """The same without control readings that have no time; told where the user asked for them."""
+    without = [one.shot for one in chosen.control if one.shot.time is None]
+    if choices.control:
+        for shot in without:
+            text = message(
+                "control_without_time",
+                "control target {point!r} has no time in the file; expected --begin and --end"
+                " (of a GSI file without a year --begin), or the target with --leave",
+                point=shot.point[:40],
+            )
+            log.problem(shot.file, text, shot.row)
+    elif without:
+        what = message(
+            "again_without_time",
+            "targets read again, without a time in the file: with --begin and --end they become"
+            " control_readings.csv",
+        )
+        unused[what] = without
+    kept = tuple(one for one in chosen.control if one.shot.time is not None)
+    return replace(chosen, control=kept)
+
+
+def _check_ties(chosen, choices, log):
+    if not chosen.ties:
+        return
+    for key, value in (("--targets-mm", choices.targets_mm),
+                       ("--targets-arcsec", choices.targets_arcsec)):  # fmt: skip
+        if value is None:
+            points = list(dict.fromkeys(one.shot.point for one in chosen.ties))
+            text = message(
+                "ties_without_sd",
+                "targets {points} tie set-ups; expected the standard deviation of readings to"
+                " targets: no file of an instrument has it",
+                points=list_some(points, SHOWN),
+            )
+            log.problem(key, text)
+
+
+def _stations(known, stands, chosen, log):
+    """{point: (xyz, file, row)} that the job needs: stations, and targets that tie."""
+    used = [one.station for one, _ in stands.values()] + [one.shot.point for one in chosen.ties]
+    found = {}
+    for point in dict.fromkeys(used):
+        for xyz, file, row in known.get(point, ()):
+            before = found.setdefault(point, (xyz, file, row))
+            pairs = [(a, b) for a, b in zip(before[0], xyz, strict=True) if None not in (a, b)]
+            if any(abs(a - b) > SAME_M for a, b in pairs):
+                text = message(
+                    "imported_known_twice",
+                    "point {point!r} has other coordinates than in row {row} of {file}; expected"
+                    " one place of each known point (--no-control leaves coordinates out)",
+                    point=point[:40],
+                    row=str(before[2]),
+                    file=before[1],
+                )
+                log.problem(file, text, row)
+    return found

@@ -1,0 +1,154 @@
+"""Rows of the job's tables, as its contract has them, from readings on face 1."""
+
+from dataclasses import dataclass
+
+from tankcal.fieldbooks.sorting import is_meant
+from tankcal.job.contract.hits import CONTROL_READINGS, WALL_HITS
+from tankcal.job.contract.observations import (
+    CONTROL,
+    DIRECTIONS,
+    SETUPS,
+    SLOPE_DISTANCES,
+    ZENITH_ANGLES,
+)
+from tankcal.job.fields import Refused, read_value
+from tankcal.messages import message
+
+CONTRACT = {
+    "setups": SETUPS,
+    "wall_hits": WALL_HITS,
+    "control_readings": CONTROL_READINGS,
+    "directions": DIRECTIONS,
+    "zenith_angles": ZENITH_ANGLES,
+    "slope_distances": SLOPE_DISTANCES,
+    "control": CONTROL,
+}
+ANGLE_DECIMALS, LENGTH_DECIMALS = 7, 6  # 0.0004 seconds of arc, a micrometre
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of a table: {column: text}, and where it comes from."""
+
+    cells: dict
+    file: str
+    row: int
+
+
+def make_rows(stands, names, stations, sorted_readings, choices):
+    """{table: list of Row}; tables without rows are not in it.
+
+    stands    the SetUps by their place
+    names     {place: name of the set-up in the job}
+    stations  {name of a point: (x, y, z)} that go into control.csv, and {name: (file, row)}
+    """
+    tables = {name: [] for name in CONTRACT}
+    for place, name in names.items():
+        given, file = stands[place]
+        cells = {
+            "setup": name,
+            "station": given.station,
+            "instrument": choices.instrument,
+            "instrument_height_m": _length(given.height_m),
+        }
+        tables["setups"].append(Row(cells, file, given.row))
+    for one in sorted_readings.hits:
+        cells = _both_angles(one.shot)
+        if is_meant(one.shot, choices.check):
+            cells["use"] = "check"
+        tables["wall_hits"].append(_row(one, names, cells, distance=True, time=True))
+    for one in sorted_readings.control:
+        cells = {"target": one.shot.point} | _both_angles(one.shot)
+        tables["control_readings"].append(_row(one, names, cells, distance=True, time=True))
+    for one in sorted_readings.ties:
+        _tie(tables, one, names, choices)
+    for point, (xyz, file, row) in stations.items():
+        cells = {"point": point} | dict(zip(("x_m", "y_m", "z_m"), map(_length, xyz), strict=True))
+        tables["control"].append(Row(cells, file, row))
+    return {name: rows for name, rows in tables.items() if rows}
+
+
+def _row(one, names, cells, *, distance=False, time=False):
+    shot = one.shot
+    cells = {"setup": names[shot.setup]} | cells
+    if distance:
+        cells["distance_m"] = _length(shot.distance_m)
+    if time:
+        cells["time"] = "" if shot.time is None else shot.time.isoformat(timespec="seconds")
+    return Row(cells, shot.file, shot.row)
+
+
+def _both_angles(shot):
+    return {
+        "direction_deg": _angle(shot.direction_deg),
+        "zenith_deg": _angle(shot.zenith_deg),
+    }
+
+
+def _tie(tables, one, names, choices):
+    shot = one.shot
+    height = _length(shot.target_height_m)
+    seconds, millimetres = _number(choices.targets_arcsec), _number(choices.targets_mm)
+    for table, column, text, sd in (
+        ("directions", "direction_deg", _angle(shot.direction_deg), ("s_arcsec", seconds)),
+        ("zenith_angles", "zenith_deg", _angle(shot.zenith_deg), ("s_arcsec", seconds)),
+        ("slope_distances", "distance_m", _length(shot.distance_m), ("s_mm", millimetres)),
+    ):
+        if text:
+            cells = {"to": shot.point, column: text, sd[0]: sd[1], "target_height_m": height}
+            tables[table].append(_row(one, names, cells))
+
+
+def _angle(value):
+    return "" if value is None else _plain(value, ANGLE_DECIMALS)
+
+
+def _length(value):
+    return "" if value is None else _plain(value, LENGTH_DECIMALS)
+
+
+def _number(value):
+    return "" if value is None else f"{value:g}"
+
+
+def _plain(value, decimals):
+    """Digits without zeros at their end, but with those of a millimetre."""
+    text = f"{value:.{decimals}f}"
+    while text.endswith("0") and len(text) - text.index(".") > 4:
+        text = text[:-1]
+    return text
+
+
+def check_rows(tables, log):
+    """Tell what the job's contract would refuse, each text once, with the row it comes from."""
+    told = set()
+    for table, rows in tables.items():
+        for field in CONTRACT[table]:
+            for row in rows:
+                text = row.cells.get(field.name, "")
+                if not text:
+                    if field.required:
+                        _refuse(log, row, table, field)
+                    continue
+                try:
+                    read_value(field, text, ".")
+                except Refused as error:
+                    if (field.name, text) not in told:
+                        log.problem(row.file, error.text, row.row, f"{table}.{field.name}")
+                    told.add((field.name, text))
+
+
+def _refuse(log, row, table, field):
+    expected = message(
+        "imported_blank", "not in the file; expected {wanted}", wanted=field.expectation()
+    )
+    log.problem(row.file, expected, row.row, f"{table}.{field.name}")
+
+
+def columns_of(table, rows):
+    """The columns that a table needs, in the order of the contract."""
+    return [
+        field.name
+        for field in CONTRACT[table]
+        if field.required or any(row.cells.get(field.name) for row in rows)
+    ]

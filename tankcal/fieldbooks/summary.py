@@ -1,0 +1,199 @@
+"""What an import says: what was found, what was applied, and what was left out."""
+
+from tankcal.errors import Problem
+from tankcal.fieldbooks.detection import NAMES
+from tankcal.fieldbooks.faces import LARGE_DEG, LARGE_M
+from tankcal.job.checks.hits import MOST_HITS
+from tankcal.messages import list_some, message
+
+SHOWN = 8
+ARCSEC = 3600.0
+APPLIED_BY_INSTRUMENT = ("gsi", "sdr")  # formats whose distances have the prism constant in them
+
+
+def summarise(books, chosen, unused, names, stands, reports, coordinates, standing):
+    """Lines, in the order in which a surveyor asks.
+
+    unused       {what: shots}
+    coordinates  ({known point: ...}, {those of them that were written: ...})
+    standing     other tables of the folder that have rows
+    """
+    lines = []
+    for book in books:
+        lines += _of_book(book)
+    shown = [_of_setup(name, stands[place][0].station) for place, name in names.items()]
+    lines.append(message("import_setups", "set-ups: {names}", names=list_some(shown, SHOWN)))
+    reports = [one for one in reports if one.setup in names]
+    for report in reports:
+        lines += _of_faces(names[report.setup], report)
+    lines.append(message("import_hits", "hits of the wall: {count}", count=len(chosen.hits)))
+    lines += _of_targets(chosen)
+    known, stations = coordinates
+    if known:
+        lines.append(
+            message(
+                "import_known",
+                "points with coordinates: {count}; in control.csv, without standard deviations:"
+                " {names}",
+                count=len(known),
+                names=list_some(list(stations), SHOWN) or ["-"],
+            )
+        )
+    for what, shots in unused.items():
+        lines.append(
+            message(
+                "import_not_used",
+                "not used: {what}: {count} ({names})",
+                what=what,
+                count=len(shots),
+                names=list_some(list(dict.fromkeys(one.point or "?" for one in shots)), SHOWN),
+            )
+        )
+    if standing:
+        tables = [f"{one}.csv" for one in standing]
+        lines.append(
+            message(
+                "import_standing",
+                "{tables}: left as they are, nothing in the files is for them",
+                tables=tables,
+            )
+        )
+    return lines
+
+
+def _of_setup(name, station):
+    return name if name == station else f"{name} ({station})"
+
+
+def _of_book(book):
+    made = [NAMES[book.format], *([book.instrument] if book.instrument else [])]
+    yield message("import_file", "{file}: {made}; {units}", file=book.file, made=made,
+                  units=book.units or ["-"])  # fmt: skip
+    if book.format in APPLIED_BY_INSTRUMENT and book.shots:
+        constants = sorted({one.prism_mm for one in book.shots if one.prism_mm is not None})
+        yield message(
+            "import_applied",
+            "{file}: distances as the instrument wrote them, with its prism constant ({constants})"
+            " and ppm in them: nothing is applied again",
+            file=book.file,
+            constants=[f"{one:+g} mm" for one in constants] or ["-"],
+        )
+    for note in book.notes:
+        yield message("import_note", "{file}: {note}", file=book.file, note=note)
+    for counts, is_rejected in ((book.rejected, True), (book.left_out, False)):
+        for what, (count, row) in counts.items():
+            values = {"file": book.file, "what": what, "count": count, "row": str(row)}
+            if is_rejected:
+                yield message("import_rejected", "{file}: {what}, not used: {count}, the first in"
+                              " row {row}", **values)  # fmt: skip
+            else:
+                yield message("import_left_out", "{file}: not understood, so left out: {what}:"
+                              " {count}, the first in row {row}", **values)  # fmt: skip
+
+
+def _of_faces(setup, report):
+    yield message(
+        "import_faces",
+        "set-up {setup}: {pairs} points on both faces (their mean is taken), {first} on face 1"
+        " alone, {second} on face 2 alone",
+        setup=setup,
+        pairs=report.pairs,
+        first=report.single[0],
+        second=report.single[1],
+    )
+    if report.collimation is not None and report.index is not None:
+        yield message(
+            "import_collimation",
+            "set-up {setup}: collimation {c_arcsec:+.1f} arcsec (none further than"
+            " {c_spread:.1f}), index error {i_arcsec:+.1f} arcsec (none further than"
+            " {i_spread:.1f}), both distances within {apart_mm:.1f} mm",
+            setup=setup,
+            c_arcsec=ARCSEC * report.collimation[0],
+            c_spread=ARCSEC * report.collimation[1],
+            i_arcsec=ARCSEC * report.index[0],
+            i_spread=ARCSEC * report.index[1],
+            apart_mm=1000 * report.apart_m,
+        )
+
+
+def _of_targets(chosen):
+    for readings, is_control in ((chosen.control, True), (chosen.ties, False)):
+        points = list(dict.fromkeys(one.shot.point for one in readings))
+        if points and is_control:
+            yield message("import_control", "readings of control targets: {count} ({names})",
+                          count=len(readings), names=list_some(points, SHOWN))  # fmt: skip
+        elif points:
+            yield message("import_ties", "readings of targets that tie set-ups: {count} ({names})",
+                          count=len(readings), names=list_some(points, SHOWN))  # fmt: skip
+
+
+def warn_of(chosen, names, stands, reports):
+    """Problems that do not stop an import, but deserve a look."""
+    found = []
+    for place, name in names.items():
+        stand, file = stands[place]
+        if stand.height_m is None:
+            text = message("no_instrument_height", "set-up {setup}: no height of the instrument in"
+                           " the file: it is left blank (0)", setup=name)  # fmt: skip
+            found.append(Problem(file, text, stand.row))
+    for report in (one for one in reports if one.setup in names):
+        name, file = names[report.setup], stands[report.setup][1]
+        for what in (report.collimation, report.index):
+            if what is not None and max(abs(what[0]), what[1]) > LARGE_DEG:
+                text = message(
+                    "instrument_to_adjust",
+                    "set-up {setup}: the two faces differ by an error of {size:.0f} arcsec, over"
+                    " {limit:.0f}: is the instrument adjusted? Points on one face alone carry it",
+                    setup=name,
+                    size=ARCSEC * max(abs(what[0]), what[1]),
+                    limit=ARCSEC * LARGE_DEG,
+                )
+                found.append(Problem(file, text))
+                break
+        if report.apart_m > LARGE_M:
+            text = message(
+                "distances_apart",
+                "set-up {setup}: distances of both faces differ by {apart_mm:.1f} mm, over"
+                " {limit_mm:.0f}",
+                setup=name,
+                apart_mm=1000 * report.apart_m,
+                limit_mm=1000 * LARGE_M,
+            )
+            found.append(Problem(file, text))
+    if len(chosen.hits) > MOST_HITS:
+        shot = chosen.hits[0].shot
+        text = message(
+            "more_hits_than_a_job_takes",
+            "{count} hits, and a job takes at most {most}: leave some out with --leave",
+            count=len(chosen.hits),
+            most=MOST_HITS,
+        )
+        found.append(Problem(shot.file, text, shot.row))
+    found += _of_constants(chosen)
+    if chosen.ties:
+        text = message(
+            "frame_not_held",
+            "targets tie set-ups, and no file has standard deviations of coordinates: give those of"
+            " known points here, or [adjustment] datum = 'minimal' in job.toml",
+        )
+        found.append(Problem("control.csv", text))
+    return found
+
+
+def _of_constants(chosen):
+    """Hits that seem to have been read with the constant of a prism."""
+    hits = {one.shot.prism_mm for one in chosen.hits} - {None}
+    targets = {one.shot.prism_mm for one in (*chosen.control, *chosen.ties)} - {None}
+    first = chosen.hits[0].shot if chosen.hits else None
+    if len(hits) > 1:
+        text = message("several_constants", "hits with several prism constants: {constants} mm",
+                       constants=[f"{one:+g}" for one in sorted(hits)])  # fmt: skip
+        yield Problem(first.file, text, first.row)
+    elif hits - {0.0} and hits == targets:
+        text = message(
+            "constant_of_prism",
+            "hits of the bare wall with the prism constant of the targets, {constant:+g} mm: was"
+            " the instrument set to ranging without reflector?",
+            constant=next(iter(hits)),
+        )
+        yield Problem(first.file, text, first.row)

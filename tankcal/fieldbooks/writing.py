@@ -1,0 +1,126 @@
+"""The tables of an import in the folder of a job: all of them, or nothing.
+
+A table that has only headings, as `tankcal new` writes it, is filled in; one with rows is left as
+it is, and the import refused, unless it is to be replaced.
+"""
+
+import csv
+import io
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+from tankcal.errors import InputError, Problem
+from tankcal.fieldbooks.rows import CONTRACT, columns_of
+from tankcal.job.folder import csv_marks, read_toml
+from tankcal.job.tables import SETTINGS_FILE, Log, read_bytes
+from tankcal.messages import message
+
+
+def write_tables(folder, tables, *, replace):
+    """Write {table: rows} into a folder; returns (paths, names of other tables with rows).
+
+    Raises InputError when the folder is a file, or where tables with rows stand in the way.
+    """
+    folder, log = Path(folder), Log()
+    if folder.exists() and not folder.is_dir():
+        text = message("import_into_file", "is a file; expected the folder of a job")
+        raise InputError(Problem(folder.name, text))
+    separator, decimal = _marks(folder, log)
+    standing = [name for name in CONTRACT if _has_rows(folder / f"{name}.csv")]
+    if not replace:
+        for name in standing:
+            if name in tables:
+                text = message(
+                    "table_stands",
+                    "has rows already, and is left as it is; expected an empty table, or --replace",
+                )
+                log.problem(f"{name}.csv", text)
+    log.stop_if_problems()
+    texts = {
+        f"{name}.csv": _comments(folder / f"{name}.csv") + _text(name, rows, separator, decimal)
+        for name, rows in tables.items()
+    }
+    _put(folder, texts)
+    return [folder / name for name in texts], [one for one in standing if one not in tables]
+
+
+def _marks(folder, log):
+    """Separator and decimal mark of the job in the folder."""
+    if not (folder / SETTINGS_FILE).is_file():
+        return ",", "."
+    data = read_bytes(folder / SETTINGS_FILE, log)
+    settings = None if data is None else read_toml(SETTINGS_FILE, data, log)[0]
+    return csv_marks(SETTINGS_FILE, settings or {}, log) or (",", ".")
+
+
+def _lines(path):
+    try:
+        return path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+    except OSError:
+        return []
+
+
+def _has_rows(path):
+    """Whether a file has more than comments and a heading."""
+    return sum(bool(line.strip(" ,;\t")) and not line.startswith("#") for line in _lines(path)) > 1
+
+
+def _comments(path):
+    """The comments at the head of a table that is filled in."""
+    if _has_rows(path):
+        return ""
+    return "".join(f"{line}\n" for line in _lines(path) if line.startswith("#"))
+
+
+def _text(name, rows, separator, decimal):
+    columns, stream = columns_of(name, rows), io.StringIO()
+    numbers = {field.name for field in CONTRACT[name] if field.kind == "number"}
+    writer = csv.writer(stream, delimiter=separator, lineterminator="\n")
+    writer.writerow(columns)
+    for row in rows:
+        cells = [row.cells.get(one, "") for one in columns]
+        if decimal == ",":
+            cells = [
+                cell.replace(".", ",") if column in numbers else cell
+                for column, cell in zip(columns, cells, strict=True)
+            ]
+        writer.writerow(cells)
+    return stream.getvalue()
+
+
+def _put(folder, texts):
+    """Write the files beside the folder first, then move all of them into it."""
+    target = folder.resolve()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    temporary = Path(tempfile.mkdtemp(prefix=".tankcal-", dir=target.parent))
+    try:
+        for name, text in texts.items():
+            (temporary / name).write_text(text, encoding="utf-8", newline="")
+        if not target.exists():
+            temporary.chmod(0o755)
+            temporary.rename(target)
+            return
+        _move_all(temporary, target, texts)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _move_all(temporary, target, names):
+    """Move files into a folder; where one cannot be, those moved before go back."""
+    kept, done = temporary / "before", []
+    kept.mkdir()
+    try:
+        for name in names:
+            if (target / name).exists():
+                shutil.copy2(target / name, kept / name)
+            os.replace(temporary / name, target / name)
+            done.append(name)
+    except OSError:
+        for name in done:
+            if (kept / name).exists():
+                os.replace(kept / name, target / name)
+            else:
+                (target / name).unlink(missing_ok=True)
+        raise
