@@ -25,11 +25,6 @@ def facts(paper):
     )
 
 
-def method(paper):
-    """One line for the certificate: what was measured, how many points, sigma0."""
-    return words.method_line(paper.words, paper.record["adjustment"])
-
-
 def datum(paper):
     """Sentences: what holds the frame, and what depends on that choice."""
     return [blocks.listing(words.datum_sentences(paper.words, paper.record["adjustment"]))]
