@@ -136,7 +136,7 @@ def test_a_wrong_scale_of_the_survey_leaves_the_plates_alone():
     """dV/ds = integral of 2 r (r - t), closed form for a cylinder."""
     stack = shell([0, 9.5], lambda z: 6.5, inset_m=0.008)
     expected = 2 * np.pi * 6.5 * (6.5 - 0.008) * 9.5
-    assert stack.by_scale_m3([9.5])[0] == pytest.approx(expected, rel=1e-12)
+    assert stack.integrated([9.5], stack.scale_features)[0] == pytest.approx(expected, rel=1e-12)
 
 
 def barrelled(bulge, courses=3, taper=0.0):

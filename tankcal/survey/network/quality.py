@@ -96,14 +96,6 @@ def accuracy(adjusted, points, xyz_m, sd_m):
     )
 
 
-def control_factor(points, unknowns, equations=3):
-    """K = sqrt(p n / (p n - r)): residuals at control points times K stand for check points.
-
-    points  n          unknowns  r          equations  p, for each point
-    """
-    return float(np.sqrt(points * equations / (points * equations - unknowns)))
-
-
 @dataclass(frozen=True)
 class Compared:
     """Observations that were not adjusted, against the adjusted survey.
