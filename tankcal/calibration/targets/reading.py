@@ -151,24 +151,28 @@ def _lists(wanted, log):
                     "targets_number", "found {found:g}; expected a number of 0 or more", found=value
                 ),
             )
-    if wanted.what == "circles":
-        if wanted.names is not None:
-            log.problem(
-                "names",
-                message(
-                    "targets_names_of_circles", "only for coded targets; circles have `places`"
-                ),
-            )
-        if wanted.places is None:
-            log.problem(
-                "places",
-                message(
-                    "targets_places_missing",
-                    "missing; expected approximate places, which give the circles their names",
-                ),
-            )
-            return None, {}
-        return None, read_places(Path(wanted.places), log)
+    return _places_of_circles(wanted, log) if wanted.what == "circles" else _names(wanted, log)
+
+
+def _places_of_circles(wanted, log):
+    if wanted.names is not None:
+        log.problem(
+            "names",
+            message("targets_names_of_circles", "only for coded targets; circles have `places`"),
+        )
+    if wanted.places is None:
+        log.problem(
+            "places",
+            message(
+                "targets_places_missing",
+                "missing; expected approximate places, which give the circles their names",
+            ),
+        )
+        return None, {}
+    return None, read_places(Path(wanted.places), log)
+
+
+def _names(wanted, log):
     if wanted.places is not None:
         log.problem(
             "places",
@@ -304,6 +308,21 @@ def _warn(photos, wanted, names, log):
                 sizes=listed,
             ),
         )
+    _warn_of_names(photos, wanted, names, log)
+    if wanted.what != "circles" and names is None:
+        chance = dictionary_of(wanted.dictionary).chance
+        if chance > CHANCE_TOLD:
+            expected = message(
+                "targets_chance",
+                "by chance, one of {frames:.0f} black frames with anything inside is read as "
+                "a code; give the list of the ids that were placed",
+                frames=1 / chance,
+            )
+            log.warning("dictionary", expected)
+
+
+def _warn_of_names(photos, wanted, names, log):
+    """Targets in one photo only, and names of the list in none."""
     times = Counter(name for photo in photos for name in photo.targets)
     once = [name for name, count in times.items() if count == 1]
     if once and len(photos) > 1:
@@ -329,13 +348,3 @@ def _warn(photos, wanted, names, log):
                 names=listed,
             ),
         )
-    if wanted.what != "circles" and names is None:
-        chance = dictionary_of(wanted.dictionary).chance
-        if chance > CHANCE_TOLD:
-            expected = message(
-                "targets_chance",
-                "by chance, one of {frames:.0f} black frames with anything inside is read as "
-                "a code; give the list of the ids that were placed",
-                frames=1 / chance,
-            )
-            log.warning("dictionary", expected)
