@@ -2,7 +2,7 @@
 
 from tankcal.report import blocks
 from tankcal.report.survey.common import MOST_ROWS
-from tankcal.report.tables.survey import GROUPS
+from tankcal.report.tables.readings import GROUPS
 from tankcal.text import words
 from tankcal.text.digits import NOTHING
 
