@@ -31,11 +31,19 @@ SCALES = np.array([0.3, 0.3, 0.1, 0.1, 0.1, 0.3, 10.0, 10.0, 5.0, 5.0])  # of th
 def read_circles(image, smallest_px=6.0, largest_px=None):
     """White circular targets of a photograph: Found with Circles, without names.
 
-    image        (lines, columns) grey values, uint8 or float up to 255
-    smallest_px  least smaller axis (diameter)
-    largest_px   most larger axis; None: a tenth of the photo's smaller side, 30 px at least
+    Parameters
+    ----------
+    image : ndarray, shape (lines, columns)
+        Grey values, uint8 or float up to 255.
+    smallest_px : optional
+        Least smaller axis (diameter).
+    largest_px : optional
+        Most larger axis; None: a tenth of the photo's smaller side, 30 px at least.
 
-    Raises InputError without OpenCV.
+    Raises
+    ------
+    InputError
+        Without OpenCV.
     """
     image = np.asarray(image)
     if largest_px is None:

@@ -25,7 +25,10 @@ def ellipsoid_factor(probability, dof=np.inf):
 def ellipsoids(covariances_m2, probability=0.95, dof=np.inf):
     """Semi-axes (n, 3), m, largest first, and directions (n, 3, 3), one column for each.
 
-    covariances_m2  (n, 3, 3)
+    Parameters
+    ----------
+    covariances_m2 : ndarray, shape (n, 3, 3)
+        Of n points, m2.
     """
     values, vectors = np.linalg.eigh(covariances_m2)
     axes = np.sqrt(np.maximum(values[:, ::-1], 0.0)) * ellipsoid_factor(probability, dof)
@@ -112,7 +115,10 @@ class Compared:
 def compare_left_out(adjusted, observations):
     """Compare observations (coordinates relative to the survey's frame) that were left out.
 
-    observations  of tankcal.survey.observations, between points of the adjusted survey
+    Parameters
+    ----------
+    observations : tankcal.survey.observations
+        Between points of the adjusted survey.
     """
     problem, state = adjusted.problem, adjusted.solution.unknowns
     one = problem.relative(observations)

@@ -56,16 +56,21 @@ def global_test(chi2, dof, confidence=0.95, sides=2):
 class Adjusted:
     """An adjusted Survey. All covariances here are a priori: of variance factor 1.
 
-    survey    as it was handed in
-    problem   the Problem that was solved
-    solution  tankcal.adjust.Adjustment; its rows and chi2 with the scatter of repeated readings
-
     One rule for their scale: what goes on to the capacity table is the covariance a priori, from
     the declared sds, whatever sigma0 came out; the report shows sigma0 and the global test beside
     it. Only where the user asks for scale "a_posteriori" everything is multiplied by
     `scale("a_posteriori")`, sigma0 squared, and dof go with it. Never the smaller or larger of the
     two, never a part of the covariances: a test that is not passed is a doubt about observations or
     sds, to be cleared there (variance components, data snooping) and not by a factor.
+
+    Attributes
+    ----------
+    survey : Survey
+        As it was handed in.
+    problem : Problem
+        The one that was solved.
+    solution : tankcal.adjust.Adjustment
+        Its rows and chi2 with the scatter of repeated readings.
     """
 
     survey: object

@@ -42,11 +42,17 @@ class Delivery:
 class WorstDeliveries:
     """The worst of all deliveries of at least `minimum_m` whose dips are for use.
 
-    absolute, relative  the Delivery with the largest U, and the one with the largest U/volume
-    at_minimum          the one with the largest U/volume of those of exactly minimum_m; None: only
-                        higher ones are for use
-    U_bound_m3          no delivery between any two dips has a larger U
-    relative_bound      nor a larger U/volume than this
+    Attributes
+    ----------
+    absolute, relative : Delivery
+        The Delivery with the largest U, and the one with the largest U/volume.
+    at_minimum : Delivery or None
+        The one with the largest U/volume of those of exactly minimum_m; None: only higher ones
+        are for use.
+    U_bound_m3 : float
+        No delivery between any two dips has a larger U.
+    relative_bound : float
+        Nor a larger U/volume than this.
     """
 
     minimum_m: float
@@ -85,9 +91,13 @@ def worst_deliveries(table, minimum_m):
 def least_delivery_m(table, limit, is_relative=True):
     """Least delivery height (m, whole millimetres) from which on all deliveries keep a limit.
 
-    limit  of U/V, or of U in m3 when not is_relative
     The worst of all deliveries of at least a height falls with that height, so halving finds it.
     None where even the largest delivery breaks the limit.
+
+    Parameters
+    ----------
+    limit
+        Of U/V, or of U in m3 when not is_relative.
     """
     prepared = _prepared(table)
     heights = prepared.rows.height_m
