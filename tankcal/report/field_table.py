@@ -3,7 +3,7 @@
 from tankcal.report.numbers import unit
 from tankcal.report.tables.capacity import capacity_rows, capacity_table, parts_table
 from tankcal.report.tables.facts import FIELD_TABLE, REFERENCES, tank_facts
-from tankcal.report.uncertainty.table import note_on_use, times_across
+from tankcal.report.uncertainty.capacity import note_on_use, times_across
 
 MOST_ACROSS = 6
 
