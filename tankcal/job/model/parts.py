@@ -7,7 +7,20 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Course:
-    """One ring of plates, from the bottom up: height, plate and paint thickness, m."""
+    """One ring of plates, from the bottom up.
+
+    Attributes
+    ----------
+    name : str
+    height_m : float
+        From joint to joint, m.
+    thickness_m : float
+        Of its plates, m.
+    paint_m : float
+        Thickness of their paint, m.
+    welds_rad : tuple of float or None
+        Azimuths of its vertical welds, clockwise from +y, rad; None: not known.
+    """
 
     name: str
     height_m: float
@@ -176,7 +189,17 @@ class Sphere:
 
 @dataclass(frozen=True)
 class Mesh:
-    """A closed mesh of the inside: name and bytes of its file, metres of one unit of it."""
+    """A closed mesh of the inside.
+
+    Attributes
+    ----------
+    file : str
+        Name of its file.
+    unit_m : float
+        Length of one unit of it, m.
+    data : bytes
+        What the file holds.
+    """
 
     file: str
     unit_m: float

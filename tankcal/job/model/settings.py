@@ -174,7 +174,13 @@ class TableSpec:
 
 @dataclass(frozen=True)
 class Switches:
-    """Which corrections are made; one that is off is named in the report."""
+    """Which corrections are made; one that is off is named in the report.
+
+    Attributes
+    ----------
+    plate, paint, temperature, head, tilt, bottom, deadwood, roof : bool
+        False: that correction is not made.
+    """
 
     plate: bool = True
     paint: bool = True
@@ -188,8 +194,18 @@ class Switches:
 
 @dataclass(frozen=True)
 class Material:
-    """The shell's steel: Young's modulus Pa, thermal expansion 1/K."""
+    """The shell's steel.
+
+    Attributes
+    ----------
+    e_pa : float
+        Young's modulus, Pa.
+    expansion_per_k : float
+        Thermal expansion, 1/K.
+    expansion_given : bool
+        False: the default was taken, and the report says so.
+    """
 
     e_pa: float = 206e9
     expansion_per_k: float = 1.1e-5
-    expansion_given: bool = False  # False: the default was taken, and the report says so
+    expansion_given: bool = False

@@ -10,7 +10,15 @@ from tankcal.messages import message
 
 @dataclass(frozen=True)
 class Dips:
-    """Dips of given volumes: (n,) heights, m, and their standard uncertainties, m."""
+    """Dips of given volumes.
+
+    Attributes
+    ----------
+    height_m : ndarray, shape (n,)
+        The dips, m.
+    u_m : ndarray, shape (n,)
+        Their standard uncertainties, m.
+    """
 
     height_m: np.ndarray
     u_m: np.ndarray
