@@ -123,36 +123,3 @@ def height_polynomials(levels, degree):
     """
     t = np.linspace(0.0, 1.0, degree + 1)
     return np.linalg.solve(np.vander(t, increasing=True), height_basis(levels, t, degree))
-
-
-def height_products(levels, degree):
-    """Coefficients P_mij of l_i(t) l_j(t) = sum P_mij t^m, the products of `height_basis`.
-
-    With G of `polar_products` the area at the part t of a course's height is sum P_mij G_ij t^m,
-    and the volume below it, over that height, sum P_mij G_ij t^(m + 1) / (m + 1).
-
-    Parameters
-    ----------
-    levels : array_like, shape (k,)
-        Heights of the outlines, as fractions t of the height of a course.
-    degree : int
-
-    Returns
-    -------
-    ndarray, shape (2 degree + 1, k, k)
-
-    Examples
-    --------
-    A cone from radius 1 to 2 over a height of 1 has 7/3 of the volume of the cylinder of radius 1:
-
-    >>> products = np.pi * np.outer([1.0, 2.0], [1.0, 2.0])
-    >>> terms = np.einsum("mij,ij->m", height_products([0.0, 1.0], 1), products)
-    >>> round(float(terms @ [1, 1 / 2, 1 / 3] / np.pi), 12)
-    2.333333333333
-    """
-    powers = height_polynomials(levels, degree)
-    products = np.zeros((2 * degree + 1, powers.shape[1], powers.shape[1]))
-    for i in range(degree + 1):
-        for j in range(degree + 1):
-            products[i + j] += np.outer(powers[i], powers[j])
-    return products

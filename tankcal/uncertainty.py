@@ -18,17 +18,13 @@ from tankcal.gum.components import (
     Combined,
     Source,
     combine,
-    coverage_factor,
     declared_source,
-    dof_of,
-    effective_dof,
     factor_of,
     group_correlated,
-    least_of,
-    sum_of_fourths,
     together_dof,
     triangular,
 )
+from tankcal.gum.coverage import coverage_factor, dof_of, effective_dof, least_of, sum_of_fourths
 from tankcal.gum.inputs import Input, Inputs
 from tankcal.gum.propagation import Propagation, propagate
 from tankcal.gum.sensitivities import sensitivities_of

@@ -282,7 +282,7 @@ def interiors_in(record):
     return tuple(found)
 
 
-def _read(one, cameras):
+def _refuse_unknown_form(one):
     convention, affinity = one["convention"], one["affinity"]
     if convention not in CONVENTIONS or affinity not in AFFINITIES:
         raise ValueError(
@@ -293,7 +293,7 @@ def _read(one, cameras):
                 affinity=affinity,
             )
         )
-    names, free = one["parameters"], tuple(one["free"])
+    names, free = one["parameters"], one["free"]
     if not set(names) <= set(PARAMETERS) or not set(free) <= set(names):
         raise ValueError(
             message(
@@ -304,12 +304,9 @@ def _read(one, cameras):
                 free=list(free),
             )
         )
-    given = dict(zip(names, one["values"], strict=True))
-    scope = dict(zip(names, one["scopes"], strict=True))
-    state = dict(zip(names, one["states"], strict=True))
-    covariance = np.array(one["covariance"], dtype=float).reshape(len(free), len(free))
-    values = np.array([given.get(name, 0.0) for name in PARAMETERS], dtype=float)
-    half = np.array(one["edge_mm"], dtype=float).reshape(2)
+
+
+def _refuse_impossible(values, covariance, half):
     if not (np.isfinite(covariance).all() and np.isfinite(values).all() and (half > 0).all()):
         raise ValueError(
             message(
@@ -330,11 +327,23 @@ def _read(one, cameras):
                 c=values[0],
             )
         )
+
+
+def _read(one, cameras):
+    _refuse_unknown_form(one)
+    names, free = one["parameters"], tuple(one["free"])
+    given = dict(zip(names, one["values"], strict=True))
+    scope = dict(zip(names, one["scopes"], strict=True))
+    state = dict(zip(names, one["states"], strict=True))
+    covariance = np.array(one["covariance"], dtype=float).reshape(len(free), len(free))
+    values = np.array([given.get(name, 0.0) for name in PARAMETERS], dtype=float)
+    half = np.array(one["edge_mm"], dtype=float).reshape(2)
+    _refuse_impossible(values, covariance, half)
     common = len(cameras) > 1 and "block" in scope.values()
     return Interior(
         camera=str(one["camera"]),
         photos=None if one["photos"] is None else tuple(one["photos"]),
-        form=Form(convention, affinity, float(one["radial_balance_mm"])),
+        form=Form(one["convention"], one["affinity"], float(one["radial_balance_mm"])),
         values=values,
         scope=tuple(scope.get(name, "off") for name in PARAMETERS),
         state=tuple(state.get(name, "free") for name in PARAMETERS),

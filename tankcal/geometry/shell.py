@@ -13,15 +13,16 @@ import numpy as np
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
 from tankcal.geometry.buckles import find_buckles
-from tankcal.geometry.field.blunders import find_blunders
-from tankcal.geometry.field.sites import Sites
-from tankcal.geometry.snooping import (
+from tankcal.geometry.clutter import (
     LEAST_NOISE_M,
     distances_from_axis,
     find_form,
     find_rings,
     shell_problem,
 )
+from tankcal.geometry.field.blunders import find_blunders
+from tankcal.geometry.field.cells import MOST_SITES
+from tankcal.geometry.field.sites import Sites
 from tankcal.messages import message
 
 WIDE_BAND, WALL_BAND = 0.03, 0.01  # of the nominal radius: start, and largest believed deviation

@@ -1,4 +1,4 @@
-"""Components of uncertainty, effective degrees of freedom and coverage factor.
+"""Components of uncertainty: sources, alone and correlated, and what they make together.
 
 Table, budget and `propagate` all state u, degrees of freedom, k and U by `Combined`; deliveries
 and the calculator, which work on sums kept for speed, by the same `sum_of_fourths` and `dof_of`.
@@ -10,18 +10,17 @@ distribution). Of unequal ones no rule was found that neither falls short nor is
 were simulated the least fell short the least often, however the variances and the correlation had
 been estimated (docs/uncertainty.md).
 
-Sources: JCGM 100:2008 (GUM) 5.1, 5.2, G.4.
+Source: JCGM 100:2008 (GUM) 5.1, 5.2.
 """
 
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.polynomial import Chebyshev
-from scipy.special import ndtri, stdtrit
+
+from tankcal.gum.coverage import coverage_factor, effective_dof
 
 ROUNDING = 1e-12  # of the largest volume of a table: less than that is lost in its digits
-_SMOOTH_DOF, _DEGREE = 3.0, 20  # from where on, and of what degree, k is a polynomial in 1/dof
 
 
 @dataclass(frozen=True)
@@ -318,159 +317,3 @@ def combine(sources, rows):
     squares = [np.einsum("ij,ij->i", one.columns_m3, one.columns_m3) for one in sources]
     variances = np.reshape(squares, (len(squares), rows)).T
     return Combined(variances, np.array([one.u_dof for one in sources], dtype=float))
-
-
-def effective_dof(contributions, dof):
-    """Effective degrees of freedom by Welch-Satterthwaite, u^4 / sum(u_i^4 / dof_i).
-
-    Parameters
-    ----------
-    contributions : (rows, inputs) array
-        Standard uncertainty that each input brings, in the unit of the output.
-    dof : (inputs,) array
-        Degrees of freedom of each; may be inf.
-
-    Returns
-    -------
-    (rows,) array
-        Inf where no input with finite degrees of freedom contributes.
-
-    Notes
-    -----
-    JCGM 100:2008 G.4.1, equation G.2b.
-
-    Examples
-    --------
-    >>> effective_dof([[3.0, 4.0]], [9.0, np.inf]).round(2).tolist()
-    [69.44]
-    """
-    variance = np.asarray(contributions, dtype=float) ** 2
-    dof = np.asarray(dof, dtype=float)
-    return dof_of(np.sum(variance, axis=1), sum_of_fourths(variance, dof), least_of(dof))
-
-
-def sum_of_fourths(variance, dof):
-    """Sum of u_i^4 / dof_i.
-
-    This and the variance itself are all that the rule needs: what searches or writes formulas takes
-    both from here, and `dof_of` brings them together.
-
-    Parameters
-    ----------
-    variance : ndarray, shape (..., components)
-        u_i^2 of each component.
-    dof : array_like, shape (components,)
-        Degrees of freedom; may be inf.
-
-    Returns
-    -------
-    ndarray, shape (...,)
-
-    Examples
-    --------
-    >>> float(sum_of_fourths(np.array([9.0, 16.0]), [9.0, np.inf]))
-    9.0
-    """
-    dof = np.asarray(dof, dtype=float)
-    finite = np.isfinite(dof)
-    return variance[..., finite] ** 2 @ (1 / dof[finite])
-
-
-def dof_of(variance, fourths, least=0.0):
-    """Effective degrees of freedom u^4 / sum of u_i^4 / dof_i.
-
-    Parameters
-    ----------
-    variance : array_like, shape (...,)
-        u^2.
-    fourths : array_like, shape (...,)
-        The sum, of `sum_of_fourths`.
-    least : float, optional
-        Of any component: the effective ones are never fewer, and rounding makes them none.
-
-    Returns
-    -------
-    ndarray, shape (...,)
-        Inf where no component with finite degrees of freedom contributes.
-
-    Examples
-    --------
-    >>> round(float(dof_of(25.0, 9.0)), 2)
-    69.44
-    """
-    variance, fourths = np.asarray(variance, dtype=float), np.asarray(fourths, dtype=float)
-    dof = np.full(variance.shape, np.inf)
-    np.divide(variance**2, fourths, out=dof, where=fourths > 0)
-    return np.maximum(dof, least)
-
-
-def least_of(dof):
-    """The least of finite degrees of freedom; 0 without any.
-
-    Parameters
-    ----------
-    dof : array_like, shape (n,)
-
-    Returns
-    -------
-    float
-
-    Examples
-    --------
-    >>> least_of([np.inf, 7.0, 9.0]), least_of([np.inf])
-    (7.0, 0.0)
-    """
-    dof = np.asarray(dof, dtype=float)
-    return float(np.min(dof[np.isfinite(dof)], initial=np.inf)) if np.isfinite(dof).any() else 0.0
-
-
-def coverage_factor(probability, dof):
-    """Coverage factor k of a symmetric interval: of Student's t, of the normal for infinite dof.
-
-    Parameters
-    ----------
-    probability : float
-        Of the interval, between 0 and 1.
-    dof : (...) array
-        Degrees of freedom; may be inf.
-
-    Returns
-    -------
-    (...) array
-        k, without a unit.
-
-    Raises
-    ------
-    ValueError
-        For a probability that is not between 0 and 1.
-
-    Examples
-    --------
-    >>> coverage_factor(0.95, [8, np.inf]).round(3).tolist()
-    [2.306, 1.96]
-    """
-    if not 0 < probability < 1:
-        raise ValueError(f"coverage probability {probability}: expected between 0 and 1")
-    dof = np.asarray(dof, dtype=float)
-    upper = (1 + probability) / 2
-    k = np.full(dof.shape, ndtri(upper))
-    finite = np.isfinite(dof)
-    k[finite] = _student(upper, dof[finite])
-    return k
-
-
-def _student(upper, dof):
-    """(n,) quantiles of t; of many from 3 degrees of freedom on by a polynomial in 1/dof.
-
-    The quantile is smooth in 1/dof: the Chebyshev polynomial of degree 20 has it to 1e-14 of
-    itself (probabilities 0.1 to 0.9999), in a tenth of the time.
-    """
-    smooth = dof >= _SMOOTH_DOF
-    if np.count_nonzero(smooth) <= _DEGREE:
-        return stdtrit(dof, upper)
-    inverse = Chebyshev.interpolate(
-        lambda x: stdtrit(1 / x, upper), _DEGREE, domain=[0, 1 / _SMOOTH_DOF]
-    )
-    k = np.empty(len(dof))
-    k[smooth], k[~smooth] = inverse(1 / dof[smooth]), stdtrit(dof[~smooth], upper)
-    return k

@@ -27,7 +27,7 @@ from scipy.special import (
     stdtrit,
 )
 
-from tankcal.gum.components import coverage_factor
+from tankcal.gum.coverage import coverage_factor
 from tankcal.gum.inputs import Input
 
 

@@ -10,7 +10,7 @@ import re
 import unicodedata
 from dataclasses import dataclass
 
-from tankcal.job.misread import hint_of_date, hint_of_number, hint_of_text
+from tankcal.job.hints import hint_of_date, hint_of_number, hint_of_text
 from tankcal.job.tables import BadCell, Percent, nearest, shown
 from tankcal.messages import message
 from tankcal.text.form_words import NO, YES, meant

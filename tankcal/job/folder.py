@@ -35,18 +35,7 @@ _DECIMAL_COMMA = re.compile(
 
 def read_folder(folder, log):
     """RawJob of a job folder (a Path); what is wrong goes to `log`."""
-    try:
-        names = sorted(item.name for item in folder.iterdir())
-    except OSError as error:
-        log.problem(
-            folder.name,
-            message(
-                "folder_cannot_be_read",
-                "the folder cannot be read ({strerror})",
-                strerror=error.strerror,
-            ),
-        )
-        names = []
+    names = _names_in(folder, log)
     _refuse_unknown_files(names, log)
     files = []
 
@@ -94,6 +83,22 @@ def read_folder(folder, log):
         tuple(files),
         registers,
     )
+
+
+def _names_in(folder, log):
+    """Names of what is in a folder; [] after telling `log` that it cannot be read."""
+    try:
+        return sorted(item.name for item in folder.iterdir())
+    except OSError as error:
+        log.problem(
+            folder.name,
+            message(
+                "folder_cannot_be_read",
+                "the folder cannot be read ({strerror})",
+                strerror=error.strerror,
+            ),
+        )
+        return []
 
 
 def _hint(names):

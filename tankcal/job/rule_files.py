@@ -4,6 +4,7 @@ A rule is a TOML file (docs/job-format.md): [rule] says what it is, each [uncert
 limit of the expanded uncertainty, each [deviation.NAME] one of the deviation from a stated volume.
 """
 
+from tankcal.job.contract.shorthand import choice, positive
 from tankcal.job.entries import read_section
 from tankcal.job.fields import Field, is_blank
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
@@ -29,37 +30,28 @@ RULE = (
     Field("source", "text", "where its values were read", required=True),
     Field("verified", "flag", "whether they were read in the legal or technical text itself"),
     Field("remark", "text", "anything that is to stand beside it"),
-    Field(
-        "largest_capacity_m3", "number", "largest tank it is for", low=0, above_low=True, high=1e9
-    ),
+    positive("largest_capacity_m3", "largest tank it is for", 1e9),
 )
 _SHARED = (
     Field("tanks", "names", "kinds of tank that it is for"),
     Field("clause", "text", "where it stands in the text"),
     Field("verified", "flag", "whether it was read in the legal or technical text itself"),
 )
-_PERCENT = Field("limit_percent", "number", "limit in percent", low=0, above_low=True, high=100)
+_PERCENT = positive("limit_percent", "limit in percent", 100)
 LIMITS = {
     "uncertainty": (
-        Field("of", "choice", "what is limited", required=True, choices=UNCERTAINTY_OF),
+        choice("of", "what is limited", UNCERTAINTY_OF, required=True),
         _PERCENT,
-        Field("relative_to", "choice", "what the limit is a part of", choices=RELATIVE_TO),
-        Field(
-            "minimum_height_m",
-            "number",
-            "least height of a delivery",
-            low=0,
-            above_low=True,
-            high=100,
-        ),
+        choice("relative_to", "what the limit is a part of", RELATIVE_TO),
+        positive("minimum_height_m", "least height of a delivery", 100),
         *_SHARED,
     ),
     "deviation": (
-        Field("of", "choice", "what is limited", required=True, choices=DEVIATION_OF),
+        choice("of", "what is limited", DEVIATION_OF, required=True),
         _PERCENT,
-        Field("limit_m3", "number", "limit as a volume", low=0, above_low=True, high=1e9),
-        Field("side", "choice", "which deviations are limited", choices=SIDES),
-        Field("guard", "choice", "width of the guard band", required=True, choices=GUARDS),
+        positive("limit_m3", "limit as a volume", 1e9),
+        choice("side", "which deviations are limited", SIDES),
+        choice("guard", "width of the guard band", GUARDS, required=True),
         *_SHARED,
     ),
 }

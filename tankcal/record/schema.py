@@ -91,11 +91,12 @@ class Key:
 @cache
 def keys_of(cls):
     """Keys of a dataclass, as they are written."""
-    hints = get_type_hints(cls, include_extras=True)
+    hints, said = get_type_hints(cls, include_extras=True), _said_of_attributes(cls)
     found = []
     for one in fields(cls):
         optional = one.metadata.get("optional", False)
-        doc, named = one.metadata.get("doc", ""), one.metadata.get("named") or one.name
+        doc = one.metadata.get("doc") or said.get(one.name, "")
+        named = one.metadata.get("named") or one.name
         found.append(Key(named, one.name, hints[one.name], doc, not optional))
     told = [one for one in found if one.type is Message]
     for one in told:
@@ -188,6 +189,18 @@ def _reference(cls, definitions):
 def _said_of(cls):
     """What a class says of itself before the sections of its docstring."""
     return re.split(r"\n\n\w+\n---", getdoc(cls))[0]
+
+
+def _said_of_attributes(cls):
+    """{attribute: what the section Attributes of the docstring says of it}."""
+    section = re.search(r"\n\nAttributes\n-+\n(.*?\n)(?:\n|$)", f"{getdoc(cls)}\n", re.DOTALL)
+    entry = r"^(\w+(?:, \w+)*)(?: :.*)?\n((?: +.+\n)+)"  # names, their type, lines of text
+    entries = re.findall(entry, section[1], re.MULTILINE) if section else ()
+    return {
+        name: " ".join(text.split()).rstrip(".")
+        for names, text in entries
+        for name in names.split(", ")
+    }
 
 
 def _property(one, definitions):

@@ -5,7 +5,13 @@ Printed when given, never invented: what is not given is a line to write on, or 
 
 from tankcal.job.plausibility import CODES
 from tankcal.report import blocks
-from tankcal.report.survey import statistics
+from tankcal.report.tables.facts import (
+    CERTIFICATE,
+    REFERENCES,
+    SURVEY,
+    SURVEY_DATE,
+    tank_facts,
+)
 
 TO_WRITE_ON = ""
 _ELSEWHERE = ("number", "notice", "authorised_by", "authorised_role")
@@ -65,20 +71,18 @@ def _line(warning):
     return f"{place}: {warning['text']}"
 
 
+def tank(paper):
+    """The tank, and what its table refers to."""
+    shown = (tank_facts(paper.record), REFERENCES)
+    return paper.facts([fact for table in shown for fact in paper.facts_of(table, CERTIFICATE)])
+
+
 def calibration(paper):
     """How, in which conditions and with what the tank was measured."""
-    record, job = paper.record, paper.record["job"]
-    survey = job["survey"]
-    given = job["certificate"] | {"instruments": _instruments(paper)}
-    measured = [
-        ("survey_method", statistics.method(paper) if record["adjustment"] else None),
-        ("survey_side", paper.word(f"sides.{survey['side']}")),
-        ("shell_temperature", paper.number(survey["shell_temperature_c"], "degC", digits=3)),
-        ("liquid_level", paper.number(survey["liquid_level_m"], "m", decimals=3)),
-        ("liquid_density", paper.number(survey["liquid_density_kg_m3"], "kg/m3", digits=4)),
-    ]
+    given = paper.record["job"]["certificate"] | {"instruments": _instruments(paper)}
     declared = [(key, given[key]) for key in _CALIBRATION if given.get(key)]
-    return paper.facts([("survey_date", paper.day(survey["date"])), *declared, *measured])
+    date, measured = map(paper.facts_of, (SURVEY_DATE, SURVEY))
+    return paper.facts([*date, *declared, *measured])
 
 
 def _instruments(paper):

@@ -1,33 +1,17 @@
 """The table that a gauger carries: heights and volumes, millimetres by proportional parts, no U."""
 
-from tankcal.report.dip_point import dip_point_text
 from tankcal.report.numbers import unit
 from tankcal.report.tables.capacity import capacity_rows, capacity_table, parts_table
-from tankcal.report.uncertainty.table import note_on_use, times_across
+from tankcal.report.tables.facts import FIELD_TABLE, REFERENCES, tank_facts
+from tankcal.report.uncertainty.capacity import note_on_use, times_across
 
 MOST_ACROSS = 6
 
 
 def facts(paper):
     """What must be known to read a dip: tank, certificate, zero, reference height, temperature."""
-    record = paper.record
-    job, datum = record["job"], record["job"]["datum"]
-    density = job["table"]["liquid_density_kg_m3"] or None
-    return paper.facts(
-        [
-            ("tank_id", job["tank"]["id"]),
-            ("location", job["tank"]["details"].get("location")),
-            ("certificate_number", job["certificate"].get("number")),
-            ("zero", paper.word(f"zeros.{record['capacity']['zero']}")),
-            ("reference_height", paper.number(datum["reference_height_m"], "m", decimals=3)),
-            ("dip_point", dip_point_text(paper)),
-            (
-                "reference_temperature",
-                paper.number(job["table"]["reference_temperature_c"], "degC", digits=3),
-            ),
-            ("table_density", paper.number(density, "kg/m3", digits=4)),
-        ]
-    )
+    shown = (tank_facts(paper.record), REFERENCES)
+    return paper.facts([fact for table in shown for fact in paper.facts_of(table, FIELD_TABLE)])
 
 
 def table(paper):

@@ -100,6 +100,19 @@ class PlainPaper:
             [(self.label(key), value) for key, value in items if value not in (None, "")]
         )
 
+    def facts_of(self, table, on=None):
+        """(key, text) of a declared Table of one row, for `facts`: those that this paper shows."""
+        (row,) = table.rows(self.record)
+        return [(one.key, self._fact(one, row)) for one in table.on_paper(on, [row])]
+
+    def _fact(self, column, row):
+        if column.text is not None:
+            return column.text(self, row)
+        value = row.get(column.key)
+        if value is None or not column.is_text:
+            return self.number(value, column.unit, column.decimals, digits=column.digits)
+        return self.word(f"{column.words}.{value}") if column.words else value
+
     def rows(self, table, keys):
         """The rows of a table that the record holds as one list per column."""
         return [

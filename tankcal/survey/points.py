@@ -9,18 +9,30 @@ import numpy as np
 class Points:
     """Surveyed points, in the order of the file.
 
-    names       (n,) text            rows        (n,) row of each in its file, for messages
-    xyz_m       (n, 3) coordinates   covariance_m2  (3n, 3n), or None: not given
-    sd_m        (n, 3) standard deviations, or None: not given (estimated from residuals)
-    section     (n,) text or None: given section name
-    generatrix  (n,) text or None
-    causes      named causes that the covariance contains (`surveys.Cause`): covariance = the rest
-                + sum of column column', their columns over the coordinates of these points
-    from_adjustment  True: adjusted from a survey; the covariance has the scale that it should have
-    unbound     causes that nothing has told yet (a free offset): not in the covariance, their
-                columns are derivatives
-    by_inputs   {input of an uncertainty budget: (3n,) derivative of the coordinates by it}
-    file        where messages say they come from; "": of the rows
+    Attributes
+    ----------
+    names, rows : tuple
+        Text, and row of each in its file, for messages.
+    xyz_m : ndarray, shape (n, 3)
+        Coordinates.
+    sd_m : ndarray, shape (n, 3), or None
+        Standard deviations; None: not given (estimated from residuals).
+    covariance_m2 : ndarray, shape (3n, 3n), or None
+        None: not given.
+    section, generatrix : tuple
+        Given name of each, text or None.
+    causes : tuple
+        Named causes that the covariance contains (`survey.results.Cause`): covariance = the rest +
+        sum of column column', their columns over the coordinates of these points.
+    from_adjustment : bool
+        True: adjusted from a survey; the covariance has the scale that it should have.
+    unbound : tuple
+        Causes that nothing has told yet (a free offset): not in the covariance, their columns are
+        derivatives.
+    by_inputs : dict
+        {input of an uncertainty budget: (3n,) derivative of the coordinates by it}.
+    file : str
+        Where messages say they come from; "": of the rows.
     """
 
     names: tuple

@@ -39,6 +39,8 @@ def certified_distance_m(reading_m, tool):
 def true_distance_m(reading_m, tool, temperature_c):
     """Distance after the certificate of an instrument and its temperature.
 
+    Of a tape round the tank see `strapping.reduce_strap`.
+
         true = (reading + correction_m) (1 + correction) (1 + expansion (T - T_certified))
 
     reading_m, temperature_c  (n,), nan: not given        tool  job.Instrument

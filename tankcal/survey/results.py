@@ -103,12 +103,20 @@ class GroupOfReadings:
 class DatumReport:
     """What holds the frame.
 
-    choice       as asked for: "control", "fixed_photo", "minimal" or "inner"
-    defect       number of the seven ways that no observation feels, before the choice was applied
-    words        a sentence that names them; "" when the defect is 0
-    held         what holds them: names of points with axes ("P7:z"), or of the photo
-    vertical     True: observations determine the vertical, whatever the choice
-    scale        True: observations determine the scale
+    Attributes
+    ----------
+    choice : str
+        As asked for: "control", "fixed_photo", "minimal" or "inner".
+    defect : int
+        Number of the seven ways that no observation feels, before the choice was applied.
+    words : Message
+        a sentence that names them; "" when the defect is 0.
+    held : tuple
+        What holds them: names of points with axes ("P7:z"), or of the photo.
+    vertical : bool
+        True: observations determine the vertical, whatever the choice.
+    scale : bool
+        True: observations determine the scale.
     """
 
     choice: str

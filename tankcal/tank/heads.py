@@ -61,7 +61,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Bow:
+class EllipseArc:
     """A piece of an ellipse; its parameter is the angle u, 0 where the radius is greatest.
 
     x = centre_m + along_m sin u, r = offset_m + across_m cos u, from start to stop, rad
@@ -169,7 +169,7 @@ def meridian(end, radius_m):
         return _spherical(h, radius_m)
     if end.kind == "ellipsoidal":
         by_radius, by_depth = np.array([0.0, 0, 0, 1]), np.array([0.0, 0, 1, 0])
-        return (Bow(0.0, np.pi / 2, 0.0, 0.0, h, radius_m, _inputs(by_radius, by_depth)),)
+        return (EllipseArc(0.0, np.pi / 2, 0.0, 0.0, h, radius_m, _inputs(by_radius, by_depth)),)
     by_radius, by_depth = np.array([1.0, -1 / h]), np.array([0.0, radius_m / h**2])
     return (Line(0.0, h, radius_m, -radius_m / h, _inputs(by_radius, by_depth)),)
 
@@ -215,7 +215,7 @@ def _spherical(h, radius_m):
     by_radius = radius_m / h * np.array([-1.0, 0, 1, 1])
     by_depth = np.array([ball / h, 0, 1 - ball / h, 1 - ball / h])
     edge = np.pi / 2 - 2 * np.arctan2(h, radius_m)  # of the ball, above its greatest radius
-    return (Bow(edge, np.pi / 2, h - ball, 0.0, ball, ball, _inputs(by_radius, by_depth)),)
+    return (EllipseArc(edge, np.pi / 2, h - ball, 0.0, ball, ball, _inputs(by_radius, by_depth)),)
 
 
 def _torispherical(end, radius_m):
@@ -254,8 +254,8 @@ def _torispherical(end, radius_m):
         "end_plate": np.array([inner / reach, 0, -1, -1]),
     }
     return (
-        Bow(0.0, joint, 0.0, inner, knuckle, knuckle, of_knuckle),
-        Bow(joint, np.pi / 2, -reach, 0.0, dish, dish, of_dish),
+        EllipseArc(0.0, joint, 0.0, inner, knuckle, knuckle, of_knuckle),
+        EllipseArc(joint, np.pi / 2, -reach, 0.0, dish, dish, of_dish),
     )
 
 
@@ -273,7 +273,7 @@ class Cut:
         Of the liquid's surface above the axis.
     """
 
-    arc: Line | Bow
+    arc: Line | EllipseArc
     parameter: np.ndarray
     x_m: np.ndarray
     radius_m: np.ndarray
@@ -321,7 +321,7 @@ def integrate(arc, level_m, slope, integrands, nodes=NODES):
     Parameters
     ----------
     arc
-        Line or Bow.
+        Line or EllipseArc.
     level_m : ndarray, shape (rows,)
         Height of the liquid above the axis at x = 0.
     slope

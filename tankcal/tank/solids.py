@@ -11,7 +11,7 @@ import numpy as np
 
 from tankcal.errors import HeightError, SolutionError
 from tankcal.messages import message
-from tankcal.tank.heads import Bow, Cut, End, Line, depth_of, integrate, meridian
+from tankcal.tank.heads import Cut, EllipseArc, End, Line, depth_of, integrate, meridian
 from tankcal.tank.parts import Part
 
 ROUNDING = 1e-9  # of the highest dip: a dip so little outside is the top or the bottom itself
@@ -243,7 +243,7 @@ class LyingTank(Part):
 
 @dataclass(frozen=True)
 class _Piece:
-    arc: Line | Bow
+    arc: Line | EllipseArc
     origin_m: float
     way: int
     sign: int

@@ -102,10 +102,6 @@ class ShellVolume:
         """(rows,) loss of volume below each height by metre of plate or paint: the wetted wall."""
         return self.integrated(heights_m, self.girth_features)
 
-    def by_scale_m3(self, heights_m):
-        """(rows,) derivative of the volume below each height by a scale of surveyed lengths."""
-        return self.integrated(heights_m, self.scale_features)
-
     def by_missed_m2(self, heights_m, name, *, each=False):
         """Derivative of the volume below each height by a departure that was not declared.
 

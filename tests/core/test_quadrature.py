@@ -6,7 +6,6 @@ import pytest
 from tankcal.quadrature import (
     height_basis,
     height_polynomials,
-    height_products,
     panels,
     polar_products,
 )
@@ -49,15 +48,6 @@ def test_height_basis_reproduces_polynomials_and_sums_to_one():
     parabola = 6.5 + 0.01 * np.array(levels) - 0.002 * np.array(levels) ** 2
     expected = 6.5 + 0.01 * z - 0.002 * z**2
     assert height_basis(levels, z, 2) @ parabola == pytest.approx(expected, abs=1e-13)
-
-
-def test_height_products_give_areas_of_frustum():
-    levels, t = np.array([0.2, 0.8]), np.linspace(0, 1, 7)
-    products = height_products(levels, 1)
-    radii = 6.5 + 0.01 * levels
-    coefficients = np.pi * np.einsum("mij,i,j->m", products, radii, radii)
-    area = np.polynomial.polynomial.polyval(t, coefficients)
-    assert area == pytest.approx(np.pi * (6.5 + 0.01 * t) ** 2, rel=1e-13)  # closed form
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])

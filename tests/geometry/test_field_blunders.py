@@ -7,6 +7,7 @@ import pytest
 import scipy.linalg
 from test_field import RADIUS_M, sites_of
 
+from tankcal.geometry.clutter import find_rings
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.geometry.field.blunders import against_others, find_blunders, restricted_precision
 from tankcal.geometry.field.components import (
@@ -18,7 +19,6 @@ from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.evidence import likelihood_of
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
 from tankcal.geometry.field.sites import free_design
-from tankcal.geometry.snooping import find_rings
 
 
 def written_out(sites, variances_m2):

@@ -13,7 +13,7 @@ from job_builder import write_job
 import tankcal
 from tankcal.report import outputs
 from tankcal.report.paper import Paper
-from tankcal.report.uncertainty.table import NOT_FOR_USE, density_blocks
+from tankcal.report.uncertainty.capacity import NOT_FOR_USE, density_blocks
 
 pytestmark = pytest.mark.slow
 

@@ -21,7 +21,6 @@ from tankcal.survey.network.quality import (
     accuracy,
     compare_left_out,
     components,
-    control_factor,
     ellipsoid_factor,
     ellipsoids,
     estimate_variance_components,
@@ -465,4 +464,3 @@ def test_quality_of_points(adjusted):
     check = accuracy(adjusted, [3, 9], adjusted.xyz_m[[3, 9]] - away, np.zeros((2, 3)))
     assert check.r_xyz_m == pytest.approx(np.sqrt((25e-6 + 1e-6) / 2))
     assert (check.largest_m, check.mean_m) == (pytest.approx(0.005), pytest.approx(0.003))
-    assert control_factor(10, 6) == pytest.approx(np.sqrt(30 / 24))

@@ -171,21 +171,14 @@ def test_the_tau_test_does_not_need_the_true_sds(figure):
         snoop(SURVEY, test="t")
 
 
-def test_correlations_of_photos_and_cameras():
-    """Second method: the cofactors of all unknowns; angles by differences are checked elsewhere."""
-    found = adjust(SURVEY)
-    names, covariance = found.photo_and_camera(3)
-    assert names[:7] == ("x", "y", "z", "omega", "phi", "kappa", "c")
-    assert covariance[:6, :6] == pytest.approx(found.photos[2][3], rel=1e-9)
-    assert covariance[6:, 6:] == pytest.approx(found.camera(3)[2], rel=1e-9)
-    both = found.photo_covariance([3, 5])
-    assert both[:6, :6] == pytest.approx(covariance[:6, :6], rel=1e-9)
-    assert found.photo_covariance()[18:24, 30:36] == pytest.approx(both[:6, 6:], rel=1e-9)
-    r = correlations(covariance)
+def test_correlations_of_camera_parameters():
+    """Second way: the coefficient times both standard deviations is the covariance."""
+    _, names, covariance = adjust(SURVEY).camera(3)
+    r, sd = correlations(covariance), np.sqrt(np.diag(covariance))
+    assert names[0] == "c"
     assert np.diag(r) == pytest.approx(1)
     assert np.abs(r).max() <= 1 + 1e-12
-    sd = np.sqrt(np.diag(covariance))
-    assert r[0, 6] * sd[0] * sd[6] == pytest.approx(covariance[0, 6])
+    assert r * np.outer(sd, sd) == pytest.approx(covariance)
 
 
 def test_scale_of_the_covariances():

@@ -39,13 +39,23 @@ class _Reading:
 def read_coded(image, dictionary="DICT_4X4_50", listed=None, bit_errors=0, smallest_px=None):
     """Coded targets of a photograph: Found with Markers.
 
-    image        (lines, columns) grey values, uint8 or float up to 255
-    dictionary   its name in OpenCV, with or without "DICT_"
-    listed       ids that there are, or None: all of the dictionary
-    bit_errors   cells that may be wrong; 0: none
-    smallest_px  least mean side; None: 2.5 px a cell
+    Parameters
+    ----------
+    image : ndarray, shape (lines, columns)
+        Grey values, uint8 or float up to 255.
+    dictionary : optional
+        Its name in OpenCV, with or without "DICT_".
+    listed : optional
+        Ids that there are, or None: all of the dictionary.
+    bit_errors : optional
+        Cells that may be wrong; 0: none.
+    smallest_px : optional
+        Least mean side; None: 2.5 px a cell.
 
-    Raises InputError for a dictionary that is not known, or without OpenCV.
+    Raises
+    ------
+    InputError
+        For a dictionary that is not known, or without OpenCV.
     """
     known = dictionary_of(dictionary)
     smallest = CELL_PX * known.cells.shape[1] if smallest_px is None else smallest_px

@@ -16,11 +16,18 @@ BORDER_CELLS = 1
 class Dictionary:
     """The codes of a dictionary.
 
-    name      as OpenCV has it
-    cells     (codes, n, n) 0 and 1, as printed, the black border included
-    mirrored  ids whose mirror image is a code, too
-    turning   ids that look the same after a quarter or half turn
-    chance    probability that random cells inside a black border are one of the codes
+    Attributes
+    ----------
+    name : str
+        As OpenCV has it.
+    cells : ndarray, shape (codes, n, n)
+        0 and 1, as printed, the black border included.
+    mirrored : frozenset
+        Ids whose mirror image is a code, too.
+    turning : frozenset
+        Ids that look the same after a quarter or half turn.
+    chance : float
+        Probability that random cells inside a black border are one of the codes.
     """
 
     name: str
@@ -79,7 +86,10 @@ def dictionary_of(name):
 def target_image(dictionary, number, side_px, quiet_cells=1):
     """Grey values (m, m) uint8 of a target to print, whole pixels a cell, white zone around it.
 
-    side_px  of the black square; the next multiple of the number of cells is taken
+    Parameters
+    ----------
+    side_px
+        Of the black square; the next multiple of the number of cells is taken.
     """
     known = dictionary_of(dictionary)
     if not 0 <= number < len(known.cells):

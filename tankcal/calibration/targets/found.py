@@ -27,14 +27,23 @@ REASONS = {
 class Marker:
     """A coded square.
 
-    id           of the dictionary
-    corners_px   (4, 2) column and line, clockwise from the top left of the marker as printed; the
-                 centre of the photo's first pixel is (0, 0)
-    sd_px        (4,) standard deviation of both coordinates of each corner
-    bit_errors   cells that differ from the code, border included
-    side_px      mean length of the four sides
-    blur_px      mean blur of the edges, as a standard deviation
-    clarity      how black and white the cells are: 1, as printed; 0, all of the same grey
+    Attributes
+    ----------
+    id : int
+        Of the dictionary.
+    corners_px : ndarray, shape (4, 2)
+        Column and line, clockwise from the top left of the marker as printed; the centre of the
+        photo's first pixel is (0, 0).
+    sd_px : ndarray, shape (4,)
+        Standard deviation of both coordinates of each corner.
+    bit_errors : int
+        Cells that differ from the code, border included.
+    side_px : float
+        Mean length of the four sides.
+    blur_px : float
+        Mean blur of the edges, as a standard deviation.
+    clarity : float
+        How black and white the cells are: 1, as printed; 0, all of the same grey.
     """
 
     id: int
@@ -74,14 +83,22 @@ def _diagonals(corners):
 class Circle:
     """A white circle on a dark ground.
 
-    centre_px        (2,) of the ellipse; the circle's own centre is a little beside it, see
-                     eccentricity_px
-    sd_px            standard deviation of both coordinates
-    semi_axes_px     (2,) larger and smaller half axis
-    turn_rad         of the larger one, from the columns towards the lines
-    blur_px          blur of the edge
-    contrast         white minus black, grey values
-    rms_grey         of the residuals of the fit
+    Attributes
+    ----------
+    centre_px : ndarray, shape (2,)
+        Of the ellipse; the circle's own centre is a little beside it, see eccentricity_px.
+    sd_px : float
+        Standard deviation of both coordinates.
+    semi_axes_px : ndarray, shape (2,)
+        Larger and smaller half axis.
+    turn_rad : float
+        Of the larger one, from the columns towards the lines.
+    blur_px : float
+        Blur of the edge.
+    contrast : float
+        White minus black, grey values.
+    rms_grey : float
+        Of the residuals of the fit.
     """
 
     centre_px: np.ndarray
@@ -97,10 +114,16 @@ class Circle:
 class Refused:
     """Something that looks like a target and was not accepted.
 
-    code      one of REASONS
-    place_px  (2,) its middle
-    id        of the dictionary, or None
-    detail    {what: number} that the reason rests on
+    Attributes
+    ----------
+    code : str
+        One of REASONS.
+    place_px : ndarray, shape (2,)
+        Its middle.
+    id : int or None
+        Of the dictionary, or None.
+    detail : dict
+        {what: number} that the reason rests on.
     """
 
     code: str
@@ -113,11 +136,17 @@ class Refused:
 class Found:
     """What one photograph holds.
 
-    targets   Markers in the order of their ids, or Circles from top to bottom
-    refused   Refused
-    size_px   (columns, lines)
-    doubtful  ids among the targets whose mirror image is a code of the same dictionary: a flipped
-              photo would not be noticed by them
+    Attributes
+    ----------
+    targets : tuple
+        Markers in the order of their ids, or Circles from top to bottom.
+    refused : tuple
+        Refused.
+    size_px : tuple
+        (columns, lines).
+    doubtful : tuple
+        Ids among the targets whose mirror image is a code of the same dictionary: a flipped
+        photo would not be noticed by them.
     """
 
     targets: tuple

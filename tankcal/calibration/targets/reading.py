@@ -35,16 +35,27 @@ CHANCE_TOLD = 1e-4  # that random cells are a code
 class Wanted:
     """What to read.
 
-    what         "corners" of coded targets (name-1 .. name-4), their "centres", or "circles"
-    dictionary   of coded targets, as OpenCV calls it
-    names        path of a CSV file with id and point, or None: the number is the name, and every
-                 id of the dictionary is accepted
-    places       of circles: path of a CSV file with photo, point, column_px, line_px
-    reach_px     of circles: how far one may be from its approximate place
-    smallest_px  least side, or diameter; None: 2.5 px a cell, or 6
-    largest_px   of circles: largest diameter; None: a tenth of the photo
-    bit_errors   cells of a code that may be wrong
-    encoding     one of pictures.ENCODINGS: how grey values stand for light
+    Attributes
+    ----------
+    what : str
+        "corners" of coded targets (name-1 .. name-4), their "centres", or "circles".
+    dictionary : str
+        Of coded targets, as OpenCV calls it.
+    names : Path or None
+        Path of a CSV file with id and point, or None: the number is the name, and every id of
+        the dictionary is accepted.
+    places : Path or None
+        Of circles: path of a CSV file with photo, point, column_px, line_px.
+    reach_px : float
+        Of circles: how far one may be from its approximate place.
+    smallest_px : float or None
+        Least side, or diameter; None: 2.5 px a cell, or 6.
+    largest_px : float or None
+        Of circles: largest diameter; None: a tenth of the photo.
+    bit_errors : int
+        Cells of a code that may be wrong.
+    encoding : str
+        One of pictures.ENCODINGS: how grey values stand for light.
     """
 
     what: str = "corners"
@@ -62,11 +73,18 @@ class Wanted:
 class Reading:
     """What was read and written.
 
-    photos                  PhotoReadings
-    path, refused_path      files that were written
-    targets, points         how many, over all photos
-    refused                 {reason code: how many}
-    warnings                Problems that stop nothing
+    Attributes
+    ----------
+    photos : tuple
+        PhotoReadings.
+    path, refused_path : Path
+        Files that were written.
+    targets, points : int
+        How many, over all photos.
+    refused : dict
+        {reason code: how many}.
+    warnings : tuple
+        Problems that stop nothing.
     """
 
     photos: tuple
@@ -81,13 +99,23 @@ class Reading:
 def read_photographs(paths, out_csv, wanted=None, replace=False, progress=None):
     """Read targets in photographs and write image_points.csv: a Reading. All or nothing.
 
-    paths    of the pictures; a photo's name is that of its file, without the ending
-    out_csv  path of image_points.csv; what was refused goes to ..._refused.csv beside it
-    wanted   a Wanted
-    replace  whether files that are there may be overwritten
-    progress function (text, done, total), called before each photo and at the end
+    Parameters
+    ----------
+    paths
+        Of the pictures; a photo's name is that of its file, without the ending.
+    out_csv
+        Path of image_points.csv; what was refused goes to ..._refused.csv beside it.
+    wanted : Wanted, optional
+        What to read; None: the corners of coded targets.
+    replace : optional
+        Whether files that are there may be overwritten.
+    progress : callable, optional
+        Called as progress(text, done, total) before each photo and at the end.
 
-    Raises InputError with everything that is wrong with files, names and settings.
+    Raises
+    ------
+    InputError
+        With everything that is wrong with files, names and settings.
     """
     wanted, log = wanted or Wanted(), Log()
     opencv()
@@ -151,24 +179,28 @@ def _lists(wanted, log):
                     "targets_number", "found {found:g}; expected a number of 0 or more", found=value
                 ),
             )
-    if wanted.what == "circles":
-        if wanted.names is not None:
-            log.problem(
-                "names",
-                message(
-                    "targets_names_of_circles", "only for coded targets; circles have `places`"
-                ),
-            )
-        if wanted.places is None:
-            log.problem(
-                "places",
-                message(
-                    "targets_places_missing",
-                    "missing; expected approximate places, which give the circles their names",
-                ),
-            )
-            return None, {}
-        return None, read_places(Path(wanted.places), log)
+    return _places_of_circles(wanted, log) if wanted.what == "circles" else _names(wanted, log)
+
+
+def _places_of_circles(wanted, log):
+    if wanted.names is not None:
+        log.problem(
+            "names",
+            message("targets_names_of_circles", "only for coded targets; circles have `places`"),
+        )
+    if wanted.places is None:
+        log.problem(
+            "places",
+            message(
+                "targets_places_missing",
+                "missing; expected approximate places, which give the circles their names",
+            ),
+        )
+        return None, {}
+    return None, read_places(Path(wanted.places), log)
+
+
+def _names(wanted, log):
     if wanted.places is not None:
         log.problem(
             "places",
@@ -304,6 +336,21 @@ def _warn(photos, wanted, names, log):
                 sizes=listed,
             ),
         )
+    _warn_of_names(photos, wanted, names, log)
+    if wanted.what != "circles" and names is None:
+        chance = dictionary_of(wanted.dictionary).chance
+        if chance > CHANCE_TOLD:
+            expected = message(
+                "targets_chance",
+                "by chance, one of {frames:.0f} black frames with anything inside is read as "
+                "a code; give the list of the ids that were placed",
+                frames=1 / chance,
+            )
+            log.warning("dictionary", expected)
+
+
+def _warn_of_names(photos, wanted, names, log):
+    """Targets in one photo only, and names of the list in none."""
     times = Counter(name for photo in photos for name in photo.targets)
     once = [name for name, count in times.items() if count == 1]
     if once and len(photos) > 1:
@@ -329,13 +376,3 @@ def _warn(photos, wanted, names, log):
                 names=listed,
             ),
         )
-    if wanted.what != "circles" and names is None:
-        chance = dictionary_of(wanted.dictionary).chance
-        if chance > CHANCE_TOLD:
-            expected = message(
-                "targets_chance",
-                "by chance, one of {frames:.0f} black frames with anything inside is read as "
-                "a code; give the list of the ids that were placed",
-                frames=1 / chance,
-            )
-            log.warning("dictionary", expected)

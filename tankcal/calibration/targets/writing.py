@@ -29,12 +29,20 @@ class ImagePoint:
 class PhotoReading:
     """What was read in one photo.
 
-    photo        its name
-    size_px      (columns, lines)
-    orientation  what its file says about turning it, 1: nothing; never applied
-    targets      names of the targets, before corners
-    points       ImagePoints
-    refused      Refused
+    Attributes
+    ----------
+    photo : str
+        Its name.
+    size_px : tuple
+        (columns, lines).
+    orientation : int
+        What its file says about turning it, 1: nothing; never applied.
+    targets : tuple
+        Names of the targets, before corners.
+    points : tuple
+        ImagePoints.
+    refused : tuple
+        Refused.
     """
 
     photo: str
@@ -71,10 +79,17 @@ def check_free(path, replace, log):
 def write_image_points(photos, path, replace=False):
     """Write image_points.csv and the list of the refused beside it: (2,) their paths.
 
-    photos   PhotoReadings; rows in their order
-    replace  whether files that are there may be overwritten
+    Parameters
+    ----------
+    photos
+        PhotoReadings; rows in their order.
+    replace : optional
+        Whether files that are there may be overwritten.
 
-    Raises InputError for files that are there already, or cannot be written; then none is.
+    Raises
+    ------
+    InputError
+        For files that are there already, or cannot be written; then none is.
     """
     taken = [one.name for one in (Path(path), refused_path(path)) if one.exists()]
     if taken and not replace:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from tankcal.errors import ProgramError
-from tankcal.gum.components import coverage_factor
+from tankcal.gum.coverage import coverage_factor
 
 NAMES = ("value", "u", "low", "high", "shortest_low", "shortest_high")
 SAFETY = 1.3  # a standard error from ten batches is itself known to a quarter

@@ -17,7 +17,7 @@ from tankcal.gum.monte_carlo.goal import Goal, may_stop, simulation
 from tankcal.gum.monte_carlo.inputs import inputs_of, uniforms
 from tankcal.gum.monte_carlo.linear import linear_law, shapes_of
 from tankcal.gum.monte_carlo.quadratic import QuadraticRows
-from tankcal.gum.monte_carlo.table import table_estimates
+from tankcal.gum.monte_carlo.quadratic_rows import table_estimates
 
 DIFFERENCE = 1e-3  # step of the derivatives, in scales of the input
 

@@ -4,25 +4,24 @@ import numpy as np
 
 from tankcal.job.checking import has_rows, is_not_given, places_of, tell, zero_z
 from tankcal.job.contract.kinds import VERTICAL
+from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.fields import Field
 from tankcal.messages import message
 
 KEYS = (
-    Field(
+    choice(
         "form",
-        "choice",
         "form of the bottom; blank: flat, or points or liquid when bottom.csv has their columns",
+        ("flat", "leaning", "cone", "dish", "points", "liquid"),
         kinds=VERTICAL,
-        choices=("flat", "leaning", "cone", "dish", "points", "liquid"),
     ),
-    Field(
+    number(
         "centre_z_m",
-        "number",
         "cone and dish: z of the centre, in the frame of the points, metres; the edge is at"
         " datum.bottom_z_m",
+        -1e5,
+        1e5,
         kinds=VERTICAL,
-        low=-1e5,
-        high=1e5,
     ),
 )
 

@@ -1,17 +1,17 @@
 """correlations.csv: its columns; pairs of declared inputs, each once, and possible together."""
 
 from tankcal.gum.distributions import Normal
+from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.contract.uncertainty import INPUTS
-from tankcal.job.fields import Field
 from tankcal.messages import message
 from tankcal.uncertainty import Input, Inputs
 
 CORRELATED = tuple(name for name, one in INPUTS.items() if one.correlates)
 
 COLUMNS = (
-    Field("input", "choice", "an input of uncertainty.csv", required=True, choices=CORRELATED),
-    Field("with", "choice", "another one, correlated with it", required=True, choices=CORRELATED),
-    Field("r", "number", "their coefficient of correlation", required=True, low=-1, high=1),
+    choice("input", "an input of uncertainty.csv", CORRELATED, required=True),
+    choice("with", "another one, correlated with it", CORRELATED, required=True),
+    number("r", "their coefficient of correlation", -1, 1, required=True),
 )
 
 

@@ -3,22 +3,15 @@
 import numpy as np
 
 from tankcal.job.checking import loads_the_shell, refuse_repeated, zero_z
+from tankcal.job.contract.shorthand import number, positive
 from tankcal.job.fields import Field
 from tankcal.messages import message
 
 COLUMNS = (
     Field("course", "name", "name of the ring of plates, from the bottom up", required=True),
-    Field(
-        "height_m",
-        "number",
-        "height of the course, metres",
-        required=True,
-        low=0,
-        above_low=True,
-        high=50,
-    ),
-    Field("thickness_mm", "number", "plate thickness, millimetres", required=True, low=0, high=100),
-    Field("paint_mm", "number", "paint thickness, millimetres; blank: 0", low=0, high=10),
+    positive("height_m", "height of the course, metres", 50, required=True),
+    number("thickness_mm", "plate thickness, millimetres", 0, 100, required=True),
+    number("paint_mm", "paint thickness, millimetres; blank: 0", 0, 10),
 )
 
 HEIGHT_MISS_M, HEIGHT_MISS_RELATIVE = 0.020, 0.002

@@ -3,43 +3,31 @@
 import re
 
 from tankcal.job.checking import refuse_repeated
+from tankcal.job.contract.shorthand import number
 from tankcal.job.fields import Field
 from tankcal.job.plausibility import GIVES_ROOM, TAKES_ROOM
 from tankcal.messages import message
 
 COLUMNS = (
     Field("name", "name", "name of the thing, once in the file", required=True),
-    Field(
+    number(
         "bottom_m",
-        "number",
         "dip of its lowest point, from the table's zero, metres",
+        -100,
+        100,
         required=True,
-        low=-100,
-        high=100,
     ),
-    Field(
-        "top_m",
-        "number",
-        "dip of its highest point, from the table's zero, metres",
-        required=True,
-        low=-100,
-        high=100,
+    number(
+        "top_m", "dip of its highest point, from the table's zero, metres", -100, 100, required=True
     ),
-    Field(
+    number(
         "volume_m3",
-        "number",
         "its volume, cubic metres: negative takes room (a pipe), positive gives room (a manhole)",
+        -1e6,
+        1e6,
         required=True,
-        low=-1e6,
-        high=1e6,
     ),
-    Field(
-        "u_m3",
-        "number",
-        "standard uncertainty of its volume, cubic metres",
-        low=0,
-        high=1e5,
-    ),
+    number("u_m3", "standard uncertainty of its volume, cubic metres", 0, 1e5),
 )
 
 TOLERANCE_M = 0.05  # by which a thing may stick out of the drawing's tank

@@ -2,73 +2,54 @@
 
 from tankcal.job.contract.kinds import KINDS, VERTICAL, WITH_POINTS
 from tankcal.job.contract.registers import CAMERA_SETTINGS
+from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.fields import Field
 from tankcal.text.languages import LANGUAGES
 
 # The keys of [table].
 
 TABLE = (
-    Field(
+    positive(
         "step_m",
-        "number",
         "step of the capacity table, metres: 0.01 for centimetres; blank with feet and inches",
-        low=0,
-        above_low=True,
         start="0.01",
     ),
-    Field(
+    number(
         "reference_temperature_c",
-        "number",
         "shell temperature that the table is for, degrees Celsius",
+        -200,
+        300,
         required=True,
-        low=-200,
-        high=300,
     ),
-    Field(
+    choice(
         "height_unit",
-        "choice",
         "of the printed table: m, or feet and inches in steps of 1/8 or 1/16 inch; blank: m",
-        choices=("m", "ft-in-8", "ft-in-16"),
+        ("m", "ft-in-8", "ft-in-16"),
     ),
-    Field(
+    choice(
         "volume_unit",
-        "choice",
         "of the printed table: m3, L, or bbl (42 US gallons); blank: m3",
-        choices=("m3", "L", "bbl"),
+        ("m3", "L", "bbl"),
     ),
-    Field(
-        "fine_step_m",
-        "number",
-        "smaller step within fine_zones, metres",
-        low=0,
-        above_low=True,
-    ),
+    positive("fine_step_m", "smaller step within fine_zones, metres"),
     Field(
         "fine_zones",
         "ranges",
         "dips, metres, between which the table has that step: 0-0.3; 2.1-2.4",
     ),
-    Field(
+    positive(
         "max_interpolation_error_l",
-        "number",
         "largest error of linear interpolation between rows, litres; without step_m the step is"
         " chosen by it",
-        low=0,
-        above_low=True,
-        high=1e5,
+        1e5,
     ),
-    Field(
-        "height_expansion",
-        "flag",
-        "true: dips expand with the shell, too; blank: false",
-    ),
-    Field(
+    Field("height_expansion", "flag", "true: dips expand with the shell, too; blank: false"),
+    number(
         "liquid_density_kg_m3",
-        "number",
         "density of the liquid that loads the shell, kg/m3; 0 or blank: no head",
+        0,
+        3000,
         kinds=VERTICAL,
-        low=0,
-        high=3000,
     ),
     Field(
         "other_densities_kg_m3",
@@ -79,13 +60,7 @@ TABLE = (
         above_low=True,
         high=3000,
     ),
-    Field(
-        "coverage_probability",
-        "number",
-        "of the expanded uncertainty; blank: 0.95",
-        low=0.5,
-        high=0.9999,
-    ),
+    number("coverage_probability", "of the expanded uncertainty; blank: 0.95", 0.5, 0.9999),
     Field(
         "rule",
         "rule name",
@@ -102,16 +77,9 @@ TABLE = (
         high=100,
     ),
     Field(
-        "monte_carlo",
-        "flag",
-        "false: no Monte Carlo beside the law of propagation; blank: true",
+        "monte_carlo", "flag", "false: no Monte Carlo beside the law of propagation; blank: true"
     ),
-    Field(
-        "language",
-        "choice",
-        "language of the papers; blank: English",
-        choices=LANGUAGES,
-    ),
+    choice("language", "language of the papers; blank: English", LANGUAGES),
 )
 
 
@@ -120,28 +88,26 @@ def _text(name, note):
 
 
 def _size(name, note, high, required_for=()):
-    return Field(name, "number", note, required_for=required_for, low=0.1, high=high)
+    return number(name, note, 0.1, high, required_for=required_for)
 
 
 TANK = (
     Field("id", "tank id", "the tank's name or number", required=True),
-    Field(
+    choice(
         "kind",
-        "choice",
         "kind of tank: vertical (an upright cylinder), horizontal (a lying one), sphere, or mesh"
         " (any closed surface)",
+        KINDS,
         required=True,
-        choices=KINDS,
         start="vertical",
     ),
     _size("nominal_diameter_m", "diameter from the drawing, metres", 300, VERTICAL),
     _size("nominal_height_m", "height of the shell from the drawing, metres", 100, VERTICAL),
-    Field(
+    number(
         "nominal_volume_m3",
-        "number",
         "capacity from the drawing, cubic metres; the result is compared with it",
-        low=0.01,
-        high=1e6,
+        0.01,
+        1e6,
     ),
     _text("owner", "who owns the tank"),
     _text("location", "where it stands"),
@@ -153,85 +119,58 @@ TANK = (
     _text("remarks", "anything to be printed about the tank"),
 )
 SURVEY = (
-    Field(
+    choice(
         "side",
-        "choice",
         "side of the wall on which points and sizes were measured",
+        ("outside", "inside"),
         required=True,
         kinds=WITH_POINTS,
-        choices=("outside", "inside"),
     ),
     Field("date", "date", "day of the survey, year-month-day", required=True),
-    Field(
+    number(
         "shell_temperature_c",
-        "number",
         "temperature of the shell during the survey, degrees Celsius; blank: no correction",
-        low=-200,
-        high=300,
+        -200,
+        300,
     ),
-    Field(
+    number(
         "liquid_level_m",
-        "number",
         "liquid in the tank during the survey: its dip from the table's zero, metres; 0 or blank:"
         " empty",
+        0,
+        100,
         kinds=VERTICAL,
-        low=0,
-        high=100,
     ),
-    Field(
+    number(
         "liquid_density_kg_m3",
-        "number",
         "density of that liquid, kg/m3; 0 or blank: empty",
+        0,
+        3000,
         kinds=VERTICAL,
-        low=0,
-        high=3000,
     ),
 )
 DATUM = (
-    Field(
+    number(
         "bottom_z_m",
-        "number",
         "z of the bottom of the first course, in the frame of the points, metres",
+        -1e5,
+        1e5,
         required_for=VERTICAL,
         kinds=VERTICAL,
-        low=-1e5,
-        high=1e5,
     ),
-    Field(
+    number(
         "dip_plate_z_m",
-        "number",
         "z of the dip plate, the table's zero, metres; blank: the bottom",
-        low=-1e5,
-        high=1e5,
+        -1e5,
+        1e5,
     ),
-    Field("dip_x_m", "number", "x of the dip point, metres", kinds=VERTICAL, low=-1e8, high=1e8),
-    Field("dip_y_m", "number", "y of the dip point, metres", kinds=VERTICAL, low=-1e8, high=1e8),
-    Field(
-        "reference_height_m",
-        "number",
-        "gauge reference point above the table's zero, metres",
-        low=0,
-        above_low=True,
-        high=200,
-    ),
+    number("dip_x_m", "x of the dip point, metres", -1e8, 1e8, kinds=VERTICAL),
+    number("dip_y_m", "y of the dip point, metres", -1e8, 1e8, kinds=VERTICAL),
+    positive("reference_height_m", "gauge reference point above the table's zero, metres", 200),
 )
 MATERIAL = (
-    Field(
-        "e_gpa",
-        "number",
-        "Young's modulus of the shell, GPa; blank: 206",
-        kinds=VERTICAL,
-        low=40,
-        high=500,
-    ),
-    Field(
-        "expansion_per_k",
-        "number",
-        "thermal expansion of the shell, 1/K; blank: 1.1e-5",
-        low=0,
-        above_low=True,
-        high=1e-4,
-    ),
+    number("e_gpa", "Young's modulus of the shell, GPa; blank: 206", 40, 500, kinds=VERTICAL),
+    positive("expansion_per_k", "thermal expansion of the shell, 1/K; blank: 1.1e-5", 1e-4),
 )
 ADJUSTMENT = (
     Field(
@@ -240,20 +179,18 @@ ADJUSTMENT = (
         "test the points and reject the bad ones; blank: true",
         kinds=WITH_POINTS,
     ),
-    Field(
+    choice(
         "scale",
-        "choice",
         "variances as given (a_priori) or from the residuals; blank: a_priori",
+        ("a_priori", "a_posteriori"),
         kinds=WITH_POINTS,
-        choices=("a_priori", "a_posteriori"),
     ),
-    Field(
+    choice(
         "datum",
-        "choice",
         "what holds the frame of the adjusted points: control, fixed_photo, minimal or inner;"
         " blank: control",
+        ("control", "fixed_photo", "minimal", "inner"),
         kinds=WITH_POINTS,
-        choices=("control", "fixed_photo", "minimal", "inner"),
         of_survey=True,
     ),
     Field(
@@ -270,25 +207,19 @@ ADJUSTMENT = (
         kinds=WITH_POINTS,
         of_survey=True,
     ),
-    Field(
+    positive(
         "image_sd_um",
-        "number",
         "standard deviation of image coordinates that carry none, micrometres",
+        1e4,
         kinds=WITH_POINTS,
-        low=0,
-        above_low=True,
-        high=1e4,
         of_survey=True,
     ),
-    Field(
+    positive(
         "reading_limit_um",
-        "number",
         "largest standard deviation of repeated readings of an image point or mark, micrometres;"
         " beyond it they are rejected; blank: none are",
+        1e4,
         kinds=WITH_POINTS,
-        low=0,
-        above_low=True,
-        high=1e4,
         of_survey=True,
     ),
     Field(
@@ -299,23 +230,21 @@ ADJUSTMENT = (
         kinds=WITH_POINTS,
         of_survey=True,
     ),
-    Field(
+    choice(
         "image_weights",
-        "choice",
         "image in which residuals are counted and weighed: measured or ideal (after the"
         " correction); blank: measured",
+        ("measured", "ideal"),
         kinds=WITH_POINTS,
-        choices=("measured", "ideal"),
         of_survey=True,
     ),
-    Field(
+    number(
         "refraction",
-        "number",
         "coefficient of refraction for zenith and vertical angles and slope distances, such as"
         " 0.13; blank: neither curvature nor refraction",
+        -5,
+        5,
         kinds=WITH_POINTS,
-        low=-5,
-        high=5,
         of_survey=True,
     ),
 )
@@ -346,14 +275,13 @@ CERTIFICATE = (
     _text("notice", "a word that every page carries, such as RECONSTRUCTION"),
 )
 CSV = (
-    Field(
+    choice(
         "separator",
-        "choice",
         "between the cells of the CSV files: , or ; or a tab",
-        choices=(",", ";", "\t"),
+        (",", ";", "\t"),
         start=",",
     ),
-    Field("decimal", "choice", "decimal mark in the CSV files", choices=(".", ","), start="."),
+    choice("decimal", "decimal mark in the CSV files", (".", ","), start="."),
 )
 
 KEYS = {

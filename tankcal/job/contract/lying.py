@@ -1,7 +1,7 @@
 """[horizontal] and [sphere]: their keys; sizes complete, consistent, and said once."""
 
 from tankcal.job.checking import is_not_given, missing_beside, tell
-from tankcal.job.fields import Field
+from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.messages import message
 
 HORIZONTAL_ONLY = ("horizontal",)
@@ -10,23 +10,14 @@ END_FORMS = ("flat", "conical", "ellipsoidal", "torispherical", "spherical")
 
 
 def _length(name, note, kinds, high=100.0, required=False):
-    return Field(
-        name, "number", note, required=required, kinds=kinds, low=0, above_low=True, high=high
-    )
+    return positive(name, note, high, required=required, kinds=kinds)
 
 
 def _end(letter):
     """The keys of one end of a horizontal cylinder."""
     name = f"end {letter.upper()}"
     return (
-        Field(
-            f"end_{letter}",
-            "choice",
-            f"form of {name}",
-            required=True,
-            kinds=HORIZONTAL_ONLY,
-            choices=END_FORMS,
-        ),
+        choice(f"end_{letter}", f"form of {name}", END_FORMS, required=True, kinds=HORIZONTAL_ONLY),
         _length(
             f"end_{letter}_depth_m",
             f"{name}: depth along the axis, metres; conical, ellipsoidal, spherical only",
@@ -48,13 +39,12 @@ def _end(letter):
 
 
 def _thickness(kinds):
-    return Field(
+    return number(
         "thickness_mm",
-        "number",
         "plate and paint together, millimetres: subtracted from what was measured outside",
+        0,
+        100,
         kinds=kinds,
-        low=0,
-        high=100,
     )
 
 
@@ -76,49 +66,44 @@ HORIZONTAL = (
     ),
     *_end("a"),
     *_end("b"),
-    Field(
+    number(
         "tilt_mm_per_m",
-        "number",
         "rise of end B over end A, millimetres per metre of axis; negative: A is higher; blank: 0;"
         " not with points",
+        -200,
+        200,
         kinds=HORIZONTAL_ONLY,
-        low=-200,
-        high=200,
     ),
-    Field(
+    number(
         "roll_deg",
-        "number",
         "turn of an elliptical cross-section about the axis, degrees, clockwise seen from A;"
         " blank: 0",
+        -90,
+        90,
         kinds=HORIZONTAL_ONLY,
-        low=-90,
-        high=90,
     ),
-    Field(
+    number(
         "dip_from_a_m",
-        "number",
         "dip point: along the axis from the start of the cylinder at A, metres; blank: half the"
         " length, where there is no tilt",
+        0,
+        200,
         kinds=HORIZONTAL_ONLY,
-        low=0,
-        high=200,
     ),
-    Field(
+    choice(
         "dip_direction",
-        "choice",
         "dips are read plumb, or square to the axis; blank: plumb",
+        ("plumb", "square"),
         kinds=HORIZONTAL_ONLY,
-        choices=("plumb", "square"),
     ),
     _thickness(HORIZONTAL_ONLY),
-    Field(
+    number(
         "azimuth_deg",
-        "number",
         "direction from A to B, degrees clockwise from +y, so that the points know which end is A;"
         " only with points",
+        0,
+        360,
         kinds=HORIZONTAL_ONLY,
-        low=0,
-        high=360,
     ),
 )
 SPHERE = (

@@ -1,6 +1,7 @@
 """The keys of [mesh], [corrections] and [checks] of job.toml: most are for some kinds only."""
 
 from tankcal.job.contract.kinds import VERTICAL, WITH_POINTS
+from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.fields import Field
 from tankcal.job.plausibility import DIAMETERS, SERVICES, SHELLS
 
@@ -15,13 +16,12 @@ MESH = (
         required=True,
         kinds=("mesh",),
     ),
-    Field(
+    choice(
         "unit",
-        "choice",
         "unit of the coordinates in that file",
+        tuple(MESH_UNITS_M),
         required=True,
         kinds=("mesh",),
-        choices=tuple(MESH_UNITS_M),
     ),
 )
 
@@ -42,66 +42,56 @@ CORRECTIONS = (
 )
 
 CHECKS = (
-    Field(
+    choice(
         "shell",
-        "choice",
         "metal of the shell: carbon_steel, stainless_steel, aluminium, or other; blank:"
         " carbon_steel",
-        choices=SHELLS,
+        SHELLS,
     ),
-    Field(
+    choice(
         "service",
-        "choice",
         "ambient, heated or refrigerated: what temperatures are plausible; blank: ambient",
-        choices=SERVICES,
+        SERVICES,
     ),
-    Field(
+    number(
         "air_temperature_c",
-        "number",
         "temperature of the air during the survey, degrees Celsius; the shell's is near it",
-        low=-80,
-        high=150,
+        -80,
+        150,
     ),
-    Field(
+    number(
         "top_z_m",
-        "number",
         "z of the top of the shell as surveyed, in the frame of the points, metres; bottom_z_m and"
         " the courses lead there",
+        -1e5,
+        1e5,
         kinds=VERTICAL,
-        low=-1e5,
-        high=1e5,
     ),
-    Field(
+    choice(
         "bottom_slopes",
-        "choice",
         "cone and dish: the bottom goes up or down from its edge to its centre",
+        ("up", "down"),
         kinds=VERTICAL,
-        choices=("up", "down"),
     ),
-    Field(
+    number(
         "circumference_m",
-        "number",
         "circumference of the first course by tape, outside, square to the axis, metres",
+        0.3,
+        1000,
         kinds=VERTICAL,
-        low=0.3,
-        high=1000,
     ),
-    Field(
+    choice(
         "diameter_is",
-        "choice",
         "what tank.nominal_diameter_m is by the drawing, to the millimetre: inside, middle (of the"
         " plates of the first course) or outside; blank: not known",
+        DIAMETERS,
         kinds=WITH_POINTS,
-        choices=DIAMETERS,
     ),
-    Field(
+    positive(
         "length_m",
-        "number",
         "length of the cylinder from the drawing, without the ends, metres",
+        200,
         kinds=("horizontal",),
-        low=0,
-        above_low=True,
-        high=200,
     ),
 )
 

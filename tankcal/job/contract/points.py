@@ -1,25 +1,23 @@
 """points.csv: its columns, and the checks of it alone: names and places once, sections complete."""
 
 from tankcal.job.checking import refuse_repeated, tiny_sd
+from tankcal.job.contract.shorthand import number, positive
 from tankcal.job.fields import Field
 from tankcal.messages import message
 
 
 def _sd(axis):
-    return Field(
+    return positive(
         f"s{axis}_mm",
-        "number",
         f"standard deviation of {axis}, millimetres; for all points or for none",
+        1000,
         in_full=True,
-        low=0,
-        above_low=True,
-        high=1000,
     )
 
 
 def _coordinate(axis, limit):
     note = f"coordinate {axis}, metres"
-    return Field(f"{axis}_m", "number", note, required=True, low=-limit, high=limit)
+    return number(f"{axis}_m", note, -limit, limit, required=True)
 
 
 COLUMNS = (

@@ -2,51 +2,42 @@
 
 from tankcal.job.checking import RELATIVE_DENSITY, is_not_given, missing_beside, tell
 from tankcal.job.contract.kinds import VERTICAL
-from tankcal.job.fields import Field
+from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.plausibility import ROOF_KG_M2
 from tankcal.messages import message
 
 KEYS = (
-    Field(
+    positive(
         "mass_kg",
-        "number",
         "floating roof: its mass with all that floats with it, kilograms; blank: no floating roof",
+        1e7,
         kinds=VERTICAL,
-        low=0,
-        above_low=True,
-        high=1e7,
     ),
-    Field(
+    number(
         "critical_bottom_m",
-        "number",
         "dip at which the liquid first touches it, from the table's zero, metres",
+        0,
+        100,
         kinds=VERTICAL,
-        low=0,
-        high=100,
     ),
-    Field(
+    number(
         "critical_top_m",
-        "number",
         "dip at which it floats freely, from the table's zero, metres",
+        0,
+        100,
         kinds=VERTICAL,
-        low=0,
-        high=100,
     ),
-    Field(
+    positive(
         "reference_density_kg_m3",
-        "number",
         "density of the liquid that the table is for, kg/m3",
+        3000,
         kinds=VERTICAL,
-        low=0,
-        above_low=True,
-        high=3000,
     ),
-    Field(
+    choice(
         "weighing",
-        "choice",
         "what the mass was weighed in, or reduced to: air or vacuum",
+        ("air", "vacuum"),
         kinds=VERTICAL,
-        choices=("air", "vacuum"),
     ),
 )
 

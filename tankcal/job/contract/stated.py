@@ -1,34 +1,25 @@
 """stated.csv: its columns; dips within the tank, the upper one first, volumes that it can hold."""
 
 from tankcal.job.checking import UNIT_FACTOR
+from tankcal.job.contract.shorthand import number, positive
 from tankcal.job.fields import Field
 from tankcal.messages import message
 
 COLUMNS = (
-    Field(
+    positive(
         "high_m",
-        "number",
         "dip from the table's zero, metres: its volume is reported with uncertainty and budget",
+        100,
         required=True,
-        low=0,
-        above_low=True,
-        high=100,
     ),
-    Field(
-        "low_m",
-        "number",
-        "of a delivery: the dip it ends at, metres; blank: the volume below high_m",
-        low=0,
-        high=100,
+    number(
+        "low_m", "of a delivery: the dip it ends at, metres; blank: the volume below high_m", 0, 100
     ),
-    Field(
+    positive(
         "volume_m3",
-        "number",
         "volume that an earlier table or a contract states there, cubic metres, for a decision"
         " rule that limits deviations",
-        low=0,
-        above_low=True,
-        high=1e6,
+        1e6,
     ),
     Field("note", "text", "what it is"),
 )

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from tankcal.gum.distributions import FAMILIES, expanded, within
 from tankcal.job.checking import refuse_repeated
 from tankcal.job.contract.kinds import KINDS, VERTICAL, WITH_POINTS
+from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.fields import Field
 from tankcal.messages import message
 
@@ -122,38 +123,26 @@ INPUTS = {
 UNITS = tuple(dict.fromkeys(one.unit for one in INPUTS.values()))
 
 COLUMNS = (
-    Field(
-        "input",
-        "choice",
-        "what is uncertain: " + ", ".join(INPUTS),
-        required=True,
-        choices=tuple(INPUTS),
+    choice("input", "what is uncertain: " + ", ".join(INPUTS), tuple(INPUTS), required=True),
+    number(
+        "u", "how uncertain it is: its standard uncertainty, or what u_is says", 0, required=True
     ),
-    Field(
-        "u",
-        "number",
-        "how uncertain it is: its standard uncertainty, or what u_is says",
-        required=True,
-        low=0,
-    ),
-    Field(
+    choice(
         "unit",
-        "choice",
         "; ".join(f"{name}: {one.unit}" for name, one in INPUTS.items()),
+        UNITS,
         required=True,
-        choices=UNITS,
     ),
-    Field(
+    choice(
         "u_is",
-        "choice",
         "what u is: standard; half_width of a bounded distribution; expanded, with its k; scale or"
         " sd of a t distribution; blank: standard",
-        choices=AS_READ,
+        AS_READ,
     ),
-    Field("k", "number", "coverage factor of an expanded uncertainty", low=1, high=20),
-    Field("type", "choice", "A (statistics) or B; blank: B", choices=("A", "B")),
-    Field("distribution", "choice", "blank: normal", choices=("normal", *FAMILIES, "t")),
-    Field("dof", "number", "degrees of freedom, 1 or more; blank: infinite", low=1),
+    number("k", "coverage factor of an expanded uncertainty", 1, 20),
+    choice("type", "A (statistics) or B; blank: B", ("A", "B")),
+    choice("distribution", "blank: normal", ("normal", *FAMILIES, "t")),
+    number("dof", "degrees of freedom, 1 or more; blank: infinite", 1),
     Field("note", "text", "where the figure comes from"),
 )
 

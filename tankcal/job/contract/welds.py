@@ -2,18 +2,18 @@
 
 from itertools import combinations
 
+from tankcal.job.contract.shorthand import number
 from tankcal.job.fields import Field
 from tankcal.messages import message
 
 COLUMNS = (
     Field("course", "name", "course of courses.csv that the weld is in", required=True),
-    Field(
+    number(
         "azimuth_deg",
-        "number",
         "azimuth of the vertical weld about the axis, clockwise from +y of the points, degrees",
+        0,
+        360,
         required=True,
-        low=0,
-        high=360,
     ),
 )
 

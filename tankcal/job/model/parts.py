@@ -7,7 +7,20 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Course:
-    """One ring of plates, from the bottom up: height, plate and paint thickness, m."""
+    """One ring of plates, from the bottom up.
+
+    Attributes
+    ----------
+    name : str
+    height_m : float
+        From joint to joint, m.
+    thickness_m : float
+        Of its plates, m.
+    paint_m : float
+        Thickness of their paint, m.
+    welds_rad : tuple of float or None
+        Azimuths of its vertical welds, clockwise from +y, rad; None: not known.
+    """
 
     name: str
     height_m: float
@@ -26,15 +39,25 @@ class Course:
 class Bottom:
     """The bottom of a vertical tank, below or above the bottom of its first course.
 
-    form        "flat", "leaning" (square to the shell's axis), "cone", "dish", "points" (a surveyed
-                surface) or "liquid" (measured volumes)
-    centre_z_m  cone and dish: z of the centre in the survey's frame; the edge is at bottom_z_m
-    xyz_m       (n, 3) points: surveyed, in the survey's frame
-    sd_m        (n,) standard deviations of their z, or None: not given
-    level_m     (n,) liquid: dips, from the table's zero, ascending
-    volume_m3   (n,) liquid: the capacity below each level, ascending
-    u_m3        (n,) their standard uncertainties, or None: not given
-    rows        (n,) row of each point or level in its file, for messages
+    Attributes
+    ----------
+    form : str
+        "flat", "leaning" (square to the shell's axis), "cone", "dish", "points" (a surveyed
+        surface) or "liquid" (measured volumes).
+    centre_z_m : float or None
+        Cone and dish: z of the centre in the survey's frame; the edge is at bottom_z_m.
+    xyz_m : ndarray, shape (n, 3)
+        Points: surveyed, in the survey's frame.
+    sd_m : ndarray, shape (n,)
+        Standard deviations of their z, or None: not given.
+    level_m : ndarray, shape (n,)
+        Liquid: dips, from the table's zero, ascending.
+    volume_m3 : ndarray, shape (n,)
+        Liquid: the capacity below each level, ascending.
+    u_m3 : ndarray, shape (n,)
+        Their standard uncertainties, or None: not given.
+    rows : tuple
+        Row of each point or level in its file, for messages.
     """
 
     form: str = "flat"
@@ -51,8 +74,12 @@ class Bottom:
 class Deadwood:
     """A thing in the tank that takes room (negative volume) or gives some (positive).
 
-    bottom_m, top_m  dips, from the table's zero; the volume is linear in height between them
-    u_m3             standard uncertainty of the volume, or None: not given
+    Attributes
+    ----------
+    bottom_m, top_m : float
+        Dips, from the table's zero; the volume is linear in height between them.
+    u_m3 : float or None
+        Standard uncertainty of the volume, or None: not given.
     """
 
     name: str
@@ -67,9 +94,14 @@ class Deadwood:
 class Roof:
     """A floating roof. It displaces its mass over the density of the liquid.
 
-    critical_bottom_m, critical_top_m  dips, from the table's zero: between them it is partly afloat
-    reference_density_kg_m3            of the liquid that the table is for
-    weighing                           "air" or "vacuum": what `mass_kg` was weighed in
+    Attributes
+    ----------
+    critical_bottom_m, critical_top_m : float
+        Dips, from the table's zero: between them it is partly afloat.
+    reference_density_kg_m3 : float
+        Of the liquid that the table is for.
+    weighing : str
+        "air" or "vacuum": what `mass_kg` was weighed in.
     """
 
     mass_kg: float
@@ -83,11 +115,17 @@ class Roof:
 class End:
     """One end of a horizontal cylinder, bulging outwards; sizes as measured.
 
-    kind              "flat", "conical", "ellipsoidal", "torispherical" or "spherical"
-    depth_m           along the axis, from the end of the cylinder; flat: 0; torispherical: 0, it
-                      follows from the radii
-    dish_radius_m     torispherical: radius of the dish (crown); else None
-    knuckle_radius_m  torispherical: radius of the knuckle; else None
+    Attributes
+    ----------
+    kind : str
+        "flat", "conical", "ellipsoidal", "torispherical" or "spherical".
+    depth_m : float
+        Along the axis, from the end of the cylinder; flat: 0; torispherical: 0, it follows from
+        the radii.
+    dish_radius_m : float or None
+        Torispherical: radius of the dish (crown); else None.
+    knuckle_radius_m : float or None
+        Torispherical: radius of the knuckle; else None.
     """
 
     kind: str
@@ -100,15 +138,24 @@ class End:
 class Horizontal:
     """A horizontal cylinder between its ends A and B; sizes as measured, on the side of the survey.
 
-    length_m            of the cylinder, without the ends; the same inside and outside
-    width_m, height_m   of its cross-section, equal when round; None: they come from the points
-    tilt                rise of end B over end A per metre of axis, tan of the angle; None: from
-                        the points
-    roll_rad            turn of the cross-section about the axis, clockwise seen from A
-    dip_from_a_m        of the dip point, along the axis from the start of the cylinder at A
-    dip_direction       dips are read "plumb", or "square" to the axis
-    thickness_m         plate and paint, to be subtracted from what was measured outside
-    azimuth_rad         direction from A to B, clockwise from +y; None: no points
+    Attributes
+    ----------
+    length_m : float
+        Of the cylinder, without the ends; the same inside and outside.
+    width_m, height_m : float or None
+        Of its cross-section, equal when round; None: they come from the points.
+    tilt : float or None
+        Rise of end B over end A per metre of axis, tan of the angle; None: from the points.
+    roll_rad : float
+        Turn of the cross-section about the axis, clockwise seen from A.
+    dip_from_a_m : float
+        Of the dip point, along the axis from the start of the cylinder at A.
+    dip_direction : str
+        Dips are read "plumb", or "square" to the axis.
+    thickness_m : float
+        Plate and paint, to be subtracted from what was measured outside.
+    azimuth_rad : float or None
+        Direction from A to B, clockwise from +y; None: no points.
     """
 
     length_m: float
@@ -128,8 +175,12 @@ class Horizontal:
 class Sphere:
     """A sphere.
 
-    diameter_m   as measured, on the side of the survey; None: it comes from the points
-    thickness_m  plate and paint, to be subtracted from what was measured outside
+    Attributes
+    ----------
+    diameter_m : float or None
+        As measured, on the side of the survey; None: it comes from the points.
+    thickness_m : float
+        Plate and paint, to be subtracted from what was measured outside.
     """
 
     diameter_m: float | None
@@ -138,7 +189,17 @@ class Sphere:
 
 @dataclass(frozen=True)
 class Mesh:
-    """A closed mesh of the inside: name and bytes of its file, metres of one unit of it."""
+    """A closed mesh of the inside.
+
+    Attributes
+    ----------
+    file : str
+        Name of its file.
+    unit_m : float
+        Length of one unit of it, m.
+    data : bytes
+        What the file holds.
+    """
 
     file: str
     unit_m: float

@@ -16,7 +16,11 @@ class DeclaredInput:
     u is SI (dimensionless for "scale", "tilt" and "deadwood", m, K, 1/K, Pa, kg, kg/m3, m3), of a
     t distribution what `u_is` says, "scale" or "sd"; `u_as_read` is the same in
     `unit`, as the user wrote it.
-    is_default  True: nobody declared it, tankcal assumes it
+
+    Attributes
+    ----------
+    is_default : bool
+        True: nobody declared it, tankcal assumes it.
     """
 
     name: str
@@ -35,9 +39,14 @@ class DeclaredInput:
 class StatedVolume:
     """A dip whose volume is reported with its budget; with low_m a delivery (stated.csv).
 
-    high_m, low_m  dips, from the table's zero
-    volume_m3      that another table or a contract states, or None
-    row, file      where it stands; a sheet of a workbook is "sheet stated"
+    Attributes
+    ----------
+    high_m, low_m : float
+        Dips, from the table's zero.
+    volume_m3 : float or None
+        That another table or a contract states, or None.
+    row, file : int or None
+        Where it stands; a sheet of a workbook is "sheet stated".
     """
 
     high_m: float
@@ -52,8 +61,12 @@ class StatedVolume:
 class Tank:
     """The tank: its kind, nominal sizes (None: not given), and what is printed about it.
 
-    kind     "vertical", "horizontal", "sphere" or "mesh"
-    details  owner, location, product, ...: text, printed when given
+    Attributes
+    ----------
+    kind : str
+        "vertical", "horizontal", "sphere" or "mesh".
+    details : dict
+        Owner, location, product, ...: text, printed when given.
     """
 
     id: str
@@ -68,8 +81,12 @@ class Tank:
 class Survey:
     """The survey: `date` ISO text, temperature of the shell degC, liquid that was in the tank.
 
-    side            "outside" or "inside": where points and sizes were measured
-    liquid_level_m  dip of the survey day, from the table's zero; None or 0: empty
+    Attributes
+    ----------
+    side : str
+        "outside" or "inside": where points and sizes were measured.
+    liquid_level_m : float or None
+        Dip of the survey day, from the table's zero; None or 0: empty.
     """
 
     side: str
@@ -83,10 +100,14 @@ class Survey:
 class Datum:
     """Heights in the survey's frame, m.
 
-    bottom_z_m     bottom of the first course of a vertical tank. Horizontal cylinder and sphere
-                   without points: 0, for z then counts from the inside bottom beneath the dip
-                   point; with points, and for a mesh: None, the tank's own lowest point
-    dip_plate_z_m  the dip plate, which is the table's zero; None: the zero is the bottom
+    Attributes
+    ----------
+    bottom_z_m : float or None
+        Bottom of the first course of a vertical tank. Horizontal cylinder and sphere without
+        points: 0, for z then counts from the inside bottom beneath the dip point; with points,
+        and for a mesh: None, the tank's own lowest point.
+    dip_plate_z_m : float or None
+        The dip plate, which is the table's zero; None: the zero is the bottom.
     """
 
     bottom_z_m: float | None
@@ -105,19 +126,33 @@ class Datum:
 class TableSpec:
     """What the capacity table is to be.
 
-    step_m                      None: given by `height_unit`, or chosen so that linear interpolation
-                                errs by at most `max_interpolation_error_m3`
-    reference_temperature_c     of the shell
-    liquid_density_kg_m3        of the liquid head; 0: no head
-    height_unit                 "m", "ft-in-8" or "ft-in-16" (rows of 1/8 and 1/16 inch)
-    volume_unit                 "m3", "L" or "bbl" (42 US gallons)
-    other_densities_kg_m3       densities of further tables
-    fine_step_m, fine_zones     smaller step between the dips of each (low_m, high_m), ascending
-    max_interpolation_error_m3  bound of the error of linear interpolation between rows; or None
-    height_expansion            whether dips expand with the shell, too
-    rule                        name of the decision rule, as written (`Job.rule` has it); or None
-    minimum_delivery_m          heights of the least deliveries to be reported; None: not given
-    monte_carlo                 whether the model is drawn from, too
+    Attributes
+    ----------
+    step_m : float or None
+        None: given by `height_unit`, or chosen so that linear interpolation errs by at most
+        `max_interpolation_error_m3`.
+    reference_temperature_c : float
+        Of the shell.
+    liquid_density_kg_m3 : float
+        Of the liquid head; 0: no head.
+    height_unit : str
+        "m", "ft-in-8" or "ft-in-16" (rows of 1/8 and 1/16 inch).
+    volume_unit : str
+        "m3", "L" or "bbl" (42 US gallons).
+    other_densities_kg_m3 : tuple of float
+        Densities of further tables.
+    fine_step_m, fine_zones : float or None
+        Smaller step between the dips of each (low_m, high_m), ascending.
+    max_interpolation_error_m3 : float or None
+        Bound of the error of linear interpolation between rows; or None.
+    height_expansion : bool
+        Whether dips expand with the shell, too.
+    rule : str or None
+        Name of the decision rule, as written (`Job.rule` has it); or None.
+    minimum_delivery_m : tuple of float or None
+        Heights of the least deliveries to be reported; None: not given.
+    monte_carlo : bool
+        Whether the model is drawn from, too.
     """
 
     step_m: float | None
@@ -139,7 +174,13 @@ class TableSpec:
 
 @dataclass(frozen=True)
 class Switches:
-    """Which corrections are made; one that is off is named in the report."""
+    """Which corrections are made; one that is off is named in the report.
+
+    Attributes
+    ----------
+    plate, paint, temperature, head, tilt, bottom, deadwood, roof : bool
+        False: that correction is not made.
+    """
 
     plate: bool = True
     paint: bool = True
@@ -153,8 +194,18 @@ class Switches:
 
 @dataclass(frozen=True)
 class Material:
-    """The shell's steel: Young's modulus Pa, thermal expansion 1/K."""
+    """The shell's steel.
+
+    Attributes
+    ----------
+    e_pa : float
+        Young's modulus, Pa.
+    expansion_per_k : float
+        Thermal expansion, 1/K.
+    expansion_given : bool
+        False: the default was taken, and the report says so.
+    """
 
     e_pa: float = 206e9
     expansion_per_k: float = 1.1e-5
-    expansion_given: bool = False  # False: the default was taken, and the report says so
+    expansion_given: bool = False

@@ -82,11 +82,20 @@ def write_adjustment(job, adjustment, directory, progress=None, letterhead=None,
 def rebuild(record_path, directory, progress=None, language=None, letterhead=None):
     """Write the same from a record.json alone; nothing is computed again, the record is copied.
 
-    record_path  of a record.json, or the folder of results that holds one
-    language     of workbook and papers, one of LANGUAGES; None: that of the job
     points_cov.npz, which no record holds, is taken over when it lies beside the record. The other
-    arguments are those of `write`. Raises InputError for what is no record, or a language that is
-    not known.
+    arguments are those of `write`.
+
+    Parameters
+    ----------
+    record_path : path
+        Of a record.json, or the folder of results that holds one.
+    language : str, optional
+        Of workbook and papers, one of LANGUAGES; None: that of the job.
+
+    Raises
+    ------
+    InputError
+        For what is no record, or a language that is not known.
     """
     source = record_file(record_path)
     if language not in (None, *LANGUAGES):

@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.job.covariance import MAX_POINTS
 from tankcal.report.outputs.csv_files import write_table
-from tankcal.report.tables import capacity, lines, strapping, survey, tank
+from tankcal.report.tables import capacity, lines, readings, strapping, survey, tank
 from tankcal.text.digits import PROGRAM, decimals_of_rows, fixed
 
 LEAST_DECIMALS = 6  # micrometres, square millimetres, millilitres
@@ -32,13 +32,13 @@ def write_tables(record, directory):
     if record["capacity"]:
         tables["capacity"] = capacity.capacity_table(record), _capacity(record)
     if record["adjustment"]:
-        cameras, readings = (record["adjustment"][key] for key in ("cameras", "residuals"))
+        cameras, observed = (record["adjustment"][key] for key in ("cameras", "residuals"))
         free = dict.fromkeys(name for camera in cameras for name in camera["free"])
         tables |= {
             "photos": (survey.PHOTOS, None),
             "cameras": (survey.camera_table(free), None),
-            "groups": (survey.GROUPS, None),
-            "residuals": (survey.READINGS, survey.in_their_units(readings)),
+            "groups": (readings.GROUPS, None),
+            "residuals": (readings.READINGS, readings.in_their_units(observed)),
         }
     for name, (table, columns) in tables.items():
         rows = table.rows(record) if columns is None else columns

@@ -2,7 +2,7 @@
 
 from tankcal.record.plain_data import columns_of, rows_of
 from tankcal.report.survey.common import MOST_ROWS, with_note
-from tankcal.report.tables.survey import READINGS, in_their_units
+from tankcal.report.tables.readings import READINGS, in_their_units
 
 WORST = 16  # rows of a table of the worst readings
 WEAK = 0.1  # redundancy number below which a blunder has to be 13 sds to be found

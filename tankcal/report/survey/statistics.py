@@ -2,7 +2,7 @@
 
 from tankcal.report import blocks
 from tankcal.report.survey.common import MOST_ROWS
-from tankcal.report.tables.survey import GROUPS
+from tankcal.report.tables.readings import GROUPS
 from tankcal.text import words
 from tankcal.text.digits import NOTHING
 
@@ -23,11 +23,6 @@ def facts(paper):
             ("cov_scale", words.scale_sentence(paper.words, a)),
         ]
     )
-
-
-def method(paper):
-    """One line for the certificate: what was measured, how many points, sigma0."""
-    return words.method_line(paper.words, paper.record["adjustment"])
 
 
 def datum(paper):

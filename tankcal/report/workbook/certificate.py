@@ -1,11 +1,13 @@
 """The sheet Certificate: what was calibrated, the main result, and what was assumed."""
 
 from tankcal.report.certificate import doubts_of
+from tankcal.report.numbers import unit
+from tankcal.report.tables.facts import REFERENCES, SURVEY, SURVEY_DATE, tank_facts
 from tankcal.report.uncertainty import method, rule
 from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
 from tankcal.report.workbook.look import ACCENT, DATE, LINE_PT, MUTED, lines_of, number_format
 from tankcal.text.digits import decimals_of, decimals_of_height
-from tankcal.text.words import choice_sentence, method_line, sentence
+from tankcal.text.words import choice_sentence, sentence
 
 _WIDTHS = (36, 20, 24, 14, 14)
 _LONG = 60  # letters that fit beside a label
@@ -25,9 +27,14 @@ def certificate_sheet(book, record):
         row += 2
     row = _result(book, sheet, row, record)
     row = _doubts(book, sheet, row, record)
-    row = _entries(book, sheet, row, sentence(words, "headings", "tank"), _tank(record, words))
+    row = _entries(
+        book, sheet, row, sentence(words, "headings", "tank"), _declared(book, tank_facts(record))
+    )
     row = _entries(book, sheet, row, book.word("headings.certificate"), _certificate(record, words))
-    row = _entries(book, sheet, row, book.word("headings.survey"), _survey(record, words))
+    row = _entries(
+        book, sheet, row, book.word("headings.survey"),
+        _declared(book, SURVEY_DATE, SURVEY, REFERENCES),
+    )  # fmt: skip
     row = _uncertainty(book, sheet, row, book.paper)
     row = _corrections(book, sheet, row, record)
     row = _choices(book, sheet, row, record)
@@ -37,25 +44,6 @@ def certificate_sheet(book, record):
 def _label(words, key):
     """The label of a key of the job; one without words is written out: vessel_no as Vessel no."""
     return words["labels"].get(key, key.replace("_", " ").capitalize())
-
-
-def _tank(record, words):
-    """(label, value, number format or None) of the tank."""
-    tank = record["job"]["tank"]
-    return [
-        (_label(words, "tank_id"), tank["id"], None),
-        (_label(words, "kind"), sentence(words, "kinds", tank["kind"]), None),
-        *((_label(words, key), value, None) for key, value in tank["details"].items()),
-        *(
-            (_label(words, key), tank[f"{key}_{unit}"], shown)
-            for key, unit, shown in (
-                ("nominal_diameter", "m", '0.000 "m"'),
-                ("nominal_height", "m", '0.000 "m"'),
-                ("nominal_volume", "m3", '0.000 "m³"'),
-            )
-            if tank[f"{key}_{unit}"] is not None
-        ),
-    ]
 
 
 def _certificate(record, words):
@@ -68,20 +56,23 @@ def _certificate(record, words):
     ]
 
 
-def _survey(record, words):
-    """(label, value, number format or None) of the survey and of what the table refers to."""
-    job = record["job"]
-    survey, table, adjustment = job["survey"], job["table"], record["adjustment"]
-    lines = (
-        ("survey_date", survey["date"], DATE),
-        ("survey_method", adjustment and method_line(words, adjustment), None),
-        ("survey_side", sentence(words, "sides", survey["side"]), None),
-        ("shell_temperature", survey["shell_temperature_c"], '0.0 "°C"'),
-        ("reference_temperature", table["reference_temperature_c"], '0.0 "°C"'),
-        ("zero", sentence(words, "zeros", record["capacity"]["zero"]), None),
-        ("reference_height", job["datum"]["reference_height_m"], '0.000 "m"'),
-    )
-    return [(_label(words, key), value, shown) for key, value, shown in lines if value is not None]
+def _declared(book, *tables):
+    """(label, value, number format, DATE or None) of declared facts, without what is not given."""
+    words, found = book.words, []
+    for table in tables:
+        (row,) = table.rows(book.paper.record)
+        for one in table.in_workbook([row]):
+            value = one.text(book.paper, row) if one.text else row.get(one.key)
+            if value is not None:
+                value = sentence(words, one.words, value) if one.words else value
+                found.append((_label(words, one.key), value, _format(one)))
+    return found
+
+
+def _format(column):
+    if column.key == SURVEY_DATE.name:
+        return DATE
+    return None if column.is_text else number_format(column.decimals, unit=unit(column.unit).symbol)
 
 
 def _entries(book, sheet, row, title, lines):

@@ -1,17 +1,15 @@
 """The sheets of an adjusted survey: Adjustment, Points, Observations, Cameras and photos."""
 
 from tankcal.record.plain_data import rows_of
+from tankcal.report.tables.readings import GROUPS, READINGS, in_their_units
 from tankcal.report.tables.survey import (
     CHECK_POINTS,
-    GROUPS,
     INSTRUMENTS,
     PHOTOS,
     POINTS,
-    READINGS,
     SYSTEMS,
     camera_rows,
     camera_table,
-    in_their_units,
     point_rows,
 )
 from tankcal.report.workbook.look import number_format

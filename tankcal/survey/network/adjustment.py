@@ -17,14 +17,20 @@ from tankcal.survey.observations import PlumbLines
 def adjust(survey, *, datum="control", over=None, photo=None, tolerance=1e-4, max_iterations=100):
     """Least squares of all observations of a Survey.
 
-    datum      "control": whatever is known of points and photos must fix it; "inner": what is not
-               fixed is chosen so that the points keep their places on the whole (free network)
-    over       (k,) points that take part in the inner constraints, None: all
-    photo      number of the photo that takes part in their place; None: points do
-    tolerance  of the last step, see tankcal.solver.solve
-
     Returns an Adjusted. Raises SolutionError when something is not determined: a datum defect in
     words, points and parameters by name; or when the iteration does not converge.
+
+    Parameters
+    ----------
+    datum : optional
+        "control": whatever is known of points and photos must fix it; "inner": what is not
+        fixed is chosen so that the points keep their places on the whole (free network).
+    over : ndarray, shape (k,), optional
+        Points that take part in the inner constraints, None: all.
+    photo : optional
+        Number of the photo that takes part in their place; None: points do.
+    tolerance : optional
+        Of the last step, see tankcal.solver.solve.
     """
     problem = _in_datum(survey, datum, over, photo)
     return _adjusted(

@@ -133,9 +133,13 @@ def depends_on_datum(adjusted, quantities, fixed=False):
     would change it. Distances do when nothing gives the scale, heights and coordinates nearly
     always, shapes never.
 
-    quantities  observations of tankcal.survey.observations between points of the survey; values
-                and sds do not matter
-    fixed       True: coordinates and photos held fixed count as known, not as a choice
+    Parameters
+    ----------
+    quantities : tankcal.survey.observations
+        Between points of the survey; values and sds
+        do not matter.
+    fixed : optional
+        True: coordinates and photos held fixed count as known, not as a choice.
     """
     problem, state = adjusted.problem, adjusted.solution.unknowns
     free = null_space(problem, fixed=fixed)
@@ -170,7 +174,10 @@ def datum_defect_sentence(combinations, problem=None):
 def defect_in_words(combinations, problem=None):
     """The datum defect in words, from combinations (7, d) of the seven ways: a Message.
 
-    problem  to name the points that a single rotation leaves in place, or None
+    Parameters
+    ----------
+    problem : optional
+        To name the points that a single rotation leaves in place, or None.
     """
     d = combinations.shape[1]
     basis = np.linalg.qr(combinations)[0]
@@ -258,10 +265,15 @@ def _points(names):
 def add_inner_constraints(problem, over, combinations, photo=None):
     """The Problem with a datum by inner constraints over chosen points, or over one photo.
 
-    over          (k,) points that take part, or None: all
-    combinations  (7, d) from `null_space`
-    photo         number of the photo that is moved and turned as little as can be, in place of the
-                  points; None: the points take part
+    Parameters
+    ----------
+    over : ndarray, shape (k,)
+        Points that take part, or None: all.
+    combinations : ndarray, shape (7, d)
+        From `null_space`.
+    photo : optional
+        Number of the photo that is moved and turned as little as can be, in place of the
+        points; None: the points take part.
     """
     layout, mask = problem.layout, np.zeros(problem.model.unknowns + 1)
     if photo is None:

@@ -25,7 +25,10 @@ def ellipsoid_factor(probability, dof=np.inf):
 def ellipsoids(covariances_m2, probability=0.95, dof=np.inf):
     """Semi-axes (n, 3), m, largest first, and directions (n, 3, 3), one column for each.
 
-    covariances_m2  (n, 3, 3)
+    Parameters
+    ----------
+    covariances_m2 : ndarray, shape (n, 3, 3)
+        Of n points, m2.
     """
     values, vectors = np.linalg.eigh(covariances_m2)
     axes = np.sqrt(np.maximum(values[:, ::-1], 0.0)) * ellipsoid_factor(probability, dof)
@@ -96,14 +99,6 @@ def accuracy(adjusted, points, xyz_m, sd_m):
     )
 
 
-def control_factor(points, unknowns, equations=3):
-    """K = sqrt(p n / (p n - r)): residuals at control points times K stand for check points.
-
-    points  n          unknowns  r          equations  p, for each point
-    """
-    return float(np.sqrt(points * equations / (points * equations - unknowns)))
-
-
 @dataclass(frozen=True)
 class Compared:
     """Observations that were not adjusted, against the adjusted survey.
@@ -120,7 +115,10 @@ class Compared:
 def compare_left_out(adjusted, observations):
     """Compare observations (coordinates relative to the survey's frame) that were left out.
 
-    observations  of tankcal.survey.observations, between points of the adjusted survey
+    Parameters
+    ----------
+    observations : tankcal.survey.observations
+        Between points of the adjusted survey.
     """
     problem, state = adjusted.problem, adjusted.solution.unknowns
     one = problem.relative(observations)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg
 from scipy.special import chdtri, gammaincinv
 
 from tankcal.camera.model import PARAMETERS
@@ -57,16 +56,21 @@ def global_test(chi2, dof, confidence=0.95, sides=2):
 class Adjusted:
     """An adjusted Survey. All covariances here are a priori: of variance factor 1.
 
-    survey    as it was handed in
-    problem   the Problem that was solved
-    solution  tankcal.adjust.Adjustment; its rows and chi2 with the scatter of repeated readings
-
     One rule for their scale: what goes on to the capacity table is the covariance a priori, from
     the declared sds, whatever sigma0 came out; the report shows sigma0 and the global test beside
     it. Only where the user asks for scale "a_posteriori" everything is multiplied by
     `scale("a_posteriori")`, sigma0 squared, and dof go with it. Never the smaller or larger of the
     two, never a part of the covariances: a test that is not passed is a doubt about observations or
     sds, to be cleared there (variance components, data snooping) and not by a factor.
+
+    Attributes
+    ----------
+    survey : Survey
+        As it was handed in.
+    problem : Problem
+        The one that was solved.
+    solution : tankcal.adjust.Adjustment
+        Its rows and chi2 with the scatter of repeated readings.
     """
 
     survey: object
@@ -209,31 +213,6 @@ class Adjusted:
         turn[:, 3:, 3:] = angle_derivatives(rotation)
         covariance = turn @ q @ turn.transpose(0, 2, 1)
         return self.problem.centre_m + self._state.photo_xyz_m, angles_of(rotation), covariance
-
-    def photo_and_camera(self, photo):
-        """Names (k,) and covariance (k, k) of a photo's six elements and its camera's parameters.
-
-        x, y, z in m, omega, phi, kappa in rad, then the parameters that are adjusted. Fixed
-        elements have variance 0. See `correlations`.
-        """
-        layout, places = self.problem.layout, self.problem.interior_of[photo]
-        interior = layout.interior[places]
-        names = [name for name, column in zip(PARAMETERS, interior, strict=True) if column >= 0]
-        columns = np.concatenate([layout.photos[photo], interior[interior >= 0]])
-        turn = np.eye(len(columns))
-        turn[3:6, 3:6] = angle_derivatives(self._state.rotation[photo : photo + 1])[0]
-        covariance = turn @ self._cofactors(columns) @ turn.T
-        return ("x", "y", "z", "omega", "phi", "kappa", *names), covariance
-
-    def photo_covariance(self, photos=None):
-        """Covariance (6k, 6k) of x, y, z, omega, phi, kappa of chosen photos, of all when None."""
-        layout = self.problem.layout.photos
-        chosen = np.arange(len(layout)) if photos is None else np.asarray(photos)
-        turn = np.zeros((len(chosen), 6, 6))
-        turn[:, :3, :3] = np.eye(3)
-        turn[:, 3:, 3:] = angle_derivatives(self._state.rotation[chosen])
-        turn = scipy.linalg.block_diag(*turn)
-        return turn @ self._cofactors(layout[chosen].ravel()) @ turn.T
 
     def camera(self, photo=0):
         """{parameter: value} and covariance (k, k) of those adjusted, as a photo has them."""

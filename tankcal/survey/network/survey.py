@@ -17,12 +17,20 @@ DEFAULT_SCOPE = tuple("off" if name in ("K4", "P3", "P4") else "camera" for name
 class Camera:
     """A camera and what the adjustment may do with each of its parameters (PARAMETERS).
 
-    values  (13,) mm
-    form    how its distortion is written
-    sd      (13,) standard deviations known beforehand, for the weighted ones
-    scope   13 of SCOPES: left out; one value for all photos, for each camera, for each photo
-    state   13 of STATES
-    name    as the user knows it
+    Attributes
+    ----------
+    values : ndarray, shape (13,)
+        In the order of PARAMETERS, mm.
+    form : Form
+        How its distortion is written.
+    sd : ndarray, shape (13,)
+        Standard deviations known beforehand, for the weighted ones.
+    scope : tuple
+        13 of SCOPES: left out; one value for all photos, for each camera, for each photo.
+    state : tuple
+        13 of STATES.
+    name : str
+        As the user knows it.
     """
 
     values: np.ndarray
@@ -37,11 +45,18 @@ class Camera:
 class Photos:
     """Photographs. Values that are nan are not known and have to be found.
 
-    names     tuple
-    camera    (n,) number of the camera
-    xyz_m     (n, 3) projection centres
-    rotation  (n, 3, 3) R3(kappa) R2(phi) R1(omega)
-    fixed     (n, 4) True: x, y, z, the rotation is not adjusted
+    Attributes
+    ----------
+    names : tuple of str
+        Of the photos.
+    camera : ndarray, shape (n,)
+        Number of the camera.
+    xyz_m : ndarray, shape (n, 3)
+        Projection centres.
+    rotation : ndarray, shape (n, 3, 3)
+        R3(kappa) R2(phi) R1(omega).
+    fixed : ndarray, shape (n, 4)
+        True: x, y, z, the rotation is not adjusted.
     """
 
     names: tuple
@@ -55,7 +70,10 @@ class Photos:
 class Instrument:
     """An instrument whose readings are (1 + scale) true + offset.
 
-    scale_sd, offset_sd_m  0: fixed at the value; nan: free; else a weighted unknown
+    Attributes
+    ----------
+    scale_sd, offset_sd_m : float
+        0: fixed at the value; nan: free; else a weighted unknown.
     """
 
     name: str
@@ -69,7 +87,10 @@ class Instrument:
 class System:
     """A further coordinate system of control points: X_system = (1 + scale) R X + shift.
 
-    scale_free  whether its scale is an unknown
+    Attributes
+    ----------
+    scale_free : bool
+        Whether its scale is an unknown.
     """
 
     name: str
@@ -105,19 +126,33 @@ class Survey:
     The scatter of the readings that were averaged into an observation (its Trace) counts in sigma0
     and in the redundancy as if they had been adjusted one by one.
 
-    points        names
-    xyz_m         (points, 3) start values
-    fixed         (points, 3) True: not adjusted; None: nothing is
-    image_points  ImageCoordinates of all cameras, or None
-    photos        Photos or None
-    cameras       tuple of Camera
-    observations  tuple of tankcal.survey.observations (with coordinates in the survey's frame)
-    sets          (s,) start azimuths of the zeros of the direction sets, rad
-    set_names     (s,) (set-up, set or None) of each; (): not named
-    instruments   tuple of Instrument
-    systems       tuple of System
-    correlated    tuple of tankcal.survey.observations.Block: values of the observations (none of
-                  them held exactly) that are correlated; no value stands in two
+    Attributes
+    ----------
+    points : tuple of str
+        Their names.
+    xyz_m : ndarray, shape (points, 3)
+        Start values.
+    fixed : ndarray, shape (points, 3)
+        True: not adjusted; None: nothing is.
+    image_points : ImageCoordinates or None
+        Of all cameras.
+    photos : Photos or None
+        None: no photographs.
+    cameras : tuple of Camera
+        Whose photos these are.
+    observations : tuple of tankcal.survey.observations
+        With coordinates in the survey's frame.
+    sets : ndarray, shape (s,)
+        Start azimuths of the zeros of the direction sets, rad.
+    set_names : tuple
+        (set-up, set or None) of each of the s sets; (): not named.
+    instruments : tuple of Instrument
+        With a scale or an offset.
+    systems : tuple of System
+        Further frames of coordinates.
+    correlated : tuple of tankcal.survey.observations.Block
+        Values of the observations (none of them
+        held exactly) that are correlated; no value stands in two.
     """
 
     points: tuple

@@ -13,10 +13,18 @@ CHUNK = 2048
 class Deliveries:
     """Volumes between pairs of dips, each field (n,).
 
-    low_m, high_m  dips before and after (m), as asked     volume_m3  V(high) - V(low)
-    u_m3           standard uncertainty          dof        effective degrees of freedom
-    k, U_m3        coverage factor, k u
-    for_use        False where one of the dips is in the critical zone of a floating roof
+    Attributes
+    ----------
+    low_m, high_m : ndarray
+        Dips before and after, as asked, m.
+    volume_m3 : ndarray
+        V(high) - V(low), m3.
+    u_m3, dof : ndarray
+        Standard uncertainty, m3, and effective degrees of freedom.
+    k, U_m3 : ndarray
+        Coverage factor, and k u, m3.
+    for_use : ndarray of bool
+        False where one of the dips is in the critical zone of a floating roof.
     """
 
     low_m: np.ndarray

@@ -21,7 +21,25 @@ TOLERANCE = 1e-6  # relative: the worst delivery is found to this part of itself
 
 @dataclass(frozen=True)
 class Delivery:
-    """One delivery: dips (m), volume, standard and expanded uncertainty (m3), dof, k, U/volume."""
+    """One delivery.
+
+    Attributes
+    ----------
+    low_m, high_m : float
+        The dips, m.
+    volume_m3 : float
+        Between them, m3.
+    u_m3 : float
+        Standard uncertainty, m3.
+    dof : float
+        Its degrees of freedom.
+    k : float
+        Coverage factor.
+    U_m3 : float
+        Expanded uncertainty, k u, m3.
+    relative : float
+        U over volume.
+    """
 
     low_m: float
     high_m: float
@@ -42,11 +60,19 @@ class Delivery:
 class WorstDeliveries:
     """The worst of all deliveries of at least `minimum_m` whose dips are for use.
 
-    absolute, relative  the Delivery with the largest U, and the one with the largest U/volume
-    at_minimum          the one with the largest U/volume of those of exactly minimum_m; None: only
-                        higher ones are for use
-    U_bound_m3          no delivery between any two dips has a larger U
-    relative_bound      nor a larger U/volume than this
+    Attributes
+    ----------
+    absolute : Delivery
+        The one with the largest U.
+    relative : Delivery
+        The one with the largest U/volume.
+    at_minimum : Delivery or None
+        The one with the largest U/volume of those of exactly minimum_m; None: only higher ones
+        are for use.
+    U_bound_m3 : float
+        No delivery between any two dips has a larger U.
+    relative_bound : float
+        Nor a larger U/volume than this.
     """
 
     minimum_m: float
@@ -60,9 +86,24 @@ class WorstDeliveries:
 def worst_deliveries(table, minimum_m):
     """WorstDeliveries of a Capacity for a minimum delivery height (m), or None.
 
-    max of U and of U/V over all dips with h2 - h1 >= minimum_m. None where the table has no such
-    delivery: lower than the minimum, or cut by the critical zone of its roof.
-    Raises ValueError for a minimum that is not above 0.
+    max of U and of U/V over all dips with h2 - h1 >= minimum_m.
+
+    Parameters
+    ----------
+    table : Capacity
+    minimum_m : float
+        Least height of a delivery, m.
+
+    Returns
+    -------
+    WorstDeliveries or None
+        None where the table has no such delivery: lower than the minimum, or cut by the critical
+        zone of its roof.
+
+    Raises
+    ------
+    ValueError
+        For a minimum that is not above 0.
     """
     if not minimum_m > 0:
         raise ValueError(f"minimum delivery height {minimum_m}: expected above 0")
@@ -85,9 +126,13 @@ def worst_deliveries(table, minimum_m):
 def least_delivery_m(table, limit, is_relative=True):
     """Least delivery height (m, whole millimetres) from which on all deliveries keep a limit.
 
-    limit  of U/V, or of U in m3 when not is_relative
     The worst of all deliveries of at least a height falls with that height, so halving finds it.
     None where even the largest delivery breaks the limit.
+
+    Parameters
+    ----------
+    limit
+        Of U/V, or of U in m3 when not is_relative.
     """
     prepared = _prepared(table)
     heights = prepared.rows.height_m

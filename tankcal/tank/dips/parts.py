@@ -23,9 +23,14 @@ _SAME = 1e-9
 class ProportionalParts:
     """Mean volumes of 1, 2, ... parts of a step between two heights, and their price.
 
-    part_m3       (parts - 1,) to be added to the row below a dip
-    deviation_m3  largest, by size, of (row + part - exact volume), with its sign
-    at_m          the dip where it is
+    Attributes
+    ----------
+    part_m3 : ndarray, shape (parts - 1,)
+        To be added to the row below a dip.
+    deviation_m3 : float
+        Largest, by size, of (row + part - exact volume), with its sign.
+    at_m : float
+        The dip where it is.
     """
 
     bottom_m: float
@@ -41,12 +46,25 @@ def proportional_parts(volume_m3, edges_m, row_step_m=0.01, parts=10, bound_m3=N
     A stretch between neighbouring edges that breaks the bound is cut, at rows, into the longest
     zones that keep it; where that takes zones of less than FEWEST_ROWS rows, there are none.
 
-    volume_m3   function of (n,) dips, m, to (n,) volumes, m3
-    edges_m     (k + 1,) dips of bottom, joints and top, ascending
-    row_step_m  of the table; parts  of a step (10: millimetres of a cm table, 8: eighths of inches)
-    bound_m3    function of (n,) dips, m, to (n,) largest errors, m3; None: no bound
     The deviation is taken at every mark between rows of the zone, against the exact volume.
-    Raises HeightError for edges that do not ascend from 0 or higher.
+
+    Parameters
+    ----------
+    volume_m3 : callable
+        Function of (n,) dips, m, to (n,) volumes, m3.
+    edges_m : array_like, shape (k + 1,)
+        Dips of bottom, joints and top, ascending, m.
+    row_step_m : float
+        Of the table, m.
+    parts : int
+        Of a step (10: millimetres of a cm table, 8: eighths of inches).
+    bound_m3 : callable, optional
+        Function of (n,) dips, m, to (n,) largest errors, m3; None: no bound.
+
+    Raises
+    ------
+    HeightError
+        For edges that do not ascend from 0 or higher.
     """
     edges = np.asarray(edges_m, dtype=float)
     if len(edges) < 2 or edges[0] < 0 or not np.all(np.diff(edges) > 0):

@@ -10,7 +10,15 @@ from tankcal.messages import message
 
 @dataclass(frozen=True)
 class Dips:
-    """Dips of given volumes: (n,) heights, m, and their standard uncertainties, m."""
+    """Dips of given volumes.
+
+    Attributes
+    ----------
+    height_m : ndarray, shape (n,)
+        The dips, m.
+    u_m : ndarray, shape (n,)
+        Their standard uncertainties, m.
+    """
 
     height_m: np.ndarray
     u_m: np.ndarray
@@ -41,12 +49,32 @@ def dips_of(height_m, volume_m3, factor_m3, wanted_m3):
 
     h = h_a + (V - V_a) (h_b - h_a) / (V_b - V_a),   u(h) = u(V) / ((V_b - V_a) / (h_b - h_a))
 
-    height_m   (rows,) dips, ascending; volume_m3  (rows,)
-    factor_m3  (rows, inputs) factor of the covariance of the rows: u(V) is that of the table at h
-    wanted_m3  a volume or (n,) of them
     A row itself is read with the slope of the interval below it, as in the table's own reading.
-    Raises HeightError for a volume outside the table, and for one that stands there at more than
-    one height (rows of equal volume, or a volume that falls).
+
+    Parameters
+    ----------
+    height_m, volume_m3 : array_like, shape (rows,)
+        Dips, ascending, m, and volumes, m3.
+    factor_m3 : array_like, shape (rows, inputs)
+        Factor of the covariance of the rows: u(V) is that of the table at h.
+    wanted_m3 : float or array_like, shape (n,)
+        Volumes, m3.
+
+    Returns
+    -------
+    Dips
+
+    Raises
+    ------
+    HeightError
+        For a volume outside the table, and for one that stands there at more than one height (rows
+        of equal volume, or a volume that falls).
+
+    Examples
+    --------
+    >>> found = dips_of([0.0, 1.0, 2.0], [0.0, 50.0, 100.0], [[0.1], [0.1], [0.1]], 75.0)
+    >>> found.height_m, found.u_m
+    (array([1.5]), array([0.002]))
     """
     heights, volumes = np.asarray(height_m, dtype=float), np.asarray(volume_m3, dtype=float)
     wanted = np.atleast_1d(np.asarray(wanted_m3, dtype=float))

@@ -19,12 +19,27 @@ NEAR_MARK_M = 0.0005
 def table_heights(step_m, top_m, fine_step_m=None, fine_zones=()):
     """(rows,) dips at 0, step, 2 step, ... and the top itself, m; each once, ascending.
 
-    step_m       row n is the number nearest to n * step
-    top_m        last row; a last step under a micron is dropped
-    fine_step_m  step of the rows from the one at or below `low` to the one at or above `high` of
-                 each (low_m, high_m) of `fine_zones`; a whole part of step_m
-    Raises InputError for steps that do not fit, and for more than MOST_ROWS rows; HeightError for
-    a zone outside the table.
+    Parameters
+    ----------
+    step_m
+        Row n is the number nearest to n * step.
+    top_m
+        Last row; a last step under a micron is dropped.
+    fine_step_m : optional
+        Step of the rows from the one at or below `low` to the one at or above `high` of each
+        (low_m, high_m) of `fine_zones`; a whole part of step_m.
+
+    Raises
+    ------
+    InputError
+        For steps that do not fit, and for more than MOST_ROWS rows.
+    HeightError
+        For a zone outside the table.
+
+    Examples
+    --------
+    >>> table_heights(0.5, 1.2, 0.1, [(0.0, 0.2)])
+    array([0. , 0.1, 0.2, 0.5, 1. , 1.2])
     """
     _check_steps(step_m, top_m, fine_step_m, fine_zones)
     pieces = [multiples_of(step_m, 0, int(np.floor(top_m / step_m + 1e-9)))]
@@ -48,7 +63,18 @@ def top_mark(top_m, height_unit="m", *, closed=False):
     to everybody who measures it; a tank that closes at its top is full from the next one on. In
     feet and inches the top is a mark when it is within half a millimetre of it, else as it is.
 
-    top_m  dip of the full tank; closed  whether it has no free surface there
+    Parameters
+    ----------
+    top_m : float
+        Dip of the full tank, m.
+    height_unit : {"m", "ft-in-8", "ft-in-16"}
+    closed : bool
+        Whether it has no free surface there.
+
+    Examples
+    --------
+    >>> top_mark(9.49996), top_mark(9.49946, closed=True)
+    (9.5, 9.5)
     """
     step = float(HEIGHT_STEPS_M[height_unit])
     if height_unit == "m" and closed:
@@ -130,5 +156,10 @@ def round_each(values, decimals):
     """(rows,) each value rounded by itself, once, to the nearest decimal (a tie to the even one).
 
     Correct for the number as stored: 2.675, which is stored a little below, gives 2.67.
+
+    Examples
+    --------
+    >>> round_each([2.675, 0.125], 2)
+    array([2.67, 0.12])
     """
     return np.array([round(float(value), decimals) for value in values])

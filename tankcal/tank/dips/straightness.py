@@ -30,8 +30,12 @@ _SHRINKINGS = 34  # a bracket shrinks to 1e-7 of itself, the deviation is exact 
 class Straightness:
     """The largest deviation of linear interpolation in each interval between rows.
 
-    height_m      (rows - 1,) dip where it is
-    deviation_m3  (rows - 1,) table minus exact volume there, with its sign
+    Attributes
+    ----------
+    height_m : ndarray, shape (rows - 1,)
+        Dip where it is.
+    deviation_m3 : ndarray, shape (rows - 1,)
+        Table minus exact volume there, with its sign.
     """
 
     height_m: np.ndarray
@@ -52,8 +56,12 @@ class Straightness:
 class Rows:
     """Rows of a table whose linear interpolation keeps a bound.
 
-    height_m    (rows,) dips, as `table_heights` gives them for the step and the zones
-    largest_m3  size of the largest deviation of linear interpolation, at the dip at_m
+    Attributes
+    ----------
+    height_m : ndarray, shape (rows,)
+        Dips, as `table_heights` gives them for the step and the zones.
+    largest_m3 : float
+        Size of the largest deviation of linear interpolation, at the dip at_m.
     """
 
     step_m: float
@@ -67,10 +75,16 @@ class Rows:
 def interpolation_errors(volume_m3, height_m, breakpoints_m=()):
     """`Straightness` of a table with rows at height_m.
 
-    volume_m3  function of (n,) dips, m, to (n,) exact volumes, m3
-    height_m   (rows,) dips, ascending
-    breakpoints_m  dips where the area jumps (joints, edges of deadwood); others need not be known
     Between rows and breakpoints the area is taken to turn at most once in an eighth of an interval.
+
+    Parameters
+    ----------
+    volume_m3
+        Function of (n,) dips, m, to (n,) exact volumes, m3.
+    height_m : ndarray, shape (rows,)
+        Dips, ascending.
+    breakpoints_m : optional
+        Dips where the area jumps (joints, edges of deadwood); others need not be known.
     """
     rows = np.asarray(height_m, dtype=float)
     breakpoints = np.asarray(breakpoints_m, dtype=float)
@@ -118,12 +132,23 @@ def _largest(deviation, low, high):
 def choose_rows(volume_m3, top_m, bound_m3, breakpoints_m=(), step_m=None, ladder_m=METRIC_STEPS_M):
     """`Rows` that keep the bound with the fewest rows: one step, or a finer one where needed.
 
-    volume_m3  function of (n,) dips, m, to (n,) exact volumes, m3
-    bound_m3   of the deviation of linear interpolation from the exact volume
-    breakpoints_m  dips where the area jumps
-    step_m     the table's step when it is given; then only finer zones are added. None: chosen
-    ladder_m   steps to choose from, the coarsest first (`LADDERS_M` has them by unit of heights)
-    Raises InputError, with the deviation that is reached, when no step of the ladder is enough.
+    Parameters
+    ----------
+    volume_m3
+        Function of (n,) dips, m, to (n,) exact volumes, m3.
+    bound_m3
+        Of the deviation of linear interpolation from the exact volume.
+    breakpoints_m : optional
+        Dips where the area jumps.
+    step_m : optional
+        The table's step when it is given; then only finer zones are added. None: chosen.
+    ladder_m : optional
+        Steps to choose from, the coarsest first (`LADDERS_M` has them by unit of heights).
+
+    Raises
+    ------
+    InputError
+        With the deviation that is reached, when no step of the ladder is enough.
     """
     best, reached = None, None
     for step in ladder_m if step_m is None else (step_m,):

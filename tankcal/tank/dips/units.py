@@ -44,13 +44,33 @@ _TYPED_MARKS = str.maketrans("′’″”", "''\"\"")
 def volume_from_m3(volume_m3, unit):
     """Volumes in m3 as volumes in `unit` ("m3", "L", "bbl"): one multiplication, one rounding.
 
-    volume_m3  any shape. Raises KeyError for an unknown unit.
+    Parameters
+    ----------
+    volume_m3 : array_like
+        Of any shape, m3.
+    unit : str
+
+    Raises
+    ------
+    KeyError
+        For an unknown unit.
+
+    Examples
+    --------
+    >>> float(volume_from_m3(1.5, "L"))
+    1500.0
     """
     return np.asarray(volume_m3, dtype=float) * float(1 / VOLUME_UNITS_M3[unit])
 
 
 def volume_to_m3(volume, unit):
-    """Volumes in `unit` as volumes in m3; the inverse of `volume_from_m3`."""
+    """Volumes in `unit` as volumes in m3; the inverse of `volume_from_m3`.
+
+    Examples
+    --------
+    >>> float(volume_to_m3(100.0, "bbl").round(7))
+    15.8987295
+    """
     return np.asarray(volume, dtype=float) / float(1 / VOLUME_UNITS_M3[unit])
 
 
@@ -58,7 +78,23 @@ def dip_label(height_m, height_unit="m"):
     """A dip as the table prints it: '1.035', or 3' 4 5/8" with the fraction reduced.
 
     A height between the marks of the tape (the top of a shell) shows decimals instead: of a metre
-    as many as it needs, of an inch three. Raises HeightError for a negative height in feet.
+    as many as it needs, of an inch three.
+
+    Parameters
+    ----------
+    height_m : float
+        The dip, m.
+    height_unit : {"m", "ft-in-8", "ft-in-16"}
+
+    Raises
+    ------
+    HeightError
+        For a negative height in feet.
+
+    Examples
+    --------
+    >>> print(dip_label(1.035), "or", dip_label(1.031875, "ft-in-8"))
+    1.035 or 3' 4 5/8"
     """
     if height_unit == "m":
         return fixed(height_m, decimals_of_height(height_m), PROGRAM)
@@ -86,7 +122,21 @@ def parse_dip(text, height_unit="m"):
     """Metres of a dip as text; for feet and inches 3' 4 5/8", 3-4 5/8, 3-04-5/8, 3 ft 4.625 in.
 
     Exact until the last division: the number nearest to n * 0.0254 / 16 m, as in `table_heights`.
-    Raises HeightError for anything else.
+
+    Parameters
+    ----------
+    text : str
+    height_unit : {"m", "ft-in-8", "ft-in-16"}
+
+    Raises
+    ------
+    HeightError
+        For anything else.
+
+    Examples
+    --------
+    >>> parse_dip("1.035"), parse_dip("3-4 5/8", "ft-in-8")
+    (1.035, 1.031875)
     """
     text = text.strip()
     if height_unit == "m":

@@ -34,10 +34,19 @@ def closed_mesh(vertices, faces, *, unit_m=1.0, name="mesh"):
     inside and leave the free surface positive; such a mesh counts the volume that it encloses
     twice, twice.
 
-    vertices  (n, 3) x, y, z, z up, in units of unit_m metres
-    faces     (m, 3) indices of corners
-    name      of the file, for messages
-    Raises InputError, with what was expected.
+    Parameters
+    ----------
+    vertices : ndarray, shape (n, 3)
+        x, y, z, z up, in units of unit_m metres.
+    faces : ndarray, shape (m, 3)
+        Indices of corners.
+    name : optional
+        Of the file, for messages.
+
+    Raises
+    ------
+    InputError
+        With what was expected.
     """
     if not 0 < unit_m < np.inf:
         raise problem(name, f"unit of {unit_m} m; expected a length above 0")

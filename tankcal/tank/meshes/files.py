@@ -90,9 +90,17 @@ def read_mesh(path, unit_m=1.0):
 def parse_mesh(name, data, unit_m=1.0):
     """The closed mesh in the bytes of an STL, OBJ, PLY or OFF file, checked as `closed_mesh` does.
 
-    name    of the file, its ending says what it is; z is up
-    unit_m  length of one unit of the file, m (0.001 for millimetres)
-    Raises InputError for data that cannot be read, or what is no closed mesh.
+    Parameters
+    ----------
+    name
+        Of the file, its ending says what it is; z is up.
+    unit_m : optional
+        Length of one unit of the file, m (0.001 for millimetres).
+
+    Raises
+    ------
+    InputError
+        For data that cannot be read, or what is no closed mesh.
     """
     import trimesh
 
@@ -127,8 +135,11 @@ def parse_mesh(name, data, unit_m=1.0):
 def write_mesh(mesh, path, origin_m=(0.0, 0.0, 0.0)):
     """Write a mesh as an STL, OBJ, PLY or OFF file in metres, for viewers.
 
-    origin_m  of the file's coordinates, (3,): STL and PLY hold seven digits, half a metre in
-              coordinates of UTM size
+    Parameters
+    ----------
+    origin_m : optional
+        Of the file's coordinates, (3,): STL and PLY hold seven digits, half a metre in
+        coordinates of UTM size.
     """
     import trimesh
 

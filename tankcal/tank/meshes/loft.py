@@ -17,9 +17,14 @@ from tankcal.tank.meshes.checks import closed_mesh
 class Band:
     """Rings of the wall from one joint to the next: k heights, q even azimuths from north.
 
-    heights_m  (k,) ascending, the first and the last at the joints
-    radii_m    (k, q) inside radii about the centre of their ring
-    centre_m   (k, 2) x and y of the centres
+    Attributes
+    ----------
+    heights_m : ndarray, shape (k,)
+        Ascending, the first and the last at the joints.
+    radii_m : ndarray, shape (k, q)
+        Inside radii about the centre of their ring.
+    centre_m : ndarray, shape (k, 2)
+        x and y of the centres.
     """
 
     heights_m: np.ndarray
@@ -30,8 +35,13 @@ class Band:
 def shell_bands(volume, *, slices=8, azimuths=720):
     """The bands of a shell, one a course, from the outlines that its volume is integrated from.
 
-    volume    `tankcal.tank.volumes.ShellVolume`
-    slices    of a course; azimuths of a ring
+    Parameters
+    ----------
+    volume : tankcal.tank.volumes.ShellVolume
+    slices : optional
+        Of a course.
+    azimuths : optional
+        Of a ring.
     """
     azimuth = np.arange(azimuths) * FULL_TURN / azimuths
     parts = np.linspace(0.0, 1.0, slices + 1)
@@ -54,8 +64,17 @@ def loft(bands):
     Neighbouring rings are joined by two triangles an azimuth; a step at a joint is such a strip
     too, a level one. The mesh falls short of the smooth shape by the square of the spacing.
 
-    bands  of one number of azimuths; each begins at the height where the one below it ends
-    Raises ValueError for bands that do not fit, InputError as `closed_mesh` does.
+    Parameters
+    ----------
+    bands
+        Of one number of azimuths; each begins at the height where the one below it ends.
+
+    Raises
+    ------
+    ValueError
+        For bands that do not fit.
+    InputError
+        As `closed_mesh` does.
     """
     joints = [(below.heights_m[-1], above.heights_m[0]) for below, above in pairwise(bands)]
     if any(low != high for low, high in joints):

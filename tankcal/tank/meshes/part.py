@@ -25,10 +25,16 @@ BLOCK = 1 << 16  # faces worked on at a time
 class Mesh:
     """A closed surface of triangles whose corners run anticlockwise seen from outside.
 
-    vertices_m  (n, 3) x, y, z
-    faces       (m, 3) indices of the corners
-    bodies      number of pieces that share no vertex; a hollow counts as a piece
-    notes       what was repaired or deserves a look, one line each
+    Attributes
+    ----------
+    vertices_m : ndarray, shape (n, 3)
+        x, y, z.
+    faces : ndarray, shape (m, 3)
+        Indices of the corners.
+    bodies : int
+        Number of pieces that share no vertex; a hollow counts as a piece.
+    notes : tuple of str
+        What was repaired or deserves a look, one line each.
     """
 
     vertices_m: np.ndarray
@@ -41,11 +47,18 @@ class Mesh:
 class MeshPart(Part):
     """A mesh as a part of a tank. Make one with `mesh_part`.
 
-    zero_m      height of level 0 above the lowest vertex, m
-    height_m    of the highest vertex above the lowest
-    corners_m   (m, 3) heights of the corners above the lowest vertex, ascending in each row
-    plan_m2     (m,) area of each face seen from above, positive where the outside faces up
-    surface_m2  (m,) area of each face
+    Attributes
+    ----------
+    zero_m : float
+        Height of level 0 above the lowest vertex, m.
+    height_m : float
+        Of the highest vertex above the lowest.
+    corners_m : ndarray, shape (m, 3)
+        Heights of the corners above the lowest vertex, ascending in each row.
+    plan_m2 : ndarray, shape (m,)
+        Area of each face seen from above, positive where the outside faces up.
+    surface_m2 : ndarray, shape (m,)
+        Area of each face.
     """
 
     zero_m: float
@@ -119,7 +132,10 @@ class MeshPart(Part):
 def mesh_part(mesh, zero_z_m=None):
     """The part of a tank that a `Mesh` encloses.
 
-    zero_z_m  z of level 0; the lowest vertex when None
+    Parameters
+    ----------
+    zero_z_m : optional
+        z of level 0; the lowest vertex when None.
     """
     z = mesh.vertices_m[:, 2]
     low = float(z.min())

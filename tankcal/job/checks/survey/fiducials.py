@@ -217,6 +217,11 @@ def _suspected(photo, found, names):
             photo=photo,
             marks=marks,
         )
+    return _misplaced(photo, found, named)
+
+
+def _misplaced(photo, found, named):
+    """One line about marks that are far from their calibrated places."""
     share = 100 * found.size
     start = message(
         "marks_off",

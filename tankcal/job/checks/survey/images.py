@@ -59,6 +59,10 @@ def check_film(files, imagery):
                 limit_um=FLAT_UM,
             )
             files.log.warning(table.file, expected, row, "height_um")
+    _warn_beyond_film(table, imagery, files.log)
+
+
+def _warn_beyond_film(table, imagery, log):
     for (_, name), (beyond, count) in imagery.outside.items():
         if beyond:
             expected = message(
@@ -69,7 +73,7 @@ def check_film(files, imagery):
                 count=count,
                 name=name,
             )
-            files.log.warning(table.file, expected)
+            log.warning(table.file, expected)
 
 
 MIN_POINTS = 3

@@ -1,0 +1,117 @@
+"""Facts of a tank and its survey, a name and a value each: on certificate, field table, workbook.
+
+Each set of facts is a `Table` of one row. `Column.key` is the label of the fact, and `on` and
+`sheet` say which papers show it; `plain.PlainPaper.facts_of` and the sheet Certificate write them.
+"""
+
+from tankcal.report.dip_point import dip_point_text
+from tankcal.report.tables.table import Column, Table
+from tankcal.text.words import method_line
+
+CERTIFICATE, FIELD_TABLE = "certificate", "field_table"
+BOTH = f"{CERTIFICATE} {FIELD_TABLE}"
+
+
+def _day(paper, row):
+    return paper.day(row["survey_date"])
+
+
+def _method(paper, row):
+    adjustment = paper.record["adjustment"]
+    return method_line(paper.words, adjustment) if adjustment else None
+
+
+def _volume(paper, row):
+    return paper.plain(row["nominal_volume"], "m³")
+
+
+def _expansion(paper, row):
+    return paper.plain(row["expansion"], "1/K")
+
+
+def tank_facts(record):
+    """What the tank is: its name, its kind, what the job says of its own, nominal sizes."""
+    tank = record["job"]["tank"]
+    details = tank["details"]
+    sizes = {f"nominal_{key}": tank[f"nominal_{key}_{unit}"]
+             for key, unit in (("diameter", "m"), ("height", "m"), ("volume", "m3"))}  # fmt: skip
+    row = {"tank_id": tank["id"], "kind": tank["kind"], **details, **sizes}
+    row["certificate_number"] = record["job"]["certificate"].get("number")
+    return Table(
+        "tank",
+        (
+            Column("tank_id", on=BOTH, sheet=True),
+            Column("kind", words="kinds", on=CERTIFICATE, sheet=True),
+            *(Column(key, on=BOTH if key == "location" else CERTIFICATE, sheet=True)
+              for key in details),
+            Column("certificate_number", on=FIELD_TABLE),
+            *(Column(f"nominal_{key}", "m", decimals=3, on=CERTIFICATE, sheet=True)
+              for key in ("diameter", "height")),
+            Column("nominal_volume", text=_volume, on=CERTIFICATE, sheet=True,
+                   in_sheet={"text": None, "unit": "m3", "decimals": 3}),
+        ),
+        rows=lambda record: [row],
+    )  # fmt: skip
+
+
+def _references(record):
+    job = record["job"]
+    return [
+        {
+            "zero": record["capacity"]["zero"],
+            "reference_height": job["datum"]["reference_height_m"],
+            "reference_temperature": job["table"]["reference_temperature_c"],
+            "expansion": job["material"]["expansion_per_k"],
+            "table_density": job["table"]["liquid_density_kg_m3"] or None,
+        }
+    ]
+
+
+REFERENCES = Table(
+    "references",  # what the table of capacities refers to
+    (
+        Column("zero", words="zeros", on=BOTH, sheet=True),
+        Column("dip_point", text=lambda paper, row: dip_point_text(paper), on=BOTH),
+        Column("reference_height", "m", decimals=3, on=BOTH, sheet=True),
+        Column("reference_temperature", "degC", digits=3, on=BOTH, sheet=True,
+               in_sheet={"digits": None, "decimals": 1}),
+        Column("expansion", text=_expansion, on=CERTIFICATE),
+        Column("table_density", "kg/m3", digits=4, on=BOTH),
+    ),
+    rows=_references,
+    last={
+        FIELD_TABLE: "dip_point reference_temperature table_density",
+        "sheet": "zero reference_height",
+    },
+)  # fmt: skip
+
+
+def _survey(record):
+    survey = record["job"]["survey"]
+    return [
+        {
+            "survey_date": survey["date"],
+            "survey_side": survey["side"],
+            "shell_temperature": survey["shell_temperature_c"],
+            "liquid_level": survey["liquid_level_m"],
+            "liquid_density": survey["liquid_density_kg_m3"],
+        }
+    ]
+
+
+SURVEY_DATE = Table(
+    "survey_date", (Column("survey_date", text=_day, sheet=True, in_sheet={"text": None}),),
+    rows=_survey,
+)  # fmt: skip
+SURVEY = Table(
+    "survey",
+    (
+        Column("survey_method", text=_method, sheet=True),
+        Column("survey_side", words="sides", sheet=True),
+        Column("shell_temperature", "degC", digits=3, sheet=True,
+               in_sheet={"digits": None, "decimals": 1}),
+        Column("liquid_level", "m", decimals=3),
+        Column("liquid_density", "kg/m3", digits=4),
+    ),
+    rows=_survey,
+)  # fmt: skip
