@@ -71,7 +71,14 @@ def load(path: str | PathLike, only: str | None = None) -> Job:
     raw = _read(Path(path), log)
     if raw is None:
         log.stop_if_problems()
-    is_whole = only is None
+    return job_of(raw, log, only is None)
+
+
+def job_of(raw, log, is_whole=True):
+    """The checked Job of a RawJob; InputError with every problem that `log` has been told.
+
+    is_whole  False: the survey alone is needed
+    """
     tables = _read_tables(raw, is_whole, log)
     registers = {name: read_register(raw, name, log) for name in REGISTERS}
     values = read_settings(raw, log, is_whole) if raw.settings is not None else None

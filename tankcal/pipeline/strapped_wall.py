@@ -192,8 +192,11 @@ class StrappedWall:
         return np.array([one.of == kind for one in self.readings], dtype=bool)
 
 
-def find_strapped_wall(job, progress):
-    """`StrappedWall` of a job whose circumferences were measured by tape."""
+def find_strapped_wall(job, progress, amplitudes=None):
+    """`StrappedWall` of a job whose circumferences were measured by tape.
+
+    amplitudes  of the wall's components where they are known beforehand; None: the readings tell
+    """
     straps, lines = job.strapping, job.lines
     progress(
         message(
@@ -222,7 +225,9 @@ def find_strapped_wall(job, progress):
         readings += readings_of_offsets(lines, used, courses, insets)
         places += kept
     joints, zero = joints_of(job), shell_zero(job, None)
-    readings, tested, field = _adjusted(readings, joints, zero, nominal, job.snooping)
+    readings, tested, field = _adjusted(
+        readings, (joints, zero, nominal), amplitudes, snooping=job.snooping
+    )
     return StrappedWall(
         joints,
         zero,
@@ -238,15 +243,19 @@ def find_strapped_wall(job, progress):
     )
 
 
-def _adjusted(readings, joints_m, zero_m, nominal_m, snooping):
-    """Readings with the eccentricity of their rings, what became of each, and `WallField`."""
+def _adjusted(readings, sizes, amplitudes, *, snooping):
+    """Readings with the eccentricity of their rings, what became of each, and `WallField`.
+
+    sizes  joints, the table's zero above the bottom, and the nominal radius, m
+    """
+    joints_m, zero_m, nominal_m = sizes
     sites, noise = sites_of(readings, joints_m, zero_m), noise_of(readings)
     may_go = snooping * np.array([one.of == "offsets" for one in readings])
 
     def field_of(accepted):
         some = np.flatnonzero(accepted)
         kept, own = [readings[i] for i in some], noise[np.ix_(some, some)]
-        return field_of_readings(sites.take(accepted), kept, own, nominal_m)
+        return field_of_readings(sites.take(accepted), kept, own, nominal_m, amplitudes)
 
     accepted = np.ones(len(readings), dtype=bool)
     field = field_of(accepted)
@@ -271,13 +280,17 @@ def _off_centre(readings, field):
     return found
 
 
-def field_of_readings(sites, readings, noise_m2, nominal_m):
-    """`WallField` of readings; SolutionError where they tell nothing."""
+def field_of_readings(sites, readings, noise_m2, nominal_m, amplitudes=None):
+    """`WallField` of readings; SolutionError where they tell nothing.
+
+    amplitudes  None: those that the readings tell
+    """
     radius = np.array([one.radius_m for one in readings])
     by_lines = any(one.of == "offsets" for one in readings)
     stated = STATED_BY_LINES if by_lines else STATED_BY_STRAPS
     try:
-        amplitudes = estimate_amplitudes(sites, radius, noise_m2, nominal_m)
+        if amplitudes is None:
+            amplitudes = estimate_amplitudes(sites, radius, noise_m2, nominal_m)
         field = WallField(sites, radius, noise_m2, amplitudes, nominal_m, stated=stated)
         sound = np.all(np.isfinite(field.outlines_m))
     except np.linalg.LinAlgError:
