@@ -37,6 +37,17 @@ class AreaTerm:
     sd: float
 
 
+def area_term(shape_sd_m, amplitudes, nominal_m):
+    """`AreaTerm` of a wall, and the standard deviation of its radius that it follows from.
+
+    shape_sd_m  as declared; None: of the ovality and the seams that it has by its amplitudes
+    """
+    if shape_sd_m is None:
+        waves = [one.shape in ("oval", "seam") for one in COMPONENTS]
+        shape_sd_m = float(np.sqrt(amplitudes.variances_m2[waves].sum()))
+    return AreaTerm(*perimeter_excess(shape_sd_m, nominal_m)), shape_sd_m
+
+
 @dataclass(frozen=True)
 class Straps:
     """Circumferences by tape, and what the wall that they are readings of says of them.
@@ -152,11 +163,7 @@ def join_straps(job, points, amplitudes, joints_m):
     given = job.strapping
     reduced = reduce_straps(given, job.survey.shell_temperature_c, 2 * nominal)
     places = np.array([i for i, one in enumerate(reduced) if not one.strap.check], dtype=int)
-    shape = given.shape_sd_m
-    if shape is None:
-        waves = [one.shape in ("oval", "seam") for one in COMPONENTS]
-        shape = float(np.sqrt(amplitudes.variances_m2[waves].sum()))
-    term = AreaTerm(*perimeter_excess(shape, nominal))
+    term, shape = area_term(given.shape_sd_m, amplitudes, nominal)
     readings = readings_of_straps([reduced[i] for i in places], names, term)
     inner = np.array([one.thickness_m + one.paint_m for one in job.courses])
     inner *= job.survey.side == "inside"

@@ -13,8 +13,9 @@ from tankcal.messages import message
 from tankcal.planning.changes import ITEMS, Change, changes_of, cost_of
 from tankcal.planning.checks.placed import refuse_misplaced
 from tankcal.planning.checks.seen import refuse_blind
+from tankcal.planning.limits import limited_u
 from tankcal.planning.measurements import measurements_of, nominal_of
-from tankcal.planning.prediction import Prediction, limited_u, predict
+from tankcal.planning.prediction import Prediction, predict
 from tankcal.planning.table import predicted_table, recompute_table
 from tankcal.planning.visibility import visible
 from tankcal.survey import predict_survey
