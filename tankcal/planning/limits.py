@@ -14,7 +14,7 @@ def limited_u(tabled, limits):
 
 
 def refuse_without_delivery(plan, tabled, tall):
-    """Raise InputError where the limit is for deliveries and the table has none that is long enough.
+    """Raise InputError where the limit is for deliveries and the table has none long enough.
 
     tall  height of the shell, m
     """

@@ -59,7 +59,7 @@ HITS = (
     number("start_azimuth_deg", "of the first set-up from the axis; blank: 0", -360, 360),
     number("height_m", "of the instrument above the bottom of the shell; blank: 1.6", -50, 200),
     count("hits", message("plan_note_hits", "of each set-up at each height"), True, 500),
-    number("spread_deg", "of the wall that each sees; blank: all under 60 degrees", 0, 360),
+    number("spread_deg", "azimuths of the wall that each sees; blank: all that it can", 0, 360),
     _COURSES,
     _AT,
     _INSTRUMENT,

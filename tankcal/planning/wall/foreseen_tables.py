@@ -12,7 +12,7 @@ from tankcal.job.checks.lines import MOST_OFFSETS
 from tankcal.job.checks.strapping import MOST_STRAPS
 from tankcal.job.tables import Table
 
-STEEPEST = np.radians(60.0)  # incidence of a set-up that says nothing of what it sees
+STEEPEST = np.radians(55.0)  # incidence in plan, of a set-up that says nothing of what it sees
 TIE_HEIGHTS_M = (0.4, 1.4, 2.4)  # above the instrument's foot: of targets that set-ups share
 
 

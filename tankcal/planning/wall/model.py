@@ -31,7 +31,7 @@ class PlannedStrap:
 
 @dataclass(frozen=True)
 class PlannedLines:
-    """Reference lines, evenly round the tank, all courses read at the same parts of their height."""
+    """Reference lines, evenly round the tank; each course is read at the same parts of it."""
 
     count: int
     at_percent: tuple

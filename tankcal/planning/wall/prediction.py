@@ -1,6 +1,6 @@
 """A plan of a wall answered: its job computed with the readings foreseen, and what U will be."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -126,7 +126,7 @@ class WallPrediction:
         return courses_of(self.tabled)
 
     @cached_property
-    def readings(self):
+    def reliability(self):
         """A tuple of ReadingsOutlook, of straps and offsets."""
         return readings_of(self.tabled)
 
@@ -156,11 +156,12 @@ def predict_wall(plan):
     SolutionError
         When they do not determine the wall.
     """
-    first = find_survey(plan.job, lambda text: None, plan.amplitudes)
-    amplitudes = expect_amplitudes(first.survey.field)
-    found = find_survey(plan.job, lambda text: None, amplitudes)
-    made = compute_table(found.job, found.survey)
-    tabled = WallTable(found.job, found.survey, made, found.sighting)
+    found = find_survey(plan.job, lambda text: None, plan.amplitudes)
+    field = found.survey.field  # how well sizes are known changes no weight of a reading
+    field = replace(field, amplitudes=expect_amplitudes(field))
+    wall = replace(found.survey, field=field)
+    made = compute_table(found.job, wall)
+    tabled = WallTable(found.job, wall, made, found.sighting)
     tall = sum(one.height_m for one in plan.job.courses)
     refuse_without_delivery(plan, tabled, tall)
     return WallPrediction(plan, tabled)
@@ -172,7 +173,10 @@ def courses_of(tabled):
     courses = len(job.courses)
     mean = np.kron(np.eye(courses), panels([0.0, 1.0], LEVELS)[1])
     weights = mean @ field.means.weights
-    covariance = sum(mean @ field.means.unseen(i) @ mean.T for i in range(len(COMPONENTS)))
+    sizes = field.amplitudes.inflation()
+    covariance = sum(
+        sizes[i] * mean @ field.means.unseen(i) @ mean.T for i in range(len(COMPONENTS))
+    )
     noise = _noise_of(tabled.wall)
     sds = np.sqrt(np.diag(covariance) + np.einsum("ij,jk,ik->i", weights, noise, weights))
     names = [one.name for one in job.courses]

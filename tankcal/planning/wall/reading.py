@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from tankcal.errors import InputError
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
+from tankcal.job.building import job_of
 from tankcal.job.checking import zero_z
-from tankcal.job.loading import job_of
 from tankcal.job.tables import Log, Value
 from tankcal.messages import message
 from tankcal.planning.given import PLAN_FILE
@@ -54,7 +54,11 @@ def check_sections(given, courses, log):
                     found=course, file="courses.csv", hint="",
                 )  # fmt: skip
                 one.tell(log.problem, "courses", expected)
-    wall = given.single["wall"]
+    _check_form(given.single["wall"], log)
+    _check_lines_and_ties(given, log)
+
+
+def _check_form(wall, log):
     whole, common = wall["form_mm"] or 0.0, wall["common_form_mm"] or 0.0
     if common > whole and not wall.is_refused("form_mm"):
         expected = message(
@@ -64,7 +68,21 @@ def check_sections(given, courses, log):
             whole=whole,
         )
         wall.tell(log.problem, "common_form_mm", expected)
+
+
+def _check_lines_and_ties(given, log):
+    lines = given.single["lines"]
+    if lines.filled and not given.repeated["straps"]:
+        expected = message(
+            "plan_lines_alone",
+            "given without [[straps]]; expected a circumference of one course at least: lines tell"
+            " differences of radii alone",
+        )
+        log.problem(PLAN_FILE, expected, lines.row, "lines")
     ties = given.single["setup_ties"]
+    if ties.filled and not given.repeated["hits"]:
+        expected = message("plan_ties_alone", "given without [[hits]]; expected set-ups to be tied")
+        log.problem(PLAN_FILE, expected, ties.row, "setup_ties")
     if ties.filled:
         for key in ("s_mm", "s_arcsec"):
             if key not in ties.filled:
