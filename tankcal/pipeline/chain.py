@@ -13,6 +13,7 @@ from tankcal.errors import HeightError, InputError, Problem
 from tankcal.job import Job
 from tankcal.messages import message
 from tankcal.pipeline.corrections import Correction, corrections_of
+from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
@@ -191,6 +192,11 @@ class Result:
         """Circumferences by tape, and what the wall says of them; None where none were read."""
         wall = self.wall or self.strapped
         return None if wall is None else wall.straps
+
+    @property
+    def read(self) -> ReadWall | None:
+        """What a tape and reference lines read of a wall, alone or beside points; None: nothing."""
+        return self.strapped if self.wall is None else self.wall.read
 
     @property
     def capacity(self) -> pd.DataFrame:

@@ -13,11 +13,11 @@ from tankcal.pipeline.statements import statements
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import ComputedTable, check_table, compute_table
+from tankcal.pipeline.told_causes import noise_of_wall
 from tankcal.planning.limits import limited_u, refuse_without_delivery
 from tankcal.planning.wall.model import WallPlan
 from tankcal.planning.wall.telling import told_of_plan
 from tankcal.quadrature import panels
-from tankcal.survey.network.reliability import noncentrality
 
 OF_READINGS = (  # warnings that only true readings can give
     *("reading_copied", "line_copied", "no_control_readings"),
@@ -177,7 +177,8 @@ def courses_of(tabled):
     covariance = sum(
         sizes[i] * mean @ field.means.unseen(i) @ mean.T for i in range(len(COMPONENTS))
     )
-    noise = _noise_of(tabled.wall)
+    wall = tabled.wall
+    noise = field.noise_m2 if isinstance(wall, StrappedWall) else noise_of_wall(wall)
     sds = np.sqrt(np.diag(covariance) + np.einsum("ij,jk,ik->i", weights, noise, weights))
     names = [one.name for one in job.courses]
     counts = {kind: dict.fromkeys(names, 0) for kind in ("straps", "offsets", "hits")}
@@ -193,24 +194,13 @@ def courses_of(tabled):
     )
 
 
-def _noise_of(wall):
-    """(n, n) covariance of the readings of a wall, by all that they share."""
-    if isinstance(wall, StrappedWall) or wall.straps is not None:
-        return wall.field.noise_m2
-    return (wall.radii_by_points @ (wall.covariance_m2 @ wall.radii_by_points.T)) + 0.0
-
-
 def readings_of(tabled):
     """A ReadingsOutlook of the straps and of the offsets that a wall has."""
-    wall, found = tabled.wall, []
-    if isinstance(wall, StrappedWall):
-        for kind in ("straps", "offsets"):
-            w, mdb, _ = wall.tests_of(kind)
-            if len(w):
-                found.append(_outlook(kind, mdb))
-    elif wall.straps is not None:
-        found.append(_outlook("straps", noncentrality() * wall.straps.sd_m))
-    return tuple(found)
+    wall = tabled.wall if isinstance(tabled.wall, StrappedWall) else tabled.wall.read
+    if wall is None:
+        return ()
+    found = ((kind, wall.tests_of(kind)[1]) for kind in ("straps", "offsets"))
+    return tuple(_outlook(kind, mdb) for kind, mdb in found if len(mdb))
 
 
 def _outlook(kind, mdb_m):
