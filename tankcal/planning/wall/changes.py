@@ -93,7 +93,7 @@ def _lines(plan):
         again = replace(lines, readings=lines.readings + 1)
         yield "repeat", "reading", "offsets", _made(plan, lines=again)
     for action, name, at in _levels(lines.at_percent):
-        yield action, "level", f"{name} offsets", _made(plan, lines=replace(lines, at_percent=at))
+        yield action, "level", name, _made(plan, lines=replace(lines, at_percent=at))
 
 
 def _levels(at_percent):
@@ -119,7 +119,7 @@ def _hits(plan):
         if ring.setups > 1:
             yield "drop", "setup", str(number), made(setups=ring.setups - 1)
         for action, name, at in _levels(ring.at_percent):
-            yield action, "level", f"{name} hits {number}", made(at_percent=at)
+            yield action, "level", f"{name} ({number})", made(at_percent=at)
     if design.hits and not design.straps:
         tapes = plan.given.registers.get("instruments")
         kinds = {} if tapes is None else {n: one.get("kind") for n, one in tapes.entries.items()}

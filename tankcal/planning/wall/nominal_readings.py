@@ -66,7 +66,7 @@ def _hit(job, outer, nominal_m):
     hits = job.hits
     distance = np.empty(len(hits))
     for i, (name, course) in enumerate(zip(hits.setup, hits.course, strict=True)):
-        station = hits.stations[hits.setups[name].station][:2]
+        station = hits.stations.get(hits.setups[name].station, np.zeros(3))[:2]
         inside = np.hypot(*station) < nominal_m
         zenith, turn = np.sin(hits.zenith_rad[i]), hits.direction_rad[i]
         ray = np.array([np.sin(turn), np.cos(turn)])

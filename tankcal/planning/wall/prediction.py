@@ -156,15 +156,23 @@ def predict_wall(plan):
     SolutionError
         When they do not determine the wall.
     """
-    found = find_survey(plan.job, lambda text: None, plan.amplitudes)
+    tabled = foresee_table(plan.job, plan.amplitudes)
+    tall = sum(one.height_m for one in plan.job.courses)
+    refuse_without_delivery(plan, tabled, tall)
+    return WallPrediction(plan, tabled)
+
+
+def foresee_table(job, amplitudes):
+    """`WallTable` of a job with the readings that its nominal sizes give.
+
+    amplitudes  of the wall, as they are assumed
+    """
+    found = find_survey(job, lambda text: None, amplitudes)
     field = found.survey.field  # how well sizes are known changes no weight of a reading
     field = replace(field, amplitudes=expect_amplitudes(field))
     wall = replace(found.survey, field=field)
     made = compute_table(found.job, wall)
-    tabled = WallTable(found.job, wall, made, found.sighting)
-    tall = sum(one.height_m for one in plan.job.courses)
-    refuse_without_delivery(plan, tabled, tall)
-    return WallPrediction(plan, tabled)
+    return WallTable(found.job, wall, made, found.sighting)
 
 
 def courses_of(tabled):

@@ -179,12 +179,20 @@ def wall_plan_of(raw, values, tables, given, limits, folder):
 def changed(plan, design=None, raw=None):
     """The WallPlan with another Design, or with other instruments."""
     design, raw = design or plan.design, raw or plan.given
-    job = plan.job
+    job = job_of_design(raw, design, _tank_of(plan.job), plan.amplitudes)
+    return replace(plan, job=job, design=design, given=raw)
+
+
+def tables_of(plan):
+    """{name: Table} of what will be read, whatever stands as its value."""
+    return Foreseen(plan.design, *_tank_of(plan.job)).tables()
+
+
+def _tank_of(job):
+    """Of a job, as `Foreseen` takes it."""
     courses = tuple((one.name, one.height_m) for one in job.courses)
-    tank = (courses, job.tank.nominal_diameter_m / 2, job.datum.bottom_z_m, job.datum.plate_level_m)
-    return replace(
-        plan, job=job_of_design(raw, design, tank, plan.amplitudes), design=design, given=raw
-    )
+    datum = job.datum
+    return courses, job.tank.nominal_diameter_m / 2, datum.bottom_z_m, datum.plate_level_m
 
 
 def job_of_design(raw, design, tank, amplitudes):

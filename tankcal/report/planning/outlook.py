@@ -24,10 +24,10 @@ def outlook(paper):
     """The blocks of the prediction of a PlanPaper."""
     return [
         *paper.head("prediction"),
-        _result(paper),
+        result(paper),
         *_facts(paper),
         *paper.warnings(paper.prediction.warnings),
-        *_table(paper),
+        *table(paper),
         *_weak(paper),
         *_reliability(paper),
         *_simulated(paper),
@@ -36,7 +36,8 @@ def outlook(paper):
     ]
 
 
-def _result(paper):
+def result(paper):
+    """The full tank with its U, and whether the limit is met."""
     found, table = paper.prediction, paper.prediction.table
     value = format_with_u(table.volume_m3[-1], table.U_m3[-1], paper.marks, least=0)
     text = paper.word(
@@ -95,7 +96,8 @@ def _axes(paper, values_m):
     return ", ".join(f"{axis} {text}" for axis, text in zip("xyz", texts, strict=True))
 
 
-def _table(paper):
+def table(paper):
+    """U against the dip, the table at some dips, the worst deliveries, the budget."""
     table, stated = paper.prediction.table, paper.prediction.tabled.stated
     last = len(table.height_m) - 1
     places = dict.fromkeys(np.linspace(0, last, DIPS + 1).round().astype(int)[1:].tolist())
