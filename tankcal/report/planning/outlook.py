@@ -17,6 +17,7 @@ from tankcal.uncertainty import combine
 
 DIPS = 12  # rows of the table that are shown
 MOST_POINTS = 40
+NOTHING = 1e-9  # of the largest u: an input that contributes less is not listed
 SHARE = Column("relative", "share", digits=3)
 
 
@@ -135,7 +136,9 @@ def _sources(paper):
     for one, variance in zip(table.sources, of_top, strict=True):
         name = name_of_input(paper.words, one.kind)
         variances[name] = variances.get(name, 0.0) + variance
-    return {name: np.sqrt(variance) for name, variance in variances.items()}
+    found = {name: np.sqrt(variance) for name, variance in variances.items()}
+    least = NOTHING * max(found.values(), default=0.0)
+    return {name: u for name, u in found.items() if u > least}
 
 
 def _worst(paper, worst):
