@@ -88,7 +88,8 @@ def load_plan(path):
 def _wall_plan(raw, values, tables, given, folder, log):
     """The WallPlan of a plan that says how its wall is strapped, read from lines, or hit."""
     courses = None if tables["courses"] is None else tuple(tables["courses"].of("course"))
-    check_sections(given, courses, log)
+    diameter = values["tank"]["nominal_diameter_m"]
+    check_sections(given, courses, None if diameter is None else diameter / 2, log)
     log.stop_if_problems()
     raw = _with_points(raw)
     check_tank(values, tables, raw, log)

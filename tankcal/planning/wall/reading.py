@@ -1,11 +1,13 @@
 """From the sections of a plan to a WallPlan: a design, its tables, and the job that reads them."""
 
 from dataclasses import replace
+from itertools import islice
 
 from tankcal.errors import InputError
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.job.building import job_of
 from tankcal.job.checking import zero_z
+from tankcal.job.checks.strapping import MOST_STRAPS
 from tankcal.job.tables import Log, Value
 from tankcal.messages import message
 from tankcal.planning.given import PLAN_FILE
@@ -22,6 +24,7 @@ from tankcal.planning.wall.model import (
 from tankcal.planning.wall.nominal_readings import with_nominal_readings
 from tankcal.planning.wall.telling import told_of_plan
 
+CLEAR_M, MOST_SECTIONS = 0.5, 50
 OF_POINTS = ("pattern", "photo_rings", "setup_rings", "tapes", "obstacles")
 
 
@@ -33,8 +36,11 @@ def is_wall_plan(own):
     return any(name in own for name in MEASURING)
 
 
-def check_sections(given, courses, log):
-    """What the sections of a plan say that cannot be meant."""
+def check_sections(given, courses, nominal_m, log):
+    """What the sections of a plan say that cannot be meant.
+
+    courses  names, None: unreadable       nominal_m  radius of the tank, None: unreadable
+    """
     for name in OF_POINTS:
         entries = given.repeated[name] if name in given.repeated else [given.single[name]]
         for one in entries:
@@ -54,8 +60,34 @@ def check_sections(given, courses, log):
                     found=course, file="courses.csv", hint="",
                 )  # fmt: skip
                 one.tell(log.problem, "courses", expected)
+    _check_rings(given, nominal_m, log)
     _check_form(given.single["wall"], log)
     _check_lines_and_ties(given, log)
+
+
+def _check_rings(given, nominal_m, log):
+    """Not too many sections; set-ups that stand clear of the wall."""
+    for name in ("straps", "hits"):
+        if len(given.repeated[name]) > MOST_SECTIONS:
+            expected = message(
+                "plan_many_sections",
+                "{count} of them; expected at most {most}",
+                count=len(given.repeated[name]),
+                most=MOST_SECTIONS,
+            )
+            log.problem(PLAN_FILE, expected, None, name)
+    for one in given.repeated["hits"]:
+        radius = one["radius_m"]
+        if None not in (radius, nominal_m) and abs(radius - nominal_m) < CLEAR_M:
+            expected = message(
+                "plan_setup_at_wall",
+                "found {radius:g} m; expected {clear:g} m or more from the wall, which is at"
+                " {nominal:g} m",
+                radius=radius,
+                clear=CLEAR_M,
+                nominal=nominal_m,
+            )
+            one.tell(log.problem, "radius_m", expected)
 
 
 def _check_form(wall, log):
@@ -92,14 +124,14 @@ def _check_lines_and_ties(given, log):
 
 def design_of(given, courses):
     """The `Design` of sound sections on a tank of these courses."""
-    straps = [
+    straps = (
         PlannedStrap(course, percent, one["s_mm"], int(one["readings"] or 1), _more(one))
         for one in given.repeated["straps"]
         for course in one["courses"] or courses
         for percent in _at(one)
-    ]
+    )
     return Design(
-        straps=tuple(straps),
+        straps=tuple(islice(straps, MOST_STRAPS + 1)),  # more are refused with the job
         lines=_lines(given.single["lines"]),
         hits=tuple(_hits(one, courses) for one in given.repeated["hits"]),
         ties=_ties(given.single["setup_ties"]),
