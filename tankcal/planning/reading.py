@@ -229,7 +229,7 @@ def _repeated(section, entries, text, log):
     for number, one in enumerate(entries):
         row, rows = places[number] if number < len(places) else (None, {})
         name = f"{section}[{number + 1}]"
-        found.append(_entry(name, REPEATED[section], one, row, rows, log))
+        found.append(_entry(name, REPEATED[section], one, row, rows, log, is_needed=True))
     return found
 
 
