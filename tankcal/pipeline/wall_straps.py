@@ -175,7 +175,8 @@ def join_readings(job, points, amplitudes, joints_m):
         readings = readings_of_straps([reduced[i] for i in places], names, term)
         taped = reduced, term, shape
     if job.lines is not None:
-        offsets, of_offsets = _offsets_of(job, names, points.sites)
+        insets = inner if inner.any() else insets_of(job, job.switches)
+        offsets, of_offsets = _offsets_of(job.lines, names, insets, points.sites)
         readings, places = readings + offsets, places + of_offsets
     readings = [_on_surface(one, inner[one.course], job.survey.side) for one in readings]
     zero = job.datum.plate_level_m
@@ -186,11 +187,10 @@ def join_readings(job, points, amplitudes, joints_m):
     return read, None if taped is None else _straps_of(job, read, taped, inner)
 
 
-def _offsets_of(job, names, sites):
+def _offsets_of(lines, names, insets, sites):
     """`WallReading`s of the offsets that count, and their places; rings after those of points."""
-    places = [i for i, one in enumerate(job.lines.offsets) if not one.check]
-    insets = insets_of(job, job.switches)
-    found = readings_of_offsets(job.lines, [job.lines.offsets[i] for i in places], names, insets)
+    places = [i for i, one in enumerate(lines.offsets) if not one.check]
+    found = readings_of_offsets(lines, [lines.offsets[i] for i in places], names, insets)
     first = int(sites.ring.max(initial=-1)) + 1
     return [one if one.ring < 0 else replace(one, ring=one.ring + first) for one in found], places
 

@@ -14,7 +14,6 @@ from test_hit_wall import (
     FOOT,
     LEVELS,
     NOISY,
-    PLATE,
     SLOPE,
     circle,
     oval,
@@ -42,7 +41,8 @@ def plumbed(parts, radius=oval, sd_m=0.0, seed=2, *, inside=False, levels=LEVELS
     constants = rng.uniform(0.1, 0.3, COUNT)
     rows = [["line", "course", "level_m", "offset_mm", "s_mm", "face"]]
     for z in levels:
-        away = [_distance(surface, start, one, z) + PLATE * (not inside) for one in ray]
+        plate = parts.tables["courses"][int(z // 2) + 1][2] / 1000
+        away = [_distance(surface, start, one, z) + plate * (not inside) for one in ray]
         for face, lean in ((1, KAPPA), (2, -KAPPA)):
             size = np.array(away) - 6.5 - (z - levels[0]) * lean
             read = constants + size * (1 if inside else -1) + sd_m * rng.normal(size=COUNT)
@@ -83,7 +83,10 @@ def as_points(parts, sd_mm=(1.0, 0.7, 0.5), seed=4):
 @pytest.mark.parametrize("inside", [False, True])
 def test_lines_beside_hits_agree_on_an_exact_wall(tmp_path, inside):
     """Exact geometry, on either side: nothing is set aside, and the plummet's lean comes out."""
-    result = run(tmp_path, plumbed(parts_of(), inside=inside))
+    parts = parts_of()
+    for row, plate in zip(parts.tables["courses"][1:], (8.0, 7.0, 5.0, 4.0), strict=True):
+        row[2] = plate
+    result = run(tmp_path, plumbed(parts, inside=inside))
     assert result.straps is None  # hits tell the radius that the lines carry
     assert "offsets" in {one.kind for one in result.table.sources}
     assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=3e-6)
