@@ -15,6 +15,7 @@ from tankcal.record.making import Record
 from tankcal.record.plan import PLAN, PlanFile
 from tankcal.record.schema import json_schema
 from tankcal.record.versions import RECORD
+from tankcal.record.wall_plan import WALL_PLAN, WallPlanFile
 
 SAVED = (
     (RECORD, None, Record),
@@ -23,6 +24,7 @@ SAVED = (
     (CAMERA, "influence", InfluenceFile),
     (CAMERA, "product", ProductFile),
     (PLAN, None, PlanFile),
+    (WALL_PLAN, None, WallPlanFile),
 )
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
 from tankcal.job.folder import MAX_SETTINGS_BYTES, parsed_toml
 from tankcal.job.grids import table_rows
-from tankcal.job.sheets import KEY, SECTION, SETTINGS_SHEET, VALUE
-from tankcal.job.tables import SETTINGS_FILE, Log, read_bytes
+from tankcal.job.sheets import KEY, SECTION, VALUE
+from tankcal.job.tables import SETTINGS_FILE, SETTINGS_SHEET, Log, read_bytes
 from tankcal.text.languages import DEFAULT, LANGUAGES, nearest_language
 from tankcal.text.words import load_words
 

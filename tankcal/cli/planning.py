@@ -12,6 +12,7 @@ from tankcal.cli.showing import (
     speak,
     warn,
 )
+from tankcal.cli.wall_plans import wall_item, wall_summary
 from tankcal.messages import message
 from tankcal.text.digits import fixed, format_significant, format_with_u
 
@@ -69,6 +70,7 @@ def _plan(options):
     from tankcal.cli.asked_language import asked_of_plan
     from tankcal.errors import TankcalError
     from tankcal.planning import load_plan, predict
+    from tankcal.planning.wall.model import WallPlan
     from tankcal.report import planning as planning_papers
 
     speak(options.language or asked_of_plan(options.plan))
@@ -78,8 +80,11 @@ def _plan(options):
     plan = load_plan(options.plan)
     if options.out is not None:
         planning_papers.refuse_foreign(options.out)
+    is_wall = isinstance(plan, WallPlan)
     if options.smallest:
         _refuse_unlimited(plan)
+    if is_wall:
+        _refuse_simulation(options)
     show.step(message("plan_predicting", "predicting the survey"))
     try:
         prediction = predict(plan)
@@ -96,7 +101,8 @@ def _plan(options):
         )  # fmt: skip
     show.end()
     warn(prediction.warnings)
-    found = (*_summary(prediction), *_changes(effects), *_design(path), *_scatter(simulated))
+    told = wall_summary(prediction) if is_wall else _summary(prediction)
+    found = (*told, *_verdict(prediction), *_changes(effects), *_design(path), *_scatter(simulated))
     for line in found:
         say(line)
     if written:
@@ -116,6 +122,17 @@ def _refuse_idle(options):
                 ),
             )
         )
+
+
+def _refuse_simulation(options):
+    from tankcal.errors import InputError, Problem
+
+    if options.simulate is not None:
+        expected = message(
+            "plan_wall_not_simulated",
+            "not for a plan of straps, lines or hits; expected a plan of targets",
+        )
+        raise InputError(Problem("--simulate", expected))
 
 
 def _refuse_unlimited(plan):
@@ -145,8 +162,8 @@ def _simulated(prediction, options, show):
 
 
 def _summary(prediction):
-    """What was planned, how well points will be known, and the top of the table."""
-    plan, table = prediction.plan, prediction.table
+    """What was planned, and how well points will be known."""
+    plan = prediction.plan
     solution = prediction.predicted.adjusted.solution
     parts = [
         message("plan_photographs", "{count} photographs", count=len(plan.photos)),
@@ -187,7 +204,12 @@ def _summary(prediction):
             count=len(prediction.weak),
             points=_first(prediction.weak),
         )
-    yield _top(table)
+
+
+def _verdict(prediction):
+    """The top of the table, the worst delivery, and the limit."""
+    plan = prediction.plan
+    yield _top(prediction.table)
     for one in prediction.tabled.stated.worst[:1]:
         worst = one.relative
         yield message(
@@ -245,7 +267,7 @@ def _changes(effects):
 
 def describe_change(change):
     """What is done to which item of a plan."""
-    item = _item(change.item, change.name)
+    item = wall_item(change) or _item(change.item, change.name)
     if change.action == "add":
         return message("plan_add", "add {item}", item=item)
     if change.action == "drop":

@@ -8,6 +8,8 @@ to the second order in the waves c_k of its outline, and less where it bridges a
 the waves are somebody has to declare; how they are spread over k is what `components` say of walls.
 """
 
+from functools import cache
+
 import numpy as np
 from scipy.spatial import ConvexHull
 
@@ -18,6 +20,7 @@ SHORTEST_WAVE_M = 0.2  # along the arc: plates do not bend more sharply
 DRAWS, NODES_OF_WAVE = 64, 8  # walls drawn, and nodes of an outline in its shortest wave
 
 
+@cache
 def perimeter_excess(shape_sd_m, radius_m, *, shares=None):
     """Mean and standard deviation of the excess over walls whose departures have a given size.
 

@@ -21,7 +21,6 @@ from tankcal.geometry.clutter import (
     shell_problem,
 )
 from tankcal.geometry.field.blunders import find_blunders
-from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.geometry.field.sites import Sites
 from tankcal.messages import message
 

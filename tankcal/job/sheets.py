@@ -5,20 +5,21 @@ from tankcal.job.grids import placed_columns, table_rows
 from tankcal.job.tables import (
     COVARIANCE_FILE,
     REGISTERS,
+    SETTINGS_SHEET,
     TABLES,
-    TANK_TABLES,
     RawJob,
     Register,
     Value,
+    expected_sheets,
     fingerprint,
     make_table,
+    missing_sheet,
     nearest,
     read_bytes,
     shown,
 )
 from tankcal.messages import message
 
-SETTINGS_SHEET = "job"
 README_SHEET = "read me"
 KEY, VALUE = "key", "value"
 REMARKS = ("note", "label", "unit", "example")  # columns of settings that are not read
@@ -52,22 +53,6 @@ def read_workbook(path, log):
         if name in tables
     }
     return RawJob(path.name, path.parent, place, settings, sections, wanted, None, files, registers)
-
-
-def missing_sheet():
-    """What is said of a sheet that is not there."""
-    return message("missing_sheet", "missing sheet; {sheets}", sheets=expected_sheets())
-
-
-def expected_sheets():
-    """One phrase that names the sheets of a workbook."""
-    return message(
-        "sheets_of_workbook",
-        "a workbook has the sheets {settings}, {tables} (the last five are optional), or "
-        "those of a survey in place of the points",
-        settings=SETTINGS_SHEET,
-        tables=[*TANK_TABLES],
-    )
 
 
 def is_read(title):

@@ -31,6 +31,7 @@ HITS_TABLES = ("wall_hits", "control_readings")
 TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + SURVEY_TABLES
 REGISTERS = {"cameras": "camera", "instruments": "instrument"}  # and what each one lists
 SETTINGS_FILE = "job.toml"
+SETTINGS_SHEET = "job"
 REFUSED_FILE = "image_points_refused.csv"  # written beside image_points.csv, never read
 COVARIANCE_FILE = "points_cov.npz"
 
@@ -340,3 +341,19 @@ def _headings(file, cells, number, log):
             )
             sound = False
     return tuple(cells) if sound else None
+
+
+def missing_sheet():
+    """What is said of a sheet that is not there."""
+    return message("missing_sheet", "missing sheet; {sheets}", sheets=expected_sheets())
+
+
+def expected_sheets():
+    """One phrase that names the sheets of a workbook."""
+    return message(
+        "sheets_of_workbook",
+        "a workbook has the sheets {settings}, {tables} (the last five are optional), or "
+        "those of a survey in place of the points",
+        settings=SETTINGS_SHEET,
+        tables=[*TANK_TABLES],
+    )

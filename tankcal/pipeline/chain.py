@@ -3,21 +3,18 @@
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
-from tankcal.errors import HeightError, InputError, Problem, SolutionError
+from tankcal.errors import HeightError, InputError, Problem
 from tankcal.job import Job
-from tankcal.job.tables import in_book
 from tankcal.messages import message
 from tankcal.pipeline.corrections import Correction, corrections_of
-from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
-from tankcal.pipeline.scan import Scan, fit_scan
-from tankcal.pipeline.sighted import find_hit_wall
+from tankcal.pipeline.read_wall import ReadWall
+from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
 from tankcal.pipeline.statements import (
@@ -28,18 +25,15 @@ from tankcal.pipeline.statements import (
     statements,
     verdict_of,
 )
-from tankcal.pipeline.strapped_wall import StrappedWall, find_strapped_wall
-from tankcal.pipeline.survey_warnings import (
-    incomplete_certificate,
-    open_questions,
-    refuse_undetermined,
-)
+from tankcal.pipeline.strapped_wall import StrappedWall
+from tankcal.pipeline.survey_warnings import incomplete_certificate, open_questions
+from tankcal.pipeline.surveying import find_survey, placed
 from tankcal.pipeline.table import check_table, compute_table
 from tankcal.pipeline.tanks import body_of, shell_volume
 from tankcal.pipeline.views import plot
-from tankcal.pipeline.wall import Wall, find_wall, s_transform
+from tankcal.pipeline.wall import Wall
 from tankcal.pipeline.wall_straps import Straps
-from tankcal.survey import Adjustment, adjust_survey, wall_points
+from tankcal.survey import Adjustment, adjust_survey
 from tankcal.survey.sighting import Sighting
 from tankcal.tank import dips
 from tankcal.tank.body import Body
@@ -47,7 +41,6 @@ from tankcal.tank.budgets import Budget, budget, reading_sources
 from tankcal.tank.capacity import Capacity, Quantity
 from tankcal.tank.dips import Dips, ProportionalParts, Straightness, proportional_parts
 from tankcal.tank.falling_capacity import refuse_falling
-from tankcal.tank.meshes import parse_mesh
 from tankcal.tank.rules import RuleVerdict
 from tankcal.tank.service import shell_factor, shell_temperature_c
 from tankcal.tank.volumes import ShellVolume
@@ -60,7 +53,6 @@ if TYPE_CHECKING:
 MILLIMETRE, PARTS = 0.001, 10  # of a step of the tables that proportional parts are for
 PARTS_OF_U, PARTS_M3 = 0.05, 0.0005  # error of proportional parts: a share of U, or half a litre
 VAST_M3 = 1e12  # stands for a U without end
-TOLD = 10  # warnings of the adjustment that are told when there is no wall
 
 
 @dataclass(frozen=True, repr=False)
@@ -202,6 +194,11 @@ class Result:
         return None if wall is None else wall.straps
 
     @property
+    def read(self) -> ReadWall | None:
+        """What a tape and reference lines read of a wall, alone or beside points; None: nothing."""
+        return self.strapped if self.wall is None else self.wall.read
+
+    @property
     def capacity(self) -> pd.DataFrame:
         """The capacity table, with the U that every paper states: the columns of capacity.csv.
 
@@ -322,28 +319,9 @@ def _run(job, progress, part_progress, simulated):
                 message("no_tank", "the job has no tank: only its survey can be adjusted"),
             )
         )
-    adjustment = sighting = None
-    if job.measurements is not None:
-        adjustment = _adjusted(job, progress)
-    if job.hits is None and adjustment is not None:
-        points = wall_points(adjustment, job.measurements, job.survey.side)
-        job = replace(job, points=s_transform(points))
-    dof = np.inf if adjustment is None else adjustment.dof
-    try:
-        if job.hits is None:
-            survey = _survey(job, progress, dof)
-        else:
-            job, sighting, survey = find_hit_wall(job, adjustment, progress, dof)
-    except SolutionError as error:
-        if adjustment is None or not adjustment.warnings:
-            raise
-        told = (one.text for one in _placed(job, adjustment.warnings[:TOLD]))
-        raise SolutionError(*error.args, *told) from error
+    found = find_survey(job, progress)
+    job, survey, adjustment, sighting = found.job, found.survey, found.adjustment, found.sighting
     wall = survey if isinstance(survey, Wall) else None
-    if adjustment is not None and sighting is None and wall is not None:
-        refuse_other_side(job, partial(is_within_wall, wall), adjustment)
-    elif adjustment is not None and isinstance(survey, Scan):
-        refuse_other_side(job, survey.is_within, adjustment)
     made = compute_table(job, survey, progress)
     body, zero, table = made.body, made.zero_m, made.table
     progress(message("stating", "stating volumes and deliveries"))
@@ -389,14 +367,7 @@ def _warnings(job, adjustment, sighting, survey, made):
         *check_table(job, survey, made, sighting),
         *incomplete_certificate(job),
     )
-    return _placed(job, warnings)
-
-
-def _placed(job, problems):
-    """Problems by workbook and sheet where the job stands in one."""
-    if not job.source.endswith(".xlsx"):
-        return tuple(problems)
-    return tuple(in_book(one, job.source) for one in problems)
+    return placed(job, warnings)
 
 
 @contextmanager
@@ -404,7 +375,7 @@ def _telling(job):
     try:
         yield
     except InputError as error:
-        raise InputError(_placed(job, error.problems)) from error
+        raise InputError(placed(job, error.problems)) from error
 
 
 def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjustment:
@@ -450,45 +421,12 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjus
         )
     with _telling(job):
         adjustment = adjust_survey(job.measurements, progress or (lambda text: None))
-    return replace(adjustment, warnings=_placed(job, adjustment.warnings))
+    return replace(adjustment, warnings=placed(job, adjustment.warnings))
 
 
 def _refuse_other(job, name):
     if not isinstance(job, Job):
         raise TypeError(f"found {type(job).__name__}; expected a Job: {name}(tankcal.load(path))")
-
-
-def _adjusted(job, progress):
-    """The adjusted survey of a job; SolutionError where it leaves the vertical or a scale open."""
-    if job.points is not None and not job.points.from_adjustment:
-        expected = message(
-            "points_beside_survey",
-            "given together with a survey; expected only one of them: the points come from "
-            "its adjustment",
-        )
-        raise InputError(Problem("points.csv", expected))
-    adjustment = adjust_survey(job.measurements, progress)
-    refuse_undetermined(adjustment.datum)
-    return adjustment
-
-
-def _survey(job, progress, dof):
-    """What was surveyed: a wall of courses, a mesh, the scan of another wall; None: sizes alone."""
-    if job.strapping is not None and job.points is None:
-        return find_strapped_wall(job, progress)
-    if job.tank.kind == "vertical":
-        return find_wall(job, progress, dof)
-    if job.mesh is not None:
-        progress(message("checking_mesh", "checking the mesh {file}", file=job.mesh.file))
-        return parse_mesh(job.mesh.file, job.mesh.data, job.mesh.unit_m)
-    if job.points is not None:
-        progress(
-            message(
-                "fitting_wall", "fitting the wall to {count} points", count=len(job.points.names)
-            )
-        )
-        return fit_scan(job, dof)
-    return None
 
 
 def _parts(job, made, U_m3):

@@ -7,6 +7,7 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.rule_limits import limit_at, limits_of
+from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.survey.reference_line import (
     ARCSEC,
     collimation_by_faces,
@@ -30,7 +31,7 @@ def least_lines(circumference_m):
 
 def accepted_offsets(job, wall):
     """Offsets that the wall was taken from."""
-    places = wall.places[[one.of == "offsets" for one in wall.readings]]
+    places = wall.places[wall.are("offsets")]
     _, _, accepted = wall.tests_of("offsets")
     return [job.lines.offsets[i] for i in places[accepted]]
 
@@ -55,14 +56,14 @@ def check_lines(job, wall):
         *_off_axis(job, levels, lean),
         *_of_scope(job, lean),
         *_of_plummets(job),
-        *_of_straps(job, wall, levels),
+        *(_of_straps(job, wall, levels) if isinstance(wall, StrappedWall) else ()),
     )
 
 
 def _set_aside(job, wall):
-    places = wall.places[[one.of == "offsets" for one in wall.readings]]
+    places = wall.places[wall.are("offsets")]
     w, _, accepted = wall.tests_of("offsets")
-    away = wall.tested.departure_m[[one.of == "offsets" for one in wall.readings]]
+    away = wall.tested.departure_m[wall.are("offsets")]
     for place, of_w, kept, by_m in zip(places, w, accepted, away, strict=True):
         if not kept:
             one = job.lines.offsets[place]
@@ -120,13 +121,14 @@ def _copied(job):
 
 
 def _too_few(job, wall):
-    least = least_lines(float(wall.straps.circumference_m[0]))
+    circumference = np.pi * job.tank.nominal_diameter_m
+    least = least_lines(circumference)
     if len(job.lines.lines) < least:
         text = message(
             "few_lines",
             "{count} lines round {circumference_m:.0f} m; {least} or more are advised",
             count=len(job.lines.lines),
-            circumference_m=wall.straps.circumference_m[0],
+            circumference_m=circumference,
             least=least,
         )
         yield Problem("lines.csv", text, column="line")

@@ -16,21 +16,21 @@ from tankcal.survey.poses import poses_of
 from tankcal.survey.sighting import sight
 
 
-def find_hit_wall(job, adjustment, progress, dof=np.inf):
+def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
     """The job with its hits as points, their `Sighting`, and the `Wall` that they show.
 
     Offsets that nothing but the wall tells are taken off, and it is found once more.
 
     adjustment  of the network that the set-ups belong to; None: there is none
-    dof         as in `find_wall`
+    dof, amplitudes  as in `find_wall`
     """
     job, sighting = sight_wall(job, adjustment, progress)
-    wall = find_wall(job, progress, dof)
+    wall = find_wall(job, progress, dof, amplitudes)
     told = told_causes(job, wall)
     free = {one.name: one.value for one in told if np.isinf(one.u_before)}
     if free:
         job, sighting = _as_points(job, sight(job.hits, sighting.poses, free))
-        wall = find_wall(job, progress, dof)
+        wall = find_wall(job, progress, dof, amplitudes)
         told = told_causes(job, wall)
     return job, replace(sighting, told=told), wall
 

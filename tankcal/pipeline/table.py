@@ -151,7 +151,12 @@ def _doubts_of_survey(job, survey, top_m):
     if isinstance(survey, Wall):
         straps = survey.straps
         beside = () if straps is None else check_straps_beside_points(job, straps)
-        return (*warnings_of(job, survey), *check_wall(job, survey), *beside)
+        return (
+            *warnings_of(job, survey),
+            *check_wall(job, survey),
+            *beside,
+            *check_lines(job, survey.read),
+        )
     if isinstance(survey, StrappedWall):
         return (*check_strapped(job, survey), *check_lines(job, survey))
     if isinstance(survey, Scan):

@@ -14,6 +14,7 @@ from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.outlines import FULL_TURN, polar
 from tankcal.geometry.shell import Shell, course_of, find_shell
 from tankcal.messages import message
+from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.rule_limits import limits_of
 from tankcal.pipeline.survey_warnings import (
     ADVISED_POINTS,
@@ -32,7 +33,7 @@ from tankcal.pipeline.wall_readings import (
     inputs_read_with,
     noise_by_inputs,
 )
-from tankcal.pipeline.wall_straps import PointsOfWall, Straps, join_straps
+from tankcal.pipeline.wall_straps import PointsOfWall, Straps, join_readings
 from tankcal.sections import (
     Section,
     coordinates_of,
@@ -70,8 +71,8 @@ class Wall:
         Circles and outlines through the points, from the bottom up.
     straps : Straps or None
         Circumferences by tape that are among the readings, after the points.
-    readings : tuple of WallReading
-        Those of them that were accepted.
+    read : ReadWall or None
+        What of the readings names no point: straps and offsets from reference lines.
     by_inputs : dict
         {input of the budget: (n,) derivative of the field's readings}, of what points depend on.
     without_inputs : tuple of str
@@ -87,7 +88,7 @@ class Wall:
     radii_by_points: scipy.sparse.csr_array
     sections: tuple[Section, ...]
     straps: Straps | None = None
-    readings: tuple = ()
+    read: ReadWall | None = None
     by_inputs: dict = field(default_factory=dict)
     without_inputs: tuple = ()
 
@@ -104,11 +105,13 @@ class Wall:
         causes, index = job.points.causes, coordinates_of(self.accepted)
         effects = [jacobian @ cause.column_m[index] for cause in causes]
         found = survey_factors(covariance, self.noise_dof, causes, effects)
-        if self.straps is None:
+        if self.read is None:
             return found
-        outside = job.survey.side == "outside"
-        sees = np.append(np.full(self._points, outside), np.ones(len(self.readings)))
-        plates = factors_of_plates(job, self.field, weights * sees, self.straps.plate_sd_m)
+        outside = job.survey.side == "outside"  # a reading sees a plate that is not taken off it
+        taken = [one.by_inputs.get("plate_thickness", 0.0) for one in self.readings]
+        sees = np.append(np.full(self._points, outside), outside - np.array(taken))
+        gauged = {} if self.straps is None else self.straps.plate_sd_m
+        plates = factors_of_plates(job, self.field, weights * sees, gauged)
         return (*found, *factors_of_readings(self.readings, weights[:, self._points :]), *plates)
 
     def read_with(self, weights):
@@ -119,6 +122,11 @@ class Wall:
         for name, column in self.by_inputs.items():
             found[name] = found.get(name, 0.0) + weights @ column
         return found
+
+    @property
+    def readings(self):
+        """Readings of the field that name no point, and were accepted."""
+        return [] if self.read is None else self.read.accepted
 
     @property
     def _points(self):
@@ -212,20 +220,22 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     sections = tuple(fit_section(*one, form_m2) for one in to_fit)
     by_points = means @ _radii_by_points(sections, len(accepted))
     by_inputs = _by_inputs(job.points, by_points, accepted)
-    if job.strapping is not None or job.points.unbound or by_inputs:
+    is_read = job.strapping is not None or job.lines is not None
+    if is_read or job.points.unbound or by_inputs:
         unbound = unbound_of(job.points, by_points, accepted)
         noise = by_points @ (covariance @ by_points.T)  # between sections, too
         noise = noise.toarray() if scipy.sparse.issparse(noise) else noise
-    if job.strapping is None:
+    if not is_read:
         sites = unbound.shared_by(sites) if job.points.unbound else sites
         if by_inputs:
             noise = noise + noise_by_inputs(job.inputs, by_inputs, len(radius))
-        field, readings, straps = WallField(sites, radius, noise, amplitudes, nominal), (), None
+        field, read, straps = WallField(sites, radius, noise, amplitudes, nominal), None, None
     else:
         points = PointsOfWall(sites, radius, noise, unbound, by_inputs)
-        field, readings, straps = join_straps(job, points, amplitudes, joints)
-        by_points = _padded(by_points, len(readings))
-        by_inputs = {name: np.pad(one, (0, len(readings))) for name, one in by_inputs.items()}
+        read, straps = join_readings(job, points, amplitudes, joints)
+        field, more = read.field, len(read.accepted)
+        by_points = _padded(by_points, more)
+        by_inputs = {name: np.pad(one, (0, more)) for name, one in by_inputs.items()}
     return Wall(
         shell=shell,
         joints_m=joints,
@@ -236,7 +246,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         radii_by_points=by_points,
         sections=sections,
         straps=straps,
-        readings=tuple(readings),
+        read=read,
         by_inputs=by_inputs,
         without_inputs=() if job.hits is None else ("offset",),  # the instrument has one of its own
     )

@@ -131,6 +131,19 @@ def readings_of_offsets(given, used, courses, insets_m):
     return found
 
 
+def off_centre(readings, field):
+    """The readings as from the centre of their level: R lacks (e x n)^2 / (2 rho) of a circle."""
+    centres, found = field.centres_m, []
+    for one in readings:
+        if one.ring < 0:
+            found.append(one)
+            continue
+        x, y = centres[one.ring]
+        across = x * np.cos(one.azimuth_rad) - y * np.sin(one.azimuth_rad)
+        found.append(replace(one, radius_m=one.radius_m + across**2 / (2 * field.nominal_m)))
+    return found
+
+
 def sites_of(readings, joints_m, zero_m):
     """`Sites` of readings; zero_m is the height of the table's zero above the bottom."""
     course = np.array([one.course for one in readings], dtype=int)
@@ -202,7 +215,8 @@ def settle_readings(field, field_of, given, may_go):
     for _ in range(MOST_ROUNDS):
         whole = replace(field, sites=sites, radius_m=radius, noise_m2=noise).covariance_m2
         precision = restricted_precision(whole, free_design(sites)[0])
-        tested = snoop_wall(precision, precision @ (radius - radius.mean()), accepted, may_go)
+        pull, most = precision @ (radius - radius.mean()), np.sqrt(np.diag(whole) / UNCONTROLLED)
+        tested = snoop_wall(precision, pull, accepted, may_go, most)
         if np.all(tested.accepted == accepted):
             break
         accepted = tested.accepted

@@ -1,4 +1,5 @@
-"""Straps round a wall that points show, too: readings of the same field, each tested by all others.
+"""Straps and offsets of a wall that points show, too: readings of the same field, each tested by
+all others.
 
 A circumference is the mean radius of its level but for the area term, whose size the points tell:
 the ovality and the seams that they were found to have. Inside points see the shell without plate
@@ -10,16 +11,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.linalg
 
+from tankcal.geometry.field.blunders import Tested
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.estimate import LEVELS, WallField
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.girth import perimeter_excess
 from tankcal.geometry.outlines import FULL_TURN
+from tankcal.pipeline.read_wall import ReadWall
+from tankcal.pipeline.tanks import insets_of
 from tankcal.pipeline.unbound import Unbound
 from tankcal.pipeline.wall_readings import (
     columns_of,
     noise_by_inputs,
     noise_of,
+    off_centre,
+    readings_of_offsets,
     readings_of_straps,
     settle_readings,
     sites_of,
@@ -35,6 +41,17 @@ class AreaTerm:
 
     mean: float
     sd: float
+
+
+def area_term(shape_sd_m, amplitudes, nominal_m):
+    """`AreaTerm` of a wall, and the standard deviation of its radius that it follows from.
+
+    shape_sd_m  as declared; None: of the ovality and the seams that it has by its amplitudes
+    """
+    if shape_sd_m is None:
+        waves = [one.shape in ("oval", "seam") for one in COMPONENTS]
+        shape_sd_m = float(np.sqrt(amplitudes.variances_m2[waves].sum()))
+    return AreaTerm(*perimeter_excess(shape_sd_m, nominal_m)), shape_sd_m
 
 
 @dataclass(frozen=True)
@@ -127,13 +144,13 @@ class PointsOfWall:
     by_inputs: dict = field(default_factory=dict)
 
 
-def join_straps(job, points, amplitudes, joints_m):
-    """The field of a wall from its points and its straps.
+def join_readings(job, points, amplitudes, joints_m):
+    """The field of a wall from its points, its straps and its offsets from reference lines.
 
     Parameters
     ----------
     job : Job
-        Whose wall was strapped.
+        Whose wall was strapped, read from lines, or both.
     points : PointsOfWall
     amplitudes : Amplitudes
         Of the wall, as its points tell them.
@@ -141,69 +158,109 @@ def join_straps(job, points, amplitudes, joints_m):
 
     Returns
     -------
-    field : WallField
-        Of the points, then of the accepted straps.
-    readings : list of WallReading
-        These straps, on the surface that the points are on.
-    straps : Straps
+    read : ReadWall
+        Its field is of the points, then of the accepted readings, on the surface that the points
+        are on.
+    straps : Straps or None
     """
-    radius, noise = points.radius_m, points.noise_m2
     nominal, names = job.tank.nominal_diameter_m / 2, [one.name for one in job.courses]
-    given = job.strapping
-    reduced = reduce_straps(given, job.survey.shell_temperature_c, 2 * nominal)
-    places = np.array([i for i, one in enumerate(reduced) if not one.strap.check], dtype=int)
-    shape = given.shape_sd_m
-    if shape is None:
-        waves = [one.shape in ("oval", "seam") for one in COMPONENTS]
-        shape = float(np.sqrt(amplitudes.variances_m2[waves].sum()))
-    term = AreaTerm(*perimeter_excess(shape, nominal))
-    readings = readings_of_straps([reduced[i] for i in places], names, term)
     inner = np.array([one.thickness_m + one.paint_m for one in job.courses])
     inner *= job.survey.side == "inside"
+    taped, readings, places = None, [], []
+    if job.strapping is not None:
+        given = job.strapping
+        reduced = reduce_straps(given, job.survey.shell_temperature_c, 2 * nominal)
+        places = [i for i, one in enumerate(reduced) if not one.strap.check]
+        term, shape = area_term(given.shape_sd_m, amplitudes, nominal)
+        readings = readings_of_straps([reduced[i] for i in places], names, term)
+        taped = reduced, term, shape
+    if job.lines is not None:
+        insets = inner if inner.any() else insets_of(job, job.switches)
+        offsets, of_offsets = _offsets_of(job.lines, names, insets, points.sites)
+        readings, places = readings + offsets, places + of_offsets
     readings = [_on_surface(one, inner[one.course], job.survey.side) for one in readings]
-    n, k = len(radius), len(readings)
-    both = _joined(points.sites, sites_of(readings, joints_m, job.datum.plate_level_m))
-    both = points.unbound.padded(k).shared_by(both)
-    radius = np.append(radius, [one.radius_m for one in readings])
+    zero = job.datum.plate_level_m
+    field, tested, readings = _joined_field(job, points, readings, amplitudes, (joints_m, zero))
+    read = ReadWall(
+        joints_m, zero, tuple(readings), np.array(places, dtype=int), tested, field, inner_m=inner
+    )
+    return read, None if taped is None else _straps_of(job, read, taped, inner)
+
+
+def _offsets_of(lines, names, insets, sites):
+    """`WallReading`s of the offsets that count, and their places; rings after those of points."""
+    places = [i for i, one in enumerate(lines.offsets) if not one.check]
+    found = readings_of_offsets(lines, [lines.offsets[i] for i in places], names, insets)
+    first = int(sites.ring.max(initial=-1)) + 1
+    return [one if one.ring < 0 else replace(one, ring=one.ring + first) for one in found], places
+
+
+def _joined_field(job, points, readings, amplitudes, heights):
+    """`WallField` of points and accepted readings, `Tested` of these, and they, about the centres
+    of their levels.
+
+    heights  joints, and the table's zero above the bottom, m
+    """
+    n, k, nominal = len(points.radius_m), len(readings), job.tank.nominal_diameter_m / 2
+    sites = sites_of(readings, *heights)
+    both = points.unbound.padded(k).shared_by(_joined(points.sites, sites))
+    is_bound = both.shared is None
+    if sites.shared is not None:  # of lines: the last, as `ReadWall` has them
+        own = np.pad(sites.shared, ((n, 0), (0, 0)))
+        both = replace(both, shared=own if is_bound else np.hstack([both.shared, own]))
     columns = columns_of([one.by_inputs for one in readings])
     columns = {
         name: np.append(points.by_inputs.get(name, np.zeros(n)), columns.get(name, np.zeros(k)))
         for name in dict.fromkeys((*points.by_inputs, *columns))
     }
-    noise = scipy.linalg.block_diag(noise, noise_of(readings))
+    noise = scipy.linalg.block_diag(points.noise_m2, noise_of(readings))
     noise += noise_by_inputs(job.inputs, columns, n + k)
-    may_go = np.append(np.zeros(n), np.full(k, job.snooping and both.shared is None))
+    may = [job.snooping and (is_bound or one.of == "offsets") for one in readings]
+    may_go = np.append(np.zeros(n), may)
 
     def field_of(accepted):
         some = np.flatnonzero(accepted)
         own = noise[np.ix_(some, some)]
         return WallField(both.take(accepted), radius[some], own, amplitudes, nominal)
 
-    field, tested = settle_readings(
-        field_of(np.ones(n + k, dtype=bool)), field_of, (both, radius, noise), may_go
-    )
-    kept, sd = tested.accepted[n:], tested.sd_m[n:]
-    straps = Straps(
+    radius, every = np.append(points.radius_m, [one.radius_m for one in readings]), np.ones(n + k)
+    field = field_of(every > 0)
+    if np.any(sites.ring >= 0):
+        readings = off_centre(readings, field)
+        radius = np.append(points.radius_m, [one.radius_m for one in readings])
+        field = field_of(every > 0)
+    field, tested = settle_readings(field, field_of, (both, radius, noise), may_go)
+    parts = (tested.accepted, tested.departure_m, tested.w, tested.sd_m)
+    return field, Tested(*(one[n:] for one in parts)), readings
+
+
+def _straps_of(job, read, taped, inner_m):
+    """`Straps` of a `ReadWall`.
+
+    taped  reduced circumferences, `AreaTerm`, and the shape that it follows from
+    """
+    reduced, term, shape = taped
+    mine, tested = read.are("straps"), read.tested
+    return Straps(
         reduced=reduced,
-        adjusted=places,
-        accepted=kept,
-        w=np.where(np.isfinite(sd), tested.w[n:], np.nan),
-        sd_m=sd,
-        departure_m=tested.departure_m[n:],
+        adjusted=read.places[mine],
+        accepted=tested.accepted[mine],
+        w=read.tests_of("straps")[0],
+        sd_m=tested.sd_m[mine],
+        departure_m=tested.departure_m[mine],
         area_term=term,
         shape_sd_m=shape,
-        radius_m=mean_radii(field) + inner,
+        radius_m=mean_radii(read.field) + inner_m,
         plate_sd_m=gauged_plates(job),
-        tapes=tapes_used(given),
+        tapes=tapes_used(job.strapping),
     )
-    return field, [one for one, used in zip(readings, kept, strict=True) if used], straps
 
 
 def _on_surface(reading, inner_m, side):
-    """A strap's radius on the surface that the points are on: inside without plate and paint."""
+    """A reading's radius on the surface that points are on: inside without plate and paint."""
     if side == "outside":
         return reading
-    by = {"plate_thickness": -1.0, "paint": -1.0}
+    by = {name: reading.by_inputs.get(name, 0.0) - 1.0 for name in ("plate_thickness", "paint")}
     return replace(reading, radius_m=reading.radius_m - inner_m, by_inputs=reading.by_inputs | by)
 
 

@@ -49,7 +49,7 @@ def assemble_plan(job, given, folder):
         extra=extra,
         facing=facing,
         obstacles=tuple(_obstacle(one) for one in given.repeated["obstacles"]),
-        limits=_limits(given.single["limits"]),
+        limits=limits_of(given.single["limits"]),
         amplitudes=_amplitudes(pattern),
         costs={key: value or 0.0 for key, value in given.single["costs"].values.items()},
         folder=folder,
@@ -99,7 +99,8 @@ def _obstacle(given):
     )  # fmt: skip
 
 
-def _limits(given):
+def limits_of(given):
+    """The `Limits` of a [limits]."""
     incidence = INCIDENCE_DEG if given["incidence_deg"] is None else given["incidence_deg"]
     return Limits(
         incidence_rad=float(np.radians(incidence)),

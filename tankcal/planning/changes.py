@@ -4,8 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tankcal.errors import TankcalError
 from tankcal.planning.model import Known, Plan
 from tankcal.planning.patterns import places_around, row_heights_m, tape_of
+from tankcal.planning.wall.changes import WALL_ITEMS, wall_changes_of, wall_count
+from tankcal.planning.wall.model import WallPlan
 
 ITEMS = ("photo_station", "setup", "tape", "control_point", "target_row", "reading")
 IMAGES, SETS = "all image points", "all sets of the total station"  # what is read again
@@ -21,6 +24,7 @@ class Change:
 
     action  "add", "drop" or "repeat"      item  of ITEMS     name  of the item
     cost    of the plan after less of the plan before
+    why     it cannot be; "": it can
     """
 
     action: str
@@ -28,6 +32,7 @@ class Change:
     name: str
     plan: Plan
     cost: float
+    why: str = ""
 
 
 def cost_of(plan):
@@ -42,6 +47,8 @@ def cost_of(plan):
     float
         In the unit of those costs; 0 where the plan states none.
     """
+    if isinstance(plan, WallPlan):
+        return _priced(plan, wall_count(plan))
     count = {
         "photo_station": len(plan.stations),
         "photograph": len(plan.photos),
@@ -52,11 +59,17 @@ def cost_of(plan):
         "reading": sum(one.readings - 1 for one in (*plan.photos, *plan.ties))
         + sum(one.sets - 1 for one in plan.setups),
     }
+    return _priced(plan, count)
+
+
+def _priced(plan, count):
     return float(sum(plan.costs.get(name, 0.0) * number for name, number in count.items()))
 
 
 def changes_of(plan, actions=("add", "drop", "repeat"), items=ITEMS):
-    """Every Change of one item of a Plan."""
+    """Every Change of one item of a Plan or a WallPlan."""
+    if isinstance(plan, WallPlan):
+        return tuple(_changes_of_wall(plan, actions, WALL_ITEMS if items is ITEMS else items))
     found = []
     for item in items:
         found += [one for one in _OF[item](plan) if one[0] in actions]
@@ -65,6 +78,18 @@ def changes_of(plan, actions=("add", "drop", "repeat"), items=ITEMS):
         Change(action, item, name, after, cost_of(after) - before)
         for action, item, name, after in found
     )
+
+
+def _changes_of_wall(plan, actions, items):
+    before = cost_of(plan)
+    for action, item, name, how in wall_changes_of(plan):
+        if action not in actions or item not in items:
+            continue
+        try:
+            after, why = how(), ""
+        except TankcalError as error:  # its job is refused: nothing is left of that course
+            after, why = plan, str(error).splitlines()[0]
+        yield Change(action, item, name, after, cost_of(after) - before, why)
 
 
 def _stations(plan):

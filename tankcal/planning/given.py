@@ -44,9 +44,11 @@ class Given:
 
     single    {section: Entry}               repeated  {section: [Entry]}
     tables    {name: ColumnValues or None}   control   ColumnValues of control.csv or None
+    is_wall   whether it is strapped, read from lines or hit, in place of targets
     """
 
     single: dict
     repeated: dict
     tables: dict
     control: object = None
+    is_wall: bool = False

@@ -13,10 +13,13 @@ from tankcal.messages import message
 from tankcal.planning.changes import ITEMS, Change, changes_of, cost_of
 from tankcal.planning.checks.placed import refuse_misplaced
 from tankcal.planning.checks.seen import refuse_blind
+from tankcal.planning.limits import limited_u
 from tankcal.planning.measurements import measurements_of, nominal_of
-from tankcal.planning.prediction import Prediction, limited_u, predict
+from tankcal.planning.prediction import Prediction, predict
 from tankcal.planning.table import predicted_table, recompute_table
 from tankcal.planning.visibility import visible
+from tankcal.planning.wall.changes import SEARCHED
+from tankcal.planning.wall.model import WallPlan
 from tankcal.survey import predict_survey
 
 REPEATED = 10  # steps of a greedy search, where nothing else ends it
@@ -127,6 +130,8 @@ def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, progres
     start = now = predict(plan)
     limit, made, tried = plan.limits.relative_u, [], 0
     actions = ("add", "repeat") if add else ("drop",)
+    if isinstance(plan, WallPlan) and items is ITEMS:
+        items = SEARCHED
     choose = changes or (lambda now: changes_of(now, actions, items))
     for _ in range(steps):
         if add and now.meets:
@@ -203,9 +208,10 @@ def _candidates(effects, now, limit, add):
     if add:
         gains = [one for one in works if one.relative_u < (1 - LEAST_GAIN) * before]
         return sorted(gains, key=lambda one: _worth(one, before), reverse=True)
-    poor = poor_targets(now.plan, now.seen, now.tabled)
     keeps = [one for one in works if limit is not None and one.relative_u <= limit]
-    keeps = [one for one in keeps if one.poor <= poor]
+    if not isinstance(now.plan, WallPlan):
+        poor = poor_targets(now.plan, now.seen, now.tabled)
+        keeps = [one for one in keeps if one.poor <= poor]
     return sorted(keeps, key=lambda one: _saving(one, before), reverse=True)
 
 
@@ -232,6 +238,8 @@ def _saving(effect, now):
 def _effect(change, before):
     """The Effect of a Change, from the Prediction before it."""
     plan = change.plan
+    if isinstance(plan, WallPlan):
+        return _effect_on_wall(change, before)
     try:
         if change.action == "add":
             refuse_misplaced(plan, change.name)
@@ -246,3 +254,17 @@ def _effect(change, before):
     u = limited_u(tabled, plan.limits)
     top = float(tabled.made.table.U_m3[-1])
     return Effect(change, u, u - before.relative_u, top, poor_targets(plan, seen, tabled))
+
+
+def _effect_on_wall(change, before):
+    """The Effect of a Change of a WallPlan: its job, computed again."""
+    why, inf = change.why, float("inf")
+    if not why:
+        try:
+            tabled = predict(change.plan).tabled
+        except TankcalError as error:
+            why = str(error).splitlines()[0]
+    if why:
+        return Effect(change, inf, inf, inf, 0, why)
+    u, top = limited_u(tabled, change.plan.limits), float(tabled.made.table.U_m3[-1])
+    return Effect(change, u, u - before.relative_u, top, 0)

@@ -7,16 +7,18 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
-from tankcal.pipeline.statements import MINIMA_M
 from tankcal.pipeline.survey_warnings import VAGUE
 from tankcal.planning.bodies import describe_separate_bodies, find_separate_bodies
 from tankcal.planning.checks.seen import refuse_blind
 from tankcal.planning.doubtful import reliability
 from tankcal.planning.foreseen import foreseen, idle_ties
+from tankcal.planning.limits import limited_u, refuse_without_delivery
 from tankcal.planning.measurements import measurements_of, nominal_of
 from tankcal.planning.model import Plan
 from tankcal.planning.table import PredictedTable, predicted_table
 from tankcal.planning.visibility import Visibility, visible
+from tankcal.planning.wall.model import WallPlan
+from tankcal.planning.wall.prediction import predict_wall
 from tankcal.survey import Predicted, predict_survey
 from tankcal.survey.network.quality import precision
 
@@ -151,11 +153,11 @@ def predict(plan):
 
     Parameters
     ----------
-    plan : Plan
+    plan : Plan or WallPlan
 
     Returns
     -------
-    Prediction
+    Prediction or WallPrediction
 
     Raises
     ------
@@ -164,6 +166,8 @@ def predict(plan):
     SolutionError
         When the survey would not determine its datum, its scale, the vertical.
     """
+    if isinstance(plan, WallPlan):
+        return predict_wall(plan)
     seen = visible(plan)
     refuse_blind(plan, seen)
     measurements = measurements_of(plan, seen)
@@ -175,7 +179,7 @@ def predict(plan):
     except SolutionError as error:
         told = [str(error), *(one.expected for one in idle_ties(plan, points))]
         raise SolutionError("; ".join(told)) from error
-    _refuse_without_delivery(plan, tabled)
+    refuse_without_delivery(plan, tabled, plan.shell.high_m - plan.shell.low_m)
     return Prediction(plan, seen, measurements, predicted, tabled, points)
 
 
@@ -188,30 +192,6 @@ def _predicted(plan, seen, measurements):
         if len(parts) < 2:
             raise
         raise SolutionError(describe_separate_bodies(parts)) from error
-
-
-def limited_u(tabled, limits):
-    """U over volume of the full tank, or of the worst delivery of the least minimum."""
-    if limits.of == "delivery":
-        return float(tabled.stated.worst[0].relative.relative)
-    table = tabled.made.table
-    return float(table.U_m3[-1] / table.volume_m3[-1])
-
-
-def _refuse_without_delivery(plan, tabled):
-    """Raise where the limit is for deliveries and the table has none that is long enough."""
-    if plan.limits.of == "delivery" and not tabled.stated.worst:
-        least = min(plan.job.table.minimum_delivery_m or MINIMA_M)
-        file, row, name = plan.limits.place
-        tall = plan.shell.high_m - plan.shell.low_m
-        expected = message(
-            "plan_no_delivery",
-            "no delivery of {least:g} m or more in a shell of {tall:g} m; expected "
-            "top, or a smaller table.minimum_delivery_m",
-            least=least,
-            tall=tall,
-        )
-        raise InputError(Problem(file, expected, row, name))
 
 
 def _refuse_exact(measurements):

@@ -32,11 +32,14 @@ from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import REGISTERS, Log, RawJob, Value, fingerprint, nearest, read_bytes
 from tankcal.job.tables import TABLES as JOB_FILES
 from tankcal.messages import message
-from tankcal.planning.assembly import assemble_plan
+from tankcal.planning.assembly import assemble_plan, limits_of
 from tankcal.planning.checks.given import check_given
 from tankcal.planning.checks.placed import check_plan
-from tankcal.planning.contract import JOB_TABLES, REPEATED, SINGLE, TABLES, Count
+from tankcal.planning.contract import JOB_TABLES, REPEATED, SINGLE, TABLES
+from tankcal.planning.fields import Count
 from tankcal.planning.given import PLAN_FILE, Entry, Given
+from tankcal.planning.wall.contract import TABLES as WALL_TABLES
+from tankcal.planning.wall.reading import check_sections, is_wall_plan, wall_plan_of
 from tankcal.text.numerals import NUMBER
 
 
@@ -70,6 +73,8 @@ def load_plan(path):
     registers = {name: read_register(raw, name, log) for name in REGISTERS}
     tables = _job_tables(raw, log)
     given = replace(given, control=tables["control"])
+    if given.is_wall:
+        return _wall_plan(raw, values, tables, given, folder, log)
     _check(raw, values, tables | _measured(given), registers, given, log)
     log.stop_if_problems()
     job = _job(raw, values, tables, registers, log)
@@ -78,6 +83,20 @@ def load_plan(path):
     check_plan(plan, given, raw, log)
     log.stop_if_problems()
     return replace(plan, given=_with_points(raw), warnings=tuple(log.warnings))
+
+
+def _wall_plan(raw, values, tables, given, folder, log):
+    """The WallPlan of a plan that says how its wall is strapped, read from lines, or hit."""
+    courses = None if tables["courses"] is None else tuple(tables["courses"].of("course"))
+    diameter = values["tank"]["nominal_diameter_m"]
+    check_sections(given, courses, None if diameter is None else diameter / 2, log)
+    log.stop_if_problems()
+    raw = _with_points(raw)
+    check_tank(values, tables, raw, log)
+    log.stop_if_problems()
+    limits = limits_of(given.single["limits"])
+    name = folder.resolve().name
+    return wall_plan_of(raw, values, tables, given, limits, name)
 
 
 def _with_points(raw):
@@ -131,10 +150,13 @@ def _read(folder, log):
     text, (whole, rows) = decode(PLAN_FILE, data, log), parsed
     own = {name: whole.pop(name) for name in (*SINGLE, *REPEATED) if name in whole}
     settings, sections = flattened(PLAN_FILE, whole, rows, log)
-    single = {name: _single(name, own.get(name, {}), rows, log) for name in SINGLE}
+    needed = () if is_wall_plan(own) else ("pattern",)
+    single = {name: _single(name, own.get(name, {}), rows, log, name in needed) for name in SINGLE}
     repeated = {name: _repeated(name, own.get(name, []), text, log) for name in REPEATED}
     marks = csv_marks(PLAN_FILE, settings, log)
-    tables, known = {}, [f"{name}.csv" for name in (*JOB_TABLES, *TABLES)]
+    is_wall = is_wall_plan(own)
+    beside = tuple(one for one in JOB_TABLES if one != "control") + WALL_TABLES
+    tables, known = {}, [f"{one}.csv" for one in (beside if is_wall else (*JOB_TABLES, *TABLES))]
     for path in sorted(folder.glob("*.csv")):
         if path.name not in known:
             log.problem(
@@ -160,7 +182,7 @@ def _read(folder, log):
         files=tuple(files), registers=registers,
     )  # fmt: skip
     of_plan = {name: _table(name, tables.get(name), log) for name in TABLES}
-    return raw, Given(single, repeated, of_plan)
+    return raw, Given(single, repeated, of_plan, is_wall=is_wall)
 
 
 def _table(name, table, log):
@@ -176,7 +198,7 @@ def _table(name, table, log):
     return values
 
 
-def _single(section, entries, rows, log):
+def _single(section, entries, rows, log, is_needed):
     if not isinstance(entries, dict):
         log.problem(
             PLAN_FILE,
@@ -186,7 +208,7 @@ def _single(section, entries, rows, log):
         )
         entries = {}
     found = {key: rows.get(f"{section}.{key}") for key in entries}
-    return _entry(section, SINGLE[section], entries, rows.get(section), found, log)
+    return _entry(section, SINGLE[section], entries, rows.get(section), found, log, is_needed)
 
 
 def _repeated(section, entries, text, log):
@@ -207,7 +229,7 @@ def _repeated(section, entries, text, log):
     for number, one in enumerate(entries):
         row, rows = places[number] if number < len(places) else (None, {})
         name = f"{section}[{number + 1}]"
-        found.append(_entry(name, REPEATED[section], one, row, rows, log))
+        found.append(_entry(name, REPEATED[section], one, row, rows, log, is_needed=True))
     return found
 
 
@@ -224,7 +246,7 @@ def _rows_of(section, text):
     return found
 
 
-def _entry(name, fields, entries, row, rows, log):
+def _entry(name, fields, entries, row, rows, log, is_needed=False):
     known = [field.name for field in fields]
     for key in entries:
         if key not in known:
@@ -238,7 +260,7 @@ def _entry(name, fields, entries, row, rows, log):
             Value(entries[field.name], rows.get(field.name)) if field.name in entries else None,
             None,
             log,
-            field.required and bool(entries or name == "pattern"),
+            field.required and bool(entries or is_needed),
             row,
         )
         for field in fields

@@ -80,7 +80,7 @@ def lines_of(result):
     if given is None:
         return None
     offsets = _offsets(result)
-    levels, lean = levels_and_lean(result.job, result.strapped)
+    levels, lean = levels_and_lean(result.job, result.read)
     names = [course.name for course in result.job.courses]
     return LinesRecord(
         offsets=offsets,
@@ -91,7 +91,7 @@ def lines_of(result):
                 level_m=one.level_m,
                 lines=one.lines,
                 rise_m=one.rise_m,
-                radius_m=result.strapped.radius_at(names.index(one.course), one.level_m),
+                radius_m=result.read.radius_at(names.index(one.course), one.level_m),
                 centre_x_m=one.centre_m[0],
                 centre_y_m=one.centre_m[1],
             )
@@ -108,8 +108,8 @@ def lines_of(result):
 
 
 def _offsets(result):
-    wall, given = result.strapped, result.job.lines.offsets
-    mine = np.array([one.of == "offsets" for one in wall.readings])
+    wall, given = result.read, result.job.lines.offsets
+    mine = wall.are("offsets")
     w, mdb, accepted = wall.tests_of("offsets")
     found = dict(
         zip(wall.places[mine], zip(wall.tested.departure_m[mine], w, mdb, accepted, strict=True),
@@ -159,7 +159,7 @@ def _plummets(result):
     given, found = result.job.lines, []
     used = [one for one in given.offsets if not one.check]
     for name, plummet in given.plummets.items():
-        kappa, u = result.strapped.collimations.get(name, (0.0, 0.0))
+        kappa, u = result.read.collimations.get(name, (0.0, 0.0))
         by_faces = collimation_by_faces(given, used, name)
         found.append(
             PlummetUsed(

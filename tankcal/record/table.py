@@ -217,6 +217,8 @@ def _measured_by(job, result):
         found = {"survey": "wall_hits", "covariance": "hits"}
     if result.straps is not None:
         found["straps"] = "beside_points"
+    if job.lines is not None:
+        found["lines"] = "beside_points"
     return found
 
 

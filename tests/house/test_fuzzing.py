@@ -129,8 +129,9 @@ def test_spoilt_workbooks_are_reported(tmp_path):
                 told(load, write_book(tmp_path / "job.xlsx", spoilt))
 
 
-def test_spoilt_plans_are_reported(tmp_path):
-    files = text_files(EXAMPLE.parent / "plan-silva")
+@pytest.mark.parametrize("name", ["plan-silva", "plan-reference-line", "plan-wall-hits"])
+def test_spoilt_plans_are_reported(tmp_path, name):
+    files = text_files(EXAMPLE.parent / name)
     for seed in range(FEW):
         spoilt = spoilt_folder(files, np.random.default_rng([8, seed]))
         with at("plan", seed, spoilt, tmp_path):

@@ -727,15 +727,6 @@ def _untied_in_sets(parts):
     return [("setups.csv", "setup"), ("setups.csv", "setup")]
 
 
-def _lines_too(parts):
-    strapped(parts)
-    parts.registers["instruments"]["TS"]["u_collimation_arcsec"] = 5.0
-    parts.tables["lines"] = [["line"], *([f"L{i}"] for i in range(4))]
-    offsets = [[f"L{i}", "1", 0.4, 100.0, 0.5] for i in range(4)]
-    parts.tables["offsets"] = [["line", "course", "level_m", "offset_mm", "s_mm"], *offsets]
-    return [("offsets.csv", None)]
-
-
 def _strap_without_thickness(parts):
     strapped(parts)
     del parts.registers["instruments"]["T"]["thickness_mm"]

@@ -143,11 +143,14 @@ def restricted_precision(covariance, design):
     return inverse - by_design @ normal @ by_design.T
 
 
-def snoop_wall(precision, pull, accepted, may_go=True):
-    """`Tested` after setting aside one reading after another, of those that may go."""
+def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf):
+    """`Tested` after setting aside one reading after another, of those that may go.
+
+    most_sd_m  of a departure, beyond which no other reading controls it: then it stays
+    """
 
     def tests(found):
-        return found.accepted, np.abs(found.w) * may_go, CRITICAL
+        return found.accepted, np.abs(found.w) * may_go * (found.sd_m < most_sd_m), CRITICAL
 
     def again(before, goes, comes):
         return against_others(precision, pull, before.accepted & ~goes | comes)

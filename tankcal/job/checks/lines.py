@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.job.checking import has_rows, refuse_repeated
-from tankcal.job.checks.extent import is_strapped
+from tankcal.job.checks.extent import has_wall_points, is_strapped
 from tankcal.job.checks.strapping import (
     check_levels,
     refuse_free_scale,
@@ -38,7 +38,7 @@ def check_lines(values, tables, registers, raw, log):
         )
         log.problem(raw.file_of(missing), expected)
         return
-    if not is_strapped(tables):
+    if not is_strapped(tables) and not has_wall_points(tables):
         expected = message(
             "lines_without_strap",
             "no circumference in {file}; expected one at least, of a course that the lines read:"
@@ -72,7 +72,9 @@ def check_lines(values, tables, registers, raw, log):
     sound = not (offsets.skipped or lines.skipped)
     needed = (offsets.of(name) for name in ("line", "course", "level_m"))
     if sound and not any(None in column for column in needed):
-        _check_coverage(lines, offsets, straps, log)
+        _check_coverage(lines, offsets, log)
+        if not has_wall_points(tables):
+            _check_strapped(offsets, straps, log)
 
 
 def plummets_of(registers):
@@ -86,8 +88,10 @@ def plummets_of(registers):
 
 
 def plummets_used(lines, plummets):
-    """(n,) name of the plummet of each line: the only one where it is blank."""
-    usual = next(iter(plummets)) if len(plummets) == 1 else None
+    """(n,) name of the plummet of each line; blank: the only instrument, or that of this kind."""
+    named = [name for name, one in plummets.items() if (one["kind"] or "").lower() == "plummet"]
+    alone = named if len(plummets) > 1 else [*plummets]
+    usual = alone[0] if len(alone) == 1 else None
     return [usual if name is None else name for name in lines.of("instrument")]
 
 
@@ -181,7 +185,7 @@ def _turned(lines, offsets, used):
     }
 
 
-def _check_coverage(lines, offsets, straps, log):
+def _check_coverage(lines, offsets, log):
     reference = at_reference(offsets)
     if reference is None:
         expected = message(
@@ -231,16 +235,25 @@ def _check_coverage(lines, offsets, straps, log):
                 fewest=FEWEST_LINES,
             )
             log.problem(offsets.file, expected, rows[first], "level_m")
+
+
+def _check_strapped(offsets, straps, log):
+    """Without points of the wall a strap tells the radius that the lines carry on."""
+    counts = [use != "check" for use in offsets.of("use")]
+    read = {one for one, used in zip(offsets.of("course"), counts, strict=True) if used}
+    reference = at_reference(offsets)
+    if reference is None:
+        return
     strapped = {
         name
         for name, use in zip(straps.of("course"), straps.of("use"), strict=True)
         if use != "check"
     }
-    if not strapped & set(course[counts]):
+    if not strapped & read:
         expected = message(
             "reference_not_strapped",
             "no course that the lines read is strapped; expected a circumference of course"
             " {course!r}",
-            course=course[reference][0],
+            course=np.array(offsets.of("course"))[reference][0],
         )
         log.problem(straps.file, expected, column="course")

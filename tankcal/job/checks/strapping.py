@@ -288,13 +288,6 @@ def _check_settings(values, tables, tapes, alone, raw, log):
             "strapped_inside", "found inside; expected outside: a tape lies on the outside"
         )
         tell(log.problem, raw, "survey", "side", expected)
-    if not alone and has_rows(tables["offsets"]):
-        expected = message(
-            "points_beside_lines",
-            "given together with points of the wall; expected only one of them: tankcal does not"
-            " join points and reference lines yet",
-        )
-        log.problem(tables["offsets"].file, expected)
     if alone and values["bottom"]["form"] in ("leaning", "points"):
         expected = message(
             "bottom_needs_axis",

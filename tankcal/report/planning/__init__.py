@@ -37,19 +37,29 @@ def write(
     refuse_foreign(directory)
     progress = progress or (lambda text: None)
     with folders.replaced(directory) as temporary:
-        paper = PlanPaper(prediction, language, effects, design, simulated)
+        kind = _paper_of(prediction)
+        paper = kind(prediction, language, effects, design, simulated)
         _write(paper, temporary, progress)
         if design is not None and design.steps:
             (temporary / DESIGN).mkdir()
-            _write(PlanPaper(design.prediction, language), temporary / DESIGN, progress)
+            _write(kind(design.prediction, language), temporary / DESIGN, progress)
     names = (*FILES, JOB, DESIGN)
     return [path for path in (Path(directory) / name for name in names) if path.exists()]
 
 
+def _paper_of(prediction):
+    from tankcal.planning.wall.prediction import WallPrediction
+    from tankcal.report.planning.wall_paper import WallPaper
+
+    return WallPaper if isinstance(prediction, WallPrediction) else PlanPaper
+
+
 def _write(paper, folder, progress):
     """The files of a PlanPaper."""
-    from tankcal.report.pdf import pdf
-    from tankcal.report.planning import empty_job, figures, files, workbook
+    if paper.is_wall:
+        _write_wall(paper, folder, progress)
+        return
+    from tankcal.report.planning import empty_job, files, workbook
     from tankcal.report.planning.field_sheets import sheets
     from tankcal.report.planning.outlook import outlook
 
@@ -58,8 +68,28 @@ def _write(paper, folder, progress):
     progress(message("plan_writing_tables", "writing the tables"))
     files.write(paper, folder, empty_job.fingerprints(folder / JOB))
     workbook.write(paper, folder / "field-sheets.xlsx")
+    _set(paper, folder, progress, outlook(paper), sheets(paper))
+
+
+def _write_wall(paper, folder, progress):
+    """The files of a WallPaper."""
+    from tankcal.report.planning import empty_job, wall_files
+    from tankcal.report.planning.wall_paper import wall_outlook, wall_sheets
+
+    progress(message("plan_writing_job", "writing the empty job"))
+    wall_files.write_empty_job(paper.prediction, folder / JOB)
+    progress(message("plan_writing_tables", "writing the tables"))
+    wall_files.write_wall(paper, folder, empty_job.fingerprints(folder / JOB))
+    _set(paper, folder, progress, wall_outlook(paper), wall_sheets(paper))
+
+
+def _set(paper, folder, progress, prediction, sheets):
+    """The PDFs of a paper, and the picture of the changes."""
+    from tankcal.report.pdf import pdf
+    from tankcal.report.planning import figures
+
     progress(message("plan_setting_papers", "setting prediction and field sheets"))
-    for name, blocks in (("prediction.pdf", outlook(paper)), ("field-sheets.pdf", sheets(paper))):
+    for name, blocks in (("prediction.pdf", prediction), ("field-sheets.pdf", sheets)):
         (folder / name).write_bytes(pdf([block.data for block in blocks], folder))
     if any(not one.why for one in paper.effects):
         figures.changes(paper).savefig(folder / "changes.png", dpi=150)

@@ -13,6 +13,7 @@ from tankcal.messages import message
 from tankcal.planning.measurements import targets_of
 from tankcal.planning.model import TAPED
 from tankcal.record.plan import PLAN
+from tankcal.record.wall_plan import WALL_PLAN
 from tankcal.text.languages import DEFAULT
 
 ARCSEC = 3600.0
@@ -50,7 +51,8 @@ def refuse_filled(folder, plan_file):
     except (OSError, ValueError, RecursionError):
         written = None
     else:
-        written = PLAN.migrated(plan, plan_file.name)["job"]
+        is_wall = WALL_PLAN.version_of(plan) is not None
+        written = (WALL_PLAN if is_wall else PLAN).migrated(plan, plan_file.name)["job"]
     if not folder.is_dir() or fingerprints(folder) != written:
         raise InputError(
             Problem(
@@ -69,7 +71,7 @@ def form_of(prediction):
     plan = prediction.plan
     raw = plan.given
     settings = {
-        f"{section}.{key}": _text(one.raw)
+        f"{section}.{key}": text(one.raw)
         for section, entries in raw.settings.items()
         for key, one in entries.items()
     }
@@ -79,9 +81,9 @@ def form_of(prediction):
         survey="photos" if plan.photos else "total-station",
         language=plan.job.table.language or DEFAULT,
         settings={key: text for key, text in settings.items() if key not in MEASURED},
-        given={name: _as_given(raw.tables[name]) for name in AS_GIVEN if name in raw.tables}
+        given={name: as_given(raw.tables[name]) for name in AS_GIVEN if name in raw.tables}
         | _tables(prediction),
-        registered={name: _entries(name, found) for name, found in raw.registers.items()},
+        registered={name: entries(name, found) for name, found in raw.registers.items()},
         to_fill=tuple(key for key in settings if key in MEASURED),
         more=tuple(name for name in COLUMNS if name in used),
     )
@@ -111,8 +113,8 @@ def _targets(plan):
             "point": point,
             "section": section,
             "generatrix": line,
-            "z_m": _fixed(z, 4),
-            "offset_mm": _fixed(1000 * offset, 3),
+            "z_m": short(z, 4),
+            "offset_mm": short(1000 * offset, 3),
         }
         for point, section, line, z, offset in zip(*columns, strict=True)
     )
@@ -124,9 +126,9 @@ def _photo(plan, one):
     settings = plan.job.measurements.settings
     if settings.datum == "control":
         return row
-    places = {f"{axis}_m": _fixed(x, 3) for axis, x in zip("xyz", one.xyz_m, strict=True)}
+    places = {f"{axis}_m": short(x, 3) for axis, x in zip("xyz", one.xyz_m, strict=True)}
     angles = {
-        f"{name}_deg": _fixed(degrees(angle), 2)
+        f"{name}_deg": short(degrees(angle), 2)
         for name, angle in zip(("omega", "phi", "kappa"), angles_of(one.rotation), strict=True)
     }
     return row | places | angles
@@ -173,26 +175,27 @@ def _sd(table, setup):
     if table == "slope_distances":
         return {"s_mm": _mm(setup.distance_sd_m)}
     sd = setup.direction_sd_rad if table == "directions" else setup.zenith_sd_rad
-    return {"s_arcsec": _fixed(ARCSEC * degrees(sd), 6)}
+    return {"s_arcsec": short(ARCSEC * degrees(sd), 6)}
 
 
-def _as_given(table):
+def as_given(table):
+    """The rows of a Table, {column: text} each."""
     return tuple(
-        {name: _text(cell) for name, cell in zip(table.headings, row, strict=True)}
+        {name: text(cell) for name, cell in zip(table.headings, row, strict=True)}
         for row in table.rows
     )
 
 
-def _entries(register, found):
+def entries(register, found):
     """{name: {key: text}} with the spelling of keys that a starter job has."""
     usual = {short: name for name, short in SHORT_KEYS[register].items()}
     return {
-        name: {usual.get(key, key): _text(one.raw) for key, one in given.items()}
+        name: {usual.get(key, key): text(one.raw) for key, one in given.items()}
         for name, given in found.entries.items()
     }
 
 
-def _text(raw):
+def text(raw):
     """A value of TOML or CSV as a text that means the same in a job."""
     if raw is None:
         return ""
@@ -205,10 +208,10 @@ def _text(raw):
 
 
 def _mm(metres):
-    return _fixed(1000 * metres, 6)
+    return short(1000 * metres, 6)
 
 
-def _fixed(value, decimals):
+def short(value, decimals):
     """A number without zeros at its end."""
     text = f"{value:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text

@@ -18,6 +18,19 @@ def write(paper, folder, fingerprints):
     save(found, folder / "plan.json")
     for name, (headings, rows) in _tables(found).items():
         _write(folder / name, headings, rows)
+    write_capacity(found, folder)
+    write_effects(paper, folder)
+
+
+def write_capacity(found, folder):
+    """Write capacity.csv of the plain data of a plan."""
+    table = found["table"]
+    rows = zip(*table.values(), strict=True)
+    _write(folder / "capacity.csv", " ".join(table), rows)
+
+
+def write_effects(paper, folder):
+    """Write changes.csv and design.csv, where there are any."""
     steps = () if paper.design is None else paper.design.steps
     for name, effects in (("changes.csv", paper.effects), ("design.csv", steps)):
         if effects:
@@ -33,7 +46,7 @@ def write(paper, folder, fingerprints):
 
 
 def _tables(found):
-    """{file: (headings, rows)} of points, sections and the table of a plan.json."""
+    """{file: (headings, rows)} of points and sections of a plan.json."""
     points = [
         [one["name"], one["rays"], *map(_mm, one["sd_m"]), one["undetermined"], one["weak"]]
         for one in found["points"]
@@ -43,14 +56,12 @@ def _tables(found):
          _mm(one["radius_sd_m"])]
         for one in found["sections"]
     ]  # fmt: skip
-    table = found["table"]
     return {
         "points.csv": ("point rays sx_mm sy_mm sz_mm undetermined weak", points),
         "sections.csv": (
             "section height_m targets centre_sx_mm centre_sy_mm radius_s_mm",
             sections,
         ),
-        "capacity.csv": (" ".join(table), zip(*table.values(), strict=True)),
     }
 
 

@@ -12,6 +12,7 @@ _EFFECT = (
     Column("cost", digits=4),
 )  # fmt: skip
 EFFECTS = (Column("change"), *_EFFECT)
+OF_WALL = tuple(one for one in EFFECTS if one.key != "poor")
 PLACED = (
     Column("change"), *(Column(key, "m", decimals=1) for key in ("arc_m", "off_m", "height_m")),
     *_EFFECT,
@@ -27,9 +28,9 @@ def changes(paper):
     gains = [one for one in works if one.change.action != "drop"]
     return [
         paper.heading("changes"),
-        paper.paragraph("changes"),
-        *_best(paper, "gains", gains, PLACED),
-        *_best(paper, "drops", drops, EFFECTS),
+        paper.paragraph("wall_changes" if paper.is_wall else "changes"),
+        *_best(paper, "gains", gains, OF_WALL if paper.is_wall else PLACED),
+        *_best(paper, "drops", drops, OF_WALL if paper.is_wall else EFFECTS),
         *_needed(paper),
         paper.figure(figures.changes(paper), "changes"),
     ]
@@ -90,7 +91,7 @@ def design(paper):
     )
     if not path.steps:
         return [paper.heading("design"), paper.paragraph("no_step"), text, *_missed(paper, path)]
-    steps = paper.table("design", _effects(paper, path.steps), PLACED)
+    steps = paper.table("design", _effects(paper, path.steps), OF_WALL if paper.is_wall else PLACED)
     papers = paper.paragraph("design_has_papers", folder=DESIGN)
     return [paper.heading("design"), text, *_missed(paper, path), papers, steps]
 

@@ -17,6 +17,7 @@ from tankcal.uncertainty import combine
 
 DIPS = 12  # rows of the table that are shown
 MOST_POINTS = 40
+NOTHING = 1e-9  # of the largest u: an input that contributes less is not listed
 SHARE = Column("relative", "share", digits=3)
 
 
@@ -24,10 +25,10 @@ def outlook(paper):
     """The blocks of the prediction of a PlanPaper."""
     return [
         *paper.head("prediction"),
-        _result(paper),
+        result(paper),
         *_facts(paper),
         *paper.warnings(paper.prediction.warnings),
-        *_table(paper),
+        *table(paper),
         *_weak(paper),
         *_reliability(paper),
         *_simulated(paper),
@@ -36,7 +37,8 @@ def outlook(paper):
     ]
 
 
-def _result(paper):
+def result(paper):
+    """The full tank with its U, and whether the limit is met."""
     found, table = paper.prediction, paper.prediction.table
     value = format_with_u(table.volume_m3[-1], table.U_m3[-1], paper.marks, least=0)
     text = paper.word(
@@ -95,7 +97,8 @@ def _axes(paper, values_m):
     return ", ".join(f"{axis} {text}" for axis, text in zip("xyz", texts, strict=True))
 
 
-def _table(paper):
+def table(paper):
+    """U against the dip, the table at some dips, the worst deliveries, the budget."""
     table, stated = paper.prediction.table, paper.prediction.tabled.stated
     last = len(table.height_m) - 1
     places = dict.fromkeys(np.linspace(0, last, DIPS + 1).round().astype(int)[1:].tolist())
@@ -133,7 +136,9 @@ def _sources(paper):
     for one, variance in zip(table.sources, of_top, strict=True):
         name = name_of_input(paper.words, one.kind)
         variances[name] = variances.get(name, 0.0) + variance
-    return {name: np.sqrt(variance) for name, variance in variances.items()}
+    found = {name: np.sqrt(variance) for name, variance in variances.items()}
+    least = NOTHING * max(found.values(), default=0.0)
+    return {name: u for name, u in found.items() if u > least}
 
 
 def _worst(paper, worst):

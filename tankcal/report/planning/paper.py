@@ -23,6 +23,8 @@ class PlanPaper(PlainPaper):
     Words are looked up in the group's part under `planning` first, then in the group itself.
     """
 
+    is_wall = False
+
     def __init__(self, prediction, language=None, effects=(), design=None, simulated=None):
         self.prediction, self.plan = prediction, prediction.plan
         self.effects, self.design, self.simulated = effects, design, simulated

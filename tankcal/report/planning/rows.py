@@ -8,6 +8,7 @@ import numpy as np
 from tankcal.camera.model import PARAMETERS
 from tankcal.geometry.rotations import view_of_rotation
 from tankcal.planning.places import joints_m, place_of
+from tankcal.planning.wall.model import WallPlan
 
 LEVEL = 0.01  # rise over run, or run over rise, of what is called level or upright
 SD_KEYS = ("direction_sd_rad", "zenith_sd_rad", "distance_sd_m")
@@ -223,7 +224,8 @@ def place_of_change(change):
     A tape hangs or lies about its middle; its height is that of its lowest end.
     """
     plan, name = change.plan, change.name
-    if change.action != "add" or change.item not in _ADDED:
+    of_wall = isinstance(plan, WallPlan)
+    if of_wall or change.action != "add" or change.item not in _ADDED:
         return {}
     return _at(plan, _ADDED[change.item](plan, name))
 

@@ -1,0 +1,155 @@
+"""From the raw tables of a job to a checked `Job`, or to every problem that it has."""
+
+from dataclasses import replace
+
+from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
+from tankcal.job.checks import check_all
+from tankcal.job.checks.extent import has_hits, has_survey, is_strapped
+from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
+from tankcal.job.covariance import read_covariance
+from tankcal.job.entries import kind_of, read_columns, read_register, read_settings
+from tankcal.job.hits import make_hits
+from tankcal.job.lines import make_lines
+from tankcal.job.measuring import make_measurements
+from tankcal.job.rule_files import find_rule
+from tankcal.job.strapping import make_strapping
+from tankcal.job.tables import (
+    COVARIANCE_FILE,
+    HITS_TABLES,
+    REGISTERS,
+    STRAPPING_TABLES,
+    SURVEY_TABLES,
+    TABLES,
+    TANK_TABLES,
+    missing_sheet,
+)
+from tankcal.messages import message
+
+
+def job_of(raw, log, is_whole=True):
+    """The checked Job of a RawJob; InputError with every problem that `log` has been told.
+
+    is_whole  False: the survey alone is needed
+    """
+    tables = _read_tables(raw, is_whole, log)
+    registers = {name: read_register(raw, name, log) for name in REGISTERS}
+    values = read_settings(raw, log, is_whole) if raw.settings is not None else None
+    check_all(values, tables, registers, raw, is_whole, log)
+    attached = _attached(raw, values, tables["points"], log) if is_whole else None
+    log.stop_if_problems()
+    measurements = None
+    if has_survey(tables):
+        measurements = make_measurements(values, tables, registers)
+    if not is_whole:
+        return make_frame(raw, values, tables, measurements, tuple(log.warnings))
+    strapping = make_strapping(values, tables, registers)
+    made = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
+    lines, hits = make_lines(tables, registers), make_hits(tables, registers)
+    return replace(made, strapping=strapping, lines=lines, hits=hits)
+
+
+def _read_tables(raw, is_whole, log):
+    """{name: ColumnValues}, None for a table that is missing, cannot be read or does not belong.
+
+    A table of a survey that is there but empty is None, too.
+    """
+    kind = kind_of(raw)
+    allowed = None if kind is None else TABLES_OF_KIND[kind]
+    if kind is not None and "points" in allowed:
+        allowed += SURVEY_TABLES
+    if kind == "vertical":
+        allowed += STRAPPING_TABLES + HITS_TABLES
+    tables = {}
+    for name in TABLES:
+        table = raw.tables.get(name)
+        is_empty = table is None or not (table.rows or table.skipped)
+        if allowed is not None and name not in allowed:
+            if not is_empty:
+                log.problem(
+                    table.file,
+                    message(
+                        "not_for_this_kind",
+                        "not for a tank of kind {of_kind}; remove the table",
+                        of_kind=kind,
+                    ),
+                )
+            tables[name] = None
+            continue
+        if table is None or (is_empty and name not in TANK_TABLES):
+            tables[name] = None
+        else:
+            tables[name] = read_columns(name, table, log)
+    if is_whole:
+        _tell_missing_tables(raw, tables, kind, log)
+    return tables
+
+
+def _tell_missing_tables(raw, tables, kind, log):
+    for name in REQUIRED_TABLES.get(kind, ()):
+        measured = has_survey(tables) or is_strapped(tables) or has_hits(tables)
+        elsewhere = name == "points" and measured
+        if name in raw.tables or elsewhere:
+            continue
+        instead = [one for one in _IN_PLACE_OF_POINTS if one in raw.tables]
+        if name != "points" or not instead:
+            log.problem(raw.file_of(name), _missing(raw, name))
+        elif raw.tables[instead[0]] is not None:  # else it is told already
+            log.problem(raw.tables[instead[0]].file, _IN_PLACE_OF_POINTS[instead[0]])
+
+
+_IN_PLACE_OF_POINTS = {
+    "wall_hits": message("no_rows_of_hits", "no rows; expected a sight to the wall in each"),
+    "circumferences": message(
+        "no_circumferences", "no rows; expected a reading of the tape on each course at least"
+    ),
+}
+
+
+def _missing(raw, name):
+    if raw.file_of(name).startswith("sheet "):
+        return missing_sheet()
+    needed = ", ".join(field.name for field in COLUMNS[name] if field.required)
+    if name == "points":
+        return message(
+            "missing_points_file",
+            "missing file; expected one with the columns {columns}, or the files of a survey, "
+            "such as distances.csv",
+            columns=needed,
+        )
+    return message(
+        "missing_file", "missing file; expected one with the columns {columns}", columns=needed
+    )
+
+
+def _attached(raw, values, points, log):
+    """What lies beside the settings, None for what cannot be read; values: None: unreadable."""
+    mesh = rule = None
+    if values is not None:
+        mesh, rule = values["mesh"]["file"], values["table"]["rule"]
+    return Attached(
+        _covariance(raw, points, log),
+        None if mesh is None else read_mesh_file(raw.folder, mesh, log),
+        None if rule is None else find_rule(raw, rule, log),
+    )
+
+
+def _covariance(raw, points, log):
+    """The full covariance of the points, m2, or None: not given, or told to `log`."""
+    if raw.covariance is None:
+        return None
+    if points is None:
+        is_unreadable = "points" in raw.tables and raw.tables["points"] is None
+        if not is_unreadable:
+            expected = message(
+                "covariance_without_points",
+                "given without its points; expected points.csv beside it",
+            )
+            log.problem(COVARIANCE_FILE, expected)
+        return None
+    if points.columns["sx_mm"] is not None:
+        expected = message(
+            "covariance_beside_sds",
+            "given together with sx_mm, sy_mm, sz_mm of the points; expected only one of them",
+        )
+        log.problem(COVARIANCE_FILE, expected)
+    return read_covariance(raw.covariance, points.of("point"), log)

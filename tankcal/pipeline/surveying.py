@@ -1,0 +1,128 @@
+"""From what was measured to what was surveyed of a tank: points, then its wall.
+
+The readings may be those of a survey or what one that is only planned foresees.
+"""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.job.model import Job
+from tankcal.job.tables import in_book
+from tankcal.messages import message
+from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
+from tankcal.pipeline.scan import Scan, fit_scan
+from tankcal.pipeline.sighted import find_hit_wall
+from tankcal.pipeline.strapped_wall import find_strapped_wall
+from tankcal.pipeline.survey_warnings import refuse_undetermined
+from tankcal.pipeline.wall import Wall, find_wall, s_transform
+from tankcal.survey import Adjustment, adjust_survey, wall_points
+from tankcal.survey.sighting import Sighting
+from tankcal.tank.meshes import parse_mesh
+
+TOLD = 10  # warnings of the adjustment that are told when there is no wall
+
+
+@dataclass(frozen=True)
+class Surveyed:
+    """What was surveyed of a tank.
+
+    Attributes
+    ----------
+    job : Job
+        With the points that its adjustment or its hits gave.
+    survey : Wall, StrappedWall, Scan, mesh or None
+        None where declared sizes alone describe the tank.
+    adjustment : Adjustment or None
+    sighting : Sighting or None
+    """
+
+    job: Job
+    survey: object
+    adjustment: Adjustment | None = None
+    sighting: Sighting | None = None
+
+
+def find_survey(job, progress, amplitudes=None):
+    """`Surveyed` of a job: its survey adjusted, its wall found.
+
+    Parameters
+    ----------
+    job : Job
+    progress : callable
+        Called with a line of text as each step begins.
+    amplitudes : Amplitudes, optional
+        Of the components of an upright wall where they are known beforehand; None: the readings
+        tell them.
+
+    Raises
+    ------
+    InputError, SolutionError
+        As `chain.run`.
+    """
+    adjustment = sighting = None
+    if job.measurements is not None:
+        adjustment = _adjusted(job, progress)
+    if job.hits is None and adjustment is not None:
+        points = wall_points(adjustment, job.measurements, job.survey.side)
+        job = replace(job, points=s_transform(points))
+    dof = np.inf if adjustment is None else adjustment.dof
+    try:
+        if job.hits is None:
+            survey = _survey(job, progress, dof, amplitudes)
+        else:
+            job, sighting, survey = find_hit_wall(
+                job, adjustment, progress, dof, amplitudes=amplitudes
+            )
+    except SolutionError as error:
+        if adjustment is None or not adjustment.warnings:
+            raise
+        told = (one.text for one in placed(job, adjustment.warnings[:TOLD]))
+        raise SolutionError(*error.args, *told) from error
+    if adjustment is not None and sighting is None and isinstance(survey, Wall):
+        refuse_other_side(job, partial(is_within_wall, survey), adjustment)
+    elif adjustment is not None and isinstance(survey, Scan):
+        refuse_other_side(job, survey.is_within, adjustment)
+    return Surveyed(job, survey, adjustment, sighting)
+
+
+def placed(job, problems):
+    """Problems by workbook and sheet where the job stands in one."""
+    if not job.source.endswith(".xlsx"):
+        return tuple(problems)
+    return tuple(in_book(one, job.source) for one in problems)
+
+
+def _adjusted(job, progress):
+    """The adjusted survey of a job; SolutionError where it leaves the vertical or a scale open."""
+    if job.points is not None and not job.points.from_adjustment:
+        expected = message(
+            "points_beside_survey",
+            "given together with a survey; expected only one of them: the points come from "
+            "its adjustment",
+        )
+        raise InputError(Problem("points.csv", expected))
+    adjustment = adjust_survey(job.measurements, progress)
+    refuse_undetermined(adjustment.datum)
+    return adjustment
+
+
+def _survey(job, progress, dof, amplitudes):
+    """What was surveyed: a wall of courses, a mesh, the scan of another wall; None: sizes alone."""
+    if job.strapping is not None and job.points is None:
+        return find_strapped_wall(job, progress, amplitudes)
+    if job.tank.kind == "vertical":
+        return find_wall(job, progress, dof, amplitudes)
+    if job.mesh is not None:
+        progress(message("checking_mesh", "checking the mesh {file}", file=job.mesh.file))
+        return parse_mesh(job.mesh.file, job.mesh.data, job.mesh.unit_m)
+    if job.points is not None:
+        progress(
+            message(
+                "fitting_wall", "fitting the wall to {count} points", count=len(job.points.names)
+            )
+        )
+        return fit_scan(job, dof)
+    return None

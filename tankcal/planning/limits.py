@@ -1,0 +1,31 @@
+"""What a plan has to meet, and what is said of it."""
+
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+from tankcal.pipeline.statements import MINIMA_M
+
+
+def limited_u(tabled, limits):
+    """U over volume of the full tank, or of the worst delivery of the least minimum."""
+    if limits.of == "delivery":
+        return float(tabled.stated.worst[0].relative.relative)
+    table = tabled.made.table
+    return float(table.U_m3[-1] / table.volume_m3[-1])
+
+
+def refuse_without_delivery(plan, tabled, tall):
+    """Raise InputError where the limit is for deliveries and the table has none long enough.
+
+    tall  height of the shell, m
+    """
+    if plan.limits.of == "delivery" and not tabled.stated.worst:
+        least = min(plan.job.table.minimum_delivery_m or MINIMA_M)
+        file, row, name = plan.limits.place
+        expected = message(
+            "plan_no_delivery",
+            "no delivery of {least:g} m or more in a shell of {tall:g} m; expected "
+            "top, or a smaller table.minimum_delivery_m",
+            least=least,
+            tall=tall,
+        )
+        raise InputError(Problem(file, expected, row, name))

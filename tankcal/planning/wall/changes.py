@@ -1,0 +1,150 @@
+"""Changes of a WallPlan by one item: strap, lines, level, hits, set-up, a better instrument."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+from tankcal.planning.wall.model import USUAL_AT, PlannedStrap
+from tankcal.planning.wall.reading import changed
+
+SEARCHED = ("strap", "line", "face", "level", "hit", "setup", "reading")
+WALL_ITEMS = (*SEARCHED, "accuracy", "certificate")  # the last are no part of a design
+MORE_LINES = 4
+BETTER = ("u_scale_ppm", "u_offset_mm", "u_collimation_arcsec", "u_incidence_mm")
+MOST_FACES, MOST_READINGS, FEWEST_LINES, FEWEST_HITS = 2, 20, 4, 5
+
+
+def wall_changes_of(plan):
+    """(action, item, name, how) of every change; how() is the WallPlan after it."""
+    found = []
+    for changes in (_straps, _lines, _hits, _certificates):
+        found += changes(plan)
+    return found
+
+
+def wall_count(plan):
+    """{item: how many of it a WallPlan has}, of those that cost."""
+    design = plan.design
+    lines = design.lines
+    levels = 0 if lines is None else len(lines.at_percent) * len(plan.job.courses)
+    read = 0 if lines is None else lines.count * levels * lines.faces * lines.readings
+    read += sum(one.readings for one in design.straps)
+    read += sum(
+        one.setups * one.hits * len(one.at_percent) * len(one.courses) for one in design.hits
+    )
+    return {
+        "strap": len(design.straps),
+        "line": 0 if lines is None else lines.count,
+        "setup": sum(one.setups for one in design.hits),
+        "reading": read,
+    }
+
+
+def _made(plan, **parts):
+    return lambda: changed(plan, replace(plan.design, **parts))
+
+
+def _straps(plan):
+    design = plan.design
+    for one in design.straps:
+        others = tuple(strap for strap in design.straps if strap is not one)
+        if others or design.hits:
+            yield "drop", "strap", one.name, _made(plan, straps=others)
+        if one.readings < MOST_READINGS:
+            again = replace(one, readings=one.readings + 1)
+            straps = tuple(again if strap is one else strap for strap in design.straps)
+            yield "repeat", "strap", one.name, _made(plan, straps=straps)
+    if not design.straps:
+        return
+    for course in plan.job.courses:
+        taken = [one.at_percent for one in design.straps if one.course == course.name]
+        added = replace(design.straps[0], course=course.name, at_percent=between(taken), readings=1)
+        yield "add", "strap", added.name, _made(plan, straps=(*design.straps, added))
+    finer = tuple(replace(one, sd_mm=one.sd_mm / 2) for one in design.straps)
+    yield "repeat", "accuracy", "straps", _made(plan, straps=finer)
+
+
+def between(taken):
+    """The middle of the widest gap between heights, percent, as far from an edge as from another.
+
+    Examples
+    --------
+    >>> between([20, 80]), between([50]), between([])
+    (50.0, 25.0, 50.0)
+    """
+    marks = [0.0, *sorted(taken), 100.0]
+    gaps = [(high - low, -low) for low, high in pairwise(marks)]
+    wide, low = max(gaps)
+    return -low + wide / 2
+
+
+def _lines(plan):
+    lines = plan.design.lines
+    if lines is None:
+        return
+    count = lines.count + MORE_LINES
+    yield "add", "line", str(MORE_LINES), _made(plan, lines=replace(lines, count=count))
+    if lines.count - MORE_LINES >= FEWEST_LINES:
+        fewer = replace(lines, count=lines.count - MORE_LINES)
+        yield "drop", "line", str(MORE_LINES), _made(plan, lines=fewer)
+    other = MOST_FACES + 1 - lines.faces
+    action = "add" if other == MOST_FACES else "drop"
+    yield action, "face", "2", _made(plan, lines=replace(lines, faces=other))
+    if lines.readings < MOST_READINGS:
+        again = replace(lines, readings=lines.readings + 1)
+        yield "repeat", "reading", "offsets", _made(plan, lines=again)
+    for action, name, at in _levels(lines.at_percent):
+        yield action, "level", name, _made(plan, lines=replace(lines, at_percent=at))
+
+
+def _levels(at_percent):
+    """(action, percent, heights after it) of a height more or less in every course."""
+    added = between(at_percent)
+    yield "add", f"{added:g} %", tuple(sorted((*at_percent, added)))
+    for one in at_percent if len(at_percent) > 1 else ():
+        yield "drop", f"{one:g} %", tuple(at for at in at_percent if at != one)
+
+
+def _hits(plan):
+    design = plan.design
+    for number, ring in enumerate(design.hits, 1):
+
+        def made(ring=ring, **parts):
+            rings = tuple(replace(one, **parts) if one is ring else one for one in design.hits)
+            return _made(plan, hits=rings)
+
+        yield "add", "hit", str(number), made(hits=ring.hits + max(1, ring.hits // 2))
+        if ring.hits // 2 >= 1:
+            yield "drop", "hit", str(number), made(hits=ring.hits - ring.hits // 2)
+        yield "add", "setup", str(number), made(setups=ring.setups + 1)
+        if ring.setups > 1:
+            yield "drop", "setup", str(number), made(setups=ring.setups - 1)
+        for action, name, at in _levels(ring.at_percent):
+            yield action, "level", f"{name} ({number})", made(at_percent=at)
+    if design.hits and not design.straps:
+        tapes = plan.given.registers.get("instruments")
+        kinds = {} if tapes is None else {n: one.get("kind") for n, one in tapes.entries.items()}
+        names = [name for name, kind in kinds.items() if kind and kind.raw == "tape"]
+        if names:
+            first = plan.job.courses[0].name
+            straps = tuple(
+                PlannedStrap(first, at, 0.5, more=(("instrument", names[-1]),)) for at in USUAL_AT
+            )
+            yield "add", "strap", f"{first}-20, {first}-80", _made(plan, straps=straps)
+
+
+def _certificates(plan):
+    """Instruments whose certificate would be twice as good."""
+    register = plan.given.registers.get("instruments")
+    for name, entry in {} if register is None else register.entries.items():
+        given = {
+            key: entry[key].raw / 2
+            for key in BETTER
+            if key in entry and isinstance(entry[key].raw, int | float) and entry[key].raw > 0
+        }
+        if given:
+            yield (
+                "repeat",
+                "certificate",
+                name,
+                lambda name=name, given=given: changed(plan, raw=plan.with_instrument(name, given)),
+            )

@@ -1,0 +1,78 @@
+"""The sections of plan.toml that say how a wall will be strapped, read from lines, or hit."""
+
+from tankcal.job.contract.hits import RANGING
+from tankcal.job.fields import Field
+from tankcal.messages import message
+from tankcal.planning.fields import count, number, numbers_list
+
+_INSTRUMENT = Field("instrument", "name", "as in instruments.toml; blank: the only one that fits")
+_AT = numbers_list(
+    "at_percent", "heights in each course, percent of its height; blank: 20, 80", 0, 100
+)
+_COURSES = Field("courses", "names", "names of courses; blank: all")
+_READINGS = count("readings", "how often each is read; blank: 1", high=20)
+STRAPS = (
+    _COURSES,
+    _AT,
+    _READINGS,
+    number(
+        "s_mm",
+        message("plan_note_strap_sd", "standard deviation of one reading of the tape"),
+        0,
+        100,
+        True,
+        True,
+    ),
+    _INSTRUMENT,
+    number("temperature_c", "of the tape; blank: that of the shell", -60, 120),
+    number("tension_n", "pull of the tape; blank: that of its certificate", 0, 1000),
+    count("pulls", "in how many pieces it is pulled round; blank: 1", high=50),
+)
+LINES = (
+    count("count", message("plan_note_lines", "how many lines stand round the tank"), True, 200),
+    _AT,
+    _READINGS,
+    number(
+        "s_mm",
+        message("plan_note_offset_sd", "standard deviation of one offset"),
+        0,
+        100,
+        True,
+        True,
+    ),
+    count("faces", "1, or 2: the plummet is turned as well; blank: 2", high=2),
+    _INSTRUMENT,
+    Field("side", "choice", "where they stand; blank: outside", choices=("outside", "inside")),
+    number("first_azimuth_deg", "of the first line from the axis; blank: 0", -360, 360),
+)
+HITS = (
+    count(
+        "setups", message("plan_note_hit_setups", "how many set-ups stand in this ring"), True, 60
+    ),
+    number(
+        "radius_m",
+        message("plan_note_hit_radius", "of the ring about the axis of the tank, metres"),
+        0,
+        1000,
+        True,
+    ),
+    number("start_azimuth_deg", "of the first set-up from the axis; blank: 0", -360, 360),
+    number("height_m", "of the instrument above the bottom of the shell; blank: 1.6", -50, 200),
+    count("hits", message("plan_note_hits", "of each set-up at each height"), True, 500),
+    number("spread_deg", "azimuths of the wall that each sees; blank: all that it can", 0, 360),
+    _COURSES,
+    _AT,
+    _INSTRUMENT,
+)
+TIES = (
+    count("targets", message("plan_note_ties", "that neighbours share"), True, 20),
+    *(one for one in RANGING if one.name in ("s_mm", "s_arcsec")),
+)
+WALL = (
+    number("form_mm", "rms ovality of a course, as expected; blank: as walls have it", 0, 500),
+    number("common_form_mm", "the part of it that runs up the whole shell; blank: 0", 0, 500),
+)
+SINGLE = {"lines": LINES, "setup_ties": TIES, "wall": WALL}
+REPEATED = {"straps": STRAPS, "hits": HITS}
+MEASURING = ("straps", "lines", "hits")
+TABLES = ("obstructions", "thickness", "tape_checks")  # of a job, beside those of any plan

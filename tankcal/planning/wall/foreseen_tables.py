@@ -1,0 +1,205 @@
+"""The tables that a crew will fill in, from a `Design`: a row for each reading.
+
+What is read does not stand in them as a nominal tank would have it: `nominal_readings` says that.
+"""
+
+from itertools import islice
+
+import numpy as np
+
+from tankcal.job.checks.hits import MOST_HITS
+from tankcal.job.checks.lines import MOST_OFFSETS
+from tankcal.job.checks.strapping import MOST_STRAPS
+from tankcal.job.tables import Table
+
+STEEPEST = np.radians(55.0)  # incidence in plan, of a set-up that says nothing of what it sees
+TIE_HEIGHTS_M = (0.4, 1.4, 2.4)  # above the instrument's foot: of targets that set-ups share
+
+
+class Foreseen:
+    """Tables of a design on a tank.
+
+    design  Design              courses  ((name, height_m), ...) from the bottom up
+    radius_m  nominal           bottom_m  z of the bottom     zero_m  of the table above it
+    """
+
+    def __init__(self, design, courses, radius_m, bottom_m, zero_m):
+        self.design, self.radius_m = design, radius_m
+        self.bottom_m, self.zero_m = bottom_m, zero_m
+        self.foot, foot = {}, 0.0
+        for name, height in courses:
+            self.foot[name] = (foot, height)
+            foot += height
+
+    def tables(self):
+        """{name: Table}, of decimal points."""
+        found = {}
+        if self.design.straps:
+            found["circumferences"] = self._straps(), MOST_STRAPS
+        if self.design.lines is not None:
+            found["lines"] = self._lines(), MOST_OFFSETS
+            found["offsets"] = self._offsets(), MOST_OFFSETS
+        if self.design.hits:
+            found["wall_hits"] = self._hits(), MOST_HITS
+            found["setups"] = self._setups(), MOST_HITS
+            found["control"] = self._stations(), MOST_HITS
+            if self.design.ties is not None:
+                found |= {name: (rows, MOST_HITS) for name, rows in self._ties().items()}
+        return {name: _table(name, islice(rows, most + 1)) for name, (rows, most) in found.items()}
+
+    def _height(self, course, percent):
+        """Above the bottom; nan: of no course."""
+        foot, height = self.foot.get(course, (np.nan, np.nan))
+        return foot + percent / 100 * height
+
+    def _level(self, course, percent):
+        return round(float(self._height(course, percent)) - self.zero_m, 4)
+
+    def _straps(self):
+        around = 2 * np.pi * self.radius_m
+        for one in self.design.straps:
+            row = {
+                "circumference": one.name,
+                "course": one.course,
+                "level_m": self._level(one.course, one.at_percent),
+                "reading_m": around,
+                "s_mm": one.sd_mm,
+            } | dict(one.more)
+            for _ in range(one.readings):
+                yield row
+
+    def _lines(self):
+        lines = self.design.lines
+        for number in range(lines.count):
+            azimuth = (lines.first_deg + 360 * number / lines.count) % 360
+            yield {
+                "line": str(number + 1),
+                "azimuth_deg": azimuth,
+                "instrument": lines.instrument,
+                "side": lines.side,
+            }
+
+    def _offsets(self):
+        """The level of the first strap that lies on one is the reference: then U is the least."""
+        lines = self.design.lines
+        levels = [(course, percent) for course in self.foot for percent in lines.at_percent]
+        strapped = [(one.course, one.at_percent) for one in self.design.straps]
+        of_course = [level for level in levels if level[0] in {name for name, _ in strapped}]
+        reference = next((one for one in strapped if one in levels), (of_course or levels)[0])
+        for line in range(lines.count):
+            for face in range(1, lines.faces + 1):
+                for course, percent in levels:
+                    row = {
+                        "line": str(line + 1),
+                        "course": course,
+                        "level_m": self._level(course, percent),
+                        "offset_mm": 200.0,
+                        "s_mm": lines.sd_mm,
+                        "face": face,
+                        "reference": "true" if (course, percent) == reference else "false",
+                    }
+                    for _ in range(lines.readings):
+                        yield row
+
+    def _rings(self):
+        """(ring, name of a set-up, azimuth of its place) of all."""
+        for number, ring in enumerate(self.design.hits, 1):
+            for k in range(ring.setups):
+                turn = np.radians(ring.start_deg) + 2 * np.pi * k / ring.setups
+                yield ring, f"{number}-{k + 1}", turn
+
+    def _place(self, ring, azimuth):
+        return ring.radius_m * np.array([np.sin(azimuth), np.cos(azimuth)])
+
+    def _setups(self):
+        for ring, name, _ in self._rings():
+            yield {
+                "setup": name,
+                "station": f"S{name}",
+                "instrument": ring.instrument,
+                "instrument_height_m": ring.height_m,
+            }
+
+    def _stations(self):
+        for ring, name, azimuth in self._rings():
+            x, y = self._place(ring, azimuth).round(4)
+            yield {"point": f"S{name}", "x_m": x, "y_m": y, "z_m": self.bottom_m}
+
+    def _hits(self):
+        for ring, name, turn in self._rings():
+            aims = self._azimuths(ring, turn)
+            station = np.append(self._place(ring, turn).round(4), self.bottom_m + ring.height_m)
+            for course in ring.courses:
+                for percent in ring.at_percent:
+                    z = self.bottom_m + self._height(course, percent)
+                    for aim in aims:
+                        there = [self.radius_m * np.sin(aim), self.radius_m * np.cos(aim), z]
+                        yield {"setup": name, "course": course} | _sight(station, there)
+
+    def _azimuths(self, ring, turn):
+        """(hits,) about the axis: even over the whole turn, or over what a set-up sees of it."""
+        inside, spread = ring.radius_m < self.radius_m, ring.spread_deg
+        if inside and (spread is None or spread >= 360):
+            step = 2 * np.pi / ring.hits
+            return turn + step * (np.arange(ring.hits) + turn / 2 / np.pi)
+        wide = np.radians(spread or 0.0) if spread is not None else 2 * self._in_sight(ring)
+        if ring.hits == 1:
+            return np.array([turn])
+        return turn + wide * (np.arange(ring.hits) / (ring.hits - 1) - 0.5)
+
+    def _in_sight(self, ring):
+        """Half the azimuths that a set-up round the tank sees under no more than STEEPEST."""
+        part = self.radius_m / ring.radius_m
+        return STEEPEST - np.arcsin(part * np.sin(STEEPEST))
+
+    def _ties(self):
+        """Readings of targets that stand between neighbouring set-ups of a ring."""
+        targets, s_mm, s_arcsec = self.design.ties
+        found = {"directions": [], "zenith_angles": [], "slope_distances": []}
+        rings = list(self._rings())
+        for number, ring in enumerate(self.design.hits, 1):
+            mine = [one for one in rings if one[0] is ring and one[1].startswith(f"{number}-")]
+            for k, (_, name, turn) in enumerate(mine):
+                station = np.append(self._place(ring, turn).round(4), self.bottom_m + ring.height_m)
+                gaps = dict.fromkeys([k, (k - 1) % len(mine)]) if len(mine) > 1 else ()
+                for gap in gaps:
+                    for target in range(targets):
+                        there = self._target(ring, mine[gap][2], target)
+                        read = _sight(station, there)
+                        row = {"setup": name, "to": f"T{number}-{gap + 1}-{target + 1}"}
+                        for table, key, sd in (
+                            ("directions", "direction_deg", {"s_arcsec": s_arcsec}),
+                            ("zenith_angles", "zenith_deg", {"s_arcsec": s_arcsec}),
+                            ("slope_distances", "distance_m", {"s_mm": s_mm}),
+                        ):
+                            found[table].append(row | {key: read[key]} | sd)
+        return found
+
+    def _target(self, ring, turn, number):
+        """(3,) place of a target half-way to the next set-up, in turn nearer and further."""
+        azimuth = turn + np.pi / ring.setups
+        away = max(ring.radius_m, 1.0) + (0.5 if number % 2 else -0.3) * (1 + number // 2)
+        z = self.bottom_m + TIE_HEIGHTS_M[number % 3]
+        return np.array([away * np.sin(azimuth), away * np.cos(azimuth), z])
+
+
+def _sight(station, there):
+    """{column: value} of the sight from a station to a place, a circle's zero being +y."""
+    away = np.asarray(there) - station
+    distance = float(np.linalg.norm(away))
+    return {
+        "direction_deg": float(np.degrees(np.arctan2(away[0], away[1])) % 360),
+        "zenith_deg": float(np.degrees(np.arccos(away[2] / distance))),
+        "distance_m": distance,
+    }
+
+
+def _table(name, rows):
+    rows = list(rows)
+    headings = tuple(dict.fromkeys(key for row in rows for key in row))
+    cells = tuple(tuple(_cell(row.get(key)) for key in headings) for row in rows)
+    return Table(f"{name}.csv", headings, 1, cells, tuple(range(2, len(rows) + 2)), ".")
+
+
+def _cell(value):
+    return "" if value is None else value if isinstance(value, str) else repr(float(value))

@@ -1,0 +1,112 @@
+"""A wall to be strapped, read from reference lines or hit: how, and the job that it will be."""
+
+from dataclasses import dataclass, field, replace
+
+from tankcal.geometry.field.amplitudes import Amplitudes, assumed_amplitudes
+from tankcal.job.model import Job
+from tankcal.job.tables import RawJob, Value
+from tankcal.planning.model import Limits
+
+USUAL_AT = (20.0, 80.0)  # percent of a course's height: where its rows are read
+
+
+@dataclass(frozen=True)
+class PlannedStrap:
+    """A circumference of a course, read some times.
+
+    at_percent  of the course's height      more  {column of circumferences.csv: value}
+    """
+
+    course: str
+    at_percent: float
+    sd_mm: float
+    readings: int = 1
+    more: tuple = ()
+
+    @property
+    def name(self):
+        """COURSE-PERCENT."""
+        return f"{self.course}-{self.at_percent:g}"
+
+
+@dataclass(frozen=True)
+class PlannedLines:
+    """Reference lines, evenly round the tank; each course is read at the same parts of it."""
+
+    count: int
+    at_percent: tuple
+    sd_mm: float
+    faces: int = 2
+    readings: int = 1
+    instrument: str | None = None
+    side: str = "outside"
+    first_deg: float = 0.0
+
+
+@dataclass(frozen=True)
+class PlannedHits:
+    """A ring of set-ups, each of which hits the bare wall at some heights of some courses.
+
+    spread_deg  of the wall that each sees, as azimuths about the axis; None: all that it can
+    height_m    of the instrument above the bottom of the shell
+    """
+
+    setups: int
+    radius_m: float
+    hits: int
+    at_percent: tuple
+    courses: tuple
+    start_deg: float = 0.0
+    height_m: float = 1.6
+    spread_deg: float | None = None
+    instrument: str | None = None
+
+
+@dataclass(frozen=True)
+class Design:
+    """What will be measured.
+
+    ties  (targets that neighbouring set-ups share, s_mm, s_arcsec); None: the wall alone ties them
+    """
+
+    straps: tuple[PlannedStrap, ...] = ()
+    lines: PlannedLines | None = None
+    hits: tuple[PlannedHits, ...] = ()
+    ties: tuple | None = None
+
+
+@dataclass(frozen=True)
+class WallPlan:
+    """A survey of a wall by tape, reference lines or bare hits, before it is made.
+
+    Attributes
+    ----------
+    job : Job
+        With the readings that a tank of the nominal sizes would give.
+    design : Design
+    limits : Limits
+    amplitudes : Amplitudes
+        How far the wall departs from a cylinder, as it is expected.
+    costs : dict
+        {item: cost of one}: "strap", "line", "setup", "reading".
+    folder : str
+    given : RawJob
+        What stands in the folder, as it was read.
+    warnings : tuple of Problem
+    """
+
+    job: Job
+    design: Design
+    limits: Limits
+    amplitudes: Amplitudes = field(default_factory=assumed_amplitudes)
+    costs: dict = field(default_factory=dict)
+    folder: str = ""
+    given: RawJob | None = None
+    warnings: tuple = ()
+
+    def with_instrument(self, name, values):
+        """`given` with other values of an instrument: {key: value}."""
+        register = self.given.registers["instruments"]
+        entry = register.entries[name] | {key: Value(one) for key, one in values.items()}
+        register = replace(register, entries=register.entries | {name: entry})
+        return replace(self.given, registers=self.given.registers | {"instruments": register})

@@ -1,0 +1,217 @@
+"""A plan of a wall answered: its job computed with the readings foreseen, and what U will be."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from tankcal.geometry.field.components import COMPONENTS
+from tankcal.geometry.field.estimate import LEVELS
+from tankcal.geometry.field.information import expect_amplitudes
+from tankcal.job.model import Job
+from tankcal.pipeline.statements import statements
+from tankcal.pipeline.strapped_wall import StrappedWall
+from tankcal.pipeline.surveying import find_survey
+from tankcal.pipeline.table import ComputedTable, check_table, compute_table
+from tankcal.pipeline.told_causes import noise_of_wall
+from tankcal.planning.limits import limited_u, refuse_without_delivery
+from tankcal.planning.wall.model import WallPlan
+from tankcal.planning.wall.telling import told_of_plan
+from tankcal.quadrature import panels
+
+OF_READINGS = (  # warnings that only true readings can give
+    *("reading_copied", "line_copied", "no_control_readings"),
+    *("repeats_apart", "strap_apart", "strapped_course_apart", "courses_exchanged"),
+)
+
+
+@dataclass(frozen=True)
+class CourseOutlook:
+    """What is foreseen of one course.
+
+    Attributes
+    ----------
+    name : str
+        The course.
+    straps, offsets, hits : int
+        Readings of it.
+    radius_sd_m : float
+        Standard deviation of its mean radius by the readings and by what they do not see, m.
+    """
+
+    name: str
+    straps: int
+    offsets: int
+    hits: int
+    radius_sd_m: float
+
+
+@dataclass(frozen=True)
+class ReadingsOutlook:
+    """How well readings of one kind control one another.
+
+    Attributes
+    ----------
+    kind : str
+        "straps" or "offsets".
+    count : int
+        Readings.
+    uncontrolled : int
+        Of these, those that no other reading controls.
+    mdb_m : float
+        Largest of the smallest blunders of a radius that the tests of the others find, m.
+    """
+
+    kind: str
+    count: int
+    uncontrolled: int
+    mdb_m: float
+
+
+@dataclass(frozen=True)
+class WallTable:
+    """The job with its points, its wall, and the table.
+
+    Attributes
+    ----------
+    job : Job
+    wall : Wall or StrappedWall
+    made : ComputedTable
+    sighting : Sighting or None
+    """
+
+    job: Job
+    wall: object
+    made: ComputedTable
+    sighting: object = None
+
+    @cached_property
+    def stated(self):
+        """Budgets and worst deliveries (`statements.Statements`)."""
+        return statements(self.job, self.made.table, self.made.straightness.largest_m3)
+
+
+@dataclass(frozen=True)
+class WallPrediction:
+    """What a survey of a wall by tape, lines or hits would give, before it is made.
+
+    Attributes
+    ----------
+    plan : WallPlan
+    tabled : WallTable
+    """
+
+    plan: WallPlan
+    tabled: WallTable
+
+    @property
+    def table(self):
+        """The capacity table with U of every row (`capacity.Capacity`)."""
+        return self.tabled.made.table
+
+    @property
+    def relative_u(self):
+        """U over volume of what the plan's limit is for: the full tank, or the worst delivery."""
+        return limited_u(self.tabled, self.plan.limits)
+
+    @property
+    def meets(self):
+        """Whether the limit is met; None without one."""
+        limit = self.plan.limits.relative_u
+        return None if limit is None else bool(self.relative_u <= limit)
+
+    @cached_property
+    def courses(self):
+        """A tuple of CourseOutlook, from the bottom up."""
+        return courses_of(self.tabled)
+
+    @cached_property
+    def reliability(self):
+        """A tuple of ReadingsOutlook, of straps and offsets."""
+        return readings_of(self.tabled)
+
+    @cached_property
+    def warnings(self):
+        """A tuple of Problem: what the run of such a survey will warn of."""
+        tabled = self.tabled
+        of_run = check_table(tabled.job, tabled.wall, tabled.made, tabled.sighting)
+        found = (*self.plan.warnings, *self.plan.job.warnings, *told_of_plan(of_run))
+        return tuple(one for one in dict.fromkeys(found) if _code(one) not in OF_READINGS)
+
+
+def _code(problem):
+    return getattr(problem.expected, "code", None)
+
+
+def predict_wall(plan):
+    """`WallPrediction` of a WallPlan.
+
+    Its job is computed with amplitudes of the wall as they are assumed, as well known as its
+    readings would tell those of a wall of just these sizes.
+
+    Raises
+    ------
+    InputError
+        For readings that tell too little of a course.
+    SolutionError
+        When they do not determine the wall.
+    """
+    tabled = foresee_table(plan.job, plan.amplitudes)
+    tall = sum(one.height_m for one in plan.job.courses)
+    refuse_without_delivery(plan, tabled, tall)
+    return WallPrediction(plan, tabled)
+
+
+def foresee_table(job, amplitudes):
+    """`WallTable` of a job with the readings that its nominal sizes give.
+
+    amplitudes  of the wall, as they are assumed
+    """
+    found = find_survey(job, lambda text: None, amplitudes)
+    field = found.survey.field  # how well sizes are known changes no weight of a reading
+    field = replace(field, amplitudes=expect_amplitudes(field))
+    wall = replace(found.survey, field=field)
+    made = compute_table(found.job, wall)
+    return WallTable(found.job, wall, made, found.sighting)
+
+
+def courses_of(tabled):
+    """A CourseOutlook of each course."""
+    job, field = tabled.job, tabled.wall.field
+    courses = len(job.courses)
+    mean = np.kron(np.eye(courses), panels([0.0, 1.0], LEVELS)[1])
+    weights = mean @ field.means.weights
+    sizes = field.amplitudes.inflation()
+    covariance = sum(
+        sizes[i] * mean @ field.means.unseen(i) @ mean.T for i in range(len(COMPONENTS))
+    )
+    wall = tabled.wall
+    noise = field.noise_m2 if isinstance(wall, StrappedWall) else noise_of_wall(wall)
+    sds = np.sqrt(np.diag(covariance) + np.einsum("ij,jk,ik->i", weights, noise, weights))
+    names = [one.name for one in job.courses]
+    counts = {kind: dict.fromkeys(names, 0) for kind in ("straps", "offsets", "hits")}
+    for one in () if job.strapping is None else job.strapping.straps:
+        counts["straps"][one.course] += 1
+    for one in () if job.lines is None else job.lines.offsets:
+        counts["offsets"][one.course] += 1
+    for course in () if job.hits is None else job.hits.course:
+        counts["hits"][course] += 1
+    return tuple(
+        CourseOutlook(name, *(counts[kind][name] for kind in counts), float(sd))
+        for name, sd in zip(names, sds, strict=True)
+    )
+
+
+def readings_of(tabled):
+    """A ReadingsOutlook of the straps and of the offsets that a wall has."""
+    wall = tabled.wall if isinstance(tabled.wall, StrappedWall) else tabled.wall.read
+    if wall is None:
+        return ()
+    found = ((kind, wall.tests_of(kind)[1]) for kind in ("straps", "offsets"))
+    return tuple(_outlook(kind, mdb) for kind, mdb in found if len(mdb))
+
+
+def _outlook(kind, mdb_m):
+    known = mdb_m[np.isfinite(mdb_m)]
+    largest = float(known.max()) if len(known) else float("nan")
+    return ReadingsOutlook(kind, len(mdb_m), len(mdb_m) - len(known), largest)

@@ -1,0 +1,247 @@
+"""From the sections of a plan to a WallPlan: a design, its tables, and the job that reads them."""
+
+from dataclasses import replace
+from itertools import islice
+
+from tankcal.errors import InputError
+from tankcal.geometry.field.amplitudes import assumed_amplitudes
+from tankcal.job.building import job_of
+from tankcal.job.checking import zero_z
+from tankcal.job.checks.strapping import MOST_STRAPS
+from tankcal.job.tables import Log, Value
+from tankcal.messages import message
+from tankcal.planning.given import PLAN_FILE
+from tankcal.planning.wall.contract import MEASURING
+from tankcal.planning.wall.foreseen_tables import Foreseen
+from tankcal.planning.wall.model import (
+    USUAL_AT,
+    Design,
+    PlannedHits,
+    PlannedLines,
+    PlannedStrap,
+    WallPlan,
+)
+from tankcal.planning.wall.nominal_readings import with_nominal_readings
+from tankcal.planning.wall.telling import told_of_plan
+
+CLEAR_M, MOST_SECTIONS = 0.5, 50
+OF_POINTS = ("pattern", "photo_rings", "setup_rings", "tapes", "obstacles")
+
+
+def is_wall_plan(own):
+    """Does a plan say how its wall is strapped, read from lines, or hit?
+
+    own  {section: what stands there}
+    """
+    return any(name in own for name in MEASURING)
+
+
+def check_sections(given, courses, nominal_m, log):
+    """What the sections of a plan say that cannot be meant.
+
+    courses  names, None: unreadable       nominal_m  radius of the tank, None: unreadable
+    """
+    for name in OF_POINTS:
+        entries = given.repeated[name] if name in given.repeated else [given.single[name]]
+        for one in entries:
+            if one.filled:
+                expected = message(
+                    "plan_points_and_wall",
+                    "given together with straps, lines or hits; expected only one of them: a plan"
+                    " is of targets or of the bare wall",
+                )
+                log.problem(PLAN_FILE, expected, one.row, one.name)
+    for one in (*given.repeated["straps"], *given.repeated["hits"]):
+        for course in one["courses"] or ():
+            if courses and course not in courses:
+                expected = message(
+                    "plan_no_such_name",
+                    "found {found!r}; expected a name of {file}{hint}",
+                    found=course, file="courses.csv", hint="",
+                )  # fmt: skip
+                one.tell(log.problem, "courses", expected)
+    _check_rings(given, nominal_m, log)
+    _check_form(given.single["wall"], log)
+    _check_lines_and_ties(given, log)
+
+
+def _check_rings(given, nominal_m, log):
+    """Not too many sections; set-ups that stand clear of the wall."""
+    for name in ("straps", "hits"):
+        if len(given.repeated[name]) > MOST_SECTIONS:
+            expected = message(
+                "plan_many_sections",
+                "{count} of them; expected at most {most}",
+                count=len(given.repeated[name]),
+                most=MOST_SECTIONS,
+            )
+            log.problem(PLAN_FILE, expected, None, name)
+    for one in given.repeated["hits"]:
+        radius = one["radius_m"]
+        if None not in (radius, nominal_m) and abs(radius - nominal_m) < CLEAR_M:
+            expected = message(
+                "plan_setup_at_wall",
+                "found {radius:g} m; expected {clear:g} m or more from the wall, which is at"
+                " {nominal:g} m",
+                radius=radius,
+                clear=CLEAR_M,
+                nominal=nominal_m,
+            )
+            one.tell(log.problem, "radius_m", expected)
+
+
+def _check_form(wall, log):
+    whole, common = wall["form_mm"] or 0.0, wall["common_form_mm"] or 0.0
+    if common > whole and not wall.is_refused("form_mm"):
+        expected = message(
+            "plan_form_part",
+            "found {common:g}, which is a part of form_mm; expected at most {whole:g}",
+            common=common,
+            whole=whole,
+        )
+        wall.tell(log.problem, "common_form_mm", expected)
+
+
+def _check_lines_and_ties(given, log):
+    lines = given.single["lines"]
+    if lines.filled and not given.repeated["straps"]:
+        expected = message(
+            "plan_lines_alone",
+            "given without [[straps]]; expected a circumference of one course at least: lines tell"
+            " differences of radii alone",
+        )
+        log.problem(PLAN_FILE, expected, lines.row, "lines")
+    ties = given.single["setup_ties"]
+    if ties.filled and not given.repeated["hits"]:
+        expected = message("plan_ties_alone", "given without [[hits]]; expected set-ups to be tied")
+        log.problem(PLAN_FILE, expected, ties.row, "setup_ties")
+    if ties.filled:
+        for key in ("s_mm", "s_arcsec"):
+            if key not in ties.filled:
+                expected = message("plan_number_missing", "missing; expected a number above 0")
+                ties.tell(log.problem, key, expected)
+
+
+def design_of(given, courses):
+    """The `Design` of sound sections on a tank of these courses."""
+    straps = (
+        PlannedStrap(course, percent, one["s_mm"], int(one["readings"] or 1), _more(one))
+        for one in given.repeated["straps"]
+        for course in one["courses"] or courses
+        for percent in _at(one)
+    )
+    return Design(
+        straps=tuple(islice(straps, MOST_STRAPS + 1)),  # more are refused with the job
+        lines=_lines(given.single["lines"]),
+        hits=tuple(_hits(one, courses) for one in given.repeated["hits"]),
+        ties=_ties(given.single["setup_ties"]),
+    )
+
+
+def _at(entry):
+    return tuple(sorted(set(entry["at_percent"] or USUAL_AT)))
+
+
+def _more(entry):
+    keys = ("instrument", "temperature_c", "tension_n", "pulls")
+    return tuple((key, entry[key]) for key in keys if entry[key] is not None)
+
+
+def _lines(entry):
+    if not entry.filled:
+        return None
+    return PlannedLines(
+        count=int(entry["count"]),
+        at_percent=_at(entry),
+        sd_mm=entry["s_mm"],
+        faces=int(entry["faces"] or 2),
+        readings=int(entry["readings"] or 1),
+        instrument=entry["instrument"],
+        side=entry["side"] or "outside",
+        first_deg=entry["first_azimuth_deg"] or 0.0,
+    )
+
+
+def _hits(entry, courses):
+    return PlannedHits(
+        setups=int(entry["setups"]),
+        radius_m=entry["radius_m"],
+        hits=int(entry["hits"]),
+        at_percent=_at(entry),
+        courses=entry["courses"] or courses,
+        start_deg=entry["start_azimuth_deg"] or 0.0,
+        height_m=1.6 if entry["height_m"] is None else entry["height_m"],
+        spread_deg=entry["spread_deg"],
+        instrument=entry["instrument"],
+    )
+
+
+def _ties(entry):
+    if not entry.filled:
+        return None
+    return int(entry["targets"]), entry["s_mm"], entry["s_arcsec"]
+
+
+def wall_plan_of(raw, values, tables, given, limits, folder):
+    """The WallPlan of sound sections, its job being read as any job is.
+
+    Raises InputError: what the job says of its tables is told of the section that makes them.
+    """
+    table = tables["courses"]
+    courses = tuple(zip(table.of("course"), table.of("height_m"), strict=True))
+    design = design_of(given, tuple(name for name, _ in courses))
+    wall = given.single["wall"]
+    sizes = (
+        None if wall[key] is None else wall[key] / 1000 for key in ("form_mm", "common_form_mm")
+    )
+    amplitudes = assumed_amplitudes(*sizes)
+    bottom = values["datum"]["bottom_z_m"]
+    tank = (courses, values["tank"]["nominal_diameter_m"] / 2, bottom, zero_z(values) - bottom)
+    return WallPlan(
+        job=job_of_design(raw, design, tank, amplitudes),
+        design=design,
+        limits=limits,
+        amplitudes=amplitudes,
+        costs={key: value or 0.0 for key, value in given.single["costs"].values.items()},
+        folder=folder,
+        given=raw,
+    )
+
+
+def changed(plan, design=None, raw=None):
+    """The WallPlan with another Design, or with other instruments."""
+    design, raw = design or plan.design, raw or plan.given
+    job = job_of_design(raw, design, _tank_of(plan.job), plan.amplitudes)
+    return replace(plan, job=job, design=design, given=raw)
+
+
+def tables_of(plan):
+    """{name: Table} of what will be read, whatever stands as its value."""
+    return Foreseen(plan.design, *_tank_of(plan.job)).tables()
+
+
+def _tank_of(job):
+    """Of a job, as `Foreseen` takes it."""
+    courses = tuple((one.name, one.height_m) for one in job.courses)
+    datum = job.datum
+    return courses, job.tank.nominal_diameter_m / 2, datum.bottom_z_m, datum.plate_level_m
+
+
+def job_of_design(raw, design, tank, amplitudes):
+    """The Job of a RawJob and the tables that a `Design` makes, with the readings foreseen.
+
+    tank  courses, radius, z of the bottom, zero of the table above it: as `Foreseen` takes them
+    """
+    made = Foreseen(design, *tank).tables()
+    settings = dict(raw.settings)
+    if design.ties is not None:
+        given = settings.get("adjustment", {})
+        settings["adjustment"] = {"datum": Value("inner")} | given
+    whole = replace(raw, tables=raw.tables | made, settings=settings)
+    try:
+        job = job_of(whole, Log())
+    except InputError as error:
+        raise InputError(told_of_plan(error.problems)) from error
+    if design.lines is not None or job.hits is not None or job.strapping is not None:
+        job = with_nominal_readings(job, amplitudes)
+    return replace(job, warnings=told_of_plan(job.warnings))

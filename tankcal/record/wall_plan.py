@@ -1,0 +1,87 @@
+"""The prediction of a wall by tape, lines or hits as it is saved: plan.json."""
+
+import numpy as np
+
+from tankcal.planning.wall.changes import wall_count
+from tankcal.planning.wall.prediction import CourseOutlook, ReadingsOutlook
+from tankcal.record.plain_data import to_plain
+from tankcal.record.plan import (
+    Fingerprint,
+    PlanLimit,
+    PlannedDelivery,
+    PlannedSource,
+    PlannedTable,
+)
+from tankcal.record.saved_formats import SavedFormat
+from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.texts import WarningRecord, warnings_of
+
+WALL_PLAN = SavedFormat("tankcal-wall-plan", 1, "plan.json")  # so far one version
+
+
+class PlannedWall(Saved):
+    """What will be measured."""
+
+    circumferences: int = key("different ones by tape")
+    strap_readings: int = key("of the tape")
+    lines: int = key("reference lines")
+    faces: int = key("of their plummet; 0: no lines")
+    offsets: int = key("from them")
+    setups: int = key("of a total station")
+    hits: int = key("of the bare wall")
+    shared_targets: int = key("that neighbouring set-ups share")
+
+
+class WallPlanFile(Saved, kw_only=True):
+    """What a survey of a wall by tape, reference lines or hits would give, before it is made."""
+
+    format: str = key("see Versions", default=WALL_PLAN.format)
+    tank: str = key("id", of="plan.job.tank.id")
+    side: str = key('"outside" or "inside"', of="plan.job.survey.side")
+    survey: PlannedWall = key("what will be measured")
+    limit: PlanLimit = key("that the plan is to keep")
+    table: PlannedTable = key("the capacity table")
+    sources: list[PlannedSource] = key("of the uncertainty of the top row")
+    worst_deliveries: list[PlannedDelivery] = key("of each minimum height")
+    courses: list[CourseOutlook] = key("from the bottom up")
+    reliability: list[ReadingsOutlook] = key("of straps and offsets")
+    warnings: list[WarningRecord] = key("what should be read")
+    job: list[Fingerprint] = key("files of the empty job", default=())
+
+
+def plain_of_wall(prediction, job=()):
+    """The `WallPlanFile` of a WallPrediction, as plain data; job: [{file, sha256}] of its job."""
+    table, plan = prediction.table, prediction.plan
+    found = filled_from(
+        WallPlanFile,
+        prediction,
+        survey=survey_of(plan),
+        limit=PlanLimit(
+            plan.limits.relative_u, plan.limits.of, prediction.relative_u, prediction.meets
+        ),
+        table=filled_from(PlannedTable, table),
+        sources=[
+            PlannedSource(one.kind, np.linalg.norm(one.columns_m3[-1])) for one in table.sources
+        ],
+        worst_deliveries=[
+            filled_from(PlannedDelivery, one) for one in prediction.tabled.stated.worst
+        ],
+        warnings=warnings_of(prediction.warnings),
+        job=job,
+    )
+    return to_plain(found)
+
+
+def survey_of(plan):
+    """The `PlannedWall` of a WallPlan."""
+    design, job, count = plan.design, plan.job, wall_count(plan)
+    return PlannedWall(
+        circumferences=len({one.name for one in design.straps}),
+        strap_readings=0 if job.strapping is None else len(job.strapping.straps),
+        lines=count["line"],
+        faces=0 if design.lines is None else design.lines.faces,
+        offsets=0 if job.lines is None else len(job.lines.offsets),
+        setups=count["setup"],
+        hits=0 if job.hits is None else len(job.hits),
+        shared_targets=0 if design.ties is None else design.ties[0],
+    )

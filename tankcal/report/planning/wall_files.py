@@ -1,0 +1,67 @@
+"""The files of a plan of straps, reference lines or hits for programs, and its empty job."""
+
+from tankcal.job.starter import FilledForm, write_form
+from tankcal.planning.wall.reading import tables_of
+from tankcal.record import save
+from tankcal.record.wall_plan import plain_of_wall
+from tankcal.report.planning.empty_job import AS_GIVEN, MEASURED, as_given, entries, short, text
+from tankcal.report.planning.files import write_capacity, write_effects
+from tankcal.text.languages import DEFAULT
+
+GIVEN = (*AS_GIVEN, "obstructions", "thickness", "tape_checks")
+READ = ("reading_m", "offset_mm", "direction_deg", "zenith_deg", "distance_m")  # left blank
+
+
+def write_wall(paper, folder, fingerprints):
+    """Write plan.json and the CSV files; fingerprints: [{file, sha256}] of the empty job."""
+    found = plain_of_wall(paper.prediction, fingerprints)
+    save(found, folder / "plan.json")
+    write_capacity(found, folder)
+    write_effects(paper, folder)
+
+
+def write_empty_job(prediction, directory):
+    """Write the empty job of a WallPrediction into a folder that is made, text and job.xlsx."""
+    write_form(directory, form_of_wall(prediction.plan))
+
+
+def form_of_wall(plan):
+    """The FilledForm of a WallPlan: a row for each reading, without its value."""
+    raw, design = plan.given, plan.design
+    settings = {
+        f"{section}.{key}": text(one.raw)
+        for section, given in raw.settings.items()
+        for key, one in given.items()
+    }
+    if design.ties is not None:
+        settings.setdefault("adjustment.datum", "inner")
+    foreseen = {name: _without_values(table) for name, table in tables_of(plan).items()}
+    survey = "strapping" if design.lines is None else "reference-line"
+    return FilledForm(
+        kind="vertical",
+        survey="wall-hits" if design.hits else survey,
+        language=plan.job.table.language or DEFAULT,
+        settings={key: one for key, one in settings.items() if key not in MEASURED},
+        given={name: as_given(raw.tables[name]) for name in GIVEN if name in raw.tables} | foreseen,
+        registered={name: entries(name, found) for name, found in raw.registers.items()},
+        to_fill=tuple(key for key in settings if key in MEASURED),
+        more=tuple(foreseen),
+    )
+
+
+def _without_values(table):
+    return tuple(
+        {
+            name: "" if name in READ else _tidy(cell)
+            for name, cell in zip(table.headings, row, strict=True)
+        }
+        for row in table.rows
+    )
+
+
+def _tidy(cell):
+    """A number without a zero after its point."""
+    try:
+        return short(float(cell), 6)
+    except ValueError:
+        return cell

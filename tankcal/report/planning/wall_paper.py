@@ -1,0 +1,96 @@
+"""The papers of a plan of straps, reference lines or hits: prediction and field sheets."""
+
+import numpy as np
+
+from tankcal.planning.changes import cost_of
+from tankcal.record.wall_plan import survey_of
+from tankcal.report import blocks
+from tankcal.report.plain import Column
+from tankcal.report.planning.improvements import changes, design
+from tankcal.report.planning.outlook import result, table
+from tankcal.report.planning.paper import PlanPaper
+from tankcal.report.planning.wall_rows import COURSES, courses_of, field_tables_of_wall
+
+COUNTED = ("circumferences", "strap_readings", "lines", "offsets", "setups", "hits")
+
+
+class WallPaper(PlanPaper):
+    """A `WallPrediction` with the words of a language; as `PlanPaper` otherwise."""
+
+    is_wall = True
+
+    def change(self, change):
+        """A `planning.changes.Change` of a WallPlan in words."""
+        return self.word(f"changes.{change.action}_wall_{change.item}", name=change.name)
+
+
+def wall_outlook(paper):
+    """The blocks of the prediction of a WallPaper."""
+    return [
+        *paper.head("prediction"),
+        result(paper),
+        paper.facts(_counts(paper)),
+        paper.paragraph("wall_as_assumed"),
+        *paper.warnings(paper.prediction.warnings),
+        *table(paper),
+        paper.heading("courses"),
+        paper.table("courses", courses_of(paper.prediction), COURSES),
+        *_reliability(paper),
+        *changes(paper),
+        *design(paper),
+    ]
+
+
+def _counts(paper):
+    counts, cost = survey_of(paper.plan), cost_of(paper.plan)
+    return [
+        ("planned_for", paper.day()),
+        *((key, _count(paper, getattr(counts, key))) for key in COUNTED),
+        ("cost", paper.plain(cost) if cost else None),
+    ]
+
+
+def _count(paper, number):
+    return paper.number(number, decimals=0) if number else None
+
+
+def _reliability(paper):
+    rows = [
+        {
+            "readings": paper.word(f"labels.{one.kind}"),
+            "count": one.count,
+            "uncontrolled": one.uncontrolled or None,
+            "blunder_m": one.mdb_m if np.isfinite(one.mdb_m) else None,
+        }
+        for one in paper.prediction.reliability
+    ]
+    columns = [
+        Column("readings"), Column("count", decimals=0), Column("uncontrolled", decimals=0),
+        Column("blunder_m", "mm", digits=2, heading="blunder"),
+    ]  # fmt: skip
+    if not rows:
+        return []
+    return [paper.heading("reliability"), paper.paragraph("wall_reliability"),
+            paper.table("reliability", rows, columns)]  # fmt: skip
+
+
+def wall_sheets(paper):
+    """The blocks of the field sheets of a WallPaper."""
+    tables = field_tables_of_wall(paper.plan)
+    heads = {
+        "circumferences": "circumferences",
+        "sight_lines": "offsets",
+        "hit_setups": "hits",
+    }
+    found = [*paper.head("field_sheets"), paper.facts(_counts(paper))]
+    found += paper.warnings(paper.plan.warnings)
+    for name, one in tables.items():
+        if name in heads:
+            found += [paper.heading(heads[name]), paper.paragraph(f"wall_{heads[name]}")]
+        found.append(paper.table(name, *one, across=2 if name == "shared_targets" else None))
+    return [
+        *found,
+        paper.heading("afterwards"),
+        blocks.listing([paper.word(f"texts.after_{one}") for one in ("job", "names", "run")]),
+        blocks.signature([paper.word("signatures.surveyed")]),
+    ]

@@ -1,0 +1,156 @@
+"""What a crew will read of a wall, row by row: straps, lines, offsets, hits and set-ups."""
+
+import numpy as np
+
+from tankcal.report.plain import Column
+
+HEIGHT = Column("height_m", "m", decimals=3)
+LEVEL = Column("level_m", "m", decimals=3)
+IN_COURSE = Column("height_in_course_m", "m", decimals=3)
+COURSE, COUNT = Column("course"), Column("readings", decimals=0)
+AZIMUTH = Column("azimuth_rad", "rad deg", decimals=1)
+INSTRUMENT, AS_READ = Column("instrument"), Column("value", nothing="_" * 14, words="marks")
+SD = Column("sd_m", "mm", decimals=2)
+STRAPS = (
+    Column("circumference"), COURSE, IN_COURSE, LEVEL, Column("expected_m", "m", decimals=3), SD,
+    INSTRUMENT, Column("reading", decimals=0), AS_READ, Column("temperature", nothing="_" * 6),
+)  # fmt: skip
+LINES = (Column("line"), AZIMUTH, INSTRUMENT)
+OFFSETS = (COURSE, IN_COURSE, LEVEL, Column("reference", words="marks"), COUNT, SD)
+SETUPS = (
+    Column("setup"), AZIMUTH, Column("from_axis_m", "m", decimals=2), HEIGHT, INSTRUMENT,
+)  # fmt: skip
+HITS = (COURSE, IN_COURSE, HEIGHT, Column("setups", decimals=0), Column("hits", decimals=0))
+TIES = (Column("point"), Column("setup"))
+COURSES = (
+    COURSE, Column("straps", decimals=0), Column("offsets", decimals=0), Column("hits", decimals=0),
+    Column("radius_m", "mm", digits=2),
+)  # fmt: skip
+
+
+def field_tables_of_wall(plan):
+    """{name: (rows, columns)} of every table of the field sheets that has rows."""
+    found = {
+        "circumferences": (_straps(plan), STRAPS),
+        "sight_lines": (_lines(plan), LINES),
+        "offsets": (_offsets(plan), OFFSETS),
+        "hit_setups": (_setups(plan), SETUPS),
+        "hit_levels": (_hits(plan), HITS),
+        "shared_targets": (_ties(plan), TIES),
+    }
+    return {name: table for name, table in found.items() if table[0]}
+
+
+def _feet(plan):
+    """{course: height of its lower edge above the table's zero}."""
+    heights = np.cumsum([0.0] + [one.height_m for one in plan.job.courses])
+    zero = plan.job.datum.plate_level_m
+    return {one.name: low - zero for one, low in zip(plan.job.courses, heights, strict=False)}
+
+
+def _straps(plan):
+    given, feet, seen = plan.job.strapping, _feet(plan), {}
+    rows = []
+    for one in () if given is None else given.straps:
+        seen[one.name] = seen.get(one.name, 0) + 1
+        rows.append(
+            {
+                "circumference": one.name,
+                "course": one.course,
+                "height_in_course_m": one.level_m - feet[one.course],
+                "level_m": one.level_m,
+                "expected_m": one.reading_m,
+                "sd_m": one.sd_m,
+                "instrument": one.tape,
+                "reading": seen[one.name],
+            }
+        )
+    return rows
+
+
+def _lines(plan):
+    given = plan.job.lines
+    return [
+        {"line": one.name, "azimuth_rad": one.azimuth_rad, "instrument": one.instrument}
+        for one in (() if given is None else given.lines.values())
+    ]
+
+
+def _offsets(plan):
+    """Each level once, with how often it is read on each line."""
+    given, feet, rows = plan.job.lines, _feet(plan), {}
+    for one in () if given is None else given.offsets:
+        row = rows.setdefault(
+            (one.course, one.level_m),
+            {
+                "course": one.course,
+                "height_in_course_m": one.level_m - feet[one.course],
+                "level_m": one.level_m,
+                "reference": "reference" if one.reference else None,
+                "readings": 0,
+                "sd_m": one.sd_m,
+            },
+        )
+        row["readings"] += 1
+    count = 1 if given is None else len(given.lines)
+    return [row | {"readings": row["readings"] // count} for row in rows.values()]
+
+
+def _setups(plan):
+    hits = plan.job.hits
+    rows = []
+    for name, one in {} if hits is None else hits.setups.items():
+        x, y, _ = hits.stations[one.station]
+        rows.append(
+            {
+                "setup": name,
+                "azimuth_rad": float(np.arctan2(x, y) % (2 * np.pi)),
+                "from_axis_m": float(np.hypot(x, y)),
+                "height_m": one.height_m,
+                "instrument": one.instrument,
+            }
+        )
+    return rows
+
+
+def _hits(plan):
+    """Each level once, with its set-ups and the hits of each."""
+    rows, foot = [], 0.0
+    for course in plan.job.courses:
+        for ring in plan.design.hits:
+            for percent in ring.at_percent if course.name in ring.courses else ():
+                inner = percent / 100 * course.height_m
+                rows.append(
+                    {
+                        "course": course.name,
+                        "height_in_course_m": inner,
+                        "height_m": foot + inner,
+                        "setups": ring.setups,
+                        "hits": ring.hits,
+                    }
+                )
+        foot += course.height_m
+    return rows
+
+
+def _ties(plan):
+    found = {}
+    measurements = plan.job.measurements
+    for one in () if measurements is None else measurements.readings:
+        for setup, target in zip(one.setup or (), one.end, strict=True):
+            found.setdefault(target, dict.fromkeys(())).setdefault(setup)
+    return [{"point": name, "setup": ", ".join(setups)} for name, setups in found.items()]
+
+
+def courses_of(prediction):
+    """A row for each course: its readings, and the standard deviation of its mean radius."""
+    return [
+        {
+            "course": one.name,
+            "straps": one.straps or None,
+            "offsets": one.offsets or None,
+            "hits": one.hits or None,
+            "radius_m": one.radius_sd_m,
+        }
+        for one in prediction.courses
+    ]

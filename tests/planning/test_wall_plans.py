@@ -1,0 +1,334 @@
+"""Plans of walls by tape, lines and hits: the job that they foresee, what helps, what is refused.
+
+Truth: the empty job filled in and run; jobs on generated walls that are no model of the package;
+curvature of the likelihood over draws; monotony.
+"""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import EXAMPLE
+from generated_hits import hit_job
+from generated_lines import plumbed_job
+from generated_strapping import strapped_job
+from generated_walls import make_wall
+
+import tankcal
+from tankcal.cli import main
+from tankcal.errors import InputError
+from tankcal.geometry.field.amplitudes import assumed_amplitudes
+from tankcal.geometry.field.estimate import WallField
+from tankcal.geometry.field.evidence import likelihood_of
+from tankcal.geometry.field.information import expect_amplitudes
+from tankcal.geometry.field.sites import Sites
+from tankcal.pipeline.surveying import find_survey
+from tankcal.pipeline.table import compute_table
+from tankcal.planning import load_plan, predict, smallest, what_helps
+from tankcal.planning.wall.model import PlannedStrap
+from tankcal.planning.wall.nominal_readings import with_nominal_readings
+from tankcal.planning.wall.prediction import foresee_table
+from tankcal.planning.wall.reading import changed
+from tankcal.record.wall_plan import WALL_PLAN, plain_of_wall
+from tankcal.report.planning import wall_files
+
+LINES, HITS = (EXAMPLE.parent / f"plan-{name}" for name in ("reference-line", "wall-hits"))
+STRAPS_ALONE = (
+    ('courses = ["1"]\nat_percent = [20]\nreadings = 3\n', ""),
+    ("[lines]\ncount = 12\nat_percent = [20, 80]\ns_mm = 0.5\nfaces = 2\n", ""),
+)
+
+
+def plan_of(folder, source=LINES, *pairs):
+    """The folder of a shipped plan, with texts of its plan.toml replaced."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in source.iterdir():
+        (folder / path.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+    text = (folder / "plan.toml").read_text(encoding="utf-8")
+    for old, new in pairs:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "plan.toml").write_text(text, encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module", params=[LINES, HITS], ids=["lines", "hits"])
+def prediction(request):
+    return predict(load_plan(request.param))
+
+
+def fill(folder, job, settings):
+    """Fill an empty job in with the readings of a Job, row by row."""
+    text = (folder / "job.toml").read_text(encoding="utf-8")
+    for key, value in settings.items():
+        text = "\n".join(
+            f"{key} = {value}" if line.startswith(f"{key} = ") else line
+            for line in text.splitlines()
+        )
+    (folder / "job.toml").write_text(text, encoding="utf-8")
+    values = {
+        "circumferences": [{"reading_m": one.reading_m} for one in job.strapping.straps],
+    }
+    if job.lines is not None:
+        values["offsets"] = [{"offset_mm": 1000 * one.offset_m} for one in job.lines.offsets]
+    if job.hits is not None:
+        hits = job.hits
+        rows = zip(hits.direction_rad, hits.zenith_rad, hits.distance_m, strict=True)
+        values["wall_hits"] = [
+            {"direction_deg": np.degrees(a), "zenith_deg": np.degrees(z), "distance_m": d}
+            for a, z, d in rows
+        ]
+    for name, read in values.items():
+        path = folder / f"{name}.csv"
+        lines = [one for one in path.read_text(encoding="utf-8").splitlines() if one[0] != "#"]
+        headings, *rows = csv.reader(lines)
+        assert len(rows) == len(read)
+        for row, one in zip(rows, read, strict=True):
+            for key, value in one.items():
+                row[headings.index(key)] = repr(float(value))
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows([headings, *rows])
+
+
+@pytest.mark.slow
+def test_the_empty_job_filled_in_is_the_plan(prediction, tmp_path):
+    """Its U with the plan's amplitudes is the prediction's, in every row."""
+    plan = prediction.plan
+    wall_files.write_empty_job(prediction, tmp_path / "job")
+    settings = {
+        "date": '"2026-07-01"',
+        "shell_temperature_c": plan.job.survey.shell_temperature_c,
+        "bottom_z_m": 0.0,
+    }
+    fill(tmp_path / "job", plan.job, settings)
+    job = tankcal.load(tmp_path / "job")
+    found = foresee_table(job, plan.amplitudes).made.table
+    np.testing.assert_allclose(found.U_m3, prediction.table.U_m3, rtol=1e-8)
+    np.testing.assert_allclose(found.volume_m3, prediction.table.volume_m3, rtol=1e-9)
+
+
+def job_on(kind, wall, rng, folder):
+    """A Job on a generated wall."""
+    if kind == "straps":
+        return strapped_job(rng, wall, straps=2, folder=folder, shape_sd_m=0.004)
+    if kind == "lines":
+        job = plumbed_job(rng, wall, lines=12, folder=folder)[0]
+        return replace(job, strapping=replace(job.strapping, shape_sd_m=0.004))
+    return hit_job(rng, wall, folder=folder, hits=16)
+
+
+def about_its_axis(job, wall):
+    """The job, the stations of its hits told from the axis of the tank that it found."""
+    if job.hits is None:
+        return job
+    x, y = wall.shell.axis_m
+    return replace(job, hits=replace(job.hits, stations={"SI": np.array([-x, -y, 0.0])}))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "most"), [("straps", 1e-3), ("lines", 1e-3), ("hits", 6e-3)])
+def test_u_is_that_of_a_job_but_for_the_amplitudes_that_it_learns(tmp_path, kind, most):
+    """Jobs on generated walls: with the amplitudes that they learned the plan's U over volume is
+    theirs; what is left is the real wall, its lean and its place.
+    """
+    for family in ("coil", "chord"):
+        rng = np.random.default_rng(3)
+        wall = make_wall(rng, family, radius_m=7.5, courses=6)
+        job = job_on(kind, wall, rng, tmp_path / kind)
+        found = find_survey(job, lambda text: None)
+        table = compute_table(found.job, found.survey).table
+        learned = found.survey.field.amplitudes
+        nominal = with_nominal_readings(about_its_axis(job, found.survey), learned)
+        same = find_survey(nominal, lambda text: None, learned)
+        foreseen = compute_table(same.job, same.survey).table
+        rows = slice(10, min(len(table.U_m3), len(foreseen.U_m3)))
+        ours = table.U_m3[rows] / table.volume_m3[rows]
+        theirs = foreseen.U_m3[rows] / foreseen.volume_m3[rows]
+        np.testing.assert_allclose(ours, theirs, rtol=most)
+
+
+@pytest.mark.study
+def test_u_of_jobs_on_generated_walls_study(tmp_path, figure):
+    """How far U of a job is from that of its plan, by what it learns of its wall."""
+    for kind in ("straps", "lines", "hits"):
+        ratios = []
+        for family in ("coil", "brick", "dents", "buckle", "chord"):
+            for seed in range(6):
+                rng = np.random.default_rng(seed)
+                wall = make_wall(rng, family, radius_m=7.5, courses=6)
+                job = job_on(kind, wall, rng, tmp_path / kind)
+                found = find_survey(job, lambda text: None)
+                u = compute_table(found.job, found.survey).table.U_m3[-1]
+                amplitudes = assumed_amplitudes()
+                nominal = with_nominal_readings(about_its_axis(job, found.survey), amplitudes)
+                ratios.append(u / foresee_table(nominal, amplitudes).made.table.U_m3[-1])
+        figure(f"U of jobs by {kind} over that of their plans", np.round(np.median(ratios), 2))
+        assert 0.75 < np.median(ratios) < 1.1
+        assert np.max(ratios) < 1.25
+
+
+@pytest.mark.slow
+def test_expected_information_is_the_mean_curvature():
+    """Simulation: walls drawn with the assumed sizes, curvature of their likelihood."""
+    azimuth = np.tile(2 * np.pi * np.arange(10) / 10, 6)
+    course, zeta = np.repeat([0, 0, 1, 1, 2, 2], 10), np.repeat([-0.6, 0.6] * 3, 10)
+    ring = np.repeat(np.arange(6), 10)
+    sites = Sites(course, ring, zeta, azimuth, np.zeros(60, dtype=bool))
+    noise, amplitudes = 1e-6 * np.eye(60), assumed_amplitudes()
+    field = WallField(sites, np.full(60, 7.0), noise, amplitudes, 7.0)
+    root, rng = np.linalg.cholesky(field.covariance_m2), np.random.default_rng(1)
+    logs, step, found = np.log(amplitudes.variances_m2), 0.05, 0.0
+    draws = 400
+    for _ in range(draws):
+        drawn = likelihood_of(sites, 7.0 + root @ rng.normal(size=60), noise, 7.0, False)
+        slopes = [
+            (drawn.misfit(logs + step * one)[1] - drawn.misfit(logs - step * one)[1]) / step / 4
+            for one in np.eye(len(logs))
+        ]
+        found = found + np.array(slopes) / draws
+    told = np.linalg.inv(expect_amplitudes(field).log_covariance)
+    np.testing.assert_allclose(found, told, atol=0.15 * np.sqrt(np.diag(told)).max())
+
+
+@pytest.mark.slow
+def test_a_further_strap_never_widens_u(prediction):
+    plan, rng = prediction.plan, np.random.default_rng(0)
+    for _ in range(3):
+        course = str(rng.integers(1, len(plan.job.courses) + 1))
+        one = PlannedStrap(course, float(rng.integers(2, 98)), 0.5, more=(("instrument", "T-12"),))
+        design = replace(plan.design, straps=(*plan.design.straps, one))
+        after = predict(changed(plan, design)).table
+        assert np.all(after.U_m3[1:] <= prediction.table.U_m3[1:] * (1 + 1e-6))
+
+
+@pytest.mark.slow
+def test_a_further_strap_of_a_tank_that_is_strapped_alone(tmp_path):
+    """U of the full tank never widens; below, a course is a cylinder of the mean of its straps,
+    which is not the best estimate at each height: there U may widen, by little.
+    """
+    plan = load_plan(plan_of(tmp_path, LINES, *STRAPS_ALONE))
+    before, rng = predict(plan).table.U_m3, np.random.default_rng(0)
+    for _ in range(6):
+        course = str(rng.integers(1, 7))
+        one = PlannedStrap(course, float(rng.integers(2, 98)), 0.5, more=(("instrument", "T-12"),))
+        design = replace(plan.design, straps=(*plan.design.straps, one))
+        after = predict(changed(plan, design)).table.U_m3
+        assert after[-1] < before[-1]
+        assert np.all(after[1:] < 1.03 * before[1:])
+
+
+@pytest.mark.slow
+def test_what_helps_is_ranked_and_says_what_it_costs(prediction):
+    effects = what_helps(prediction.plan, before=prediction)
+    works = [one for one in effects if not one.why]
+    assert [one.relative_u for one in works] == sorted(one.relative_u for one in works)
+    adds = [one for one in works if one.change.action in ("add", "repeat")]
+    assert all(one.difference <= 1e-9 for one in adds)
+    assert all(one.difference >= -1e-9 for one in works if one.change.action == "drop")
+    strap = next(one for one in works if (one.change.action, one.change.item) == ("add", "strap"))
+    assert strap.change.cost == pytest.approx(15.5)
+
+
+@pytest.mark.slow
+def test_the_second_face_replaces_a_certificate(tmp_path):
+    """With one face and a certificate the plummet's lean is a line of the budget."""
+    folder = plan_of(tmp_path, LINES, ("faces = 2", "faces = 1"))
+    with pytest.raises(InputError, match="u_collimation_arcsec"):
+        load_plan(folder)
+    path = folder / "instruments.toml"
+    path.write_text(path.read_text() + "u_collimation_arcsec = 10\n")
+    plan = load_plan(folder)
+    found = predict(plan)
+    assert "collimation" in {one.kind for one in found.table.sources}
+    effects = what_helps(plan, before=found)
+    face = next(one for one in effects if one.change.item == "face")
+    better = next(one for one in effects if one.change.name == "ZL-3")
+    assert face.change.action == "add"
+    assert face.relative_u < better.relative_u < found.relative_u
+
+
+@pytest.mark.slow
+def test_the_smallest_design_meets_its_limit(tmp_path):
+    plan = load_plan(plan_of(tmp_path, LINES, ("relative_u = 0.0004", "relative_u = 0.00047")))
+    path = smallest(plan)
+    assert path.prediction.meets
+    assert path.steps
+    assert path.relative_u <= 0.00047 < path.start_u
+
+
+@pytest.mark.slow
+def test_set_ups_round_the_tank_that_share_targets(tmp_path):
+    """Tied set-ups need no strap where the offset is known; untied ones that see a part do less."""
+    pairs = (
+        ('side = "inside"', 'side = "outside"'),
+        ("setups = 1\nradius_m = 1.5 ", "setups = 4\nradius_m = 14 "),
+        ("hits = 20 ", "hits = 9 "),
+    )
+    loose = predict(load_plan(plan_of(tmp_path / "loose", HITS, *pairs)))
+    ties = ("[limits]", "[setup_ties]\ntargets = 3\ns_mm = 1\ns_arcsec = 3\n\n[limits]")
+    tied = predict(load_plan(plan_of(tmp_path / "tied", HITS, *pairs, ties)))
+    assert {*loose.tabled.sighting.poses.ties} == {"wall"}
+    assert {*tied.tabled.sighting.poses.ties} == {"network"}
+    assert tied.relative_u < loose.relative_u
+
+
+BAD = {
+    "no s": (LINES, "s_mm = 0.4\n", "", ("plan.toml", "straps[1].s_mm")),
+    "course": (LINES, 'courses = ["1"]', 'courses = ["9"]', ("plan.toml", "straps[1].courses")),
+    "percent": (LINES, "at_percent = [20]", "at_percent = [120]", None),
+    "few lines": (LINES, "count = 12", "count = 3", ("plan.toml", "lines")),
+    "tape": (LINES, 'instrument = "T-12"', 'instrument = "T-99"', ("plan.toml", "straps")),
+    "targets, too": (LINES, "[lines]", "[pattern]\ngeneratrices = 8\n[lines]", None),
+    "no strap": (LINES, "[[straps]]", "[[hits]]", None),
+    "no shape": (LINES, "shape_sd_mm = 4.0", "", ("plan.toml", "shell.shape_sd_mm")),
+    "key": (LINES, "faces = 2", "face = 2", ("plan.toml", "lines.face")),
+    "half": (LINES, "count = 12", "count = 12.5", ("plan.toml", "lines.count")),
+    "many": (HITS, "hits = 20 ", "hits = 400 ", ("plan.toml", "hits")),
+    "on the wall": (HITS, "radius_m = 1.5 ", "radius_m = 7.0 ", ("plan.toml", "hits[1].radius_m")),
+    "ties alone": (
+        LINES,
+        "[limits]",
+        "[setup_ties]\ntargets = 3\ns_mm = 1\ns_arcsec = 3\n[limits]",
+        ("plan.toml", "setup_ties"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_input_is_one_line_each(tmp_path, name, capsys):
+    source, old, new, place = BAD[name]
+    folder = plan_of(tmp_path / "plan", source, (old, new))
+    status = main(["plan", str(folder), "--quiet"])
+    told = capsys.readouterr().err
+    assert status in (2, 3)
+    assert "Traceback" not in told
+    if place is not None:
+        with pytest.raises(InputError) as error:
+            load_plan(folder)
+        assert place in {(one.file, one.column) for one in error.value.problems}
+
+
+@pytest.mark.slow
+def test_files_of_a_plan(tmp_path, capsys):
+    """Papers in the asked language, plan.json by its schema; a filled job is never replaced."""
+    out = tmp_path / "out"
+    assert main(["plan", str(LINES), "--out", str(out), "--language", "es", "--quiet"]) == 0
+    assert "anillo 1: u del radio medio" in capsys.readouterr().out
+    saved = json.loads((out / "plan.json").read_text(encoding="utf-8"))
+    assert WALL_PLAN.migrated(saved, "plan.json")["survey"]["offsets"] == 288
+    assert {one.name for one in out.iterdir()} >= {"prediction.pdf", "field-sheets.pdf", "job"}
+    assert main(["plan", str(LINES), "--out", str(out), "--quiet"]) == 0
+    path = out / "job" / "circumferences.csv"
+    path.write_text(path.read_text(encoding="utf-8").replace("1-20,1,0.36,,", "1-20,1,0.36,47.9,"))
+    assert main(["plan", str(LINES), "--out", str(out), "--quiet"]) == 2
+    assert main(["plan", str(LINES), "--simulate", "5", "--quiet"]) == 2
+
+
+def test_plain_data_have_what_the_prediction_has(prediction):
+    found = plain_of_wall(prediction)
+    assert found["table"]["U_m3"] == prediction.table.U_m3.tolist()
+    assert [one["name"] for one in found["courses"]] == [
+        one.name for one in prediction.plan.job.courses
+    ]
