@@ -33,9 +33,10 @@ def add(commands):
     )
     new.add_argument(
         "--survey",
-        choices=("photos", "total-station", "strapping", "reference-line", "wall-hits"),
+        choices=("photos", "total-station", "strapping", "reference-line", "wall-hits", "tangents"),
         help="with files for photographs, total-station readings, circumferences by tape, "
-        "offsets from reference lines or bare hits of the wall, in place of surveyed points",
+        "offsets from reference lines, bare hits of the wall or tangents, in place of surveyed "
+        "points",
     )
     new.set_defaults(command=_new)
 

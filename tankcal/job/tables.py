@@ -28,7 +28,8 @@ STRAPPING_TABLES = (
     *("lines", "offsets"),
 )
 HITS_TABLES = ("wall_hits", "control_readings")
-TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + SURVEY_TABLES
+TANGENT_TABLES = ("tangents",)
+TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + SURVEY_TABLES
 REGISTERS = {"cameras": "camera", "instruments": "instrument"}  # and what each one lists
 SETTINGS_FILE = "job.toml"
 REFUSED_FILE = "image_points_refused.csv"  # written beside image_points.csv, never read

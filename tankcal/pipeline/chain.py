@@ -36,11 +36,13 @@ from tankcal.pipeline.survey_warnings import (
 )
 from tankcal.pipeline.table import check_table, compute_table
 from tankcal.pipeline.tanks import body_of, shell_volume
+from tankcal.pipeline.touched import find_tangent_wall
 from tankcal.pipeline.views import plot
 from tankcal.pipeline.wall import Wall, find_wall, s_transform
 from tankcal.pipeline.wall_straps import Straps
 from tankcal.survey import Adjustment, adjust_survey, wall_points
 from tankcal.survey.sighting import Sighting
+from tankcal.survey.tangents import Touching
 from tankcal.tank import dips
 from tankcal.tank.body import Body
 from tankcal.tank.budgets import Budget, budget, reading_sources
@@ -79,6 +81,8 @@ class Result:
         The wall of a vertical tank that a tape was put round.
     sighting : sighting.Sighting or None
         Bare hits of the wall as points, and where they were taken from.
+    touching : tangents.Touching or None
+        Tangents as points of the wall, and where they were sighted from.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -132,6 +136,7 @@ class Result:
     adjustment: Adjustment | None = None
     strapped: StrappedWall | None = None
     sighting: Sighting | None = None
+    touching: Touching | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -322,25 +327,28 @@ def _run(job, progress, part_progress, simulated):
                 message("no_tank", "the job has no tank: only its survey can be adjusted"),
             )
         )
-    adjustment = sighting = None
+    adjustment = sighting = touching = None
+    sighted = job.hits is not None or job.tangents is not None
     if job.measurements is not None:
         adjustment = _adjusted(job, progress)
-    if job.hits is None and adjustment is not None:
+    if not sighted and adjustment is not None:
         points = wall_points(adjustment, job.measurements, job.survey.side)
         job = replace(job, points=s_transform(points))
     dof = np.inf if adjustment is None else adjustment.dof
     try:
-        if job.hits is None:
-            survey = _survey(job, progress, dof)
-        else:
+        if job.hits is not None:
             job, sighting, survey = find_hit_wall(job, adjustment, progress, dof)
+        elif job.tangents is not None:
+            job, touching, survey = find_tangent_wall(job, adjustment, progress, dof)
+        else:
+            survey = _survey(job, progress, dof)
     except SolutionError as error:
         if adjustment is None or not adjustment.warnings:
             raise
         told = (one.text for one in _placed(job, adjustment.warnings[:TOLD]))
         raise SolutionError(*error.args, *told) from error
     wall = survey if isinstance(survey, Wall) else None
-    if adjustment is not None and sighting is None and wall is not None:
+    if adjustment is not None and not sighted and wall is not None:
         refuse_other_side(job, partial(is_within_wall, wall), adjustment)
     elif adjustment is not None and isinstance(survey, Scan):
         refuse_other_side(job, survey.is_within, adjustment)
@@ -371,10 +379,11 @@ def _run(job, progress, part_progress, simulated):
         simulation=simulation,
         intervals=intervals,
         rule=verdict_of(job, body, table, intervals, simulation),
-        warnings=_warnings(job, adjustment, sighting, survey, made),
+        warnings=_warnings(job, adjustment, sighting or touching, survey, made),
         adjustment=adjustment,
         strapped=survey if isinstance(survey, StrappedWall) else None,
         sighting=sighting,
+        touching=touching,
     )
 
 

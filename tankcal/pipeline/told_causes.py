@@ -69,7 +69,7 @@ def told_causes(job, wall):
     field, weight = wall.field, _of_mean_radius(wall.field)
     along = weight @ field.means.weights
     precision = None
-    found, noise = [], _noise_of(wall)
+    found, noise = [], noise_of_wall(wall)
     u_radius = np.sqrt(along @ noise @ along + _unseen(field, weight))
     left = field.radius_m - field.radius_m.mean()
     index = coordinates_of(wall.accepted)
@@ -98,7 +98,7 @@ def _bound(correlation):
     return float(np.clip(correlation, -1, 1))
 
 
-def _noise_of(wall):
+def noise_of_wall(wall):
     """(n, n) covariance of the readings; a field that no strap joins has it section by section."""
     if wall.straps is not None:
         return wall.field.noise_m2

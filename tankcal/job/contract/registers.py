@@ -248,6 +248,7 @@ REGISTERS_OF_SURVEY = {
     "strapping": ("instruments",),
     "reference-line": ("instruments",),
     "wall-hits": ("instruments",),
+    "tangents": ("instruments",),
 }
 # keys of [adjustment] that need photographs
 OF_PHOTOS = ("fixed_photo", "image_sd_um", "reading_limit_um", "depth_of_field", "image_weights")

@@ -5,7 +5,7 @@ in excess) is told after it.
 """
 
 from tankcal.job.checking import has_rows, tell
-from tankcal.job.checks.extent import has_hits, has_survey
+from tankcal.job.checks.extent import has_survey, is_sighted
 from tankcal.job.checks.survey.cameras import check_cameras
 from tankcal.job.checks.survey.datum import check_datum, check_held, check_known
 from tankcal.job.checks.survey.doubtful import check_doubtful
@@ -28,7 +28,7 @@ def check_survey(values, tables, registers, raw, is_whole, log):
     is_whole  False: the survey alone is asked for, so that it must be there
     """
     if not has_survey(tables):
-        if not (is_whole and has_hits(tables)):
+        if not (is_whole and is_sighted(tables)):
             _tell_nothing_to_adjust(values, tables, raw, is_whole, log)
         return
     if is_whole and has_rows(tables["points"]):
