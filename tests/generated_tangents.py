@@ -18,9 +18,8 @@ from tankcal.survey.measurements import Setup
 from tankcal.survey.sighting import NETWORK, Poses
 from tankcal.survey.tangents import Tangents
 
-STEPS, HALVINGS = 1200, 45  # along a sight near the wall; of the bracket of its azimuth
+STEPS, HALVINGS = 400, 32  # along a sight near the wall; of the bracket of its azimuth
 SIDES = ("left", "right")
-PLATE_M = 0.008
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,9 @@ class Circle:
     turned_rad: float = 0.0  # disturbed after the traverse
 
 
-def take_tangents(surface, station, levels_m, size_m, tool=Circle(), rng=None, zero=0.0):  # noqa: B008
+def take_tangents(
+    surface, station, levels_m, size_m, tool=Circle(), rng=None, zero=0.0, steps=STEPS
+):
     """Rows (level, side, direction rad, zenith rad): both limbs at each level.
 
     size_m  radius of the wall, about
@@ -45,7 +46,7 @@ def take_tangents(surface, station, levels_m, size_m, tool=Circle(), rng=None, z
     length = np.sqrt(distance**2 - size_m**2)
     zenith = np.arctan2(length, levels - station[2])
     nominal = np.arctan2(*away.T) + sign * np.arcsin(size_m / distance)
-    along = length[:, None] + np.linspace(-0.35, 0.35, STEPS) * size_m
+    along = length[:, None] + np.linspace(-0.35, 0.35, steps) * size_m
     low, high = nominal - sign * 0.05, nominal + sign * 0.05  # through the tank; past it
     for _ in range(HALVINGS):
         middle = (low + high) / 2
@@ -129,7 +130,9 @@ def tangent_job(rng, wall, *, folder, stations, levels=2, sd_rad=2.4e-5, lean=2e
     slope = tuple(lean * rng.normal(size=2))
     foot = tuple(0.05 * wall.radius_m * rng.uniform(-1, 1, 2))
     surface = Surface(partial(_radius, wall), foot, slope)
-    true = ring_of_stations(stations, (1.8 + 0.4 * rng.uniform()) * wall.radius_m, turn=rng.uniform(0, 6))
+    true = ring_of_stations(
+        stations, (1.8 + 0.4 * rng.uniform()) * wall.radius_m, turn=rng.uniform(0, 6)
+    )
     z = [(c + part) * wall.course_m for c in range(wall.courses) for part in parts]
     found = [
         (f"I{i + 1}", *row)
@@ -147,7 +150,7 @@ def tangent_job(rng, wall, *, folder, stations, levels=2, sd_rad=2.4e-5, lean=2e
     )
     job = _any_job(folder)
     along = wall.course_m * np.hypot(1, np.hypot(*slope))
-    course = replace(job.courses[0], height_m=along, thickness_m=PLATE_M, paint_m=0.0)
+    course = replace(job.courses[0], height_m=along, thickness_m=0.0, paint_m=0.0)
     job = replace(
         job,
         tangents=given,

@@ -21,7 +21,7 @@ SURVEY_TABLES = (
     *("targets", "photos", "image_points", "fiducials", "film", "control", "check", "setups"),
     *("distances", "slope_distances", "directions", "zenith_angles", "azimuths"),
     *("horizontal_angles", "vertical_angles", "height_differences", "plumb_lines"),
-    *("vectors", "correlated_readings"),
+    *("vectors", "stadia", "correlated_readings"),
 )
 STRAPPING_TABLES = (
     *("circumferences", "obstructions", "thickness", "tape_checks"),

@@ -20,6 +20,7 @@ from tankcal.pipeline.scan import Scan, fit_scan
 from tankcal.pipeline.sighted import find_hit_wall
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
+from tankcal.pipeline.stadia_checks import check_bases
 from tankcal.pipeline.statements import (
     Statements,
     pairs_to_simulate,
@@ -391,7 +392,7 @@ def _warnings(job, adjustment, sighting, survey, made):
     of_survey = ()
     if adjustment is not None:
         left_open = open_questions(job, adjustment.datum, adjustment.causes)
-        of_survey = (*adjustment.warnings, *left_open)
+        of_survey = (*adjustment.warnings, *left_open, *check_bases(job.measurements))
     warnings = (
         *job.warnings,
         *of_survey,
@@ -459,7 +460,8 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjus
         )
     with _telling(job):
         adjustment = adjust_survey(job.measurements, progress or (lambda text: None))
-    return replace(adjustment, warnings=_placed(job, adjustment.warnings))
+    warnings = (*adjustment.warnings, *check_bases(job.measurements))
+    return replace(adjustment, warnings=_placed(job, warnings))
 
 
 def _refuse_other(job, name):

@@ -10,7 +10,7 @@ from tankcal.job.contract.observations import READINGS
 
 def has_survey(tables):
     """Are there observations to be adjusted, readable or not?"""
-    return any(has_rows(tables[name]) for name in ("image_points", *READINGS))
+    return any(has_rows(tables[name]) for name in ("image_points", "stadia", *READINGS))
 
 
 def is_strapped(tables):

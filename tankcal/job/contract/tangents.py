@@ -41,6 +41,6 @@ TANGENTS = (
 )
 BESIDE = (  # the traverse that ties the set-ups, and a tape that is joined
     *("setups", "control", "directions", "zenith_angles", "slope_distances", "distances"),
-    *("horizontal_angles", "height_differences", "circumferences", "obstructions"),
+    *("stadia", "height_differences", "circumferences", "obstructions"),
 )
 COLUMNS = {"tangents": TANGENTS}

@@ -168,6 +168,7 @@ EXAMPLES_OF_TABLES = {
             "time": "2026-01-05T14:30",
         }
     ],
+    "stadia": [{"setup": "S1-1", "to": "S2", "bar": "bar 1", "angle_deg": 10.3942, "s_arcsec": 1}],
     "tangents": [
         {
             "setup": "S1-1",

@@ -15,6 +15,7 @@ from tankcal.job.checks.survey.images import check_images
 from tankcal.job.checks.survey.instruments import check_instruments
 from tankcal.job.checks.survey.names import check_names
 from tankcal.job.checks.survey.readings import check_correlated, check_readings
+from tankcal.job.checks.survey.stadia import check_stadia
 from tankcal.job.contract import KEYS
 from tankcal.job.tables import SURVEY_TABLES
 from tankcal.messages import message
@@ -45,6 +46,7 @@ def check_survey(values, tables, registers, raw, is_whole, log):
     check_instruments(files)
     check_images(files)
     check_readings(files)
+    check_stadia(files)
     check_known(files)
     check_names(files)
     check_held(files)
