@@ -117,11 +117,18 @@ def _modes_of(radius_m):
 
 
 def _support_at(at, radii_m):
-    """(k,) support function of the hull of radii at even azimuths, at those of places (k,)."""
+    """(k,) support function of the hull of radii at even azimuths, at those of places (k,).
+
+    It touches between nodes: a parabola through the highest one and those beside it.
+    """
     count = len(radii_m)
     reach = np.arange(-(count // REACH), count // REACH + 1)  # a tangent touches near its azimuth
     near = radii_m[(at[:, None] + reach) % count]
-    return np.max(near * np.cos(FULL_TURN / count * reach), axis=1)
+    near = near * np.cos(FULL_TURN / count * reach)
+    top = np.clip(np.argmax(near, axis=1), 1, near.shape[1] - 2)
+    low, high, beyond = (near[np.arange(len(at)), top + k] for k in (-1, 0, 1))
+    bend = np.maximum(2 * high - low - beyond, 1e-300)
+    return high + (low - beyond) ** 2 / (8 * bend)
 
 
 def _drawn_shares(rng):

@@ -39,7 +39,7 @@ class TangentTests:
     mdb_m : ndarray, shape (n,)
         Smallest blunder of the tangent's distance that the test finds; nan: no test was made.
     setups : dict
-        {set-up: (w of a disturbed set-up, its turn rad, shift (2,) m)}: as if it had been moved.
+        {set-up: (w of a disturbed set-up, its turn rad, or its shift (2,) m)}.
     """
 
     used: np.ndarray
@@ -88,17 +88,19 @@ def judge_tangents(job, wall, touching):
 
 
 def _as_if_moved(touching, at, mine, precision, pull):
-    """(w, turn, shift) of a set-up whose readings are mine, and all of whose places would move."""
+    """(w, turn, shift) of a set-up whose readings are mine: of all that may move at once, and of
+    its circle, or its station, alone.
+    """
     f = touching.normal_rad[at]
     length = np.where(touching.seen_right[at], 1.0, -1.0) * touching.length_m[at]
     columns = np.column_stack([length, np.sin(f), np.cos(f)]) * mine[:, None]
     scale = np.maximum(np.abs(columns).max(axis=0), 1e-9)
     columns = columns / scale
     normal, right = columns.T @ precision @ columns, columns.T @ pull
-    found = np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ right
-    statistic = max(float(right @ found), 0.0)
-    turn, x, y = found / scale
-    return np.sqrt(statistic), float(turn), (float(x), float(y))
+    statistic = float(right @ np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ right)
+    turn = right[0] / max(normal[0, 0], 1e-300) / scale[0]
+    shift = np.linalg.pinv(normal[1:, 1:], rcond=1e-6, hermitian=True) @ right[1:] / scale[1:]
+    return np.sqrt(max(statistic, 0.0)), float(turn), tuple(shift.tolist())
 
 
 def critical_of_setup(count):
@@ -210,7 +212,7 @@ def _of_setups(job, tests):
         text = message(
             "setup_disturbed",
             "the tangents from set-up {setup!r} contradict all others (w = {w:.1f}), as if its"
-            " circle were turned by {turn_arcsec:+.0f} seconds of arc and its station moved by"
+            " circle were turned by {turn_arcsec:+.0f} seconds of arc, or its station moved by"
             " {shift_mm:.1f} mm: was it disturbed after the traverse?",
             setup=name,
             w=w,

@@ -162,7 +162,7 @@ def _levels(result, tests):
                 y_m=None if curve is None else curve.y_m + origin[1],
                 perimeter_m=None if curve is None else curve.perimeter_m,
                 area_m2=None if curve is None else curve.area_m2,
-                wall_area_m2=section.area_m2,
+                wall_area_m2=section.outline.area_m2(),
             )
         )
     return found

@@ -88,6 +88,6 @@ def _columns(table):
 
 def _column(texts, field):
     heading, (_, unit) = texts.heading(field), parted(field.name)
-    if field.name.removesuffix(UNIT_OF_CIRCLE) in ("direction", "zenith"):
+    if field.name.removesuffix(UNIT_OF_CIRCLE) in ("direction", "zenith", "angle"):
         unit = ""  # as the circle shows it
     return heading, unit, WIDE.get(field.kind, 1.0)

@@ -40,7 +40,7 @@ TANGENTS = (
     USE,
 )
 BESIDE = (  # the traverse that ties the set-ups, and a tape that is joined
-    *("setups", "control", "directions", "zenith_angles", "slope_distances", "distances"),
-    *("stadia", "height_differences", "circumferences", "obstructions"),
+    *("setups", "control", "directions", "zenith_angles", "slope_distances"),
+    *("stadia", "circumferences", "obstructions"),
 )
 COLUMNS = {"tangents": TANGENTS}
