@@ -1,11 +1,12 @@
 """How tangents agree with the wall and with each other, and what is to be said about it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtri
 
 from tankcal.errors import Problem
+from tankcal.geometry.field.amplitudes import estimate_amplitudes
 from tankcal.geometry.field.blunders import restricted_precision
 from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.shell import course_of
@@ -18,6 +19,7 @@ from tankcal.survey.network.reliability import noncentrality
 RULES = "tangents"
 ALPHA = 0.001  # of the test of a set-up, over the number of set-ups
 SHOWN = 5
+SUSPECT = 2.0  # test quantity of the worst set-up, from which it is tested by all others
 MANY_LEVELS = 0.5  # of them, off: it is the heights as a whole
 LOST = 0.5  # of the tangents of a set-up, rejected: the set-up is to blame
 
@@ -70,9 +72,7 @@ def judge_tangents(job, wall, touching):
     at = counted[wall.accepted[order]]  # of each reading of the field, among all sights
     field = wall.field
     whole = field.covariance_m2 + noise_of_wall(wall) - field.noise_m2
-    precision = restricted_precision(whole, free_design(field.sites)[0])
-    pull = (precision @ (field.radius_m - field.radius_m.mean()))[:sites]
-    precision = precision[:sites, :sites]
+    precision, pull = _tested(field, whole, sites)
     weight = np.maximum(np.diag(precision), 1e-300)
     departure[at], w[at] = pull / weight, pull / np.sqrt(weight)
     own = (job.tangents.sd_rad * touching.length_m) ** 2 + touching.excess[2] ** 2
@@ -84,7 +84,37 @@ def judge_tangents(job, wall, touching):
         for name in dict.fromkeys(job.tangents.setup)
         if np.any(names == name)
     }
+    suspect = max(setups, key=lambda one: setups[one][0])
+    if setups[suspect][0] > SUSPECT:
+        mine = names == suspect
+        other = _without(field, whole - field.covariance_m2, mine)
+        if other is not None:
+            setups[suspect] = _as_if_moved(touching, at, mine, *_tested(field, other, sites))
     return TangentTests(used, departure, w, redundancy, mdb, setups)
+
+
+def _tested(field, whole, count):
+    """P and P y of the first readings of a field (`field.blunders`)."""
+    precision = restricted_precision(whole, free_design(field.sites)[0])
+    pull = precision @ (field.radius_m - field.radius_m.mean())
+    return precision[:count, :count], pull[:count]
+
+
+def _without(field, more_m2, mine):
+    """Covariance of the readings with amplitudes that those of a set-up do not tell; None: the
+    others tell nothing.
+
+    A set-up that was moved looks like a form of the wall, if it is asked itself how large that is.
+    """
+    keep = np.ones(len(field.radius_m), dtype=bool)
+    keep[: len(mine)] = ~mine
+    noise = (field.noise_m2 + more_m2)[np.ix_(keep, keep)]
+    if len(np.unique(field.sites.course[keep])) < len(np.unique(field.sites.course)):
+        return None
+    known = estimate_amplitudes(
+        field.sites.take(keep), field.radius_m[keep], noise, field.nominal_m
+    )
+    return replace(field, amplitudes=known).covariance_m2 + more_m2
 
 
 def _as_if_moved(touching, at, mine, precision, pull):
@@ -213,7 +243,8 @@ def _of_setups(job, tests):
             "setup_disturbed",
             "the tangents from set-up {setup!r} contradict all others (w = {w:.1f}), as if its"
             " circle were turned by {turn_arcsec:+.0f} seconds of arc, or its station moved by"
-            " {shift_mm:.1f} mm: was it disturbed after the traverse?",
+            " {shift_mm:.1f} mm: was it disturbed after the traverse, or has the wall a seam"
+            " there?",
             setup=name,
             w=w,
             turn_arcsec=float(np.degrees(turn) * 3600),

@@ -62,17 +62,17 @@ def check_tangents(values, tables, registers, raw, log):
         tell(log.problem, raw, "survey", "side", expected)
     check_levels(table, courses, values, log)
     if not table.skipped:
-        _check_limbs(table, log)
+        _check_limbs(table, () if courses is None else courses.of("course"), log)
 
 
-def _check_limbs(table, log):
-    """Each level from enough set-ups, at both limbs."""
+def _check_limbs(table, courses, log):
+    """Each level of a known course from enough set-ups."""
     columns = (table.of(name) for name in ("course", "level_m", "setup", "side", "use"))
     levels, first = {}, {}
     for row, (course, level, setup, side, use) in zip(
         table.rows, zip(*columns, strict=True), strict=True
     ):
-        if None in (course, level, setup, side) or use == "check":
+        if None in (level, setup, side) or course not in courses or use == "check":
             continue
         levels.setdefault((course, level), {}).setdefault(setup, set()).add(side)
         first.setdefault((course, level), row)
