@@ -92,6 +92,7 @@ def noisy(tmp_path_factory):
     return run(tmp_path_factory.mktemp("noisy") / "job", parts_of())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [circle, oval])
 def test_exact_tangents_give_the_table(tmp_path, radius, figure):
     """Exact geometry: a circle to its rounding, ovality within what is said of the hull."""
@@ -110,12 +111,14 @@ def test_noise_is_within_U(noisy):
     assert {"instrument_scale", "tangent_excess", "points"} <= budget
 
 
+@pytest.mark.slow
 def test_valleys_are_within_U(tmp_path):
     result = run(tmp_path, parts_of(sights(valley, rng=np.random.default_rng(2)), seed=2))
     error = result.table.volume_m3[-1] - inside_of(valley)
     assert 0 < error < result.table.U_m3[-1]  # no tangent sees it
 
 
+@pytest.mark.slow
 def test_a_workbook_is_the_same_job(tmp_path, noisy):
     book = tankcal.load(write_book(tmp_path / "job.xlsx", parts_of()))
     again = tankcal.run(book, simulated=False)
@@ -167,6 +170,7 @@ def test_statistics_are_those_of_leaving_one_out(noisy):
     assert np.all((tests.redundancy > 0) & (tests.redundancy < 1))
 
 
+@pytest.mark.slow
 def test_a_tangent_to_a_rail_is_set_aside_by_name(tmp_path):
     rows = sights(rng=np.random.default_rng(1))
     rows[37]["direction_deg"] += 0.2
@@ -177,6 +181,7 @@ def test_a_tangent_to_a_rail_is_set_aside_by_name(tmp_path):
     assert abs(result.table.volume_m3[-1] - inside_of(oval)) < result.table.U_m3[-1]
 
 
+@pytest.mark.slow
 def test_compared_tangents_are_not_adjusted(tmp_path):
     rows = sights(rng=np.random.default_rng(1))
     for row in rows:
@@ -204,6 +209,7 @@ def test_exchanged_directions_are_told_as_limbs(tmp_path):
     assert problems_of(tmp_path, parts_of(rows)) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1 / 0.9, 0.9, -1.0])
 @pytest.mark.parametrize("names", [None, ("I4",)])
 def test_angles_of_another_kind_are_told(tmp_path, factor, names):
@@ -215,6 +221,7 @@ def test_angles_of_another_kind_are_told(tmp_path, factor, names):
     assert found[::2] == ("tangents.csv", "direction")
 
 
+@pytest.mark.slow
 def test_a_disturbed_set_up_is_named(tmp_path):
     """A turn of 5 minutes; a tenth of that looks like the form of the wall, and is in U."""
     rng = np.random.default_rng(3)
@@ -233,6 +240,7 @@ def test_a_sound_set_up_is_not_named(noisy):
     assert all(w < critical_of_setup(8) for w, _, _ in tests.setups.values())
 
 
+@pytest.mark.slow
 def test_exchanged_courses_and_levels_are_told(tmp_path):
     rows = sights(levels=(1.0, 3.0, 5.0, 7.0))
     for row in rows:
@@ -248,6 +256,7 @@ def test_exchanged_courses_and_levels_are_told(tmp_path):
     assert len([one for one in result.warnings if one.column == "level_m"]) == 2
 
 
+@pytest.mark.slow
 def test_straps_beside_tangents_are_readings_of_the_wall(tmp_path, noisy):
     parts = parts_of()
     parts.tables["circumferences"] = [
@@ -340,6 +349,7 @@ def test_spoilt_tables_give_lines_and_no_traceback(tmp_path):
             tankcal.run(tankcal.load(folder), simulated=False)
 
 
+@pytest.mark.slow
 def test_the_table_of_tangents_may_come_in_gon(tmp_path, noisy):
     parts = parts_of()
     columns, *rows = parts.tables["tangents"]

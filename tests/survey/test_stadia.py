@@ -75,9 +75,10 @@ def test_the_bar_alone_gives_the_scale(tmp_path):
     np.testing.assert_allclose(*sides, rtol=1e-8)
     scale = next(one for one in adjustment.causes if one.name == "bar")
     assert (scale.what, scale.u) == ("instrument_scale", pytest.approx(10.0))
+    # readings are (1 + scale) times what is true, so places shrink
     move = scale.column_m.reshape(-1, 3)
     away = found - found.mean(axis=0)
-    np.testing.assert_allclose(move[:, :2] - move[:, :2].mean(axis=0), 1e-5 * away[:, :2],
+    np.testing.assert_allclose(move[:, :2] - move[:, :2].mean(axis=0), -1e-5 * away[:, :2],
                                rtol=0, atol=2e-9)  # fmt: skip
 
 
