@@ -115,7 +115,7 @@ class Touching:
         The limb that the sight passes at.
     excess : tuple of float
         By how much tangents stand outside the wall: mean, which was taken off, standard deviation
-        of that, and of one tangent beside it, m.
+        of that, and of those to one limb from a set-up beside it, m.
     """
 
     points: Points
@@ -218,10 +218,12 @@ def touch(tangents, poses, *, zero_z_m, nominal_m, tools=(), excess=(0.0, 0.0, 0
     z, by_zenith = _heights(tangents, station[:, 2], length, zero_z_m)
     xyz = np.column_stack([station[:, :2] + length[:, None] * sight - excess[0] * normal, z])
     by = _by_poses(poses, pose, normal, np.where(seen, length, -length), by_zenith != 0)
-    own = _own(tangents, length, by_zenith, excess[2])
+    own = _own(tangents, length, by_zenith)
     causes = _causes(poses, by, tools)
     shared = np.pad(-excess[1] * normal, ((0, 0), (0, 1))).ravel()
     covariance = scipy.linalg.block_diag(*own) + by @ poses.covariance @ by.T
+    bridged = excess[2] * _by_limbs(tangents, normal)
+    covariance += bridged @ bridged.T
     if excess[1]:
         causes += (Cause("", "tangent_excess", 1e3 * excess[1], "mm", shared),)
         covariance += np.outer(shared, shared)
@@ -294,9 +296,21 @@ def _by_poses(poses, pose, normal, turn_m, rises):
     return by.reshape(3 * n, -1)
 
 
-def _own(tangents, length_m, by_zenith_m, excess_m):
+def _by_limbs(tangents, normal):
+    """(3 n, l) outwards, of all sights from a set-up to one limb: a valley that they bridge there
+    may run up the whole shell, and repeated sights bridge the same one.
+    """
+    keys = list(zip(tangents.setup, tangents.is_right.tolist(), strict=True))
+    limbs = {key: i for i, key in enumerate(dict.fromkeys(keys))}
+    found = np.zeros((len(keys), 3, len(limbs)))
+    for i, key in enumerate(keys):
+        found[i, :2, limbs[key]] = normal[i]
+    return found.reshape(-1, len(limbs))
+
+
+def _own(tangents, length_m, by_zenith_m):
     """(n, 3, 3) covariance of what each sight has of its own; as large along it as across."""
-    across = (tangents.sd_rad * length_m) ** 2 + excess_m**2
+    across = (tangents.sd_rad * length_m) ** 2
     own = np.zeros((len(tangents), 3, 3))
     own[:, 0, 0] = own[:, 1, 1] = across
     own[:, 2, 2] = (tangents.sd_rad * by_zenith_m) ** 2

@@ -75,6 +75,8 @@ class Form:
             return self.kind
         if (section, field.name) == ("table", "language") and self.language != DEFAULT:
             return self.language
+        if self.survey == "tangents" and (section, field.name) == ("survey", "side"):
+            return "outside"
         if self.survey in STRAPPED:
             return STARTS_OF_STRAPPING.get(f"{section}.{field.name}", field.start)
         return field.start
