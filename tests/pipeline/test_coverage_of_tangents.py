@@ -2,6 +2,7 @@
 
 The wall of `generated_tangents` leans and has valleys and buckles that no tangent sees; the sights
 are found by turning the telescope until it touches. The stations are off as their covariance says.
+U is wide rather than narrow: two levels of a course leave its bulge to what is assumed of it.
 """
 
 import numpy as np
@@ -45,4 +46,4 @@ def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
     count = walls * len(classes)
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)
     assert min(classes) > 0.92 - 3 * np.sqrt(0.95 * 0.05 / walls)
-    assert wide < 1.8
+    assert wide < 2.3
