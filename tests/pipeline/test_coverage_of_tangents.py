@@ -46,4 +46,4 @@ def test_intervals_hold_on_walls_that_are_not_the_model_study(tmp_path, figure):
     count = walls * len(classes)
     assert min(parts) > 0.94 - 3 * np.sqrt(0.95 * 0.05 / count)
     assert min(classes) > 0.92 - 3 * np.sqrt(0.95 * 0.05 / walls)
-    assert wide < 2.3
+    assert wide < 1.8

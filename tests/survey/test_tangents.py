@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from generated_hits import Surface
 from generated_tangents import ring_of_stations, take_tangents
+from scipy.spatial import ConvexHull
 
 from tankcal.geometry.field.amplitudes import Amplitudes
 from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES
-from tankcal.geometry.girth import tangent_excess
+from tankcal.geometry.girth import _support_at, tangent_excess
 from tankcal.geometry.support import fit_support, support_columns
 from tankcal.survey.measurements import Setup
 from tankcal.survey.sighting import NETWORK, Poses
@@ -178,3 +179,17 @@ def test_excess_over_valleys_is_less_than_that_of_convex_walls():
     """A property: the hull bridges valleys, so the quadratic formula is too much of them."""
     found = [tangent_excess(amplitudes_of(common_seams=s), 6.5)[0] / s**2 for s in (5e-4, 8e-3)]
     assert found[1] < found[0]
+
+
+def test_mean_support_is_the_perimeter_of_the_hull():
+    """Second method: Cauchy's formula against the hull of the same outline as a polygon."""
+    rng, count = np.random.default_rng(4), 16384
+    turn = 2 * np.pi * np.arange(count) / count
+    radius = 6.5 + sum(
+        2e-3 * rng.normal() * np.cos(k * turn - rng.uniform(0, 6)) / (1 + k / 10)
+        for k in range(2, 100)
+    )
+    hull = ConvexHull(np.column_stack([radius * np.cos(turn), radius * np.sin(turn)]))
+    support = _support_at(np.arange(0, count, 4), radius)
+    assert hull.area - 2 * np.pi * radius.mean() > 5e-3  # m: it bridges valleys
+    assert 2 * np.pi * support.mean() == pytest.approx(hull.area, abs=2e-5)
