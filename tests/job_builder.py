@@ -492,3 +492,33 @@ def hit_parts(rows, **settings):
     tool = {"kind": "total_station", "s_mm": 1.0, "s_arcsec": 5.0, "u_offset_mm": 0.5}
     given = {key: value for key, value in given.items() if value is not None}
     return Parts(given, tables, registers={"instruments": {"TS": tool}})
+
+
+def tangent_parts(rows, traverse, **settings):
+    """Parts of a tank of four courses of 2 m, R 6.5 m, whose limbs were sighted from outside.
+
+    rows      of tangents.csv, {column: value} each
+    traverse  {table: its rows} of the network of the set-ups
+    """
+    given = {
+        **SETTINGS,
+        "tank.id": "TT-1",
+        "tank.nominal_diameter_m": 13.0,
+        "tank.nominal_height_m": 8.0,
+        "table.step_m": 0.1,
+        "adjustment.datum": "inner",
+    } | {key.replace("__", "."): value for key, value in settings.items()}
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    setups = dict.fromkeys(row["setup"] for row in rows)
+    tables = {
+        "courses": _courses([2.0] * 4, 8.0, None),
+        "setups": [
+            ["setup", "station", "instrument", "instrument_height_m"],
+            *([name, "S" + name[1:], "TS", 0.0] for name in setups),
+        ],
+        "tangents": [columns, *([row.get(name) for name in columns] for row in rows)],
+        **traverse,
+    }
+    tool = {"kind": "total_station", "u_scale_ppm": 5.0, "certificate": "TS-7"}
+    given = {key: value for key, value in given.items() if value is not None}
+    return Parts(given, tables, registers={"instruments": {"TS": tool}})

@@ -12,7 +12,7 @@ from tankcal.cli.showing import (
     speak,
     warn,
 )
-from tankcal.cli.wall_plans import wall_item, wall_summary
+from tankcal.cli.wall_plans import plan_holds, planned_setups, wall_item, wall_summary
 from tankcal.messages import message
 from tankcal.text.digits import fixed, format_significant, format_with_u
 
@@ -167,13 +167,12 @@ def _summary(prediction):
     solution = prediction.predicted.adjusted.solution
     parts = [
         message("plan_photographs", "{count} photographs", count=len(plan.photos)),
-        message("plan_setups", "{count} set-ups", count=len(plan.setups)),
+        planned_setups(len(plan.setups)),
         message("plan_ties", "{count} ties", count=len(plan.ties)),
         message("plan_control", "{count} control points", count=len(plan.known)),
         message("plan_targets", "{count} targets", count=len(plan.targets.names)),
     ]
-    parts = [part for part in parts if part.values["count"]]
-    yield message("plan_holds", "{tank}: {parts}", tank=plan.job.tank.id, parts=parts)
+    yield plan_holds(plan, parts)
     yield message(
         "plan_network",
         "network: {rows} observations, {unknowns} unknowns, redundancy {dof}; mean sd of a target "

@@ -33,9 +33,13 @@ def add(commands):
     )
     new.add_argument(
         "--survey",
-        choices=("photos", "total-station", "strapping", "reference-line", "wall-hits"),
+        choices=(
+            *("photos", "total-station", "strapping", "reference-line", "wall-hits", "tangents"),
+            "triangulation",
+        ),
         help="with files for photographs, total-station readings, circumferences by tape, "
-        "offsets from reference lines or bare hits of the wall, in place of surveyed points",
+        "offsets from reference lines, bare hits of the wall, tangents or triangulation with a "
+        "stadia, in place of surveyed points",
     )
     new.set_defaults(command=_new)
 

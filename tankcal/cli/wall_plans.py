@@ -5,6 +5,17 @@ from tankcal.messages import message
 from tankcal.text.digits import format_significant
 
 
+def planned_setups(count):
+    """That many set-ups."""
+    return message("plan_setups", "{count} set-ups", count=count)
+
+
+def plan_holds(plan, parts):
+    """What a plan has, of what it may have."""
+    parts = [part for part in parts if part.values["count"]]
+    return message("plan_holds", "{tank}: {parts}", tank=plan.job.tank.id, parts=parts)
+
+
 def wall_summary(prediction):
     """What was planned, and how well the radius of its courses will be known."""
     from tankcal.record.wall_plan import survey_of
@@ -15,11 +26,10 @@ def wall_summary(prediction):
         message("plan_straps", "{count} readings of the tape", count=has.strap_readings),
         message("plan_lines", "{count} reference lines", count=has.lines),
         message("plan_offsets", "{count} offsets", count=has.offsets),
-        message("plan_setups", "{count} set-ups", count=has.setups),
+        planned_setups(has.setups),
         message("plan_hits", "{count} hits of the wall", count=has.hits),
     ]
-    parts = [part for part in parts if part.values["count"]]
-    yield message("plan_holds", "{tank}: {parts}", tank=plan.job.tank.id, parts=parts)
+    yield plan_holds(plan, parts)
     for one in prediction.courses:
         yield message(
             "plan_course_radius",

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
 from tankcal.job.checks import check_all
-from tankcal.job.checks.extent import has_hits, has_survey, is_strapped
+from tankcal.job.checks.extent import has_survey, is_sighted, is_strapped
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.covariance import read_covariance
 from tankcal.job.entries import kind_of, read_columns, read_register, read_settings
@@ -20,9 +20,11 @@ from tankcal.job.tables import (
     STRAPPING_TABLES,
     SURVEY_TABLES,
     TABLES,
+    TANGENT_TABLES,
     TANK_TABLES,
     missing_sheet,
 )
+from tankcal.job.tangents import make_tangents
 from tankcal.messages import message
 
 
@@ -45,7 +47,8 @@ def job_of(raw, log, is_whole=True):
     strapping = make_strapping(values, tables, registers)
     made = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
     lines, hits = make_lines(tables, registers), make_hits(tables, registers)
-    return replace(made, strapping=strapping, lines=lines, hits=hits)
+    tangents = make_tangents(tables, registers)
+    return replace(made, strapping=strapping, lines=lines, hits=hits, tangents=tangents)
 
 
 def _read_tables(raw, is_whole, log):
@@ -58,7 +61,7 @@ def _read_tables(raw, is_whole, log):
     if kind is not None and "points" in allowed:
         allowed += SURVEY_TABLES
     if kind == "vertical":
-        allowed += STRAPPING_TABLES + HITS_TABLES
+        allowed += STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES
     tables = {}
     for name in TABLES:
         table = raw.tables.get(name)
@@ -86,7 +89,7 @@ def _read_tables(raw, is_whole, log):
 
 def _tell_missing_tables(raw, tables, kind, log):
     for name in REQUIRED_TABLES.get(kind, ()):
-        measured = has_survey(tables) or is_strapped(tables) or has_hits(tables)
+        measured = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
         elsewhere = name == "points" and measured
         if name in raw.tables or elsewhere:
             continue
@@ -99,6 +102,7 @@ def _tell_missing_tables(raw, tables, kind, log):
 
 _IN_PLACE_OF_POINTS = {
     "wall_hits": message("no_rows_of_hits", "no rows; expected a sight to the wall in each"),
+    "tangents": message("no_rows_of_tangents", "no rows; expected a sight to a limb in each"),
     "circumferences": message(
         "no_circumferences", "no rows; expected a reading of the tape on each course at least"
     ),

@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.job.cameras import AXES, datum_point, make_camera
+from tankcal.job.checks.survey.stadia import bars_of, bars_used, is_bar
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.contract.registers import FREE, INSTRUMENT_KINDS
 from tankcal.job.imagery import imagery_of
@@ -50,8 +51,9 @@ def make_measurements(values, tables, registers):
             _instrument(name, given) for name, given in registers["instruments"].items()
         ),
         setups=setups_of(tables["setups"]),
-        readings=tuple(
-            _readings(name, tables[name]) for name in READINGS if _has_rows(tables[name])
+        readings=(
+            *(_readings(name, tables[name]) for name in READINGS if _has_rows(tables[name])),
+            *_stadia_readings(tables, registers),
         ),
         nominal=_nominal(values),
         fiducials=fits,
@@ -169,6 +171,8 @@ def _targets(table):
 def _instrument(name, given):
     kind = given["kind"].lower().replace(" ", "_").replace("-", "_")
     scale, offset = given["u_scale_ppm"], given["u_offset_mm"]
+    if is_bar(kind) and given["length_m"] and given["u_mm"] is not None:
+        scale = 1e3 * given["u_mm"] / given["length_m"]  # ppm
     details = {key: given[key] for key in PRINTED if given[key] is not None}
     return Instrument(
         name=name,
@@ -225,6 +229,38 @@ def _readings(name, table):
         rows=table.rows,
         sheet=table.file if table.file.startswith("sheet ") else "",
         **optional,
+    )
+
+
+def _stadia_readings(tables, registers):
+    """Distances that a bar of the length b tells, seen under the angle beta.
+
+        d = (b / 2) cot(beta / 2),   derivative by beta -b / (4 sin^2(beta / 2))
+
+    What the length of a bar is off by is a scale of all its distances.
+    """
+    table = tables["stadia"]
+    if not _has_rows(table):
+        return ()
+    bars = bars_of(registers)
+    used = bars_used(table, bars)
+    stations = {one.name: one.station for one in setups_of(tables["setups"])}
+    length = np.array([bars[name]["length_m"] for name in used])
+    half = angle_in_rad(table, "angle") / 2
+    return (
+        Readings(
+            table="distances",
+            value=length / 2 / np.tan(half),
+            sd=length / (4 * np.sin(half) ** 2) * table.numbers("s_arcsec") * ARCSEC,
+            start=tuple(stations[name] for name in table.of("setup")),
+            end=tuple(table.of("to")),
+            check=_check(table),
+            instrument=tuple(used),
+            horizontal=np.ones(len(table.rows), dtype=bool),
+            temperature_c=np.full(len(table.rows), np.nan),
+            rows=table.rows,
+            sheet=table.file,
+        ),
     )
 
 

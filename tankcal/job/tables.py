@@ -21,14 +21,15 @@ SURVEY_TABLES = (
     *("targets", "photos", "image_points", "fiducials", "film", "control", "check", "setups"),
     *("distances", "slope_distances", "directions", "zenith_angles", "azimuths"),
     *("horizontal_angles", "vertical_angles", "height_differences", "plumb_lines"),
-    *("vectors", "correlated_readings"),
+    *("vectors", "stadia", "correlated_readings"),
 )
 STRAPPING_TABLES = (
     *("circumferences", "obstructions", "thickness", "tape_checks"),
     *("lines", "offsets"),
 )
 HITS_TABLES = ("wall_hits", "control_readings")
-TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + SURVEY_TABLES
+TANGENT_TABLES = ("tangents",)
+TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + SURVEY_TABLES
 REGISTERS = {"cameras": "camera", "instruments": "instrument"}  # and what each one lists
 SETTINGS_FILE = "job.toml"
 SETTINGS_SHEET = "job"

@@ -17,6 +17,7 @@ from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
+from tankcal.pipeline.stadia_checks import check_bases
 from tankcal.pipeline.statements import (
     Statements,
     pairs_to_simulate,
@@ -35,6 +36,7 @@ from tankcal.pipeline.wall import Wall
 from tankcal.pipeline.wall_straps import Straps
 from tankcal.survey import Adjustment, adjust_survey
 from tankcal.survey.sighting import Sighting
+from tankcal.survey.tangents import Touching
 from tankcal.tank import dips
 from tankcal.tank.body import Body
 from tankcal.tank.budgets import Budget, budget, reading_sources
@@ -71,6 +73,8 @@ class Result:
         The wall of a vertical tank that a tape was put round.
     sighting : sighting.Sighting or None
         Bare hits of the wall as points, and where they were taken from.
+    touching : tangents.Touching or None
+        Tangents as points of the wall, and where they were sighted from.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -124,6 +128,7 @@ class Result:
     adjustment: Adjustment | None = None
     strapped: StrappedWall | None = None
     sighting: Sighting | None = None
+    touching: Touching | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -320,7 +325,7 @@ def _run(job, progress, part_progress, simulated):
             )
         )
     found = find_survey(job, progress)
-    job, survey, adjustment, sighting = found.job, found.survey, found.adjustment, found.sighting
+    job, survey, adjustment = found.job, found.survey, found.adjustment
     wall = survey if isinstance(survey, Wall) else None
     made = compute_table(job, survey, progress)
     body, zero, table = made.body, made.zero_m, made.table
@@ -349,10 +354,11 @@ def _run(job, progress, part_progress, simulated):
         simulation=simulation,
         intervals=intervals,
         rule=verdict_of(job, body, table, intervals, simulation),
-        warnings=_warnings(job, adjustment, sighting, survey, made),
+        warnings=_warnings(job, adjustment, found.sighting or found.touching, survey, made),
         adjustment=adjustment,
         strapped=survey if isinstance(survey, StrappedWall) else None,
-        sighting=sighting,
+        sighting=found.sighting,
+        touching=found.touching,
     )
 
 
@@ -360,7 +366,7 @@ def _warnings(job, adjustment, sighting, survey, made):
     of_survey = ()
     if adjustment is not None:
         left_open = open_questions(job, adjustment.datum, adjustment.causes)
-        of_survey = (*adjustment.warnings, *left_open)
+        of_survey = (*adjustment.warnings, *left_open, *check_bases(job.measurements))
     warnings = (
         *job.warnings,
         *of_survey,
@@ -421,7 +427,8 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> Adjus
         )
     with _telling(job):
         adjustment = adjust_survey(job.measurements, progress or (lambda text: None))
-    return replace(adjustment, warnings=placed(job, adjustment.warnings))
+    warnings = (*adjustment.warnings, *check_bases(job.measurements))
+    return replace(adjustment, warnings=placed(job, warnings))
 
 
 def _refuse_other(job, name):

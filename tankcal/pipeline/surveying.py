@@ -17,9 +17,11 @@ from tankcal.pipeline.scan import Scan, fit_scan
 from tankcal.pipeline.sighted import find_hit_wall
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.survey_warnings import refuse_undetermined
+from tankcal.pipeline.touched import find_tangent_wall
 from tankcal.pipeline.wall import Wall, find_wall, s_transform
 from tankcal.survey import Adjustment, adjust_survey, wall_points
 from tankcal.survey.sighting import Sighting
+from tankcal.survey.tangents import Touching
 from tankcal.tank.meshes import parse_mesh
 
 TOLD = 10  # warnings of the adjustment that are told when there is no wall
@@ -32,17 +34,20 @@ class Surveyed:
     Attributes
     ----------
     job : Job
-        With the points that its adjustment or its hits gave.
+        With the points that its adjustment, its hits or its tangents gave.
     survey : Wall, StrappedWall, Scan, mesh or None
         None where declared sizes alone describe the tank.
     adjustment : Adjustment or None
     sighting : Sighting or None
+    touching : Touching or None
+        Tangents as points of the wall.
     """
 
     job: Job
     survey: object
     adjustment: Adjustment | None = None
     sighting: Sighting | None = None
+    touching: Touching | None = None
 
 
 def find_survey(job, progress, amplitudes=None):
@@ -62,30 +67,33 @@ def find_survey(job, progress, amplitudes=None):
     InputError, SolutionError
         As `chain.run`.
     """
-    adjustment = sighting = None
+    adjustment = sighting = touching = None
+    is_sighted = job.hits is not None or job.tangents is not None
     if job.measurements is not None:
         adjustment = _adjusted(job, progress)
-    if job.hits is None and adjustment is not None:
+    if not is_sighted and adjustment is not None:
         points = wall_points(adjustment, job.measurements, job.survey.side)
         job = replace(job, points=s_transform(points))
     dof = np.inf if adjustment is None else adjustment.dof
     try:
-        if job.hits is None:
-            survey = _survey(job, progress, dof, amplitudes)
-        else:
+        if job.hits is not None:
             job, sighting, survey = find_hit_wall(
                 job, adjustment, progress, dof, amplitudes=amplitudes
             )
+        elif job.tangents is not None:
+            job, touching, survey = find_tangent_wall(job, adjustment, progress, dof)
+        else:
+            survey = _survey(job, progress, dof, amplitudes)
     except SolutionError as error:
         if adjustment is None or not adjustment.warnings:
             raise
         told = (one.text for one in placed(job, adjustment.warnings[:TOLD]))
         raise SolutionError(*error.args, *told) from error
-    if adjustment is not None and sighting is None and isinstance(survey, Wall):
+    if adjustment is not None and not is_sighted and isinstance(survey, Wall):
         refuse_other_side(job, partial(is_within_wall, survey), adjustment)
     elif adjustment is not None and isinstance(survey, Scan):
         refuse_other_side(job, survey.is_within, adjustment)
-    return Surveyed(job, survey, adjustment, sighting)
+    return Surveyed(job, survey, adjustment, sighting, touching)
 
 
 def placed(job, problems):

@@ -16,9 +16,11 @@ from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.strapping_checks import check_strapped, check_straps_beside_points
 from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
+from tankcal.pipeline.tangent_checks import check_tangents
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
 from tankcal.pipeline.wall import Wall, warnings_of
 from tankcal.solver.threads import threads_for
+from tankcal.survey.tangents import Touching
 from tankcal.tank.body import Body
 from tankcal.tank.capacity import Capacity
 from tankcal.tank.dips import (
@@ -132,8 +134,8 @@ def check_table(job, survey, made, sighting=None):
     survey : Wall, Scan, mesh or None
         As `compute_table` was given it.
     made : ComputedTable
-    sighting : Sighting, optional
-        Of a wall that was hit without targets.
+    sighting : Sighting or Touching, optional
+        Of a wall that was hit without targets, or whose limbs were sighted.
 
     Returns
     -------
@@ -141,10 +143,18 @@ def check_table(job, survey, made, sighting=None):
     """
     return (
         *_doubts_of_survey(job, survey, made.top_m),
-        *(() if sighting is None else check_hits(job, survey, sighting)),
+        *_doubts_of_sights(job, survey, sighting),
         *warn_of_undeclared(made.body.undeclared()),
         *against_nominal(job.tank, made.table.volume_m3[-1]),
     )
+
+
+def _doubts_of_sights(job, survey, sighting):
+    if sighting is None:
+        return ()
+    if isinstance(sighting, Touching):
+        return check_tangents(job, survey, sighting)
+    return check_hits(job, survey, sighting)
 
 
 def _doubts_of_survey(job, survey, top_m):

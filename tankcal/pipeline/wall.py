@@ -166,7 +166,7 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None):
             )
         )
         shell = _shell(job, joints_of(job), radial_sds(job.points))
-        if job.hits is not None:
+        if job.hits is not None or job.tangents is not None:
             shell = _clear_of_welds(job, shell)
         progress(
             message(
@@ -265,7 +265,7 @@ def _padded(by_points, more):
 
 
 def _clear_of_welds(job, shell):
-    """The shell without the hits beside vertical welds: there the plate is drawn in or out."""
+    """The shell without the sights beside vertical welds: there the plate is drawn in or out."""
     points, least = job.points, limits_of("wall_hits")["weld_distance_m"]
     every, reason = np.arange(len(points.names)), shell.reason.copy()
     azimuth = _azimuths(job, shell, every)
@@ -342,7 +342,7 @@ def _shell(job, heights, sds):
             welds_rad=_welds(job),
         )
     except SolutionError as error:
-        if job.hits is not None:
+        if job.hits is not None or job.tangents is not None:
             hint = message(
                 "told_by_heights",
                 "{error}, bottom_z_m, the heights of the instruments and the units of the angles",

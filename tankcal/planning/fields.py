@@ -1,4 +1,4 @@
-"""Fields of plan.toml in one line each."""
+"""Fields of plan.toml in one line each, and checks that several sections share."""
 
 from tankcal.job.fields import Field
 from tankcal.messages import message
@@ -23,3 +23,27 @@ def count(name, note, required=False, high=500):
 
 def numbers_list(name, note, low, high, required=False):
     return Field(name, "numbers", note, required, low=low, high=high)
+
+
+def no_such_name(found, file, hint=""):
+    """What is said of a name that no row or table of a file has."""
+    return message(
+        "plan_no_such_name",
+        "found {found!r}; expected a name of {file}{hint}",
+        found=found,
+        file=file,
+        hint=hint,
+    )
+
+
+def check_form(section, log):
+    """That the ovality of the whole shell is a part of that of a course."""
+    whole, common = section["form_mm"] or 0.0, section["common_form_mm"] or 0.0
+    if common > whole and not section.is_refused("form_mm"):
+        expected = message(
+            "plan_form_part",
+            "found {common:g}, which is a part of form_mm; expected at most {whole:g}",
+            common=common,
+            whole=whole,
+        )
+        section.tell(log.problem, "common_form_mm", expected)

@@ -10,7 +10,7 @@ from tankcal.job.model import InputFile
 from tankcal.job.model.parts import Course, Deadwood
 from tankcal.job.model.settings import Datum, Material, Survey, Switches, TableSpec, Tank
 from tankcal.pipeline.corrections import Correction
-from tankcal.record import plumbed, sighted, statements, straps, survey, table, texts
+from tankcal.record import plumbed, sighted, statements, straps, survey, table, texts, touched
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.plain_data import to_plain
 from tankcal.record.schema import Saved, filled_from, key
@@ -61,6 +61,9 @@ class Record(Saved, kw_only=True):
     hits: sighted.HitsRecord | None = key(
         "bare wall hits; left out where there are none", default=None, optional=True
     )
+    tangents: touched.TangentsRecord | None = key(
+        "tangents from outside; left out where there are none", default=None, optional=True
+    )
     courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
     capacity: table.CapacityTable | None = key("the table", default=None)
     interpolation: table.InterpolationError | None = key("between rows", default=None)
@@ -99,6 +102,7 @@ def record_of(result):
             strapping=straps.strapping_of(result),
             lines=plumbed.lines_of(result),
             hits=sighted.hits_of(result),
+            tangents=touched.tangents_of(result),
             courses=survey.courses_of(result),
             capacity=table.capacity_of(result),
             interpolation=filled_from(table.InterpolationError, result.straightness),

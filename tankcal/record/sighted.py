@@ -221,21 +221,24 @@ def _control(repeats):
     ]
 
 
+def departure_from_sections(result, xyz_m):
+    """The section nearest to a place (3,), and how far outwards from its outline that lies, m."""
+    height = xyz_m[2] - result.job.datum.bottom_z_m
+    section = min(result.wall.sections, key=lambda one: abs(one.group.height_m - height))
+    outline, slope = section.outline, np.array(result.wall.shell.slope)
+    away = xyz_m[:2] - (height - section.group.height_m) * slope - (outline.x_m, outline.y_m)
+    return section, np.hypot(*away) - outline.radius_m(np.array([np.arctan2(*away)]))[0]
+
+
 def _compared(result):
     job, sighting, found = result.job, result.sighting, []
-    slope = np.array(result.wall.shell.slope)
     for place in np.flatnonzero(job.hits.check):
-        xyz = sighting.points.xyz_m[place]
-        height = xyz[2] - job.datum.bottom_z_m
-        section = min(result.wall.sections, key=lambda one: abs(one.group.height_m - height))
-        outline = section.outline
-        away = xyz[:2] - (height - section.group.height_m) * slope - (outline.x_m, outline.y_m)
-        radius = outline.radius_m(np.array([np.arctan2(*away)]))[0]
+        section, departure = departure_from_sections(result, sighting.points.xyz_m[place])
         found.append(
             ComparedHit(
                 setup=job.hits.setup[place],
                 section=section.group.name,
-                departure_m=np.hypot(*away) - radius,
+                departure_m=departure,
                 row=job.hits.rows[place] if job.hits.rows else None,
             )
         )

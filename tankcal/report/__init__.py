@@ -10,7 +10,16 @@ FILES = (
     *("report.pdf", "report.html"),
 )
 LETTERHEAD = "letterhead.json"  # there when a letterhead was given
-_NOT_IN_ALL = ("budgets", "deliveries", "rule", "monte_carlo", "strapping", "lines", "hits")
+_NOT_IN_ALL = (
+    "budgets",
+    "deliveries",
+    "rule",
+    "monte_carlo",
+    "strapping",
+    "lines",
+    "hits",
+    "tangents",
+)
 _PARTS = (
     ("certificate.pdf", "certificate"),
     ("working-papers.pdf", "working-papers"),

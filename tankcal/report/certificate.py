@@ -88,15 +88,17 @@ def calibration(paper):
 def _instruments(paper):
     """The instruments of an adjusted survey, or tapes, with their certificates, or None."""
     adjustment = paper.record["adjustment"]
-    strapping, lines, hits = (paper.record.get(key) for key in ("strapping", "lines", "hits"))
+    strapping, lines = (paper.record.get(key) for key in ("strapping", "lines"))
+    sighted = (paper.record.get("hits"), paper.record.get("tangents"))
     used = {}
     for one in adjustment["instruments"] if adjustment else ():
         used[one["instrument"]] = one["details"].get("certificate")
     for one in lines["plummets"] if lines else ():
         if one["plummet"]:  # else nobody described it
             used[one["plummet"]] = one["certificate"]
-    for one in hits["setups"] if hits else ():
-        used[one["instrument"]] = one["certificate"]
+    for one in (setup for sights in sighted if sights for setup in sights["setups"]):
+        if one["instrument"]:
+            used[one["instrument"]] = one["certificate"]
     for one in strapping["tapes"] if strapping else ():
         used[one["tape"]] = one["certificate"]
         if one["master"]:

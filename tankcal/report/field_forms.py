@@ -17,6 +17,8 @@ ROWS = {  # that a sheet has room for
     "setups": 6,
     "control_readings": 24,
     "wall_hits": 30,
+    "tangents": 30,
+    "stadia": 10,
 }
 IN_THE_OFFICE = ("use", "s_mm", "s_arcsec", "note")  # columns that nobody fills in on site
 UNIT_OF_CIRCLE = "_deg"  # of three columns of one angle the one that stands for all
@@ -38,7 +40,7 @@ def write_field_sheets(path, survey, language):
     path : Path
         Of the new file.
     survey : str
-        "strapping", "reference-line" or "wall-hits".
+        "strapping", "reference-line", "wall-hits" or "tangents".
     language : str
         One of `languages.LANGUAGES`.
     """
@@ -86,6 +88,6 @@ def _columns(table):
 
 def _column(texts, field):
     heading, (_, unit) = texts.heading(field), parted(field.name)
-    if field.name.removesuffix(UNIT_OF_CIRCLE) in ("direction", "zenith"):
+    if field.name.removesuffix(UNIT_OF_CIRCLE) in ("direction", "zenith", "angle"):
         unit = ""  # as the circle shows it
     return heading, unit, WIDE.get(field.kind, 1.0)

@@ -6,6 +6,8 @@ set-up is the frame. Where each has a station of its own and none shares a targe
 ties them: their places and the zeros of their circles are unknowns of the wall.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from tankcal.errors import InputError, Problem
@@ -34,9 +36,8 @@ def poses_of(hits, adjustment=None, *, nominal_m, is_inside):
     """
     tools = tuple(dict.fromkeys(hits.instrument))
     known = [hits.instruments[name] for name in tools]
-    keys = tuple(dict.fromkeys(zip(hits.setup, hits.set, strict=True)))
     prior = np.array([[one.u_scale, np.nan_to_num(one.u_offset_m)] for one in known]).ravel() ** 2
-    poses = _unplaced(hits, keys, tools, prior)
+    poses = _unplaced(hits, tools, prior)
     if adjustment is not None:
         poses = _in_network(hits, poses, adjustment)
     untied = np.array([i for i, tie in enumerate(poses.ties) if tie == WALL], dtype=int)
@@ -46,8 +47,24 @@ def poses_of(hits, adjustment=None, *, nominal_m, is_inside):
     return poses
 
 
-def _unplaced(hits, keys, tools, prior):
+def poses_in_network(tangents, adjustment):
+    """`Poses` of the set-ups of tangents, with all instruments of the network, and the standard
+    deviations (scale, offset m) that these had beforehand; nan: free.
+
+    A set-up that the network does not have is tied by "wall": nothing knows where it stood.
+    """
+    known = adjustment.adjusted.survey.instruments
+    names = tuple(one.name for one in known)
+    poses = _unplaced(tangents, names, np.zeros(2 * len(names)))
+    poses = replace(poses, ties=(WALL,) * len(poses.keys))
+    return _in_network(tangents, poses, adjustment), tuple(
+        (one.scale_sd, one.offset_sd_m) for one in known
+    )
+
+
+def _unplaced(hits, tools, prior):
     """Poses at the heights of their stations; the only set-up is the frame."""
+    keys = tuple(dict.fromkeys(zip(hits.setup, hits.set, strict=True)))
     names = list(dict.fromkeys(name for name, _ in keys))
     count, xyz = 4 * len(keys), np.zeros((len(keys), 3))
     covariance = np.zeros((count + len(prior), count + len(prior)))

@@ -283,6 +283,7 @@ def test_a_mesh_takes_no_survey(tmp_path):
     parts.settings |= {"survey.date": "2024-05-31", "table.reference_temperature_c": 20.0}
     parts.settings["table.step_m"] = 0.1
     parts.beside["a.stl"] = b"solid"
+    parts.tables["stadia"] = [["setup", "to", "angle_deg", "s_arcsec"], ["S", "P1", 10.0, 1.0]]
     problems = problems_of(write_folder(tmp_path / "job", parts))
     assert {problem.file for problem in problems} == {f"{name}.csv" for name in SURVEY_TABLES}
     assert all("not for a tank of kind mesh" in problem.expected for problem in problems)

@@ -158,7 +158,7 @@ def test_offset_and_radius_of_the_field_page(
     wall = SimpleNamespace(
         field=field,
         accepted=np.arange(n),
-        straps=True,
+        read=True,
         radii_by_points=scipy.sparse.csr_array(radial),
     )
     found, _ = told_causes(SimpleNamespace(points=points), wall)

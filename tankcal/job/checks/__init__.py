@@ -9,9 +9,9 @@ from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.extent import (
     Extent,
     extent_of,
-    has_hits,
     has_survey,
     has_wall_points,
+    is_sighted,
     is_strapped,
 )
 from tankcal.job.checks.geometry import check_cylinder, check_scan
@@ -21,6 +21,7 @@ from tankcal.job.checks.plausible import check_plausible
 from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.strapping import check_strapping
 from tankcal.job.checks.survey import check_survey
+from tankcal.job.checks.tangents import check_tangents
 from tankcal.job.contract.bottom import check_bottom
 from tankcal.job.contract.correlations import check_correlations
 from tankcal.job.contract.courses import check_courses
@@ -50,6 +51,7 @@ def check_all(values, tables, registers, raw, is_whole, log):
             check_strapping(values, tables, registers, raw, log)
             check_lines(values, tables, registers, raw, log)
             check_hits(values, tables, registers, raw, log)
+            check_tangents(values, tables, registers, raw, log)
     check_survey(values, tables, registers, raw, is_whole, log)
 
 
@@ -62,7 +64,7 @@ def check_tank(values, tables, raw, log):
         check_steps(values["table"], extent, raw, log)
         check_settings(values, tables, extent, kind, raw, log)
         check_plausible(values, tables, extent, kind, raw, log)
-    elsewhere = has_survey(tables) or is_strapped(tables) or has_hits(tables)
+    elsewhere = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
     needs_points = kind == "vertical" and not elsewhere
     if points is not None and (needs_points or has_rows(points)):
         check_points(points, log)

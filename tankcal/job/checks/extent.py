@@ -10,7 +10,7 @@ from tankcal.job.contract.observations import READINGS
 
 def has_survey(tables):
     """Are there observations to be adjusted, readable or not?"""
-    return any(has_rows(tables[name]) for name in ("image_points", *READINGS))
+    return any(has_rows(tables[name]) for name in ("image_points", "stadia", *READINGS))
 
 
 def is_strapped(tables):
@@ -28,14 +28,24 @@ def has_hits(tables):
     return has_rows(tables["wall_hits"])
 
 
+def has_tangents(tables):
+    """Were the limbs of the tank sighted from a traverse round it?"""
+    return has_rows(tables["tangents"])
+
+
+def is_sighted(tables):
+    """Does the wall come from sights that name no target?"""
+    return has_hits(tables) or has_tangents(tables)
+
+
 def may_be_hit_from_both_sides(tables):
     """Are there hits from more set-ups than one, which may stand in and round the tank?"""
     return has_hits(tables) and len(set(tables["wall_hits"].of("setup"))) > 1
 
 
 def has_wall_points(tables):
-    """Does the wall come from points, handed in, hit or to be adjusted?"""
-    return has_rows(tables["points"]) or has_survey(tables) or has_hits(tables)
+    """Does the wall come from points, handed in, sighted or to be adjusted?"""
+    return has_rows(tables["points"]) or has_survey(tables) or is_sighted(tables)
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,10 @@ from tankcal.job.contract import (
     lines,
     points,
     roof,
+    stadia,
     stated,
     strapping,
+    tangents,
     uncertainty,
     welds,
 )
@@ -36,7 +38,8 @@ SECTIONS = (
 )
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES}
-COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | SURVEY_COLUMNS
+COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS | stadia.COLUMNS
+COLUMNS |= SURVEY_COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "roof": roof.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
@@ -45,6 +48,8 @@ SURVEYS = ADJUSTED_SURVEYS | {
     "strapping": tuple(strapping.COLUMNS),
     "reference-line": (*lines.COLUMNS, *strapping.COLUMNS),
     "wall-hits": (*hits.COLUMNS, *hits.BESIDE),
+    "triangulation": (*stadia.COLUMNS, *stadia.BESIDE),
+    "tangents": (*tangents.COLUMNS, *tangents.BESIDE),
 }
 
 REQUIRED_TABLES = {"vertical": ("points", "courses")}

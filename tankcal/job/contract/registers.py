@@ -4,12 +4,13 @@ from tankcal.camera.comparator import KINDS as TRANSFORMATIONS
 from tankcal.camera.model import AFFINITIES, CONVENTIONS
 from tankcal.job.contract.hits import RANGING
 from tankcal.job.contract.lines import PLUMMET
+from tankcal.job.contract.stadia import BAR
 from tankcal.job.contract.strapping import TAPE
 from tankcal.job.fields import Field
 from tankcal.survey.network.survey import STATES
 
 FREE = "free"
-INSTRUMENT_KINDS = ("tape", "edm", "total_station", "theodolite", "level", "plummet")
+INSTRUMENT_KINDS = ("tape", "edm", "total_station", "theodolite", "level", "plummet", "stadia")
 # name in cameras.toml and largest magnitude of each parameter, by its name in tankcal.camera.model
 PARAMETER_KEYS = {
     "c": ("c_mm", 1e5),
@@ -241,13 +242,15 @@ SHORT_KEYS = {
     | {sd_key(name): f"s_{name}" for name in ("c", "x0", "y0")},
     "instruments": {},
 }
-REGISTER_KEYS = {"cameras": CAMERA, "instruments": (*INSTRUMENT, *TAPE, *PLUMMET, *RANGING)}
+REGISTER_KEYS = {"cameras": CAMERA, "instruments": (*INSTRUMENT, *TAPE, *PLUMMET, *RANGING, *BAR)}
 REGISTERS_OF_SURVEY = {
     "photos": ("cameras", "instruments"),
     "total-station": ("instruments",),
     "strapping": ("instruments",),
     "reference-line": ("instruments",),
     "wall-hits": ("instruments",),
+    "tangents": ("instruments",),
+    "triangulation": ("instruments",),
 }
 # keys of [adjustment] that need photographs
 OF_PHOTOS = ("fixed_photo", "image_sd_um", "reading_limit_um", "depth_of_field", "image_weights")

@@ -26,6 +26,7 @@ from tankcal.survey.measurements import Measurements
 from tankcal.survey.points import Points
 from tankcal.survey.reference_line import ReferenceLines
 from tankcal.survey.strapping import Strapping
+from tankcal.survey.tangents import Tangents
 from tankcal.survey.wall_hits import WallHits
 from tankcal.tank.rules.model import Rule
 
@@ -104,6 +105,8 @@ class Job:
         Offsets from lines of sight, beside them.
     hits : WallHits or None
         Bare hits of the wall, in place of points.
+    tangents : Tangents or None
+        Sights to the limbs of the tank, in place of points.
     """
 
     tank: Tank | None
@@ -136,3 +139,4 @@ class Job:
     strapping: Strapping | None = None
     lines: ReferenceLines | None = None
     hits: WallHits | None = None
+    tangents: Tangents | None = None

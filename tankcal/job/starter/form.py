@@ -16,7 +16,7 @@ from tankcal.job.fields import Field
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
 STRAPPED = ("strapping", "reference-line")  # surveys that are not adjusted as points
-OF_SHELLS = (*STRAPPED, "wall-hits")  # surveys of upright tanks alone
+OF_SHELLS = (*STRAPPED, "wall-hits", "tangents")  # surveys of upright tanks alone
 STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
 PLACEHOLDER = "NAME"  # of a camera or an instrument
 
@@ -75,6 +75,8 @@ class Form:
             return self.kind
         if (section, field.name) == ("table", "language") and self.language != DEFAULT:
             return self.language
+        if self.survey == "tangents" and (section, field.name) == ("survey", "side"):
+            return "outside"
         if self.survey in STRAPPED:
             return STARTS_OF_STRAPPING.get(f"{section}.{field.name}", field.start)
         return field.start

@@ -112,6 +112,8 @@ TABLE_NOTES = {
     "correlated_readings": "one row for each pair of values that are correlated; may stay empty",
     "lines": "one row for each vertical line of sight round the tank",
     "offsets": "one row for each reading of the wall's offset; repeated readings are repeated rows",
+    "stadia": "one row for each reading of a stadia bar from a set-up; may stay empty",
+    "tangents": "one row for each sight to a limb of the tank, from outside",
     "wall_hits": "one row for each sight to the bare wall, without a target",
     "control_readings": "one row for each reading of a control target: at the start, every half"
     " hour and at the end; may stay empty",

@@ -4,6 +4,7 @@ from tankcal.job.checking import is_not_given, refuse_repeated
 from tankcal.job.tables import nearest
 from tankcal.messages import message
 from tankcal.pipeline.survey_warnings import ADVISED_POINTS, FEWEST_POINTS
+from tankcal.planning.fields import check_form, no_such_name
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.units import warn_of_units
 
@@ -29,14 +30,8 @@ def check_given(values, registers, given, raw, log):
         known = registers[register]
         for one in given.repeated[section]:
             if one[key] is not None and one[key] not in known:
-                expected = message(
-                    "plan_no_such_name",
-                    "found {found!r}; expected a name of {file}{hint}",
-                    found=one[key],
-                    file=f"{register}.toml",
-                    hint=nearest(one[key], known),
-                )
-                one.tell(log.problem, key, expected)
+                hint = nearest(one[key], known)
+                one.tell(log.problem, key, no_such_name(one[key], f"{register}.toml", hint))
     _check_kinds(registers["instruments"], given, log)
     _check_pattern(given.single["pattern"], log)
     for section in ("photo_rings", "setup_rings"):
@@ -91,15 +86,7 @@ def _check_pattern(pattern, log):
             "plan_levels_or_heights", "given together with heights_m; expected one of the two"
         )
         pattern.tell(log.problem, "levels", expected)
-    whole, common = pattern["form_mm"] or 0.0, pattern["common_form_mm"] or 0.0
-    if common > whole and not pattern.is_refused("form_mm"):
-        expected = message(
-            "plan_form_part",
-            "found {common:g}, which is a part of form_mm; expected at most {whole:g}",
-            common=common,
-            whole=whole,
-        )
-        pattern.tell(log.problem, "common_form_mm", expected)
+    check_form(pattern, log)
 
 
 def _check_obstacles(given, log):

@@ -10,6 +10,7 @@ from tankcal.job.checking import zero_z
 from tankcal.job.checks.strapping import MOST_STRAPS
 from tankcal.job.tables import Log, Value
 from tankcal.messages import message
+from tankcal.planning.fields import check_form, no_such_name
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.wall.contract import MEASURING
 from tankcal.planning.wall.foreseen_tables import Foreseen
@@ -54,14 +55,9 @@ def check_sections(given, courses, nominal_m, log):
     for one in (*given.repeated["straps"], *given.repeated["hits"]):
         for course in one["courses"] or ():
             if courses and course not in courses:
-                expected = message(
-                    "plan_no_such_name",
-                    "found {found!r}; expected a name of {file}{hint}",
-                    found=course, file="courses.csv", hint="",
-                )  # fmt: skip
-                one.tell(log.problem, "courses", expected)
+                one.tell(log.problem, "courses", no_such_name(course, "courses.csv"))
     _check_rings(given, nominal_m, log)
-    _check_form(given.single["wall"], log)
+    check_form(given.single["wall"], log)
     _check_lines_and_ties(given, log)
 
 
@@ -88,18 +84,6 @@ def _check_rings(given, nominal_m, log):
                 nominal=nominal_m,
             )
             one.tell(log.problem, "radius_m", expected)
-
-
-def _check_form(wall, log):
-    whole, common = wall["form_mm"] or 0.0, wall["common_form_mm"] or 0.0
-    if common > whole and not wall.is_refused("form_mm"):
-        expected = message(
-            "plan_form_part",
-            "found {common:g}, which is a part of form_mm; expected at most {whole:g}",
-            common=common,
-            whole=whole,
-        )
-        wall.tell(log.problem, "common_form_mm", expected)
 
 
 def _check_lines_and_ties(given, log):

@@ -13,6 +13,8 @@ __all__ = ["DESIGN", "FILES", "JOB", "PlanPaper", "refuse_foreign", "write"]
 
 JOB = "job"  # folder of the empty job
 DESIGN = "design"  # folder of the plan that a search ends with
+WRITING_JOB = message("plan_writing_job", "writing the empty job")
+WRITING_TABLES = message("plan_writing_tables", "writing the tables")
 FILES = (
     *("plan.json", "points.csv", "sections.csv", "capacity.csv", "changes.csv", "design.csv"),
     *("changes.png", "prediction.pdf", "field-sheets.pdf", "field-sheets.xlsx"),
@@ -63,9 +65,9 @@ def _write(paper, folder, progress):
     from tankcal.report.planning.field_sheets import sheets
     from tankcal.report.planning.outlook import outlook
 
-    progress(message("plan_writing_job", "writing the empty job"))
+    progress(WRITING_JOB)
     empty_job.write(paper.prediction, folder / JOB)
-    progress(message("plan_writing_tables", "writing the tables"))
+    progress(WRITING_TABLES)
     files.write(paper, folder, empty_job.fingerprints(folder / JOB))
     workbook.write(paper, folder / "field-sheets.xlsx")
     _set(paper, folder, progress, outlook(paper), sheets(paper))
@@ -76,9 +78,9 @@ def _write_wall(paper, folder, progress):
     from tankcal.report.planning import empty_job, wall_files
     from tankcal.report.planning.wall_paper import wall_outlook, wall_sheets
 
-    progress(message("plan_writing_job", "writing the empty job"))
+    progress(WRITING_JOB)
     wall_files.write_empty_job(paper.prediction, folder / JOB)
-    progress(message("plan_writing_tables", "writing the tables"))
+    progress(WRITING_TABLES)
     wall_files.write_wall(paper, folder, empty_job.fingerprints(folder / JOB))
     _set(paper, folder, progress, wall_outlook(paper), wall_sheets(paper))
 

@@ -16,6 +16,7 @@ from tankcal.report.workbook.papers import (
     lines_sheet,
     provenance_sheet,
     strapping_sheet,
+    tangents_sheet,
 )
 from tankcal.report.workbook.parts import (
     densities_sheet,
@@ -83,6 +84,8 @@ def _sheets_of_tank(book, record):
         lines_sheet(book, record)
     if record.get("hits"):
         hits_sheet(book, record)
+    if record.get("tangents"):
+        tangents_sheet(book, record)
     corrections_sheet(book, record)
     inside_sheet(book, record)
     budget_sheet(book, record)

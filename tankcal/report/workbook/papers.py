@@ -1,6 +1,6 @@
 """The working papers: courses, corrections, choices and provenance."""
 
-from tankcal.report.tables import hits, lines, strapping, tank
+from tankcal.report.tables import hits, lines, strapping, tangents, tank
 from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
@@ -64,6 +64,16 @@ def hits_sheet(book, record):
     tables = [
         (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
         for table in chosen
+    ]
+    write_tables(book, sheet, _HEAD_ROW, tables)
+
+
+def tangents_sheet(book, record):
+    """Set-ups of tangents, levels with perimeter and area, every sight."""
+    sheet = book.sheet("tangents", book.word("texts.tangents_subtitle"), landscape=True)
+    tables = [
+        (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
+        for table in (tangents.SETUPS, tangents.LEVELS, tangents.READINGS)
     ]
     write_tables(book, sheet, _HEAD_ROW, tables)
 

@@ -5,7 +5,7 @@ in excess) is told after it.
 """
 
 from tankcal.job.checking import has_rows, tell
-from tankcal.job.checks.extent import has_hits, has_survey
+from tankcal.job.checks.extent import has_survey, is_sighted
 from tankcal.job.checks.survey.cameras import check_cameras
 from tankcal.job.checks.survey.datum import check_datum, check_held, check_known
 from tankcal.job.checks.survey.doubtful import check_doubtful
@@ -15,6 +15,7 @@ from tankcal.job.checks.survey.images import check_images
 from tankcal.job.checks.survey.instruments import check_instruments
 from tankcal.job.checks.survey.names import check_names
 from tankcal.job.checks.survey.readings import check_correlated, check_readings
+from tankcal.job.checks.survey.stadia import check_stadia
 from tankcal.job.contract import KEYS
 from tankcal.job.tables import SURVEY_TABLES
 from tankcal.messages import message
@@ -28,7 +29,7 @@ def check_survey(values, tables, registers, raw, is_whole, log):
     is_whole  False: the survey alone is asked for, so that it must be there
     """
     if not has_survey(tables):
-        if not (is_whole and has_hits(tables)):
+        if not (is_whole and is_sighted(tables)):
             _tell_nothing_to_adjust(values, tables, raw, is_whole, log)
         return
     if is_whole and has_rows(tables["points"]):
@@ -45,6 +46,7 @@ def check_survey(values, tables, registers, raw, is_whole, log):
     check_instruments(files)
     check_images(files)
     check_readings(files)
+    check_stadia(files)
     check_known(files)
     check_names(files)
     check_held(files)

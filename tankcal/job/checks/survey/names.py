@@ -12,6 +12,7 @@ KNOWN = (("control", "point"), ("check", "point"), ("targets", "point"), ("setup
 def _columns():
     """(table, column) of every name of a point that is observed."""
     yield "image_points", "point"
+    yield "stadia", "to"
     for name in READINGS:
         for column in ("at", "from", "to"):
             yield name, column

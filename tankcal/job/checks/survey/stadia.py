@@ -1,0 +1,69 @@
+"""Readings of a stadia: its bar described, its set-ups known, its angles those of a distance."""
+
+from tankcal.job.checking import has_rows
+from tankcal.job.checks.survey.files import refuse_undefined
+from tankcal.job.checks.survey.readings import check_angle
+from tankcal.job.contract.stadia import KIND
+from tankcal.messages import message
+
+
+def bars_of(registers):
+    """{name: {key: value}} of the stadias of instruments.toml."""
+    instruments = registers["instruments"]
+    return {name: one for name, one in instruments.items() if is_bar(one["kind"])}
+
+
+def is_bar(kind):
+    """Is it the kind of a stadia, however it is written?"""
+    return (kind or "").strip().lower() == KIND
+
+
+def bars_used(table, bars):
+    """(n,) the bar of each reading: the only one where it is blank; None: there are more."""
+    usual = next(iter(bars)) if len(bars) == 1 else None
+    return [usual if name is None else name for name in table.of("bar")]
+
+
+def check_stadia(files):
+    """All readings of stadias, and the bars that they name."""
+    table, bars = files.tables["stadia"], bars_of(files.registers)
+    for name, given in bars.items():
+        for key in ("length_m", "u_mm"):
+            if given[key] is None and has_rows(table):
+                expected = message(
+                    "bar_not_described",
+                    "missing; expected it of a stadia: distances are read against its length",
+                )
+                files.tell_key(files.log.problem, "instruments", name, key, expected)
+    if not has_rows(table):
+        return
+    setups = files.tables["setups"]
+    defined = () if setups is None else dict.fromkeys(setups.of("setup"))
+    refuse_undefined(files, table, "setup", defined, "setups")
+    check_angle(files, table, "angle")
+    if files.raw.registers.get("instruments", 0) is None:  # unreadable, which is told
+        return
+    used = bars_used(table, bars)
+    stations = {}
+    if setups is not None:
+        stations = dict(zip(setups.of("setup"), setups.of("station"), strict=True))
+    told = set()
+    for row, setup, to, bar in zip(
+        table.rows, table.of("setup"), table.of("to"), used, strict=True
+    ):
+        if bar not in bars and bar not in told:
+            told.add(bar)
+            expected = message(
+                "no_such_bar",
+                "found {name!r}; expected a stadia of {file}: kind = stadia, length_m, u_mm",
+                name=bar or "",
+                file=files.raw.file_of("instruments"),
+            )
+            files.log.problem(table.file, expected, row, "bar")
+        if to is not None and stations.get(setup) == to:
+            expected = message(
+                "stadia_at_itself",
+                "found station {to!r} of the set-up itself; expected another one",
+                to=to,
+            )
+            files.log.problem(table.file, expected, row, "to")

@@ -1,0 +1,44 @@
+"""The table of stadia readings: a bar of known length, and the angle between its ends."""
+
+from tankcal.job.contract.observations import USE, angle_fields
+from tankcal.job.fields import Field
+
+LEAST = 3e-4  # of a turn: 2 m at 1 km; a bar farther away tells no distance
+STADIA = (
+    Field("setup", "name", "the set-up that reads it, as in setups.csv", required=True),
+    Field("to", "name", "the station that the middle of the bar stands over", required=True),
+    Field("bar", "name", "stadia of instruments.toml; blank: the only one there"),
+    *angle_fields("angle", "horizontal angle between the ends of the bar", (LEAST, 0.25)),
+    Field(
+        "s_arcsec",
+        "number",
+        "standard deviation of that angle, seconds of arc",
+        required=True,
+        low=0,
+        high=1e4,
+        above_low=True,
+    ),
+    USE,
+)
+COLUMNS = {"stadia": STADIA}
+KIND = "stadia"  # of an instrument
+BAR = (  # keys of instruments.toml
+    Field(
+        "length_m",
+        "number",
+        "distance between the marks of a stadia, metres",
+        low=0.1,
+        high=10,
+    ),
+    Field(
+        "u_mm",
+        "number",
+        "standard uncertainty of that distance, millimetres",
+        low=0,
+        high=100,
+    ),
+)
+BESIDE = (  # of a triangulation
+    *("setups", "directions", "zenith_angles", "targets", "control", "check"),
+    *("distances", "height_differences", "correlated_readings"),
+)

@@ -1,0 +1,31 @@
+"""From the checked table of tangents to `Tangents`, all in SI."""
+
+import numpy as np
+
+from tankcal.job.checks.extent import has_tangents
+from tankcal.job.measuring import ARCSEC, angle_in_rad, setups_of
+from tankcal.survey.tangents import Tangents
+
+
+def make_tangents(tables, registers):
+    """Tangents of tables and registers without problems; None: there are none."""
+    if not has_tangents(tables):
+        return None
+    table = tables["tangents"]
+    return Tangents(
+        setup=tuple(table.of("setup")),
+        set=tuple(table.of("set")),
+        course=tuple(table.of("course")),
+        level_m=table.numbers("level_m"),
+        is_right=np.array([side == "right" for side in table.of("side")], dtype=bool),
+        direction_rad=angle_in_rad(table, "direction"),
+        zenith_rad=angle_in_rad(table, "zenith"),
+        sd_rad=table.numbers("s_arcsec") * ARCSEC,
+        check=np.array([use == "check" for use in table.of("use")], dtype=bool),
+        setups={one.name: one for one in setups_of(tables["setups"])},
+        certificates={
+            name: given["certificate"] or "" for name, given in registers["instruments"].items()
+        },
+        rows=table.rows,
+        file=table.file,
+    )

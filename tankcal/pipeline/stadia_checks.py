@@ -1,0 +1,55 @@
+"""The exchange rule of a stadia: a base comes out the same from both of its ends, and again."""
+
+from itertools import chain
+
+import numpy as np
+
+from tankcal.errors import Problem
+from tankcal.messages import message
+from tankcal.pipeline.rule_limits import limits_of
+
+KIND = "stadia"  # of an instrument
+
+
+def check_bases(measurements):
+    """`Problem`s of the bases that stadias were read over."""
+    if measurements is None:
+        return ()
+    bars = {one.name for one in measurements.instruments if one.kind == KIND}
+    bases = {}
+    for table in measurements.readings:
+        if table.table != "distances":
+            continue
+        for i, name in enumerate(table.instrument):
+            if name in bars:
+                key = tuple(sorted((table.start[i], table.end[i])))
+                row = table.rows[i] if table.rows else None
+                reading = table.start[i], float(table.value[i]), row, table.file
+                bases.setdefault(key, []).append(reading)
+    return tuple(chain.from_iterable(_of_base(*item) for item in bases.items()))
+
+
+def _of_base(ends, readings):
+    starts, lengths, rows, files = zip(*readings, strict=True)
+    if len(set(starts)) < 2:
+        text = message(
+            "base_from_one_end",
+            "the base {first} to {second} was read with the stadia at one end only; expected it"
+            " again with theodolite and stadia exchanged",
+            first=ends[0],
+            second=ends[1],
+        )
+        yield Problem(files[0], text, rows[0], "to")
+    limit, spread = limits_of("tangents")["base_mm"] / 1000, float(np.ptp(lengths))
+    if spread > limit * (1 + 1e-9):
+        worst = int(np.argmax(np.abs(np.array(lengths) - np.median(lengths))))
+        text = message(
+            "base_differs",
+            "the base {first} to {second} comes out {spread_mm:.1f} mm apart, over the limit of"
+            " {limit_mm:g} mm: did the stadia or the theodolite move, or is an angle wrong?",
+            first=ends[0],
+            second=ends[1],
+            spread_mm=1000 * spread,
+            limit_mm=1000 * limit,
+        )
+        yield Problem(files[worst], text, rows[worst], "to")

@@ -1,0 +1,253 @@
+"""How tangents agree with the wall and with each other, and what is to be said about it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import chdtri
+
+from tankcal.errors import Problem
+from tankcal.geometry.field.amplitudes import estimate_amplitudes
+from tankcal.geometry.field.blunders import restricted_precision
+from tankcal.geometry.field.sites import free_design
+from tankcal.geometry.shell import course_of
+from tankcal.messages import list_some, message
+from tankcal.pipeline.rule_limits import limit_at, limits_of
+from tankcal.pipeline.told_causes import noise_of_wall
+from tankcal.pipeline.wall import joints_of
+from tankcal.survey.network.reliability import noncentrality
+
+RULES = "tangents"
+ALPHA = 0.001  # of the test of a set-up, over the number of set-ups
+SHOWN = 5
+SUSPECT = 2.0  # test quantity of the worst set-up, from which it is tested by all others
+MANY_LEVELS = 0.5  # of them, off: it is the heights as a whole
+LOST = 0.5  # of the tangents of a set-up, rejected: the set-up is to blame
+
+
+@dataclass(frozen=True)
+class TangentTests:
+    """What became of tangents; n sights, in the order of their file.
+
+    Attributes
+    ----------
+    used : ndarray of bool, shape (n,)
+        The wall is known from them.
+    departure_m : ndarray, shape (n,)
+        Outwards, from the wall as all others have it; nan: only compared.
+    w : ndarray, shape (n,)
+        That over its standard deviation; nan: no test was made.
+    redundancy : ndarray, shape (n,)
+        Share of a change of the reading that shows in it; nan: no test was made.
+    mdb_m : ndarray, shape (n,)
+        Smallest blunder of the tangent's distance that the test finds; nan: no test was made.
+    setups : dict
+        {set-up: (w of a disturbed set-up, its turn rad, or its shift (2,) m)}.
+    """
+
+    used: np.ndarray
+    departure_m: np.ndarray
+    w: np.ndarray
+    redundancy: np.ndarray
+    mdb_m: np.ndarray
+    setups: dict
+
+
+def least_tangents(job):
+    """How many tangents a level of a tank of that circumference should have."""
+    return limit_at(RULES, "tangents", "least", np.pi * job.tank.nominal_diameter_m)
+
+
+def judge_tangents(job, wall, touching):
+    """`TangentTests` of the tangents of a wall."""
+    n = len(job.tangents)
+    counted = np.flatnonzero(~job.tangents.check)  # the order of the job's points
+    departure, w, redundancy, mdb = np.full((4, n), np.nan)
+    departure[counted], w[counted] = wall.shell.residual_m, wall.shell.w
+    used = np.zeros(n, dtype=bool)
+    used[counted[wall.accepted]] = True
+    order = np.concatenate([one.group.members for one in wall.sections])
+    sites = len(wall.field.radius_m) - len(wall.readings)
+    if sites != len(order):  # several in a cell
+        return TangentTests(used, departure, w, redundancy, mdb, {})
+    at = counted[wall.accepted[order]]  # of each reading of the field, among all sights
+    field = wall.field
+    whole = field.covariance_m2 + noise_of_wall(wall) - field.noise_m2
+    precision, pull = _tested(field, whole, sites)
+    weight = np.maximum(np.diag(precision), 1e-300)
+    departure[at], w[at] = pull / weight, pull / np.sqrt(weight)
+    own = (job.tangents.sd_rad * touching.length_m) ** 2 + touching.excess[2] ** 2
+    redundancy[at] = np.clip(own[at] * weight, 0, 1)
+    mdb[at] = noncentrality() / np.sqrt(weight)
+    names = np.array(job.tangents.setup)[at]
+    setups = {
+        name: _as_if_moved(touching, at, names == name, precision, pull)
+        for name in dict.fromkeys(job.tangents.setup)
+        if np.any(names == name)
+    }
+    suspect = max(setups, key=lambda one: setups[one][0])
+    if setups[suspect][0] > SUSPECT:
+        mine = names == suspect
+        other = _without(field, whole - field.covariance_m2, mine)
+        if other is not None:
+            setups[suspect] = _as_if_moved(touching, at, mine, *_tested(field, other, sites))
+    return TangentTests(used, departure, w, redundancy, mdb, setups)
+
+
+def _tested(field, whole, count):
+    """P and P y of the first readings of a field (`field.blunders`)."""
+    precision = restricted_precision(whole, free_design(field.sites)[0])
+    pull = precision @ (field.radius_m - field.radius_m.mean())
+    return precision[:count, :count], pull[:count]
+
+
+def _without(field, more_m2, mine):
+    """Covariance of the readings with amplitudes that those of a set-up do not tell; None: the
+    others tell nothing.
+
+    A set-up that was moved looks like a form of the wall, if it is asked itself how large that is.
+    """
+    keep = np.ones(len(field.radius_m), dtype=bool)
+    keep[: len(mine)] = ~mine
+    noise = (field.noise_m2 + more_m2)[np.ix_(keep, keep)]
+    if len(np.unique(field.sites.course[keep])) < len(np.unique(field.sites.course)):
+        return None
+    known = estimate_amplitudes(
+        field.sites.take(keep), field.radius_m[keep], noise, field.nominal_m
+    )
+    return replace(field, amplitudes=known).covariance_m2 + more_m2
+
+
+def _as_if_moved(touching, at, mine, precision, pull):
+    """(w, turn, shift) of a set-up whose readings are mine: of all that may move at once, and of
+    its circle, or its station, alone.
+    """
+    f = touching.normal_rad[at]
+    length = np.where(touching.seen_right[at], 1.0, -1.0) * touching.length_m[at]
+    columns = np.column_stack([length, np.sin(f), np.cos(f)]) * mine[:, None]
+    scale = np.maximum(np.abs(columns).max(axis=0), 1e-9)
+    columns = columns / scale
+    normal, right = columns.T @ precision @ columns, columns.T @ pull
+    statistic = float(right @ np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ right)
+    turn = right[0] / max(normal[0, 0], 1e-300) / scale[0]
+    shift = np.linalg.pinv(normal[1:, 1:], rcond=1e-6, hermitian=True) @ right[1:] / scale[1:]
+    return np.sqrt(max(statistic, 0.0)), float(turn), tuple(shift.tolist())
+
+
+def critical_of_setup(count):
+    """Test quantity from which one of so many set-ups counts as disturbed."""
+    return float(np.sqrt(chdtri(3, ALPHA / max(count, 1))))
+
+
+def check_tangents(job, wall, touching):
+    """`Problem`s of the tangents of a wall."""
+    tests = judge_tangents(job, wall, touching)
+    return (
+        *_of_levels(job, wall),
+        *_of_heights(job, touching),
+        *_of_setups(job, tests),
+    )
+
+
+def _of_levels(job, wall):
+    least = least_tangents(job)
+    few = [one.group.name for one in wall.sections if len(one.group.members) < least]
+    if few:
+        text = message(
+            "few_tangents",
+            "levels {levels} have fewer than {least} tangents, as many as a circumference of"
+            " {girth_m:.0f} m asks for",
+            levels=list_some(few, SHOWN),
+            least=least,
+            girth_m=np.pi * job.tank.nominal_diameter_m,
+        )
+        yield Problem(job.tangents.file, text)
+    courses = [section.group.course for section in wall.sections]
+    least = limits_of(RULES)["levels_a_course"]
+    short = [
+        course.name for index, course in enumerate(job.courses) if courses.count(index) < least
+    ]
+    if short:
+        text = message(
+            "few_levels_of_tangents",
+            "courses {courses} were sighted at fewer than {least} levels: nothing shows a taper"
+            " there",
+            courses=list_some(short, SHOWN),
+            least=least,
+        )
+        yield Problem(job.tangents.file, text)
+
+
+def _of_heights(job, touching):
+    """Tangents that touch the wall at another height than their level, or on another course."""
+    tangents, names = job.tangents, [course.name for course in job.courses]
+    above = touching.points.xyz_m[:, 2] - job.datum.bottom_z_m
+    off = above - job.datum.plate_level_m - tangents.level_m
+    there = course_of(above, joints_of(job))
+    most = limits_of(RULES)["level_m"]
+    wrong = {}
+    for place in np.flatnonzero(np.abs(off) > most):
+        key = tangents.course[place], float(tangents.level_m[place]), names[int(there[place])]
+        wrong.setdefault(key, []).append(place)
+    if len(wrong) > MANY_LEVELS * len(tangents.levels[1]):
+        text = message(
+            "tangents_off_levels",
+            "the tangents touch the wall {off:+.2f} m from their levels: are bottom_z_m, the"
+            " heights of the stations or those of the instruments wrong?",
+            off=float(np.median(off)),
+        )
+        yield Problem(tangents.file, text, None, "level_m")
+        return
+    for (course, level, other), places in wrong.items():
+        text = message(
+            "tangents_at_other_level",
+            "{count} tangents of {level:g} m on course {course!r} touch the wall {off:+.2f} m from"
+            " there, on course {other!r}: is the level wrong, or the zenith angle, bottom_z_m or"
+            " the height of the instrument?",
+            count=len(places),
+            level=level,
+            course=course,
+            off=float(np.median(off[places])),
+            other=other,
+        )
+        yield Problem(tangents.file, text, _row(tangents, places[0]), "level_m")
+
+
+def _row(tangents, place):
+    return tangents.rows[place] if tangents.rows else None
+
+
+def _of_setups(job, tests):
+    """The set-up that contradicts all others most, where one does."""
+    counts = {name: [] for name in dict.fromkeys(job.tangents.setup)}
+    for name, check, used in zip(job.tangents.setup, job.tangents.check, tests.used, strict=True):
+        if not check:
+            counts[name].append(used)
+    for name, kept in counts.items():
+        if kept and np.mean(kept) < LOST:
+            text = message(
+                "setup_rejected",
+                "{count} of the {all} tangents from set-up {setup!r} contradict all others: was it"
+                " disturbed, or is its station or the zero of its circle wrong?",
+                count=len(kept) - sum(kept),
+                all=len(kept),
+                setup=name,
+            )
+            yield Problem("setups.csv", text, job.tangents.setups[name].row, "setup")
+            return
+    if not tests.setups:
+        return
+    name = max(tests.setups, key=lambda one: tests.setups[one][0])
+    w, turn, shift = tests.setups[name]
+    if w > critical_of_setup(len(tests.setups)):
+        text = message(
+            "setup_disturbed",
+            "the tangents from set-up {setup!r} contradict all others (w = {w:.1f}), as if its"
+            " circle were turned by {turn_arcsec:+.0f} seconds of arc, or its station moved by"
+            " {shift_mm:.1f} mm: was it disturbed after the traverse, or has the wall a seam"
+            " there?",
+            setup=name,
+            w=w,
+            turn_arcsec=float(np.degrees(turn) * 3600),
+            shift_mm=1000 * float(np.hypot(*shift)),
+        )
+        yield Problem("setups.csv", text, job.tangents.setups[name].row, "setup")

@@ -1,0 +1,89 @@
+"""What record, papers and workbook say of tangents, of the shipped example."""
+
+import json
+from pathlib import Path
+
+import openpyxl
+import pytest
+
+import tankcal
+from tankcal.record import record_of
+from tankcal.report import workbook
+from tankcal.report.plain import PlainPaper
+from tankcal.report.tables import tangents
+from tankcal.text.languages import LANGUAGES
+from tankcal.text.words import load_words, translate_record
+
+EXAMPLE = Path("examples/tangents")
+
+
+@pytest.fixture(scope="module")
+def result():
+    return tankcal.run(tankcal.load(EXAMPLE), simulated=False)
+
+
+@pytest.fixture(scope="module")
+def record(result):
+    return record_of(result)
+
+
+def test_the_truth_is_within_U(result, figure):
+    """Simulation: its truth is a wall of seams and waves that the sights were turned to touch."""
+    truth = json.loads((EXAMPLE / "truth.json").read_text("utf-8"))["volume_m3"]
+    error = result.table.volume_m3[-1] - truth
+    figure("error over U of examples/tangents", f"{error / result.table.U_m3[-1]:.2f}")
+    assert abs(error) < result.table.U_m3[-1]
+
+
+def test_the_two_sights_that_met_a_rail_are_set_aside(record):
+    gone = [one for one in record["tangents"]["readings"] if not one["used"] and one["w"]]
+    assert [(one["setup"], one["side"]) for one in gone] == [("I3", "right"), ("I6", "right")]
+    assert all(one["departure_m"] > 0.02 for one in gone)
+
+
+def test_every_set_up_and_level_is_there(record):
+    said = record["tangents"]
+    assert len(said["setups"]) == 8
+    assert sum(one["tangents"] for one in said["setups"]) == 156
+    assert sum(one["checks"] for one in said["setups"]) == 2
+    assert [one["level_m"] for one in said["levels"]] == sorted(
+        one["level_m"] for one in said["levels"]
+    )
+    for one in said["levels"]:
+        assert one["area_m2"] == pytest.approx(one["wall_area_m2"], rel=2e-4)
+        assert one["perimeter_m"] ** 2 / (4 * 3.141592653589793) >= one["area_m2"]
+    assert said["excess_m"] > 0
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_table_has_words(record, language):
+    words = load_words(language)
+    paper, said = PlainPaper(words), translate_record(words, record)
+    for table in (tangents.SETUPS, tangents.LEVELS, tangents.READINGS):
+        assert table.rows(said)
+        assert paper.word(f"captions.{table.name}")
+        for column in table.columns:
+            assert paper.word(f"table_headings.{column.heading or column.key}")
+
+
+def test_the_workbook_has_a_sheet(record, tmp_path):
+    workbook.write(record, tmp_path / "capacity.xlsx")
+    sheet = openpyxl.load_workbook(tmp_path / "capacity.xlsx")["Tangents"]
+    cells = [cell.value for row in sheet.iter_rows() for cell in row if cell.value is not None]
+    assert cells.count("I1") == 1 + 20
+    assert {"left", "right", "TS"} <= set(cells)
+
+
+def test_instruments_of_tangents_are_on_the_certificate(record):
+    from tankcal.report.certificate import _instruments
+
+    class Paper:
+        def __init__(self):
+            self.record, self.words = record, load_words("en")
+
+        def word(self, key, **values):
+            return PlainPaper(self.words).word(key, **values)
+
+    said = _instruments(Paper())
+    assert "TS-2026-03" in said
+    assert "B-2025-17" in said
