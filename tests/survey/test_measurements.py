@@ -36,6 +36,12 @@ def table_of(survey, name):
 def test_folder_and_workbook_give_the_same_survey(tmp_path, tank):
     only = None if tank else "adjustment"
     parts = read_on_comparator(survey_parts(tank=tank))
+    base = np.hypot(*np.subtract(PLACES["S2"], PLACES["S1"])[:2])
+    parts.registers["instruments"]["bar"] = {"kind": "stadia", "length_m": 2.0, "u_mm": 0.02}
+    parts.tables["stadia"] = [
+        ["setup", "to", "bar", "angle_deg", "s_arcsec"],
+        ["1", "S2", "bar", float(np.degrees(2 * np.arctan(1 / base))), 1.0],
+    ]
     folder = load(write_folder(tmp_path / "job", parts), only=only)
     assert_same_job(folder, load(write_book(tmp_path / "job.xlsx", parts), only))
     assert folder.warnings == ()
