@@ -10,7 +10,6 @@ from tankcal.planning.model import Box, Known, Limits, Pillar, Plan, Tie
 from tankcal.planning.patterns import photographs_of, setups_of, shell_of, tape_of, targets_of
 
 INCIDENCE_DEG, RAYS = 70.0, 3
-HIGHEST_MODE = 1000  # of the sum that turns an rms departure into an amplitude
 
 
 def assemble_plan(job, given, folder):
