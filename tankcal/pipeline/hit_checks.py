@@ -6,7 +6,7 @@ from tankcal.errors import Problem
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.shell import course_of
 from tankcal.messages import list_some, message
-from tankcal.pipeline.rule_limits import limit_at, limits_of
+from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.control_drift import repeats_of
 

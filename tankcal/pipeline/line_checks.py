@@ -6,8 +6,8 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
-from tankcal.pipeline.rule_limits import limit_at, limits_of
 from tankcal.pipeline.strapped_wall import StrappedWall
+from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.survey.reference_line import (
     ARCSEC,
     collimation_by_faces,

@@ -6,7 +6,7 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
-from tankcal.pipeline.rule_limits import limits_of
+from tankcal.pipeline.survey_limits import limits_of
 
 KIND = "stadia"  # of an instrument
 

@@ -12,7 +12,7 @@ from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import check_side
-from tankcal.pipeline.rule_limits import limit_at
+from tankcal.pipeline.survey_limits import limit_at
 
 FILE = "circumferences.csv"
 FAHRENHEIT_K = 8.0  # from the shell's: so near a temperature in Fahrenheit is that of the shell

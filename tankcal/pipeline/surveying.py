@@ -13,11 +13,11 @@ from tankcal.job.model import Job
 from tankcal.job.tables import in_book
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
+from tankcal.pipeline.hit_wall import find_hit_wall
 from tankcal.pipeline.scan import Scan, fit_scan
-from tankcal.pipeline.sighted import find_hit_wall
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.survey_warnings import refuse_undetermined
-from tankcal.pipeline.touched import find_tangent_wall
+from tankcal.pipeline.tangent_wall import find_tangent_wall
 from tankcal.pipeline.wall import Wall, find_wall, s_transform
 from tankcal.survey import Adjustment, adjust_survey, wall_points
 from tankcal.survey.sighting import Sighting

@@ -11,8 +11,8 @@ from tankcal.geometry.field.blunders import restricted_precision
 from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.shell import course_of
 from tankcal.messages import list_some, message
-from tankcal.pipeline.rule_limits import limit_at, limits_of
-from tankcal.pipeline.told_causes import noise_of_wall
+from tankcal.pipeline.cause_correlations import noise_of_wall
+from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.network.reliability import noncentrality
 

@@ -15,7 +15,7 @@ from tankcal.geometry.outlines import FULL_TURN, polar
 from tankcal.geometry.shell import Shell, course_of, find_shell
 from tankcal.messages import message
 from tankcal.pipeline.read_wall import ReadWall
-from tankcal.pipeline.rule_limits import limits_of
+from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.survey_warnings import (
     ADVISED_POINTS,
     FEWEST_POINTS,
@@ -26,7 +26,7 @@ from tankcal.pipeline.survey_warnings import (
     warn_of_vague_vertical,
     weak_sections,
 )
-from tankcal.pipeline.unbound import unbound_of
+from tankcal.pipeline.untied_setups import unbound_of
 from tankcal.pipeline.wall_readings import (
     factors_of_plates,
     factors_of_readings,

@@ -19,7 +19,7 @@ from tankcal.geometry.girth import perimeter_excess
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.tanks import insets_of
-from tankcal.pipeline.unbound import Unbound
+from tankcal.pipeline.untied_setups import Unbound
 from tankcal.pipeline.wall_readings import (
     columns_of,
     noise_by_inputs,

@@ -10,10 +10,14 @@ from tankcal.job.model import InputFile
 from tankcal.job.model.parts import Course, Deadwood
 from tankcal.job.model.settings import Datum, Material, Survey, Switches, TableSpec, Tank
 from tankcal.pipeline.corrections import Correction
-from tankcal.record import plumbed, sighted, statements, straps, survey, table, texts, touched
+from tankcal.record import statements, survey, table, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
+from tankcal.record.hits import HitsRecord, hits_of
+from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.plain_data import to_plain
 from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.strapping import StrappingRecord, strapping_of
+from tankcal.record.tangents import TangentsRecord, tangents_of
 from tankcal.record.versions import FORMAT
 from tankcal.tank.deliveries import WorstDeliveries
 
@@ -52,16 +56,16 @@ class Record(Saved, kw_only=True):
     points: list[survey.SurveyedPoint] = key("of an adjusted survey every adjusted point first")
     rejected: list[survey.RejectedPoint] = key("points that are not on the wall", default=())
     sections: list[survey.SectionCircle] = key("from the bottom up", default=())
-    strapping: straps.StrappingRecord | None = key(
+    strapping: StrappingRecord | None = key(
         "circumferences by tape; left out where there are none", default=None, optional=True
     )
-    lines: plumbed.LinesRecord | None = key(
+    lines: LinesRecord | None = key(
         "reference lines; left out where there are none", default=None, optional=True
     )
-    hits: sighted.HitsRecord | None = key(
+    hits: HitsRecord | None = key(
         "bare wall hits; left out where there are none", default=None, optional=True
     )
-    tangents: touched.TangentsRecord | None = key(
+    tangents: TangentsRecord | None = key(
         "tangents from outside; left out where there are none", default=None, optional=True
     )
     courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
@@ -99,10 +103,10 @@ def record_of(result):
             points=survey.points_of(result),
             rejected=survey.rejected_of(result),
             sections=survey.sections_of(result),
-            strapping=straps.strapping_of(result),
-            lines=plumbed.lines_of(result),
-            hits=sighted.hits_of(result),
-            tangents=touched.tangents_of(result),
+            strapping=strapping_of(result),
+            lines=lines_of(result),
+            hits=hits_of(result),
+            tangents=tangents_of(result),
             courses=survey.courses_of(result),
             capacity=table.capacity_of(result),
             interpolation=filled_from(table.InterpolationError, result.straightness),

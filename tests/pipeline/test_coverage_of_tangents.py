@@ -13,8 +13,8 @@ from generated_tangents import tangent_job
 from generated_walls import make_wall
 from test_coverage_of_walls import judged, study
 
+from tankcal.pipeline.tangent_wall import touch_wall
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.touched import touch_wall
 
 STATIONS = {1: 6, 2: 8, 3: 12}
 

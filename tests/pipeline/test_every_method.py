@@ -15,7 +15,7 @@ from generated_strapping import shape_of, strapped_job
 from generated_walls import FAMILIES, job_of, make_wall, survey
 from test_coverage_of_walls import judged
 
-from tankcal.pipeline.sighted import sight_wall
+from tankcal.pipeline.hit_wall import sight_wall
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall import find_wall

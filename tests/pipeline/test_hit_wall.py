@@ -21,8 +21,8 @@ from generated_hits import (
 from job_builder import hit_parts, write_book, write_folder
 
 import tankcal
-from tankcal.pipeline.sighted import take_points
-from tankcal.pipeline.told_causes import told_causes
+from tankcal.pipeline.cause_correlations import told_causes
+from tankcal.pipeline.hit_wall import take_points
 from tankcal.survey import adjust_survey, wall_points
 
 FOOT, SLOPE, HEIGHT = (1.0, -0.5), (0.002, -0.001), 8.0

@@ -9,11 +9,11 @@ from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.estimate import LEVELS
 from tankcal.geometry.field.information import expect_amplitudes
 from tankcal.job.model import Job
+from tankcal.pipeline.cause_correlations import noise_of_wall
 from tankcal.pipeline.statements import statements
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import ComputedTable, check_table, compute_table
-from tankcal.pipeline.told_causes import noise_of_wall
 from tankcal.planning.limits import limited_u, refuse_without_delivery
 from tankcal.planning.wall.model import WallPlan
 from tankcal.planning.wall.telling import told_of_plan

@@ -11,8 +11,8 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.geometry.girth import tangent_excess
 from tankcal.messages import message
+from tankcal.pipeline.hit_wall import take_points
 from tankcal.pipeline.misread_tangents import refuse_limbs, refuse_misread
-from tankcal.pipeline.sighted import take_points
 from tankcal.pipeline.wall import find_wall, s_transform
 from tankcal.survey.poses import poses_in_network
 from tankcal.survey.sighting import WALL

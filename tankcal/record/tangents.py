@@ -4,8 +4,8 @@ import numpy as np
 
 from tankcal.geometry.support import fit_support
 from tankcal.pipeline.tangent_checks import critical_of_setup, judge_tangents, least_tangents
+from tankcal.record.hits import departure_from_sections
 from tankcal.record.schema import Saved, key
-from tankcal.record.sighted import departure_from_sections
 
 MOST_WAVES, PER_WAVE = 6, 4  # highest order of a level's curve; tangents for each of its orders
 

@@ -8,8 +8,8 @@ from tankcal.errors import InputError, Problem
 from tankcal.geometry.shell import course_of
 from tankcal.job.checks.hits import offset_unknown
 from tankcal.messages import message
+from tankcal.pipeline.cause_correlations import told_causes
 from tankcal.pipeline.misread_hits import refuse_other_units
-from tankcal.pipeline.told_causes import told_causes
 from tankcal.pipeline.wall import find_wall, joints_of, s_transform
 from tankcal.sections import coordinates_of
 from tankcal.survey.poses import poses_of
