@@ -33,7 +33,9 @@ def test_the_record_has_every_reading(strapped):
     assert [one.circumference for one in found.readings] == [
         one.strap.name for one in result.strapped.reduced
     ]
-    steps = ("certificate", "temperature", "tension", "tape_thickness", "rise", "out_of_level")
+    steps = (
+        *("certificate", "temperature", "tension", "tape_thickness", "rise", "sag", "out_of_level"),
+    )
     for one in found.readings:
         corrected = one.reading_m + sum(getattr(one, f"{step}_m") for step in steps)
         assert one.circumference_m == pytest.approx(corrected, abs=1e-9)
