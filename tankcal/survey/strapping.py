@@ -259,7 +259,7 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
     obstructions = tuple(obstructions)
     steps["rise"] = -sum(one.excess(diameter_m) for one in obstructions)
     sag = sag_of(strap, tape, obstructions)
-    steps["sag"] = -sag.excess_m
+    steps["sag"] = 0.0 - sag.excess_m
     unlevel = _out_of_level(strapping, diameter_m)
     steps["out_of_level"] = -unlevel
     per_k = length * tape.expansion_per_k if tape.temperature_c is not None else 0.0

@@ -229,7 +229,7 @@ def _check_obstructions(table, names, log):
     refuse_others(table, "circumference", names, log)
     for place, (row, kind) in enumerate(zip(table.rows, table.of("kind"), strict=True)):
         for column in NEEDED.get(kind, ()):
-            if table.of(column)[place] is None:
+            if table.of(column)[place] is None and not log.has(table.file, row, column):
                 expected = message(
                     "obstruction_incomplete",
                     "blank; expected it of an obstruction of kind {of_kind}",
