@@ -12,6 +12,7 @@ import tankcal
 from tankcal.errors import InputError, SolutionError
 from tankcal.pipeline.strapped_wall import field_of_readings, find_strapped_wall
 from tankcal.pipeline.strapping_checks import limit_of_repeats
+from tankcal.survey.strapping import Obstruction
 
 OPEN = {0.9: 146.70404, 1.8: 293.40807, 3.6: 586.81461, 6.0: 978.05449, 8.4: 1369.27879}
 HEAD_850 = {0.9: 0.00428, 1.8: 0.01710, 3.6: 0.07056, 6.0: 0.20700, 8.4: 0.43102}
@@ -36,7 +37,7 @@ def test_tank_s_1(tmp_path, density):
 
 
 def test_folder_and_workbook_give_the_same(tmp_path):
-    parts = strapped_parts()
+    parts = with_span(strapped_parts(), count=2)
     parts.tables["thickness"] = [["course", "thickness_mm", "paint_mm"], ["1", 8.9, 0.2],
                                  ["1", 9.0, 0.3]]  # fmt: skip
     folder = tankcal.load(write_folder(tmp_path / "folder", parts))
@@ -46,6 +47,7 @@ def test_folder_and_workbook_give_the_same(tmp_path):
     ]
     assert folder.strapping.tapes == book.strapping.tapes
     assert folder.strapping.obstructions == book.strapping.obstructions
+    assert folder.strapping.obstructions["1a"][-1] == Obstruction("sag", 2, span_m=10.0)
     for job in (folder, book):
         assert job.courses[0].thickness_m == pytest.approx(0.00895)
         assert job.courses[0].paint_m == pytest.approx(0.00025)
@@ -88,6 +90,12 @@ def test_a_free_span_reaches_the_table(tmp_path):
     assert {one.kind for one in spanned.table.sources} >= {"tape_weight", "tape_tension"}
     rubbed = result_of(with_span(strapped_parts(), friction=0.2), tmp_path / "rubbed")
     assert {one.kind for one in rubbed.table.sources} >= {"tape_sag", "tape_friction"}
+
+
+def test_a_span_that_cannot_be_read_is_told_once(tmp_path):
+    with pytest.raises(InputError) as refused:
+        tankcal.load(write_folder(tmp_path, with_span(strapped_parts(), "wide")))
+    assert [(one.row, one.column) for one in refused.value.problems] == [(5, "span_m")]
 
 
 def test_a_weight_in_kilograms_is_told(tmp_path):
