@@ -87,6 +87,7 @@ def _tape(name, given):
         laying_m=(given["laying_mm"] or 0.0) / 1000,
         master=given["master"] or "",
         certificate=given["certificate"] or "",
+        weight_n_per_m=given["weight_n_per_m"] or 0.0,
     )
 
 
@@ -99,9 +100,10 @@ def _obstructions(table):
         return {}
     found = {}
     lengths = [f"{name}_mm" for name in ("thickness", "width", "over", "arc", "excess")]
-    columns = map(table.of, ("circumference", "kind", "count", *lengths, "s_mm"))
-    for name, kind, count, *sizes, s_mm in zip(*columns, strict=True):
-        one = Obstruction(kind, count or 1.0, *map(_metres, sizes), sd_m=(s_mm or 0.0) / 1000)
+    columns = map(table.of, ("circumference", "kind", "count", *lengths, "span_m", "s_mm"))
+    for name, kind, count, *sizes, span, s_mm in zip(*columns, strict=True):
+        sizes = map(_metres, sizes)
+        one = Obstruction(kind, count or 1.0, *sizes, span_m=span, sd_m=(s_mm or 0.0) / 1000)
         found.setdefault(name, []).append(one)
     return {name: tuple(those) for name, those in found.items()}
 

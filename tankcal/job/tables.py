@@ -82,6 +82,7 @@ class Log:
         self.problems = []
         self.warnings = []
         self._letters = {}
+        self._cells = set()  # with a problem
 
     def place_columns(self, file, letters):
         """Tell in which column of a sheet each heading stands: {heading: letters}.
@@ -93,10 +94,15 @@ class Log:
     def problem(self, file, expected, row=None, column=None):
         """Note one thing that stops the job; each text becomes one printable line."""
         self.problems.append(self._problem(file, expected, row, column))
+        self._cells.add((file, row, column))
 
     def warning(self, file, expected, row=None, column=None):
         """Note one thing that does not stop the job."""
         self.warnings.append(self._problem(file, expected, row, column))
+
+    def has(self, file, row, column):
+        """Is a problem of that cell noted already?"""
+        return (file, row, column) in self._cells
 
     def _problem(self, file, expected, row, column):
         letters = self._letters.get(file)

@@ -2,10 +2,10 @@
 
     strain = (F - F_cert) / (A E),   F the mean tension round the tank
     length = (reading + correction_mm) (1 + correction) (1 + a (T - T_cert)) (1 + strain)
-    circumference = length - pi d - sum of excesses,   d the thickness of the tape
+    circumference = length - pi d - sum of excesses - sag,   d the thickness of the tape
 
-A warm or a stretched tape reads too little. A tape whose temperature nobody read lies on the shell
-and has that of the shell.
+A warm or a stretched tape reads too little, one that hangs free over a span too much. A tape whose
+temperature nobody read lies on the shell and has that of the shell.
 
 Source: ISO 7507-1:2003; API MPMS 2.2A (methods); the formulas of excesses follow from plane
 geometry: a tape leaves a round shell on the two tangents from an edge.
@@ -15,11 +15,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-KINDS = ("butt_strap", "weld", "step", "lap", "step_over", "measured")
+from tankcal.survey.tape_tension import sag_of, strain_of
+
+KINDS = ("butt_strap", "weld", "step", "lap", "step_over", "measured", "sag")
 # what is assumed where a job says nothing: half-widths of rectangular distributions
 TAPE_TEMPERATURE_K = 2.0  # of a tape whose own temperature was read
 TENSION_SHARE = 0.1  # of the pull
 FRICTION_SHARE = 0.5  # of the coefficient
+WEIGHT_SHARE = 0.05  # of the weight of a metre
 RECTANGULAR = np.sqrt(3.0)
 
 
@@ -38,6 +41,8 @@ class Tape:
         Friction 0: a tension is that round the whole tank; else it is that of the pull.
     stiffness_n : float
         Section times Young's modulus; inf: it does not stretch.
+    weight_n_per_m : float
+        For the sag of free spans.
     u_scale, u_offset_m, laying_m : float
         Standard uncertainties; of the laying for each pull.
     master : str
@@ -59,6 +64,7 @@ class Tape:
     laying_m: float = 0.0
     master: str = ""
     certificate: str = ""
+    weight_n_per_m: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -77,7 +83,8 @@ class Obstruction:
     """What keeps a tape off the shell; lengths in m, None where its kind needs none.
 
     kind  "butt_strap" or "weld" (thickness, width), "step" or "lap" (thickness), "step_over" (over
-          the obstruction, and the shell's arc between the tool's legs) or "measured" (excess)
+          the obstruction, and the shell's arc between the tool's legs), "measured" (excess) or
+          "sag" (span that the tape hangs free over: see `tape_tension.sag_of`)
     """
 
     kind: str
@@ -87,14 +94,17 @@ class Obstruction:
     over_m: float | None = None
     arc_m: float | None = None
     excess_m: float | None = None
+    span_m: float | None = None
     sd_m: float = 0.0
 
     def excess(self, diameter_m):
-        """By how much the tape is longer than the shell's circumference, m.
+        """By how much the tape is longer than the shell's circumference, m; 0 of a free span.
 
         Of a butt strap or weld cap N (2 t W / D + (8/3) t sqrt(t / D)), of one step half the term
         of its tangents, of a lap joint that of half its thickness on each side.
         """
+        if self.kind == "sag":
+            return 0.0
         if self.kind == "measured":
             return self.count * self.excess_m
         if self.kind == "step_over":
@@ -200,7 +210,7 @@ class Reduced:
     circumference_m : float
     steps_m : dict
         {correction: what it adds}, in their order: "certificate", "temperature", "tension",
-        "tape_thickness", "rise", "out_of_level".
+        "tape_thickness", "rise", "sag", "out_of_level".
     sd_m : float
         Of what no other reading shares.
     effects : tuple of Effect
@@ -214,20 +224,6 @@ class Reduced:
     sd_m: float
     effects: tuple[Effect, ...]
     by_shell_temperature_m: float
-
-
-def mean_tension_n(pull_n, friction, pulls):
-    """Mean tension round a tank of a tape pulled at both ends, in some pulls.
-
-    pull (1 - exp(-mu w)) / (mu w), w half the angle that one pull wraps.
-
-    Examples
-    --------
-    >>> [round(float(mean_tension_n(1.0, mu, 1)), 3) for mu in (0.1, 0.3)]
-    [0.858, 0.648]
-    """
-    lost = friction * np.pi / pulls
-    return pull_n * (-np.expm1(-lost) / lost if lost else 1.0)
 
 
 def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diameter_m):
@@ -256,12 +252,14 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
         warmer = temperature - tape.temperature_c
     steps["temperature"] = length * tape.expansion_per_k * warmer
     length += steps["temperature"]
-    strain, by_tension, by_friction = _strain(strap, tape)
+    strain, by_tension, by_friction = strain_of(strap, tape)
     steps["tension"] = length * strain
     length += steps["tension"]
     steps["tape_thickness"] = -np.pi * tape.thickness_m
     obstructions = tuple(obstructions)
     steps["rise"] = -sum(one.excess(diameter_m) for one in obstructions)
+    sag = sag_of(strap, tape, obstructions)
+    steps["sag"] = 0.0 - sag.excess_m
     unlevel = _out_of_level(strapping, diameter_m)
     steps["out_of_level"] = -unlevel
     per_k = length * tape.expansion_per_k if tape.temperature_c is not None else 0.0
@@ -270,9 +268,13 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
         Effect("instrument_scale", scale, 1e6 * tape.u_scale, "ppm", length * tape.u_scale),
         Effect("instrument_offset", tape.name, 1e3 * tape.u_offset_m, "mm", tape.u_offset_m),
         Effect("tape_tension", tape.name, 100 * TENSION_SHARE / RECTANGULAR, "%",
-               length * by_tension * TENSION_SHARE / RECTANGULAR),
+               (length * by_tension + 2 * sag.excess_m) * TENSION_SHARE / RECTANGULAR),
         Effect("tape_friction", tape.name, tape.friction * FRICTION_SHARE / RECTANGULAR, "1",
-               length * by_friction * FRICTION_SHARE / RECTANGULAR),
+               (length * by_friction - sag.by_friction_m) * FRICTION_SHARE / RECTANGULAR),
+        Effect("tape_weight", tape.name, 100 * WEIGHT_SHARE / RECTANGULAR, "%",
+               -2 * sag.excess_m * WEIGHT_SHARE / RECTANGULAR),
+        Effect("tape_sag", tape.name, 100 * sag.place_share, "%",
+               -sag.excess_m * sag.place_share),
         Effect("tape_level", "", 1e3 * unlevel / RECTANGULAR, "mm", -unlevel / RECTANGULAR),
         Effect("tape_temperature", tape.name, TAPE_TEMPERATURE_K / RECTANGULAR, "K",
                0.0 if on_shell else per_k * TAPE_TEMPERATURE_K / RECTANGULAR),
@@ -287,17 +289,6 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
         tuple(one for one in effects if one.by_m),
         per_k if on_shell else 0.0,
     )
-
-
-def _strain(strap, tape):
-    """Strain over that of the certificate, and its derivatives by relative pull and friction."""
-    pull = tape.tension_n if strap.tension_n is None else strap.tension_n
-    if pull is None or not np.isfinite(tape.stiffness_n):
-        return 0.0, 0.0, 0.0
-    mean = mean_tension_n(pull, tape.friction, strap.pulls)
-    lost = tape.friction * np.pi / strap.pulls
-    by_friction = (pull * np.exp(-lost) - mean) / tape.stiffness_n if lost else 0.0
-    return (mean - (tape.tension_n or 0.0)) / tape.stiffness_n, mean / tape.stiffness_n, by_friction
 
 
 def _out_of_level(strapping, diameter_m):

@@ -12,6 +12,7 @@ import tankcal
 from tankcal.errors import InputError, SolutionError
 from tankcal.pipeline.strapped_wall import field_of_readings, find_strapped_wall
 from tankcal.pipeline.strapping_checks import limit_of_repeats
+from tankcal.survey.strapping import Obstruction
 
 OPEN = {0.9: 146.70404, 1.8: 293.40807, 3.6: 586.81461, 6.0: 978.05449, 8.4: 1369.27879}
 HEAD_850 = {0.9: 0.00428, 1.8: 0.01710, 3.6: 0.07056, 6.0: 0.20700, 8.4: 0.43102}
@@ -36,7 +37,7 @@ def test_tank_s_1(tmp_path, density):
 
 
 def test_folder_and_workbook_give_the_same(tmp_path):
-    parts = strapped_parts()
+    parts = with_span(strapped_parts(), count=2)
     parts.tables["thickness"] = [["course", "thickness_mm", "paint_mm"], ["1", 8.9, 0.2],
                                  ["1", 9.0, 0.3]]  # fmt: skip
     folder = tankcal.load(write_folder(tmp_path / "folder", parts))
@@ -46,6 +47,7 @@ def test_folder_and_workbook_give_the_same(tmp_path):
     ]
     assert folder.strapping.tapes == book.strapping.tapes
     assert folder.strapping.obstructions == book.strapping.obstructions
+    assert folder.strapping.obstructions["1a"][-1] == Obstruction("sag", 2, span_m=10.0)
     for job in (folder, book):
         assert job.courses[0].thickness_m == pytest.approx(0.00895)
         assert job.courses[0].paint_m == pytest.approx(0.00025)
@@ -66,6 +68,39 @@ def test_every_cause_stands_in_the_budget(tmp_path):
         *("straps", "instrument_scale", "tape_tension", "tape_friction", "tape_level"),
         *("tape_temperature", "area_term", "plate_readings", "bulge", "shell_temperature"),
     }
+
+
+def with_span(parts, span_m=10.0, count=None, **tape):
+    """The parts with a free span on circumference 1a, and what is told of their tape."""
+    header, *rows = parts.tables["obstructions"]
+    span = ["1a", "sag", count, *[None] * (len(header) - 3), span_m]
+    parts.tables["obstructions"] = [[*header, "span_m"], *([*row, None] for row in rows), span]
+    parts.registers["instruments"]["T-12"] |= {"weight_n_per_m": 0.2} | tape
+    return parts
+
+
+def test_a_free_span_reaches_the_table(tmp_path):
+    """Differences: two spans of 10 m at 60 N take 2 x 0.463 mm off one of two circumferences."""
+    plain = result_of(strapped_parts(), tmp_path / "plain")
+    spanned = result_of(with_span(strapped_parts(), count=2), tmp_path / "span")
+    sags = [one.steps_m["sag"] for one in spanned.straps.reduced]
+    assert sags == pytest.approx([-2 * 0.2**2 * 10**3 / (24 * 60**2), *[0.0] * 9])
+    by = spanned.at(1.8).value_m3 / plain.at(1.8).value_m3 - 1
+    assert by == pytest.approx(2 * sags[0] / 2 / 45.32, rel=0.02)
+    assert {one.kind for one in spanned.table.sources} >= {"tape_weight", "tape_tension"}
+    rubbed = result_of(with_span(strapped_parts(), friction=0.2), tmp_path / "rubbed")
+    assert {one.kind for one in rubbed.table.sources} >= {"tape_sag", "tape_friction"}
+
+
+def test_a_span_that_cannot_be_read_is_told_once(tmp_path):
+    with pytest.raises(InputError) as refused:
+        tankcal.load(write_folder(tmp_path, with_span(strapped_parts(), "wide")))
+    assert [(one.row, one.column) for one in refused.value.problems] == [(5, "span_m")]
+
+
+def test_a_weight_in_kilograms_is_told(tmp_path):
+    job = tankcal.load(write_folder(tmp_path, with_span(strapped_parts(), weight_n_per_m=0.02)))
+    assert [one.expected.code for one in job.warnings] == ["tape_weight_unlike_steel"]
 
 
 def test_the_radius_of_a_course_is_the_best_linear_estimate(tmp_path):
@@ -350,7 +385,36 @@ def half_a_pull(parts):
     parts.tables["circumferences"] = [[*header, "pulls"], *([*row, 2.5] for row in rows)]
 
 
+def no_weight(parts):
+    del with_span(parts).registers["instruments"]["T-12"]["weight_n_per_m"]
+
+
+def no_pull(parts):
+    with_span(parts)
+    for key in ("tension_n", "section_mm2", "e_gpa"):
+        del parts.registers["instruments"]["T-12"][key]
+    for row in parts.tables["circumferences"][1:]:
+        row[5] = None
+
+
+def long_spans(parts):
+    with_span(parts, count=5)
+
+
+def deep_span(parts):
+    with_span(parts, 12.0, weight_n_per_m=4.0)
+
+
+def no_span(parts):
+    with_span(parts, None)
+
+
 BAD = {
+    "span_weight_missing": no_weight,
+    "span_pull_missing": no_pull,
+    "span_longer_than_round": long_spans,
+    "span_hangs_deep": deep_span,
+    "obstruction_incomplete of a span": no_span,
     "part_of_a_pull": half_a_pull,
     "tape_of_no_temperature": no_temperature,
     "tape_scale_free": free_scale,

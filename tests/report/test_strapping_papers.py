@@ -15,12 +15,16 @@ from tankcal.report.paper import Paper
 
 @pytest.fixture(scope="module")
 def strapped(tmp_path_factory):
-    """Folder of the record and the CSV files of tank S-1, with a master and a shape."""
+    """Folder of the record and the CSV files of tank S-1: with a master, a shape, a free span."""
     parts = strapped_parts(shell__shape_sd_mm=5.0, strapping__wave_mm=20.0)
     tape = parts.registers["instruments"]["T-12"]
     parts.registers["instruments"] = {"T-12": tape | {"master": "M-1"}, "M-1": dict(tape)}
     parts.tables["tape_checks"] = [["level", "master_m", "working_m", "s_mm"],
                                    ["2", 45.315, 45.314, 0.3]]  # fmt: skip
+    header, *rows = parts.tables["obstructions"]
+    span = ["1a", "sag", 2, None, None, None, 10.0]
+    parts.tables["obstructions"] = [[*header, "span_m"], *([*row, None] for row in rows), span]
+    parts.registers["instruments"]["T-12"]["weight_n_per_m"] = 0.2
     folder = tmp_path_factory.mktemp("strapped")
     result = tankcal.run(tankcal.load(write_folder(folder / "job", parts)), simulated=False)
     write(result, folder / "results", papers=False)
@@ -33,7 +37,9 @@ def test_the_record_has_every_reading(strapped):
     assert [one.circumference for one in found.readings] == [
         one.strap.name for one in result.strapped.reduced
     ]
-    steps = ("certificate", "temperature", "tension", "tape_thickness", "rise", "out_of_level")
+    steps = (
+        *("certificate", "temperature", "tension", "tape_thickness", "rise", "sag", "out_of_level"),
+    )
     for one in found.readings:
         corrected = one.reading_m + sum(getattr(one, f"{step}_m") for step in steps)
         assert one.circumference_m == pytest.approx(corrected, abs=1e-9)
@@ -62,6 +68,14 @@ def test_the_csv_file_has_every_reading(strapped):
         [one.circumference_m for one in result.strapped.reduced], abs=1e-6
     )
     assert {row["used"] for row in rows} == {"yes"}
+    sags = [float(row["sag_mm"]) for row in rows]
+    assert sags == pytest.approx([-2e3 * 0.2**2 * 10**3 / (24 * 60**2), *[0] * 9], abs=1e-6)
+
+
+def test_the_budget_names_the_tape_that_hangs(strapped):
+    paper = Paper(load_record(strapped[1] / "record.json"))
+    lines = {one["input"]: paper.input_name(one) for one in paper.record["budget"]}
+    assert lines["tape_weight"] == "Weight of the tape: T-12"
 
 
 @pytest.mark.slow

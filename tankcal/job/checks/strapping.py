@@ -10,6 +10,7 @@ from tankcal.job.checking import (
     temperature_missing,
 )
 from tankcal.job.checks.extent import has_wall_points, is_strapped
+from tankcal.job.checks.spans import check_spans
 from tankcal.job.contract.observations import READINGS
 from tankcal.job.contract.registers import FREE
 from tankcal.job.contract.strapping import NEEDED
@@ -42,6 +43,8 @@ def check_strapping(values, tables, registers, raw, log):
     _check_courses(straps, tables, courses, known, alone, log)
     _check_tapes(straps, registers["instruments"], tapes, raw, log)
     _check_obstructions(tables["obstructions"], set(straps.of("circumference")), log)
+    if has_rows(tables["obstructions"]):
+        check_spans(tables["obstructions"], straps, tapes_read(straps, tapes), tapes, raw, log)
     if has_rows(tables["thickness"]):
         refuse_others(tables["thickness"], "course", known, log)
     _check_comparisons(tables["tape_checks"], tapes, raw, log)
@@ -226,7 +229,7 @@ def _check_obstructions(table, names, log):
     refuse_others(table, "circumference", names, log)
     for place, (row, kind) in enumerate(zip(table.rows, table.of("kind"), strict=True)):
         for column in NEEDED.get(kind, ()):
-            if table.of(column)[place] is None:
+            if table.of(column)[place] is None and not log.has(table.file, row, column):
                 expected = message(
                     "obstruction_incomplete",
                     "blank; expected it of an obstruction of kind {of_kind}",

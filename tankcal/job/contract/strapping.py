@@ -12,6 +12,7 @@ NEEDED = {  # of an obstruction, by its kind
     "lap": ("thickness_mm",),
     "step_over": ("over_mm", "arc_mm"),
     "measured": ("excess_mm",),
+    "sag": ("span_m",),
 }
 
 
@@ -67,7 +68,7 @@ OBSTRUCTIONS = (
         "kind",
         "choice",
         "butt_strap or weld (thickness, width); step (one edge) or lap (thickness); step_over"
-        " (over, arc); measured (excess)",
+        " (over, arc); measured (excess); sag (span that the tape hangs free over)",
         required=True,
         choices=KINDS,
     ),
@@ -77,6 +78,13 @@ OBSTRUCTIONS = (
     _number("over_mm", "step-over: length of the tape over it, millimetres", 0, 20000),
     _number("arc_mm", "step-over: arc of the bare shell between the legs, millimetres", 0, 20000),
     _number("excess_mm", "measured: how much longer the tape is for it, millimetres", -50, 500),
+    _number(
+        "span_m",
+        "sag: length of the free span, its ends level, metres; the tape needs weight_n_per_m",
+        0,
+        100,
+        above_low=True,
+    ),
     _number("s_mm", "standard deviation of that, millimetres; blank: 0", 0, 100),
 )
 THICKNESS = (
@@ -147,5 +155,12 @@ TAPE = (  # keys of instruments.toml
         1,
     ),
     _number("laying_mm", "standard deviation of how each pull lies, millimetres", 0, 50),
+    _number(
+        "weight_n_per_m",
+        "weight of a metre of a tape, newtons; needed where it hangs free (sag in"
+        " obstructions.csv)",
+        0.01,
+        5,
+    ),
     _name("master", "tape that this one was compared with in tape_checks.csv"),
 )

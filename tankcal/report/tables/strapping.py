@@ -2,7 +2,9 @@
 
 from tankcal.report.tables.table import Column, Table
 
-_STEPS = ("certificate", "temperature", "tension", "tape_thickness", "rise", "out_of_level")
+_STEPS = (
+    *("certificate", "temperature", "tension", "tape_thickness", "rise", "sag", "out_of_level"),
+)
 _BOTH = "straps strap_corrections"
 
 STRAPS = Table(

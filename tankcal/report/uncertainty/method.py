@@ -20,6 +20,8 @@ FROM_SURVEY = (
     "tape_temperature",
     "tape_tension",
     "tape_friction",
+    "tape_weight",
+    "tape_sag",
     "tape_level",
     "plate_readings",
     "area_term",
