@@ -20,7 +20,7 @@ class StrapReading(Saved):
     tension_m: float = key("correction for its pull")
     tape_thickness_m: float = key("correction for half the thickness of the tape")
     rise_m: float = key("correction for what keeps it off the shell")
-    sag_m: float = key("correction for where it hangs free")
+    sag_m: float | None = key("correction for where it hangs free", optional=True)
     out_of_level_m: float = key("correction for a tape that is not level")
     circumference_m: float = key("of the painted shell, after these corrections")
     sd_m: float = key("of it, of what no other reading shares")
