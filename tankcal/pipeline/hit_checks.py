@@ -11,7 +11,7 @@ from tankcal.pipeline.wall import joints_of
 from tankcal.survey.control_drift import repeats_of
 
 RULES, CONTROL = "wall_hits", "control_readings.csv"
-UNLIKE_SDS = 3.0  # of an offset or a scale, from what its certificate says
+UNLIKE_SDS = 3.0  # of an offset or a scale from its certificate, of an angle from its repeat
 OVER_JOINT_M = 0.02  # a hit of a course may lie so far beyond it
 SHOWN = 5
 GON = FULL_TURN / 400
@@ -43,7 +43,7 @@ def _of_control(job):
         yield Problem(CONTROL, text)
         return
     for one in repeats_of(job.hits.control):
-        angle = limits["control_angle_gon"] * GON
+        angle = max(limits["control_angle_gon"] * GON, _scatter_of(job.hits, one.setup))
         for name, values, limit, per, unit in (
             ("direction", one.direction_rad, angle, GON / 1000, "mgon"),
             ("zenith", one.zenith_rad, angle, GON / 1000, "mgon"),
@@ -63,6 +63,12 @@ def _of_control(job):
                     unit=unit,
                 )
                 yield Problem(CONTROL, text, one.rows[worst], name)
+
+
+def _scatter_of(hits, setup):
+    """By how much two angles of a set-up differ at most by their standard deviation, rad."""
+    own = hits.sd_rad[np.array(hits.setup) == setup]
+    return UNLIKE_SDS * np.sqrt(2) * np.median(own) if len(own) else 0.0
 
 
 def _of_levels(job, wall):
