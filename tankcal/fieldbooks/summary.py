@@ -114,6 +114,14 @@ def _of_faces(setup, report):
             i_spread=ARCSEC * report.index[1],
             apart_mm=1000 * report.apart_m,
         )
+    if sum(report.single) and (report.collimation or report.index):
+        yield message(
+            "import_freed",
+            "set-up {setup}: the collimation and index errors of its pairs are removed from its"
+            " {count} readings on one face alone",
+            setup=setup,
+            count=sum(report.single),
+        )
 
 
 def _of_targets(chosen):
@@ -143,7 +151,8 @@ def warn_of(chosen, names, stands, reports):
                 text = message(
                     "instrument_to_adjust",
                     "set-up {setup}: the two faces differ by an error of {size:.0f} arcsec, over"
-                    " {limit:.0f}: is the instrument adjusted? Points on one face alone carry it",
+                    " {limit:.0f}: is the instrument adjusted? Points on one face alone are freed"
+                    " of its mean only",
                     setup=name,
                     size=ARCSEC * max(abs(what[0]), what[1]),
                     limit=ARCSEC * LARGE_DEG,
