@@ -77,6 +77,7 @@ class FieldBook:
     left_out   {Message or text: [count, first row]}: what was not understood
     rejected   the same of what the surveyor deleted
     instrument name of the instrument that the file gives
+    texts      {field: [(text, row)]}: angles and distances as they stand in the file
     """
 
     file: str
@@ -89,6 +90,7 @@ class FieldBook:
     left_out: dict = field(default_factory=dict)
     rejected: dict = field(default_factory=dict)
     instrument: str = ""
+    texts: dict = field(default_factory=dict)
 
     @property
     def has_shots(self):
@@ -112,6 +114,11 @@ class FieldBook:
         """Keep a unit that was found, once."""
         if text not in self.units:
             self.units.append(text)
+
+    def keep_text(self, name, text, row):
+        """Keep a number of a field as it is written; a blank one is none."""
+        if text.strip():
+            self.texts.setdefault(name, []).append((text.strip(), row))
 
     def say_units(self, *, length=None, angle=None, last=None):
         """Keep the units that were found: names of METRES, of DEGREES, or dms and packed_dms.

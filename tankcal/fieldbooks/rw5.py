@@ -208,6 +208,8 @@ def _take_shot(book, log, row, kind, fields, code, state):
         )
         log.problem(book.file, text, row)
         return
+    for one in codes:
+        book.keep_text(one, given[one], row)
     _add(book, log, row, kind, {one: given[one] for one in codes}, code, state,
          fields.get("FP", ""))  # fmt: skip
 

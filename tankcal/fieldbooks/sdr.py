@@ -196,6 +196,8 @@ def _take_shot(book, log, row, line, state):
     values = _numbers(book, log, row, [distance, vertical, direction], 1.0)
     if values is None:
         return
+    for name, text in (("distance", distance), ("zenith", vertical), ("direction", direction)):
+        book.keep_text(name, text, row)
     distance, vertical, direction = values
     scale = DEGREES[state.angle]
     zenith = None if vertical is None else vertical * scale

@@ -96,7 +96,7 @@ MO,AD0,UN1,SF1.00000000,EC0,EO0.0,AU0
 OC,OP1,N 100.0000,E 200.0000,EL10.000,--CP
 BK,OP1,BP2,BS0.0000,BC0.0000
 LS,HI1.500000,HR0.000000
-BD,OP1,FP2,AR0.0000,ZE90.0000,SD5.000,--BS
+BD,OP1,FP2,AR0.0000,ZE90.0000,SD5.000000,--BS
 SS,OP1,FP101,AR57.1630,ZE89.4305,SD7.393000,--WALL
 SS,OP1,FP102,AR237.1650,ZE270.1645,SD7.395000,--WALL
 """
@@ -147,7 +147,8 @@ def test_coordinates_that_differ_matter_where_they_are_needed(tmp_path):
 
 def test_a_time_belongs_to_the_reading_before_it_alone(tmp_path):
     text = RW5 + "--DT07-14-2026\n--TM09:00:00\n--DT07-14-2026\n--TM12:00:00\n"
-    _, tables = read(tmp_path, text.replace("FP102", "FP103").replace("237.1650,ZE270", "3,ZE70"))
+    text = text.replace("FP102", "FP103").replace("237.1650,ZE270", "3.0000,ZE70")
+    _, tables = read(tmp_path, text)
     assert [one["time"] for one in tables["wall_hits"]] == ["", "2026-07-14T09:00:00"]
 
 
@@ -265,7 +266,7 @@ def test_columns_by_number_and_vertical_angles_from_the_horizon(tmp_path):
 
 
 def test_hits_control_and_what_is_left_are_chosen(tmp_path):
-    text = RW5 + "SS,OP1,FP900,AR1.0000,ZE80.0000,SD4.0,--K\n--DT07-14-2026\n--TM09:00:00\n"
+    text = RW5 + "SS,OP1,FP900,AR1.0000,ZE80.0000,SD4.000000,--K\n--DT07-14-2026\n--TM09:00:00\n"
     found, tables = read(tmp_path, text, hits=("101-102",), check=("102",), control=("K",),
                          leave=("2",))  # fmt: skip
     assert [one["use"] for one in tables["wall_hits"]] == ["", "check"]
@@ -300,7 +301,7 @@ def test_an_end_needs_a_beginning_before_it(tmp_path, capsys):
 
 
 def test_times_that_no_file_has_are_said(tmp_path):
-    text = RW5 + "BD,OP1,FP2,AR0.0000,ZE90.0000,SD5.000,--BS\n"
+    text = RW5 + "BD,OP1,FP2,AR0.0000,ZE90.0000,SD5.000000,--BS\n"
     found, tables = read(tmp_path, text)
     assert "control_readings" not in tables
     assert "again_without_time" in codes(found.summary)
