@@ -26,12 +26,14 @@ class SetUp:
     station   name of the point below it; "": the file names none
     height_m  of the instrument above the point, None: not given
     xyz_m     east, north and height of the point, None: not given
+    is_told   whether the file says anything of it; else only readings tell that there is one
     """
 
     station: str
     height_m: float | None
     xyz_m: tuple | None
     row: int
+    is_told: bool = True
 
 
 @dataclass(frozen=True)
@@ -133,9 +135,9 @@ class FieldBook:
         elif length is not None:
             self.unit(message("lengths_in", "lengths in {unit}", unit=length))
 
-    def stand(self, station, height_m, xyz_m, row):
+    def stand(self, station, height_m, xyz_m, row, *, is_told=True):
         """Begin a set-up."""
-        self.setups.append(SetUp(station, height_m, xyz_m, row))
+        self.setups.append(SetUp(station, height_m, xyz_m, row, is_told))
 
     def add_shot(self, log, row, *, point, direction, zenith, distance, face=None, height=None,
                  code="", time=None, prism=None, setup=None):  # fmt: skip
@@ -146,7 +148,7 @@ class FieldBook:
         setup  place of the set-up; None: the last
         """
         if not self.setups:
-            self.setups.append(SetUp("", None, None, row))
+            self.stand("", None, None, row, is_told=False)
         if not all(
             (
                 _is_within(log, self.file, row, direction, 2 * FULL_TURN, "deg"),

@@ -140,7 +140,12 @@ def warn_of(chosen, names, stands, reports):
     found = []
     for place, name in names.items():
         stand, file = stands[place]
-        if stand.height_m is None:
+        if not stand.is_told:
+            text = message("no_station", "set-up {setup}: no station in the file, so its point and"
+                           " the height of the instrument are unknown: fill them into setups.csv"
+                           " before you run the job", setup=name)  # fmt: skip
+            found.append(Problem(file, text, stand.row))
+        elif stand.height_m is None:
             text = message("no_instrument_height", "set-up {setup}: no height of the instrument in"
                            " the file: it is left blank (0)", setup=name)  # fmt: skip
             found.append(Problem(file, text, stand.row))

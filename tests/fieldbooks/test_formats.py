@@ -67,7 +67,7 @@ def test_gsi_sexagesimal_and_face_2(tmp_path):
     assert float(hit["zenith_deg"]) == pytest.approx(90 - 1 / 3600, abs=1e-7)
     assert hit["distance_m"] == "6.5002"
     assert tables["setups"][0]["setup"] == "S1"
-    assert codes(found.warnings) == {"no_instrument_height"}
+    assert codes(found.warnings) == {"no_station"}
 
 
 def test_gsi_set_ups_change_with_their_station(tmp_path):
@@ -260,6 +260,35 @@ def test_columns_by_number_and_vertical_angles_from_the_horizon(tmp_path):
         ["A", "90.000", "81.000", "6.096"],
         ["A", "180.000", "99.000", "6.096"],
     ]
+
+
+# ---- no station
+
+
+@pytest.mark.parametrize(("name", "left_out"), [
+    ("sdr", ("02",)), ("rw5", ("OC", "LS")), ("rw5", ("OC", "BK", "LS")),
+])  # fmt: skip
+def test_a_file_without_a_station_says_what_to_fill_in(tmp_path, name, left_out):
+    from simulated_fieldbooks import one_stand
+    from written_fieldbooks import WRITERS
+
+    lines = WRITERS[name](one_stand()).splitlines(True)
+    text = "".join(line for line in lines if not line.startswith(left_out))
+    found, tables = read(tmp_path, text)
+    assert codes(found.warnings) == {"no_station"}
+    assert [one["setup"] for one in tables["setups"]] == ["1"]
+    text = "".join(line for line in lines if not line.startswith("LS"))
+    assert codes(read(tmp_path, text)[0].warnings) == (
+        {"no_instrument_height"} if name == "rw5" else set()
+    )
+
+
+def test_a_missing_station_of_jobxml_is_one_problem(tmp_path):
+    text = jxl("".join(shot(str(number), 10 * number, 90, 6) for number in range(1, 9)))
+    with pytest.raises(InputError) as told:
+        read(tmp_path, text.replace('"s"', '"other"'))
+    (problem,) = told.value.problems
+    assert (problem.expected.code, problem.expected.values["count"]) == ("jxl_station", 8)
 
 
 # ---- which is what, and the folder
