@@ -365,6 +365,22 @@ def test_an_empty_table_is_filled_in_and_one_with_rows_is_not(tmp_path, capsys):
     assert main(["import", str(book), "--out", str(job), "--replace"]) == 0
 
 
+@pytest.mark.slow
+def test_a_folder_without_a_job_is_told_how_to_go_on(tmp_path, capsys):
+    """What is printed is followed; with the job there, nothing of it is said."""
+    book, out = tmp_path / "book.rw5", tmp_path / "nowhere"
+    book.write_text(RW5)
+    assert main(["import", str(book), "--out", str(out)]) == 0
+    new, again, run = (line.split()[1:] for line in capsys.readouterr().out.splitlines()[-4:]
+                       if line.startswith("  tankcal"))  # fmt: skip
+    assert new == ["new", f"{out}-job", "--survey", "wall-hits"]
+    assert main(new) == 0
+    capsys.readouterr()
+    assert main(["import", str(book), *again[2:]]) == 0
+    assert capsys.readouterr().out.splitlines()[-2:] == ["then", f"  tankcal {' '.join(run)}"]
+    assert run == ["run", f"{out}-job"]
+
+
 def test_json_and_another_language(tmp_path, capsys):
     book = tmp_path / "book.rw5"
     book.write_text(RW5)
