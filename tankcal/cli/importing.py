@@ -126,5 +126,23 @@ def _import(options):
     say(message("import_wrote", "wrote into {folder}:", folder=str(options.out)))
     for path in found.paths:
         print(f"  {path}")
+    _say_next(Path(options.out), "total-station" if options.no_hits else "wall-hits")
+
+
+def _say_next(folder, survey):
+    """What to do then; a folder without job.toml holds tables, but is no job yet."""
+    job = folder
+    if not (folder / "job.toml").is_file():
+        job = folder.parent / f"{folder.resolve().name or 'tank'}-job"
+        text = message(
+            "import_without_job",
+            "{folder} has no job.toml, so it cannot be run: make an empty job, then import once"
+            " more with --out {job}, which fills in its empty tables",
+            folder=str(folder),
+            job=str(job),
+        )
+        say(text)
+        print(f"  tankcal new {shlex.quote(str(job))} --survey {survey}")
+        print(f"  tankcal import ... --out {shlex.quote(str(job))}")
     say(message("import_next", "then"))
-    print(f"  tankcal run {shlex.quote(str(options.out))}")
+    print(f"  tankcal run {shlex.quote(str(job))}")

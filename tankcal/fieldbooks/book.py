@@ -26,12 +26,14 @@ class SetUp:
     station   name of the point below it; "": the file names none
     height_m  of the instrument above the point, None: not given
     xyz_m     east, north and height of the point, None: not given
+    is_told   whether the file says anything of it; else only readings tell that there is one
     """
 
     station: str
     height_m: float | None
     xyz_m: tuple | None
     row: int
+    is_told: bool = True
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,7 @@ class FieldBook:
     left_out   {Message or text: [count, first row]}: what was not understood
     rejected   the same of what the surveyor deleted
     instrument name of the instrument that the file gives
+    texts      {field: [(text, row)]}: angles and distances as they stand in the file
     """
 
     file: str
@@ -89,6 +92,7 @@ class FieldBook:
     left_out: dict = field(default_factory=dict)
     rejected: dict = field(default_factory=dict)
     instrument: str = ""
+    texts: dict = field(default_factory=dict)
 
     @property
     def has_shots(self):
@@ -113,6 +117,11 @@ class FieldBook:
         if text not in self.units:
             self.units.append(text)
 
+    def keep_text(self, name, text, row):
+        """Keep a number of a field as it is written; a blank one is none."""
+        if text.strip():
+            self.texts.setdefault(name, []).append((text.strip(), row))
+
     def say_units(self, *, length=None, angle=None, last=None):
         """Keep the units that were found: names of METRES, of DEGREES, or dms and packed_dms.
 
@@ -126,9 +135,9 @@ class FieldBook:
         elif length is not None:
             self.unit(message("lengths_in", "lengths in {unit}", unit=length))
 
-    def stand(self, station, height_m, xyz_m, row):
+    def stand(self, station, height_m, xyz_m, row, *, is_told=True):
         """Begin a set-up."""
-        self.setups.append(SetUp(station, height_m, xyz_m, row))
+        self.setups.append(SetUp(station, height_m, xyz_m, row, is_told))
 
     def add_shot(self, log, row, *, point, direction, zenith, distance, face=None, height=None,
                  code="", time=None, prism=None, setup=None):  # fmt: skip
@@ -139,7 +148,7 @@ class FieldBook:
         setup  place of the set-up; None: the last
         """
         if not self.setups:
-            self.setups.append(SetUp("", None, None, row))
+            self.stand("", None, None, row, is_told=False)
         if not all(
             (
                 _is_within(log, self.file, row, direction, 2 * FULL_TURN, "deg"),

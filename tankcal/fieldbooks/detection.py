@@ -3,6 +3,7 @@
 import re
 
 from tankcal.fieldbooks import gsi, jobxml, profile, rw5, sdr
+from tankcal.fieldbooks.cutting import tell_cut_numbers
 from tankcal.messages import message
 
 FORMATS = ("gsi", "rw5", "jxl", "sdr", "csv")
@@ -50,8 +51,11 @@ def read_book(file, data, log, wanted=None, described=None):
             log.problem(file, expected, row)
             return None
     if found == "csv":
-        return profile.read(text, file, log, described)
-    return {"gsi": gsi, "rw5": rw5, "sdr": sdr}[found].read(text, file, log)
+        book = profile.read(text, file, log, described)
+    else:
+        book = {"gsi": gsi, "rw5": rw5, "sdr": sdr}[found].read(text, file, log)
+    tell_cut_numbers(book, log)
+    return book
 
 
 def _text(file, data, log):

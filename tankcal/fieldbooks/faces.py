@@ -3,7 +3,10 @@
     c = (hz1 - hz2 + 180) / 2 . sin z        collimation error
     i = (v1 + v2 - 360) / 2                  index error of the vertical circle
 
-The mean of both faces is free of c and i. A reading of face 2 alone is turned to face 1.
+The mean of both faces is free of c and i. A reading of face 2 alone is turned to face 1. What is
+read on one face alone is freed of the c and i that the pairs of its set-up show, as
+
+    hz = hz1 - c / sin z,    v = v1 - i
 """
 
 import math
@@ -70,7 +73,28 @@ def reduce_faces(shots, log):
         else:
             mine[str(shot.face)] += 1
             readings.append(Reading(_on_face_1(shot), str(shot.face)))
-    return readings, [_report(setup, one) for setup, one in errors.items()]
+    reports = {setup: _report(setup, one) for setup, one in errors.items()}
+    return [_freed(one, reports[one.shot.setup]) for one in readings], [*reports.values()]
+
+
+def _freed(reading, report):
+    """A reading of one face without the mean c and i of its set-up; others as they are."""
+    if reading.faces == "both":
+        return reading
+    sign = 1.0 if reading.faces == "1" else -1.0  # face 2 is turned already
+    shot, sine = reading.shot, 1.0
+    if shot.zenith_deg is not None and report.index is not None:
+        shot = replace(shot, zenith_deg=shot.zenith_deg - sign * report.index[0])
+    if shot.zenith_deg is not None:
+        sine = _sine(shot.zenith_deg)
+    if shot.direction_deg is not None and report.collimation is not None:
+        direction = shot.direction_deg - sign * report.collimation[0] / sine
+        shot = replace(shot, direction_deg=direction % FULL_TURN)
+    return replace(reading, shot=shot)
+
+
+def _sine(zenith):
+    return max(math.sin(zenith * DEGREE), 1e-3)
 
 
 def _on_face_1(shot):
@@ -95,7 +119,7 @@ def _mean(first, second, mine, log):
     if None not in (first.zenith_deg, turned.zenith_deg):
         index = (first.zenith_deg - turned.zenith_deg) / 2
         found["zenith_deg"] = first.zenith_deg - index
-        sine = max(math.sin(found["zenith_deg"] * DEGREE), 1e-3)
+        sine = _sine(found["zenith_deg"])
     if None not in (first.direction_deg, turned.direction_deg):
         apart = (first.direction_deg - turned.direction_deg + HALF_TURN) % FULL_TURN - HALF_TURN
         collimation = apart / 2 * sine

@@ -46,6 +46,7 @@ def read(data, file, log):
     except (ValueError, LookupError):  # an encoding that it declares, and that nobody knows
         text = message("xml_encoding", "an encoding of XML that is not known; expected UTF-8")
         log.problem(file, text, 1)
+    taker.tell_strays()
     if not taker.has_field_book and not log.problems:
         text = message("no_field_book", "no FieldBook in it; expected that of a JobXML file")
         log.problem(file, text)
@@ -63,6 +64,7 @@ class _Taker:
         self.texts, self.has_field_book = [], False
         self.targets, self.ppm, self.stations = {}, {}, {}
         self.last_ppm = 0.0
+        self.strays = {}  # {ID of a station that is missing: [readings, row of the first]}
 
     def refuse_doctype(self, *_):
         text = message(
@@ -206,12 +208,7 @@ class _Taker:
         book, given = self.book, self.record.get("StationID")
         place, ppm = self.stations.get(given, (None, self.last_ppm))
         if place is None and (given or not book.setups):
-            text = message(
-                "jxl_station",
-                "of station {station!r}; expected the ID of a StationRecord before it",
-                station=(given or "")[:40],
-            )
-            self.log.problem(book.file, text, self.row)
+            self.strays.setdefault(given or "", [0, self.row])[0] += 1
             return
         height, prism = self.targets.get(self.record.get("TargetID"), (None, 0.0))
         distance = self.number("Circle/EDMDistance")
@@ -225,6 +222,18 @@ class _Taker:
             code=self.record.get("Code", ""), prism=1000 * prism, setup=place,
             time=time_of(self.attributes.get("TimeStamp", "")),
         )  # fmt: skip
+
+    def tell_strays(self):
+        """One problem for each station that is missing."""
+        for station, (count, row) in self.strays.items():
+            text = message(
+                "jxl_station",
+                "{count} readings of station {station!r}, the first here; expected a StationRecord"
+                " of this ID before them",
+                count=count,
+                station=station[:40],
+            )
+            self.log.problem(self.book.file, text, row)
 
 
 def time_of(text):

@@ -152,6 +152,8 @@ def _take(book, log, row, given, values, before):
     angles = {key: _angle(book, log, row, given[key], values) for key in ("direction", "zenith")}
     if False in angles.values():
         return before
+    for key in ("direction", "zenith", "distance"):
+        book.keep_text(key, given[key], row)
     face = {"": None, "1": 1, "2": 2, "I": 1, "II": 2}.get(given.get("face", "").upper(), 0)
     time = _time(given.get("time", ""), values)
     if face == 0 or time is False:

@@ -42,6 +42,7 @@ class _State:
     station = back = height = rod = None
     azimuth = circle = None  # of the backsight
     key = None  # of the set-up
+    is_told = False  # has there been a record OC or LS?
     date = None  # of the last note that has one
     follows_shot = False  # is a time that stands here that of the last reading?
     kind = None  # of horizontal angle in this set-up: "turned" or "azimuth"
@@ -67,6 +68,7 @@ def _take(book, log, row, line, state):
     elif kind == "MO":
         _take_mode(book, log, row, fields, state)
     elif kind == "OC":
+        state.is_told = True
         state.station = fields.get("OP", fields.get("PN", ""))
         state.back = state.azimuth = state.circle = None
         _take_point(book, log, row, state.station, fields, state)
@@ -74,6 +76,7 @@ def _take(book, log, row, line, state):
         state.back = fields.get("BP")
         state.azimuth, state.circle = (_angle(fields.get(one), state) for one in ("BS", "BC"))
     elif kind == "LS":
+        state.is_told = True
         if "HI" in fields:
             state.height = _length(book, log, row, fields["HI"], state)
         if "HR" in fields:
@@ -195,7 +198,7 @@ def _take_shot(book, log, row, kind, fields, code, state):
     here = (state.station, state.back, state.azimuth, state.circle, state.height)
     if here != state.key:
         state.key, state.kind = here, None
-        book.stand(state.station or "", state.height, None, row)
+        book.stand(state.station or "", state.height, None, row, is_told=state.is_told)
     codes = [one for one in (*_HORIZONTAL, "ZE", "VA", "SD", "HD") if one in fields]
     given = {one: fields[one] for one in codes}
     bad = [one for one in codes if one != "BR" and number_of(given[one]) is None]
@@ -208,6 +211,8 @@ def _take_shot(book, log, row, kind, fields, code, state):
         )
         log.problem(book.file, text, row)
         return
+    for one in codes:
+        book.keep_text(one, given[one], row)
     _add(book, log, row, kind, {one: given[one] for one in codes}, code, state,
          fields.get("FP", ""))  # fmt: skip
 

@@ -130,7 +130,7 @@ def _take_backsight(book, _log, row, _line, _state):
     """Another backsight after readings is another zero of the circle: a set-up of its own."""
     if book.has_shots:
         now = book.setups[-1]
-        book.stand(now.station, now.height_m, now.xyz_m, row)
+        book.stand(now.station, now.height_m, now.xyz_m, row, is_told=now.is_told)
 
 
 def _fields(line, state, names, numbers):
@@ -183,7 +183,7 @@ def _take_shot(book, log, row, line, state):
         return
     station, point, distance, vertical, direction, code = _fields(line, state, 2, 3)
     if not book.setups:  # no record 02: the reading itself names its station
-        book.stand(plain_name(station), None, None, row)
+        book.stand(plain_name(station), None, None, row, is_told=False)
     if plain_name(station) != book.setups[-1].station:
         text = message(
             "sdr_station",
@@ -196,6 +196,8 @@ def _take_shot(book, log, row, line, state):
     values = _numbers(book, log, row, [distance, vertical, direction], 1.0)
     if values is None:
         return
+    for name, text in (("distance", distance), ("zenith", vertical), ("direction", direction)):
+        book.keep_text(name, text, row)
     distance, vertical, direction = values
     scale = DEGREES[state.angle]
     zenith = None if vertical is None else vertical * scale

@@ -114,6 +114,14 @@ def _of_faces(setup, report):
             i_spread=ARCSEC * report.index[1],
             apart_mm=1000 * report.apart_m,
         )
+    if sum(report.single) and (report.collimation or report.index):
+        yield message(
+            "import_freed",
+            "set-up {setup}: the collimation and index errors of its pairs are removed from its"
+            " {count} readings on one face alone",
+            setup=setup,
+            count=sum(report.single),
+        )
 
 
 def _of_targets(chosen):
@@ -132,7 +140,12 @@ def warn_of(chosen, names, stands, reports):
     found = []
     for place, name in names.items():
         stand, file = stands[place]
-        if stand.height_m is None:
+        if not stand.is_told:
+            text = message("no_station", "set-up {setup}: no station in the file, so its point and"
+                           " the height of the instrument are unknown: fill them into setups.csv"
+                           " before you run the job", setup=name)  # fmt: skip
+            found.append(Problem(file, text, stand.row))
+        elif stand.height_m is None:
             text = message("no_instrument_height", "set-up {setup}: no height of the instrument in"
                            " the file: it is left blank (0)", setup=name)  # fmt: skip
             found.append(Problem(file, text, stand.row))
@@ -143,7 +156,8 @@ def warn_of(chosen, names, stands, reports):
                 text = message(
                     "instrument_to_adjust",
                     "set-up {setup}: the two faces differ by an error of {size:.0f} arcsec, over"
-                    " {limit:.0f}: is the instrument adjusted? Points on one face alone carry it",
+                    " {limit:.0f}: is the instrument adjusted? Points on one face alone are freed"
+                    " of its mean only",
                     setup=name,
                     size=ARCSEC * max(abs(what[0]), what[1]),
                     limit=ARCSEC * LARGE_DEG,

@@ -67,7 +67,7 @@ def test_gsi_sexagesimal_and_face_2(tmp_path):
     assert float(hit["zenith_deg"]) == pytest.approx(90 - 1 / 3600, abs=1e-7)
     assert hit["distance_m"] == "6.5002"
     assert tables["setups"][0]["setup"] == "S1"
-    assert codes(found.warnings) == {"no_instrument_height"}
+    assert codes(found.warnings) == {"no_station"}
 
 
 def test_gsi_set_ups_change_with_their_station(tmp_path):
@@ -96,7 +96,7 @@ MO,AD0,UN1,SF1.00000000,EC0,EO0.0,AU0
 OC,OP1,N 100.0000,E 200.0000,EL10.000,--CP
 BK,OP1,BP2,BS0.0000,BC0.0000
 LS,HI1.500000,HR0.000000
-BD,OP1,FP2,AR0.0000,ZE90.0000,SD5.000,--BS
+BD,OP1,FP2,AR0.0000,ZE90.0000,SD5.000000,--BS
 SS,OP1,FP101,AR57.1630,ZE89.4305,SD7.393000,--WALL
 SS,OP1,FP102,AR237.1650,ZE270.1645,SD7.395000,--WALL
 """
@@ -147,7 +147,8 @@ def test_coordinates_that_differ_matter_where_they_are_needed(tmp_path):
 
 def test_a_time_belongs_to_the_reading_before_it_alone(tmp_path):
     text = RW5 + "--DT07-14-2026\n--TM09:00:00\n--DT07-14-2026\n--TM12:00:00\n"
-    _, tables = read(tmp_path, text.replace("FP102", "FP103").replace("237.1650,ZE270", "3,ZE70"))
+    text = text.replace("FP102", "FP103").replace("237.1650,ZE270", "3.0000,ZE70")
+    _, tables = read(tmp_path, text)
     assert [one["time"] for one in tables["wall_hits"]] == ["", "2026-07-14T09:00:00"]
 
 
@@ -261,11 +262,40 @@ def test_columns_by_number_and_vertical_angles_from_the_horizon(tmp_path):
     ]
 
 
+# ---- no station
+
+
+@pytest.mark.parametrize(("name", "left_out"), [
+    ("sdr", ("02",)), ("rw5", ("OC", "LS")), ("rw5", ("OC", "BK", "LS")),
+])  # fmt: skip
+def test_a_file_without_a_station_says_what_to_fill_in(tmp_path, name, left_out):
+    from simulated_fieldbooks import one_stand
+    from written_fieldbooks import WRITERS
+
+    lines = WRITERS[name](one_stand()).splitlines(True)
+    text = "".join(line for line in lines if not line.startswith(left_out))
+    found, tables = read(tmp_path, text)
+    assert codes(found.warnings) == {"no_station"}
+    assert [one["setup"] for one in tables["setups"]] == ["1"]
+    text = "".join(line for line in lines if not line.startswith("LS"))
+    assert codes(read(tmp_path, text)[0].warnings) == (
+        {"no_instrument_height"} if name == "rw5" else set()
+    )
+
+
+def test_a_missing_station_of_jobxml_is_one_problem(tmp_path):
+    text = jxl("".join(shot(str(number), 10 * number, 90, 6) for number in range(1, 9)))
+    with pytest.raises(InputError) as told:
+        read(tmp_path, text.replace('"s"', '"other"'))
+    (problem,) = told.value.problems
+    assert (problem.expected.code, problem.expected.values["count"]) == ("jxl_station", 8)
+
+
 # ---- which is what, and the folder
 
 
 def test_hits_control_and_what_is_left_are_chosen(tmp_path):
-    text = RW5 + "SS,OP1,FP900,AR1.0000,ZE80.0000,SD4.0,--K\n--DT07-14-2026\n--TM09:00:00\n"
+    text = RW5 + "SS,OP1,FP900,AR1.0000,ZE80.0000,SD4.000000,--K\n--DT07-14-2026\n--TM09:00:00\n"
     found, tables = read(tmp_path, text, hits=("101-102",), check=("102",), control=("K",),
                          leave=("2",))  # fmt: skip
     assert [one["use"] for one in tables["wall_hits"]] == ["", "check"]
@@ -300,7 +330,7 @@ def test_an_end_needs_a_beginning_before_it(tmp_path, capsys):
 
 
 def test_times_that_no_file_has_are_said(tmp_path):
-    text = RW5 + "BD,OP1,FP2,AR0.0000,ZE90.0000,SD5.000,--BS\n"
+    text = RW5 + "BD,OP1,FP2,AR0.0000,ZE90.0000,SD5.000000,--BS\n"
     found, tables = read(tmp_path, text)
     assert "control_readings" not in tables
     assert "again_without_time" in codes(found.summary)
@@ -333,6 +363,22 @@ def test_an_empty_table_is_filled_in_and_one_with_rows_is_not(tmp_path, capsys):
     ]  # fmt: skip
     assert {one.name: one.read_bytes() for one in job.iterdir()} == before
     assert main(["import", str(book), "--out", str(job), "--replace"]) == 0
+
+
+@pytest.mark.slow
+def test_a_folder_without_a_job_is_told_how_to_go_on(tmp_path, capsys):
+    """What is printed is followed; with the job there, nothing of it is said."""
+    book, out = tmp_path / "book.rw5", tmp_path / "nowhere"
+    book.write_text(RW5)
+    assert main(["import", str(book), "--out", str(out)]) == 0
+    new, again, run = (line.split()[1:] for line in capsys.readouterr().out.splitlines()[-4:]
+                       if line.startswith("  tankcal"))  # fmt: skip
+    assert new == ["new", f"{out}-job", "--survey", "wall-hits"]
+    assert main(new) == 0
+    capsys.readouterr()
+    assert main(["import", str(book), *again[2:]]) == 0
+    assert capsys.readouterr().out.splitlines()[-2:] == ["then", f"  tankcal {' '.join(run)}"]
+    assert run == ["run", f"{out}-job"]
 
 
 def test_json_and_another_language(tmp_path, capsys):

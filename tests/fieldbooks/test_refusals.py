@@ -1,5 +1,7 @@
 """Whatever is handed in, it is read, or refused in plain lines with file and row."""
 
+import re
+
 import numpy as np
 import pytest
 from draws import draws
@@ -80,6 +82,47 @@ def test_each_fault_is_one_line(tmp_path, name, old, new, problems):
         (tmp_path / "profile.toml").write_text(PROFILE, encoding="utf-8")
         choices["profile"] = tmp_path / "profile.toml"
     assert problems_of(tmp_path, text.replace(old, new, 1), **choices) == problems
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "row", "column"),
+    [
+        ("rw5", r"SD(4)[.]\d+", r"SD\1", 6, "SD"),
+        ("rw5", r"ZE(\d+)[.]\d+", r"ZE\1", 6, "ZE"),
+        ("rw5", r"AR(\d+[.]\d)\d+", r"AR\1", 6, "AR"),
+        ("sdr", r"(?s)(.*09F1.{64}\d+[.]).*", r"\1", 215, "direction"),
+        ("sdr", r"(09F1.{32})(\d[.]\d{5})\d{3}", r"\1\2   ", 7, "distance"),
+        ("csv", ";4,88467;", ";4,88;", 2, "distance"),
+        ("csv", r"(18° 29' \d+),\d+", r"\1", 2, "direction"),
+    ],
+)
+def test_a_number_that_is_cut_short_is_told(tmp_path, name, old, new, row, column):
+    (tmp_path / "profile.toml").write_text(PROFILE, encoding="utf-8")
+    whole = WRITERS[name](one_stand())
+    text = re.sub(old, new, whole, count=1)
+    assert text != whole
+    path = tmp_path / "book.txt"
+    path.write_text(text, encoding="utf-8", newline="")
+    found = told(path, tmp_path / "out",
+                 profile=tmp_path / "profile.toml" if name == "csv" else None)  # fmt: skip
+    assert [(one.expected.code, one.row, one.column) for one in found] == [
+        ("cut_short", row, column)
+    ]
+
+
+def test_round_numbers_are_no_cut_ones(tmp_path):
+    """With all decimals; without the blanks at the end; of a program that leaves out zeros."""
+    (tmp_path / "profile.toml").write_text(PROFILE, encoding="utf-8")
+    path, profile = tmp_path / "book.txt", tmp_path / "profile.toml"
+    text = WRITERS["sdr"](one_stand())
+    text = re.sub(r"(09F1.{64})\d+[.]\d+", r"\g<1>290.00000000", text, count=1)
+    path.write_text("\n".join(line.rstrip() for line in text.splitlines()), encoding="utf-8")
+    assert told(path, tmp_path / "sdr") is None
+    text = WRITERS["csv"](one_stand()).replace(";4,88467;", ";5,00000;", 1)
+    text = re.sub(r"(,\d+?)0+;", r"\1;", text).replace(";5,0;", ";5;")
+    path.write_text(text, encoding="utf-8")
+    assert ";5;" in text
+    assert told(path, tmp_path / "csv", profile=profile) is None
 
 
 def test_a_table_without_a_profile(tmp_path):

@@ -4,6 +4,7 @@ Truth: the numbers of the survey itself, to the rounding of each format.
 """
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -134,6 +135,21 @@ def test_face_2_alone_is_turned_to_face_1(tmp_path):
     tables = imported(tmp_path, sdr(only))
     read = numbers(tables["wall_hits"], "direction_deg", "zenith_deg", "distance_m")
     np.testing.assert_allclose(read, hits_of(one_stand()), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("left", [1, 2])
+def test_one_face_alone_is_freed_of_the_errors_of_the_pairs(tmp_path, left):
+    """Closed form: targets read on one face later lie where both faces put them before."""
+    (stand,) = one_stand(faces=2, collimation=0.003, index=-0.004)
+    aims = stand.aims[:-8] + tuple(one for one in stand.aims[-8:] if one.face == left)
+    path = tmp_path / "book.sdr"
+    path.write_text(sdr([replace(stand, aims=aims)]), encoding="utf-8")
+    found = import_fieldbooks([path], tmp_path / "job", Choices())
+    with (tmp_path / "job" / "control_readings.csv").open(encoding="utf-8") as file:
+        read = numbers(csv.DictReader(file), "direction_deg", "zenith_deg")
+    np.testing.assert_allclose(read[4:], read[:4], rtol=0, atol=1e-6)
+    (told,) = (one for one in found.summary if one.code == "import_freed")
+    assert told.values["count"] == 4
 
 
 @pytest.mark.slow
