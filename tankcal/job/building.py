@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
+from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_all
 from tankcal.job.checks.extent import has_survey, is_sighted, is_strapped
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
@@ -88,6 +89,8 @@ def _read_tables(raw, is_whole, log):
 
 
 def _tell_missing_tables(raw, tables, kind, log):
+    if kind == "vertical":
+        _tell_sights_missing(raw, tables, log)
     for name in REQUIRED_TABLES.get(kind, ()):
         measured = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
         elsewhere = name == "points" and measured
@@ -98,6 +101,17 @@ def _tell_missing_tables(raw, tables, kind, log):
             log.problem(raw.file_of(name), _missing(raw, name))
         elif raw.tables[instead[0]] is not None:  # else it is told already
             log.problem(raw.tables[instead[0]].file, _IN_PLACE_OF_POINTS[instead[0]])
+
+
+def _tell_sights_missing(raw, tables, log):
+    """Set-ups that name no target, beside an empty table of what was sighted from them."""
+    elsewhere = has_rows(tables["points"]) or has_rows(tables["targets"]) or is_sighted(tables)
+    measured = has_survey(tables) or is_strapped(tables)  # without, the points are missing
+    if elsewhere or not measured or not has_rows(tables["setups"]):
+        return
+    for name in ("wall_hits", "tangents"):
+        if raw.tables.get(name) is not None:
+            log.problem(raw.tables[name].file, _IN_PLACE_OF_POINTS[name])
 
 
 _IN_PLACE_OF_POINTS = {
