@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from tankcal.errors import SHEET
 from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
 from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_all
@@ -124,7 +125,7 @@ _IN_PLACE_OF_POINTS = {
 
 
 def _missing(raw, name):
-    if raw.file_of(name).startswith("sheet "):
+    if raw.file_of(name).startswith(SHEET):
         return missing_sheet()
     needed = ", ".join(field.name for field in COLUMNS[name] if field.required)
     if name == "points":
