@@ -10,6 +10,11 @@ from tankcal.messages import message
 SHEET = "sheet "  # how the file of a problem in a workbook begins
 
 
+def sheet_named(name):
+    """The place of a sheet, as a text that each language says in its words."""
+    return message("in_sheet", "sheet {sheet}", sheet=name)
+
+
 class TankcalError(Exception):
     """Anything that tankcal raises on purpose; `exit_status` is what the command line returns."""
 
@@ -67,7 +72,7 @@ class Problem:
         place = [self.book] if self.book else []
         is_sheet = self.file.startswith(SHEET)
         name = self.file.removeprefix(SHEET)
-        place.append(message("in_sheet", "sheet {sheet}", sheet=name) if is_sheet else self.file)
+        place.append(sheet_named(name) if is_sheet else self.file)
         if self.cell is not None:
             place.append(message("in_cell", "cell {cell}", cell=self.cell))
         elif self.row is not None:

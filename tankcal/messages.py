@@ -75,6 +75,10 @@ class _Filler(string.Formatter):
     def __init__(self, number, said):
         self._number, self._said = number, said
 
+    def convert_field(self, value, conversion):
+        is_quoted = conversion == "r" and isinstance(value, str)
+        return repr(str(value)) if is_quoted else super().convert_field(value, conversion)
+
     def format_field(self, value, spec):
         if isinstance(value, list | tuple):
             return ", ".join(self.format_field(one, spec) for one in value)

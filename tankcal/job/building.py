@@ -2,7 +2,9 @@
 
 from dataclasses import replace
 
+from tankcal.errors import SHEET
 from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
+from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_all
 from tankcal.job.checks.extent import has_survey, is_sighted, is_strapped
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
@@ -88,6 +90,8 @@ def _read_tables(raw, is_whole, log):
 
 
 def _tell_missing_tables(raw, tables, kind, log):
+    if kind == "vertical":
+        _tell_sights_missing(raw, tables, log)
     for name in REQUIRED_TABLES.get(kind, ()):
         measured = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
         elsewhere = name == "points" and measured
@@ -100,6 +104,17 @@ def _tell_missing_tables(raw, tables, kind, log):
             log.problem(raw.tables[instead[0]].file, _IN_PLACE_OF_POINTS[instead[0]])
 
 
+def _tell_sights_missing(raw, tables, log):
+    """Set-ups that name no target, beside an empty table of what was sighted from them."""
+    elsewhere = has_rows(tables["points"]) or has_rows(tables["targets"]) or is_sighted(tables)
+    measured = has_survey(tables) or is_strapped(tables)  # without, the points are missing
+    if elsewhere or not measured or not has_rows(tables["setups"]):
+        return
+    for name in ("wall_hits", "tangents"):
+        if raw.tables.get(name) is not None:
+            log.problem(raw.tables[name].file, _IN_PLACE_OF_POINTS[name])
+
+
 _IN_PLACE_OF_POINTS = {
     "wall_hits": message("no_rows_of_hits", "no rows; expected a sight to the wall in each"),
     "tangents": message("no_rows_of_tangents", "no rows; expected a sight to a limb in each"),
@@ -110,7 +125,7 @@ _IN_PLACE_OF_POINTS = {
 
 
 def _missing(raw, name):
-    if raw.file_of(name).startswith("sheet "):
+    if raw.file_of(name).startswith(SHEET):
         return missing_sheet()
     needed = ", ".join(field.name for field in COLUMNS[name] if field.required)
     if name == "points":

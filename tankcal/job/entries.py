@@ -185,7 +185,7 @@ def _refuse_unknown(file, section, entries, section_row, log):
     if section not in KEYS:
         log.problem(
             file,
-            message("unknown_section", "unknown section{hint}", hint=nearest(section, KEYS)),
+            unknown_section(section, KEYS),
             section_row,
             f"[{section}]",
         )
@@ -194,6 +194,11 @@ def _refuse_unknown(file, section, entries, section_row, log):
     for key, value in entries.items():
         if key not in known and not _is_own(section, key, known):
             log.problem(file, _unknown_key(key, known), value.row, f"{section}.{key}")
+
+
+def unknown_section(section, known):
+    """What is said of a section that is none of the known ones."""
+    return message("unknown_section", "unknown section{hint}", hint=nearest(section, known))
 
 
 def _unknown_key(key, known):

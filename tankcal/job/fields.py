@@ -105,10 +105,19 @@ class Field:
         if self.kind == "numbers":
             return message(
                 "several_numbers",
-                "numbers{bounds}, such as 700; 850 (in a .toml file also [700, 850])",
+                "numbers{bounds}, such as {one}; {other} (in a .toml file also [{one}, {other}])",
                 bounds=self._bounds(),
+                **self._two_of_them(),
             )
         return _EXPECTED[self.kind]
+
+    def _two_of_them(self):
+        """Two values that the field allows, as a file has them: {one, other}."""
+        low, high = max(self.low, 0.0), self.high
+        two = (700.0, 850.0)
+        if not low <= two[0] < two[1] <= high:
+            two = (low + 0.2 * (high - low), low + 0.8 * (high - low))
+        return {name: f"{value:g}" for name, value in zip(("one", "other"), two, strict=True)}
 
     def wanted(self):
         """What is expected where nothing stands: "height of the course (a number above 0)"."""

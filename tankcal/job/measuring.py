@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tankcal.errors import SHEET
 from tankcal.job.cameras import AXES, datum_point, make_camera
 from tankcal.job.checks.survey.stadia import bars_of, bars_used, is_bar
 from tankcal.job.contract.observations import ANGLES, READINGS
@@ -227,7 +228,7 @@ def _readings(name, table):
         end=tuple(table.of("to")),
         check=_check(table),
         rows=table.rows,
-        sheet=table.file if table.file.startswith("sheet ") else "",
+        sheet=table.file if table.file.startswith(SHEET) else "",
         **optional,
     )
 

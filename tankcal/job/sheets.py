@@ -1,5 +1,6 @@
 """A job as one Excel workbook: a sheet `job` for the settings and a sheet for each table."""
 
+from tankcal.errors import sheet_named
 from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
 from tankcal.job.grids import placed_columns, table_rows
 from tankcal.job.tables import (
@@ -41,12 +42,12 @@ def read_workbook(path, log):
     tables = {name: _table(name, sheet, log) for name, sheet in sheets.items()}
     settings, sections = None, {}
     if SETTINGS_SHEET not in tables:
-        log.problem(f"sheet {SETTINGS_SHEET}", missing_sheet())
+        log.problem(sheet_named(SETTINGS_SHEET), missing_sheet())
     elif tables[SETTINGS_SHEET] is not None:
         settings, sections = _settings(tables[SETTINGS_SHEET], SECTION, log)
     files = (fingerprint(path.name, data),)
     wanted = {name: tables[name] for name in TABLES if name in tables}
-    place = f"sheet {SETTINGS_SHEET}"
+    place = sheet_named(SETTINGS_SHEET)
     registers = {
         name: _register(tables[name], owner, log)
         for name, owner in REGISTERS.items()
@@ -77,7 +78,7 @@ def _known_sheets(file, found, log):
             sheets[name] = sheet
         elif name == COVARIANCE_FILE.rpartition(".")[0]:
             log.problem(
-                f"sheet {name}",
+                sheet_named(name),
                 message("covariance_in_workbook", "a full covariance needs the job as a folder"),
             )
         else:
@@ -95,7 +96,7 @@ def _known_sheets(file, found, log):
 
 def _table(name, sheet, log):
     """Table of a sheet, or None after telling `log` why it cannot be read."""
-    place = f"sheet {name}"
+    place = sheet_named(name)
     if sheet.is_hidden:
         log.problem(
             place,

@@ -10,7 +10,7 @@ import hashlib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from tankcal.errors import SHEET, InputError, Problem
+from tankcal.errors import SHEET, InputError, Problem, sheet_named
 from tankcal.messages import message
 
 TANK_TABLES = (
@@ -210,8 +210,8 @@ class RawJob:
 
     def file_of(self, table):
         """Name of the table's file or sheet in messages, whether it is there or not."""
-        if self.settings_file.startswith("sheet "):
-            return f"sheet {table}"
+        if self.settings_file.startswith(SHEET):
+            return sheet_named(table)
         return f"{table}.toml" if table in REGISTERS else f"{table}.csv"
 
 

@@ -13,6 +13,7 @@ from tankcal.survey.tangents import circle_of_sights
 GON_IN_DEG, DEG_IN_GON, BACKWARDS = 0.9, 1 / 0.9, -1.0  # of a direction, to what was meant
 CLOSER = 0.2  # residuals, of those as it is read, from which on another reading is told
 LEAST = 0.004  # of the radius: residuals that need no explanation
+OFF_LEVEL_M = 0.3  # of the height of a sight from its level: so far it needs no explanation
 NEAR_NOMINAL = 0.1  # of the radius: a circle so far from the nominal one is not the tank
 MANY = 0.5  # of the limbs: so many are exchanged as a whole
 
@@ -65,6 +66,46 @@ def refuse_misread(tangents, poses, nominal_m):
             diameter_m=2 * nominal_m,
         )
         raise InputError(Problem(tangents.file, text))
+
+
+def refuse_misread_zeniths(tangents, poses, touching, zero_z_m):
+    """Raise InputError where zenith angles reach their levels in another unit only.
+
+    poses     `Poses` of their set-ups
+    touching  `Touching`, whose places in plan need no zenith angle
+    zero_z_m  z of the zero of levels
+    """
+    station = poses.xyz_m[poses.place_of(tangents)]
+    length = np.linalg.norm(touching.points.xyz_m[:, :2] - station[:, :2], axis=1)
+    level, setup = zero_z_m + tangents.level_m, np.array(tangents.setup)
+    problems = []
+    for name in dict.fromkeys(tangents.setup):
+        mine = (setup == name) & np.isfinite(tangents.zenith_rad) & np.isfinite(level)
+        if not mine.any():
+            continue
+        off = {}
+        for factor in (1.0, GON_IN_DEG, DEG_IN_GON):
+            up = np.pi / 2 - factor * tangents.zenith_rad[mine]
+            z = station[mine, 2] + length[mine] * np.tan(up)
+            off[factor] = np.median(np.abs(z - level[mine]))
+        best = min(off, key=off.get)
+        if off[1.0] > OFF_LEVEL_M and off[best] <= CLOSER * off[1.0]:
+            row = tangents.rows[int(np.argmax(mine))] if tangents.rows else None
+            problems.append(Problem(tangents.file, _text_of_zenith(best), row, "zenith"))
+    if problems:
+        raise InputError(problems)
+
+
+def _text_of_zenith(factor):
+    if factor == GON_IN_DEG:
+        return message(
+            "tangent_zeniths_in_gon",
+            "the sights are at the levels given if these are gon: is it so?",
+        )
+    return message(
+        "tangent_zeniths_in_degrees",
+        "the sights are at the levels given if these are degrees: is it so?",
+    )
 
 
 def _text(factor):

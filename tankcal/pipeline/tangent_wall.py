@@ -12,7 +12,11 @@ from tankcal.errors import InputError, Problem
 from tankcal.geometry.girth import tangent_excess
 from tankcal.messages import message
 from tankcal.pipeline.hit_wall import take_points
-from tankcal.pipeline.misread_tangents import refuse_limbs, refuse_misread
+from tankcal.pipeline.misread_tangents import (
+    refuse_limbs,
+    refuse_misread,
+    refuse_misread_zeniths,
+)
 from tankcal.pipeline.wall import find_wall, s_transform
 from tankcal.survey.poses import poses_in_network
 from tankcal.survey.sighting import WALL
@@ -52,6 +56,7 @@ def touch_wall(job, poses, tools, progress, dof=np.inf):
     refuse_misread(job.tangents, poses, radius)
     touching = touch(job.tangents, poses, **known)
     refuse_limbs(job.tangents, touching)
+    refuse_misread_zeniths(job.tangents, poses, touching, known["zero_z_m"])
     wall = find_wall(_with_points(job, touching), progress, dof)
     excess = tangent_excess(wall.field.amplitudes, radius)
     touching = touch(job.tangents, poses, **known, excess=excess)

@@ -9,6 +9,7 @@ from tankcal.job.checks import check_tank
 from tankcal.job.checks.survey.cameras import check_cameras
 from tankcal.job.checks.survey.files import SurveyFiles
 from tankcal.job.checks.survey.instruments import check_instruments
+from tankcal.job.contract import KEYS
 from tankcal.job.entries import (
     ColumnValues,
     kind_of,
@@ -16,6 +17,7 @@ from tankcal.job.entries import (
     read_register,
     read_setting,
     read_settings,
+    unknown_section,
 )
 from tankcal.job.fields import is_blank
 from tankcal.job.folder import (
@@ -149,6 +151,8 @@ def _read(folder, log):
     log.stop_if_problems()
     text, (whole, rows) = decode(PLAN_FILE, data, log), parsed
     own = {name: whole.pop(name) for name in (*SINGLE, *REPEATED) if name in whole}
+    _refuse_misspelt(whole, rows, text, log)
+    _refuse_nothing_measured(own, log)
     settings, sections = flattened(PLAN_FILE, whole, rows, log)
     needed = () if is_wall_plan(own) else ("pattern",)
     single = {name: _single(name, own.get(name, {}), rows, log, name in needed) for name in SINGLE}
@@ -183,6 +187,34 @@ def _read(folder, log):
     )  # fmt: skip
     of_plan = {name: _table(name, tables.get(name), log) for name in TABLES}
     return raw, Given(single, repeated, of_plan, is_wall=is_wall)
+
+
+def _refuse_misspelt(whole, rows, text, log):
+    """A problem for each section whose name is like one of a plan; it is taken out of `whole`."""
+    of_jobs = {name.partition(".")[0] for name in KEYS}
+    for name in [one for one in whole if one not in of_jobs]:
+        entries = whole[name] if isinstance(whole[name], list) else [whole[name]]
+        known = (*of_jobs, *SINGLE, *REPEATED)
+        if not nearest(name, known) or not all(isinstance(one, dict) for one in entries):
+            continue
+        places = _rows_of(re.escape(name), text)
+        row = places[0][0] if places else rows.get(name)
+        column = f"[[{name}]]" if isinstance(whole[name], list) else f"[{name}]"
+        log.problem(PLAN_FILE, unknown_section(name, known), row, column)
+        del whole[name]
+
+
+def _refuse_nothing_measured(own, log):
+    """Raise InputError for a plan that has neither targets nor the measuring of a bare wall."""
+    if "pattern" in own or is_wall_plan(own):
+        return
+    expected = message(
+        "plan_of_nothing",
+        "nothing is measured; expected a [pattern] of targets, or [[straps]], [lines] or [[hits]]"
+        " of the bare wall",
+    )
+    log.problem(PLAN_FILE, expected)
+    log.stop_if_problems()
 
 
 def _table(name, table, log):

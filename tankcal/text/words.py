@@ -93,8 +93,15 @@ def translate_record(words, record):
 
 def _adjustment_in_language(words, adjustment):
     left_out = [_said(words, one, "text") for one in adjustment.get("left_out", [])]
+    places = {}
+    if residuals := adjustment.get("residuals"):  # by columns
+        files = [_place_said(words, one) for one in residuals["file"]]
+        places["residuals"] = {**residuals, "file": files}
+    if held := adjustment.get("held"):
+        places["held"] = [_placed(words, one) for one in held]
     return {
         **adjustment,
+        **places,
         "datum": _said(words, adjustment["datum"], "words", "words_"),
         "aside": [one["text"] for one in left_out] or adjustment["aside"],
     }
@@ -114,11 +121,14 @@ def _said(words, row, key, of=""):
 
 def _placed(words, row):
     """A row of the record whose sheet is named in the reader's language."""
-    if not row["file"].startswith(SHEET):
-        return row
-    sheet = row["file"].removeprefix(SHEET)
-    text = message_sentence(words, row["file"], "in_sheet", {"sheet": sheet})
-    return {**row, "file": text}
+    return {**row, "file": _place_said(words, row["file"])}
+
+
+def _place_said(words, file):
+    """The name of a file as it is, of a sheet with the language's word for it."""
+    if not file.startswith(SHEET):
+        return file
+    return message_sentence(words, file, "in_sheet", {"sheet": file.removeprefix(SHEET)})
 
 
 def _number(value, form, marks):

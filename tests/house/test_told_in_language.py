@@ -3,13 +3,14 @@
 import re
 
 import pytest
-from job_builder import write_workbook
+from job_builder import write_book, write_workbook
+from survey_builder import survey_parts
 
 import tankcal
 from tankcal.cli import main
 from tankcal.cli.asked_language import asked_language
 from tankcal.cli.showing import say_in_language, speak
-from tankcal.errors import Problem
+from tankcal.errors import InputError, Problem
 from tankcal.job.contract import KEYS
 from tankcal.job.fields import Field, Refused, read_value
 from tankcal.job.starter import write_starter
@@ -127,3 +128,16 @@ def test_unknown_word_is_refused_with_expected_ones():
     assert isinstance(told.value.text, Message)
     speak("pt-BR")
     assert say_in_language(told.value.text) == "encontrado 'talvez'; esperado 'fora' ou 'dentro'"
+
+
+@pytest.mark.parametrize(("language", "said"), [("pt-BR", "planilha"), ("es", "hoja")])
+def test_a_sheet_inside_a_text_is_named_in_words(tmp_path, language, said):
+    """A register that is not there, told of the sheet that refers to it."""
+    parts = survey_parts()
+    del parts.registers["instruments"]
+    with pytest.raises(InputError) as error:
+        tankcal.load(write_book(tmp_path / "t.xlsx", parts))
+    speak(language)
+    told = [say_in_language(one.text) for one in error.value.problems]
+    assert any(f": {said} instruments " in line for line in told)
+    assert [line for line in told if "sheet " in line] == []

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from generated_hits import Tool
+from generated_tangents import ring_of_stations, traverse_tables
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from job_builder import job_parts, write_book, write_folder
+from job_builder import job_parts, tangent_parts, write_book, write_folder
 from messages_told import lines
 from spoilt import FORMS, places, problems_of, settings_place, table_file, write
 from survey_builder import WALL, read_on_comparator, survey_parts
@@ -780,3 +782,30 @@ def test_column_missing_in_all_rows_is_reported_once(tmp_path):
     (problem,) = (one for one in told if one.column == "y_mm")
     assert (problem.file, problem.row) == ("image_points.csv", None)
     assert problem.expected.startswith("the column is missing or blank")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("tangents", "a sight to a limb in each"), ("wall_hits", "a sight to the wall in each")],
+)
+@pytest.mark.parametrize("in_book", [False, True])
+def test_headings_alone_beside_a_traverse_are_told(tmp_path, name, words, in_book):
+    """A survey of set-ups alone has no wall; with targets.csv an empty table says nothing."""
+    stations = ring_of_stations(4, 13.0)
+    parts = tangent_parts(
+        [{"setup": f"I{i}", "course": "1"} for i in range(1, 5)],
+        traverse_tables(stations, np.zeros(4), Tool()),
+    )
+    del parts.tables["tangents"]
+    columns = ["setup", "course", "level_m", "side", "direction_deg", "zenith_deg", "s_arcsec"]
+    hits = ["setup", "course", "direction_deg", "zenith_deg", "distance_m"]
+    parts.tables[name] = [columns if name == "tangents" else hits]
+    parts.tables["control"] = [["point", "x_m", "y_m", "z_m", "sx_mm"], ["S1", 0, 13, 1.5, 1]]
+    path = tmp_path / ("job.xlsx" if in_book else "job")
+    where = f"job.xlsx, sheet {name}" if in_book else f"{name}.csv"
+    told = f"{where}: no rows; expected {words}"
+    (write_book if in_book else write_folder)(path, parts)
+    assert told in lines(problems_of(path))
+    parts.tables["targets"] = [["point"], ["S2"]]
+    (write_book if in_book else write_folder)(path, parts)
+    assert load(path).measurements is not None

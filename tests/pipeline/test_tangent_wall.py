@@ -222,6 +222,19 @@ def test_angles_of_another_kind_are_told(tmp_path, factor, names):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("factor", [1 / 0.9, 0.9])
+@pytest.mark.parametrize("names", [None, ("I4",)])
+def test_zenith_angles_in_another_unit_are_told(tmp_path, factor, names):
+    rows = sights(levels=(1.0, 3.0, 5.0, 7.0))
+    for row in rows:
+        if names is None or row["setup"] in names:
+            row["zenith_deg"] = row["zenith_deg"] * factor
+    told = problems_of(tmp_path, parts_of(rows))
+    assert {one[::2] for one in told} == {("tangents.csv", "zenith")}
+    assert len(told) == (len(STATIONS) if names is None else 1)
+
+
+@pytest.mark.slow
 def test_a_disturbed_set_up_is_named(tmp_path):
     """A turn of 5 minutes; a tenth of that looks like the form of the wall, and is in U."""
     rng = np.random.default_rng(3)

@@ -15,6 +15,7 @@ from generated_hits import hit_job
 from generated_lines import plumbed_job
 from generated_strapping import strapped_job
 from generated_walls import make_wall
+from messages_told import lines
 
 import tankcal
 from tankcal.cli import main
@@ -309,6 +310,39 @@ def test_bad_input_is_one_line_each(tmp_path, name, capsys):
         with pytest.raises(InputError) as error:
             load_plan(folder)
         assert place in {(one.file, one.column) for one in error.value.problems}
+
+
+TOLD = [  # of a plan, what is changed in it, the whole line in the column
+    (HITS, "hits = 20 ", "hits = 2 ", "hits[1].hits: found 2; expected 3 or more"),
+    (HITS, "hits = 20 ", "hits = 400 ", "hits: 4000 hits; expected at most 2500"),
+    (LINES, "at_percent = [20]", "at_percent = [180]", "such as 20; 80 (in"),
+    (LINES, "[[straps]]", "[[strap]]", "[[strap]]: unknown section (did you mean straps?)"),
+    (HITS, "hits = 20 ", "spread_deg = 0\nhits = 20 ", "found 0; expected a number above 0"),
+]
+
+
+@pytest.mark.parametrize(("source", "old", "new", "words"), TOLD)
+def test_what_is_told_names_the_key_and_what_it_may_be(tmp_path, source, old, new, words):
+    folder = plan_of(tmp_path / "plan", source, (old, new))
+    with pytest.raises(InputError) as error:
+        load_plan(folder)
+    told = lines(error.value.problems)
+    assert any(words in one for one in told), told
+
+
+def test_a_plan_without_any_section_is_told_of_all_kinds(tmp_path):
+    names = ("[[straps]]", "[[strap]]"), ("[lines]", "[line]")
+    with pytest.raises(InputError) as error:
+        load_plan(plan_of(tmp_path / "plan", LINES, *names))
+    nothing, *misspelt = sorted(lines(error.value.problems), key=len, reverse=True)
+    assert nothing.startswith("plan.toml: nothing is measured; expected a [pattern] of targets, or")
+    assert {one.partition("mean ")[2] for one in misspelt} == {"straps?)", "lines?)"}
+
+
+def test_three_hits_at_two_heights_are_enough(tmp_path):
+    """The least that is accepted does give a prediction."""
+    folder = plan_of(tmp_path / "plan", HITS, ("hits = 20 ", "hits = 3 "))
+    assert predict(load_plan(folder)).relative_u > 0
 
 
 @pytest.mark.slow

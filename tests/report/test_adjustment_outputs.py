@@ -1,5 +1,6 @@
 """What a user sees of an adjusted survey: record, CSV files, workbook, papers, command line."""
 
+import copy
 import csv
 import gc
 import json
@@ -405,6 +406,22 @@ def test_the_workbook_of_a_survey_alone(only):
     cells = [cell for name in book.sheetnames for row in book[name] for cell in row]
     assert not [cell for cell in cells if cell.data_type == "f"]
     assert {HARD_NAME, HARD_TEXT} <= {cell.value for cell in cells}
+
+
+@pytest.mark.parametrize(("language", "said"), [("en", "sheet"), ("pt-BR", "planilha")])
+def test_sheets_that_readings_stand_in_are_named_in_words(station, tmp_path, language, said):
+    record = copy.deepcopy(station[1])
+    residuals = record["adjustment"]["residuals"]
+    residuals["file"] = [f"sheet {one.removesuffix('.csv')}" for one in residuals["file"]]
+    paper = Paper(record, language=language)
+    named = set(paper.record["adjustment"]["residuals"]["file"])
+    tables = ("directions", "zenith_angles", "slope_distances")
+    assert named == {f"{said} {one}" for one in tables}
+    workbook.write(record, tmp_path / "a.xlsx", language)
+    book = openpyxl.load_workbook(tmp_path / "a.xlsx")
+    cells = {str(cell.value) for sheet in book for row in sheet for cell in row}
+    assert named <= cells
+    assert language == "en" or not [one for one in cells if one.startswith("sheet ")]
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ import pickle
 from collections import defaultdict
 from pathlib import Path
 
+import numpy as np
 import pytest
 from job_builder import write_job
 from messages_told import lines
@@ -213,3 +214,11 @@ def test_only_shipped_rules_are_translated(result):
     record["job"] = {"table": {"rule": "oiml_r71"}}
     told = translate_record(words, record)["rule"]
     assert told["rule"] == {"name": "OIML R 71", "remark": "Não lido"}
+
+
+def test_a_text_of_an_array_is_quoted_as_any_other():
+    """numpy's own texts, and a Message in quotes."""
+    names = np.array(["A-1", "B"])
+    assert message("of", "course {name!r}", name=names[0]) == "course 'A-1'"
+    assert message("of", "{of!r}", of=message("known", "known")) == "'known'"
+    assert message("of", "{count!r}", count=2) == "2"

@@ -16,6 +16,17 @@ FEWEST_HITS = 5  # of a section of the wall
 RANGES = ("slope_distances", "distances")  # tables by which a network tells an offset
 
 
+def too_many_hits(count):
+    """What is said of more hits than can be used."""
+    return message(
+        "too_many_hits",
+        "{count} hits; expected at most {most}: with more, take every second one or hand them"
+        " in as points.csv",
+        count=count,
+        most=MOST_HITS,
+    )
+
+
 def check_hits(values, tables, registers, raw, log):
     """Hits from set-ups that are there, by instruments that say how well they range."""
     hits, control = tables["wall_hits"], tables["control_readings"]
@@ -25,14 +36,7 @@ def check_hits(values, tables, registers, raw, log):
             log.warning(control.file, expected)
         return
     if len(hits.rows) > MOST_HITS:
-        expected = message(
-            "too_many_hits",
-            "{count} hits; expected at most {most}: with more, take every second one or hand them"
-            " in as points.csv",
-            count=len(hits.rows),
-            most=MOST_HITS,
-        )
-        log.problem(hits.file, expected)
+        log.problem(hits.file, too_many_hits(len(hits.rows)))
         return
     count = sum(use != "check" for use in hits.of("use"))
     if count < FEWEST_HITS and not hits.skipped:

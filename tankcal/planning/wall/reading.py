@@ -1,5 +1,6 @@
 """From the sections of a plan to a WallPlan: a design, its tables, and the job that reads them."""
 
+import math
 from dataclasses import replace
 from itertools import islice
 
@@ -7,6 +8,7 @@ from tankcal.errors import InputError
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.job.building import job_of
 from tankcal.job.checking import zero_z
+from tankcal.job.checks.hits import FEWEST_HITS, MOST_HITS, too_many_hits
 from tankcal.job.checks.strapping import MOST_STRAPS
 from tankcal.job.tables import Log, Value
 from tankcal.messages import message
@@ -26,6 +28,7 @@ from tankcal.planning.wall.nominal_readings import with_nominal_readings
 from tankcal.planning.wall.telling import told_of_plan
 
 CLEAR_M, MOST_SECTIONS = 0.5, 50
+FEWEST_AZIMUTHS = 3  # that a circle goes through
 OF_POINTS = ("pattern", "photo_rings", "setup_rings", "tapes", "obstacles")
 
 
@@ -57,6 +60,8 @@ def check_sections(given, courses, nominal_m, log):
             if courses and course not in courses:
                 one.tell(log.problem, "courses", no_such_name(course, "courses.csv"))
     _check_rings(given, nominal_m, log)
+    if courses:
+        _check_hits(given.repeated["hits"], courses, log)
     check_form(given.single["wall"], log)
     _check_lines_and_ties(given, log)
 
@@ -84,6 +89,35 @@ def _check_rings(given, nominal_m, log):
                 nominal=nominal_m,
             )
             one.tell(log.problem, "radius_m", expected)
+
+
+def _check_hits(rings, courses, log):
+    """Enough hits for the sections of each course, and not more than can be used."""
+    if any(None in (ring["setups"], ring["hits"]) for ring in rings):
+        return  # told already
+    total = 0
+    few = []  # rings
+    for course in courses:
+        here = [ring for ring in rings if course in (ring["courses"] or courses)]
+        aims = [int(ring["setups"] * ring["hits"]) for ring in here]
+        hits = sum(aim * len(_at(ring)) for aim, ring in zip(aims, here, strict=True))
+        total += hits
+        if sum(aims) < FEWEST_AZIMUTHS or hits < FEWEST_HITS:
+            few += [ring for ring in here if ring not in few]
+    for ring in few:
+        fewest = max(FEWEST_AZIMUTHS, math.ceil(FEWEST_HITS / len(_at(ring))))
+        expected = message(
+            "plan_few_hits",
+            "found {found:g}; expected {fewest} or more: the sections of a course need {hits} hits"
+            " at {azimuths} azimuths at least",
+            found=ring["hits"],
+            fewest=math.ceil(fewest / ring["setups"]),
+            hits=FEWEST_HITS,
+            azimuths=FEWEST_AZIMUTHS,
+        )
+        ring.tell(log.problem, "hits", expected)
+    if total > MOST_HITS:
+        log.problem(PLAN_FILE, too_many_hits(total), None, "hits")
 
 
 def _check_lines_and_ties(given, log):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from tankcal.errors import SHEET
 from tankcal.job.checking import has_rows
 from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.checks.survey.instruments import TAKEN_FROM_SETUPS
@@ -159,7 +160,7 @@ def check_angle(files, table, angle, *, is_needed=True):
 
 def files_name(table):
     """Name of a table of a job from that of its file or sheet."""
-    return table.file.removeprefix("sheet ").removesuffix(".csv")
+    return table.file.removeprefix(SHEET).removesuffix(".csv")
 
 
 def _refuse_same_ends(files, name, table):
