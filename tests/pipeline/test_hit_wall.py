@@ -152,6 +152,7 @@ def test_two_setups_tied_by_targets(tmp_path):
     assert noisy.sighting.poses.ties == ("network", "network")
 
 
+@pytest.mark.slow
 def test_hits_after_the_network_are_named_points_in_it(tmp_path):
     """Second method: the same readings as targets of their own, all in one adjustment."""
     parts = tied_parts(np.random.default_rng(5))
@@ -254,6 +255,7 @@ def test_straps_of_an_outside_survey_by_points(tmp_path):
     assert more == pytest.approx(2 * 0.001 / 6.5, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_thinner_plate_moves_a_strap_inside_once(tmp_path):
     """The strap is outside, the hits inside: 1 mm less plate is 1 mm more of its inner radius, and
     as much of the offset, of which steep sights take less.
@@ -501,6 +503,7 @@ def both_parts(seed=None, offset_m=0.0):
     return parts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["inside", "outside"])
 def test_one_offset_inside_and_outside(tmp_path, side):
     """Nobody knows the offset, no tape: inside it makes the tank smaller, outside larger."""
@@ -516,6 +519,7 @@ def test_one_offset_inside_and_outside(tmp_path, side):
     assert abs(found.table.volume_m3[-1] - volume_of(oval)) < found.table.U_m3[-1]
 
 
+@pytest.mark.slow
 def test_plates_between_the_sides(tmp_path):
     """1 mm less plate goes into the radius as far as the hits outside tell it, and U knows it."""
     parts = both_parts(seed=5)
@@ -531,6 +535,7 @@ def test_plates_between_the_sides(tmp_path):
     assert -lines["plate_thickness"].sensitivity == pytest.approx(grown, rel=0.02)
 
 
+@pytest.mark.slow
 def test_an_offset_that_both_sides_deny_is_named(tmp_path):
     parts = both_parts(seed=7, offset_m=0.004)
     result = run(tmp_path, parts)

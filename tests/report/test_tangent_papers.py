@@ -66,6 +66,7 @@ def test_every_table_has_words(record, language):
             assert paper.word(f"table_headings.{column.heading or column.key}")
 
 
+@pytest.mark.slow
 def test_the_workbook_has_a_sheet(record, tmp_path):
     workbook.write(record, tmp_path / "capacity.xlsx")
     sheet = openpyxl.load_workbook(tmp_path / "capacity.xlsx")["Tangents"]

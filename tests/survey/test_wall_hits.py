@@ -84,6 +84,7 @@ def test_what_hits_share_by_differences():
     np.testing.assert_allclose(found - own, by @ (root @ root.T) @ by.T, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_own_noise_by_simulation():
     read = take_hits(ROUND, STATION, even_aims(ROUND, LEVELS, 4), zero=ZERO)
     known, rng = RangingInstrument("TS", u_offset_m=0.0), np.random.default_rng(2)
