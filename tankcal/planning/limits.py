@@ -13,6 +13,26 @@ def limited_u(tabled, limits):
     return float(table.U_m3[-1] / table.volume_m3[-1])
 
 
+class OfTable:
+    """What a prediction says of its table (`tabled`) and of the limit of its plan (`plan`)."""
+
+    @property
+    def table(self):
+        """The capacity table with U of every row (`capacity.Capacity`)."""
+        return self.tabled.made.table
+
+    @property
+    def relative_u(self):
+        """U over volume of what the plan's limit is for: the full tank, or the worst delivery."""
+        return limited_u(self.tabled, self.plan.limits)
+
+    @property
+    def meets(self):
+        """Whether the limit is met; None without one."""
+        limit = self.plan.limits.relative_u
+        return None if limit is None else bool(self.relative_u <= limit)
+
+
 def refuse_without_delivery(plan, tabled, tall):
     """Raise InputError where the limit is for deliveries and the table has none long enough.
 

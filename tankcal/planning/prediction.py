@@ -12,7 +12,7 @@ from tankcal.planning.bodies import describe_separate_bodies, find_separate_bodi
 from tankcal.planning.checks.seen import refuse_blind
 from tankcal.planning.doubtful import reliability
 from tankcal.planning.foreseen import foreseen, idle_ties
-from tankcal.planning.limits import limited_u, refuse_without_delivery
+from tankcal.planning.limits import OfTable, refuse_without_delivery
 from tankcal.planning.measurements import measurements_of, nominal_of
 from tankcal.planning.model import Plan
 from tankcal.planning.table import PredictedTable, predicted_table
@@ -72,7 +72,7 @@ class SectionOutlook:
 
 
 @dataclass(frozen=True)
-class Prediction:
+class Prediction(OfTable):
     """What a survey would give, before it is made.
 
     Attributes
@@ -93,22 +93,6 @@ class Prediction:
     predicted: Predicted
     tabled: PredictedTable
     points: tuple[PointOutlook, ...]
-
-    @property
-    def table(self):
-        """The capacity table with U of every row (`capacity.Capacity`)."""
-        return self.tabled.made.table
-
-    @property
-    def relative_u(self):
-        """U over volume of what the plan's limit is for: the full tank, or the worst delivery."""
-        return limited_u(self.tabled, self.plan.limits)
-
-    @property
-    def meets(self):
-        """Whether the limit is met; None without one."""
-        limit = self.plan.limits.relative_u
-        return None if limit is None else bool(self.relative_u <= limit)
 
     @property
     def datum(self):

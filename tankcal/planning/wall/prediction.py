@@ -14,7 +14,7 @@ from tankcal.pipeline.statements import statements
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import ComputedTable, check_table, compute_table
-from tankcal.planning.limits import limited_u, refuse_without_delivery
+from tankcal.planning.limits import OfTable, refuse_without_delivery
 from tankcal.planning.wall.model import WallPlan
 from tankcal.planning.wall.telling import told_of_plan
 from tankcal.quadrature import panels
@@ -92,7 +92,7 @@ class WallTable:
 
 
 @dataclass(frozen=True)
-class WallPrediction:
+class WallPrediction(OfTable):
     """What a survey of a wall by tape, lines or hits would give, before it is made.
 
     Attributes
@@ -103,22 +103,6 @@ class WallPrediction:
 
     plan: WallPlan
     tabled: WallTable
-
-    @property
-    def table(self):
-        """The capacity table with U of every row (`capacity.Capacity`)."""
-        return self.tabled.made.table
-
-    @property
-    def relative_u(self):
-        """U over volume of what the plan's limit is for: the full tank, or the worst delivery."""
-        return limited_u(self.tabled, self.plan.limits)
-
-    @property
-    def meets(self):
-        """Whether the limit is met; None without one."""
-        limit = self.plan.limits.relative_u
-        return None if limit is None else bool(self.relative_u <= limit)
 
     @cached_property
     def courses(self):
