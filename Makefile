@@ -93,7 +93,7 @@ $(VENV)/base: pyproject.toml constraints.txt
 	touch $@
 
 $(VENV)/full: $(VENV)/base
-	$(BIN)/pip install --quiet --editable '.[test,check,images]'
+	$(BIN)/pip install --quiet --editable '.[test,check,images,clouds,cluster]'
 	touch $@
 
 $(VENV)/docs: $(VENV)/full
