@@ -119,9 +119,14 @@ def pytest_configure(config):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Of a test that is `slow(after=n)`, the first n cases are not: `make test` runs them."""
+    """A test that asks for one of its module's `SLOW_FIXTURES` is slow as well.
+
+    Of a test that is `slow(after=n)`, the first n cases are not: `make test` runs them.
+    """
     seen = Counter()
     for item in items:
+        if getattr(item.module, "SLOW_FIXTURES", frozenset()).intersection(item.fixturenames):
+            item.add_marker("slow")
         mark = next((one for one in item.own_markers if one.name == "slow"), None)
         if mark is not None and mark.kwargs:
             case = (item.path, item.originalname)

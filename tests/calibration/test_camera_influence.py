@@ -44,6 +44,7 @@ from tankcal.survey.results import Reading
 from tankcal.text.shipped import shipped_folder
 
 HEIGHT_M, BASE_M, IMAGE_SD_MM = 200.0, 60.0, 0.0005
+SLOW_FIXTURES = {"tank"}  # seconds each
 FLIGHT = np.array([4.38, 0.01, -0.02, -4e-3, 2e-4, 0, 0, 1e-4, -5e-5, 0, 0, 1e-4, 2e-4])
 LENS = Form("correction_subtracted", "both_x")
 GROUND = (9, 13, 20, 25, 29)

@@ -27,6 +27,9 @@ from tankcal.text.words import load_words
 pytest_plugins = ("camera_results",)
 
 
+SLOW_FIXTURES = {"stability", "parameters", "run"}  # seconds each
+
+
 @pytest.fixture(scope="module", params=["stability", "parameters", "influence", "product"])
 def folder(request, results, tmp_path_factory):
     """The folder with everything of one kind, and its result."""

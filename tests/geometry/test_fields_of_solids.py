@@ -159,6 +159,7 @@ def test_sizes_are_as_unsure_as_they_are_said(estimated, figure):
     assert np.all(rms > 0.7)
 
 
+@pytest.mark.slow
 def test_a_functional_is_as_unsure_as_it_is_said():
     """Simulation of the model itself: errors of functionals over their sd have rms 1."""
     rng = np.random.default_rng(7)

@@ -72,6 +72,7 @@ def test_perfect_points_are_all_accepted():
     assert shell.tilt < 1e-9
 
 
+@pytest.mark.slow
 def test_the_frame_changes_nothing():
     """Shifted to UTM coordinates and turned by 90 deg: the same points, the same tilt."""
     rng = np.random.default_rng(12)

@@ -73,6 +73,7 @@ def test_a_problem_of_a_workbook_names_it(file, placed):
     assert str(in_book(Problem(file, "x", 3), "t.xlsx")) == placed
 
 
+@pytest.mark.slow
 def test_warnings_of_a_workbook_name_it_and_its_words_are_read(tmp_path):
     settings = {
         "survey.side": "fora",

@@ -275,6 +275,7 @@ def test_saved_by_libreoffice_it_is_the_same_job_and_record(form, tmp_path, by_w
     assert records[0].keys() == records[1].keys()
 
 
+@pytest.mark.slow
 def test_a_mark_before_a_row_switches_it_off(form):
     path, _ = form
     book = openpyxl.load_workbook(path)

@@ -265,6 +265,7 @@ def test_weak_vertical_is_reported(job, survey):
     assert any("is known only to 5.0 mm/m" in one for one in told)
 
 
+@pytest.mark.slow
 def test_a_sphere_of_adjusted_points_has_its_causes_too(tmp_path):
     """Closed form: a scale of u changes the diameter by D u, whatever else is uncertain."""
     rng = np.random.default_rng(4)

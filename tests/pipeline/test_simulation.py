@@ -364,6 +364,7 @@ def test_rows_not_drawn_follow_their_neighbours(monkeypatch, tmp_path):
     assert np.array_equal(some.judged.validated, every.judged.validated)
 
 
+@pytest.mark.slow
 def test_result_has_what_the_job_requests(tmp_path):
     settings = {"table.step_m": 1.0, "table.monte_carlo": True}
     job = tankcal.load(write_job(tmp_path / "job", settings=settings))

@@ -246,6 +246,7 @@ def test_square_sections_times_tilt_factor_give_same_table(tmp_path, slope):
         assert percent == pytest.approx(0.0102, abs=5e-5)  # published
 
 
+@pytest.mark.slow
 def test_without_the_tilt_heights_are_along_the_axis(tmp_path):
     options = {"tilt": (0.03, 0.0), "radius": _leaning_cut(0.03)}
     found = inside_cylinder(tmp_path / "job", {"corrections.tilt": False}, **options)

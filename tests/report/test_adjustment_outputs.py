@@ -43,6 +43,7 @@ ONLY = {
     "record.json", "points.csv", "points_cov.npz", "photos.csv", "cameras.csv", "groups.csv",
     "residuals.csv", "adjustment.xlsx", "report.ipynb", "working-papers.pdf", "report.html",
 }  # fmt: skip
+SLOW_FIXTURES = {"only", "whole", "station"}  # seconds each
 BLUNDERS = (5, 40, 77)  # rows of image points that get 0.2 mm
 
 

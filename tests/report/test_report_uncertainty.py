@@ -36,6 +36,8 @@ from tankcal.tank.rules.verdict import RuleVerdict
 from tankcal.text.digits import decimals_of, decimals_of_rows, fixed
 from tankcal.text.words import input_name, load_words
 
+SLOW_FIXTURES = {"result", "path"}  # seconds each
+
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):

@@ -187,6 +187,7 @@ def test_intervals_cover(name, figure):
     assert min(likely) > 1e-3
 
 
+@pytest.mark.slow
 def test_a_scale_error_that_is_not_declared_is_not_covered(figure):
     """Property: the study has teeth. With the tape's u_scale left out the radii miss the truth."""
     kind, rng = kinds("photographs"), np.random.default_rng(0)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from surveyed import by_photographs
 
 from tankcal.adjust import CRITICAL
@@ -19,6 +20,7 @@ def quantity(survey, uses, row):
     return float(table.test_statistic[table.rows == row][0])
 
 
+@pytest.mark.slow
 def test_image_point_agrees_only_without_the_named_reading():
     """Second method: every ray of the same point in turn is left out, and all adjusted again."""
     measurements = by_photographs(3, photos=8)[0]

@@ -92,6 +92,7 @@ def test_relative_orientation_with_blunders(flat):
     assert flat or len(poses) == 1
 
 
+@pytest.mark.slow
 def test_photographs_alone_give_the_shape():
     """Property: the same free network as from good start values, scale from the tapes."""
     survey, truth = photographed()
@@ -133,6 +134,7 @@ def test_a_fixed_photo_anchors_the_frame():
     assert adjust(found).xyz_m == pytest.approx(truth.xyz_m, abs=0.02)
 
 
+@pytest.mark.slow
 def test_two_points_and_two_heights_are_enough():
     """x, y, z of two points and z of two more (with one, two rotations about the line would do)."""
     survey, rotation = seen_from(cloud(2), THREE, np.zeros(3))
@@ -224,6 +226,7 @@ def test_nominal_coordinates_in_another_frame_than_control(turn_deg):
     assert adjust(found).xyz_m == pytest.approx(adjust(survey).xyz_m, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_the_wall_decides_between_the_poses_of_three_points():
     survey, truth = photographed(noise=0.0, form=Form())
     images = survey.image_points

@@ -65,6 +65,7 @@ def test_printed_orientation_of_two_photographs():
         assert 3600 * np.degrees(sd[number, 3:]) == pytest.approx(values[9:12], abs=0.5)
 
 
+@pytest.mark.slow
 def test_printed_digits_with_the_blunders_in():
     """Published. Misclosures of metres converge slowly: the digits need a smaller last step."""
     adjustment = adjust_survey(measured(BLUNDERS))

@@ -430,6 +430,7 @@ HEIGHTS = table_heights(0.01, 2.4)
 FACTOR = np.column_stack([0.002 * lying(HEIGHTS), 0.001 * lying_area(HEIGHTS)])
 
 
+@pytest.mark.slow
 @given(st.lists(st.floats(0.0, 2.4), min_size=1, max_size=20))
 def test_the_dip_of_a_volume_is_the_inverse_of_the_table(dips):
     """Property: what the table gives at a dip leads back to the dip."""

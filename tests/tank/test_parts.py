@@ -192,6 +192,7 @@ def quadratures_of_area(name):
     return edges, (weights * part_of(name).area_m2(nodes)).reshape(-1, 8).sum(axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_volume_is_the_integral_of_the_area(name):
     """Second method: Gauss quadrature of the area, between levels where it jumps."""

@@ -418,6 +418,7 @@ ends = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=60, derandomize=True)
 @given(
     a=ends,
