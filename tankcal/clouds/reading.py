@@ -84,7 +84,7 @@ def read_cloud(header, *, unit_m=1.0, chunk=1 << 20, progress=None):
         raise file.refusal(
             message(
                 "cloud_file_changed",
-                "changed while it was worked on: {before} bytes, now {now}",
+                "changed since it was looked at: {before} bytes, now {now}",
                 before=header.bytes,
                 now=file.bytes,
             )

@@ -30,7 +30,7 @@ def main(request):
     except BrokenPipeError:  # the parent wants no more
         pass
     except BaseException as error:  # a panic of Rust is no Exception
-        words = " ".join(f"{error}".split()) or type(error).__name__
+        words = next(iter(f"{error}".strip().splitlines()), type(error).__name__)
         shown = "".join(c if c.isprintable() else "?" for c in words)[:LONGEST_REASON]
         _send(out, FAILURE, data=shown.encode())
     out.close()

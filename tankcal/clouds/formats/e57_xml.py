@@ -8,7 +8,7 @@ from xml.parsers import expat
 from tankcal.messages import message
 
 DEEPEST = 40  # elements in each other; scanners write about ten
-MOST_ELEMENTS = 500_000
+MOST_ELEMENTS = 200_000
 LONGEST_TEXT = 1000  # letters that are kept of the text of an element
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 

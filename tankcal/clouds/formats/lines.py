@@ -10,7 +10,7 @@ import numpy as np
 
 from tankcal.messages import message
 
-BLOCK = 1 << 23  # bytes read at a time
+BLOCK = 1 << 22  # bytes read at a time
 LONGEST_LINE = 1 << 20  # bytes
 COMMENTS = (b"#", b"//", b"%")
 NUMBER = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
