@@ -54,6 +54,7 @@ def test_chunks_and_unit(tmp_path, kind):
     xyz = some_wall(103)
     parts = points_of(write_cloud(tmp_path / f"wall.{kind}", xyz), chunk=10, unit_m=0.3048)
     assert max(map(len, parts)) == 10
+    assert all(part[:, 0].flags.c_contiguous for part in parts)
     assert_allclose(np.concatenate(parts), 0.3048 * xyz, rtol=0, atol=1e-8)
 
 

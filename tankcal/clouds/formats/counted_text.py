@@ -38,8 +38,9 @@ def describe_pts(file):
 def ptx_pieces(file, chunk):
     """Points of a PTX file; directions without a return are left out."""
     for piece in _pieces(file, chunk, _ptx_header):
-        has_return = piece.xyz.any(axis=1)
-        xyz = piece.xyz if has_return.all() else piece.xyz[has_return]
+        x, y, z = piece.xyz.T
+        has_return = (x != 0) | (y != 0) | (z != 0)
+        xyz = piece.xyz if has_return.all() else piece.xyz.T[:, has_return].T
         yield Piece(piece.scan, xyz, piece.read)
 
 

@@ -56,7 +56,7 @@ class Piece:
     ----------
     scan : int
     xyz : ndarray, shape (n, 3)
-        In the unit of the file; float32 where the file has no more.
+        In the unit of the file, each column contiguous; float32 where the file has no more.
     read : int
         Records read for it, n and those without a return.
     """

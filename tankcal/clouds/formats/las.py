@@ -60,10 +60,12 @@ def pieces(file, chunk):
     box = _Box(file, header)
     blocks = _las_blocks if header.laszip is None else _laz_blocks
     for integers in blocks(file, header, chunk):
-        xyz = integers * header.scale
-        xyz += header.offset
-        box.check(xyz)
-        yield Piece(0, xyz, len(xyz))
+        columns = np.empty((3, len(integers)))  # contiguous: several times as fast as rows
+        for i, column in enumerate(columns):
+            np.multiply(integers[:, i], header.scale[i], out=column)
+            column += header.offset[i]
+        box.check(columns.T)
+        yield Piece(0, columns.T, len(integers))
 
 
 def read_header(file):

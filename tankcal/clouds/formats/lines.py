@@ -180,8 +180,8 @@ def _parse(block, layout):
             )
     except (ValueError, OverflowError, pd.errors.ParserError):  # empty data, too
         return None
-    order = np.argsort(np.argsort(layout.columns))
-    numbers = table.to_numpy()[:, order]
+    order = np.argsort(np.argsort(layout.columns))  # pandas gives columns as they stand
+    numbers = table.to_numpy().T[order].T
     return numbers if np.isfinite(numbers.sum()) and np.isfinite(numbers).all() else None
 
 

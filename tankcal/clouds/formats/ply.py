@@ -182,10 +182,10 @@ def _binary_pieces(file, header, chunk):
             rows = np.fromfile(stream, record, min(chunk, count - done))
             if len(rows) < min(chunk, count - done):
                 raise count_mismatch(file, count, done + len(rows))
-            xyz = np.empty((len(rows), 3), kind)
-            for i, column in enumerate(columns):
-                xyz[:, i] = rows[column]
-            yield Piece(0, xyz, len(rows))
+            found = np.empty((3, len(rows)), kind)
+            for row, column in zip(found, columns, strict=True):
+                row[:] = rows[column]
+            yield Piece(0, found.T, len(rows))
 
 
 def _text_pieces(file, header, chunk):
