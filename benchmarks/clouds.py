@@ -28,8 +28,10 @@ def main(points, kinds):
     with tempfile.TemporaryDirectory() as folder:
         for kind in kinds:
             path = Path(folder) / f"wall.{kind}"
-            WRITERS[kind](path, points)
-            subprocess.run([sys.executable, __file__, "--read", str(path)], check=True)
+            # each in a process of its own: a child counts the memory of a parent as its own
+            for task in ("--write", "--read"):
+                command = [sys.executable, __file__, task, str(path), str(points)]
+                subprocess.run(command, check=True)
             path.unlink()
 
 
@@ -163,5 +165,8 @@ def read(path):
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--read"]:
         read(Path(sys.argv[2]))
+    elif sys.argv[1:2] == ["--write"]:
+        path = Path(sys.argv[2])
+        WRITERS[path.suffix[1:]](path, int(sys.argv[3]))
     else:
         main(int(float((sys.argv[1:2] or ["1e6"])[0])), sys.argv[2:] or list(WRITERS))

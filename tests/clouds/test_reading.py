@@ -212,6 +212,7 @@ def test_comments_between_rows_and_a_last_line_without_end(tmp_path):
         ("1 2 3\n4 5 6\r7 8 9\n", "row 2: "),
         ("1 2 3\n4 5 1e8\n", "point 2 is (4, 5, 1e+08)"),
         ("1 2 3\n" + "4" * 3_000_000, "row 2: a line of more than"),
+        ("1 2 3\n5 6 " + "4" * 900_000 + "x\n", "row 2: z: found '4444"),
     ],
 )
 def test_rows_that_are_no_points(tmp_path, text, said):

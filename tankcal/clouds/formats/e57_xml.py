@@ -10,7 +10,7 @@ from tankcal.messages import message
 DEEPEST = 40  # elements in each other; scanners write about ten
 MOST_ELEMENTS = 200_000
 LONGEST_TEXT = 1000  # letters that are kept of the text of an element
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 
 
 @dataclass

@@ -13,7 +13,7 @@ from tankcal.messages import message
 BLOCK = 1 << 22  # bytes read at a time
 LONGEST_LINE = 1 << 20  # bytes
 COMMENTS = (b"#", b"//", b"%")
-NUMBER = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+NUMBER = re.compile(rb"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 LEAST_ROW = 6  # bytes of the shortest row of three numbers
 
 

@@ -85,7 +85,7 @@ def pieces(file, chunk):
 
 def read_header(file):
     """The `PlyHeader`, checked against the size of the file."""
-    found = re.search(rb"\nend_header[ \t]*(\r\n|\r(?!\n)|\n)", file.start)
+    found = re.search(rb"\nend_header[ \t]*\r?\n", file.start)
     if found is None or not re.match(rb"ply[ \t]*\r?\n", file.start):
         raise file.refusal(
             message(
