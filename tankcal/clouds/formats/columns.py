@@ -1,6 +1,7 @@
 """XYZ, ASC, TXT and CSV: rows of numbers, their separator and columns told by the first lines."""
 
 import re
+from dataclasses import dataclass, replace
 
 from tankcal.clouds.contents import ScanHeader
 from tankcal.clouds.formats.counted_text import looks_as_pts, looks_as_ptx
@@ -71,26 +72,30 @@ def _first_lines(file):
 
 def _find_layout(file):
     """The `Layout` of the rows and how many lines stand before them."""
-    lines, named = _first_lines(file), None
+    lines, heading = _first_lines(file), None
     for first, line in enumerate(lines):
-        if not line:
-            continue
         is_comment = line.startswith(COMMENTS)
-        if not is_comment and _begins_with_number(line):
+        if line and not is_comment and _begins_with_number(line):
             rows = [row for row in lines[first:] if row and not row.startswith(COMMENTS)]
-            return _judge(file, rows[:JUDGED], named, first), first
-        columns = _columns_of_heading(line.lstrip(b"#/% ") if is_comment else line)
-        if columns is None and not is_comment:
-            raise file.refusal(
-                message(
-                    "cloud_file_heading",
-                    "found {found!r}; expected a heading that names x, y and z, or rows of numbers",
-                    found=shown(line),
-                ),
-                row=first + 1,
-            )
-        named = columns or named
+            return _judge(file, rows[:JUDGED], heading, first), first
+        if line:
+            found = _read_heading(line.lstrip(b"#/% ") if is_comment else line, first, is_comment)
+            if found is None and not is_comment:
+                raise _bad_heading(file, line, first)
+            heading = found or heading
     raise no_points(file)
+
+
+def _bad_heading(file, line, at):
+    return file.refusal(
+        message(
+            "cloud_file_heading",
+            "found {found!r}; expected a heading that names x, y and z, a name for each column, or "
+            "rows of numbers",
+            found=shown(line),
+        ),
+        row=at + 1,
+    )
 
 
 def _begins_with_number(line):
@@ -98,70 +103,89 @@ def _begins_with_number(line):
     return NUMBER.fullmatch(cell) is not None
 
 
-def _columns_of_heading(line):
-    """Places of x, y and z among the names of a heading, by its separator; None: it has none."""
+@dataclass(frozen=True)
+class _Heading:
+    """A line that names x, y and z: their places among so many names, the mark between these."""
+
+    line: bytes
+    at: int
+    is_comment: bool
+    columns: tuple[int, int, int]
+    names: int
+    is_of_tabs: bool
+
+
+def _read_heading(line, at, is_comment):
+    """The `_Heading` of a line; None where it does not name x, y and z."""
     text = line.decode("utf-8", errors="replace").lower()
     for mark in (";", "\t", ",", None):
         if mark is not None and mark not in text:
             continue
-        places = {}
-        for i, name in enumerate(text.split(mark)):
+        names, places = text.split(mark), {}
+        for i, name in enumerate(names):
             kind = NAMES.get(UNIT.sub("", name.strip(' "\t'), count=1))
             if kind is not None:
                 places.setdefault(kind, i)
         if len(places) == 3:
-            return places["x"], places["y"], places["z"]
+            columns = places["x"], places["y"], places["z"]
+            return _Heading(line, at, is_comment, columns, len(names), mark == "\t")
     return None
 
 
-def _judge(file, rows, named, first):
+def _judge(file, rows, heading, first):
     """The `Layout` of rows of numbers."""
-    layout = _separated(file, rows, named, first)
+    layout = _separated(file, rows, heading, first)
     count = len(layout.cells(rows[0]))
+    if heading is not None and count != heading.names:
+        if not heading.is_comment:
+            raise _bad_heading(file, heading.line, heading.at)
+        heading, layout = None, replace(layout, columns=(0, 1, 2))
     if count <= max(layout.columns):
         raise file.refusal(
+            message("cloud_file_columns", "{found} columns; expected x, y and z", found=count),
+            row=first + 1,
+        )
+    if heading is None and count > 3 and _counts_rows([layout.cells(row)[0] for row in rows]):
+        raise file.refusal(
             message(
-                "cloud_file_columns",
-                "{found} columns; expected x, y and z",
-                found=count,
+                "cloud_file_numbered",
+                "its first column counts the rows; expected x, y and z first, or a heading that "
+                "names them",
             ),
             row=first + 1,
         )
-    if named is None and len(rows) > 10 and count > 3:
-        cells = [layout.cells(row)[0] for row in rows]
-        if all(cell.isdigit() for cell in cells):
-            numbers = [int(cell) for cell in cells]
-            if numbers == list(range(numbers[0], numbers[0] + len(numbers))):
-                raise file.refusal(
-                    message(
-                        "cloud_file_numbered",
-                        "its first column counts the rows; expected x, y and z first, or a heading "
-                        "that names them",
-                    ),
-                    row=first + 1,
-                )
     return layout
 
 
-def _separated(file, rows, named, first):
-    columns = named or (0, 1, 2)
+def _counts_rows(cells):
+    """Whether the cells of a column are n, n + 1, n + 2 ..."""
+    if len(cells) <= 10 or not all(re.fullmatch(rb"\d{1,18}", cell) for cell in cells):
+        return False
+    numbers = [int(cell) for cell in cells]
+    return numbers == [*range(numbers[0], numbers[0] + len(numbers))]
+
+
+def _separated(file, rows, heading, first):
+    columns = heading.columns if heading else (0, 1, 2)
     text = b"\n".join(rows)
     has_comma, has_point = b"," in text, b"." in text
     if b";" in text:
         if has_comma and has_point:
             raise _mixed(file, first)
         return Layout(";", "," if has_comma else ".", columns)
+    if heading is not None and heading.is_of_tabs and b"\t" in rows[0]:
+        if has_comma and has_point:
+            raise _mixed(file, first)
+        return Layout("tab", "," if has_comma else ".", columns)
     if not has_comma:
-        has_blank_cell = named and any(b"\t\t" in row for row in rows)
-        return Layout("tab" if has_blank_cell else "blank", ".", columns)
+        return Layout("blank", ".", columns)
     cells = [cell for row in rows for cell in row.split()]
     if len(rows[0].split()) >= 3 and not any(cell.endswith(b",") for cell in cells):
         are_decimals = all(WITH_COMMA.fullmatch(cell) for cell in cells if b"," in cell)
-        if are_decimals and not has_point:
-            return Layout("blank", ",", columns)
         if not are_decimals or has_point:
             raise _mixed(file, first)
-    if not has_point and named is None and len(rows[0].split(b",")) >= 6:
+        return Layout("blank", ",", columns)
+    if not has_point and heading is None and len(rows[0].split(b",")) >= 6:
         raise _mixed(file, first)  # 1,5,2,5,3,5 may be three numbers or six
     return Layout(",", ".", columns)
 

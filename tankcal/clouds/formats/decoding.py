@@ -97,9 +97,11 @@ def e57_chunks(request):
     image = libe57.ImageFile(request["path"], "r")
     scans = image.root()["data3D"]
     for number, asked in enumerate(request["scans"]):
+        if not asked["count"]:
+            continue
         points = scans[number]["points"]
         # a scan of few points may be read with small buffers
-        size = max(min(request["chunk"], asked["count"]), 1)
+        size = min(request["chunk"], asked["count"])
         columns = np.zeros((3, size), asked["type"])
         state = np.zeros(size, np.int8)
         buffers = libe57.VectorSourceDestBuffer()

@@ -184,8 +184,8 @@ def _count_problems(file, number, points, count, bits):
         section = _read_logical(file, _logical(place), SECTION.size)
         kind, length, data, _ = SECTION.unpack(section.ljust(SECTION.size, b"\0"))
         is_inside = kind == 1 and _logical(place) + length <= file.bytes // PAGE * DATA
-        is_inside = is_inside and (place < data <= file.bytes or not count)
-    if not is_inside:
+        is_inside = is_inside and place < data <= file.bytes
+    if not is_inside and count:
         yield message(
             "cloud_file_e57_place",
             "the points of scan {number} would begin at byte {place} of {size}, and do not: "
