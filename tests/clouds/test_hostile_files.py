@@ -29,6 +29,7 @@ def sound(tmp_path_factory):
     write_las(folder / "old.laz", xyz)
     write_las(folder / "new.las", xyz, version="1.4", form=6)
     write_las(folder / "new.laz", xyz, version="1.4", form=6)
+    write_las(folder / "last.las", xyz, version="1.4", form=6, evlrs=1)
     write_cloud(folder / "wall.e57", xyz)
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
@@ -81,6 +82,9 @@ LAS_CASES = [
     ("old.las", [(25, "B", 200)], "LAS of version 1.200"),
     ("old.las", [(104, "B", 3 | 0x80)], "without the LASzip record"),
     ("old.las", [(107, "I", 0)], "declares 0 points and holds 1000"),
+    ("last.las", [(247, "Q", 0), (107, "I", 0)], "declares 0 points and holds 1000"),
+    ("last.las", [(247, "Q", 900)], "declares 900 points and holds 1000"),
+    ("last.las", [(235, "Q", 30_000)], "declares 1000 points and holds 987"),
 ]
 
 
@@ -205,11 +209,21 @@ def test_pose_of_e57(tmp_path, quaternion):
     assert "quaternion of length 1" in said
 
 
-def test_a_scale_that_is_wrong_but_possible(tmp_path, sound):
-    """Points then lie outside of the box of the header."""
-    path = tmp_path / "a.las"
-    path.write_bytes(patched(sound["old.las"], (131, "d", 0.00015)))
-    with pytest.raises(InputError, match="outside of the box"):
+@pytest.mark.parametrize("name", ["old.las", "new.laz"])
+@pytest.mark.parametrize(
+    ("place", "value", "said"),
+    [
+        (131, 0.00015, "outside of the box"),
+        (131, 0.00005, "those of the header"),
+        (131, 1e-300, "those of the header"),
+        (155, 1.0, "outside of the box"),
+    ],
+)
+def test_scale_and_offset_that_are_wrong_but_possible(tmp_path, sound, name, place, value, said):
+    """Points then do not fill the box of the header."""
+    path = tmp_path / name
+    path.write_bytes(patched(sound[name], (place, "d", value)))
+    with pytest.raises(InputError, match=said):
         list(read_cloud(describe_cloud(path)))
 
 

@@ -97,6 +97,7 @@ def outcome(path):
         return bool(error.problems), processor_s() - start
     declared = sum(scan.declared for scan in header.scans)
     assert told[-1][:2] == (declared, declared)
+    assert declared > 0
     assert delivered == declared or header.format in ("ptx", "e57")
     return False, processor_s() - start
 

@@ -66,6 +66,7 @@ def pieces(file, chunk):
             column += header.offset[i]
         box.check(columns.T)
         yield Piece(0, columns.T, len(integers))
+    box.finish()
 
 
 def read_header(file):
@@ -90,8 +91,6 @@ def read_header(file):
     if problems:
         raise file.refusal(*problems)
     laszip = _laszip_record(file, parts) if parts.is_compressed else None
-    if parts.count == 0 and laszip is None and file.bytes - parts.first < parts.record:
-        raise no_points(file)
     if laszip is None:
         _check_what_follows(file, parts)
     else:
@@ -225,10 +224,11 @@ def _written(numbers):
 def _check_what_follows(file, parts):
     """A count that is too small leaves whole records that nothing accounts for."""
     end = parts.first + parts.count * parts.record
-    if not (parts.evlrs or parts.waveforms) and file.bytes - end >= parts.record:
-        raise count_mismatch(file, parts.count, (file.bytes - parts.first) // parts.record)
-    if parts.evlrs and parts.evlr_start < end:
-        raise count_mismatch(file, parts.count, (parts.evlr_start - parts.first) // parts.record)
+    stop = parts.evlr_start if parts.evlrs else file.bytes
+    if stop < end or (stop - end >= parts.record and not parts.waveforms):
+        raise count_mismatch(file, parts.count, (stop - parts.first) // parts.record)
+    if parts.count == 0:
+        raise no_points(file)
 
 
 def _laszip_record(file, parts):
@@ -322,20 +322,28 @@ def _chunks_of(count, size):
 
 
 class _Box:
-    """Points lie in the box of their header; a changed scale moves them out."""
+    """Points fill the box of their header; a changed scale or offset moves them out of it, or in.
+
+    Some writers round the box, some leave zeros.
+    """
 
     def __init__(self, file, header):
-        self.file, self.done = file, 0
-        slack = 10 * header.scale + 1e-9 * np.maximum(np.abs(header.low), np.abs(header.high))
-        self.low, self.high = header.low - slack, header.high + slack
-        self.is_blank = not (header.low.any() or header.high.any())  # some writers leave 0
+        self.file, self.header, self.done = file, header, 0
+        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
+        self.slack = (
+            10 * header.scale
+            + 1e-9 * np.maximum(np.abs(header.low), np.abs(header.high))
+            + 1e-3 * (header.high - header.low)
+        )
+        self.is_blank = not (header.low.any() or header.high.any())
 
     def check(self, xyz):
         """InputError for a point outside."""
-        is_inside = np.all(xyz.min(axis=0) >= self.low) and np.all(xyz.max(axis=0) <= self.high)
-        if not (self.is_blank or is_inside):
-            out = ((xyz < self.low) | (xyz > self.high)).any(axis=1)
-            i = int(np.flatnonzero(out)[0])
+        low, high = xyz.min(axis=0), xyz.max(axis=0)
+        self.low, self.high = np.minimum(self.low, low), np.maximum(self.high, high)
+        least, most = self.header.low - self.slack, self.header.high + self.slack
+        if not (self.is_blank or (np.all(low >= least) and np.all(high <= most))):
+            i = int(np.flatnonzero(((xyz < least) | (xyz > most)).any(axis=1))[0])
             raise self.file.refusal(
                 message(
                     "cloud_file_las_outside",
@@ -346,6 +354,24 @@ class _Box:
                 )
             )
         self.done += len(xyz)
+
+    def finish(self):
+        """InputError where the points of the whole file do not reach the sides of the box."""
+        is_full = np.all(self.low <= self.header.low + self.slack)
+        is_full = is_full and np.all(self.high >= self.header.high - self.slack)
+        if not (self.is_blank or is_full):
+            raise self.file.refusal(
+                message(
+                    "cloud_file_las_unfilled",
+                    "its points lie from {low} to {high}, those of the header from {least} to "
+                    "{most}: damaged, or its header was not brought up to date; write it anew with "
+                    "a program that does so",
+                    low=_written(self.low),
+                    high=_written(self.high),
+                    least=_written(self.header.low),
+                    most=_written(self.header.high),
+                )
+            )
 
 
 def _las_blocks(file, header, chunk):
