@@ -66,6 +66,8 @@ def pieces(file, chunk):
             column += header.offset[i]
         box.check(columns.T)
         yield Piece(0, columns.T, len(integers))
+    if box.done != header.count:  # said first: a box without some of its points is no surprise
+        raise count_mismatch(file, header.count, box.done)
     box.finish()
 
 
