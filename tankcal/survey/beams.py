@@ -16,7 +16,7 @@ import numpy as np
 
 from tankcal.survey.points import Points
 from tankcal.survey.results import Cause
-from tankcal.survey.sighting import bias_by_incidence
+from tankcal.survey.sighting import NETWORK, bias_by_incidence
 
 NOTHING = 1e-12  # of the largest variance of a covariance: a column below it is rounding
 
@@ -171,9 +171,9 @@ def _of_scans(registration, by, causes):
         if np.any(lower[:, at]):
             which = min(at // 6, s - 1)
             scan = registration.scans[which]
-            found.append(
-                Cause(scan.name, "registration", None, None, by @ lower[:, at], scan.is_assumed)
-            )
+            assumed = scan.is_assumed and registration.ties[which] != NETWORK
+            column = by @ lower[:, at]
+            found.append(Cause(scan.name, "registration", None, None, column, assumed))
     return found
 
 

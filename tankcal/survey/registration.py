@@ -27,8 +27,10 @@ from tankcal.survey.beams import by_turn
 from tankcal.survey.misnamed_targets import FEWEST, fit_motion, refuse_misnamed
 from tankcal.survey.readings import certified_distance_m
 from tankcal.survey.scans import KnownTargets
+from tankcal.survey.sighting import FRAME, NETWORK
 
-NETWORK, FRAME, DECLARED = "network", "frame", "declared"  # what ties a scan
+DECLARED = "declared"  # beside NETWORK (targets) and FRAME: what ties a scan
+EXACT_M = 1e-6  # the sd of a target that is held: its covariance is inverted
 LOOSE_OFFSET_M = 0.01  # of an offset on targets that nobody knows
 DETECTED = 4.13  # sds of a reading whose test is passed in 20 % of cases: 3.29 + 0.84
 LIKE_A_LINE = 0.02  # of the spread of targets along them: across it they tell no turn
@@ -335,7 +337,8 @@ class _Problem:
         rows += range(first, first + 3 * len(self.known.names))
         values += [*self.known.xyz_m.ravel()]
         if len(self.known.names):
-            blocks.append(self.known.covariance_m2)
+            exact = EXACT_M**2 * np.eye(3 * len(self.known.names))
+            blocks.append(self.known.covariance_m2 + exact)
         return np.array(rows, dtype=int), np.array(values), blocks
 
     def _target_rows(self, state, used):
