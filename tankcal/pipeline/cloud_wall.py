@@ -1,4 +1,4 @@
-"""Point clouds of a wall: their scans registered, their cells means, and the wall that they show."""
+"""Point clouds of a wall: their scans registered, means of their cells, the wall they show."""
 
 import hashlib
 from dataclasses import dataclass, replace
