@@ -1,6 +1,6 @@
 """Jobs of tanks that were scanned, as files of a scanner that no formula of the package has made.
 
-    parts = scanned_parts(rng)                a job of two scans inside, four targets, a network's control
+    parts = scanned_parts(rng)                two scans inside, five targets, a control
     write_folder(folder, parts)
 
 A scanner turns in equal steps of both angles; each beam is followed to the wall by `take_hits`. It
@@ -57,9 +57,7 @@ def target_rows(scans, rng, s_mm=0.5, targets_m=TARGETS_M):
     rows = [["scan", "target", "x_m", "y_m", "z_m", "s_mm"]]
     for name, at in scans.items():
         own = at.own(targets_m) + s_mm / 1000 * rng.normal(size=targets_m.shape)
-        rows += [
-            [name, f"T{i + 1}", *map(float, place), s_mm] for i, place in enumerate(own)
-        ]
+        rows += [[name, f"T{i + 1}", *map(float, place), s_mm] for i, place in enumerate(own)]
     return rows
 
 

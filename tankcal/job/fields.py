@@ -129,10 +129,7 @@ class Field:
             row=row,
             listed=row.replace(" ", ", "),
         )
-        if not self.choices:
-            return rows
-        return message("a_number_or", "{number}, or {words}", number=rows,
-                       words=_one_of(self.choices))  # fmt: skip
+        return self._or_words(rows)
 
     def _two_of_them(self):
         """Two values that the field allows, as a file has them: {one, other}."""
@@ -150,6 +147,9 @@ class Field:
 
     def _expected_number(self):
         number = message("a_number", "a number{bounds}", bounds=self._bounds())
+        return self._or_words(number)
+
+    def _or_words(self, number):
         if not self.choices:
             return number
         words = _one_of(self.choices)

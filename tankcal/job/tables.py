@@ -247,12 +247,14 @@ def read_bytes(path, log, limit=MAX_FILE_BYTES):
         )
         log.problem(path.name, expected)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or message("impossible_name", "impossible name")
-        log.problem(
-            path.name,
-            message("file_cannot_be_read", "the file cannot be read ({reason})", reason=reason),
-        )
+        log.problem(path.name, unreadable_file(error))
     return None
+
+
+def unreadable_file(error):
+    """What is said of a file that an OSError or a ValueError keeps from being read."""
+    reason = getattr(error, "strerror", None) or message("impossible_name", "impossible name")
+    return message("file_cannot_be_read", "the file cannot be read ({reason})", reason=reason)
 
 
 def fingerprint(name, data):

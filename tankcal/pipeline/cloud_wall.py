@@ -10,6 +10,7 @@ from tankcal.clouds import wall as cells_of_clouds
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.checks.clouds import offset_untold
 from tankcal.job.model import InputFile
+from tankcal.job.tables import unreadable_file
 from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import told_causes
 from tankcal.pipeline.hit_wall import through_wall
@@ -43,6 +44,8 @@ class Clouded:
     beamed : Beamed
     told : tuple of ToldCause
         What an upright wall says of offsets and scales.
+    left_out : ndarray of int, shape (scans,)
+        Points of each scan in boxes that are left out.
     """
 
     files: tuple
@@ -51,6 +54,7 @@ class Clouded:
     readings: object
     beamed: Beamed
     told: tuple = ()
+    left_out: np.ndarray | None = None
 
 
 def find_wall_in_clouds(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
@@ -97,8 +101,9 @@ def points_of_clouds(job, adjustment, progress):
         )
     )
     files = tuple(_fingerprint(one) for one in job.clouds.files)
+    passes = Passes(job.clouds, registration)
     found = cells_of_clouds.find_cloud_wall(
-        lambda: _passes(job.clouds, registration),
+        passes,
         radius_m=_nominal_radius_m(job),
         joints_m=tuple(job.datum.bottom_z_m + joints_of(job)) if job.courses else None,
         kind=job.tank.kind,
@@ -109,7 +114,8 @@ def points_of_clouds(job, adjustment, progress):
     _refuse_places(job, registration, found.surface)
     readings = cells_of_clouds.readings_of(found, MOST_READINGS)
     job = replace(job, files=(*job.files, *files))
-    return _as_points(job, Clouded(files, registration, found, readings, None))
+    clouded = Clouded(files, registration, found, readings, None, left_out=passes.left_out)
+    return _as_points(job, clouded)
 
 
 def registered(job, adjustment):
@@ -158,16 +164,30 @@ def normals_of(surface, xyz_m):
     return away / np.linalg.norm(away, axis=1, keepdims=True)
 
 
-def _passes(clouds, registration):
-    """(scan, places (n, 3) in the frame of the tank) of all points, boxes left out; one reading."""
-    for file in clouds.files:
-        for chunk in tankcal.clouds.read_cloud(file.header, unit_m=file.unit_m):
-            scan = file.first + chunk.scan
-            xyz = _placed(chunk.xyz_m, clouds, scan, registration)
-            if len(file.leave_out_m):
-                xyz = xyz[~_is_in_boxes(xyz, file.leave_out_m)]
-            if len(xyz):
-                yield scan, xyz
+class Passes:
+    """Readings of all files, as often as they are asked for.
+
+    Each gives (scan, places (n, 3) in the frame of the tank); `left_out` counts the points of each
+    scan in boxes, of the last one.
+    """
+
+    def __init__(self, clouds, registration):
+        self.clouds, self.registration = clouds, registration
+        self.left_out = np.zeros(len(clouds.scans), dtype=int)
+
+    def __call__(self):
+        """A fresh iterator over all points."""
+        self.left_out = np.zeros(len(self.clouds.scans), dtype=int)
+        for file in self.clouds.files:
+            for chunk in tankcal.clouds.read_cloud(file.header, unit_m=file.unit_m):
+                scan = file.first + chunk.scan
+                xyz = _placed(chunk.xyz_m, self.clouds, scan, self.registration)
+                if len(file.leave_out_m):
+                    kept = ~_is_in_boxes(xyz, file.leave_out_m)
+                    self.left_out[scan] += len(xyz) - np.count_nonzero(kept)
+                    xyz = xyz[kept]
+                if len(xyz):
+                    yield scan, xyz
 
 
 def _placed(xyz_m, clouds, scan, registration):
@@ -195,9 +215,7 @@ def _fingerprint(file):
             while block := stream.read(BLOCK):
                 digest.update(block)
     except OSError as error:
-        reason = error.strerror or type(error).__name__
-        text = message("file_cannot_be_read", "the file cannot be read ({reason})", reason=reason)
-        raise InputError(Problem(file.file, text)) from error
+        raise InputError(Problem(file.file, unreadable_file(error))) from error
     return InputFile(file.file, digest.hexdigest(), file.header.bytes)
 
 

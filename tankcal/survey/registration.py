@@ -49,7 +49,7 @@ class TargetResidual:
         Of the worst of its three coordinates: residual over its standard deviation; nan: the
         target is not checked by anything.
     mdb_m : float
-        Smallest blunder of that coordinate that the test shows in 80 % of cases; inf: none.
+        Smallest blunder that the test shows in 80 % of cases along each axis; inf: none.
     removed : bool
         Set aside; residual and w are then those that it would have.
     row : int or None
@@ -368,8 +368,8 @@ class _Problem:
         return misclosure.ravel(), by.reshape(3 * n, len(state))
 
     def tests(self, chosen):
-        """(n,) largest |w| of the coordinates of each target, and (n,) its smallest detectable
-        blunder, m; those set aside by what they would have.
+        """(n,) largest |w| of the coordinates of each target, and (n,) the blunder that shows
+        along each axis of the tank, m; those set aside by what they would have.
         """
         _, state, cofactor = self.last
         every = np.arange(len(self.targets))
@@ -382,7 +382,7 @@ class _Problem:
         w = np.where(checked, np.abs(left) / safe, np.nan)
         mdb = np.where(checked, DETECTED * np.where(chosen[:, None], sd2 / safe, safe), np.inf)
         worst = np.argmax(np.nan_to_num(w, nan=-1.0), axis=1) if len(w) else np.zeros(0, dtype=int)
-        return w[every, worst], mdb[every, worst]
+        return w[every, worst], mdb.max(axis=1)
 
     # what is wrong
 

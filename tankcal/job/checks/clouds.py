@@ -4,7 +4,7 @@ import numpy as np
 
 import tankcal.clouds
 from tankcal.errors import InputError
-from tankcal.job.checking import has_rows
+from tankcal.job.checking import has_rows, name_twice
 from tankcal.job.checks.extent import has_clouds, has_hits, has_survey, has_tangents, tells_by_tape
 from tankcal.job.contract.clouds import (
     DOCUMENTED,
@@ -15,6 +15,7 @@ from tankcal.job.contract.clouds import (
     UNITS_M,
 )
 from tankcal.job.contract.shorthand import FREE
+from tankcal.job.tables import unreadable_file
 from tankcal.messages import message
 
 FEWEST_TARGETS = 3  # of a scan: they tell its pose
@@ -96,9 +97,7 @@ def _header(raw, name, given, log):
         log.problems.extend(error.problems)
         return None
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or message("impossible_name", "impossible name")
-        text = message("file_cannot_be_read", "the file cannot be read ({reason})", reason=reason)
-        tell("file", text)
+        tell("file", unreadable_file(error))
         return None
     if not header.scans:
         tell("file", message("cloud_without_scans", "no scan in it; expected one or more"))
@@ -257,13 +256,7 @@ def _count_targets(targets, names, are_all_read, log):
                 log.problem(targets.file, text, row, "scan")
             continue
         if (scan, target) in seen:
-            text = message(
-                "name_twice",
-                "{name!r} is already in row {first_row}; expected once",
-                name=target,
-                first_row=seen[scan, target],
-            )
-            log.problem(targets.file, text, row, "target")
+            log.problem(targets.file, name_twice(target, seen[scan, target]), row, "target")
             continue
         seen[scan, target] = row
         counts[scan] = counts.get(scan, 0) + 1
