@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc, chdtri
 
 from tankcal.adjust import ALPHA
 from tankcal.errors import Problem
@@ -117,14 +117,13 @@ def _overlap(job, clouded, pair, chosen, count):
     values = told.T @ apart
     spread = told.T @ covariance @ told + len(apart) * LEAST_M**2 * np.eye(told.shape[1])
     test = float(values @ np.linalg.solve(spread, values))
-    limit = float(chi2.ppf(1 - ALPHA, told.shape[1]))
     return Overlap(
         pair,
         count,
         float(apart.mean()),
         float(np.sqrt(values @ values / len(apart))),
-        float(np.sqrt(chi2.isf(max(chi2.sf(test, told.shape[1]), 1e-300), 1))),
-        test > limit,
+        float(np.sqrt(chdtri(1, max(chdtrc(told.shape[1], test), 1e-300)))),
+        test > chdtri(told.shape[1], ALPHA),
     )
 
 

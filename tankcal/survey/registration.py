@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from tankcal.adjust import ALPHA, CRITICAL, adjust
 from tankcal.errors import SolutionError
@@ -146,7 +146,7 @@ def register(scans, tools, targets=(), known=None):
     except SolutionError:
         problem.refuse_misnamed()
         raise
-    if done.dof > 0 and done.chi2 > chi2.ppf(1 - ALPHA, done.dof):
+    if done.dof > 0 and done.chi2 > chdtri(done.dof, ALPHA):
         problem.refuse_misnamed()
         chosen, done = _without_blunders(problem, chosen, done)
     return problem.registration(done, chosen)
