@@ -118,6 +118,10 @@ def _tell_missing_tables(raw, tables, kind, log):
         elsewhere = name == "points" and measured
         if name in raw.tables or elsewhere:
             continue
+        if name == "points" and "clouds" in raw.registers:
+            if raw.registers["clouds"] is not None:  # else it is told already
+                log.problem(raw.registers["clouds"].file, _NO_CLOUD)
+            continue
         instead = [one for one in _IN_PLACE_OF_POINTS if one in raw.tables]
         if name != "points" or not instead:
             log.problem(raw.file_of(name), _missing(raw, name))
@@ -143,6 +147,11 @@ _IN_PLACE_OF_POINTS = {
         "no_circumferences", "no rows; expected a reading of the tape on each course at least"
     ),
 }
+
+
+_NO_CLOUD = message(
+    "no_cloud_at_all", "nothing filled in; expected a section for each file of a scanner"
+)
 
 
 def _missing(raw, name):

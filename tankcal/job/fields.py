@@ -28,7 +28,7 @@ _TANK_ID = re.compile(r"(?!.*\.\.)[\w(][\w .()-]*")
 _RULE_NAME = re.compile(r"(?!.*\.\.)\w[\w .()-]*")
 _MESH_FILE = re.compile(r"(?!.*\.\.)\w[\w .()-]*\.(stl|obj|ply|off)", re.IGNORECASE)
 _CLOUD_FILE = re.compile(
-    r"(?!.*\.\.)\w[\w .()/-]*\.(las|laz|e57|ply|ptx|pts|xyz|asc|txt)", re.IGNORECASE
+    r"(?!.*\.\.)\w[\w .()/-]*\.(las|laz|e57|ply|ptx|pts|xyz|asc|txt|csv)", re.IGNORECASE
 )
 _DMS = re.compile(
     r"([+-]?)([0-9]{1,3})(?:[ \t]*[°º][ \t]*|[ \t]+|-)([0-9]{1,2})(?:"

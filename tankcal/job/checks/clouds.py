@@ -196,8 +196,8 @@ def _check_errors(given, targets, tables, tell):
     if given["assume"] == DOCUMENTED:
         return
     missing = [key for key in RANGING if given[key] is None]
-    by_targets = targets and min(targets) >= FEWEST_TARGETS
-    if not by_targets:
+    known = bool(targets) or not has_rows(tables["scan_targets"])  # else who knows whose they are
+    if known and min(targets, default=0) < FEWEST_TARGETS:
         missing += [key for key in REGISTRATION if given[key] is None]
     for key in missing:
         text = message(
