@@ -58,13 +58,14 @@ schemas: $(VENV)/full ## write the JSON schemas of what is saved and docs/saved-
 	PYTHONPATH=.:tests $(BIN)/python tests/schemas.py
 
 bench: export ROUNDS ?= 5
-bench: $(VENV)/full ## time and memory of the main job, walls, tables of 1 mm rows and their u, ten million points, plans
+bench: $(VENV)/full ## time and memory of the main job, walls, tables of 1 mm rows and their u, ten million points, files of scanners, plans
 	$(BIN)/python benchmarks/main_job.py
 	$(BIN)/python benchmarks/table.py
 	$(BIN)/python benchmarks/uncertainty.py
 	$(BIN)/python benchmarks/monte_carlo.py 9500 $(ROUNDS)
 	$(BIN)/python benchmarks/wall.py
 	$(BIN)/python benchmarks/rings.py
+	$(BIN)/python benchmarks/clouds.py
 	$(BIN)/python benchmarks/planning.py $(ROUNDS)
 
 peer: $(VENV)/full ## the adjustment against C++ Ceres (needs libceres-dev)

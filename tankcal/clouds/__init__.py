@@ -5,5 +5,6 @@ a time, each scan in its own frame; `tankcal.clouds.wall` makes cells of the wal
 """
 
 from tankcal.clouds.contents import CloudChunk, CloudHeader, ScanHeader
+from tankcal.clouds.reading import describe_cloud, read_cloud
 
-__all__ = ["CloudChunk", "CloudHeader", "ScanHeader"]
+__all__ = ["CloudChunk", "CloudHeader", "ScanHeader", "describe_cloud", "read_cloud"]

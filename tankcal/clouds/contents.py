@@ -56,7 +56,8 @@ class CloudChunk:
     scan : int
         Place of the scan among those of its file.
     xyz_m : ndarray of float64, shape (n, 3)
-        In the scan's own frame, m: no pose is applied.
+        In the scan's own frame, m: no pose is applied. Columns are contiguous, so what works
+        column by column is fast.
     """
 
     scan: int

@@ -1,0 +1,201 @@
+"""XYZ, ASC, TXT and CSV: rows of numbers, their separator and columns told by the first lines."""
+
+import re
+from dataclasses import dataclass, replace
+
+from tankcal.clouds.contents import ScanHeader
+from tankcal.clouds.formats.counted_text import looks_as_pts, looks_as_ptx
+from tankcal.clouds.formats.files import Piece, no_points
+from tankcal.clouds.formats.lines import COMMENTS, NUMBER, Layout, Lines, parse_rows, shown
+from tankcal.messages import message
+
+JUDGED = 50  # lines that tell separator and columns
+NAMES = {
+    "x": "x", "east": "x", "easting": "x", "y": "y", "north": "y", "northing": "y",
+    "z": "z", "height": "z", "elevation": "z",
+}  # fmt: skip
+UNIT = re.compile(r"[\s_]*[\[(]?(mm|cm|m|ft)?[\])]?$")
+WITH_COMMA = re.compile(rb"[+-]?\d*,\d+([eE][+-]?\d+)?")
+
+
+def find_kind(file):
+    """ "ptx", "pts" or "xyz" of a text file; InputError where its ending says another thing."""
+    lines = [line for line in _first_lines(file) if line]
+    if looks_as_ptx(lines):
+        return "ptx"
+    if file.ending == ".ptx":
+        raise file.refusal(
+            message(
+                "cloud_file_no_ptx",
+                "does not begin as a PTX file does: columns, rows, four lines of 3 numbers, four "
+                "of 4",
+            )
+        )
+    return "pts" if looks_as_pts(lines) else "xyz"
+
+
+def describe(file):
+    """The one scan of a file, its number of points not known before it is read."""
+    _find_layout(file)
+    return "xyz", (ScanHeader("", None),)
+
+
+def pieces(file, chunk):
+    """Points of a file."""
+    layout, heading = _find_layout(file)
+    is_empty = True
+    with file.path.open("rb") as stream:
+        lines = Lines(file, stream)
+        if heading:
+            lines.take(heading)
+        while True:
+            block, row = lines.take(chunk)
+            if not block:
+                break
+            xyz = parse_rows(file, block, row, layout)
+            if len(xyz):
+                is_empty = False
+                yield Piece(0, xyz, len(xyz))
+    if is_empty:
+        raise no_points(file)
+
+
+def _first_lines(file):
+    """Whole lines from the start of a file, stripped."""
+    start = file.start.removeprefix(b"\xef\xbb\xbf")
+    if len(file.start) < file.bytes:
+        start = start[: start.rfind(b"\n") + 1]
+    elif b"\n" not in start and b"\r" in start.strip():
+        start = b""  # ends of lines of no system that is in use
+    return [line.strip() for line in start.split(b"\n")]
+
+
+def _find_layout(file):
+    """The `Layout` of the rows and how many lines stand before them."""
+    lines, heading = _first_lines(file), None
+    for first, line in enumerate(lines):
+        is_comment = line.startswith(COMMENTS)
+        if line and not is_comment and _begins_with_number(line):
+            rows = [row for row in lines[first:] if row and not row.startswith(COMMENTS)]
+            return _judge(file, rows[:JUDGED], heading, first), first
+        if line:
+            found = _read_heading(line.lstrip(b"#/% ") if is_comment else line, first, is_comment)
+            if found is None and not is_comment:
+                raise _bad_heading(file, line, first)
+            heading = found or heading
+    raise no_points(file)
+
+
+def _bad_heading(file, line, at):
+    return file.refusal(
+        message(
+            "cloud_file_heading",
+            "found {found!r}; expected a heading that names x, y and z, a name for each column, or "
+            "rows of numbers",
+            found=shown(line),
+        ),
+        row=at + 1,
+    )
+
+
+def _begins_with_number(line):
+    cell = re.split(rb"[\s;,]", line, maxsplit=1)[0]
+    return NUMBER.fullmatch(cell) is not None
+
+
+@dataclass(frozen=True)
+class _Heading:
+    """A line that names x, y and z: their places among so many names, the mark between these."""
+
+    line: bytes
+    at: int
+    is_comment: bool
+    columns: tuple[int, int, int]
+    names: int
+    is_of_tabs: bool
+
+
+def _read_heading(line, at, is_comment):
+    """The `_Heading` of a line; None where it does not name x, y and z."""
+    text = line.decode("utf-8", errors="replace").lower()
+    for mark in (";", "\t", ",", None):
+        if mark is not None and mark not in text:
+            continue
+        names, places = text.split(mark), {}
+        for i, name in enumerate(names):
+            kind = NAMES.get(UNIT.sub("", name.strip(' "\t'), count=1))
+            if kind is not None:
+                places.setdefault(kind, i)
+        if len(places) == 3:
+            columns = places["x"], places["y"], places["z"]
+            return _Heading(line, at, is_comment, columns, len(names), mark == "\t")
+    return None
+
+
+def _judge(file, rows, heading, first):
+    """The `Layout` of rows of numbers."""
+    layout = _separated(file, rows, heading, first)
+    count = len(layout.cells(rows[0]))
+    if heading is not None and count != heading.names:
+        if not heading.is_comment:
+            raise _bad_heading(file, heading.line, heading.at)
+        heading, layout = None, replace(layout, columns=(0, 1, 2))
+    if count <= max(layout.columns):
+        raise file.refusal(
+            message("cloud_file_columns", "{found} columns; expected x, y and z", found=count),
+            row=first + 1,
+        )
+    if heading is None and count > 3 and _counts_rows([layout.cells(row)[0] for row in rows]):
+        raise file.refusal(
+            message(
+                "cloud_file_numbered",
+                "its first column counts the rows; expected x, y and z first, or a heading that "
+                "names them",
+            ),
+            row=first + 1,
+        )
+    return layout
+
+
+def _counts_rows(cells):
+    """Whether the cells of a column are n, n + 1, n + 2 ..."""
+    if len(cells) <= 10 or not all(re.fullmatch(rb"\d{1,18}", cell) for cell in cells):
+        return False
+    numbers = [int(cell) for cell in cells]
+    return numbers == [*range(numbers[0], numbers[0] + len(numbers))]
+
+
+def _separated(file, rows, heading, first):
+    columns = heading.columns if heading else (0, 1, 2)
+    text = b"\n".join(rows)
+    has_comma, has_point = b"," in text, b"." in text
+    if b";" in text:
+        if has_comma and has_point:
+            raise _mixed(file, first)
+        return Layout(";", "," if has_comma else ".", columns)
+    if heading is not None and heading.is_of_tabs and b"\t" in rows[0]:
+        if has_comma and has_point:
+            raise _mixed(file, first)
+        return Layout("tab", "," if has_comma else ".", columns)
+    if not has_comma:
+        return Layout("blank", ".", columns)
+    cells = [cell for row in rows for cell in row.split()]
+    if len(rows[0].split()) >= 3 and not any(cell.endswith(b",") for cell in cells):
+        are_decimals = all(WITH_COMMA.fullmatch(cell) for cell in cells if b"," in cell)
+        if not are_decimals or has_point:
+            raise _mixed(file, first)
+        return Layout("blank", ",", columns)
+    if not has_point and heading is None and len(rows[0].split(b",")) >= 6:
+        raise _mixed(file, first)  # 1,5,2,5,3,5 may be three numbers or six
+    return Layout(",", ".", columns)
+
+
+def _mixed(file, first):
+    return file.refusal(
+        message(
+            "cloud_file_comma",
+            "a comma here may be a decimal sign or may part columns; expected a decimal point, or "
+            "columns parted by semicolons",
+        ),
+        row=first + 1,
+    )

@@ -1,0 +1,193 @@
+"""PTX and PTS: text in which a count goes before the points of each scan, several in a file.
+
+PTX: columns, rows, the scanner's position, its three axes, and a matrix of 4 x 4 that is applied
+from the right to rows (x, y, z, 1); "0 0 0" is a direction without a return. PTS: a count, then
+its points, all in one frame.
+"""
+
+import numpy as np
+
+from tankcal.clouds.contents import ScanHeader
+from tankcal.clouds.formats.files import Piece, count_mismatch, no_points
+from tankcal.clouds.formats.lines import (
+    LEAST_ROW,
+    Layout,
+    Lines,
+    parse_rows,
+    shown,
+    skip_lines,
+    whole_number,
+)
+from tankcal.messages import message
+
+MOST_SCANS = 10_000
+RIGID = 1e-3  # of a rotation that is written with few digits
+LAYOUT = Layout()
+
+
+def describe_ptx(file):
+    """Scans of a PTX file, whose lines are counted."""
+    return "ptx", tuple(_describe(file, _ptx_header))
+
+
+def describe_pts(file):
+    """Blocks of a PTS file, whose lines are counted."""
+    return "pts", tuple(_describe(file, _pts_header))
+
+
+def ptx_pieces(file, chunk):
+    """Points of a PTX file; directions without a return are left out."""
+    for piece in _pieces(file, chunk, _ptx_header):
+        x, y, z = piece.xyz.T
+        has_return = (x != 0) | (y != 0) | (z != 0)
+        xyz = piece.xyz if has_return.all() else piece.xyz.T[:, has_return].T
+        yield Piece(piece.scan, xyz, piece.read)
+
+
+def pts_pieces(file, chunk):
+    """Points of a PTS file."""
+    return _pieces(file, chunk, _pts_header)
+
+
+def looks_as_ptx(lines):
+    """Whether the first lines of a file (without blank ones) begin a scan of PTX."""
+    counts = [whole_number(line) for line in lines[:2]]
+    cells = [len(line.split()) for line in lines[2:10]]
+    return None not in counts and cells == [3, 3, 3, 3, 4, 4, 4, 4]
+
+
+def looks_as_pts(lines):
+    """Whether they are a count and then rows of points."""
+    return len(lines) > 1 and whole_number(lines[0]) is not None and len(lines[1].split()) >= 3
+
+
+def _describe(file, header_of):
+    scans = []
+    with file.path.open("rb") as stream:
+        lines = Lines(file, stream)
+        while (scan := header_of(file, lines)) is not None:
+            _check_room(file, scan, lines.row)
+            there = skip_lines(lines, scan.declared)
+            if there < scan.declared:
+                raise _scan_mismatch(file, len(scans), scan, there)
+            scans.append(scan)
+            if len(scans) > MOST_SCANS:
+                raise file.refusal(
+                    message(
+                        "cloud_file_scans",
+                        "holds more than {most} scans; expected points in some of them",
+                        most=MOST_SCANS,
+                    )
+                )
+    if not sum(scan.declared for scan in scans):
+        raise no_points(file)
+    return scans
+
+
+def _check_room(file, scan, row):
+    if scan.declared * LEAST_ROW > file.bytes + LEAST_ROW:
+        raise file.refusal(
+            message(
+                "cloud_file_text_room",
+                "declares {declared} points; {size} bytes have no room for them: is it cut or "
+                "damaged?",
+                declared=scan.declared,
+                size=file.bytes,
+            ),
+            row=row,
+        )
+
+
+def _scan_mismatch(file, number, scan, there):
+    return (
+        count_mismatch(file, scan.declared, there)
+        if number == 0
+        else file.refusal(
+            message(
+                "cloud_file_scan_count",
+                "scan {number} declares {declared} points and holds {found}; expected the same "
+                "number: is the file cut or damaged?",
+                number=number + 1,
+                declared=scan.declared,
+                found=there,
+            )
+        )
+    )
+
+
+def _pieces(file, chunk, header_of):
+    with file.path.open("rb") as stream:
+        lines, number = Lines(file, stream), 0
+        while (scan := header_of(file, lines)) is not None:
+            left = scan.declared
+            while left:
+                block, row = lines.take(min(left, chunk))
+                if not block:
+                    raise _scan_mismatch(file, number, scan, scan.declared - left)
+                xyz = parse_rows(file, block, row, LAYOUT)
+                left -= len(xyz)
+                yield Piece(number, xyz, len(xyz))
+            number += 1
+
+
+def _ptx_header(file, lines):
+    """The `ScanHeader` that stands next; None at the end of the file."""
+    columns = lines.next_line()
+    if columns is None:
+        return None
+    row, sizes = lines.row, (whole_number(columns), whole_number(lines.next_line()))
+    if None in sizes:
+        raise file.refusal(
+            message(
+                "cloud_file_ptx_size",
+                "found {found!r}; expected the numbers of columns and of rows of a scan, each in a "
+                "line of its own",
+                found=shown(columns),
+            ),
+            row=row,
+        )
+    row, position = lines.row, [_numbers(lines.next_line(), 3) for _ in range(4)]
+    matrix = [_numbers(lines.next_line(), 4) for _ in range(4)]
+    if None in position or None in matrix or not _is_rigid(np.array(matrix).T):
+        raise file.refusal(
+            message(
+                "cloud_file_ptx_frame",
+                "after the size of a scan: expected its position and three axes, 3 numbers each, "
+                "and four lines of 4 numbers that turn and shift without a change of size",
+            ),
+            row=row + 1,
+        )
+    return ScanHeader("", sizes[0] * sizes[1], np.array(matrix).T)
+
+
+def _numbers(line, wanted):
+    """So many finite numbers of a line; None where it holds another thing."""
+    cells = [] if line is None else LAYOUT.cells(line)
+    numbers = [LAYOUT.number(cell) for cell in cells]
+    return None if len(numbers) != wanted or None in numbers else numbers
+
+
+def _is_rigid(pose):
+    turn = pose[:3, :3]
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = np.abs(turn @ turn.T - np.eye(3)).max()
+        is_turn = error < RIGID and np.linalg.det(turn) > 0
+    return bool(is_turn) and np.allclose(pose[3], [0, 0, 0, 1], atol=1e-9)
+
+
+def _pts_header(file, lines):
+    line = lines.next_line()
+    if line is None:
+        return None
+    count = whole_number(line)
+    if count is None:
+        raise file.refusal(
+            message(
+                "cloud_file_pts_count",
+                "found {found!r}; expected the number of points that follow, alone in its line, or "
+                "the end of the file",
+                found=shown(line),
+            ),
+            row=lines.row,
+        )
+    return ScanHeader("", count)

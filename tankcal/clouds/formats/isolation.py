@@ -1,0 +1,162 @@
+"""Libraries of compressed files at work in a child: what kills the child, the parent survives.
+
+The child (`decoding`) writes frames to its standard output: a head of kind, scan, records read and
+bytes, then the bytes of coordinates. It limits its own memory and time of processor; the parent
+ends it when it gives nothing for long.
+"""
+
+import contextlib
+import json
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.clouds.formats.decoding import DONE, FAILURE, HEAD, MEMORY, OUT_OF_TIME
+from tankcal.messages import message
+
+SILENT_S = 60  # the most that a child may take for a chunk, by the clock
+PIPE_BYTES = 1 << 20
+F_SETPIPE_SZ = 1031  # of Linux: the size of a pipe
+CODE = (
+    "import json, sys; request = json.loads(sys.argv[1]); sys.path[:] = request['sys_path']; "
+    "from tankcal.clouds.formats.decoding import main; main(request)"
+)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Some records of a scan: `data` is uint8, as the child laid it out, of `read` records."""
+
+    scan: int
+    read: int
+    data: np.ndarray
+
+
+def decoded_frames(file, request):
+    """Frames that a child makes of a file; InputError where it cannot, or dies, or hangs."""
+    request = {**request, "sys_path": sys.path}
+    child = subprocess.Popen(
+        [sys.executable, "-c", CODE, json.dumps(request)],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        bufsize=0,
+    )
+    _widen(child.stdout)
+    watch = _Watch(child)
+    try:
+        while (frame := _next_frame(file, child, watch)) is not None:
+            yield frame
+    finally:
+        watch.stop()
+        child.kill()
+        child.stdout.close()
+        child.wait()
+
+
+def _next_frame(file, child, watch):
+    """The next `Frame`, None at the end; InputError for whatever else ends a child."""
+    with watch.waiting():
+        head = _read_exactly(child.stdout, HEAD.size)
+        data = None
+        if head is not None:
+            kind, scan, read, size = HEAD.unpack(head)
+            data = _read_exactly(child.stdout, size)
+    if data is None:
+        raise _death(file, child, watch)
+    if kind == FAILURE:
+        raise _failure(file, data.tobytes().decode("utf-8", errors="replace"))
+    return None if kind == DONE else Frame(scan, read, data)
+
+
+def _read_exactly(stream, size):
+    """So many bytes as an array of uint8; None where the stream ends before."""
+    data = np.empty(size, np.uint8)
+    view, done = memoryview(data), 0
+    while done < size:
+        got = stream.readinto(view[done:])
+        if not got:
+            return None
+        done += got
+    return data
+
+
+def _widen(stream):
+    with contextlib.suppress(ImportError, OSError, AttributeError):
+        import fcntl
+
+        fcntl.fcntl(stream.fileno(), F_SETPIPE_SZ, PIPE_BYTES)
+
+
+class _Watch:
+    """Ends a child that gives nothing while it is waited for."""
+
+    def __init__(self, child):
+        self.child, self.since, self.ended_it = child, None, False
+        self._over = threading.Event()
+        threading.Thread(target=self._run, daemon=True).start()
+
+    @contextlib.contextmanager
+    def waiting(self):
+        """While the child is waited for."""
+        self.since = time.monotonic()
+        try:
+            yield
+        finally:
+            self.since = None
+
+    def stop(self):
+        """No watch any more."""
+        self._over.set()
+
+    def _run(self):
+        while not self._over.wait(1.0):
+            since = self.since
+            if since is not None and time.monotonic() - since > SILENT_S:
+                self.ended_it = True
+                self.child.kill()
+                return
+
+
+def _death(file, child, watch):
+    """Why a child ended without a word."""
+    status = child.wait()
+    if watch.ended_it or -status in OUT_OF_TIME:
+        text = message(
+            "cloud_file_hang", "its reader came to no end with it and was stopped: is it damaged?"
+        )
+    elif status < 0:
+        text = message(
+            "cloud_file_abort",
+            "its reader was ended by the system (signal {signal}): is the file damaged?",
+            signal=str(-status),
+        )
+    else:
+        text = message(
+            "cloud_file_exit",
+            "its reader ended with status {status} before the last point: is the file damaged?",
+            status=str(status),
+        )
+    return file.refusal(text)
+
+
+def _failure(file, reason):
+    """What the child said of the file."""
+    if reason == MEMORY:
+        return file.refusal(
+            message(
+                "cloud_file_memory",
+                "its reader asked for more memory than it may have: is the file damaged?",
+            )
+        )
+    return file.refusal(
+        message(
+            "cloud_file_library",
+            "its reader refused it ({reason}): is the file damaged?",
+            reason=reason,
+        )
+    )

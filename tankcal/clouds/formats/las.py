@@ -1,0 +1,376 @@
+"""LAS and LAZ: the header checked byte by byte, records of LAS read here, of LAZ in a child.
+
+The layout is that of the LAS specification 1.4 R15 (ASPRS), little-endian; that of the LASzip
+record and of the chunk table is of the LASzip library.
+"""
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.clouds.contents import ScanHeader
+from tankcal.clouds.formats.files import (
+    EXTENT_LIMIT,
+    Piece,
+    count_mismatch,
+    cut_short,
+    no_points,
+    require_library,
+)
+from tankcal.clouds.formats.isolation import decoded_frames
+from tankcal.messages import message
+
+LEAST_HEADER = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375}  # bytes, by the minor version
+LEAST_RECORD = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # bytes, by the point format
+VLR, EVLR = 54, 60  # least bytes of a variable length record
+LASZIP_ID = 22204
+FARTHEST = 1e11  # an offset: 1e8 m in mm
+VARIABLE = 0xFFFFFFFF  # the size of a chunk that the chunk table tells
+
+
+@dataclass(frozen=True)
+class LasHeader:
+    """What reading needs of a sound header; shapes (3,) in the unit of the file."""
+
+    count: int
+    first: int
+    record: int
+    scale: np.ndarray
+    offset: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    laszip: bytes | None
+
+    @property
+    def format(self):
+        """ "las" or "laz"."""
+        return "las" if self.laszip is None else "laz"
+
+
+def describe(file):
+    """Format and scans of a file; InputError with every problem of its header."""
+    header = read_header(file)
+    return header.format, (ScanHeader("", header.count),)
+
+
+def pieces(file, chunk):
+    """The points of a file as `Piece`s."""
+    header = read_header(file)
+    box = _Box(file, header)
+    blocks = _las_blocks if header.laszip is None else _laz_blocks
+    for integers in blocks(file, header, chunk):
+        columns = np.empty((3, len(integers)))  # contiguous: several times as fast as rows
+        for i, column in enumerate(columns):
+            np.multiply(integers[:, i], header.scale[i], out=column)
+            column += header.offset[i]
+        box.check(columns.T)
+        yield Piece(0, columns.T, len(integers))
+
+
+def read_header(file):
+    """The `LasHeader` of a file, checked against its size; InputError with every problem."""
+    start = file.start
+    minor = start[25] if len(start) > 25 else 0
+    least = LEAST_HEADER.get(minor)
+    if least is None or start[24:25] != b"\1":
+        found = f"{start[24]}.{minor}" if len(start) > 25 else "?"
+        raise file.refusal(
+            message(
+                "cloud_file_las_version",
+                "LAS of version {found}; expected 1.0 to 1.4",
+                found=found,
+            )
+        )
+    if len(start) < least:
+        header = message("cloud_file_las_header", "the header")
+        raise file.refusal(cut_short(file, header, least, file.bytes))
+    parts = _Parts(start, minor)
+    problems = [*_layout_problems(file, parts, least), *_number_problems(parts)]
+    if problems:
+        raise file.refusal(*problems)
+    laszip = _laszip_record(file, parts) if parts.is_compressed else None
+    if parts.count == 0 and laszip is None and file.bytes - parts.first < parts.record:
+        raise no_points(file)
+    if laszip is None:
+        _check_what_follows(file, parts)
+    else:
+        require_library(file, "lazrs")
+        _check_laszip(file, parts, laszip)
+        _check_chunk_table(file, parts, laszip)
+    return LasHeader(
+        parts.count,
+        parts.first,
+        parts.record,
+        parts.scale,
+        parts.offset,
+        parts.low,
+        parts.high,
+        laszip,
+    )
+
+
+class _Parts:
+    """The numbers of a header, as they stand."""
+
+    def __init__(self, start, minor):
+        def at(place, form):
+            return struct.unpack_from("<" + form, start, place)[0]
+
+        self.size, self.first, self.vlrs = at(94, "H"), at(96, "I"), at(100, "I")
+        form = at(104, "B")
+        self.is_compressed, self.form = bool(form & 0xC0), form & 0x3F
+        self.record, self.old_count = at(105, "H"), at(107, "I")
+        self.scale = np.frombuffer(start, "<f8", 3, 131)
+        self.offset = np.frombuffer(start, "<f8", 3, 155)
+        box = np.frombuffer(start, "<f8", 6, 179).reshape(3, 2)
+        self.high, self.low = box[:, 0], box[:, 1]
+        self.waveforms = at(227, "Q") if minor >= 3 else 0
+        self.evlr_start, self.evlrs, self.count = 0, 0, self.old_count
+        if minor >= 4:
+            self.evlr_start, self.evlrs, self.count = at(235, "Q"), at(243, "I"), at(247, "Q")
+
+
+def _layout_problems(file, parts, least):
+    """Texts of sizes that do not fit into the file, or into each other."""
+    if not least <= parts.size <= file.bytes:
+        yield message(
+            "cloud_file_las_size",
+            "a header of {found} bytes; expected {least} or more, in a file of {size} bytes",
+            found=parts.size,
+            least=least,
+            size=file.bytes,
+        )
+    vlrs_end = parts.size + VLR * parts.vlrs
+    if not vlrs_end <= parts.first <= file.bytes:
+        yield message(
+            "cloud_file_las_first",
+            "points from byte {first} on, behind {count} records that need {needed} bytes at "
+            "least, in a file of {size} bytes: damaged",
+            first=parts.first,
+            count=parts.vlrs,
+            needed=vlrs_end,
+            size=file.bytes,
+        )
+    if parts.evlrs:
+        end = parts.evlr_start + EVLR * parts.evlrs
+        if parts.evlr_start < parts.first or end > file.bytes:
+            yield message(
+                "cloud_file_las_evlrs",
+                "{count} records behind the points, from byte {start} to {end} at least, in a file "
+                "of {size} bytes with points from byte {first} on: damaged",
+                count=parts.evlrs,
+                start=parts.evlr_start,
+                end=end,
+                size=file.bytes,
+                first=parts.first,
+            )
+    if parts.form >= len(LEAST_RECORD) or parts.record < LEAST_RECORD[parts.form]:
+        yield message(
+            "cloud_file_las_record",
+            "records of format {form} and {found} bytes; expected a format of 0 to 10 with the "
+            "bytes that it needs",
+            form=parts.form,
+            found=parts.record,
+        )
+    end = parts.first + parts.count * parts.record
+    if not parts.is_compressed and parts.first <= file.bytes < end:
+        yield message(
+            "cloud_file_las_count",
+            "declares {declared} points, and has room for {found}; is the file cut or damaged?",
+            declared=parts.count,
+            found=(file.bytes - parts.first) // max(parts.record, 1),
+        )
+    if parts.old_count not in (0, parts.count):
+        yield message(
+            "cloud_file_las_counts",
+            "declares {declared} points in one place and {found} in another; expected the same",
+            declared=parts.count,
+            found=parts.old_count,
+        )
+
+
+def _number_problems(parts):
+    """Texts of a scale, an offset or a box that is no such thing."""
+    if not np.all((parts.scale > 0) & (parts.scale <= 1)):  # nan, too
+        yield message(
+            "cloud_file_las_scale",
+            "scale factors {found}; expected three numbers above 0, at most 1",
+            found=_written(parts.scale),
+        )
+    if not np.all(np.abs(parts.offset) <= FARTHEST):
+        yield message(
+            "cloud_file_las_offset",
+            "offsets {found}; expected three finite numbers, at most {most:g}",
+            found=_written(parts.offset),
+            most=FARTHEST,
+        )
+    with np.errstate(invalid="ignore", over="ignore"):
+        extent = parts.high - parts.low
+    if not np.all((extent >= 0) & (extent < EXTENT_LIMIT)) and parts.count:
+        yield message(
+            "cloud_file_las_box",
+            "coordinates from {low} to {high}; expected the largest not below the smallest, and "
+            "less than {most:g} between them",
+            low=_written(parts.low),
+            high=_written(parts.high),
+            most=EXTENT_LIMIT,
+        )
+
+
+def _written(numbers):
+    return [f"{number:g}" for number in numbers]
+
+
+def _check_what_follows(file, parts):
+    """A count that is too small leaves whole records that nothing accounts for."""
+    end = parts.first + parts.count * parts.record
+    if not (parts.evlrs or parts.waveforms) and file.bytes - end >= parts.record:
+        raise count_mismatch(file, parts.count, (file.bytes - parts.first) // parts.record)
+    if parts.evlrs and parts.evlr_start < end:
+        raise count_mismatch(file, parts.count, (parts.evlr_start - parts.first) // parts.record)
+
+
+def _laszip_record(file, parts):
+    """The bytes of the LASzip record, found among the records before the points."""
+    with file.path.open("rb") as stream:
+        place = parts.size
+        for _ in range(parts.vlrs):  # so many have room, as was checked
+            stream.seek(place)
+            head = stream.read(VLR)
+            if len(head) < VLR:
+                break
+            number, length = struct.unpack_from("<HH", head, 18)
+            end = place + VLR + length
+            if end > parts.first:
+                break
+            if head[2:18].rstrip(b"\0") == b"laszip encoded" and number == LASZIP_ID:
+                return stream.read(length)
+            place = end
+    raise file.refusal(
+        message(
+            "cloud_file_laz_no_record",
+            "compressed, without the LASzip record that says how: damaged",
+        )
+    )
+
+
+def _check_laszip(file, parts, data):
+    """Items of the record add up to a point, chunks have a size."""
+    is_sound = len(data) >= 34
+    if is_sound:
+        compressor, coder = struct.unpack_from("<HH", data)
+        chunk, items = struct.unpack_from("<I", data, 12)[0], struct.unpack_from("<H", data, 32)[0]
+        is_sound = compressor in (1, 2, 3) and coder == 0 and chunk > 0
+        is_sound = is_sound and items > 0 and len(data) >= 34 + 6 * items
+    if is_sound:
+        sizes = [struct.unpack_from("<H", data, 36 + 6 * i)[0] for i in range(items)]
+        is_sound = sum(sizes) == parts.record
+    if not is_sound:
+        raise file.refusal(
+            message(
+                "cloud_file_laz_record",
+                "the LASzip record does not describe points of {record} bytes: damaged",
+                record=parts.record,
+            )
+        )
+
+
+def _check_chunk_table(file, parts, data):
+    """The table lies in the file, and has as many chunks as points and bytes have room for."""
+    compressor = struct.unpack_from("<H", data)[0]
+    if compressor == 1:  # one stream of points, no chunks
+        return
+    size = struct.unpack_from("<I", data, 12)[0]
+    with file.path.open("rb") as stream:
+        stream.seek(parts.first)
+        place = int.from_bytes(stream.read(8), "little", signed=True)
+        is_inside = parts.first + 8 <= place <= file.bytes - 8
+        if is_inside:
+            stream.seek(place)
+            version, chunks = struct.unpack("<II", stream.read(8))
+    if not is_inside:
+        raise file.refusal(
+            message(
+                "cloud_file_laz_table",
+                "its table of chunks would stand at byte {place} of {size}: is the file cut, or "
+                "was it not finished?",
+                place=place,
+                size=file.bytes,
+            )
+        )
+    room = (place - parts.first - 8) // parts.record  # each chunk begins with a whole point
+    least, most = (0, min(parts.count, room)) if size == VARIABLE else _chunks_of(parts.count, size)
+    if version != 0 or not least <= chunks <= min(most, room, file.bytes - place - 8 + least):
+        raise file.refusal(
+            message(
+                "cloud_file_laz_chunks",
+                "a table of {chunks} chunks for {count} points in {size} bytes: damaged",
+                chunks=chunks,
+                count=parts.count,
+                size=file.bytes,
+            )
+        )
+    if parts.count == 0:
+        raise no_points(file)
+
+
+def _chunks_of(count, size):
+    """Fewest and most chunks of one size; some writers end with an empty one."""
+    full = -(-count // size)
+    return full, full + 1
+
+
+class _Box:
+    """Points lie in the box of their header; a changed scale moves them out."""
+
+    def __init__(self, file, header):
+        self.file, self.done = file, 0
+        slack = 10 * header.scale + 1e-9 * np.maximum(np.abs(header.low), np.abs(header.high))
+        self.low, self.high = header.low - slack, header.high + slack
+        self.is_blank = not (header.low.any() or header.high.any())  # some writers leave 0
+
+    def check(self, xyz):
+        """InputError for a point outside."""
+        is_inside = np.all(xyz.min(axis=0) >= self.low) and np.all(xyz.max(axis=0) <= self.high)
+        if not (self.is_blank or is_inside):
+            out = ((xyz < self.low) | (xyz > self.high)).any(axis=1)
+            i = int(np.flatnonzero(out)[0])
+            raise self.file.refusal(
+                message(
+                    "cloud_file_las_outside",
+                    "point {number} is ({x}, {y}, {z}), outside of the box that the header gives: "
+                    "damaged, or its header was not brought up to date",
+                    number=self.done + i + 1,
+                    **dict(zip("xyz", _written(xyz[i]), strict=True)),
+                )
+            )
+        self.done += len(xyz)
+
+
+def _las_blocks(file, header, chunk):
+    record = np.dtype(
+        {"names": ["xyz"], "formats": ["(3,)<i4"], "offsets": [0], "itemsize": header.record}
+    )
+    with file.path.open("rb") as stream:
+        stream.seek(header.first)
+        for done in range(0, header.count, chunk):
+            wanted = min(chunk, header.count - done)
+            found = np.fromfile(stream, record, wanted)
+            if len(found) < wanted:
+                raise count_mismatch(file, header.count, done + len(found))
+            yield found["xyz"]
+
+
+def _laz_blocks(file, header, chunk):
+    request = {
+        "kind": "laz",
+        "path": str(file.path),
+        "first": header.first,
+        "record": header.record,
+        "count": header.count,
+        "laszip": header.laszip.hex(),
+        "chunk": chunk,
+    }
+    for frame in decoded_frames(file, request):
+        yield frame.data.view("<i4").reshape(-1, 3)

@@ -1,0 +1,217 @@
+"""PLY: the vertices of a file of text or of binary numbers of either order; faces are passed by."""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.clouds.contents import ScanHeader
+from tankcal.clouds.formats.files import Piece, count_mismatch, no_points
+from tankcal.clouds.formats.lines import Layout, Lines, parse_rows, shown, skip_lines
+from tankcal.messages import message
+
+TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
+    "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
+    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+}  # fmt: skip
+ORDERS = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
+
+
+@dataclass(frozen=True)
+class _Element:
+    name: str
+    count: int
+    names: tuple[str, ...]
+    types: tuple[str, ...]  # "": a list
+
+
+@dataclass(frozen=True)
+class PlyHeader:
+    """Where and how the vertices stand.
+
+    Attributes
+    ----------
+    order : str or None
+        "<" or ">" of binary numbers; None: text.
+    before : tuple of _Element
+        What stands before the vertices.
+    vertex : _Element
+    is_last : bool
+        Whether nothing follows the vertices.
+    first : int
+        Bytes of the header.
+    lines : int
+        Lines of it.
+    """
+
+    order: str | None
+    before: tuple[_Element, ...]
+    vertex: _Element
+    is_last: bool
+    first: int
+    lines: int
+
+    @property
+    def start(self):
+        """Byte at which binary vertices begin."""
+        return self.first + sum(one.count * self.record(one).itemsize for one in self.before)
+
+    def record(self, element):
+        """The dtype of one row of an element without lists."""
+        fields = [(f"f{i}", self.order + kind) for i, kind in enumerate(element.types)]
+        return np.dtype(fields)
+
+    @property
+    def columns(self):
+        """Places of x, y and z among the properties of a vertex."""
+        return tuple(self.vertex.names.index(name) for name in "xyz")
+
+
+def describe(file):
+    """The one scan of a file."""
+    return "ply", (ScanHeader("", read_header(file).vertex.count),)
+
+
+def pieces(file, chunk):
+    """The vertices of a file."""
+    header = read_header(file)
+    return (
+        _text_pieces(file, header, chunk)
+        if header.order is None
+        else _binary_pieces(file, header, chunk)
+    )
+
+
+def read_header(file):
+    """The `PlyHeader`, checked against the size of the file."""
+    found = re.search(rb"\nend_header[ \t]*\r?\n", file.start)
+    if found is None or not re.match(rb"ply[ \t]*\r?\n", file.start):
+        raise file.refusal(
+            message(
+                "cloud_file_ply_end",
+                'no line "end_header" among the first {bytes} bytes: is the file cut or damaged?',
+                bytes=len(file.start),
+            )
+        )
+    text = file.start[: found.end()]
+    order, elements = _parse_header(file, text)
+    at = next((i for i, one in enumerate(elements) if one.name == "vertex"), None)
+    vertex = elements[at] if at is not None else _Element("vertex", 0, (), ())
+    header = PlyHeader(
+        order, elements[:at], vertex, at == len(elements) - 1, len(text), text.count(b"\n")
+    )
+    _check_vertices(file, header)
+    return header
+
+
+def _parse_header(file, text):
+    """Order of bytes and elements; InputError with the row that is of another kind."""
+    order, elements = "", []
+    for row, line in enumerate(text.split(b"\n"), start=1):
+        words = line.decode("utf-8", errors="replace").split()
+        match words:
+            case [] | ["ply"] | ["end_header"] | ["comment" | "obj_info", *_]:
+                continue
+            case ["format", kind, "1.0"] if kind in ORDERS:
+                order = ORDERS[kind]
+                continue
+            case ["element", name, count] if re.fullmatch("[0-9]{1,18}", count):
+                elements.append(_Element(name, int(count), (), ()))
+                continue
+            case ["property", kind, name] if kind in TYPES and elements:
+                elements[-1] = _with_property(elements[-1], name, TYPES[kind])
+                continue
+            case ["property", "list", size, kind, name] if elements and {size, kind} <= {*TYPES}:
+                elements[-1] = _with_property(elements[-1], name, "")
+                continue
+        raise file.refusal(
+            message(
+                "cloud_file_ply_row",
+                "found {found!r} in the header; expected a format, an element or a property of PLY",
+                found=shown(line),
+            ),
+            row=row,
+        )
+    if order == "":
+        raise file.refusal(
+            message("cloud_file_ply_format", 'no line "format" in the header: damaged')
+        )
+    return order, tuple(elements)
+
+
+def _with_property(element, name, kind):
+    return _Element(element.name, element.count, (*element.names, name), (*element.types, kind))
+
+
+def _check_vertices(file, header):
+    vertex = header.vertex
+    has_lists = "" in vertex.types or any("" in one.types for one in header.before)
+    if {*"xyz"} - {*vertex.names} or len({*vertex.names}) < len(vertex.names) or has_lists:
+        raise file.refusal(
+            message(
+                "cloud_file_ply_vertex",
+                "expected an element vertex with x, y and z, each property once, without lists in "
+                "it or before it",
+            )
+        )
+    if not vertex.count:
+        raise no_points(file)
+    if header.order is None:
+        least = 2 * len(vertex.names)
+        room = (file.bytes - header.first + 1) // least
+        is_sound = vertex.count <= room
+        before = sum(one.count for one in header.before)
+        is_sound = is_sound and before <= file.bytes
+    else:
+        size = header.record(vertex).itemsize
+        room = max(file.bytes - header.start, 0) // size
+        is_sound = vertex.count == room or (vertex.count < room and not header.is_last)
+    if not is_sound:
+        raise count_mismatch(file, vertex.count, room)
+
+
+def _binary_pieces(file, header, chunk):
+    record, count = header.record(header.vertex), header.vertex.count
+    columns = [f"f{i}" for i in header.columns]
+    kinds = {header.vertex.types[i] for i in header.columns}
+    kind = np.float32 if "f4" in kinds else np.float64
+    with file.path.open("rb") as stream:
+        stream.seek(header.start)
+        for done in range(0, count, chunk):
+            rows = np.fromfile(stream, record, min(chunk, count - done))
+            if len(rows) < min(chunk, count - done):
+                raise count_mismatch(file, count, done + len(rows))
+            found = np.empty((3, len(rows)), kind)
+            for row, column in zip(found, columns, strict=True):
+                row[:] = rows[column]
+            yield Piece(0, found.T, len(rows))
+
+
+def _text_pieces(file, header, chunk):
+    vertex, layout = header.vertex, Layout(columns=header.columns)
+    is_single = "f4" in {vertex.types[i] for i in header.columns}
+    with file.path.open("rb") as stream:
+        lines = Lines(file, stream)
+        for _ in range(header.lines):
+            lines.take(1)
+        skip_lines(lines, sum(one.count for one in header.before))
+        left = vertex.count
+        while left:
+            block, row = lines.take(min(chunk, left))
+            if not block:
+                raise count_mismatch(file, vertex.count, vertex.count - left)
+            xyz = parse_rows(file, block, row, layout)
+            left -= len(xyz)
+            # what a writer printed of float32 has no more digits than that
+            single = xyz.astype(np.float32) if is_single else xyz
+            yield Piece(0, single if np.array_equal(single, xyz) else xyz, len(xyz))
+        if header.is_last and lines.next_line() is not None:
+            raise file.refusal(
+                message(
+                    "cloud_file_ply_rest",
+                    "more rows behind the {declared} vertices that it declares: damaged",
+                    declared=vertex.count,
+                ),
+                row=lines.row,
+            )
