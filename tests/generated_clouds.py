@@ -110,12 +110,11 @@ def take_scan(rng, scene, position, rays, *, noise_m=0.002, beam_rad=3e-4, even=
     t, kind, cosine = _trace(scene, origin, _direction(turn, rise))
     jitter = rng.normal(0, beam_rad, (2, len(turn)))
     other, _, _ = _trace(scene, origin, _direction(turn + jitter[0], rise + jitter[1]))
+    hit = np.isfinite(t)
+    t, other, turn, rise, kind, cosine = (one[hit] for one in (t, other, turn, rise, kind, cosine))
     share = rng.uniform(0, 1, len(turn))
-    edge = (
-        np.isfinite(t) & np.isfinite(other) & (np.abs(other - t) > 0.02) & (np.abs(other - t) < 2)
-    )
-    with np.errstate(invalid="ignore"):
-        t = np.where(edge, t + share * (other - t), t)
+    edge = (np.abs(other - t) > 0.02) & (np.abs(other - t) < 2)
+    t = np.where(edge, t + share * (np.where(edge, other, t) - t), t)
     kind = np.where(edge, MIXED, kind)
     if scene.second is not None:
         part, before = scene.second
@@ -123,7 +122,7 @@ def take_scan(rng, scene, position, rays, *, noise_m=0.002, beam_rad=3e-4, even=
         t = np.where(ghost, t - before / np.maximum(cosine, 0.1), t)
         kind = np.where(ghost, SECOND, kind)
     t = t + rng.normal(0, 1, len(t)) * noise_m * (0.7 + t / 30) / np.sqrt(np.maximum(cosine, 0.05))
-    seen = np.isfinite(t) & (t < 60)
+    seen = t < 60
     xyz = origin + t[:, None] * _direction(turn, rise)
     if scene.gap is not None:
         azimuth = np.arctan2(xyz[:, 0], xyz[:, 1]) % FULL_TURN

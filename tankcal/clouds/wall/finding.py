@@ -27,9 +27,10 @@ from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 
 SAMPLE = 500_000
+FARTHEST_M = 1e8  # of coordinates: doubles tell 15 nm there
 ROW_M, COLUMN_M, FEWEST_COLUMNS = 0.05, 0.15, 360  # of a cell, where memory and points allow
 MEMORY_BYTES = 256 << 20  # of the sums of all scans
-POINTS_OF_CELL = 25  # that a cell should get, were they even over wall, bottom and roof
+POINTS_OF_CELL = 40  # that a cell should get, were they even over the wall: they never are
 COARSEST_M = 0.4
 LEAST_SD_M = 5e-5  # no mean of a cell is told better
 TWO_SURFACES, SECTORS, SECTORS_WITH = 0.10, 36, 0.6  # cells with two modes; where they are
@@ -146,8 +147,9 @@ def find_cloud_wall(
     sample = PointSample(SAMPLE)
     for scan, xyz in passes():
         sample.add(_checked(xyz, scan), scan)
+    some = sample.points()
     surface, ends = find_surface(
-        sample.points(),
+        some,
         kind=kind,
         ends_m=None if joints_m is None else (joints_m[0], joints_m[-1]),
         radius_m=radius_m,
@@ -156,8 +158,16 @@ def find_cloud_wall(
     scans = max([*sample.delivered, len(sides or ()) - 1]) + 1
     joints = tuple(joints_m) if kind == "vertical" else ends
     points = sum(sample.delivered.values())
-    del sample
-    grid = make_grid(surface, joints, band_m, row_m, scans, points, memory_bytes)
+    grid = make_grid(
+        surface,
+        joints,
+        band_m=band_m,
+        row_m=row_m,
+        scans=scans,
+        points=points * _share_near(some, surface, ends, band_m),
+        memory_bytes=memory_bytes,
+    )
+    del sample, some
     progress(
         message(
             "cloud_second_pass",
@@ -178,24 +188,44 @@ def _checked(xyz_m, scan):
     xyz_m = np.asarray(xyz_m, dtype=float)
     if xyz_m.ndim != 2 or xyz_m.shape[1] != 3:
         raise ValueError(f"points of scan {scan} have shape {xyz_m.shape}; expected (n, 3)")
-    bad = np.flatnonzero(~np.isfinite(xyz_m).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(xyz_m) < FARTHEST_M).all(axis=1))
     if len(bad):
         text = message(
             "cloud_not_finite",
-            "scan {scan} has points without finite coordinates, the first of them {point}; "
-            "expected numbers",
+            "scan {scan} has points that cannot be, the first of them {point}; expected "
+            "coordinates of less than {most:g} m",
             scan=scan + 1,
             point=str(tuple(xyz_m[bad[0]].tolist())),
+            most=FARTHEST_M,
         )
         raise InputError(Problem(FILE, text))
     return xyz_m
 
 
-def make_grid(surface, joints_m, band_m, row_m, scans, points, memory_bytes=MEMORY_BYTES):
-    """`CellGrid` whose rows begin at the joints, as fine as points and memory allow."""
+def _share_near(xyz_m, surface, ends_m, band_m):
+    """Which part of a sample lies between the ends, near the surface."""
+    u, _, distance = surface.places(xyz_m)
+    return float(np.mean((u > ends_m[0]) & (u < ends_m[1]) & (np.abs(distance) < band_m)))
+
+
+def make_grid(
+    surface, joints_m, *, points, scans=1, band_m=0.1, row_m=ROW_M, memory_bytes=MEMORY_BYTES
+):
+    """`CellGrid` whose rows begin at the joints, as fine as points and memory allow.
+
+    Parameters
+    ----------
+    surface : CylinderSurface or SphereSurface
+    joints_m : sequence of float
+        u of the ends of the courses.
+    points : float
+        That are expected within the band.
+    scans, band_m, row_m, memory_bytes : optional
+        As for `find_cloud_wall`.
+    """
     around = FULL_TURN * surface.radius_m
     columns = max(FEWEST_COLUMNS, int(np.ceil(around / COLUMN_M)))
-    area = around * (joints_m[-1] - joints_m[0] + surface.radius_m)
+    area = around * (joints_m[-1] - joints_m[0])
     row_m = max(row_m, POINTS_OF_CELL * area / max(points, 1) / (around / columns))
     row_m = min(row_m, COARSEST_M)
     while True:

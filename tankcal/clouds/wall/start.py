@@ -15,12 +15,15 @@ from tankcal.geometry.shell import consensus_circle, find_shell
 from tankcal.messages import message
 
 LEVELS, LEAST_LEVELS = 24, 0.3  # heights that squares of the view are told by, and how many of them
-SQUARE = 1 / 75  # of the radius
+SQUARE, LEAST_SQUARES = 1 / 75, 20  # of the radius; of them, with points at many heights
+CLEAR_BAND, MOST_OF_THEM = 0.01, 0.6  # of the radius; of the points of another shape
+DIAGNOSED = 60_000  # points that a cause is looked for with
 AROUND, FITTED_LEVELS = 72, 24  # cells of the points that the axis is fitted to
 WIDE = 0.03  # of the radius: how far from the first circle points may be of the wall
 FEWEST = 500  # points between the ends of the shell
 UNITS = {"mm": 1000.0, "cm": 100.0, "ft": 1 / 0.3048, "in": 1 / 0.0254, "km": 0.001}
 FILE = "clouds.toml"
+LEAST_ON_SPHERE = 0.3  # of the points
 SPHERE_TRIES, SPHERE_BANDS = 400, (0.03, 0.02, 0.01, 0.006, 0.006)
 
 
@@ -64,7 +67,7 @@ def find_surface(xyz_m, *, kind, ends_m, radius_m, azimuth_rad=0.0):
     try:
         return _surface(xyz_m, kind, ends_m, radius_m, azimuth_rad)
     except SolutionError as error:
-        cause = _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad)
+        cause = _likely_cause(xyz_m[:DIAGNOSED], kind, ends_m, radius_m, azimuth_rad)
         raise _problem(
             cause or message("cloud_shows_no_wall", "{why}", why=error.args[0])
         ) from None
@@ -102,7 +105,18 @@ def _standing(xyz_m, ends_m, radius_m, frame):
         )
     middle = np.array([*np.median(inside[:, :2], axis=0), (ends_m[0] + ends_m[1]) / 2])
     local, joints = inside - middle, np.array(ends_m) - middle[2]
-    x, y, r = consensus_circle(_upright_squares(local, joints, radius_m), radius_m)
+    squares = _upright_squares(local, joints, radius_m)
+    if len(squares) < LEAST_SQUARES:
+        raise SolutionError(
+            message(
+                "cloud_nothing_upright",
+                "nothing along the axis of the tank was found in {count} points near its nominal "
+                "radius of {nominal_m:.3f} m: check the unit, the axes and the frame",
+                count=len(inside),
+                nominal_m=radius_m,
+            )
+        )
+    x, y, r = consensus_circle(squares, radius_m)
     distance = np.hypot(local[:, 0] - x, local[:, 1] - y) - r
     near = local[np.abs(distance) < WIDE * radius_m]
     some = _spread(near, x, y, joints)
@@ -157,7 +171,7 @@ def _sphere(xyz_m, radius_m):
     middle = np.median(xyz_m, axis=0)
     local = xyz_m - middle
     judges = local[rng.choice(len(local), min(len(local), 4000), replace=False)]
-    best = 0.0, None
+    best = -1.0, None
     for four in local[rng.integers(len(local), size=(SPHERE_TRIES, 4))]:
         a = 2 * (four[1:] - four[0])
         b = np.sum(four[1:] ** 2 - four[0] ** 2, axis=1)
@@ -168,7 +182,7 @@ def _sphere(xyz_m, radius_m):
             continue
         away = np.abs(np.linalg.norm(judges - centre, axis=1) - radius_m)
         best = max(best, (float(np.mean(away < WIDE * radius_m)), tuple(centre)))
-    if best[1] is None or best[0] < 0.3:
+    if best[1] is None or best[0] < LEAST_ON_SPHERE:
         raise SolutionError(
             message(
                 "no_sphere_in_cloud",
@@ -176,7 +190,7 @@ def _sphere(xyz_m, radius_m):
                 "third of the points (best {share:.0f} %): check the diameter and the unit",
                 band=100 * WIDE,
                 nominal_m=radius_m,
-                share=100 * best[0],
+                share=100 * max(best[0], 0.0),
             )
         )
     centre, radius = np.array(best[1]), radius_m
@@ -204,13 +218,21 @@ def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad):
                 )
     if kind != "sphere":
         for factor in (1.0, 1.3, 0.8):
-            if _is_found(xyz_m, "sphere", None, radius_m * factor, 0.0):
+            try:
+                sphere = _sphere(xyz_m, radius_m * factor)
+            except SolutionError:
+                continue
+            off = np.abs(sphere.places(xyz_m)[2])
+            if np.mean(off < CLEAR_BAND * sphere.radius_m) > MOST_OF_THEM:
                 return message(
                     "cloud_of_sphere",
                     "the points lie on a sphere of a radius of about {radius_m:.3f} m, not on a "
                     "cylinder: check tank.kind",
-                    radius_m=_sphere(xyz_m, radius_m * factor).radius_m,
+                    radius_m=sphere.radius_m,
                 )
+    for other, turns, code in _other_kinds(kind, azimuth_rad):
+        if any(_is_found(xyz_m, other, None, radius_m, turn) for turn in turns):
+            return code
     for factor in np.geomspace(0.4, 2.5, 33):
         other = radius_m * factor
         try:
@@ -225,6 +247,21 @@ def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad):
             radius_m=found.radius_m,
         )
     return None
+
+
+def _other_kinds(kind, azimuth_rad):
+    """Lying cylinders to try: kind, azimuths, and what it would mean."""
+    turns = azimuth_rad + np.arange(0, np.pi, np.radians(3))
+    if kind == "horizontal":
+        elsewhere = message(
+            "cloud_axis_elsewhere",
+            "the points lie on a cylinder that runs elsewhere: check horizontal.azimuth_deg",
+        )
+        return [("horizontal", turns, elsewhere)]
+    if kind == "vertical":
+        lies = message("cloud_lies", "the points lie on a lying cylinder: check tank.kind")
+        return [("horizontal", turns, lies)]
+    return []
 
 
 def _is_found(xyz_m, kind, ends_m, radius_m, azimuth_rad):
