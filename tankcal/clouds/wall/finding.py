@@ -31,7 +31,7 @@ FARTHEST_M = 1e8  # of coordinates: doubles tell 15 nm there
 ROW_M, COLUMN_M, FEWEST_COLUMNS = 0.05, 0.15, 360  # of a cell, where memory and points allow
 MEMORY_BYTES = 256 << 20  # of the sums of all scans
 POINTS_OF_CELL = 40  # that a cell should get, were they even over the wall: they never are
-COARSEST_M = 0.4
+COARSEST_M, TALLEST = 0.2, 0.1  # a row, and how much of a course: it bulges between its joints
 LEAST_SD_M = 5e-5  # no mean of a cell is told better
 TWO_SURFACES, SECTORS, SECTORS_WITH = 0.10, 36, 0.6  # cells with two modes; where they are
 LEAST_WALL = 0.02  # of the cells, that must be wall
@@ -227,20 +227,22 @@ def make_grid(
     columns = max(FEWEST_COLUMNS, int(np.ceil(around / COLUMN_M)))
     area = around * (joints_m[-1] - joints_m[0])
     row_m = max(row_m, POINTS_OF_CELL * area / max(points, 1) / (around / columns))
-    row_m = min(row_m, COARSEST_M)
+    row_m = min(row_m, COARSEST_M, TALLEST * np.diff(joints_m).min())
     while True:
         edges = [joints_m[0]]
         for low, high in pairwise(joints_m):
             rows = max(1, int(np.ceil((high - low) / row_m)))
             edges.extend(low + (high - low) * np.arange(1, rows + 1) / rows)
         grid = CellGrid(np.array(edges), columns, band_m, max(8, round(band_m / 0.002)))
-        if grid.bytes_of(scans) <= memory_bytes or row_m > COARSEST_M:
+        is_coarsest = row_m >= COARSEST_M and columns <= FEWEST_COLUMNS // 2
+        if is_coarsest or grid.bytes_of(scans) <= memory_bytes:
             return grid
-        if row_m < 2 * around / columns:
+        if row_m < COARSEST_M and row_m < 2 * around / columns:
             row_m *= 1.25
-        else:
+        elif columns > FEWEST_COLUMNS // 2:
             columns = max(FEWEST_COLUMNS // 2, int(columns / 1.25))
-            row_m *= 1.05
+        else:
+            row_m *= 1.25
 
 
 def wall_of_cells(cells, joints_m, sides):

@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 WALL, EMPTY, FEW, OBSTRUCTED, STEEP, OFF_TREND = range(6)
-FEWEST = 8  # points of a cell that says anything
+FEWEST = 6  # points of a cell that says anything
 OCCUPIED = 0.15  # of the fullest bin of a cell
 SURE = 8  # points of the fullest bin, above which its neighbours are not smoothed over
 LEAST_SHARE = 0.1  # of the points of a cell, of a mode that counts

@@ -68,9 +68,7 @@ def find_surface(xyz_m, *, kind, ends_m, radius_m, azimuth_rad=0.0):
         return _surface(xyz_m, kind, ends_m, radius_m, azimuth_rad)
     except SolutionError as error:
         cause = _likely_cause(xyz_m[:DIAGNOSED], kind, ends_m, radius_m, azimuth_rad)
-        raise _problem(
-            cause or message("cloud_shows_no_wall", "{why}", why=error.args[0])
-        ) from None
+        raise _problem(cause or error.args[0]) from None
 
 
 def _surface(xyz_m, kind, ends_m, radius_m, azimuth_rad):
