@@ -66,8 +66,9 @@ def test_wall_of_a_cell_is_what_its_neighbours_show():  # property: the other mo
 
 
 def test_seam_of_30_mm_stays():  # closed form: a cusp 0.4 m wide over the whole height
-    arc = 0.13 * (np.arange(80) - 40.3)
-    counts = _histograms(np.tile(-0.03 * np.maximum(0, 1 - np.abs(arc) / 0.2), (40, 1)))
+    arc = 0.13 * (np.arange(80) - 40.3 + np.linspace(-0.5, 0.5, 60)[:, None, None])
+    form = -0.03 * np.maximum(0, 1 - np.abs(np.tile(arc, (40, 1))) / 0.2)
+    counts = sum(_histograms(part, points=1) for part in form)
     assert np.all(_grow(counts).why == IS_WALL)
 
 
@@ -129,7 +130,7 @@ def test_grid_begins_rows_at_joints_and_keeps_to_memory():  # property
     for grid in (fine, small):
         assert np.isin(joints, grid.edges_m).all()
     assert small.bytes_of(8) <= 100 << 20
-    assert np.diff(fine.edges_m).max() <= 0.05
+    assert np.diff(fine.edges_m).max() <= 0.05 + 1e-9
 
 
 def _two_walls():
@@ -187,7 +188,7 @@ def test_sphere_and_lying_cylinder():  # closed form
     for wall, middle in ((sphere, [10, 20, 3]), (found, [2, 10, 20])):
         away = readings_of(wall).xyz_m - middle
         away[:, 0] *= wall is sphere
-        assert_allclose(np.linalg.norm(away, axis=1), 3.0, atol=2e-3)
+        assert_allclose(np.linalg.norm(away, axis=1), 3.0, atol=4e-3)
 
 
 INSIDE = ((2.3, 0.7, 1.6), (-2.2, -1.5, 1.6), (0.7, -3.0, 4.0))
@@ -238,10 +239,10 @@ def test_clutter_moves_no_radius(name, figure):  # simulation: rays, not the mod
     kept = wall.is_wall.any(axis=0)[is_truly].mean()
     bias = _mean_of_courses(_errors(scene, wall), scene.courses)
     hand = _mean_of_courses(_errors(scene, by_hand), scene.courses)
-    figure(
-        f"cells of a cloud, {name}: bias {1e3 * np.abs(bias).max():.3f} mm, against clutter taken "
-        f"out by hand {1e3 * np.abs(bias - hand).max():.3f} mm, wall kept {100 * kept:.2f} %"
-    )
+    name = f"cells of a cloud, {name}: "
+    figure(name + "bias of a course", f"{1e3 * np.abs(bias).max():.3f} mm")
+    figure(name + "against clutter taken out by hand", f"{1e3 * np.abs(bias - hand).max():.3f} mm")
+    figure(name + "wall kept", f"{100 * kept:.2f} %")
     assert np.abs(bias).max() < 2e-4
     assert np.abs(bias - hand).max() < 3e-4
     assert kept >= 0.98

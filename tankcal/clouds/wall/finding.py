@@ -19,7 +19,16 @@ from tankcal.clouds.wall.features import (
     find_obstructions,
     find_welds,
 )
-from tankcal.clouds.wall.growing import OFF_TREND, WALL, grow_wall, off_trend, spread_between
+from tankcal.clouds.wall.growing import (
+    EMPTY,
+    FEW,
+    FEWEST,
+    OFF_TREND,
+    WALL,
+    grow_wall,
+    off_trend,
+    spread_between,
+)
 from tankcal.clouds.wall.sampling import PointSample
 from tankcal.clouds.wall.start import FILE, find_surface
 from tankcal.errors import InputError, Problem
@@ -31,10 +40,11 @@ FARTHEST_M = 1e8  # of coordinates: doubles tell 15 nm there
 ROW_M, COLUMN_M, FEWEST_COLUMNS = 0.05, 0.15, 360  # of a cell, where memory and points allow
 MEMORY_BYTES = 256 << 20  # of the sums of all scans
 POINTS_OF_CELL = 40  # that a cell should get, were they even over the wall: they never are
+LEAST_COLUMNS, WIDEST_M = 90, 0.3  # where points are few
 COARSEST_M, TALLEST = 0.2, 0.1  # a row, and how much of a course: it bulges between its joints
 LEAST_SD_M = 5e-5  # no mean of a cell is told better
 TWO_SURFACES, SECTORS, SECTORS_WITH = 0.10, 36, 0.6  # cells with two modes; where they are
-LEAST_WALL = 0.02  # of the cells, that must be wall
+LEAST_WALL = 0.25  # of the cells in which anything is seen
 
 
 @dataclass(frozen=True)
@@ -228,19 +238,21 @@ def make_grid(
     area = around * (joints_m[-1] - joints_m[0])
     row_m = max(row_m, POINTS_OF_CELL * area / max(points, 1) / (around / columns))
     row_m = min(row_m, COARSEST_M, TALLEST * np.diff(joints_m).min())
+    affordable = points / POINTS_OF_CELL / ((joints_m[-1] - joints_m[0]) / row_m)
+    columns = min(columns, max(LEAST_COLUMNS, int(affordable), int(around / WIDEST_M)))
     while True:
         edges = [joints_m[0]]
         for low, high in pairwise(joints_m):
             rows = max(1, int(np.ceil((high - low) / row_m)))
             edges.extend(low + (high - low) * np.arange(1, rows + 1) / rows)
         grid = CellGrid(np.array(edges), columns, band_m, max(8, round(band_m / 0.002)))
-        is_coarsest = row_m >= COARSEST_M and columns <= FEWEST_COLUMNS // 2
+        is_coarsest = row_m >= COARSEST_M and columns <= 2 * LEAST_COLUMNS
         if is_coarsest or grid.bytes_of(scans) <= memory_bytes:
             return grid
         if row_m < COARSEST_M and row_m < 2 * around / columns:
             row_m *= 1.25
-        elif columns > FEWEST_COLUMNS // 2:
-            columns = max(FEWEST_COLUMNS // 2, int(columns / 1.25))
+        elif columns > 2 * LEAST_COLUMNS:
+            columns = max(2 * LEAST_COLUMNS, int(columns / 1.25))
         else:
             row_m *= 1.25
 
@@ -275,7 +287,7 @@ def wall_of_cells(cells, joints_m, sides):
             bin_m=grid.bin_m,
             joined_rows=joint_rows,
         )
-        _refuse_no_wall(grown, surface)
+        _refuse_no_wall(grown, cells)
         _refuse_two_surfaces(grown, grid, surface)
         for i in mine:
             mean, spread, count[i] = _means(cells, i, grown)
@@ -372,19 +384,33 @@ def _scatter(radius):
     return min(one for one in (spread_between(around), spread_between(up), np.inf) if one > 0)
 
 
-def _refuse_no_wall(grown, surface):
-    share = np.mean(grown.why == WALL)
-    if share < LEAST_WALL:
+def _refuse_no_wall(grown, cells):
+    """Raise InputError where few of the cells in which anything is seen are wall."""
+    something = (grown.why.ravel() != EMPTY) | np.any(cells.far >= FEWEST, axis=1)
+    seen = max(np.count_nonzero(something), 1)
+    share = np.count_nonzero(grown.why == WALL) / seen
+    if share >= LEAST_WALL:
+        return
+    if np.count_nonzero(grown.why == FEW) > seen / 2:
+        text = message(
+            "cloud_too_sparse",
+            "found fewer than {least} points in most cells of the wall ({rows} x {columns}); "
+            "expected a denser cloud: bring its points as points.csv",
+            least=FEWEST,
+            rows=cells.grid.rows,
+            columns=cells.grid.columns,
+        )
+    else:
         text = message(
             "cloud_wall_too_small",
-            "only {share:.1f} % of the cells of the shell show a wall near the radius "
-            "{radius_m:.3f} m; expected {least:.0f} % at least: check the unit, the frame and what "
-            "stands before the wall",
+            "only {share:.1f} % of the cells in which anything is seen show a wall near the radius "
+            "{radius_m:.3f} m; expected {least:.0f} % at least: check tank.kind, the unit, the "
+            "frame and what stands before the wall",
             share=100 * share,
-            radius_m=surface.radius_m,
+            radius_m=cells.surface.radius_m,
             least=100 * LEAST_WALL,
         )
-        raise InputError(Problem(FILE, text))
+    raise InputError(Problem(FILE, text))
 
 
 def _refuse_two_surfaces(grown, grid, surface):
