@@ -176,3 +176,17 @@ def test_exchanged_targets_are_refused_by_name(tmp_path):
     rows[2][1], rows[3][1] = rows[3][1], rows[2][1]
     with pytest.raises(InputError, match="names exchanged"):
         tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)))
+
+
+@pytest.mark.slow
+def test_the_example_is_the_wall_that_it_was_made_of():
+    """Closed form: 62.794 m3 of the outline that the example was made of."""
+    found = tankcal.run(tankcal.load("examples/cloud"), simulated=False)
+    top = found.at(3.2)
+    assert abs(top.value_m3 - 62.794) < top.U_m3
+    assert found.clouded.registration.ties == ("network", "network")
+    np.testing.assert_allclose(found.clouded.registration.place_m[0], [0.55, 0.2, 1.3], atol=1.5e-3)
+    clouds = record_of(found)["clouds"]
+    assert [one["declared"] for one in clouds["files"]] == [16016, 16016]
+    assert [one["delivered"] for one in clouds["scans"]] == [16016, 16016]
+    assert not any(one["removed"] for one in clouds["targets"])
