@@ -35,11 +35,11 @@ def add(commands):
         "--survey",
         choices=(
             *("photos", "total-station", "strapping", "reference-line", "wall-hits", "tangents"),
-            "triangulation",
+            *("triangulation", "cloud"),
         ),
         help="with files for photographs, total-station readings, circumferences by tape, "
-        "offsets from reference lines, bare hits of the wall, tangents or triangulation with a "
-        "stadia, in place of surveyed points",
+        "offsets from reference lines, bare hits of the wall, tangents, triangulation with a "
+        "stadia or point clouds, in place of surveyed points",
     )
     new.set_defaults(command=_new)
 

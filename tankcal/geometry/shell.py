@@ -148,7 +148,7 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
     origin = np.array([*np.median(xyz_m[:, :2], axis=0), (joints_m[0] + joints_m[-1]) / 2])
     local = xyz_m - origin
 
-    start = _consensus_circle(local[candidates, :2], nominal_radius_m)
+    start = consensus_circle(local[candidates, :2], nominal_radius_m)
     wall, axis = _leaning_cylinder(local, course, candidates, start, nominal_radius_m)
     reason[candidates & ~wall] = "consensus"
     believed = np.ones(len(xyz_m)) if sd_m is None else np.maximum(sd_m, LEAST_NOISE_M)
@@ -251,7 +251,7 @@ def _repeated(xyz_m):
     return repeated
 
 
-def _consensus_circle(xy, nominal_radius):
+def consensus_circle(xy, nominal_radius):
     """(x, y, radius) of the three-point circle near the nominal radius that most points support."""
     if len(xy) < 5:
         raise SolutionError(

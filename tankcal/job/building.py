@@ -7,15 +7,18 @@ from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
 from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_all
 from tankcal.job.checks.extent import has_survey, is_sighted, is_strapped
+from tankcal.job.clouds import make_clouds
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
+from tankcal.job.contract.clouds import KINDS as OF_CLOUDS
 from tankcal.job.covariance import read_covariance
-from tankcal.job.entries import kind_of, read_columns, read_register, read_settings
+from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
 from tankcal.job.hits import make_hits
 from tankcal.job.lines import make_lines
 from tankcal.job.measuring import make_measurements
 from tankcal.job.rule_files import find_rule
 from tankcal.job.strapping import make_strapping
 from tankcal.job.tables import (
+    CLOUD_TABLES,
     COVARIANCE_FILE,
     HITS_TABLES,
     REGISTERS,
@@ -35,8 +38,8 @@ def job_of(raw, log, is_whole=True):
 
     is_whole  False: the survey alone is needed
     """
-    tables = _read_tables(raw, is_whole, log)
     registers = {name: read_register(raw, name, log) for name in REGISTERS}
+    tables = _read_tables(raw, registers, is_whole, log)
     values = read_settings(raw, log, is_whole) if raw.settings is not None else None
     check_all(values, tables, registers, raw, is_whole, log)
     attached = _attached(raw, values, tables["points"], log) if is_whole else None
@@ -50,13 +53,16 @@ def job_of(raw, log, is_whole=True):
     made = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
     lines, hits = make_lines(tables, registers), make_hits(tables, registers)
     tangents = make_tangents(tables, registers)
-    return replace(made, strapping=strapping, lines=lines, hits=hits, tangents=tangents)
+    clouds = make_clouds(values, tables, registers, raw)
+    return replace(
+        made, strapping=strapping, lines=lines, hits=hits, tangents=tangents, clouds=clouds
+    )
 
 
-def _read_tables(raw, is_whole, log):
+def _read_tables(raw, registers, is_whole, log):
     """{name: ColumnValues}, None for a table that is missing, cannot be read or does not belong.
 
-    A table of a survey that is there but empty is None, too.
+    A table of a survey that is there but empty is None, too. Clouds make a table, one row a file.
     """
     kind = kind_of(raw)
     allowed = None if kind is None else TABLES_OF_KIND[kind]
@@ -64,20 +70,15 @@ def _read_tables(raw, is_whole, log):
         allowed += SURVEY_TABLES
     if kind == "vertical":
         allowed += STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES
-    tables = {}
+    if kind in OF_CLOUDS:
+        allowed += CLOUD_TABLES
+    tables = {"clouds": _cloud_table(raw, registers, kind, log)}
     for name in TABLES:
         table = raw.tables.get(name)
         is_empty = table is None or not (table.rows or table.skipped)
         if allowed is not None and name not in allowed:
             if not is_empty:
-                log.problem(
-                    table.file,
-                    message(
-                        "not_for_this_kind",
-                        "not for a tank of kind {of_kind}; remove the table",
-                        of_kind=kind,
-                    ),
-                )
+                log.problem(table.file, not_for_this_kind(kind))
             tables[name] = None
             continue
         if table is None or (is_empty and name not in TANK_TABLES):
@@ -89,6 +90,26 @@ def _read_tables(raw, is_whole, log):
     return tables
 
 
+def _cloud_table(raw, registers, kind, log):
+    """ColumnValues of the clouds, one row each; None: there is none, or they do not belong."""
+    given, register = registers["clouds"], raw.registers.get("clouds")
+    if register is None or not given:
+        return None
+    if kind is not None and kind not in OF_CLOUDS:
+        log.problem(register.file, not_for_this_kind(kind))
+        return None
+    rows = tuple(register.rows[name] for name in given)
+    columns = {"cloud": [*given], "file": [one["file"] for one in given.values()]}
+    return ColumnValues(register.file, rows, 0, columns)
+
+
+def not_for_this_kind(kind):
+    """What is said of a table that a tank of a kind does not have."""
+    return message(
+        "not_for_this_kind", "not for a tank of kind {of_kind}; remove the table", of_kind=kind
+    )
+
+
 def _tell_missing_tables(raw, tables, kind, log):
     if kind == "vertical":
         _tell_sights_missing(raw, tables, log)
@@ -96,6 +117,10 @@ def _tell_missing_tables(raw, tables, kind, log):
         measured = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
         elsewhere = name == "points" and measured
         if name in raw.tables or elsewhere:
+            continue
+        if name == "points" and "clouds" in raw.registers:
+            if raw.registers["clouds"] is not None:  # else it is told already
+                log.problem(raw.registers["clouds"].file, _NO_CLOUD)
             continue
         instead = [one for one in _IN_PLACE_OF_POINTS if one in raw.tables]
         if name != "points" or not instead:
@@ -122,6 +147,11 @@ _IN_PLACE_OF_POINTS = {
         "no_circumferences", "no rows; expected a reading of the tape on each course at least"
     ),
 }
+
+
+_NO_CLOUD = message(
+    "no_cloud_at_all", "nothing filled in; expected a section for each file of a scanner"
+)
 
 
 def _missing(raw, name):

@@ -39,15 +39,19 @@ def refuse_repeated(table, column, log):
         if name is None:
             continue
         if name in first_row:
-            expected = message(
-                "name_twice",
-                "{name!r} is already in row {first_row}; expected once",
-                name=name,
-                first_row=first_row[name],
-            )
-            log.problem(table.file, expected, row, column)
+            log.problem(table.file, name_twice(name, first_row[name]), row, column)
         else:
             first_row[name] = row
+
+
+def name_twice(name, first_row):
+    """What is said of a name that stands in a table a second time."""
+    return message(
+        "name_twice",
+        "{name!r} is already in row {first_row}; expected once",
+        name=name,
+        first_row=first_row,
+    )
 
 
 def course_heights(courses):

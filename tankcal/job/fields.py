@@ -21,11 +21,15 @@ MAX_TEXT = 300
 MAX_LIST = 50  # numbers or pairs
 IN_TOML = "toml"  # in place of a decimal mark: a number is a number, and never a cell
 MAX_NAMES = 5000
+MAX_ROWS = 4000
 NEXT_TO_ZERO = 1e-30  # no size, no standard deviation is so small: its square would be nothing
 
 _TANK_ID = re.compile(r"(?!.*\.\.)[\w(][\w .()-]*")
 _RULE_NAME = re.compile(r"(?!.*\.\.)\w[\w .()-]*")
 _MESH_FILE = re.compile(r"(?!.*\.\.)\w[\w .()-]*\.(stl|obj|ply|off)", re.IGNORECASE)
+_CLOUD_FILE = re.compile(
+    r"(?!.*\.\.)\w[\w .()/-]*\.(las|laz|e57|ply|ptx|pts|xyz|asc|txt|csv)", re.IGNORECASE
+)
 _DMS = re.compile(
     r"([+-]?)([0-9]{1,3})(?:[ \t]*[°º][ \t]*|[ \t]+|-)([0-9]{1,2})(?:"
     r"(?:[ \t]*['′’][ \t]*|[ \t]+|-)([0-9]{1,2}(?:[.,][0-9]{0,9})?)[ \t]*(?:\"|″|”|''|′′)?|['′’]?)"
@@ -54,7 +58,8 @@ class Field:
     kind       "number", "text", "name", "tank id", "choice", "flag", "date", "time" (date and time
                of day; read as seconds since 2000), "mesh file",
                "rule name", "numbers" (several of them), "ranges" (pairs of numbers), "names"
-               (several of them) or "dms" (degrees, minutes and seconds; read as degrees)
+               (several of them), "rows" (of so many numbers each), "cloud file" or "dms"
+               (degrees, minutes and seconds; read as degrees)
     note       one line for the person who fills it in
     required   must be there and filled in, for every kind of tank in `kinds`
     kinds      the kinds of tank that it is for; (): all
@@ -64,6 +69,7 @@ class Field:
     in_full    an optional column that is filled in for every row, or for none
     start      what the starter job has there
     of_survey  of use only where observations are adjusted
+    width      numbers in each of the rows
     """
 
     name: str
@@ -79,6 +85,7 @@ class Field:
     kinds: tuple[str, ...] = ()
     required_for: tuple[str, ...] = ()
     of_survey: bool = False
+    width: int = 0
 
     def suits(self, tank_kind):
         """Is it for tanks of this kind? Of a kind that is not known (None), nothing is refused."""
@@ -102,6 +109,8 @@ class Field:
                 "degrees, minutes and seconds such as 123 04 05.6{bounds}",
                 bounds=self._bounds_in_degrees(),
             )
+        if self.kind == "rows":
+            return self._expected_rows()
         if self.kind == "numbers":
             return message(
                 "several_numbers",
@@ -110,6 +119,17 @@ class Field:
                 **self._two_of_them(),
             )
         return _EXPECTED[self.kind]
+
+    def _expected_rows(self):
+        row = " ".join(str(i) for i in range(1, self.width + 1))
+        rows = message(
+            "several_rows",
+            "rows of {width} numbers, such as {row}; {row} (in a .toml file also [[{listed}]])",
+            width=self.width,
+            row=row,
+            listed=row.replace(" ", ", "),
+        )
+        return self._or_words(rows)
 
     def _two_of_them(self):
         """Two values that the field allows, as a file has them: {one, other}."""
@@ -127,6 +147,9 @@ class Field:
 
     def _expected_number(self):
         number = message("a_number", "a number{bounds}", bounds=self._bounds())
+        return self._or_words(number)
+
+    def _or_words(self, number):
         if not self.choices:
             return number
         words = _one_of(self.choices)
@@ -184,6 +207,11 @@ _EXPECTED = {
         "a_mesh_file",
         "the plain name of a .stl, .obj, .ply or .off file, in the job's folder",
     ),
+    "cloud file": message(
+        "a_cloud_file",
+        "a .las, .laz, .e57, .ply, .ptx, .pts, .xyz or .asc file in the job's folder or below it,"
+        " such as scans/a.e57",
+    ),
 }
 
 
@@ -224,6 +252,7 @@ def read_value(field, raw, decimal=None):
         "numbers": _read_numbers,
         "ranges": _read_ranges,
         "names": _read_names,
+        "rows": _read_rows,
         "dms": _read_dms,
     }.get(field.kind, _read_text)
     return reader(field, raw, decimal)
@@ -340,7 +369,12 @@ def _read_text(field, raw, _decimal):
     elif field.kind == "name":
         sound = is_name(text)
     else:
-        patterns = {"tank id": _TANK_ID, "mesh file": _MESH_FILE, "rule name": _RULE_NAME}
+        patterns = {
+            "tank id": _TANK_ID,
+            "mesh file": _MESH_FILE,
+            "cloud file": _CLOUD_FILE,
+            "rule name": _RULE_NAME,
+        }
         pattern = patterns[field.kind]
         sound = len(text) <= MAX_NAME and pattern.fullmatch(text) is not None
     if not sound:
@@ -421,6 +455,27 @@ def _read_numbers(field, raw, decimal):
     mark = "." if is_text else decimal
     try:
         return tuple(_read_number(field, part.strip() if is_text else part, mark) for part in parts)
+    except Refused as refusal:
+        raise _refused(field, refusal.text.values["found"]) from None
+
+
+def _read_rows(field, raw, decimal):
+    """Tuple of rows of numbers, of a list of lists or of a text such as 1 0 0; 0 1 0."""
+    if isinstance(raw, str) and raw.strip() in field.choices:
+        return raw.strip()
+    rows = raw
+    if isinstance(raw, str):
+        rows = [part.split() for part in raw.split(";") if part.strip()]
+    elif isinstance(raw, list) and raw and not any(isinstance(row, list) for row in raw):
+        rows = [raw]
+    if not isinstance(rows, list) or not 0 < len(rows) <= MAX_ROWS:
+        raise _refused(field, shown(raw))
+    if not all(isinstance(row, list) and len(row) == field.width for row in rows):
+        raise _refused(field, shown(raw))
+    mark = "." if isinstance(raw, str) else decimal
+    one = Field(field.name, "number", field.note, low=field.low, high=field.high)
+    try:
+        return tuple(tuple(_read_number(one, value, mark) for value in row) for row in rows)
     except Refused as refusal:
         raise _refused(field, refusal.text.values["found"]) from None
 

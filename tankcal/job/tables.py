@@ -29,8 +29,10 @@ STRAPPING_TABLES = (
 )
 HITS_TABLES = ("wall_hits", "control_readings")
 TANGENT_TABLES = ("tangents",)
-TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + SURVEY_TABLES
-REGISTERS = {"cameras": "camera", "instruments": "instrument"}  # and what each one lists
+CLOUD_TABLES = ("scan_targets",)
+TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + CLOUD_TABLES
+TABLES += SURVEY_TABLES
+REGISTERS = {"cameras": "camera", "instruments": "instrument", "clouds": "cloud"}  # what each lists
 SETTINGS_FILE = "job.toml"
 SETTINGS_SHEET = "job"
 REFUSED_FILE = "image_points_refused.csv"  # written beside image_points.csv, never read
@@ -195,7 +197,7 @@ class RawJob:
     covariance  bytes of points_cov.npz, or None
     files       (name, SHA-256, bytes) of each file read
     folder      Path of the folder of job.toml or of the workbook
-    registers   {"cameras" or "instruments": Register}
+    registers   {"cameras", "instruments" or "clouds": Register}
     """
 
     source: str
@@ -245,12 +247,14 @@ def read_bytes(path, log, limit=MAX_FILE_BYTES):
         )
         log.problem(path.name, expected)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or message("impossible_name", "impossible name")
-        log.problem(
-            path.name,
-            message("file_cannot_be_read", "the file cannot be read ({reason})", reason=reason),
-        )
+        log.problem(path.name, unreadable_file(error))
     return None
+
+
+def unreadable_file(error):
+    """What is said of a file that an OSError or a ValueError keeps from being read."""
+    reason = getattr(error, "strerror", None) or message("impossible_name", "impossible name")
+    return message("file_cannot_be_read", "the file cannot be read ({reason})", reason=reason)
 
 
 def fingerprint(name, data):

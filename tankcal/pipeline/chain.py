@@ -12,6 +12,7 @@ import pandas as pd
 from tankcal.errors import HeightError, InputError, Problem
 from tankcal.job import Job
 from tankcal.messages import message
+from tankcal.pipeline.cloud_wall import Clouded
 from tankcal.pipeline.corrections import Correction, corrections_of
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.scan import Scan
@@ -75,6 +76,8 @@ class Result:
         Bare hits of the wall as points, and where they were taken from.
     touching : tangents.Touching or None
         Tangents as points of the wall, and where they were sighted from.
+    clouded : cloud_wall.Clouded or None
+        Clouds as points of the wall: their scans, cells and what hides the wall.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -129,6 +132,7 @@ class Result:
     strapped: StrappedWall | None = None
     sighting: Sighting | None = None
     touching: Touching | None = None
+    clouded: Clouded | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -354,11 +358,14 @@ def _run(job, progress, part_progress, simulated):
         simulation=simulation,
         intervals=intervals,
         rule=verdict_of(job, body, table, intervals, simulation),
-        warnings=_warnings(job, adjustment, found.sighting or found.touching, survey, made),
+        warnings=_warnings(
+            job, adjustment, found.sighting or found.touching or found.clouded, survey, made
+        ),
         adjustment=adjustment,
         strapped=survey if isinstance(survey, StrappedWall) else None,
         sighting=found.sighting,
         touching=found.touching,
+        clouded=found.clouded,
     )
 
 

@@ -29,7 +29,7 @@ def check_hits(job, wall, sighting):
         *_of_levels(job, wall),
         *_of_courses(job, sighting),
         *_of_incidence(sighting),
-        *_of_causes(wall, sighting.told),
+        *causes_unlike_certificates(wall, sighting.told),
     )
 
 
@@ -141,11 +141,11 @@ def _of_incidence(sighting):
         yield Problem(sighting.points.file, text, sighting.points.rows[flat[0]])
 
 
-def _of_causes(wall, told):
+def causes_unlike_certificates(wall, told, file="instruments.toml"):
     """Offsets and scales that straps, or hits from the other side, make out to be unlike their
-    certificates.
+    certificates, which stand in a file.
     """
-    if wall.straps is None and not wall.by_inputs:
+    if not told or (wall.straps is None and not wall.by_inputs):
         return
     for one in told:
         if not np.isfinite(one.u_before) or abs(one.value) <= UNLIKE_SDS * one.u_before:
@@ -175,4 +175,4 @@ def _of_causes(wall, told):
                     ratio=ratio,
                 ),
             )
-        yield Problem("instruments.toml", text, None, f"{one.name}.{key}")
+        yield Problem(file, text, None, f"{one.name}.{key}")

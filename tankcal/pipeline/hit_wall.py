@@ -113,10 +113,20 @@ def _on_one_side(job, sighting):
     moved = sighting.is_inside != (job.survey.side == "inside")
     if not moved.any():
         return sighting
-    points, joints = sighting.points, job.datum.bottom_z_m + joints_of(job)
+    points = through_wall(job, sighting.points, sighting.normal, moved)
+    return replace(sighting, points=points)
+
+
+def through_wall(job, points, normal, moved):
+    """Points of an upright wall of which some are moved to its other side.
+
+    normal  (n, 3) of the wall, outwards
+    moved   (n,) which are not on the side of the survey
+    """
+    joints = job.datum.bottom_z_m + joints_of(job)
     course = course_of(points.xyz_m[:, 2], joints)
     outwards = 1.0 if job.survey.side == "outside" else -1.0
-    normal = (outwards * moved)[:, None] * sighting.normal
+    normal = (outwards * moved)[:, None] * normal
     switches = {"plate_thickness": job.switches.plate, "paint": job.switches.paint}
     sizes = {
         "plate_thickness": np.array([one.thickness_m for one in job.courses])[course],
@@ -125,7 +135,7 @@ def _on_one_side(job, sighting):
     size = sum(switches[name] * one for name, one in sizes.items())
     xyz = points.xyz_m + size[:, None] * normal
     by = {name: normal.ravel() for name, one in sizes.items() if switches[name] and one.any()}
-    return replace(sighting, points=replace(points, xyz_m=xyz, by_inputs=by))
+    return replace(points, xyz_m=xyz, by_inputs=by)
 
 
 def _refuse_unknown_offset(job, sighting):

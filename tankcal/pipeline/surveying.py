@@ -12,6 +12,7 @@ from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.model import Job
 from tankcal.job.tables import in_book
 from tankcal.messages import message
+from tankcal.pipeline.cloud_wall import Clouded, find_wall_in_clouds
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
 from tankcal.pipeline.hit_wall import find_hit_wall
 from tankcal.pipeline.scan import Scan, fit_scan
@@ -41,6 +42,8 @@ class Surveyed:
     sighting : Sighting or None
     touching : Touching or None
         Tangents as points of the wall.
+    clouded : Clouded or None
+        Clouds as points of the wall.
     """
 
     job: Job
@@ -48,6 +51,7 @@ class Surveyed:
     adjustment: Adjustment | None = None
     sighting: Sighting | None = None
     touching: Touching | None = None
+    clouded: Clouded | None = None
 
 
 def find_survey(job, progress, amplitudes=None):
@@ -67,8 +71,8 @@ def find_survey(job, progress, amplitudes=None):
     InputError, SolutionError
         As `chain.run`.
     """
-    adjustment = sighting = touching = None
-    is_sighted = job.hits is not None or job.tangents is not None
+    adjustment = sighting = touching = clouded = None
+    is_sighted = any(one is not None for one in (job.hits, job.tangents, job.clouds))
     if job.measurements is not None:
         adjustment = _adjusted(job, progress)
     if not is_sighted and adjustment is not None:
@@ -82,6 +86,10 @@ def find_survey(job, progress, amplitudes=None):
             )
         elif job.tangents is not None:
             job, touching, survey = find_tangent_wall(job, adjustment, progress, dof)
+        elif job.clouds is not None:
+            job, clouded, survey = find_wall_in_clouds(
+                job, adjustment, progress, dof, amplitudes=amplitudes
+            )
         else:
             survey = _survey(job, progress, dof, amplitudes)
     except SolutionError as error:
@@ -91,9 +99,9 @@ def find_survey(job, progress, amplitudes=None):
         raise SolutionError(*error.args, *told) from error
     if adjustment is not None and not is_sighted and isinstance(survey, Wall):
         refuse_other_side(job, partial(is_within_wall, survey), adjustment)
-    elif adjustment is not None and isinstance(survey, Scan):
+    elif adjustment is not None and not is_sighted and isinstance(survey, Scan):
         refuse_other_side(job, survey.is_within, adjustment)
-    return Surveyed(job, survey, adjustment, sighting, touching)
+    return Surveyed(job, survey, adjustment, sighting, touching, clouded)
 
 
 def placed(job, problems):

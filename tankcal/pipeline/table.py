@@ -9,6 +9,8 @@ import numpy as np
 
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.messages import message
+from tankcal.pipeline.cloud_checks import check_clouds
+from tankcal.pipeline.cloud_wall import Clouded
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
 from tankcal.pipeline.hit_checks import check_hits
 from tankcal.pipeline.line_checks import check_lines
@@ -134,8 +136,8 @@ def check_table(job, survey, made, sighting=None):
     survey : Wall, Scan, mesh or None
         As `compute_table` was given it.
     made : ComputedTable
-    sighting : Sighting or Touching, optional
-        Of a wall that was hit without targets, or whose limbs were sighted.
+    sighting : Sighting, Touching or Clouded, optional
+        Of a wall that was hit without targets, whose limbs were sighted, or that was scanned.
 
     Returns
     -------
@@ -152,6 +154,8 @@ def check_table(job, survey, made, sighting=None):
 def _doubts_of_sights(job, survey, sighting):
     if sighting is None:
         return ()
+    if isinstance(sighting, Clouded):
+        return check_clouds(job, survey, sighting)
     if isinstance(sighting, Touching):
         return check_tangents(job, survey, sighting)
     return check_hits(job, survey, sighting)

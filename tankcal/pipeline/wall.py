@@ -248,7 +248,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         straps=straps,
         read=read,
         by_inputs=by_inputs,
-        without_inputs=() if job.hits is None else ("offset",),  # the instrument has one of its own
+        without_inputs=("offset",) if job.hits or job.clouds else (),  # instruments have their own
     )
 
 

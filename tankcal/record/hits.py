@@ -106,7 +106,11 @@ def hits_of(result):
     repeats = repeats_of(result.job.hits.control)
     return HitsRecord(
         setups=_setups(result),
-        shared=_shared(result),
+        shared=shared_of(
+            result.sighting.told,
+            {name: tool.certificate for name, tool in result.job.hits.instruments.items()},
+            result.sighting.told_m,
+        ),
         rings=_rings(result),
         incidence=_incidence(result.sighting),
         control=_control(repeats),
@@ -150,29 +154,30 @@ def _setups(result):
     return found
 
 
-def _shared(result):
-    tools, found = result.job.hits.instruments, []
-    for one in result.sighting.told:
-        unit, per = ("mm", 1e3) if one.what == "instrument_offset" else ("ppm", 1e6)
-        certificate = tools[one.name].certificate if one.name in tools else ""
+def shared_of(told, certificates, told_m):
+    """`SharedByHits` of causes that a wall told.
+
+    certificates  {instrument: number}
+    told_m        {instrument: what was taken off its readings before}, m
+    """
+    found = []
+    for one in told:
+        is_offset = one.what == "instrument_offset"
+        unit, per = ("mm", 1e3) if is_offset else ("ppm", 1e6)
+        taken_off = told_m.get(one.name, 0.0) if is_offset else 0.0
         found.append(
             SharedByHits(
                 instrument=one.name,
-                certificate=certificate,
+                certificate=certificates.get(one.name, ""),
                 what=one.what,
                 unit=unit,
                 u_before=per * one.u_before,
-                value=per * (one.value + _taken_off(result.sighting, one)),
+                value=per * (one.value + taken_off),
                 u_after=per * one.u_after,
                 correlation=one.correlation,
             )
         )
     return found
-
-
-def _taken_off(sighting, one):
-    """What was taken off the hits of an offset that the wall told, m."""
-    return sighting.told_m.get(one.name, 0.0) if one.what == "instrument_offset" else 0.0
 
 
 def _rings(result):

@@ -12,6 +12,7 @@ from tankcal.job.model.settings import Datum, Material, Survey, Switches, TableS
 from tankcal.pipeline.corrections import Correction
 from tankcal.record import statements, survey, table, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
+from tankcal.record.clouds import CloudsRecord, clouds_of
 from tankcal.record.hits import HitsRecord, hits_of
 from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.plain_data import to_plain
@@ -62,6 +63,9 @@ class Record(Saved, kw_only=True):
     lines: LinesRecord | None = key(
         "reference lines; left out where there are none", default=None, optional=True
     )
+    clouds: CloudsRecord | None = key(
+        "clouds of the wall; left out where there are none", default=None, optional=True
+    )
     hits: HitsRecord | None = key(
         "bare wall hits; left out where there are none", default=None, optional=True
     )
@@ -106,6 +110,7 @@ def record_of(result):
             strapping=strapping_of(result),
             lines=lines_of(result),
             hits=hits_of(result),
+            clouds=clouds_of(result),
             tangents=tangents_of(result),
             courses=survey.courses_of(result),
             capacity=table.capacity_of(result),

@@ -215,6 +215,8 @@ def _measured_by(job, result):
     found = {"covariance": _covariance_choice(job) if result.adjustment is None else "adjusted"}
     if job.hits is not None:
         found = {"survey": "wall_hits", "covariance": "hits"}
+    elif job.clouds is not None:
+        found = {"survey": "clouds", "covariance": "clouds"}
     elif job.tangents is not None:
         found = {"survey": "tangents", "covariance": "tangents"}
     if result.straps is not None:

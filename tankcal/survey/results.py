@@ -197,19 +197,23 @@ class Cause:
     name : str
         "tape 1".
     what : str
-        "instrument_scale" or "instrument_offset".
+        "instrument_scale", "instrument_offset", "incidence" or "registration".
     u, unit
-        As declared: ppm or mm.
+        As declared: ppm or mm; None: it was computed. Several of one name and kind are one cause of
+        several columns.
     column_m : ndarray, shape (3 points,)
         Change of all coordinates by one u, in the order of Adjustment.names; covariance = column
         column' + everything else, uncorrelated.
+    is_assumed : bool
+        Whether nobody declared it.
     """
 
     name: str
     what: str
-    u: float
-    unit: str
+    u: float | None
+    unit: str | None
     column_m: np.ndarray
+    is_assumed: bool = False
 
 
 @dataclass(frozen=True)

@@ -121,7 +121,7 @@ def sight(hits, poses, told_m=None):
     azimuth = poses.orientation_rad[pose] + hits.direction_rad
     ray, by_azimuth, by_zenith = rays(azimuth, hits.zenith_rad)
     xyz = poses.xyz_m[pose] + distance[:, None] * ray
-    cosine, inside, normal = _incidence(xyz, poses.xyz_m[pose], ray)
+    cosine, inside, normal = incidence_in_plan(xyz, poses.xyz_m[pose], ray)
     # by x, y, z, orientation of each pose, then by scale and offset of each instrument
     n, p, k = len(hits), len(poses.keys), len(poses.instruments)
     by = np.zeros((n, 3, 4 * p + 2 * k))
@@ -183,7 +183,12 @@ def rays(azimuth_rad, zenith_rad):
     return ray, by_azimuth, np.column_stack([up * sin, up * cos, -down])
 
 
-def _incidence(xyz, station, ray):
+def bias_by_incidence(cosine):
+    """(n,) g = 1 / cos(incidence) - 1: 1 at 60 degrees, and no more than at 85 degrees."""
+    return 1 / np.maximum(cosine, STEEPEST) - 1
+
+
+def incidence_in_plan(xyz, station, ray):
     """(n,) cosine of the incidence, whether the station is within the circle through all, and
     (n, 3) its normal.
     """
@@ -229,7 +234,7 @@ def _of_untied(poses, by):
 
 def _of_surfaces(hits, known, mine, ray, cosine):
     """Of the bias by incidence: one unknown for each surface that an instrument saw."""
-    bias = known.u_incidence_m * (1 / np.maximum(cosine, STEEPEST) - 1)
+    bias = known.u_incidence_m * bias_by_incidence(cosine)
     surface, found = np.array([one or "" for one in hits.surface]), []
     for one in dict.fromkeys(surface[mine].tolist()):
         column = (np.where(mine & (surface == one), -bias, 0.0)[:, None] * ray).ravel()

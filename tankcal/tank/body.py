@@ -31,7 +31,7 @@ class Factor:
         "points", "bulge", "ovality", "seams", or what a named cause is ("instrument_scale").
     columns : ndarray, shape (f, c)
         Factor of the covariance of a shell's features or of a solid's inputs.
-    dof, u, unit, type, note
+    dof, u, unit, type, note, is_default
         As in `uncertainty.Source`.
     """
 
@@ -42,6 +42,7 @@ class Factor:
     unit: str | None = None
     type: str = "A"
     note: str = ""
+    is_default: bool = False
 
     def source(self, columns_m3):
         """The `Source` of (rows, c) columns that its own columns make in a table."""
@@ -53,6 +54,7 @@ class Factor:
             self.unit,
             type=self.type,
             note=self.note,
+            is_default=self.is_default,
         )
 
 
@@ -68,7 +70,8 @@ def survey_factors(covariance, dof=np.inf, causes=(), effects=()):
     dof : optional
         Degrees of freedom of the covariance.
     causes : optional
-        With name, what, u, unit (`surveys.Cause`); effects: (f,) of one u of each.
+        With name, what, u, unit, is_assumed (`surveys.Cause`); effects: (f,) of one u of each.
+        Those of one name and kind make one `Factor`.
 
     Raises
     ------
@@ -88,10 +91,26 @@ def survey_factors(covariance, dof=np.inf, causes=(), effects=()):
     return (
         Factor("points", rest[:, left > 0], dof),
         *(
-            Factor(cause.what, effect[:, None], np.inf, cause.u, cause.unit, "B", cause.name)
-            for cause, effect in zip(causes, effects, strict=True)
+            Factor(
+                one.what,
+                np.column_stack(columns),
+                u=one.u,
+                unit=one.unit,
+                type="B",
+                note=one.name,
+                is_default=one.is_assumed,
+            )
+            for one, columns in _by_name(causes, effects)
         ),
     )
+
+
+def _by_name(causes, effects):
+    """The first cause of each name and kind, with the effects of all of that name and kind."""
+    found = {}
+    for cause, effect in zip(causes, effects, strict=True):
+        found.setdefault((cause.what, cause.name), (cause, []))[1].append(effect)
+    return tuple(found.values())
 
 
 @dataclass(frozen=True)

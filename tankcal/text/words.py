@@ -181,6 +181,7 @@ _DECLARED = ("head",)  # choices whose number the job gave: it is not rounded
 
 NAMED_INPUTS = (
     *("deadwood", "instrument_scale", "instrument_offset", "plate_readings"),
+    "registration",
     *("tape_comparison", "tape_temperature", "tape_tension", "tape_friction"),
     *("tape_weight", "tape_sag"),
 )

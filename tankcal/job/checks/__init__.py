@@ -6,6 +6,7 @@ missing or bad stays silent: what is wrong with them has been told already.
 
 from tankcal.job.checking import has_rows
 from tankcal.job.checks.bearing import useless_inputs
+from tankcal.job.checks.clouds import check_clouds
 from tankcal.job.checks.extent import (
     Extent,
     extent_of,
@@ -42,7 +43,7 @@ def check_all(values, tables, registers, raw, is_whole, log):
 
     values     of the settings, or None: unreadable
     tables     {name: ColumnValues, or None: not there}
-    registers  {"cameras" or "instruments": {name: {key: value}}}
+    registers  {"cameras", "instruments" or "clouds": {name: {key: value}}}
     is_whole   False: the survey alone is asked for, whatever there is of the tank
     """
     if is_whole:
@@ -52,6 +53,7 @@ def check_all(values, tables, registers, raw, is_whole, log):
             check_lines(values, tables, registers, raw, log)
             check_hits(values, tables, registers, raw, log)
             check_tangents(values, tables, registers, raw, log)
+        check_clouds(values, tables, registers, raw, log)
     check_survey(values, tables, registers, raw, is_whole, log)
 
 

@@ -1,6 +1,7 @@
 """Which inputs of uncertainty.csv have an effect on a job, and why the others have none."""
 
 from tankcal.job.checks.extent import (
+    has_clouds,
     has_hits,
     has_wall_points,
     is_strapped,
@@ -99,7 +100,11 @@ def _of_vertical(values, tables):
 
 def _has_own_offset(tables):
     """Is what the wall was measured by free of an offset that all radii share?"""
-    return has_hits(tables) or (is_strapped(tables) and not has_wall_points(tables))
+    return (
+        has_hits(tables)
+        or has_clouds(tables)
+        or (is_strapped(tables) and not has_wall_points(tables))
+    )
 
 
 def _of_bottom(values, bottom):

@@ -33,9 +33,14 @@ def has_tangents(tables):
     return has_rows(tables["tangents"])
 
 
+def has_clouds(tables):
+    """Was the wall scanned?"""
+    return has_rows(tables.get("clouds"))
+
+
 def is_sighted(tables):
-    """Does the wall come from sights that name no target?"""
-    return has_hits(tables) or has_tangents(tables)
+    """Does the wall come from sights that name no target, or from scans?"""
+    return has_hits(tables) or has_tangents(tables) or has_clouds(tables)
 
 
 def may_be_hit_from_both_sides(tables):

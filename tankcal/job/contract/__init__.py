@@ -6,6 +6,7 @@ the tables of `docs/job-format.md` (`make job-format`) are written from these li
 
 from tankcal.job.contract import (
     bottom,
+    clouds,
     correlations,
     courses,
     deadwood,
@@ -39,7 +40,7 @@ SECTIONS = (
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES}
 COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS | stadia.COLUMNS
-COLUMNS |= SURVEY_COLUMNS
+COLUMNS |= clouds.COLUMNS | SURVEY_COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "roof": roof.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
@@ -50,6 +51,7 @@ SURVEYS = ADJUSTED_SURVEYS | {
     "wall-hits": (*hits.COLUMNS, *hits.BESIDE),
     "triangulation": (*stadia.COLUMNS, *stadia.BESIDE),
     "tangents": (*tangents.COLUMNS, *tangents.BESIDE),
+    "cloud": (*clouds.COLUMNS, *clouds.BESIDE),
 }
 
 REQUIRED_TABLES = {"vertical": ("points", "courses")}

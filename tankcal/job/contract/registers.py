@@ -1,15 +1,16 @@
-"""The keys of cameras.toml, instruments.toml and [adjustment.camera]."""
+"""The keys of cameras.toml, instruments.toml, clouds.toml and [adjustment.camera]."""
 
 from tankcal.camera.comparator import KINDS as TRANSFORMATIONS
 from tankcal.camera.model import AFFINITIES, CONVENTIONS
+from tankcal.job.contract.clouds import CLOUD
 from tankcal.job.contract.hits import RANGING
 from tankcal.job.contract.lines import PLUMMET
+from tankcal.job.contract.shorthand import FREE
 from tankcal.job.contract.stadia import BAR
 from tankcal.job.contract.strapping import TAPE
 from tankcal.job.fields import Field
 from tankcal.survey.network.survey import STATES
 
-FREE = "free"
 INSTRUMENT_KINDS = ("tape", "edm", "total_station", "theodolite", "level", "plummet", "stadia")
 # name in cameras.toml and largest magnitude of each parameter, by its name in tankcal.camera.model
 PARAMETER_KEYS = {
@@ -241,8 +242,13 @@ SHORT_KEYS = {
     "cameras": {key: name for name, (key, _) in PARAMETER_KEYS.items() if name[0] in "KP"}
     | {sd_key(name): f"s_{name}" for name in ("c", "x0", "y0")},
     "instruments": {},
+    "clouds": {},
 }
-REGISTER_KEYS = {"cameras": CAMERA, "instruments": (*INSTRUMENT, *TAPE, *PLUMMET, *RANGING, *BAR)}
+REGISTER_KEYS = {
+    "cameras": CAMERA,
+    "instruments": (*INSTRUMENT, *TAPE, *PLUMMET, *RANGING, *BAR),
+    "clouds": CLOUD,
+}
 REGISTERS_OF_SURVEY = {
     "photos": ("cameras", "instruments"),
     "total-station": ("instruments",),
@@ -251,6 +257,7 @@ REGISTERS_OF_SURVEY = {
     "wall-hits": ("instruments",),
     "tangents": ("instruments",),
     "triangulation": ("instruments",),
+    "cloud": ("clouds", "instruments"),
 }
 # keys of [adjustment] that need photographs
 OF_PHOTOS = ("fixed_photo", "image_sd_um", "reading_limit_um", "depth_of_field", "image_weights")

@@ -4,6 +4,8 @@ from math import inf
 
 from tankcal.job.fields import Field
 
+FREE = "free"  # in place of a standard uncertainty: an unknown
+
 
 def number(name, note, low=-inf, high=inf, **more):
     """A number from `low` to `high`."""

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from tankcal.job.model.clouds import Clouds
 from tankcal.job.model.parts import (
     Bottom,
     Course,
@@ -107,6 +108,8 @@ class Job:
         Bare hits of the wall, in place of points.
     tangents : Tangents or None
         Sights to the limbs of the tank, in place of points.
+    clouds : Clouds or None
+        Files of scanners, in place of points.
     """
 
     tank: Tank | None
@@ -140,3 +143,4 @@ class Job:
     lines: ReferenceLines | None = None
     hits: WallHits | None = None
     tangents: Tangents | None = None
+    clouds: Clouds | None = None

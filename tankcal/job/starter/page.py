@@ -30,6 +30,7 @@ _OF_KIND = {
     "date": "date",
     "time": "date and time",
     "mesh file": "file",
+    "cloud file": "file",
     "rule name": "rule",
     "ranges": "pairs of numbers",
 }
@@ -69,6 +70,9 @@ def values_of(field):
     if field.kind in ("number", "numbers"):
         words = [_bounds(field), *(f"`{choice}`" for choice in field.choices)]
         return " or ".join(word for word in words if word) or field.kind
+    if field.kind == "rows":
+        words = [f"rows of {field.width} numbers", *(f"`{choice}`" for choice in field.choices)]
+        return " or ".join(words)
     if field.kind == "choice":
         if len(field.choices) > MANY:
             return "one of those named"

@@ -113,6 +113,7 @@ TABLE_NOTES = {
     "lines": "one row for each vertical line of sight round the tank",
     "offsets": "one row for each reading of the wall's offset; repeated readings are repeated rows",
     "stadia": "one row for each reading of a stadia bar from a set-up; may stay empty",
+    "scan_targets": "one row for each target in each scan; may stay empty",
     "tangents": "one row for each sight to a limb of the tank, from outside",
     "wall_hits": "one row for each sight to the bare wall, without a target",
     "control_readings": "one row for each reading of a control target: at the start, every half"
@@ -121,6 +122,7 @@ TABLE_NOTES = {
 REGISTER_NOTES = {
     "cameras": "one section for each camera; put its name, as in photos.csv, in place of NAME",
     "instruments": "one section for each instrument; put its name in place of NAME; may stay empty",
+    "clouds": "one section for each file of a scanner; put a name of your own in place of NAME",
 }
 
 

@@ -11,6 +11,7 @@ FROM_SURVEY = (
     "instrument_scale",
     "instrument_offset",
     "incidence",
+    "registration",
     "tangent_excess",
     "points",
     "straps",

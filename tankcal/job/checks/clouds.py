@@ -1,0 +1,305 @@
+"""Do point clouds make sense as a whole? Files, poses, scanners, targets, what else is given."""
+
+import numpy as np
+
+import tankcal.clouds
+from tankcal.errors import InputError
+from tankcal.job.checking import has_rows, is_not_given, missing_beside, name_twice, tell
+from tankcal.job.checks.extent import has_clouds, has_hits, has_survey, has_tangents, tells_by_tape
+from tankcal.job.contract.clouds import (
+    DOCUMENTED,
+    OF_FILE,
+    OF_SCANNER,
+    RANGING,
+    REGISTRATION,
+    UNITS_M,
+)
+from tankcal.job.contract.shorthand import FREE
+from tankcal.job.entries import kind_of
+from tankcal.job.tables import unreadable_file
+from tankcal.messages import message
+
+FEWEST_TARGETS = 3  # of a scan: they tell its pose
+RIGID = 1e-4  # a pose may be so far from a rotation: rounding of a few digits
+PLACE = 3  # coordinates
+
+
+def check_clouds(values, tables, registers, raw, log):
+    """Files that are there and sound, poses that move and do not bend, and errors declared."""
+    given, targets = registers.get("clouds", {}), tables["scan_targets"]
+    if not has_clouds(tables):
+        if has_rows(targets):
+            log.warning(targets.file, message("no_clouds", "without effect: the job has no cloud"))
+        return
+    file = raw.registers["clouds"].file
+    _refuse_beside(tables, log)
+    size = ("tank", "nominal_diameter_m")
+    if values is not None and kind_of(raw) != "vertical" and is_not_given(raw, *size):
+        tell(log.problem, raw, *size, missing_beside(file))  # of an upright one it always is
+    headers = {name: _header(raw, name, one, log) for name, one in given.items()}
+    names = {name: scans_of(name, headers[name]) for name in given if headers[name] is not None}
+    counts = _count_targets(targets, names, len(names) == len(given), log)
+    for name, one in given.items():
+        tell_of = _teller(raw, file, name, log)
+        if headers[name] is not None:
+            _check_poses(one, headers[name], tell_of)
+        _check_places(one, tell_of)
+        _check_errors(one, [counts.get(scan, 0) for scan in names.get(name, ())], tables, tell_of)
+    _refuse_unlike(raw, file, given, log)
+    if has_rows(targets):
+        _warn_lonely(tables, targets, log)
+
+
+def scans_of(name, header):
+    """Names of the scans of a file: that of its section, with a number where there are more."""
+    count = len(header.scans)
+    return (name,) if count == 1 else tuple(f"{name} {i + 1}" for i in range(count))
+
+
+def _teller(raw, file, name, log):
+    """Tell a problem of one key of a cloud, with its row."""
+    register = raw.registers["clouds"]
+
+    def tell(key, expected, to=log.problem):
+        value = register.entries[name].get(key)
+        row = register.rows[name] if value is None or value.row is None else value.row
+        to(file, expected, row, f"{name}.{key}")
+
+    return tell
+
+
+def _refuse_beside(tables, log):
+    beside = {"points": has_rows(tables["points"]), "targets": has_rows(tables["targets"])}
+    beside |= {"wall_hits": has_hits(tables), "tangents": has_tangents(tables)}
+    for name, is_there in beside.items():
+        if is_there:
+            expected = message(
+                "beside_clouds",
+                "given together with a cloud; expected only one of them: tankcal does not join"
+                " them yet",
+            )
+            log.problem(tables[name].file, expected)
+
+
+def _header(raw, name, given, log):
+    """CloudHeader of a file; None after telling all that is wrong with it."""
+    if given["file"] is None:
+        return None
+    path = raw.folder / given["file"]
+    tell = _teller(raw, raw.registers["clouds"].file, name, log)
+    try:
+        if not path.is_file():
+            text = message(
+                "cloud_not_found",
+                "{file} not found; expected a file of a scanner",
+                file=given["file"],
+            )
+            tell("file", text)
+            return None
+        header = tankcal.clouds.describe_cloud(path)
+    except InputError as error:
+        log.problems.extend(error.problems)
+        return None
+    except (OSError, ValueError) as error:
+        tell("file", unreadable_file(error))
+        return None
+    if not header.scans:
+        tell("file", message("cloud_without_scans", "no scan in it; expected one or more"))
+        return None
+    return header
+
+
+def poses_of(given, header, unit_m):
+    """Of each scan its pose (4, 4), lengths in m, or None: not given, or the file has none."""
+    if given["pose"] is None:
+        return [None] * len(header.scans)
+    if given["pose"] == OF_FILE:
+        found = [one.pose for one in header.scans]
+    else:
+        found = [*np.reshape(given["pose"], (-1, 4, 4))]
+    scale = np.ones((4, 4))
+    scale[:3, 3] = unit_m
+    return [None if one is None else np.asarray(one, dtype=float) * scale for one in found]
+
+
+def _check_poses(given, header, tell):
+    pose, count = given["pose"], len(header.scans)
+    if pose is None:
+        if count > 1 and any(one.pose is not None for one in header.scans):
+            text = message(
+                "pose_of_scans_missing",
+                'blank, but the file has {count} scans with a pose each; expected "file", or four'
+                " rows for each",
+                count=count,
+            )
+            tell("pose", text)
+        return
+    if pose == OF_FILE:
+        without = [i + 1 for i, one in enumerate(header.scans) if one.pose is None]
+        if without:
+            text = message(
+                "file_without_pose",
+                "found file, but scans {scans} of the file have no pose; expected four rows of four"
+                " numbers for each scan, or blank",
+                scans=without[:5],
+            )
+            tell("pose", text)
+            return
+    elif len(pose) != 4 * count:
+        text = message(
+            "rows_of_pose",
+            "{rows} rows; expected {wanted}, four for each of the {count} scans of the file",
+            rows=len(pose),
+            wanted=4 * count,
+            count=count,
+        )
+        tell("pose", text)
+        return
+    for i, one in enumerate(poses_of(given, header, 1.0)):
+        if not _is_rigid(one):
+            text = message(
+                "pose_not_rigid",
+                "the pose of scan {scan} is no rotation and shift; expected rows that turn a"
+                " right-handed frame without a scale, and 0 0 0 1 as the last",
+                scan=i + 1,
+            )
+            tell("pose", text)
+
+
+def _is_rigid(pose):
+    turn = pose[:3, :3]
+    return bool(
+        np.all(np.isfinite(pose))
+        and np.allclose(pose[3], [0, 0, 0, 1], atol=1e-9)
+        and np.allclose(turn @ turn.T, np.eye(3), atol=RIGID)
+        and np.linalg.det(turn) > 0
+    )
+
+
+def _check_places(given, tell):
+    stood = given["scanner_xyz"]
+    if stood is not None and len(stood) != PLACE:
+        text = message("three_numbers", "{count} numbers; expected x, y and z", count=len(stood))
+        tell("scanner_xyz", text)
+    for i, box in enumerate(given["leave_out"] or ()):
+        if not all(low < high for low, high in zip(box[:3], box[3:], strict=True)):
+            text = message(
+                "empty_box",
+                "box {number} holds nothing; expected x0 y0 z0 x1 y1 z1 with each first number"
+                " below its second",
+                number=i + 1,
+            )
+            tell("leave_out", text)
+
+
+def _check_errors(given, targets, tables, tell):
+    """What all points of a scan share is declared, or is to be assumed.
+
+    targets  their number on each scan of the file; empty: the file cannot be read
+    """
+    if given["assume"] == DOCUMENTED:
+        return
+    missing = [key for key in RANGING if given[key] is None]
+    known = bool(targets) or not has_rows(tables["scan_targets"])  # else who knows whose they are
+    if known and min(targets, default=0) < FEWEST_TARGETS:
+        missing += [key for key in REGISTRATION if given[key] is None]
+    for key in missing:
+        text = message(
+            "shared_error_missing",
+            'missing; expected its value, 0 where it is exact, or assume = "documented": all points'
+            " of the scan share it, so that no table is made without it",
+        )
+        tell(key, text)
+    if given["u_offset_mm"] == FREE and not tells_by_tape(tables):
+        tell("u_offset_mm", offset_untold())
+
+
+def offset_untold():
+    """What is said of a free offset that no tape tells."""
+    return message(
+        "offset_of_cloud_untold",
+        "found free; expected its standard uncertainty, or a circumference by tape: nothing in the"
+        " job tells it",
+    )
+
+
+def _refuse_unlike(raw, file, given, log):
+    """Problems of files of one scanner that declare different errors of it."""
+    first = {}
+    for name, one in given.items():
+        other = first.setdefault(one["scanner"], name)
+        for key in OF_SCANNER:
+            if one[key] != given[other][key] and not log.has(file, None, f"{name}.{key}"):
+                text = message(
+                    "unlike_scanner",
+                    "not what {other!r} has, but both are of one scanner; expected the same, or"
+                    " another name of the scanner",
+                    other=other,
+                )
+                _teller(raw, file, name, log)(key, text)
+
+
+def _count_targets(targets, names, are_all_read, log):
+    """{scan: how many targets it has}; what is wrong with their rows is told."""
+    if not has_rows(targets):
+        return {}
+    known = [scan for scans in names.values() for scan in scans]
+    counts, seen = {}, {}
+    columns = zip(targets.rows, targets.of("scan"), targets.of("target"), strict=True)
+    for row, scan, target in columns:
+        if scan is None or target is None:
+            continue
+        if scan not in known:
+            if are_all_read:
+                text = message(
+                    "scan_of_no_cloud",
+                    "found {scan!r}; expected a scan of clouds.toml: {known}",
+                    scan=scan,
+                    known=known[:12],
+                )
+                log.problem(targets.file, text, row, "scan")
+            continue
+        if (scan, target) in seen:
+            log.problem(targets.file, name_twice(target, seen[scan, target]), row, "target")
+            continue
+        seen[scan, target] = row
+        counts[scan] = counts.get(scan, 0) + 1
+    return counts
+
+
+def _warn_lonely(tables, targets, log):
+    """A warning for each target that one scan alone has, and nothing else."""
+    known = set()
+    for name, columns in (
+        ("control", ("point",)),
+        ("directions", ("to",)),
+        ("slope_distances", ("to",)),
+        ("distances", ("from", "to")),
+        ("zenith_angles", ("to",)),
+        ("height_differences", ("from", "to")),
+        ("vectors", ("from", "to")),
+        ("image_points", ("point",)),
+    ):
+        table = tables[name]
+        if has_rows(table):
+            known.update(one for column in columns for one in table.of(column))
+    listed = targets.of("target")
+    for row, target in zip(targets.rows, listed, strict=True):
+        if target is not None and target not in known and listed.count(target) == 1:
+            text = message(
+                "lonely_target",
+                "{target!r} is on this scan alone; expected it on another scan, or in the survey:"
+                " it ties nothing",
+                target=target,
+            )
+            log.warning(targets.file, text, row, "target")
+
+
+def has_network(tables):
+    """Is there a survey to be adjusted whose points may be targets of scans?"""
+    return has_survey(tables)
+
+
+def unit_of(given):
+    """Metres of one unit of a file."""
+    return UNITS_M[given["unit"]]

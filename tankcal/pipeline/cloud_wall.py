@@ -1,0 +1,260 @@
+"""Point clouds of a wall: their scans registered, means of their cells, the wall they show."""
+
+import hashlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import tankcal.clouds
+from tankcal.clouds import wall as cells_of_clouds
+from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.job.checks.clouds import offset_untold
+from tankcal.job.model import InputFile
+from tankcal.job.tables import unreadable_file
+from tankcal.messages import message
+from tankcal.pipeline.cause_correlations import told_causes
+from tankcal.pipeline.hit_wall import through_wall
+from tankcal.pipeline.scan import fit_scan
+from tankcal.pipeline.wall import find_wall, joints_of, s_transform
+from tankcal.survey.beams import Beamed, points_of_beams
+from tankcal.survey.readings import certified_distance_m
+from tankcal.survey.registration import Registration, register
+from tankcal.survey.scans import KnownTargets
+
+FILE, TARGETS = "clouds.toml", "scan_targets.csv"
+MOST_READINGS = 1200  # whose full covariance is kept
+FAR_AWAY = 20.0  # radii: no scanner that sees a wall stands further from it
+BLOCK = 1 << 20
+STEP_M = 1.0  # along the normal of a surface
+
+
+@dataclass(frozen=True)
+class Clouded:
+    """Clouds as points of a wall, and how they came about.
+
+    Attributes
+    ----------
+    files : tuple of InputFile
+        SHA-256 of each file of a scanner, in the order of the job.
+    registration : Registration
+    cells : CloudWall
+        Cells of the wall, what hides it, and how many points were read.
+    readings : CloudReadings
+        Means of cells: the points of the job, in their order.
+    beamed : Beamed
+    told : tuple of ToldCause
+        What an upright wall says of offsets and scales.
+    left_out : ndarray of int, shape (scans,)
+        Points of each scan in boxes that are left out.
+    """
+
+    files: tuple
+    registration: Registration
+    cells: object
+    readings: object
+    beamed: Beamed
+    told: tuple = ()
+    left_out: np.ndarray | None = None
+
+
+def find_wall_in_clouds(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
+    """The job with means of its clouds as points, `Clouded`, and the `Wall` or `Scan` of them.
+
+    Offsets that nothing but a tape tells are taken off, and the wall is found once more.
+
+    Parameters
+    ----------
+    job : Job
+    adjustment : Adjustment or None
+        Of the network that targets of scans belong to.
+    progress : callable
+    dof, amplitudes
+        As in `find_wall`.
+
+    Raises
+    ------
+    InputError
+        For clouds without a wall, targets under wrong names, a scanner on the other side.
+    """
+    job, clouded = points_of_clouds(job, adjustment, progress)
+    if job.tank.kind != "vertical":
+        return job, clouded, fit_scan(job, dof)
+    wall = find_wall(job, progress, dof, amplitudes)
+    told = told_causes(job, wall)
+    free = {one.name: one.value for one in told if np.isinf(one.u_before)}
+    if free:
+        job, clouded = _as_points(job, clouded, free)
+        wall = find_wall(job, progress, dof, amplitudes)
+        told = told_causes(job, wall)
+    return job, replace(clouded, told=told), wall
+
+
+def points_of_clouds(job, adjustment, progress):
+    """The job with means of its clouds as points, and their `Clouded`."""
+    registration = registered(job, adjustment)
+    progress(
+        message(
+            "reading_clouds",
+            "reading {count} files of {scans} scans",
+            count=len(job.clouds.files),
+            scans=len(job.clouds.scans),
+        )
+    )
+    files = tuple(_fingerprint(one) for one in job.clouds.files)
+    passes = Passes(job.clouds, registration)
+    found = cells_of_clouds.find_cloud_wall(
+        passes,
+        radius_m=_nominal_radius_m(job),
+        joints_m=tuple(job.datum.bottom_z_m + joints_of(job)) if job.courses else None,
+        kind=job.tank.kind,
+        azimuth_rad=(job.horizontal.azimuth_rad if job.horizontal else None) or 0.0,
+        sides=job.clouds.sides,
+        progress=progress,
+    )
+    _refuse_places(job, registration, found.surface)
+    readings = cells_of_clouds.readings_of(found, MOST_READINGS)
+    job = replace(job, files=(*job.files, *files))
+    clouded = Clouded(files, registration, found, readings, None, left_out=passes.left_out)
+    return _as_points(job, clouded)
+
+
+def registered(job, adjustment):
+    """`Registration` of the scans of a job; adjustment: of its network, or None."""
+    clouds, known = job.clouds, job.clouds.control
+    if adjustment is not None:
+        wanted = {one.target for one in clouds.targets}
+        names = tuple(name for name in adjustment.names if name in wanted)
+        place = {name: i for i, name in enumerate(adjustment.names)}
+        xyz = adjustment.xyz_m[[place[name] for name in names]].reshape(-1, 3)
+        known = KnownTargets(names, xyz, adjustment.full_covariance_m2(names))
+    try:
+        return register(clouds.scans, clouds.ranging, clouds.targets, known)
+    except SolutionError as error:
+        file = TARGETS if clouds.targets else FILE
+        raise InputError(Problem(file, error.args[0])) from error
+
+
+def _as_points(job, clouded, told_m=None):
+    """The job with the readings of a cloud as its points, all on one side of the wall."""
+    readings, surface = clouded.readings, clouded.cells.surface
+    beamed = points_of_beams(
+        readings.xyz_m,
+        readings.sd_m,
+        readings.scan,
+        normals_of(surface, readings.xyz_m),
+        clouded.registration,
+        job.clouds.tools,
+        file=FILE,
+        told_m=told_m,
+    )
+    side = np.array(job.clouds.sides)[readings.scan]
+    moved = side != job.survey.side
+    if moved.any() and job.courses:
+        points = through_wall(job, beamed.points, normals_of(surface, readings.xyz_m), moved)
+        beamed = replace(beamed, points=points)
+    _refuse_untold(job, beamed)
+    job = replace(job, points=s_transform(beamed.points))
+    return job, replace(clouded, beamed=beamed)
+
+
+def normals_of(surface, xyz_m):
+    """(n, 3) unit vectors outwards, square to a surface of cells at places (n, 3)."""
+    u, turn, distance = surface.places(np.array(xyz_m))
+    away = surface.points(u, turn, distance + STEP_M) - surface.points(u, turn, distance)
+    return away / np.linalg.norm(away, axis=1, keepdims=True)
+
+
+class Passes:
+    """Readings of all files, as often as they are asked for.
+
+    Each gives (scan, places (n, 3) in the frame of the tank); `left_out` counts the points of each
+    scan in boxes, of the last one.
+    """
+
+    def __init__(self, clouds, registration):
+        self.clouds, self.registration = clouds, registration
+        self.left_out = np.zeros(len(clouds.scans), dtype=int)
+
+    def __call__(self):
+        """A fresh iterator over all points."""
+        self.left_out = np.zeros(len(self.clouds.scans), dtype=int)
+        for file in self.clouds.files:
+            for chunk in tankcal.clouds.read_cloud(file.header, unit_m=file.unit_m):
+                scan = file.first + chunk.scan
+                xyz = _placed(chunk.xyz_m, self.clouds, scan, self.registration)
+                if len(file.leave_out_m):
+                    kept = ~_is_in_boxes(xyz, file.leave_out_m)
+                    self.left_out[scan] += len(xyz) - np.count_nonzero(kept)
+                    xyz = xyz[kept]
+                if len(xyz):
+                    yield scan, xyz
+
+
+def _placed(xyz_m, clouds, scan, registration):
+    given = clouds.scans[scan]
+    tool = clouds.ranging[given.scanner]
+    beam = xyz_m - given.beam_from_m
+    if tool.correction or tool.correction_m:
+        distance = np.maximum(np.linalg.norm(beam, axis=1), 1e-9)
+        beam = beam * (certified_distance_m(distance, tool) / distance)[:, None]
+    return beam @ registration.rotation[scan].T + registration.place_m[scan]
+
+
+def _is_in_boxes(xyz_m, boxes_m):
+    inside = np.zeros(len(xyz_m), dtype=bool)
+    for box in boxes_m:
+        inside |= np.all((xyz_m >= box[:3]) & (xyz_m <= box[3:]), axis=1)
+    return inside
+
+
+def _fingerprint(file):
+    """`InputFile` of a file of a scanner, read once in blocks."""
+    digest = hashlib.sha256()
+    try:
+        with open(file.header.path, "rb") as stream:
+            while block := stream.read(BLOCK):
+                digest.update(block)
+    except OSError as error:
+        raise InputError(Problem(file.file, unreadable_file(error))) from error
+    return InputFile(file.file, digest.hexdigest(), file.header.bytes)
+
+
+def _nominal_radius_m(job):
+    return job.tank.nominal_diameter_m / 2
+
+
+def _refuse_places(job, registration, surface):
+    """Raise InputError for scanners on the other side of the wall than said, or far from it."""
+    distance = surface.places(registration.place_m.copy())[2]
+    radius = _nominal_radius_m(job)
+    problems = []
+    for file in job.clouds.files:
+        for scan in range(file.first, file.first + len(file.header.scans)):
+            if abs(distance[scan]) > FAR_AWAY * radius:
+                text = message(
+                    "scanner_far_away",
+                    "scan {scan!r} comes from {away:.0f} m away from the wall; expected where the"
+                    " scanner stood as scanner_xyz: offset and scale act along its beams",
+                    scan=job.clouds.scans[scan].name,
+                    away=abs(distance[scan]),
+                )
+                problems.append(Problem(FILE, text, column=f"{file.name}.scanner_xyz"))
+            elif (distance[scan] < 0) != (job.clouds.sides[scan] == "inside"):
+                text = message(
+                    "scan_on_other_side",
+                    "scan {scan!r} is said to be taken {side}, but its scanner stood on the other"
+                    " side of the wall; expected the side of its scanner",
+                    scan=job.clouds.scans[scan].name,
+                    side=job.clouds.sides[scan],
+                )
+                problems.append(Problem(FILE, text, column=f"{file.name}.side"))
+    if problems:
+        raise InputError(problems)
+
+
+def _refuse_untold(job, beamed):
+    """Raise InputError for an offset that nobody gave, and that no tape tells."""
+    taped = job.strapping is not None and any(not one.check for one in job.strapping.straps)
+    names = [one.name for one in beamed.points.unbound if one.what == "instrument_offset"]
+    if names and not (taped and job.tank.kind == "vertical"):
+        raise InputError(Problem(FILE, offset_untold(), column="u_offset_mm"))

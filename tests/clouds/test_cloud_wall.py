@@ -1,0 +1,296 @@
+"""What is wall in a cloud: scans of tanks that are no model of the package."""
+
+import numpy as np
+import pytest
+from generated_clouds import FULL_TURN, WALL, Scene, make_scene, passes_of, take_scan
+from numpy.testing import assert_allclose, assert_array_equal
+
+from tankcal.clouds.wall import find_cloud_wall, readings_of
+from tankcal.clouds.wall.cells import WallCells
+from tankcal.clouds.wall.finding import make_grid, wall_of_cells
+from tankcal.clouds.wall.growing import OBSTRUCTED, grow_wall, off_trend
+from tankcal.clouds.wall.growing import WALL as IS_WALL
+from tankcal.clouds.wall.surfaces import CylinderSurface
+from tankcal.errors import InputError
+
+JOINTS = np.array([0.0, 2.0, 4.0])
+
+
+def _cylinder(count=60_000, radius=3.0, noise=0.002, seed=1, height=4.0):
+    rng = np.random.default_rng(seed)
+    turn, z = rng.uniform(0, FULL_TURN, count), rng.uniform(0, height, count)
+    r = radius + rng.normal(0, noise, count)
+    return np.column_stack([10 + r * np.sin(turn), 20 + r * np.cos(turn), z])
+
+
+def _find(*scans, **options):
+    given = {"radius_m": 3.0, "joints_m": JOINTS} | options
+    return find_cloud_wall(passes_of(scans), **given)
+
+
+def _histograms(distance_m, points=30, noise=1.0, bins=50, bin_m=0.004):
+    """Counts (rows, columns, bins) of walls at given distances, normal to a bin's width."""
+    edges = np.arange(bins + 1) - bins / 2
+    rng = np.random.default_rng(5)
+    counts = np.zeros((*distance_m.shape, bins), dtype=np.int64)
+    for place in np.ndindex(distance_m.shape):
+        values = distance_m[place] / bin_m + rng.normal(0, noise / 2, points)
+        counts[place] = np.histogram(values, edges)[0]
+    return counts
+
+
+def _grow(counts):
+    return grow_wall(counts, column_m=np.full(len(counts), 0.13), row_m=0.05, bin_m=0.004)
+
+
+def test_buckle_is_wall_and_a_pipe_is_not():  # closed form: 60 mm over 2 m; a step of 50 mm
+    z, arc = np.meshgrid(0.05 * np.arange(60), 0.13 * np.arange(90), indexing="ij")
+    away = np.minimum(np.hypot(z - 1.5, arc - 4.0), 1.0)
+    form = -0.03 * (1 + np.cos(np.pi * away))
+    counts = _histograms(form)
+    counts[:, 60:62] = _histograms(np.full((60, 2), -0.05))
+    grown = _grow(counts)
+    assert np.all(grown.why[:, :60] == IS_WALL)
+    assert np.all(grown.why[:, 60:62] == OBSTRUCTED)
+    assert np.all(grown.why[:, 62:] == IS_WALL)
+
+
+def test_wall_of_a_cell_is_what_its_neighbours_show():  # property: the other mode is larger
+    counts = _histograms(np.zeros((40, 60)))
+    counts[10:20, 30:40] += 4 * _histograms(np.full((10, 10), -0.06))
+    grown = _grow(counts)
+    middle = (grown.low + grown.high) / 2
+    assert np.all(grown.why == IS_WALL)
+    assert np.abs(middle - 24.5).max() <= 2
+    assert grown.two_modes.sum() == 100
+
+
+def test_seam_of_30_mm_stays():  # closed form: a cusp 0.4 m wide over the whole height
+    arc = 0.13 * (np.arange(80) - 40.3 + np.linspace(-0.5, 0.5, 60)[:, None, None])
+    form = -0.03 * np.maximum(0, 1 - np.abs(np.tile(arc, (40, 1))) / 0.2)
+    counts = sum(_histograms(part, points=1) for part in form)
+    assert np.all(_grow(counts).why == IS_WALL)
+
+
+def test_off_trend_finds_a_single_cell():  # closed form
+    values = np.add.outer(0.001 * np.arange(20.0), 0.01 * np.cos(np.arange(90) / 90 * FULL_TURN))
+    values += np.random.default_rng(1).normal(0, 1e-4, values.shape)
+    values[7, 30] += 0.004
+    off = off_trend(values, np.full(values.shape, 1e-4), np.ones(values.shape, dtype=bool))
+    assert_array_equal(np.argwhere(off), [[7, 30]])
+
+
+def test_round_cylinder():  # closed form
+    wall = _find(_cylinder(), _cylinder(seed=2))
+    assert_allclose(np.nanmean(wall.radius_m, axis=(1, 2)), 3.0, atol=1e-4)
+    assert_allclose(wall.surface.centre_m[:2], [10, 20], atol=1e-3)
+    assert wall.is_wall.any(axis=0).mean() > 0.99
+    assert wall.masked_share.max() < 0.01
+    assert not wall.joints
+    assert not wall.welds
+    assert_array_equal(wall.delivered, [60_000, 60_000])
+
+
+def test_pieces_change_no_byte_of_the_wall():  # property
+    scan = _cylinder(20_000)
+    whole = _find(scan)
+    pieces = find_cloud_wall(passes_of([scan], chunk=313), radius_m=3.0, joints_m=JOINTS)
+    assert pieces.radius_m.tobytes() == whole.radius_m.tobytes()
+
+
+def test_sd_of_a_cell_is_its_scatter():  # simulation: the truth is a cylinder
+    wall = _find(_cylinder(200_000, noise=0.003))
+    error = wall.radius_m[wall.is_wall] - 3.0
+    ratio = np.std(error) / np.median(wall.sd_m[wall.is_wall])
+    assert 0.8 < ratio < 1.2
+
+
+def test_readings_are_even():  # property
+    wall = _find(_cylinder(), _cylinder(seed=2))
+    readings = readings_of(wall, most=400)
+    assert 300 < len(readings.scan) <= 400
+    xyz = readings.xyz_m - [10, 20, 0]
+    assert_allclose(np.hypot(*xyz[:, :2].T), 3.0, atol=1e-3)
+    for course in (0, 1):
+        levels = np.unique(readings.level[readings.course == course])
+        heights = [xyz[readings.level == one, 2].mean() for one in levels]
+        assert len(levels) == 5
+        assert_allclose(np.diff(heights), 0.4, atol=0.11)
+        assert min(heights) > JOINTS[course]
+    per_sector = np.bincount(readings.sector)
+    assert per_sector.max() - per_sector.min() <= per_sector.max() / 4
+    assert readings.sd_m.min() >= wall.scatter_m.min()
+
+
+def test_grid_begins_rows_at_joints_and_keeps_to_memory():  # property
+    surface = CylinderSurface(np.zeros(3), 30.0)
+    joints = [0.0, 2.44, 4.9, 7.3]
+    fine = make_grid(surface, joints, points=1e9, memory_bytes=1 << 40)
+    small = make_grid(surface, joints, points=1e9, scans=8, memory_bytes=100 << 20)
+    for grid in (fine, small):
+        assert np.isin(joints, grid.edges_m).all()
+    assert small.bytes_of(8) <= 100 << 20
+    assert np.diff(fine.edges_m).max() <= 0.05 + 1e-9
+
+
+def _two_walls():
+    scan = _cylinder(120_000)
+    inner = np.random.default_rng(3).uniform(size=len(scan)) < 0.4
+    scan[inner, :2] = [10, 20] + (scan[inner, :2] - [10, 20]) * (1 - 0.06 / 3)
+    return scan
+
+
+def _sphere():
+    directions = np.random.default_rng(6).normal(size=(80_000, 3))
+    return [10, 20, 3] + 3 * directions / np.linalg.norm(directions, axis=1)[:, None]
+
+
+def _broken(scan, value):
+    scan = scan.copy()
+    scan[77, 1] = value
+    return scan
+
+
+@pytest.mark.slow(after=4)
+@pytest.mark.parametrize(
+    ("scan", "code", "options"),
+    [
+        (_cylinder(100), "cloud_too_few", {}),
+        (_broken(_cylinder(), np.nan), "cloud_not_finite", {}),
+        (_broken(_cylinder(), 1e300), "cloud_not_finite", {}),
+        (np.zeros((0, 3)), "cloud_too_few", {}),
+        (_two_walls(), "cloud_two_surfaces", {}),
+        (_cylinder() * 1000, "cloud_in_other_unit", {}),
+        (_cylinder() / 0.3048, "cloud_in_other_unit", {}),
+        (_cylinder() + [0, 0, 50], "cloud_beside_shell", {}),
+        (_cylinder(), "cloud_of_other_radius", {"radius_m": 3.8}),
+        (_sphere(), "cloud_of_sphere", {"joints_m": [0.0, 6.0]}),
+        (np.ones((50_000, 3)), "cloud_nothing_upright", {}),
+        (np.random.default_rng(1).normal(2, 3, (50_000, 3)), "cloud_nothing_upright", {}),
+        (_cylinder()[:, [2, 0, 1]] - [0, 10, 18], "cloud_lies", {"joints_m": [0.0, 6.0]}),
+        (_cylinder(), "cloud_wall_too_small", {"kind": "sphere", "joints_m": None}),
+    ],
+)
+def test_what_is_no_wall_is_told(scan, code, options):
+    with pytest.raises(InputError) as raised:
+        _find(scan, **options)
+    assert raised.value.problems[0].expected.code == code
+
+
+@pytest.mark.slow
+def test_sphere_and_lying_cylinder():  # closed form
+    sphere = _find(_sphere(), kind="sphere", joints_m=None)
+    assert_allclose(np.nanmean(sphere.radius_m), 3.0, atol=1e-4)
+    assert_allclose(sphere.surface.centre_m, [10, 20, 3], atol=1e-3)
+    lying = _cylinder()[:, [2, 0, 1]]  # along x
+    found = _find(lying, kind="horizontal", joints_m=None, azimuth_rad=np.pi / 2)
+    assert_allclose(np.nanmean(found.radius_m), 3.0, atol=1e-4)
+    for wall, middle in ((sphere, [10, 20, 3]), (found, [2, 10, 20])):
+        away = readings_of(wall).xyz_m - middle
+        away[:, 0] *= wall is sphere
+        assert_allclose(np.linalg.norm(away, axis=1), 3.0, atol=4e-3)
+
+
+INSIDE = ((2.3, 0.7, 1.6), (-2.2, -1.5, 1.6), (0.7, -3.0, 4.0))
+SCENES = {
+    "stairs, pipes, a second surface at 20 mm": (5, {"pipes": 10, "second": (0.05, 0.02)}),
+    "pipes on a fifth, a second surface at 200 mm": (6, {"pipes": 20, "second": (0.05, 0.2)}),
+    "a second surface at 60 mm in 0.5 %": (4, {"pipes": 5, "second": (0.005, 0.06)}),
+    "a sector is missing": (9, {"pipes": 5, "gap": (1.0, 2.0)}),
+    "courses of other radii": (3, {"step_m": (0.0, 0.004, -0.003, 0.005)}),
+}
+
+
+def _errors(scene, wall):
+    """Of the cells that are wall, against the true form about the true axis, and their course."""
+    found = []
+    for scan in range(len(wall.sides)):
+        kept = wall.is_wall[scan]
+        off = wall.radius_m[scan][kept] - wall.surface.radius_m
+        xyz = wall.surface.points(wall.along_m[scan][kept], wall.turn_rad[scan][kept], off)
+        x, y = xyz[:, :2].T - np.array(scene.axis(xyz[:, 2]))
+        truth = scene.radius(np.arctan2(x, y) % FULL_TURN, xyz[:, 2])
+        found.append(np.column_stack([np.hypot(x, y) - truth, xyz[:, 2] // scene.course_m]))
+    return np.vstack(found)
+
+
+def _mean_of_courses(errors, courses):
+    course = np.clip(errors[:, 1], 0, courses - 1).astype(int)
+    return np.bincount(course, errors[:, 0], courses) / np.bincount(course, minlength=courses)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("name", SCENES)
+def test_clutter_moves_no_radius(name, figure):  # simulation: rays, not the model
+    seed, given = SCENES[name]
+    rng = np.random.default_rng(seed)
+    scene = make_scene(rng, stairs=True, **given)
+    scans = [take_scan(rng, scene, place, 250_000) for place in INSIDE]
+    wall = find_cloud_wall(
+        passes_of([xyz for xyz, _ in scans]), radius_m=7.5, joints_m=scene.joints_m
+    )
+    sound, every = (WallCells(wall.surface, wall.grid, len(scans)) for _ in range(2))
+    for number, (xyz, kind) in enumerate(scans):
+        sound.add(xyz[kind == WALL], number)
+        every.add(xyz, number)
+    by_hand = wall_of_cells(sound, wall.joints_m, wall.sides)
+    counts = [sum(one.counts(i).sum(axis=2) for i in range(3)) for one in (sound, every)]
+    is_truly = (counts[0] >= 8) & (counts[0] >= counts[1] / 2)
+    kept = wall.is_wall.any(axis=0)[is_truly].mean()
+    bias = _mean_of_courses(_errors(scene, wall), scene.courses)
+    hand = _mean_of_courses(_errors(scene, by_hand), scene.courses)
+    name = f"cells of a cloud, {name}: "
+    figure(name + "bias of a course", f"{1e3 * np.abs(bias).max():.3f} mm")
+    figure(name + "against clutter taken out by hand", f"{1e3 * np.abs(bias - hand).max():.3f} mm")
+    figure(name + "wall kept", f"{100 * kept:.2f} %")
+    assert np.abs(bias).max() < 2e-4
+    assert np.abs(bias - hand).max() < 3e-4
+    assert kept >= 0.98
+
+
+@pytest.mark.slow
+def test_buckle_and_seams_of_a_scan_are_kept():  # simulation
+    scene = Scene(buckle=(3.0, 5.0, 0.06, 2.0))
+    scan, _ = take_scan(np.random.default_rng(1), scene, (1.0, -0.5, 3.0), 600_000)
+    wall = find_cloud_wall(passes_of([scan]), radius_m=7.5, joints_m=scene.joints_m)
+    height, turn = wall.along_m[0], wall.turn_rad[0]
+    buckle = np.hypot((turn - 3.0) * 7.5, height - 5.0) < 0.9
+    seam = np.abs(turn - 1.0) * 7.5 < 0.2
+    for place in (buckle, seam):
+        assert wall.is_wall[0][place & np.isfinite(height)].mean() > 0.98
+    assert np.abs([one.azimuth_rad - 1.0 for one in wall.welds]).min() < 0.02
+    assert len([one for one in wall.welds if abs(one.azimuth_rad - 1.0) < 0.02]) == 4
+
+
+@pytest.mark.slow
+def test_outside_and_inside_are_told_apart():  # simulation: a plate of 12 mm
+    inner, outer = _cylinder(200_000), _cylinder(200_000, radius=3.012, seed=2)
+    wall = _find(inner, outer, sides=("inside", "outside"))
+    assert_allclose(np.nanmean(wall.radius_m, axis=(1, 2)), [3.0, 3.012], atol=1e-4)
+
+
+@pytest.mark.slow
+def test_what_stands_before_the_wall_is_proposed():  # simulation
+    rng = np.random.default_rng(7)
+    scene = Scene(pipes=[(2.0, 0.3, 0.15, 1.0, 7.0)], nozzles=[(5.0, 1.0, 0.4, 0.25)], buckle=None)
+    scan, _ = take_scan(rng, scene, (0.5, 0.5, 3.0), 800_000)
+    wall = find_cloud_wall(passes_of([scan]), radius_m=7.5, joints_m=scene.joints_m)
+    pipe, nozzle = wall.obstructions[:2]
+    if nozzle.guess == "pipe":
+        pipe, nozzle = nozzle, pipe
+    assert (pipe.guess, nozzle.guess) == ("pipe", "nozzle")
+    assert pipe.height_m[0] < 1.5
+    assert pipe.height_m[1] > 6.5
+    assert -0.7 < pipe.distance_m[0] < pipe.distance_m[1] < -0.2
+    assert abs(np.mean(nozzle.azimuth_rad) - 5.0) < 0.05
+    assert nozzle.deadwood_row[0].startswith("nozzle")
+
+
+@pytest.mark.slow
+def test_joints_of_other_radii_are_proposed():  # simulation
+    scene = Scene(step_m=(0.0, 0.005, -0.004, 0.006), buckle=None, bulge_m=0.002)
+    scan, _ = take_scan(np.random.default_rng(8), scene, (0.5, 0.5, 3.0), 600_000)
+    wall = find_cloud_wall(passes_of([scan]), radius_m=7.5, joints_m=scene.joints_m)
+    assert_allclose([one.height_m for one in wall.joints], [2.0, 4.0, 6.0], atol=1e-9)
+    assert_allclose([one.nearest_m for one in wall.joints], [2.0, 4.0, 6.0], atol=1e-9)
+    assert_allclose([one.step_m for one in wall.joints], [0.005, -0.009, 0.01], atol=1e-3)

@@ -1,0 +1,228 @@
+"""Clouds of a job: registered, found, and their wall with all that they share.
+
+Truth: tanks that are no model of the package, scanned by `scanned_tanks`; their volume by
+integration of the surface.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from generated_hits import Tool
+from job_builder import job_parts, write_folder
+from scanned_tanks import (
+    COURSE_M,
+    COURSES,
+    SCANS,
+    ScannerAt,
+    scanned_parts,
+    xyz_text,
+)
+
+import tankcal
+from tankcal.errors import InputError
+from tankcal.pipeline import cloud_wall
+from tankcal.pipeline.cloud_checks import overlaps_of
+from tankcal.record import record_of
+from tankcal.record.schema import checked
+from tankcal.record.versions import RECORD
+
+TOOL = Tool(offset_m=3e-4, scale=5e-6, bias_m=5e-4, sd_m=1e-3, sd_rad=5e-5)
+
+
+def with_tool(tool):
+    return {name: replace(one, tool=tool) for name, one in SCANS.items()}
+
+
+def true_volume_m3():
+    """Of the surface of `scanned_tanks`: mean of r^2 by closed form in azimuth, then over z."""
+    z = np.linspace(0, COURSE_M * COURSES, 401)
+    mean = 3.0 + 0.0005 * z
+    return np.trapezoid(np.pi * (mean**2 + 0.004**2 / 2), z)
+
+
+def warnings_of(result):
+    return [str(one) for one in result.warnings]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    parts = scanned_parts(np.random.default_rng(3), with_tool(TOOL))
+    return write_folder(tmp_path_factory.mktemp("scanned") / "job", parts)
+
+
+@pytest.fixture(scope="module")
+def result(folder):
+    return tankcal.run(tankcal.load(folder))
+
+
+@pytest.fixture
+def few(monkeypatch):
+    monkeypatch.setattr(cloud_wall, "MOST_READINGS", 400)
+
+
+@pytest.mark.slow
+def test_volume_is_that_of_the_surface(result):
+    top = result.at(COURSE_M * COURSES)
+    assert abs(top.value_m3 - true_volume_m3()) < top.U_m3
+    assert top.U_m3 / top.value_m3 < 1e-3
+
+
+@pytest.mark.slow
+def test_scans_stand_where_their_targets_say(result):
+    found = result.clouded.registration
+    assert found.ties == ("network", "network")
+    for place, at in zip(found.place_m, SCANS.values(), strict=True):
+        np.testing.assert_allclose(place, at.place_m, atol=2e-3)
+    assert len(warnings_of(result)) == 2  # inputs not declared, certificate: none of the clouds
+
+
+@pytest.mark.slow
+def test_budget_names_what_is_shared(result):
+    lines = {(one.name, one.note) for one in result.budget().lines}
+    names = {name for name, _ in lines}
+    assert {"registration", "instrument_offset", "instrument_scale", "incidence"} <= names
+    assert ("registration", "A") in lines
+    shares = {one.name: one.share for one in result.budget().lines}
+    assert shares["instrument_offset"] > 0.3  # 0.5 mm of each radius
+
+
+@pytest.mark.slow
+def test_record_tells_files_scans_and_what_is_hidden(result):
+    record = record_of(result)
+    assert checked(record, RECORD.schema(), "record.json") == ([], [])
+    clouds = record["clouds"]
+    assert [one["declared"] for one in clouds["files"]] == [None, None]
+    assert [one["tie"] for one in clouds["scans"]] == ["network", "network"]
+    assert sum(one["readings"] for one in clouds["scans"]) == len(result.job.points.names)
+    assert len(clouds["targets"]) == 10
+    assert all(0 < one["mdb_m"] < 0.01 for one in clouds["targets"])
+    assert [one["masked"] for one in clouds["courses"]] == [0.0, 0.0]
+    assert {one["sha256"] for one in clouds["files"]} <= {one["sha256"] for one in record["files"]}
+
+
+@pytest.mark.slow
+def test_more_points_do_not_make_the_shared_part_smaller(tmp_path, few, result):
+    """Property: half of the points, the same u but for the noise of its cells."""
+    parts = scanned_parts(np.random.default_rng(3), with_tool(TOOL), rows=30)
+    thin = tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)))
+    assert thin.table.u_m3[-1] == pytest.approx(result.table.u_m3[-1], rel=0.05)
+
+
+@pytest.mark.slow
+def test_scans_that_do_not_meet_are_named(tmp_path, few):
+    """Without targets, a pose that is 6 mm off where 1 mm was declared."""
+    parts = scanned_parts(np.random.default_rng(5), with_tool(TOOL), targets=False)
+    for name, at in SCANS.items():
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = at.rotation, at.place_m
+        pose[0, 3] += 0.006 if name == "B" else 0.0
+        given = parts.registers["clouds"][name]
+        given |= {"pose": pose.tolist(), "s_translation_mm": 1.0, "s_rotation_arcsec": 10.0}
+    job = tankcal.load(write_folder(tmp_path / "job", parts))
+    found = tankcal.run(job)
+    said = [one for one in warnings_of(found) if "apart where both show" in one]
+    assert len(said) == 1
+    assert "scans 'A' and 'B'" in said[0]
+    (overlap,) = overlaps_of(found.job, found.clouded)
+    assert overlap.apart_m == pytest.approx(0.006 / np.sqrt(2), rel=0.1)
+
+
+@pytest.mark.slow
+def test_what_is_assumed_is_warned_of_and_marked(tmp_path, few):
+    scans = {"A": ScannerAt((0.2, 0.3, 1.4), tool=TOOL)}
+    parts = scanned_parts(np.random.default_rng(6), scans, targets=False)
+    given = {"file": "A.xyz", "unit": "m", "scanner": "S", "assume": "documented"}
+    pose = np.eye(4)
+    pose[:3, 3] = scans["A"].place_m
+    parts.registers["clouds"] = {"A": {**given, "pose": pose.tolist()}}
+    found = tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)))
+    marked = {one.name for one in found.budget().lines if one.is_default}
+    assert {"registration", "instrument_offset", "instrument_scale"} <= marked
+    said = "\n".join(warnings_of(found))
+    assert "an offset of 2.0 mm and a scale of 20 ppm" in said
+    assert "registration of scans A is assumed: 3.0 mm and 20''" in said
+    assert found.table.u_m3[-1] / found.table.volume_m3[-1] == pytest.approx(2 * 2e-3 / 3, rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_box_leaves_a_cupboard_out(tmp_path, few):
+    parts = scanned_parts(np.random.default_rng(6), with_tool(TOOL))
+    box = [[1.5, -0.5, 0.5, 2.5, 0.5, 1.5]]  # nothing of the wall, but much of a cupboard
+    at = SCANS["A"]
+    cupboard = np.random.default_rng(1).uniform([1.6, -0.4, 0.6], [2.4, 0.4, 1.4], (2000, 3))
+    parts.extra_files["A.xyz"] += xyz_text(at.own(cupboard))
+    parts.registers["clouds"]["A"]["leave_out"] = box
+    found = tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)))
+    assert found.clouded.left_out.tolist() == [2000, 0]
+
+
+@pytest.mark.slow
+def test_a_scanner_on_the_other_side_and_one_far_away_are_refused(tmp_path, few):
+    parts = scanned_parts(np.random.default_rng(6), with_tool(TOOL))
+    parts.registers["clouds"]["A"]["side"] = "outside"
+    parts.registers["clouds"]["B"]["side"] = "outside"
+    with pytest.raises(InputError) as refused:
+        tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)))
+    said = [str(one) for one in refused.value.problems]
+    assert len(said) == 2
+    assert all("on the other side of the wall" in one for one in said)
+
+
+@pytest.mark.slow
+def test_exchanged_targets_are_refused_by_name(tmp_path):
+    parts = scanned_parts(np.random.default_rng(6), with_tool(TOOL), columns=8, rows=2)
+    rows = parts.tables["scan_targets"]
+    rows[2][1], rows[3][1] = rows[3][1], rows[2][1]
+    with pytest.raises(InputError, match="names exchanged"):
+        tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)))
+
+
+@pytest.mark.slow
+def test_the_example_is_the_wall_that_it_was_made_of():
+    """Closed form: 62.794 m3 of the outline that the example was made of."""
+    found = tankcal.run(tankcal.load("examples/cloud"), simulated=False)
+    top = found.at(3.2)
+    assert abs(top.value_m3 - 62.794) < top.U_m3
+    assert found.clouded.registration.ties == ("network", "network")
+    np.testing.assert_allclose(found.clouded.registration.place_m[0], [0.55, 0.2, 1.3], atol=1.5e-3)
+    clouds = record_of(found)["clouds"]
+    assert [one["declared"] for one in clouds["files"]] == [16016, 16016]
+    assert [one["delivered"] for one in clouds["scans"]] == [16016, 16016]
+    assert not any(one["removed"] for one in clouds["targets"])
+
+
+def _scanned_solid(folder, kind, xyz, **settings):
+    """Result of a solid that was scanned once from near its middle."""
+    parts = job_parts(kind=kind, settings={"survey.side": "inside", **settings})
+    at = np.array([0.3, -0.2, 0.4])
+    pose = np.eye(4)
+    pose[:3, 3] = at
+    parts.extra_files["a.xyz"] = xyz_text(xyz - at)
+    exact = {"s_translation_mm": 0.0, "s_rotation_arcsec": 0.0}
+    given = {"file": "a.xyz", "unit": "m", "u_offset_mm": 0.5, "u_scale_ppm": 0.0, **exact}
+    parts.registers["clouds"] = {"A": {**given, "pose": pose.tolist()}}
+    return tankcal.run(tankcal.load(write_folder(folder / "job", parts)))
+
+
+@pytest.mark.slow
+def test_a_sphere_and_a_lying_cylinder(tmp_path, few):
+    """Closed form: diameters and volumes of exact solids with noise."""
+    rng = np.random.default_rng(4)
+    turn, along = rng.uniform(0, 2 * np.pi, 60_000), rng.uniform(-5, 5, 60_000)
+    r = 1.2 + 1e-3 * rng.normal(size=len(turn))
+    lying = np.column_stack([r * np.cos(turn), along, r * np.sin(turn)])
+    settings = {"horizontal.diameter_m": None, "horizontal.azimuth_deg": 0.0}
+    settings |= {"horizontal.dip_from_a_m": 5.0, "tank.nominal_diameter_m": 2.4}
+    found = _scanned_solid(tmp_path / "lying", "horizontal", lying, **settings)
+    assert found.scan.values[0] == pytest.approx(2.4, abs=3e-4)
+    (tmp_path / "ball").mkdir()
+    ray = rng.normal(size=(200_000, 3))
+    ray /= np.linalg.norm(ray, axis=1)[:, None]
+    ball = ray * (5 + 1e-3 * rng.normal(size=(len(ray), 1)))
+    settings = {"sphere.diameter_m": None, "tank.nominal_diameter_m": 10.0}
+    found = _scanned_solid(tmp_path / "ball", "sphere", ball, **settings)
+    assert found.scan.values[0] == pytest.approx(10.0, abs=3e-4)
+    offset = next(one for one in found.budget().lines if one.name == "instrument_offset")
+    own = np.sqrt(offset.share) * found.table.u_m3[-1]
+    assert own == pytest.approx(np.pi * 10**2 * 5e-4, rel=0.02)  # area times 0.5 mm
