@@ -65,6 +65,7 @@ def test_wall_of_a_cell_is_what_its_neighbours_show():  # property: the other mo
     assert grown.two_modes.sum() == 100
 
 
+@pytest.mark.slow
 def test_seam_of_30_mm_stays():  # closed form: a cusp 0.4 m wide over the whole height
     arc = 0.13 * (np.arange(80) - 40.3 + np.linspace(-0.5, 0.5, 60)[:, None, None])
     form = -0.03 * np.maximum(0, 1 - np.abs(np.tile(arc, (8, 1))) / 0.2)
@@ -91,6 +92,7 @@ def test_round_cylinder():  # closed form
     assert_array_equal(wall.delivered, [60_000, 60_000])
 
 
+@pytest.mark.slow
 def test_pieces_change_no_byte_of_the_wall():  # property
     scan = _cylinder(20_000)
     whole = _find(scan)
