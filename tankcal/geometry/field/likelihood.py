@@ -22,6 +22,7 @@ LEAST_NOISE_M = 1e-6  # what is given as perfect is not quite
 ROUNDING = 1e-11  # of the largest variances, that keeps a covariance positive
 MOST_STEPS, SMALL_STEP = 12, 1e-7  # of a logarithm, to the very top
 LOG_STEP = 0.1  # of the differences that give the curvature
+MIRRORED = 64  # rows at once
 NEAR_TOP = 0.02  # of a logarithm: so near the top the curvature is that of the top
 
 
@@ -49,8 +50,10 @@ class Part:
         """Log of the determinant of the part's own covariance, and its inverse, lower half."""
         if not len(self.fixed):  # of a course whose radius and centres leave nothing free
             return 0.0, self.fixed
-        covariance = self.fixed + (variances @ self._flat).reshape(self.fixed.shape)
-        # a symmetric matrix is its own transpose, and the transpose is as LAPACK has its columns
+        place, own, fixed, _ = self._halves
+        covariance = np.zeros(self.fixed.shape)
+        covariance.ravel()[place] = fixed + variances @ own
+        # the transpose of the upper half: the lower one, in columns, as LAPACK has it
         root, wrong = scipy.linalg.lapack.dpotrf(
             rounded(covariance).T, lower=True, clean=False, overwrite_a=True
         )
@@ -66,7 +69,8 @@ class Part:
         outer = scipy.linalg.blas.dsyrk(
             -1.0, less, beta=1.0, c=inverse, lower=True, overwrite_c=True
         )
-        return self._lower @ outer.T.ravel()
+        place, own, _, twice = self._halves
+        return own @ (twice * outer.T.ravel()[place])
 
     @cached_property
     def both(self):
@@ -74,15 +78,14 @@ class Part:
         return np.column_stack([self.values, self.reading])
 
     @cached_property
-    def _flat(self):
-        return self.own.reshape(len(self.own), -1)
-
-    @cached_property
-    def _lower(self):
-        """(q, m m) the covariances, column by column, their upper halves in the lower ones."""
-        found = 2 * np.triu(self.own)  # the transpose of the lower half, by rows
-        found[:, range(len(self.fixed)), range(len(self.fixed))] /= 2
-        return found.reshape(len(self.own), -1)
+    def _halves(self):
+        """Places of the upper half in a matrix, own (q, h) and fixed (h,) there, and how often each
+        counts: in half the memory a search waits for them half as long.
+        """
+        place = np.flatnonzero(np.triu(np.ones(self.fixed.shape)))
+        twice = np.where(place % (len(self.fixed) + 1) == 0, 1.0, 2.0)
+        own = self.own.reshape(len(self.own), -1).take(place, axis=1)
+        return place, own, self.fixed.ravel()[place], twice
 
 
 @dataclass(frozen=True)
@@ -135,9 +138,9 @@ class Likelihood:
         normal, right = told[:-1, :-1], told[:-1, -1]
         half = np.linalg.cholesky(before)
         root = np.linalg.cholesky(np.eye(len(half)) + half.T @ normal @ half)
-        spread_root = (
-            scipy.linalg.solve_triangular(root, half.T, lower=True).T if len(half) else half
-        )
+        spread_root = half
+        if len(half):
+            spread_root = scipy.linalg.solve_triangular(root, half.T, lower=True).T
         common = spread_root @ (spread_root.T @ right)
         value += told[-1, -1] - right @ common + 2 * np.sum(np.log(np.diag(root)))
 
@@ -232,7 +235,10 @@ def invert(covariance):
     root = np.linalg.cholesky(covariance)
     if not len(root):  # of a course whose radius and centres leave nothing free
         return root, root
-    inverse = scipy.linalg.lapack.dpotri(root, lower=True)[0]
-    whole = inverse + inverse.T  # the upper half of `root` is zero, and of its inverse
-    whole.flat[:: len(whole) + 1] /= 2
+    whole = scipy.linalg.lapack.dpotri(root.T, lower=False)[0].T  # its lower half, by rows
+    for start in range(0, len(whole), MIRRORED):
+        stop = start + MIRRORED
+        corner = np.tril(whole[start:stop, start:stop])
+        whole[start:stop, start:stop] = corner + np.tril(corner, -1).T
+        whole[:start, start:stop] = whole[start:stop, :start].T
     return root, whole
