@@ -61,7 +61,7 @@ def find_form(local, course, zeta, candidates, axis, relative, slope_sd, least_m
     fit = fitted(np.ones(len(thin), dtype=bool), None)
     if least_m is not None:
         fit = snoop(fit, tests, refit, at_once=0.9, returns=1).adjustment
-    everywhere = _predicted(fit, thin, xyz, of, uneven, relative, slope_sd)
+    everywhere = _predicted(fit, thin, xyz, of, uneven, relative)
     if least_m is not None:
         _, statistic, critical = tests(everywhere)
         rest = np.ones(len(index), dtype=bool)
@@ -77,13 +77,15 @@ def _thinned(xyz, course, axis):
     return np.sort(order[:: max(1, len(xyz) // FITTED)])
 
 
-def _predicted(fit, thin, xyz, course, uneven, relative, slope_sd):
+def _predicted(fit, thin, xyz, course, uneven, relative):
     """The fit to some points as `_FormFit` of all of them."""
     if len(thin) == len(xyz):
         return fit
     start = fit.fit.unknowns
-    model = shell_problem(xyz, course, start[:4], relative, 1.0, slope_sd, uneven)[0]
-    residual, w = model(start, 0.0)[0][: len(xyz)], np.zeros(len(xyz))
+    offset, distance = distances_from_axis(xyz, start[:4])
+    row_of = np.unique(course, return_inverse=True)[1]
+    by_form = _form_columns(offset, _relative_height(xyz))
+    residual = _misclosure(distance, row_of, by_form, uneven.columns, start)
     w = residual / (fit.noise * relative)
     residual[thin], w[thin] = fit.residual, fit.w
     accepted = np.ones(len(xyz), dtype=bool)
@@ -250,7 +252,7 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
     courses, row_of = np.unique(course, return_inverse=True)
     n, modes = len(xyz), 0 if form is None else 2 * (MODES - 1)
     first_mode = 4 + len(courses)
-    height = xyz[:, 2] / max(np.abs(xyz[:, 2]).max(), 1e-9)
+    height = _relative_height(xyz)
     by_radius = np.zeros((n, len(courses)))
     by_radius[np.arange(n), row_of] = -1.0
     by_uneven = np.zeros((n, 0)) if uneven is None else uneven.columns
@@ -264,19 +266,16 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
         offset, distance = distances_from_axis(xyz, x[:4])
         azimuth = np.arctan2(offset[:, 0], offset[:, 1])
         sin, cos = offset[:, 0] / distance, offset[:, 1] / distance
-        form_now, turn = np.zeros(n), np.zeros(n)
-        by_form = np.zeros((n, 2 * modes))
+        turn, by_form = np.zeros(n), np.zeros((n, 2 * modes))
         if modes:
-            waves = harmonics(azimuth, MODES)[:, 3:]
-            by_form = np.hstack([waves, waves * height[:, None]])
+            by_form = _form_columns(offset, height)
             slopes = harmonics(azimuth, MODES, derivative=1)[:, 3:]
-            form_now = by_form @ x[first_mode:last_mode]
             by_azimuth = np.hstack([slopes, slopes * height[:, None]])
             turn = by_azimuth @ x[first_mode:last_mode] / distance
         by_xy = -np.column_stack([sin - turn * cos, cos + turn * sin])
         by_axis = np.hstack([by_xy, by_xy * xyz[:, 2:]])
         top = np.hstack([by_axis, by_radius, -by_form, -by_uneven])
-        misclosure = distance - x[4:first_mode][row_of] - form_now - by_uneven @ x[last_mode:]
+        misclosure = _misclosure(distance, row_of, by_form, by_uneven, x)
         modelled = np.concatenate([misclosure, x[first_mode:last_mode], x[2:4], x[last_mode:]])
         return modelled - observations, np.vstack([top, priors]), None
 
@@ -287,6 +286,23 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
     prior = form**2 * mode_variances(MODES) if modes else np.zeros(0)
     variances = np.concatenate([sd**2, prior, prior, np.full(2, slope_sd**2), uneven_variances])
     return model, start, np.zeros(len(variances)), variances
+
+
+def _relative_height(xyz):
+    return xyz[:, 2] / max(np.abs(xyz[:, 2]).max(), 1e-9)
+
+
+def _form_columns(offset, height):
+    """(n, columns) derivative of the radii by the form, and by its part that grows with height."""
+    waves = harmonics(np.arctan2(offset[:, 0], offset[:, 1]), MODES)[:, 3:]
+    return np.hstack([waves, waves * height[:, None]])
+
+
+def _misclosure(distance, row_of, by_form, by_uneven, x):
+    """(n,) distances less the radius of the course, the form, and what is uneven."""
+    first_mode, more = len(x) - by_form.shape[1] - by_uneven.shape[1], by_uneven.shape[1]
+    form, uneven = x[first_mode : len(x) - more], x[len(x) - more :]
+    return distance - x[4:first_mode][row_of] - by_form @ form - by_uneven @ uneven
 
 
 def distances_from_axis(local, axis):

@@ -267,11 +267,8 @@ def consensus_circle(xy, nominal_radius):
     near = np.abs(circles[:, 2] / nominal_radius - 1) < WIDE_BAND
     judges = xy if len(xy) <= 2000 else xy[rng.choice(len(xy), 2000, replace=False)]
     band = WIDE_BAND * nominal_radius
-    support = [
-        np.mean(np.abs(np.hypot(judges[:, 0] - x, judges[:, 1] - y) - r) < band)
-        for x, y, r in circles[near]
-    ]
-    best = max(support, default=0.0)
+    support = _shares_near(judges, circles[near], band)
+    best = np.max(support, initial=0.0)
     if best < LEAST_PART:
         band, share = 100 * WIDE_BAND, 100 * best
         raise SolutionError(
@@ -286,6 +283,13 @@ def consensus_circle(xy, nominal_radius):
             )
         )
     return circles[near][int(np.argmax(support))]
+
+
+def _shares_near(xy, circles, band):
+    """(k,) share of the points (n, 2) within a band of each of k circles (x, y, radius)."""
+    x, y, r = circles.T[:, :, None]
+    squared = (xy[:, 0] - x) ** 2 + (xy[:, 1] - y) ** 2
+    return np.mean((squared > np.maximum(r - band, 0) ** 2) & (squared < (r + band) ** 2), axis=1)
 
 
 def _circles_through(triples):
@@ -305,11 +309,13 @@ def _leaning_cylinder(local, course, candidates, circle, nominal_radius):
     axis = np.array([circle[0], circle[1], 0.0, 0.0])
     distance = distances_from_axis(local, axis)[1]
     wall = candidates & (np.abs(distance - circle[2]) < WIDE_BAND * nominal_radius)
+    fitted = ~wall
     for band in np.repeat(np.geomspace(WIDE_BAND, WALL_BAND, 5), 3) * nominal_radius:
-        rough = np.full(wall.sum(), 0.01)
-        fit = adjust(*shell_problem(local[wall], course[wall], axis, rough, None, WIDEST_SLOPE))
-        axis = fit.unknowns[:4]
-        distance = distances_from_axis(local, axis)[1]
+        if np.any(fitted != wall):  # else the same points give the same axis
+            rough, fitted = np.full(wall.sum(), 0.01), wall
+            fit = adjust(*shell_problem(local[wall], course[wall], axis, rough, None, WIDEST_SLOPE))
+            axis = fit.unknowns[:4]
+            distance = distances_from_axis(local, axis)[1]
         names, first = np.unique(course[wall], return_inverse=True)
         radii = np.array([np.median(distance[wall][first == i]) for i in range(len(names))])
         # a course without a point so far is judged by its nearest neighbour

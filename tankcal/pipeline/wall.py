@@ -100,10 +100,15 @@ class Wall:
 
     def factors(self, job, weights):
         """`Factor`s of what the points leave uncertain about features, (f, m) by the readings."""
-        jacobian = weights @ self.radii_by_points
-        covariance = jacobian @ (self.covariance_m2 @ jacobian.T)
-        causes, index = job.points.causes, coordinates_of(self.accepted)
-        effects = [jacobian @ cause.column_m[index] for cause in causes]
+        by_points, causes = self.radii_by_points, job.points.causes
+        if scipy.sparse.issparse(self.covariance_m2):  # of many points: sums over each reading's
+            of_readings = by_points @ self.covariance_m2 @ by_points.T
+            covariance = weights @ (of_readings @ weights.T)
+        else:
+            jacobian = weights @ by_points
+            covariance = jacobian @ (self.covariance_m2 @ jacobian.T)
+        index = coordinates_of(self.accepted)
+        effects = [weights @ (by_points @ cause.column_m[index]) for cause in causes]
         found = survey_factors(covariance, self.noise_dof, causes, effects)
         if self.read is None:
             return found

@@ -1,8 +1,10 @@
 """Buckles and clutter: patches of rejected points in closed form, and buckled shells."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from generated_walls import GeneratedWall, _cap, job_of, survey
+from generated_walls import FULL_TURN, GeneratedWall, Survey, _cap, job_of, survey
 
 from tankcal.geometry.buckles import find_buckles
 from tankcal.pipeline.tanks import body_of
@@ -58,3 +60,28 @@ def test_a_deep_buckle_over_a_course_is_wall(points, tmp_path, figure):
         errors.append(1e6 * (body.volume_m3([body.highest_m])[0] / truth - 1))
     figure(f"buckle of 60 mm, {points} points a ring, ppm of the volume", np.round(errors, 1))
     assert np.mean(np.abs(errors)) < 18  # what a circle makes of it
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rings", [(0.2, 0.8), (0.15, 0.5, 0.85)])
+def test_what_24_points_miss_of_a_buckle_is_less_than_what_a_circle_does(rings, tmp_path, figure):
+    """No noise, nothing set aside: the mean over places of the buckle between the points."""
+    errors, points, courses = [], 24, 6
+    around = FULL_TURN * np.arange(points) / points
+    course = np.repeat(np.arange(courses), len(rings) * points)
+    zeta = np.tile(np.repeat(2 * np.array(rings) - 1, points), courses)
+    azimuth = np.tile(around, courses * len(rings))
+    for part in (np.arange(4) + 0.5) / 4:
+        wall = GeneratedWall(6.5, courses, 1.8)
+        at = 1.0 + part * FULL_TURN / points
+        wall.add(2, _cap(wall, at, 1.5), lambda s: -0.06 * np.cos(np.pi / 2 * s) ** 2)
+        radius = wall.radius_at(course, zeta, azimuth)
+        job = job_of(wall, Survey(course, zeta, azimuth, radius, 0.001), tmp_path)
+        job = replace(job, snooping=False)
+        body = body_of(job, find_wall(job, lambda text: None))
+        truth = wall.volume_below([wall.height_m])[0]
+        errors.append(1e6 * (body.volume_m3([body.highest_m])[0] / truth - 1))
+    figure(
+        f"buckle of 60 mm kept, {len(rings)} rings of 24, ppm of the volume", np.round(errors, 1)
+    )
+    assert abs(np.mean(errors)) < 18

@@ -270,6 +270,18 @@ def test_order_turn_and_size_change_nothing():
             assert volume(other, course) == pytest.approx(volume(field, course), rel=1e-8)
 
 
+@pytest.mark.parametrize("radius_m", [1.0, 6.5, 40.0, 60.0])
+def test_seams_between_azimuths_are_the_closed_form(radius_m):
+    """Second method: the correlation of each difference by itself, the long way around as well."""
+    rng = np.random.default_rng(3)
+    places = np.append(rng.uniform(-7, 7, 60), [0.0, np.pi, FULL_TURN - 1e-13])
+    others = np.append(rng.uniform(0, FULL_TURN, 40), np.nan)
+    found = azimuth_correlations(places, others, radius_m)["seam"]
+    expected = seam_correlation(np.subtract.outer(places, others[:-1]), radius_m)
+    assert found[:, :-1] == pytest.approx(expected, abs=1e-12)
+    assert not found[:, -1].any()
+
+
 @pytest.mark.slow
 def test_walls_drawn_from_the_components_are_held(figure):
     """Simulation of the algebra alone: 400 walls of the model, their totals in units of u."""

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.linalg
+import scipy.optimize
 from test_field import RADIUS_M, sites_of
 
 from tankcal.geometry.clutter import find_rings
-from tankcal.geometry.field.amplitudes import assumed_amplitudes
+from tankcal.geometry.field.amplitudes import FINE, assumed_amplitudes
 from tankcal.geometry.field.blunders import against_others, find_blunders, restricted_precision
 from tankcal.geometry.field.components import (
     COMPONENTS,
@@ -17,7 +18,7 @@ from tankcal.geometry.field.components import (
 )
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.evidence import likelihood_of
-from tankcal.geometry.field.likelihood import LEAST_NOISE_M
+from tankcal.geometry.field.likelihood import LEAST_NOISE_M, LOG_STEP, MIRRORED, invert
 from tankcal.geometry.field.sites import free_design
 
 
@@ -114,6 +115,34 @@ def test_the_likelihood_leaves_out_what_courses_share():
         away = (logs - evidence.middle) / evidence.log_sd
         found.append(evidence.misfit(logs)[0] - away @ away)
     assert found[1] - found[0] == pytest.approx(expected[1] - expected[0], rel=2e-4)
+
+
+def test_the_search_finds_the_very_top_and_its_curvature():
+    """Second method: another kind of search from elsewhere, and differences of the slope."""
+    sites = sites_of(3, [-0.6, 0.6], 12)
+    radius = RADIUS_M + 0.004 * np.random.default_rng(2).normal(size=len(sites))
+    evidence = likelihood_of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, True)
+    best, covariance = evidence.top(FINE)
+    options = {"method": "L-BFGS-B", "jac": True, "bounds": evidence.bounds}
+    start = evidence.middle + 1.0
+    other = scipy.optimize.minimize(evidence.misfit, start, options={"ftol": 1e-15}, **options)
+    assert evidence.misfit(best)[0] <= other.fun + 1e-9
+    assert best == pytest.approx(other.x, abs=2e-3)
+    assert evidence.misfit(best)[1] == pytest.approx(np.zeros(len(best)), abs=1e-5)
+    used = np.unique(np.concatenate([evidence.own, evidence.common]))
+    moved = best + LOG_STEP * np.eye(len(best))[used]
+    slopes = np.array([evidence.misfit(one)[1][used] for one in moved]) / (2 * LOG_STEP)
+    told = np.linalg.inv((slopes + slopes.T) / 2)
+    assert covariance[np.ix_(used, used)] == pytest.approx(told, rel=1e-4, abs=1e-5)
+
+
+def test_a_matrix_that_is_larger_than_a_piece_is_inverted_whole():
+    columns = np.random.default_rng(1).normal(size=(3 * MIRRORED + 5, 300))
+    covariance = columns @ columns.T
+    root, inverse = invert(covariance)
+    assert np.array_equal(inverse, inverse.T)
+    assert inverse @ covariance == pytest.approx(np.eye(len(inverse)), abs=1e-9)
+    assert root @ root.T == pytest.approx(covariance)
 
 
 def test_a_course_of_three_points_tells_nothing(capfd):

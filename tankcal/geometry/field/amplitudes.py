@@ -13,7 +13,7 @@ from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.evidence import likelihood_of
 from tankcal.geometry.field.likelihood import LEAST_M
 
-ROUGH, FINE = 1e-5, 1e-8  # relative change of the likelihood that ends its search
+ROUGH, FINE = 3e-6, 1e-12  # relative change of the likelihood that ends its search
 
 
 @dataclass(frozen=True)

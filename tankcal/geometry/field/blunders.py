@@ -140,7 +140,8 @@ def restricted_precision(covariance, design):
     inverse = invert(covariance)[1]
     by_design = inverse @ design
     normal = scipy.linalg.pinvh(design.T @ by_design)  # some points may hardly bear on anything
-    return inverse - by_design @ normal @ by_design.T
+    inverse -= (by_design @ normal) @ by_design.T
+    return inverse
 
 
 def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf):

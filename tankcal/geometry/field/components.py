@@ -30,6 +30,8 @@ LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
 
 _LEVEL = (1.0, 0, 0, 0, 0, 0, 0)
 KINDS = ("bulge", "ovality", "seams")
+LARGEST_QUOTIENT = 110.0  # b of which exp(2 pi b) is still a number
+PIECE = 1 << 14  # correlations at once
 NOT_AROUND = 15.0  # exp(-15 pi) is rounding: of a seam that short nothing is left half a turn away
 
 
@@ -74,6 +76,11 @@ class Component:
         weights = np.array(self.orders, dtype=float)
         weights = weights / np.sum(weights / (2 * np.arange(len(weights)) + 1))
         return (legendre(zeta) * np.sqrt(weights))[:, weights > 0]
+
+    @property
+    def is_level(self):
+        """The same at all heights of a course."""
+        return self.orders == _LEVEL
 
     def height_covariance(self, zeta, other):
         """(n, m) h between heights (n,) and (m,) of a course."""
@@ -138,6 +145,44 @@ def seam_correlation(difference_rad, radius_m, length_m=SEAM_LENGTH_M):
     return found / _seam_sum(b)
 
 
+def _seams_between(azimuth_rad, other_rad, radius_m):
+    """(n, m) `seam_correlation` between azimuths, in pieces of rows that a processor keeps at hand.
+
+    exp(-b x) is a quotient of exp(b a), so that there are no more exponentials than azimuths.
+    """
+    b = radius_m / SEAM_LENGTH_M
+    first, second = azimuth_rad % FULL_TURN - np.pi, other_rad % FULL_TURN - np.pi
+    if b > LARGEST_QUOTIENT:
+        return seam_correlation(np.subtract.outer(first, second), radius_m)
+    turn, at_once = np.exp(-b * FULL_TURN), max(1, PIECE // max(len(second), 1))
+    scale, near_by, far_by = _of_modes(b, turn)
+    scale /= _seam_sum(b)
+    grows, falls = np.exp(b * second), np.exp(-b * second)
+    found = np.empty((len(first), len(second)))
+    for start in range(0, len(first), at_once):
+        here = first[start : start + at_once]
+        x = np.abs(np.subtract.outer(here, second))
+        np.minimum(x, FULL_TURN - x, out=x)
+        one = np.multiply.outer(np.exp(b * here), falls)
+        other = np.multiply.outer(np.exp(-b * here), grows)
+        near, around = np.minimum(one, other), np.maximum(one, other, out=one)
+        around *= turn  # the same along the other way
+        np.maximum(near, around, out=near)
+        if b < NOT_AROUND:
+            far = turn / near
+            far *= far_by - x
+        else:
+            far = 0.0
+        x += near_by
+        near *= x
+        near += far
+        np.multiply(near, scale, out=found[start : start + at_once])
+    low = [np.stack([np.ones(len(a)), np.cos(a), np.sin(a)], axis=1) for a in (first, second)]
+    taken = np.array([b**-4, *2 * [2 / (1 + b**2) ** 2]]) / _seam_sum(b)
+    found -= (low[0] * taken) @ low[1].T
+    return found
+
+
 def weld_columns(azimuth_rad, welds_rad, radius_m):
     """(n, w) a seam of WELD_LENGTH_M at each weld, of peak one: c(a - weld); 0 of a whole turn."""
     away = np.subtract.outer(azimuth_rad, welds_rad)
@@ -167,13 +212,19 @@ def _all_modes(x, b):
         x = x % FULL_TURN
     x = np.minimum(x, FULL_TURN - x)
     turn = np.exp(-b * FULL_TURN)
-    coth = np.pi * (1 + turn) / (1 - turn)
+    scale, near_by, far_by = _of_modes(b, turn)
     near = np.exp(-b * x)
-    found = near * (1 / b + coth - np.pi + x)
+    found = near * (near_by + x)
     if b < NOT_AROUND:  # else nothing comes from the other way around
         far = turn / near
-        found += far * (1 / b + coth + np.pi - x)
-    return np.pi / (2 * b**2 * (1 - turn)) * found
+        found += far * (far_by - x)
+    return scale * found
+
+
+def _of_modes(b, turn):
+    """Factor of the sum of all modes, and what stands beside x along the near and the far way."""
+    coth = np.pi * (1 + turn) / (1 - turn)
+    return np.pi / (2 * b**2 * (1 - turn)), 1 / b + coth - np.pi, 1 / b + coth + np.pi
 
 
 def azimuth_correlations(azimuth_rad, other_rad, radius_m):
@@ -181,9 +232,17 @@ def azimuth_correlations(azimuth_rad, other_rad, radius_m):
 
     The mean of a whole turn has none of the waves around it.
     """
-    difference = np.subtract.outer(azimuth_rad, other_rad)
+    seen = np.isfinite(azimuth_rad), np.isfinite(other_rad)
+    rows, columns = (np.nan_to_num(one) for one in (azimuth_rad, other_rad))
+    waves = [
+        oval_columns(one) * there[:, None] for one, there in zip((rows, columns), seen, strict=True)
+    ]
+    seams = _seams_between(rows, columns, radius_m)
+    for away, axis in zip(seen, (0, 1), strict=True):
+        if not away.all():
+            np.moveaxis(seams, axis, 0)[~away] = 0.0
     return {
-        "mean": np.ones(difference.shape),
-        "oval": np.nan_to_num(oval_columns(azimuth_rad)) @ np.nan_to_num(oval_columns(other_rad)).T,
-        "seam": np.nan_to_num(seam_correlation(difference, radius_m)),
+        "mean": np.broadcast_to(1.0, seams.shape),
+        "oval": waves[0] @ waves[1].T,
+        "seam": seams,
     }

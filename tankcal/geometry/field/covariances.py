@@ -42,6 +42,9 @@ class Covariances:
     def __init__(self, sites, nominal_m):
         self.sites, self.nominal_m = sites, nominal_m
         self.place, self.azimuths_rad = distinct_azimuths(sites.azimuth_rad)
+        if len(self.azimuths_rad) == len(sites):  # in the order of the sites: nothing to gather
+            self.azimuths_rad = self.azimuths_rad[self.place]
+            self.place = np.arange(len(sites))
 
     @cached_property
     def members(self):
@@ -107,7 +110,9 @@ class Covariances:
         }
 
     def _up(self, chosen, variances_m2, members=slice(None)):
-        """Sum of the variances times h, between the heights of some sites."""
+        """Sum of the variances times h, between the heights of some sites; one number if level."""
+        if all(COMPONENTS[i].is_level for i in chosen):
+            return np.sum(variances_m2[chosen])
         zeta = self.sites.zeta[members]
         local = [i for i in chosen if COMPONENTS[i].orders == "local"]
         columns = [
@@ -125,6 +130,8 @@ class Covariances:
         """c between some sites."""
         if shape == "mean":
             return 1.0
+        if len(self.azimuths_rad) == len(self.place) and isinstance(members, slice):
+            return self._along[shape]
         place = self.place[members]
         return self._along[shape][place[:, None], place]
 
