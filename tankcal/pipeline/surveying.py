@@ -81,7 +81,9 @@ def find_survey(job, progress, amplitudes=None):
                 job, adjustment, progress, dof, amplitudes=amplitudes
             )
         elif job.tangents is not None:
-            job, touching, survey = find_tangent_wall(job, adjustment, progress, dof)
+            job, touching, survey = find_tangent_wall(
+                job, adjustment, progress, dof, amplitudes=amplitudes
+            )
         else:
             survey = _survey(job, progress, dof, amplitudes)
     except SolutionError as error:
