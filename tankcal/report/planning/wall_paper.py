@@ -13,6 +13,8 @@ from tankcal.report.planning.wall_rows import COURSES, courses_of, field_tables_
 
 COUNTED = ("circumferences", "strap_readings", "lines", "offsets", "setups", "hits", "tangents")
 
+NARROW = ("sight_lines", "offsets", "shared_targets")  # tables of few columns: two side by side
+
 
 class WallPaper(PlanPaper):
     """A `WallPrediction` with the words of a language; as `PlanPaper` otherwise."""
@@ -91,7 +93,7 @@ def wall_sheets(paper):
     for name, one in tables.items():
         if name in heads:
             found += [paper.heading(heads[name]), paper.paragraph(f"wall_{heads[name]}")]
-        found.append(paper.table(name, *one, across=2 if name == "shared_targets" else None))
+        found.append(paper.table(name, *one, across=2 if name in NARROW else None))
     return [
         *found,
         paper.heading("afterwards"),
