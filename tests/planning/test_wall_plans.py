@@ -508,3 +508,13 @@ def test_plain_data_have_what_the_prediction_has(prediction):
     assert [one["name"] for one in found["courses"]] == [
         one.name for one in prediction.plan.job.courses
     ]
+
+
+@pytest.mark.slow
+def test_nothing_is_said_of_costs_that_nobody_gave(tmp_path, capsys):
+    costs = "[costs]\nstrap = 15\nsetup = 40\nreading = 0.5\n"
+    folder = plan_of(tmp_path / "plan", TANGENTS, (costs, ""))
+    assert main(["plan", str(folder), "--changes", "--quiet"]) == 0
+    said = capsys.readouterr().out
+    assert "ppm)" in said
+    assert "cost" not in said
