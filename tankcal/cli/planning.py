@@ -130,7 +130,7 @@ def _refuse_simulation(options):
     if options.simulate is not None:
         expected = message(
             "plan_wall_not_simulated",
-            "not for a plan of straps, lines or hits; expected a plan of targets",
+            "not for a plan of straps, lines, hits or tangents; expected a plan of targets",
         )
         raise InputError(Problem("--simulate", expected))
 
@@ -252,16 +252,30 @@ def _first(points):
 def _changes(effects):
     for one in effects[:SHOWN]:
         if not one.why:
-            yield message(
-                "plan_effect",
-                "  {change}: U/V {relative} ({difference:+.1f} ppm, cost {cost:+g})",
-                change=describe_change(one.change),
-                relative=_percent(one.relative_u),
-                difference=1e6 * one.difference,
-                cost=one.change.cost,
-            )
+            yield _effect(one)
     if len(effects) > SHOWN:
         yield message("plan_more_changes", "  and {more} more changes", more=len(effects) - SHOWN)
+
+
+def _effect(one):
+    """One change; nothing is said of costs where the plan states none."""
+    values = {
+        "change": describe_change(one.change),
+        "relative": _percent(one.relative_u),
+        "difference": 1e6 * one.difference,
+    }
+    if not any(one.change.plan.costs.values()):
+        return message(
+            "plan_effect_without_cost",
+            "  {change}: U/V {relative} ({difference:+.1f} ppm)",
+            **values,
+        )
+    return message(
+        "plan_effect",
+        "  {change}: U/V {relative} ({difference:+.1f} ppm, cost {cost:+g})",
+        **values,
+        cost=one.change.cost,
+    )
 
 
 def describe_change(change):
@@ -305,16 +319,26 @@ def _design(path):
         "smallest design: {steps}",
         steps=steps or message("plan_no_change", "no change"),
     )
-    yield message(
-        "plan_smallest_worth",
-        "  U/V {before} before, {after} after; cost {start_cost:g} before, {cost:g} after; {tried} "
-        "plans tried",
-        before=_percent(path.start_u),
-        after=_percent(path.relative_u),
-        start_cost=path.start_cost,
-        cost=path.cost,
-        tried=path.tried,
-    )
+    values = {
+        "before": _percent(path.start_u),
+        "after": _percent(path.relative_u),
+        "tried": path.tried,
+    }
+    if path.start_cost or path.cost:
+        yield message(
+            "plan_smallest_worth",
+            "  U/V {before} before, {after} after; cost {start_cost:g} before, {cost:g} after; "
+            "{tried} plans tried",
+            **values,
+            start_cost=path.start_cost,
+            cost=path.cost,
+        )
+    else:
+        yield message(
+            "plan_smallest_without_cost",
+            "  U/V {before} before, {after} after; {tried} plans tried",
+            **values,
+        )
     if path.prediction.meets is False:
         yield message("plan_none_meets", "  no plan that was tried meets the limit")
 

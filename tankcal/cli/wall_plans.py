@@ -1,4 +1,4 @@
-"""What the terminal says of a plan of straps, reference lines or wall hits."""
+"""What the terminal says of a plan of straps, reference lines, wall hits or tangents."""
 
 from tankcal.cli.showing import marks
 from tankcal.messages import message
@@ -28,6 +28,7 @@ def wall_summary(prediction):
         message("plan_offsets", "{count} offsets", count=has.offsets),
         planned_setups(has.setups),
         message("plan_hits", "{count} hits of the wall", count=has.hits),
+        message("plan_tangents", "{count} tangents", count=has.tangents),
     ]
     yield plan_holds(plan, parts)
     for one in prediction.courses:
@@ -51,6 +52,12 @@ def wall_item(change):
         "level": message("plan_item_level", "the level {name} of each course", name=name),
         "hit": message("plan_item_hits", "hits of ring {name}, half as many as it has", name=name),
         "accuracy": message("plan_item_accuracy", "each reading of the tape, with half its s_mm"),
+        "station": message(
+            "plan_item_station", "a station of the traverse, all {name} from the axis", name=name
+        ),
+        "traverse": message(
+            "plan_item_traverse", "each reading between stations, with half its s_mm and s_arcsec"
+        ),
         "certificate": message(
             "plan_item_certificate", "the calibration of {name}, with half its u", name=name
         ),
@@ -59,4 +66,8 @@ def wall_item(change):
         return message("plan_item_ring_setup", "a set-up of ring {name}", name=name)
     if change.item == "reading" and name == "offsets":
         return message("plan_item_offsets", "all offsets")
+    if change.item == "reading" and name == "tangents":
+        return message("plan_item_tangents", "all tangents")
+    if change.item == "accuracy" and name == "tangents":
+        return message("plan_item_finer_tangents", "each tangent, with half its s_arcsec")
     return told.get(change.item)

@@ -8,6 +8,7 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.survey.diagnosis.misread_files import OTHER_UNITS
 from tankcal.survey.tangents import circle_of_sights
 
 GON_IN_DEG, DEG_IN_GON, BACKWARDS = 0.9, 1 / 0.9, -1.0  # of a direction, to what was meant
@@ -59,6 +60,9 @@ def refuse_misread(tangents, poses, nominal_m):
     if problems:
         raise InputError(problems)
     if not np.isfinite(np.median(usual)):
+        azimuth = zero + tangents.direction_rad
+        curve, _, left = circle_of_sights(station, azimuth, nominal_m)
+        _refuse_other_length(tangents, curve.radius_m, nominal_m, np.median(np.abs(left)))
         text = message(
             "tangents_show_no_circle",
             "the tangents touch no circle of about the nominal diameter {diameter_m:.3f} m: check"
@@ -66,6 +70,23 @@ def refuse_misread(tangents, poses, nominal_m):
             diameter_m=2 * nominal_m,
         )
         raise InputError(Problem(tangents.file, text))
+
+
+def _refuse_other_length(tangents, radius_m, nominal_m, left_m):
+    """Raise InputError where the circle is that of a tank whose traverse is in another unit."""
+    for factor, unit in OTHER_UNITS:
+        is_close = abs(radius_m * factor - nominal_m) < NEAR_NOMINAL * nominal_m
+        if is_close and left_m < LEAST * radius_m:
+            told = message(
+                "tangents_of_other_length",
+                "the tangents touch a circle of {diameter_m:.3f} m, which is the nominal"
+                " {nominal_m:.3f} m if the distances of the traverse, or its bar, are in {unit}: is"
+                " it so?",
+                diameter_m=2 * radius_m,
+                nominal_m=2 * nominal_m,
+                unit=unit,
+            )
+            raise InputError(Problem("slope_distances.csv", told, None, "distance_m"))
 
 
 def refuse_misread_zeniths(tangents, poses, touching, zero_z_m):

@@ -85,7 +85,9 @@ def find_survey(job, progress, amplitudes=None):
                 job, adjustment, progress, dof, amplitudes=amplitudes
             )
         elif job.tangents is not None:
-            job, touching, survey = find_tangent_wall(job, adjustment, progress, dof)
+            job, touching, survey = find_tangent_wall(
+                job, adjustment, progress, dof, amplitudes=amplitudes
+            )
         elif job.clouds is not None:
             job, clouded, survey = find_wall_in_clouds(
                 job, adjustment, progress, dof, amplitudes=amplitudes

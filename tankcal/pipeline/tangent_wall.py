@@ -23,11 +23,11 @@ from tankcal.survey.sighting import WALL
 from tankcal.survey.tangents import touch
 
 
-def find_tangent_wall(job, adjustment, progress, dof=np.inf):
+def find_tangent_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
     """The job with its tangents as points, their `Touching`, and the `Wall` that they show.
 
     adjustment  of the network that their set-ups belong to
-    dof         as in `find_wall`
+    dof, amplitudes  as in `find_wall`
     """
     progress(
         message(
@@ -39,10 +39,10 @@ def find_tangent_wall(job, adjustment, progress, dof=np.inf):
     )
     poses, tools = poses_in_network(job.tangents, adjustment)
     _refuse_untied(job.tangents, poses)
-    return touch_wall(job, poses, tools, progress, dof)
+    return touch_wall(job, poses, tools, progress, dof, amplitudes)
 
 
-def touch_wall(job, poses, tools, progress, dof=np.inf):
+def touch_wall(job, poses, tools, progress, dof=np.inf, amplitudes=None):
     """As `find_tangent_wall`, from known `Poses`.
 
     tools  as in `tangents.touch`
@@ -57,11 +57,11 @@ def touch_wall(job, poses, tools, progress, dof=np.inf):
     touching = touch(job.tangents, poses, **known)
     refuse_limbs(job.tangents, touching)
     refuse_misread_zeniths(job.tangents, poses, touching, known["zero_z_m"])
-    wall = find_wall(_with_points(job, touching), progress, dof)
+    wall = find_wall(_with_points(job, touching), progress, dof, amplitudes)
     excess = tangent_excess(wall.field.amplitudes, radius)
     touching = touch(job.tangents, poses, **known, excess=excess)
     job = _with_points(job, touching)
-    return job, touching, find_wall(job, lambda text: None, dof)
+    return job, touching, find_wall(job, lambda text: None, dof, amplitudes)
 
 
 def _with_points(job, touching):

@@ -14,7 +14,7 @@ from tankcal.planning.visibility import measurable
 from tankcal.survey import Nominal
 from tankcal.survey.measurements import ImageReadings, KnownPoints, Photo, Readings, Setup, Targets
 from tankcal.survey.observations import KINDS
-from tankcal.survey.readings import true_distance_m
+from tankcal.survey.readings import read_distance_m
 
 
 def nominal_of(plan):
@@ -207,6 +207,5 @@ def _read(true_m, name, tools, off):
     """What an instrument reads of a true distance, at the temperature of its certificate."""
     if name is None:
         return true_m
-    zero, one = true_distance_m([0.0, 1.0], tools[name], [np.nan, np.nan])
     scale, offset = off[name]
-    return (true_m * (1.0 + scale) + offset - zero) / (one - zero)
+    return read_distance_m(true_m * (1.0 + scale) + offset, tools[name])

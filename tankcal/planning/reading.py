@@ -93,12 +93,13 @@ def _wall_plan(raw, values, tables, given, folder, log):
     diameter = values["tank"]["nominal_diameter_m"]
     check_sections(given, courses, None if diameter is None else diameter / 2, log)
     log.stop_if_problems()
+    told = tuple(log.warnings)
     raw = _with_points(raw)
     check_tank(values, tables, raw, log)
     log.stop_if_problems()
     limits = limits_of(given.single["limits"])
     name = folder.resolve().name
-    return wall_plan_of(raw, values, tables, given, limits, name)
+    return replace(wall_plan_of(raw, values, tables, given, limits, name), warnings=told)
 
 
 def _with_points(raw):
@@ -210,8 +211,8 @@ def _refuse_nothing_measured(own, log):
         return
     expected = message(
         "plan_of_nothing",
-        "nothing is measured; expected a [pattern] of targets, or [[straps]], [lines] or [[hits]]"
-        " of the bare wall",
+        "nothing is measured; expected a [pattern] of targets, or [[straps]], [lines], [[hits]]"
+        " or [tangents] of the bare wall",
     )
     log.problem(PLAN_FILE, expected)
     log.stop_if_problems()

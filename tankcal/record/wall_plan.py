@@ -1,4 +1,4 @@
-"""The prediction of a wall by tape, lines or hits as it is saved: plan.json."""
+"""The prediction of a wall by tape, lines, hits or tangents as it is saved: plan.json."""
 
 import numpy as np
 
@@ -30,10 +30,11 @@ class PlannedWall(Saved):
     setups: int = key("of a total station")
     hits: int = key("of the bare wall")
     shared_targets: int = key("that neighbouring set-ups share")
+    tangents: int = key("sights to the limbs of the tank")
 
 
 class WallPlanFile(Saved, kw_only=True):
-    """What a survey of a wall by tape, reference lines or hits would give, before it is made."""
+    """What a survey of a wall by tape, reference lines, hits or tangents would give, beforehand."""
 
     format: str = key("see Versions", default=WALL_PLAN.format)
     tank: str = key("id", of="plan.job.tank.id")
@@ -44,7 +45,7 @@ class WallPlanFile(Saved, kw_only=True):
     sources: list[PlannedSource] = key("of the uncertainty of the top row")
     worst_deliveries: list[PlannedDelivery] = key("of each minimum height")
     courses: list[CourseOutlook] = key("from the bottom up")
-    reliability: list[ReadingsOutlook] = key("of straps and offsets")
+    reliability: list[ReadingsOutlook] = key("of straps, offsets and tangents")
     warnings: list[WarningRecord] = key("what should be read")
     job: list[Fingerprint] = key("files of the empty job", default=())
 
@@ -84,4 +85,5 @@ def survey_of(plan):
         setups=count["setup"],
         hits=0 if job.hits is None else len(job.hits),
         shared_targets=0 if design.ties is None else design.ties[0],
+        tangents=0 if job.tangents is None else len(job.tangents),
     )

@@ -7,21 +7,24 @@ from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
 
 FILE = "field-sheets.pdf"
-ROWS = {  # that a sheet has room for
-    "lines": 12,
-    "offsets": 30,
-    "circumferences": 18,
-    "obstructions": 10,
-    "thickness": 12,
-    "tape_checks": 6,
-    "setups": 6,
-    "control_readings": 24,
-    "wall_hits": 30,
-    "tangents": 30,
-    "stadia": 10,
-}
+FORMS = (  # tables of each, read in one go, and the rows that a sheet has room for
+    (("lines",), 12),
+    (("offsets",), 30),
+    (("setups",), 9),
+    (("stadia",), 6),
+    (("directions", "zenith_angles", "slope_distances"), 30),
+    (("tangents",), 30),
+    (("wall_hits",), 30),
+    (("control_readings",), 24),
+    (("circumferences",), 15),
+    (("obstructions",), 9),
+    (("thickness",), 8),
+    (("tape_checks",), 4),
+)
 IN_THE_OFFICE = ("use", "s_mm", "s_arcsec", "note")  # columns that nobody fills in on site
 UNIT_OF_CIRCLE = "_deg"  # of three columns of one angle the one that stands for all
+UNITS_OF_CIRCLES = "gon / ° / ° ′ ″"  # as the circle shows it: the others are struck out
+ANGLES = ("direction", "zenith", "angle")
 OTHER_UNITS = ("_gon", "_dms")
 WIDE = {"name": 1.5, "text": 2.0}  # shares of the width, beside one of a number
 FACTS = ("tank", "date", "crew", "weather", "shell_temperature", "instruments", "masters")
@@ -66,10 +69,14 @@ def sheets(survey, language):
         blocks.key_values([(paper.word(f"forms.{fact}"), " ") for fact in FACTS]),
         blocks.paragraph(paper.word("forms.how")),
     ]
-    for name in (one for one in ROWS if one in SURVEYS[survey]):
+    forms = [(names, rows) for names, rows in FORMS if set(names) <= set(SURVEYS[survey])]
+    if any(_is_angle(field) for names, _ in forms for field in _columns(names)):
+        found.append(blocks.paragraph(paper.word("forms.angles")))
+    for names, rows in forms:
+        titles = [texts.words["input"]["titles"][name] for name in names]
         found += [
-            blocks.heading(texts.words["input"]["titles"][name]),
-            blocks.form([_column(texts, field) for field in _columns(name)], ROWS[name]),
+            blocks.heading("; ".join(titles)),
+            blocks.form([_column(texts, field) for field in _columns(names)], rows),
         ]
     return [*found, blocks.signature([paper.word("forms.signed")])]
 
@@ -78,16 +85,23 @@ def _code(survey):
     return survey.replace("-", "_")
 
 
-def _columns(table):
-    return [
-        field
+def _columns(tables):
+    """The columns of tables that are filled in side by side, each once; heights of targets last."""
+    found = {
+        field.name: field
+        for table in tables
         for field in COLUMNS[table]
         if field.name not in IN_THE_OFFICE and not field.name.endswith(OTHER_UNITS)
-    ]
+    }
+    return sorted(found.values(), key=lambda field: field.name == "target_height_m")
+
+
+def _is_angle(field):
+    return field.name.removesuffix(UNIT_OF_CIRCLE) in ANGLES
 
 
 def _column(texts, field):
     heading, (_, unit) = texts.heading(field), parted(field.name)
-    if field.name.removesuffix(UNIT_OF_CIRCLE) in ("direction", "zenith", "angle"):
-        unit = ""  # as the circle shows it
+    if _is_angle(field):
+        return heading, UNITS_OF_CIRCLES, WIDE["name"]
     return heading, unit, WIDE.get(field.kind, 1.0)

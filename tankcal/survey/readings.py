@@ -52,6 +52,20 @@ def true_distance_m(reading_m, tool, temperature_c):
     return found * (1.0 + tool.expansion_per_k * warmer)
 
 
+def read_distance_m(true_m, tool):
+    """What an instrument reads of a true distance, at the temperature of its certificate.
+
+    Examples
+    --------
+    >>> from tankcal.survey.measurements import Instrument
+    >>> tape = Instrument("T", "tape", correction=1e-4, correction_m=0.002)
+    >>> float(true_distance_m(read_distance_m(7.0, tape), tape, np.nan))
+    7.0
+    """
+    zero, one = true_distance_m(np.array([0.0, 1.0]), tool, np.full(2, np.nan))
+    return (true_m - zero) / (one - zero)
+
+
 def observations_of_readings(readings, numbers, *, bend, warnings, correlated=frozenset()):
     """The observations of a table of readings: those that are adjusted, those that are compared.
 

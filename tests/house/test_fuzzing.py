@@ -129,7 +129,9 @@ def test_spoilt_workbooks_are_reported(tmp_path):
                 told(load, write_book(tmp_path / "job.xlsx", spoilt))
 
 
-@pytest.mark.parametrize("name", ["plan-silva", "plan-reference-line", "plan-wall-hits"])
+@pytest.mark.parametrize(
+    "name", ["plan-silva", "plan-reference-line", "plan-wall-hits", "plan-tangents"]
+)
 def test_spoilt_plans_are_reported(tmp_path, name):
     files = text_files(EXAMPLE.parent / name)
     for seed in range(FEW):

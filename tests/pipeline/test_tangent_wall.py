@@ -372,3 +372,15 @@ def test_the_table_of_tangents_may_come_in_gon(tmp_path, noisy):
         row[at] = row[at] / 0.9
     result = run(tmp_path, parts)
     np.testing.assert_allclose(result.table.volume_m3, noisy.table.volume_m3, rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_a_traverse_in_feet_is_told(tmp_path):
+    """Where its tangents alone show it: a minimal datum takes any scale."""
+    traverse = traverse_tables(STATIONS, ZEROS, NOISY, np.random.default_rng(1))
+    heads, *rows = traverse["slope_distances"]
+    at = heads.index("distance_m")
+    times = [[c / 0.3048 if i == at else c for i, c in enumerate(row)] for row in rows]
+    parts = tangent_parts(sights(), traverse | {"slope_distances": [heads, *times]})
+    with pytest.raises(InputError, match="its bar, are in feet"):
+        run(tmp_path / "job", parts)

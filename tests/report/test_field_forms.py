@@ -1,15 +1,26 @@
 """Field sheets that a crew fills in by pen: which columns they have, in which words."""
 
+import shutil
+import subprocess
+
 import pytest
 
 from tankcal.cli import main
 from tankcal.job.contract import SURVEYS
 from tankcal.job.starter.form import OF_SHELLS
 from tankcal.job.starter.texts import texts_in
-from tankcal.report.field_forms import FILE, IN_THE_OFFICE, ROWS, sheets
+from tankcal.report.field_forms import (
+    FILE,
+    FORMS,
+    IN_THE_OFFICE,
+    UNITS_OF_CIRCLES,
+    sheets,
+    write_field_sheets,
+)
 from tankcal.text.languages import LANGUAGES
 
-OF_A_NETWORK = ("control", "directions", "zenith_angles", "slope_distances")  # kept by instruments
+OF_THE_OFFICE = ("control",)  # known beforehand
+LEAST_WORDS = 20  # of a page that has a form: head, foot and the line to sign on are fewer
 HIGH_MM, ROW_MM = 245, 7  # of what is written on a page, and of a row
 
 
@@ -19,10 +30,11 @@ def test_every_table_of_readings_has_a_sheet(survey, language):
     found = [block.data for block in sheets(survey, language)]
     titles = [one["text"] for one in found if one["kind"] == "heading"]
     words = texts_in(language).words["input"]
-    tables = [table for table in SURVEYS[survey] if table not in OF_A_NETWORK]
-    assert sorted(titles) == sorted(words["titles"][table] for table in tables)
+    tables = [table for table in SURVEYS[survey] if table not in OF_THE_OFFICE]
+    told = "; ".join(titles).split("; ")
+    assert sorted(told) == sorted(words["titles"][table] for table in tables)
     forms = [one for one in found if one["kind"] == "form"]
-    assert len(forms) == len(tables)
+    assert len(forms) == len(titles)
     for one in forms:
         assert 2 <= len(one["columns"]) <= 9
         assert (one["rows"] + 3) * ROW_MM < HIGH_MM
@@ -43,4 +55,34 @@ def test_new_writes_them(tmp_path, survey, capsys):
 
 def test_a_sheet_has_room():
     tables = {table for survey in OF_SHELLS for table in SURVEYS[survey]}
-    assert set(ROWS) == tables - set(OF_A_NETWORK)
+    assert {name for names, _ in FORMS for name in names} == tables - set(OF_THE_OFFICE)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_crew_writes_set_ups_and_the_traverse_before_its_tangents(language):
+    """In the order of the work; the three readings to a station stand in one row, with units."""
+    found = [block.data for block in sheets("tangents", language)]
+    words = texts_in(language).words["input"]
+    titles = [one["text"] for one in found if one["kind"] == "heading"]
+    order = ["setups", "stadia", "directions", "tangents", "circumferences", "obstructions"]
+    assert [one.split("; ")[0] for one in titles] == [words["titles"][name] for name in order]
+    traverse = [one for one in found if one["kind"] == "form"][2]["columns"]
+    units = [one["unit"] for one in traverse]
+    assert units == ["", "", "", UNITS_OF_CIRCLES, UNITS_OF_CIRCLES, "m", "m"]
+
+
+def pages_of(path):
+    """[words] of each page of a PDF."""
+    if not shutil.which("pdftotext"):
+        pytest.skip("no pdftotext here (poppler)")
+    said = subprocess.run(["pdftotext", str(path), "-"], capture_output=True, check=True).stdout
+    return [page.split() for page in said.decode().split("\f")[:-1]]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("survey", OF_SHELLS)
+def test_no_page_is_nearly_empty(tmp_path, survey):
+    """Each page of the PDF has a form, the last one more than the line to sign on."""
+    write_field_sheets(tmp_path / FILE, survey, "pt-BR")
+    pages = pages_of(tmp_path / FILE)
+    assert all(len(words) > LEAST_WORDS for words in pages), [len(one) for one in pages]

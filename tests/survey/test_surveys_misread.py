@@ -150,3 +150,29 @@ def test_distances_that_define_the_scale_keep_their_unit():
     assert "the global test fails: sigma0 = " in text
     assert "millimetres" not in text
     assert "feet" not in text
+
+
+@pytest.mark.parametrize(
+    ("factor", "what"), [(1 / 0.9, "gon read as degrees"), (0.9, "degrees read")]
+)
+def test_the_circles_of_one_set_up_in_the_other_unit(stations, factor, what):
+    """Of both kinds of its angles: the set-up is named, and the row where it begins."""
+    name, misread = stations.readings[0].setup[0], stations
+    for kind in ("directions", "zenith_angles"):
+        table = next(one for one in stations.readings if one.table == kind)
+        mine = np.array([one == name for one in table.setup])
+        misread = changed(misread, kind, value=table.value * np.where(mine, factor, 1.0))
+    assert f"the angles of set-up {name} fit if they are {what}" in told(misread)
+
+
+@pytest.mark.parametrize("datum", ["minimal", "control"])
+def test_circles_are_told_before_coordinates_that_hold_nothing(stations, datum):
+    """A mirror of all circles and a swap of axes explain the same, to the last digit."""
+    table = next(one for one in stations.readings if one.table == "directions")
+    mirrored = changed(stations, "directions", value=-table.value)
+    mirrored = replace(mirrored, settings=replace(stations.settings, datum=datum))
+    text = told(mirrored)
+    circle, swap = (text.find(one) for one in ("read anticlockwise", "if x and y are swapped"))
+    assert circle >= 0
+    if datum == "minimal" and swap >= 0:
+        assert circle < swap

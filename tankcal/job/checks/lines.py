@@ -25,6 +25,16 @@ def has_lines(tables):
     return has_rows(tables["lines"]) or has_rows(tables["offsets"])
 
 
+def too_many_offsets(count):
+    """What is said of more offsets than can be used."""
+    return message(
+        "too_many_offsets",
+        "{count} offsets; expected at most {most}",
+        count=count,
+        most=MOST_OFFSETS,
+    )
+
+
 def check_lines(values, tables, registers, raw, log):
     """Lines with offsets, on a tank that is strapped, by plummets whose collimation is known."""
     if not has_lines(tables):
@@ -48,13 +58,7 @@ def check_lines(values, tables, registers, raw, log):
         log.problem(offsets.file, expected)
         return
     if len(offsets.rows) > MOST_OFFSETS:
-        expected = message(
-            "too_many_offsets",
-            "{count} offsets; expected at most {most}",
-            count=len(offsets.rows),
-            most=MOST_OFFSETS,
-        )
-        log.problem(offsets.file, expected)
+        log.problem(offsets.file, too_many_offsets(len(offsets.rows)))
         return
     _check_lines(lines, log)
     plummets = plummets_of(registers)

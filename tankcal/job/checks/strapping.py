@@ -21,6 +21,16 @@ MOST_STRAPS = 1000  # readings round one tank
 END_M = 0.02  # so far beyond its course a level may stand
 
 
+def too_many_straps(count):
+    """What is said of more straps than can be used."""
+    return message(
+        "too_many_straps",
+        "{count} readings; expected at most {most}",
+        count=count,
+        most=MOST_STRAPS,
+    )
+
+
 def check_strapping(values, tables, registers, raw, log):
     """Circumferences with a tape, on courses that are there; obstructions and checks that fit."""
     straps = tables["circumferences"]
@@ -28,13 +38,7 @@ def check_strapping(values, tables, registers, raw, log):
         _tell_without_effect(tables, log)
         return
     if len(straps.rows) > MOST_STRAPS:
-        expected = message(
-            "too_many_straps",
-            "{count} readings; expected at most {most}",
-            count=len(straps.rows),
-            most=MOST_STRAPS,
-        )
-        log.problem(straps.file, expected)
+        log.problem(straps.file, too_many_straps(len(straps.rows)))
         return
     tapes = tapes_of(registers)
     courses = tables["courses"]

@@ -13,19 +13,23 @@ MOST_TANGENTS = 2500  # whose full covariance is kept
 FEWEST_SETUPS = 3  # of a level: two sights from each
 
 
+def too_many_tangents(count):
+    """What is said of more tangents than can be used."""
+    return message(
+        "too_many_tangents",
+        "{count} tangents; expected at most {most}",
+        count=count,
+        most=MOST_TANGENTS,
+    )
+
+
 def check_tangents(values, tables, registers, raw, log):
     """Sights of both limbs from set-ups that a network ties, outside."""
     table = tables["tangents"]
     if not has_tangents(tables):
         return
     if len(table.rows) > MOST_TANGENTS:
-        expected = message(
-            "too_many_tangents",
-            "{count} tangents; expected at most {most}",
-            count=len(table.rows),
-            most=MOST_TANGENTS,
-        )
-        log.problem(table.file, expected)
+        log.problem(table.file, too_many_tangents(len(table.rows)))
         return
     for name in ("points", "targets", "wall_hits", "offsets"):
         if has_rows(tables[name]):

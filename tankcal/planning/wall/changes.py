@@ -1,13 +1,18 @@
-"""Changes of a WallPlan by one item: strap, lines, level, hits, set-up, a better instrument."""
+"""Changes of a WallPlan by one item: strap, lines, level, hits, set-up, station, a better
+instrument.
+"""
 
 from dataclasses import replace
 from itertools import pairwise
 
-from tankcal.planning.wall.model import USUAL_AT, PlannedStrap
-from tankcal.planning.wall.reading import changed
+import numpy as np
 
-SEARCHED = ("strap", "line", "face", "level", "hit", "setup", "reading")
-WALL_ITEMS = (*SEARCHED, "accuracy", "certificate")  # the last are no part of a design
+from tankcal.job.checks.tangents import FEWEST_SETUPS
+from tankcal.planning.wall.model import USUAL_AT, PlannedStrap, even_radius_m
+from tankcal.planning.wall.reading import changed, least_ring_m
+
+SEARCHED = ("strap", "line", "face", "level", "hit", "setup", "station", "reading")
+WALL_ITEMS = (*SEARCHED, "accuracy", "traverse", "certificate")  # the last are no part of a design
 MORE_LINES = 4
 BETTER = ("u_scale_ppm", "u_offset_mm", "u_collimation_arcsec", "u_incidence_mm")
 MOST_FACES, MOST_READINGS, FEWEST_LINES, FEWEST_HITS = 2, 20, 4, 5
@@ -16,7 +21,7 @@ MOST_FACES, MOST_READINGS, FEWEST_LINES, FEWEST_HITS = 2, 20, 4, 5
 def wall_changes_of(plan):
     """(action, item, name, how) of every change; how() is the WallPlan after it."""
     found = []
-    for changes in (_straps, _lines, _hits, _certificates):
+    for changes in (_straps, _lines, _hits, _tangents, _certificates):
         found += changes(plan)
     return found
 
@@ -31,10 +36,13 @@ def wall_count(plan):
     read += sum(
         one.setups * one.hits * len(one.at_percent) * len(one.courses) for one in design.hits
     )
+    ring = design.tangents
+    if ring is not None:  # both limbs
+        read += 2 * ring.stations * len(ring.at_percent) * len(plan.job.courses) * ring.readings
     return {
         "strap": len(design.straps),
         "line": 0 if lines is None else lines.count,
-        "setup": sum(one.setups for one in design.hits),
+        "setup": sum(one.setups for one in design.hits) + (0 if ring is None else ring.stations),
         "reading": read,
     }
 
@@ -47,7 +55,7 @@ def _straps(plan):
     design = plan.design
     for one in design.straps:
         others = tuple(strap for strap in design.straps if strap is not one)
-        if others or design.hits:
+        if others or design.hits or design.tangents is not None:
             yield "drop", "strap", one.name, _made(plan, straps=others)
         if one.readings < MOST_READINGS:
             again = replace(one, readings=one.readings + 1)
@@ -120,16 +128,51 @@ def _hits(plan):
             yield "drop", "setup", str(number), made(setups=ring.setups - 1)
         for action, name, at in _levels(ring.at_percent):
             yield action, "level", f"{name} ({number})", made(at_percent=at)
-    if design.hits and not design.straps:
-        tapes = plan.given.registers.get("instruments")
-        kinds = {} if tapes is None else {n: one.get("kind") for n, one in tapes.entries.items()}
-        names = [name for name, kind in kinds.items() if kind and kind.raw == "tape"]
-        if names:
-            first = plan.job.courses[0].name
-            straps = tuple(
-                PlannedStrap(first, at, 0.5, more=(("instrument", names[-1]),)) for at in USUAL_AT
-            )
-            yield "add", "strap", f"{first}-20, {first}-80", _made(plan, straps=straps)
+    if design.hits:
+        yield from _first_straps(plan)
+
+
+def _first_straps(plan):
+    """A strapped course beside points, where there is a tape and no strap yet."""
+    tapes = plan.given.registers.get("instruments")
+    kinds = {} if tapes is None else {n: one.get("kind") for n, one in tapes.entries.items()}
+    names = [name for name, kind in kinds.items() if kind and kind.raw == "tape"]
+    if names and not plan.design.straps:
+        first = plan.job.courses[0].name
+        straps = tuple(
+            PlannedStrap(first, at, 0.5, more=(("instrument", names[-1]),)) for at in USUAL_AT
+        )
+        yield "add", "strap", f"{first}-20, {first}-80", _made(plan, straps=straps)
+
+
+def _tangents(plan):
+    ring = plan.design.tangents
+    if ring is None:
+        return
+
+    def made(**parts):
+        return _made(plan, tangents=replace(ring, **parts))
+
+    for action, count in (("add", ring.stations + 1), ("drop", ring.stations - 1)):
+        if count >= FEWEST_SETUPS:
+            radius = _even_ring_m(plan, count)
+            yield action, "station", f"{radius:g} m", made(stations=count, radius_m=radius)
+    if ring.readings < MOST_READINGS:
+        yield "repeat", "reading", "tangents", made(readings=ring.readings + 1)
+    for action, name, at in _levels(ring.at_percent):
+        yield action, "level", name, made(at_percent=at)
+    yield "repeat", "accuracy", "tangents", made(sd_arcsec=ring.sd_arcsec / 2)
+    finer = tuple(one / 2 for one in ring.traverse)
+    yield "repeat", "traverse", "traverse", made(traverse=finer)
+    yield from _first_straps(plan)
+
+
+def _even_ring_m(plan, stations):
+    """Radius of the ring with so many stations, whose limbs lie evenly where they can."""
+    nominal, ring = plan.job.tank.nominal_diameter_m / 2, plan.design.tangents
+    least = least_ring_m(stations, nominal)
+    found = even_radius_m(stations, max(ring.radius_m, least), nominal, least)
+    return float(np.ceil(100 * (found or max(ring.radius_m, least))) / 100)
 
 
 def _certificates(plan):

@@ -1,4 +1,6 @@
-"""The sections of plan.toml that say how a wall will be strapped, read from lines, or hit."""
+"""The sections of plan.toml that say how a wall will be strapped, read from lines, hit, or
+sighted by its limbs.
+"""
 
 from tankcal.job.contract.hits import RANGING
 from tankcal.job.fields import Field
@@ -11,6 +13,16 @@ _AT = numbers_list(
 )
 _COURSES = Field("courses", "names", "names of courses; blank: all")
 _READINGS = count("readings", "how often each is read; blank: 1", high=20)
+_RADIUS = number(
+    "radius_m",
+    message("plan_note_hit_radius", "of the ring about the axis of the tank, metres"),
+    0,
+    1000,
+    True,
+)
+_HEIGHT = number(
+    "height_m", "of the instrument above the bottom of the shell; blank: 1.6", -50, 200
+)
 STRAPS = (
     _COURSES,
     _AT,
@@ -49,15 +61,9 @@ HITS = (
     count(
         "setups", message("plan_note_hit_setups", "how many set-ups stand in this ring"), True, 60
     ),
-    number(
-        "radius_m",
-        message("plan_note_hit_radius", "of the ring about the axis of the tank, metres"),
-        0,
-        1000,
-        True,
-    ),
+    _RADIUS,
     number("start_azimuth_deg", "of the first set-up from the axis; blank: 0", -360, 360),
-    number("height_m", "of the instrument above the bottom of the shell; blank: 1.6", -50, 200),
+    _HEIGHT,
     count("hits", message("plan_note_hits", "of each set-up at each height"), True, 500),
     number(
         "spread_deg",
@@ -74,11 +80,66 @@ TIES = (
     count("targets", message("plan_note_ties", "that neighbours share"), True, 20),
     *(one for one in RANGING if one.name in ("s_mm", "s_arcsec")),
 )
+TANGENTS = (
+    count(
+        "stations",
+        message("plan_note_tangent_stations", "how many stations stand round the tank"),
+        True,
+        60,
+    ),
+    _RADIUS,
+    number("start_azimuth_deg", "of the first station from the axis; blank: 0", -360, 360),
+    _HEIGHT,
+    _AT,
+    number(
+        "s_arcsec",
+        message(
+            "plan_note_tangent_sd",
+            "standard deviation of a sight to a limb, pointing included, seconds of arc",
+        ),
+        0,
+        1e4,
+        True,
+        True,
+    ),
+    _READINGS,
+    _INSTRUMENT,
+)
+TRAVERSE = (
+    number(
+        "s_mm",
+        message(
+            "plan_note_traverse_mm",
+            "standard deviation of a distance between stations, millimetres",
+        ),
+        0,
+        1e3,
+        True,
+        True,
+    ),
+    number(
+        "s_arcsec",
+        message(
+            "plan_note_traverse_arcsec",
+            "standard deviation of a direction or a zenith angle between stations, seconds of arc",
+        ),
+        0,
+        1e4,
+        True,
+        True,
+    ),
+)
 WALL = (
     number("form_mm", "rms ovality of a course, as expected; blank: as walls have it", 0, 500),
     number("common_form_mm", "the part of it that runs up the whole shell; blank: 0", 0, 500),
 )
-SINGLE = {"lines": LINES, "setup_ties": TIES, "wall": WALL}
+SINGLE = {
+    "lines": LINES,
+    "setup_ties": TIES,
+    "tangents": TANGENTS,
+    "traverse": TRAVERSE,
+    "wall": WALL,
+}
 REPEATED = {"straps": STRAPS, "hits": HITS}
-MEASURING = ("straps", "lines", "hits")
+MEASURING = ("straps", "lines", "hits", "tangents")
 TABLES = ("obstructions", "thickness", "tape_checks")  # of a job, beside those of any plan

@@ -10,6 +10,7 @@ import numpy as np
 from tankcal.job.checks.hits import MOST_HITS
 from tankcal.job.checks.lines import MOST_OFFSETS
 from tankcal.job.checks.strapping import MOST_STRAPS
+from tankcal.job.checks.tangents import MOST_TANGENTS
 from tankcal.job.tables import Table
 
 STEEPEST = np.radians(55.0)  # incidence in plan, of a set-up that says nothing of what it sees
@@ -45,6 +46,9 @@ class Foreseen:
             found["control"] = self._stations(), MOST_HITS
             if self.design.ties is not None:
                 found |= {name: (rows, MOST_HITS) for name, rows in self._ties().items()}
+        if self.design.tangents is not None:
+            found["tangents"] = self._tangents(), MOST_TANGENTS
+            found |= {name: (rows, MOST_TANGENTS) for name, rows in self._traverse().items()}
         return {name: _table(name, islice(rows, most + 1)) for name, (rows, most) in found.items()}
 
     def _height(self, course, percent):
@@ -152,6 +156,58 @@ class Foreseen:
         part = self.radius_m / ring.radius_m
         return STEEPEST - np.arcsin(part * np.sin(STEEPEST))
 
+    def _stands(self):
+        """(name, place (3,) of the instrument) of the stations of a traverse."""
+        ring = self.design.tangents
+        for k in range(ring.stations):
+            turn = np.radians(ring.start_deg) + 2 * np.pi * k / ring.stations
+            there = self._place(ring, turn).round(4)
+            yield str(k + 1), np.append(there, self.bottom_m + ring.height_m)
+
+    def _tangents(self):
+        """Both limbs of each level, station by station, each as often as it is read."""
+        ring = self.design.tangents
+        for name, there in self._stands():
+            for course in self.foot:
+                for percent in ring.at_percent:
+                    z = self.bottom_m + self._height(course, percent)
+                    for side in ("left", "right"):
+                        row = {
+                            "setup": name,
+                            "course": course,
+                            "level_m": self._level(course, percent),
+                            "side": side,
+                        }
+                        row |= tangent_sight(there, z, self.radius_m, side == "right")
+                        row["s_arcsec"] = ring.sd_arcsec
+                        for _ in range(ring.readings):
+                            yield row
+
+    def _traverse(self):
+        """{table: rows} of the set-ups, their stations, and the readings between neighbours."""
+        ring, stands = self.design.tangents, list(self._stands())
+        s_mm, s_arcsec = ring.traverse
+        kinds = _kinds_of_sights(s_mm, s_arcsec)
+        found = {"setups": [], "control": [], **{table: [] for table, _, _ in kinds}}
+        for k, (name, there) in enumerate(stands):
+            found["setups"].append(
+                {
+                    "setup": name,
+                    "station": f"S{name}",
+                    "instrument": ring.instrument,
+                    "instrument_height_m": ring.height_m,
+                }
+            )
+            x, y, _ = there
+            found["control"].append({"point": f"S{name}", "x_m": x, "y_m": y, "z_m": self.bottom_m})
+            for beside in ((k - 1) % len(stands), (k + 1) % len(stands)):
+                read = _sight(there, stands[beside][1])
+                row = {"setup": name, "to": f"S{stands[beside][0]}"}
+                for table, key, sd in kinds:
+                    high = {"target_height_m": ring.height_m}
+                    found[table].append(row | {key: read[key]} | sd | high)
+        return found
+
     def _ties(self):
         """Readings of targets that stand between neighbouring set-ups of a ring."""
         targets, s_mm, s_arcsec = self.design.ties
@@ -167,11 +223,7 @@ class Foreseen:
                         there = self._target(ring, mine[gap][2], target)
                         read = _sight(station, there)
                         row = {"setup": name, "to": f"T{number}-{gap + 1}-{target + 1}"}
-                        for table, key, sd in (
-                            ("directions", "direction_deg", {"s_arcsec": s_arcsec}),
-                            ("zenith_angles", "zenith_deg", {"s_arcsec": s_arcsec}),
-                            ("slope_distances", "distance_m", {"s_mm": s_mm}),
-                        ):
+                        for table, key, sd in _kinds_of_sights(s_mm, s_arcsec):
                             found[table].append(row | {key: read[key]} | sd)
         return found
 
@@ -181,6 +233,30 @@ class Foreseen:
         away = max(ring.radius_m, 1.0) + (0.5 if number % 2 else -0.3) * (1 + number // 2)
         z = self.bottom_m + TIE_HEIGHTS_M[number % 3]
         return np.array([away * np.sin(azimuth), away * np.cos(azimuth), z])
+
+
+def tangent_sight(station, z, radius_m, is_right):
+    """{column: value} of the sight from a station to a limb of a circle about the origin.
+
+    A circle's zero is +y; z  of the level that is touched
+    """
+    x, y, from_z = station
+    distance = np.hypot(x, y)
+    turn = np.arcsin(radius_m / distance) * (1 if is_right else -1)
+    length = np.sqrt(distance**2 - radius_m**2)
+    return {
+        "direction_deg": float(np.degrees(np.arctan2(-x, -y) + turn) % 360),
+        "zenith_deg": float(np.degrees(np.arctan2(length, z - from_z))),
+    }
+
+
+def _kinds_of_sights(s_mm, s_arcsec):
+    """(table, column, {column of its standard deviation: that}) of readings between stations."""
+    return (
+        ("directions", "direction_deg", {"s_arcsec": s_arcsec}),
+        ("zenith_angles", "zenith_deg", {"s_arcsec": s_arcsec}),
+        ("slope_distances", "distance_m", {"s_mm": s_mm}),
+    )
 
 
 def _sight(station, there):

@@ -1,6 +1,10 @@
-"""A wall to be strapped, read from reference lines or hit: how, and the job that it will be."""
+"""A wall to be strapped, read from reference lines, hit or sighted by its limbs: how, and the job
+that it will be.
+"""
 
 from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from tankcal.geometry.field.amplitudes import Amplitudes, assumed_amplitudes
 from tankcal.job.model import Job
@@ -63,6 +67,55 @@ class PlannedHits:
 
 
 @dataclass(frozen=True)
+class PlannedTangents:
+    """A traverse round the tank, from whose stations both limbs are sighted at the same parts of
+    each course.
+
+    radius_m   of its ring about the axis      height_m  of the instrument above the bottom
+    sd_arcsec  of a sight to a limb            readings  how often each limb is sighted
+    traverse   (s_mm of a distance, s_arcsec of an angle) between neighbouring stations
+    """
+
+    stations: int
+    radius_m: float
+    at_percent: tuple
+    sd_arcsec: float
+    traverse: tuple
+    start_deg: float = 0.0
+    height_m: float = 1.6
+    readings: int = 1
+    instrument: str | None = None
+
+
+def evenness_of_limbs(stations, radius_m, nominal_m):
+    """How evenly the places that sights of a ring touch lie round the wall.
+
+    The limbs of a station lie acos(nominal / radius) to both sides of it: 0.5, those of one side
+    are half-way between those of the other; 0, they fall on the same places.
+
+    Examples
+    --------
+    >>> round(evenness_of_limbs(8, 10.98, 6.1), 2), round(evenness_of_limbs(9, 12.5, 6.1), 2)
+    (0.5, 0.04)
+    """
+    apart = 2 * np.arccos(nominal_m / radius_m) * stations / (2 * np.pi)
+    return abs(float(apart - np.round(apart)))
+
+
+def even_radius_m(stations, radius_m, nominal_m, least_m):
+    """Radius of a ring whose limbs lie evenly, as near to another as can be; None: there is none.
+
+    least_m  that it must have
+    """
+    half = (np.arange(stations // 2 + 1) + 0.5) * np.pi / stations
+    found = nominal_m / np.cos(half[half < np.pi / 2 - 1e-9])
+    found = found[found >= least_m]
+    if not len(found):
+        return None
+    return float(found[np.argmin(np.abs(np.log(found / radius_m)))])
+
+
+@dataclass(frozen=True)
 class Design:
     """What will be measured.
 
@@ -73,11 +126,12 @@ class Design:
     lines: PlannedLines | None = None
     hits: tuple[PlannedHits, ...] = ()
     ties: tuple | None = None
+    tangents: PlannedTangents | None = None
 
 
 @dataclass(frozen=True)
 class WallPlan:
-    """A survey of a wall by tape, reference lines or bare hits, before it is made.
+    """A survey of a wall by tape, reference lines, bare hits or tangents, before it is made.
 
     Attributes
     ----------

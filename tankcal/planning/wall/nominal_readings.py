@@ -9,7 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from tankcal.geometry.field.information import expect_amplitudes
+from tankcal.geometry.girth import tangent_excess
+from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.wall_straps import area_term
+from tankcal.planning.wall.foreseen_tables import tangent_sight
+from tankcal.survey.readings import read_distance_m
 from tankcal.survey.strapping import reduce_straps
 
 OFFSET_M = 0.2  # of the lowest wall from a line
@@ -17,17 +22,35 @@ CLOSE_M, ROUNDS = 1e-12, 20
 
 
 def with_nominal_readings(job, amplitudes):
-    """The job with the readings of circumferences, offsets and hits that its sizes give.
+    """The job with the readings of circumferences, offsets, hits and tangents that its sizes give.
 
-    amplitudes  of the wall, for the area term of a shape that nobody declared
+    amplitudes  of the wall, for the area term of a shape that nobody declared, and for its hull
     """
+    if job.tangents is not None:
+        amplitudes = _expected(_nominal(job, amplitudes), amplitudes)
+    return _nominal(job, amplitudes)
+
+
+def _expected(job, amplitudes):
+    """`Amplitudes` as well known as its readings will tell them: as its tangents are reduced."""
+    return expect_amplitudes(find_survey(job, lambda text: None, amplitudes).survey.field)
+
+
+def _nominal(job, amplitudes):
     nominal = job.tank.nominal_diameter_m / 2
     outer = {one.name: nominal + one.thickness_m + one.paint_m for one in job.courses}
+    measurements = job.measurements
+    if job.tangents is not None:
+        measurements = replace(
+            measurements, readings=tuple(map(_ranger(job), measurements.readings))
+        )
     return replace(
         job,
+        measurements=measurements,
         strapping=job.strapping and _strapped(job, outer, amplitudes),
         lines=job.lines and _plumbed(job.lines, outer, nominal),
         hits=job.hits and _hit(job, outer, nominal),
+        tangents=job.tangents and _sighted(job, outer, amplitudes),
     )
 
 
@@ -78,3 +101,49 @@ def _hit(job, outer, nominal_m):
     scale = np.array([one.correction for one in known])
     added = np.array([one.correction_m for one in known])
     return replace(hits, distance_m=distance / (1 + scale) - added)
+
+
+def _sighted(job, outer, amplitudes):
+    """Sights past the outside of each course, and past what hulls of such walls stand out by."""
+    tangents, datum = job.tangents, job.datum
+    excess = tangent_excess(amplitudes, job.tank.nominal_diameter_m / 2)[0]
+    zero = datum.bottom_z_m + datum.plate_level_m
+    stations = place_stations(job)
+    found = [
+        tangent_sight(stations[name], zero + level, outer[course] + excess, right)
+        for name, course, level, right in zip(
+            tangents.setup, tangents.course, tangents.level_m, tangents.is_right, strict=True
+        )
+    ]
+    return replace(
+        tangents,
+        direction_rad=np.radians([one["direction_deg"] for one in found]),
+        zenith_rad=np.radians([one["zenith_deg"] for one in found]),
+    )
+
+
+def _ranger(job):
+    """Function Readings -> Readings: true distances as their instruments read them."""
+    tools = {one.name: one for one in job.measurements.instruments}
+    used = {one.name: one.instrument for one in job.measurements.setups}
+
+    def read(readings):
+        if readings.table != "slope_distances":
+            return readings
+        value = [
+            one if used[name] is None else read_distance_m(one, tools[used[name]])
+            for name, one in zip(readings.setup, readings.value, strict=True)
+        ]
+        return replace(readings, value=np.array(value))
+
+    return read
+
+
+def place_stations(job):
+    """{set-up of tangents: (3,) place of its instrument} as its plan has them."""
+    known = job.measurements.control
+    places = dict(zip(known.point, known.xyz_m, strict=True))
+    return {
+        name: places[one.station] + [0, 0, one.height_m]
+        for name, one in job.tangents.setups.items()
+    }

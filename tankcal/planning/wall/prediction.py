@@ -14,6 +14,7 @@ from tankcal.pipeline.statements import statements
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import ComputedTable, check_table, compute_table
+from tankcal.pipeline.tangent_checks import judge_tangents
 from tankcal.planning.limits import OfTable, refuse_without_delivery
 from tankcal.planning.wall.model import WallPlan
 from tankcal.planning.wall.telling import told_of_plan
@@ -33,7 +34,7 @@ class CourseOutlook:
     ----------
     name : str
         The course.
-    straps, offsets, hits : int
+    straps, offsets, hits, tangents : int
         Readings of it.
     radius_sd_m : float
         Standard deviation of its mean radius by the readings and by what they do not see, m.
@@ -43,6 +44,7 @@ class CourseOutlook:
     straps: int
     offsets: int
     hits: int
+    tangents: int
     radius_sd_m: float
 
 
@@ -53,7 +55,7 @@ class ReadingsOutlook:
     Attributes
     ----------
     kind : str
-        "straps" or "offsets".
+        "straps", "offsets" or "tangents".
     count : int
         Readings.
     uncontrolled : int
@@ -77,7 +79,8 @@ class WallTable:
     job : Job
     wall : Wall or StrappedWall
     made : ComputedTable
-    sighting : Sighting or None
+    sighting : Sighting or Touching or None
+        As `check_table` takes it.
     """
 
     job: Job
@@ -93,7 +96,7 @@ class WallTable:
 
 @dataclass(frozen=True)
 class WallPrediction(OfTable):
-    """What a survey of a wall by tape, lines or hits would give, before it is made.
+    """What a survey of a wall by tape, lines, hits or tangents would give, before it is made.
 
     Attributes
     ----------
@@ -111,7 +114,7 @@ class WallPrediction(OfTable):
 
     @cached_property
     def reliability(self):
-        """A tuple of ReadingsOutlook, of straps and offsets."""
+        """A tuple of ReadingsOutlook, of straps, offsets and tangents."""
         return readings_of(self.tabled)
 
     @cached_property
@@ -119,7 +122,11 @@ class WallPrediction(OfTable):
         """A tuple of Problem: what the run of such a survey will warn of."""
         tabled = self.tabled
         of_run = check_table(tabled.job, tabled.wall, tabled.made, tabled.sighting)
-        found = (*self.plan.warnings, *self.plan.job.warnings, *told_of_plan(of_run))
+        found = (
+            *self.plan.warnings,
+            *self.plan.job.warnings,
+            *told_of_plan(of_run, self.plan.design),
+        )
         return tuple(one for one in dict.fromkeys(found) if _code(one) not in OF_READINGS)
 
 
@@ -153,10 +160,13 @@ def foresee_table(job, amplitudes):
     """
     found = find_survey(job, lambda text: None, amplitudes)
     field = found.survey.field  # how well sizes are known changes no weight of a reading
-    field = replace(field, amplitudes=expect_amplitudes(field))
-    wall = replace(found.survey, field=field)
+    expected = expect_amplitudes(field)
+    if found.touching is not None:  # but how far a hull stands out
+        found = find_survey(job, lambda text: None, expected)
+        field = found.survey.field
+    wall = replace(found.survey, field=replace(field, amplitudes=expected))
     made = compute_table(found.job, wall)
-    return WallTable(found.job, wall, made, found.sighting)
+    return WallTable(found.job, wall, made, found.sighting or found.touching)
 
 
 def courses_of(tabled):
@@ -173,13 +183,15 @@ def courses_of(tabled):
     noise = field.noise_m2 if isinstance(wall, StrappedWall) else noise_of_wall(wall)
     sds = np.sqrt(np.diag(covariance) + np.einsum("ij,jk,ik->i", weights, noise, weights))
     names = [one.name for one in job.courses]
-    counts = {kind: dict.fromkeys(names, 0) for kind in ("straps", "offsets", "hits")}
+    counts = {kind: dict.fromkeys(names, 0) for kind in ("straps", "offsets", "hits", "tangents")}
     for one in () if job.strapping is None else job.strapping.straps:
         counts["straps"][one.course] += 1
     for one in () if job.lines is None else job.lines.offsets:
         counts["offsets"][one.course] += 1
     for course in () if job.hits is None else job.hits.course:
         counts["hits"][course] += 1
+    for course in () if job.tangents is None else job.tangents.course:
+        counts["tangents"][course] += 1
     return tuple(
         CourseOutlook(name, *(counts[kind][name] for kind in counts), float(sd))
         for name, sd in zip(names, sds, strict=True)
@@ -187,11 +199,13 @@ def courses_of(tabled):
 
 
 def readings_of(tabled):
-    """A ReadingsOutlook of the straps and of the offsets that a wall has."""
+    """A ReadingsOutlook of the straps, of the offsets and of the tangents that a wall has."""
     wall = tabled.wall if isinstance(tabled.wall, StrappedWall) else tabled.wall.read
-    if wall is None:
-        return ()
-    found = ((kind, wall.tests_of(kind)[1]) for kind in ("straps", "offsets"))
+    kinds = () if wall is None else ("straps", "offsets")
+    found = [(kind, wall.tests_of(kind)[1]) for kind in kinds]
+    if tabled.job.tangents is not None:
+        tests = judge_tangents(tabled.job, tabled.wall, tabled.sighting)
+        found.append(("tangents", tests.mdb_m[~tabled.job.tangents.check]))
     return tuple(_outlook(kind, mdb) for kind, mdb in found if len(mdb))
 
 

@@ -2,14 +2,17 @@
 
 import math
 from dataclasses import replace
-from itertools import islice
+
+import numpy as np
 
 from tankcal.errors import InputError
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.job.building import job_of
 from tankcal.job.checking import zero_z
 from tankcal.job.checks.hits import FEWEST_HITS, MOST_HITS, too_many_hits
-from tankcal.job.checks.strapping import MOST_STRAPS
+from tankcal.job.checks.lines import MOST_OFFSETS, too_many_offsets
+from tankcal.job.checks.strapping import MOST_STRAPS, too_many_straps
+from tankcal.job.checks.tangents import FEWEST_SETUPS, MOST_TANGENTS, too_many_tangents
 from tankcal.job.tables import Log, Value
 from tankcal.messages import message
 from tankcal.planning.fields import check_form, no_such_name
@@ -22,18 +25,24 @@ from tankcal.planning.wall.model import (
     PlannedHits,
     PlannedLines,
     PlannedStrap,
+    PlannedTangents,
     WallPlan,
+    even_radius_m,
+    evenness_of_limbs,
 )
 from tankcal.planning.wall.nominal_readings import with_nominal_readings
 from tankcal.planning.wall.telling import told_of_plan
 
 CLEAR_M, MOST_SECTIONS = 0.5, 50
+LIMBS = ("left", "right")
+UNEVEN = 0.15  # of limbs: nearer to each other than that, they are the same place, about
+USUAL_HEIGHT_M = 1.6  # of an instrument above the bottom
 FEWEST_AZIMUTHS = 3  # that a circle goes through
 OF_POINTS = ("pattern", "photo_rings", "setup_rings", "tapes", "obstacles")
 
 
 def is_wall_plan(own):
-    """Does a plan say how its wall is strapped, read from lines, or hit?
+    """Does a plan say how its wall is strapped, read from lines, hit or sighted by its limbs?
 
     own  {section: what stands there}
     """
@@ -51,8 +60,8 @@ def check_sections(given, courses, nominal_m, log):
             if one.filled:
                 expected = message(
                     "plan_points_and_wall",
-                    "given together with straps, lines or hits; expected only one of them: a plan"
-                    " is of targets or of the bare wall",
+                    "given together with straps, lines, hits or tangents; expected only one of"
+                    " them: a plan is of targets or of the bare wall",
                 )
                 log.problem(PLAN_FILE, expected, one.row, one.name)
     for one in (*given.repeated["straps"], *given.repeated["hits"]):
@@ -64,6 +73,9 @@ def check_sections(given, courses, nominal_m, log):
         _check_hits(given.repeated["hits"], courses, log)
     check_form(given.single["wall"], log)
     _check_lines_and_ties(given, log)
+    _check_tangents(given, nominal_m, log)
+    if courses:
+        _check_totals(given, courses, log)
 
 
 def _check_rings(given, nominal_m, log):
@@ -140,6 +152,95 @@ def _check_lines_and_ties(given, log):
                 ties.tell(log.problem, key, expected)
 
 
+def _check_tangents(given, nominal_m, log):
+    """A traverse whose stations see each other past the tank, and no other sights beside it."""
+    ring, traverse = given.single["tangents"], given.single["traverse"]
+    if traverse.filled and not ring.filled:
+        expected = message(
+            "plan_traverse_alone",
+            "given without [tangents]; expected limbs that are sighted from it",
+        )
+        log.problem(PLAN_FILE, expected, traverse.row, "traverse")
+    if not ring.filled:
+        return
+    if not traverse.filled:
+        expected = message(
+            "plan_tangents_untied",
+            "given without [traverse]; expected s_mm and s_arcsec of the readings between its"
+            " stations: they tie the sights",
+        )
+        log.problem(PLAN_FILE, expected, ring.row, "tangents")
+    for name in ("lines", "hits"):
+        other = given.single.get(name) or next(iter(given.repeated.get(name, ())), None)
+        if other is not None and other.filled:
+            expected = message(
+                "plan_tangents_beside",
+                "given together with [tangents]; expected only one of them: tankcal does not join"
+                " them yet",
+            )
+            log.problem(PLAN_FILE, expected, other.row, name)
+    count, radius = ring["stations"], ring["radius_m"]
+    if count is not None and count < FEWEST_SETUPS:
+        expected = message(
+            "plan_few_stations",
+            "found {found:g}; expected {fewest} or more: each level is sighted from so many",
+            found=count,
+            fewest=FEWEST_SETUPS,
+        )
+        ring.tell(log.problem, "stations", expected)
+        return
+    if None in (count, radius, nominal_m):
+        return
+    least = least_ring_m(count, nominal_m)
+    if radius < least:
+        expected = message(
+            "plan_stations_blind",
+            "found {radius:g} m; expected {least:.2f} m or more: the lines between {count:g}"
+            " stations must pass the wall, which is at {nominal:g} m, by {clear:g} m",
+            radius=radius,
+            least=np.ceil(100 * least) / 100,
+            count=count,
+            clear=CLEAR_M,
+            nominal=nominal_m,
+        )
+        ring.tell(log.problem, "radius_m", expected)
+    elif evenness_of_limbs(count, radius, nominal_m) < UNEVEN:
+        better = even_radius_m(int(count), radius, nominal_m, least)
+        expected = message(
+            "plan_limbs_coincide",
+            "at {radius:g} m the limbs of {count:g} stations fall on nearly the same places of the"
+            " wall, two by two; at {better:.2f} m they lie evenly",
+            radius=radius,
+            count=count,
+            better=better or 2 * radius,
+        )
+        ring.tell(log.warning, "radius_m", expected)
+
+
+def least_ring_m(stations, nominal_m):
+    """Radius of a ring whose stations see each other past the wall."""
+    return float(nominal_m / np.cos(np.pi / stations) + CLEAR_M)
+
+
+def _check_totals(given, courses, log):
+    """Not more readings of a kind than can be used."""
+    straps = sum(
+        len(one["courses"] or courses) * len(_at(one)) * int(one["readings"] or 1)
+        for one in given.repeated["straps"]
+    )
+    if straps > MOST_STRAPS:
+        log.problem(PLAN_FILE, too_many_straps(straps), None, "straps")
+    lines, ring = given.single["lines"], given.single["tangents"]
+    levels = len(courses) * len(_at(lines))
+    offsets = int((lines["count"] or 0) * (lines["faces"] or 2) * (lines["readings"] or 1)) * levels
+    if lines.filled and offsets > MOST_OFFSETS:
+        log.problem(PLAN_FILE, too_many_offsets(offsets), lines.row, "lines")
+    levels = len(courses) * len(_at(ring))
+    tangents = int((ring["stations"] or 0) * (ring["readings"] or 1)) * levels * len(LIMBS)
+    if ring.filled and tangents > MOST_TANGENTS:
+        log.problem(PLAN_FILE, too_many_tangents(tangents), ring.row, "tangents")
+
+
 def design_of(given, courses):
     """The `Design` of sound sections on a tank of these courses."""
     straps = (
@@ -149,10 +250,11 @@ def design_of(given, courses):
         for percent in _at(one)
     )
     return Design(
-        straps=tuple(islice(straps, MOST_STRAPS + 1)),  # more are refused with the job
+        straps=tuple(straps),
         lines=_lines(given.single["lines"]),
         hits=tuple(_hits(one, courses) for one in given.repeated["hits"]),
         ties=_ties(given.single["setup_ties"]),
+        tangents=_tangents(given.single["tangents"], given.single["traverse"]),
     )
 
 
@@ -188,7 +290,7 @@ def _hits(entry, courses):
         at_percent=_at(entry),
         courses=entry["courses"] or courses,
         start_deg=entry["start_azimuth_deg"] or 0.0,
-        height_m=1.6 if entry["height_m"] is None else entry["height_m"],
+        height_m=USUAL_HEIGHT_M if entry["height_m"] is None else entry["height_m"],
         spread_deg=entry["spread_deg"],
         instrument=entry["instrument"],
     )
@@ -198,6 +300,22 @@ def _ties(entry):
     if not entry.filled:
         return None
     return int(entry["targets"]), entry["s_mm"], entry["s_arcsec"]
+
+
+def _tangents(entry, traverse):
+    if not entry.filled:
+        return None
+    return PlannedTangents(
+        stations=int(entry["stations"]),
+        radius_m=entry["radius_m"],
+        at_percent=_at(entry),
+        sd_arcsec=entry["s_arcsec"],
+        traverse=(traverse["s_mm"], traverse["s_arcsec"]),
+        start_deg=entry["start_azimuth_deg"] or 0.0,
+        height_m=USUAL_HEIGHT_M if entry["height_m"] is None else entry["height_m"],
+        readings=int(entry["readings"] or 1),
+        instrument=entry["instrument"],
+    )
 
 
 def wall_plan_of(raw, values, tables, given, limits, folder):
@@ -216,7 +334,7 @@ def wall_plan_of(raw, values, tables, given, limits, folder):
     bottom = values["datum"]["bottom_z_m"]
     tank = (courses, values["tank"]["nominal_diameter_m"] / 2, bottom, zero_z(values) - bottom)
     return WallPlan(
-        job=job_of_design(raw, design, tank, amplitudes),
+        job=job_of_design(raw, design, tank, amplitudes, _rows_of(given)),
         design=design,
         limits=limits,
         amplitudes=amplitudes,
@@ -224,6 +342,12 @@ def wall_plan_of(raw, values, tables, given, limits, folder):
         folder=folder,
         given=raw,
     )
+
+
+def _rows_of(given):
+    """{section: row of plan.toml where it begins}."""
+    rows = {name: one.row for name, one in given.single.items()}
+    return rows | {name: found[0].row for name, found in given.repeated.items() if found}
 
 
 def changed(plan, design=None, raw=None):
@@ -245,21 +369,28 @@ def _tank_of(job):
     return courses, job.tank.nominal_diameter_m / 2, datum.bottom_z_m, datum.plate_level_m
 
 
-def job_of_design(raw, design, tank, amplitudes):
+def job_of_design(raw, design, tank, amplitudes, rows=None):
     """The Job of a RawJob and the tables that a `Design` makes, with the readings foreseen.
 
     tank  courses, radius, z of the bottom, zero of the table above it: as `Foreseen` takes them
+    rows  {section: row of plan.toml}, for what is told
     """
     made = Foreseen(design, *tank).tables()
     settings = dict(raw.settings)
-    if design.ties is not None:
-        given = settings.get("adjustment", {})
-        settings["adjustment"] = {"datum": Value("inner")} | given
+    datum = datum_of(design)
+    if datum is not None:
+        settings["adjustment"] = {"datum": Value(datum)} | settings.get("adjustment", {})
     whole = replace(raw, tables=raw.tables | made, settings=settings)
     try:
         job = job_of(whole, Log())
     except InputError as error:
-        raise InputError(told_of_plan(error.problems)) from error
-    if design.lines is not None or job.hits is not None or job.strapping is not None:
-        job = with_nominal_readings(job, amplitudes)
-    return replace(job, warnings=told_of_plan(job.warnings))
+        raise InputError(told_of_plan(error.problems, design, rows)) from error
+    job = with_nominal_readings(job, amplitudes)
+    return replace(job, warnings=told_of_plan(job.warnings, design, rows))
+
+
+def datum_of(design):
+    """`adjustment.datum` of the network of a `Design`, where a plan does not say it; None: none."""
+    if design.tangents is not None:
+        return "minimal"
+    return None if design.ties is None else "inner"

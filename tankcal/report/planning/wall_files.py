@@ -1,7 +1,7 @@
-"""The files of a plan of straps, reference lines or hits for programs, and its empty job."""
+"""The files of a plan of the bare wall for programs, and its empty job."""
 
 from tankcal.job.starter import FilledForm, write_form
-from tankcal.planning.wall.reading import tables_of
+from tankcal.planning.wall.reading import datum_of, tables_of
 from tankcal.record import save
 from tankcal.record.wall_plan import plain_of_wall
 from tankcal.report.planning.empty_job import AS_GIVEN, MEASURED, as_given, entries, short, text
@@ -33,13 +33,16 @@ def form_of_wall(plan):
         for section, given in raw.settings.items()
         for key, one in given.items()
     }
-    if design.ties is not None:
-        settings.setdefault("adjustment.datum", "inner")
+    datum = datum_of(design)
+    if datum is not None:
+        settings.setdefault("adjustment.datum", datum)
     foreseen = {name: _without_values(table) for name, table in tables_of(plan).items()}
     survey = "strapping" if design.lines is None else "reference-line"
+    if design.hits or design.tangents is not None:
+        survey = "wall-hits" if design.hits else "tangents"
     return FilledForm(
         kind="vertical",
-        survey="wall-hits" if design.hits else survey,
+        survey=survey,
         language=plan.job.table.language or DEFAULT,
         settings={key: one for key, one in settings.items() if key not in MEASURED},
         given={name: as_given(raw.tables[name]) for name in GIVEN if name in raw.tables} | foreseen,

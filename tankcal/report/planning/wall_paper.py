@@ -1,4 +1,4 @@
-"""The papers of a plan of straps, reference lines or hits: prediction and field sheets."""
+"""The papers of a plan of the bare wall: prediction and field sheets."""
 
 import numpy as np
 
@@ -11,7 +11,9 @@ from tankcal.report.planning.outlook import result, table
 from tankcal.report.planning.paper import PlanPaper
 from tankcal.report.planning.wall_rows import COURSES, courses_of, field_tables_of_wall
 
-COUNTED = ("circumferences", "strap_readings", "lines", "offsets", "setups", "hits")
+COUNTED = ("circumferences", "strap_readings", "lines", "offsets", "setups", "hits", "tangents")
+
+NARROW = ("sight_lines", "offsets", "shared_targets")  # tables of few columns: two side by side
 
 
 class WallPaper(PlanPaper):
@@ -21,7 +23,10 @@ class WallPaper(PlanPaper):
 
     def change(self, change):
         """A `planning.changes.Change` of a WallPlan in words."""
-        return self.word(f"changes.{change.action}_wall_{change.item}", name=change.name)
+        code = f"{change.action}_wall_{change.item}"
+        if change.name == "tangents":  # of which there is no name
+            code += "_of_tangents"
+        return self.word(f"changes.{code}", name=change.name)
 
 
 def wall_outlook(paper):
@@ -81,13 +86,14 @@ def wall_sheets(paper):
         "circumferences": "circumferences",
         "sight_lines": "offsets",
         "hit_setups": "hits",
+        "tangent_stations": "tangents",
     }
     found = [*paper.head("field_sheets"), paper.facts(_counts(paper))]
     found += paper.warnings(paper.plan.warnings)
     for name, one in tables.items():
         if name in heads:
             found += [paper.heading(heads[name]), paper.paragraph(f"wall_{heads[name]}")]
-        found.append(paper.table(name, *one, across=2 if name == "shared_targets" else None))
+        found.append(paper.table(name, *one, across=2 if name in NARROW else None))
     return [
         *found,
         paper.heading("afterwards"),

@@ -1,7 +1,8 @@
-"""What a crew will read of a wall, row by row: straps, lines, offsets, hits and set-ups."""
+"""What a crew will read of a wall, row by row: straps, lines, offsets, hits, set-ups, tangents."""
 
 import numpy as np
 
+from tankcal.planning.wall.nominal_readings import place_stations
 from tankcal.report.plain import Column
 
 HEIGHT = Column("height_m", "m", decimals=3)
@@ -11,6 +12,7 @@ COURSE, COUNT = Column("course"), Column("readings", decimals=0)
 AZIMUTH = Column("azimuth_rad", "rad deg", decimals=1)
 INSTRUMENT, AS_READ = Column("instrument"), Column("value", nothing="_" * 14, words="marks")
 SD = Column("sd_m", "mm", decimals=2)
+SD_ARCSEC = Column("sd_rad", "rad arcsec", decimals=1, heading="sd_m")
 STRAPS = (
     Column("circumference"), COURSE, IN_COURSE, LEVEL, Column("expected_m", "m", decimals=3), SD,
     INSTRUMENT, Column("reading", decimals=0), AS_READ, Column("temperature", nothing="_" * 6),
@@ -22,9 +24,25 @@ SETUPS = (
 )  # fmt: skip
 HITS = (COURSE, IN_COURSE, HEIGHT, Column("setups", decimals=0), Column("hits", decimals=0))
 TIES = (Column("point"), Column("setup"))
+STANDS = (
+    *SETUPS[:-1],
+    Column("expected_m", "m", decimals=2, heading="from_neighbours"),
+    INSTRUMENT,
+)
+BY_PEN = {"nothing": "_" * 11, "words": "marks"}  # filled in on site
+TRAVERSE = (
+    Column("setup"), Column("to"), Column("expected_m", "m", decimals=2),
+    Column("direction", **BY_PEN), Column("zenith", **BY_PEN), Column("distance", **BY_PEN),
+    Column("target_height", nothing="_" * 6, words="marks"),
+)  # fmt: skip
+TANGENTS = (
+    Column("setup"), COURSE, IN_COURSE, LEVEL, Column("side", words="marks"),
+    Column("expected_rad", "rad deg", decimals=2, heading="expected_zenith"), SD_ARCSEC,
+    Column("direction", **BY_PEN), Column("zenith", **BY_PEN),
+)  # fmt: skip
 COURSES = (
     COURSE, Column("straps", decimals=0), Column("offsets", decimals=0), Column("hits", decimals=0),
-    Column("radius_m", "mm", digits=2),
+    Column("tangents", decimals=0), Column("radius_m", "mm", digits=2),
 )  # fmt: skip
 
 
@@ -37,6 +55,9 @@ def field_tables_of_wall(plan):
         "hit_setups": (_setups(plan), SETUPS),
         "hit_levels": (_hits(plan), HITS),
         "shared_targets": (_ties(plan), TIES),
+        "tangent_stations": (_stands(plan), STANDS),
+        "traverse": (_traverse(plan), TRAVERSE),
+        "tangents": (_tangents(plan), TANGENTS),
     }
     return {name: table for name, table in found.items() if table[0]}
 
@@ -133,9 +154,59 @@ def _hits(plan):
     return rows
 
 
+def _stands(plan):
+    tangents = plan.job.tangents
+    if tangents is None:
+        return []
+    places = place_stations(plan.job)
+    beside = {row["setup"]: row["expected_m"] for row in _traverse(plan)}
+    return [
+        {
+            "setup": name,
+            "azimuth_rad": float(np.arctan2(x, y) % (2 * np.pi)),
+            "from_axis_m": float(np.hypot(x, y)),
+            "height_m": tangents.setups[name].height_m,
+            "expected_m": beside[name],
+            "instrument": tangents.setups[name].instrument,
+        }
+        for name, (x, y, _) in places.items()
+    ]
+
+
+def _traverse(plan):
+    """Each sight between neighbouring stations."""
+    if plan.job.tangents is None:
+        return []
+    ranged = next(one for one in plan.job.measurements.readings if one.table == "slope_distances")
+    pairs = zip(ranged.setup, ranged.end, ranged.value, strict=True)
+    return [{"setup": name, "to": end, "expected_m": float(m)} for name, end, m in pairs]
+
+
+def _tangents(plan):
+    tangents, feet = plan.job.tangents, _feet(plan)
+    if tangents is None:
+        return []
+    columns = (
+        *(tangents.setup, tangents.course, tangents.level_m, tangents.is_right),
+        *(tangents.zenith_rad, tangents.sd_rad),
+    )
+    return [
+        {
+            "setup": setup,
+            "course": course,
+            "height_in_course_m": level - feet[course],
+            "level_m": level,
+            "side": "right" if is_right else "left",
+            "expected_rad": zenith,
+            "sd_rad": sd,
+        }
+        for setup, course, level, is_right, zenith, sd in zip(*columns, strict=True)
+    ]
+
+
 def _ties(plan):
     found = {}
-    measurements = plan.job.measurements
+    measurements = None if plan.job.tangents is not None else plan.job.measurements
     for one in () if measurements is None else measurements.readings:
         for setup, target in zip(one.setup or (), one.end, strict=True):
             found.setdefault(target, dict.fromkeys(())).setdefault(setup)
@@ -150,6 +221,7 @@ def courses_of(prediction):
             "straps": one.straps or None,
             "offsets": one.offsets or None,
             "hits": one.hits or None,
+            "tangents": one.tangents or None,
             "radius_m": one.radius_sd_m,
         }
         for one in prediction.courses

@@ -25,6 +25,8 @@ OTHER_UNITS = (
 )
 HORIZONTAL = ("directions", "horizontal_angles", "azimuths")
 EXCHANGED = 7  # control points of which each two are exchanged
+CONTROL = "control.csv"
+MOST_SETUPS = 30  # whose circles are supposed, one after the other, to show another unit
 MOST = 12  # photos that are left out one after the other
 
 
@@ -36,7 +38,7 @@ def likely_mistake(measurements, sigma0, run):
     """
     limit = min(BETTER * sigma0, SOUND)
     explained = []
-    for suppositions in (_mirrored, _exchanged, _in_other_units):
+    for suppositions in (_mirrored, _exchanged, _in_other_units, _of_a_setup):
         for problem, changed in suppositions(measurements):
             try:
                 found = run(changed)[0].sigma0
@@ -47,7 +49,11 @@ def likely_mistake(measurements, sigma0, run):
         if any(found < CERTAIN for found, _ in explained):
             break
     best = min((found for found, _ in explained), default=np.inf)
-    return [problem for found, problem in explained if found < ALIKE * best]
+    likely = [problem for found, problem in explained if found < ALIKE * best]
+    if measurements.settings.datum == "control":
+        return likely
+    # coordinates that hold no datum are starts: swapped ones alone do no harm, but a circle does
+    return sorted(likely, key=lambda problem: problem.file == CONTROL)
 
 
 def _mirrored(measurements):
@@ -107,6 +113,28 @@ def _in_other_units(measurements):
                 yield Problem(f"{table}.csv", text), _times(measurements, [table], factor)
 
 
+def _of_a_setup(measurements):
+    """The same of the circles of one set-up in another unit, of all its tables or of one."""
+    tables = [one for one in measurements.readings if one.setup and KINDS[one.table].is_angle]
+    names = list(dict.fromkeys(name for one in tables for name in one.setup))
+    if not 1 < len(names) <= MOST_SETUPS or measurements.image_points is not None:
+        return
+    for name in names:
+        mine = [one for one in tables if name in one.setup]
+        for factor, what in GON:
+            text = message(
+                "setup_misread",
+                "the angles of set-up {setup} fit if they are {what}",
+                setup=name,
+                what=what,
+            )
+            for chosen in ([mine] if len(mine) > 1 else []) + [[one] for one in mine]:
+                first = chosen[0]
+                row = first.rows[first.setup.index(name)] if first.rows else None
+                of = tuple(one.table for one in chosen)
+                yield Problem(first.file, text, row), _times(measurements, of, factor, name)
+
+
 def _of_control(measurements):
     """x and y of control exchanged, in all systems, then in one of several."""
     control = measurements.control
@@ -161,9 +189,16 @@ def _scale_is_known(measurements, table):
     )
 
 
-def _times(measurements, tables, factor):
+def _times(measurements, tables, factor, setup=None):
+    """The values of tables times a factor; of one set-up alone where it is named."""
+
+    def by(one):
+        if setup is None:
+            return factor
+        return np.where([name == setup for name in one.setup], factor, 1.0)
+
     readings = tuple(
-        replace(one, value=one.value * factor) if one.table in tables else one
+        replace(one, value=one.value * by(one)) if one.table in tables else one
         for one in measurements.readings
     )
     return replace(measurements, readings=readings)
