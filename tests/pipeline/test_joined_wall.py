@@ -15,9 +15,12 @@ from test_hit_wall import (
     LEVELS,
     NOISY,
     SLOPE,
+    TAPE,
     circle,
+    girth_of,
     oval,
     parts_of,
+    problems_of,
     run,
     strapped,
     volume_of,
@@ -129,6 +132,47 @@ def test_a_line_read_once_is_controlled_by_nothing(tmp_path):
     read = run(tmp_path, parts).read
     assert read.tested.accepted.all()
     assert np.isinf(read.tested.sd_m).all()
+
+
+def one_ring(parts, level=LEVELS[0]):
+    """The parts with points of one level alone."""
+    points = parts.tables["points"]
+    parts.tables["points"] = [points[0], *(row for row in points[1:] if abs(row[3] - level) < 0.1)]
+    return parts
+
+
+def strapped_above(parts, radius=oval):
+    """The parts with two straps of each course but the first."""
+    rows = [
+        [f"{z}", str(int(z // 2) + 1), z, girth_of(radius, z) + np.pi * TAPE, 0.5, "T"]
+        for z in LEVELS[2:]
+    ]
+    parts = strapped(parts, radius)
+    parts.tables["circumferences"][1:] = rows
+    return parts
+
+
+@pytest.mark.parametrize("tell", [plumbed, strapped_above])
+def test_one_ring_of_points_serves_where_lines_or_straps_tell_the_rest(tmp_path, tell):
+    """Exact geometry: the ring tells the radius, lines or straps all other courses."""
+    result = run(tmp_path, one_ring(as_points(tell(parts_of()), sd_mm=(1e-3, 1e-3, 1e-3))))
+    assert len(result.wall.sections) == 1
+    assert abs(result.table.volume_m3[-1] - volume_of(oval)) < result.table.U_m3[-1]
+    rel = 2e-5 if tell is plumbed else 2e-4  # the area term of waves between 12 points
+    assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=rel)
+
+
+def test_a_lean_that_lines_show_is_no_part_of_an_outline(tmp_path, monkeypatch):
+    """Exact geometry: a shell that leans by 2 % has horizontal cuts as large as an upright one."""
+    monkeypatch.setitem(globals(), "SLOPE", (0.02, 0.0))
+    result = run(tmp_path, one_ring(as_points(plumbed(parts_of()), sd_mm=(1e-3, 1e-3, 1e-3))))
+    assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=2e-5)
+
+
+def test_courses_that_no_line_carries_a_radius_to_are_refused(tmp_path):
+    """Lines on courses of which no points and no tape tell one carry nothing."""
+    parts = one_ring(as_points(plumbed(parts_of(), levels=LEVELS[2:])))
+    assert {one[0] for one in problems_of(tmp_path, parts)} == {"courses.csv"}
 
 
 def dense(result):

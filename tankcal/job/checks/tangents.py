@@ -27,7 +27,7 @@ def check_tangents(values, tables, registers, raw, log):
         )
         log.problem(table.file, expected)
         return
-    for name in ("points", "targets", "wall_hits", "offsets"):
+    for name in ("points", "targets", "wall_hits"):
         if has_rows(tables[name]):
             expected = message(
                 "beside_tangents",
