@@ -29,6 +29,7 @@ from test_hit_wall import (
 import tankcal
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
+from tankcal.pipeline.line_checks import check_leans, compare_leans, levels_and_lean
 from tankcal.survey.reference_line import ARCSEC
 
 KAPPA, COUNT = 15 * ARCSEC, 12
@@ -173,6 +174,31 @@ def test_courses_that_no_line_carries_a_radius_to_are_refused(tmp_path):
     """Lines on courses of which no points and no tape tell one carry nothing."""
     parts = one_ring(as_points(plumbed(parts_of(), levels=LEVELS[2:])))
     assert {one[0] for one in problems_of(tmp_path, parts)} == {"courses.csv"}
+
+
+def test_the_lean_of_lines_is_that_of_the_points(tmp_path):
+    """Exact geometry: both are the slope of the shell."""
+    result = run(tmp_path, plumbed(parts_of()))
+    test = compare_leans(levels_and_lean(result.job, result.read)[1], result.wall.shell)
+    np.testing.assert_allclose([test.of_lines, test.of_points], [SLOPE, SLOPE], atol=5e-5)
+    assert test.w < 1
+    assert not list(check_leans(result.job, result.wall))
+
+
+@pytest.mark.parametrize(("azimuth", "cause"), [
+    (lambda i: -30 * i % 360, "leans_mirrored"), (lambda i: 30 * (i + 2) % 360, "leans_turned"),
+])  # fmt: skip
+def test_azimuths_of_lines_in_another_frame_are_named(tmp_path, azimuth, cause):
+    """Planted: lines numbered anticlockwise, or counted from another zero."""
+    parts = plumbed(as_points(parts_of()), sd_m=3e-4)
+    lines = parts.tables["lines"]
+    parts.tables["lines"] = [
+        [*lines[0], "azimuth_deg"], *([*row, azimuth(i)] for i, row in enumerate(lines[1:]))
+    ]  # fmt: skip
+    result = run(tmp_path, parts)
+    (told,) = check_leans(result.job, result.wall)
+    assert told.text.values["text"].values["cause"].code == cause
+    assert str(told) in map(str, result.warnings)
 
 
 def dense(result):
