@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import test_tangent_wall as of_tangents
 from generated_hits import Surface, even_aims
 from job_builder import write_folder
 from test_hit_wall import (
@@ -35,18 +36,22 @@ from tankcal.survey.reference_line import ARCSEC
 KAPPA, COUNT = 15 * ARCSEC, 12
 
 
-def plumbed(parts, radius=oval, sd_m=0.0, seed=2, *, inside=False, levels=LEVELS):
-    """The parts with offsets from lines that stand upright, read on both faces along rays."""
+def plumbed(parts, radius=oval, sd_m=0.0, seed=2, *, inside=False, levels=LEVELS, outer=None):
+    """The parts with offsets from lines that stand upright, read on both faces along rays.
+
+    outer  `Surface` outside; None: plates outside of the radius about the foot
+    """
     rng = np.random.default_rng(seed)
-    surface = Surface(radius, FOOT, SLOPE)
+    surface = outer or Surface(radius, FOOT, SLOPE)
     turn = 2 * np.pi * np.arange(COUNT) / COUNT
     ray = np.column_stack([np.sin(turn), np.cos(turn)])
-    start = np.array(FOOT) + levels[0] * np.array(SLOPE)
+    start = np.array(surface.foot_m) + levels[0] * np.array(surface.slope)
     constants = rng.uniform(0.1, 0.3, COUNT)
     rows = [["line", "course", "level_m", "offset_mm", "s_mm", "face"]]
     for z in levels:
         plate = parts.tables["courses"][int(z // 2) + 1][2] / 1000
-        away = [_distance(surface, start, one, z) + plate * (not inside) for one in ray]
+        more = plate * (not inside and outer is None)
+        away = [_distance(surface, start, one, z) + more for one in ray]
         for face, lean in ((1, KAPPA), (2, -KAPPA)):
             size = np.array(away) - 6.5 - (z - levels[0]) * lean
             read = constants + size * (1 if inside else -1) + sd_m * rng.normal(size=COUNT)
@@ -201,6 +206,23 @@ def test_azimuths_of_lines_in_another_frame_are_named(tmp_path, azimuth, cause):
     assert str(told) in map(str, result.warnings)
 
 
+@pytest.mark.slow
+def test_lines_beside_tangents_agree_on_an_exact_wall(tmp_path):
+    """Exact geometry: sights that touch, offsets along rays; a level that tangents alone saw, and
+    courses that lines alone saw.
+    """
+    outer = Surface(of_tangents.oval, of_tangents.FOOT, of_tangents.SLOPE)
+    rows = of_tangents.sights(of_tangents.oval, of_tangents.Circle(), levels=LEVELS[:4])
+    parts = plumbed(of_tangents.parts_of(rows, seed=None), outer=outer)
+    result = run(tmp_path, parts)
+    assert result.read.tested.accepted.all()
+    assert result.read.collimations["ZL"][0] == pytest.approx(KAPPA, rel=2e-2)
+    assert {one.group.course for one in result.wall.sections} == {0, 1}
+    truth = of_tangents.inside_of(of_tangents.oval)
+    assert result.table.volume_m3[-1] == pytest.approx(truth, rel=3e-5)
+    assert abs(result.table.volume_m3[-1] - truth) < result.table.U_m3[-1]
+
+
 def dense(result):
     """(values, covariance, size) of a joined wall by one adjustment of everything.
 
@@ -275,9 +297,10 @@ def dense(result):
     return found, root @ root.T, columns
 
 
-def test_points_straps_and_offsets_are_one_dense_adjustment(tmp_path):
+@pytest.mark.parametrize("seen", [lambda parts: parts, one_ring])
+def test_points_straps_and_offsets_are_one_dense_adjustment(tmp_path, seen):
     """Second method: estimates and covariances to 1e-9, linearised at the same place."""
-    parts = plumbed(as_points(strapped(parts_of())), sd_m=5e-4)
+    parts = plumbed(seen(as_points(strapped(parts_of()))), sd_m=5e-4)
     job = tankcal.load(write_folder(tmp_path, parts))
     job = replace(job, snooping=False)
     result = tankcal.run(job, simulated=False)
