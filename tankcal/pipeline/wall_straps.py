@@ -51,12 +51,14 @@ def area_term(shape_sd_m, amplitudes, nominal_m, points=None):
     """`AreaTerm` of a wall, and the standard deviation of its radius that it follows from.
 
     shape_sd_m  as declared; None: of the ovality and the seams that it has by its amplitudes
-    points      `PointsOfWall`, whose outlines it has where none is declared
+    points      `PointsOfWall`, whose outlines it has where none is declared; None: of a plan
     """
-    if shape_sd_m is not None:
+    is_declared = shape_sd_m is not None
+    if not is_declared:
+        waves = [one.shape in ("oval", "seam") for one in COMPONENTS]
+        shape_sd_m = float(np.sqrt(amplitudes.variances_m2[waves].sum()))
+    if is_declared or points is None:
         return AreaTerm(*perimeter_excess(shape_sd_m, nominal_m)), shape_sd_m
-    waves = [one.shape in ("oval", "seam") for one in COMPONENTS]
-    shape_sd_m = float(np.sqrt(amplitudes.variances_m2[waves].sum()))
     return AreaTerm(*seen_excess(amplitudes, nominal_m, _rings_of(points))), shape_sd_m
 
 
