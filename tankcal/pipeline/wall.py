@@ -228,10 +228,12 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         noise = by_points @ (covariance @ by_points.T)  # between sections, too
         noise = noise.toarray() if scipy.sparse.issparse(noise) else noise
     if not is_read:
+        apart = unbound.first_apart if job.points.unbound else None
         sites = unbound.shared_by(sites) if job.points.unbound else sites
         if by_inputs:
             noise = noise + noise_by_inputs(job.inputs, by_inputs, len(radius))
-        field, read, straps = WallField(sites, radius, noise, amplitudes, nominal), None, None
+        field = WallField(sites, radius, noise, amplitudes, nominal, plumbed=apart)
+        read = straps = None
     else:
         points = PointsOfWall(sites, radius, noise, unbound, by_inputs)
         read, straps = join_readings(job, points, amplitudes, joints, is_known=is_known)

@@ -252,7 +252,9 @@ def _joined_field(job, points, readings, amplitudes, heights):
     may = [job.snooping and (is_bound or one.of == "offsets") for one in readings]
     may_go = np.append(np.zeros(n), may)
 
-    apart = int(points.sites.ring.max(initial=-1)) + 1
+    apart = points.unbound.first_apart
+    if apart is None:
+        apart = int(points.sites.ring.max(initial=-1)) + 1
 
     def field_of(accepted):
         some = np.flatnonzero(accepted)

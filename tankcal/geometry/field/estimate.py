@@ -58,8 +58,8 @@ class WallField:
         any each course is a cylinder of its mean radius, as standards of strapping have it; with
         "mean" alone a surface of revolution.
     plumbed : int, optional
-        Rings from this number on stand off a plumb line, not off the axis: where they are is no
-        part of an outline.
+        Rings from this number on do not stand off the axis, but off a plumb line, or off set-ups
+        that may move: where they are is no part of an outline.
     """
 
     sites: Sites
