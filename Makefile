@@ -60,6 +60,7 @@ schemas: $(VENV)/full ## write the JSON schemas of what is saved and docs/saved-
 bench: export ROUNDS ?= 5
 bench: $(VENV)/full ## time and memory of the main job, walls, tables of 1 mm rows and their u, ten million points, files of scanners, plans
 	$(BIN)/python benchmarks/main_job.py
+	$(BIN)/python benchmarks/strapping.py
 	$(BIN)/python benchmarks/table.py
 	$(BIN)/python benchmarks/uncertainty.py
 	$(BIN)/python benchmarks/monte_carlo.py 9500 $(ROUNDS)

@@ -175,7 +175,7 @@ def hit_job(rng, wall, *, folder, hits, levels=2, straps=False, sd_m=1.5e-3, lea
     taped = None
     if straps:
         tape = Tape("T", 0.0, 0.0, None, None, 0.0, TAPE_M, u_scale=TAPE_SCALE)
-        taped = Strapping(_straps(rng, wall), (tape,), shape_sd_m=0.0)
+        taped = Strapping(_straps(rng, wall), (tape,), shape_sd_m=None)
     return replace(
         job,
         hits=given,

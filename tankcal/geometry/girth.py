@@ -12,17 +12,21 @@ A tangent whose normal has the azimuth f stands as far from the centre as the hu
     p(f) = R(f) + R'(f)^2 / (2 R) + ...  where the wall is convex, and farther out over a valley.
 """
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+import scipy.linalg
 from scipy.spatial import ConvexHull
 
-from tankcal.geometry.field.components import COMPONENTS, mode_shares
+from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations, mode_shares
 from tankcal.geometry.outlines import FULL_TURN
 
 SHORTEST_WAVE_M = 0.2  # along the arc: plates do not bend more sharply
 DRAWS, NODES_OF_WAVE = 64, 8  # walls drawn, and nodes of an outline in its shortest wave
 TANGENTS, REACH = 128, 8  # of each wall, and the part of a turn to either side that they may touch
+FREE_M, LEAST_M = 1.0, 1e-6  # sd of radius and centre of a ring beforehand; of its readings, least
+MOST_RINGS = 8  # asked what a wall looks like
 
 
 @cache
@@ -67,6 +71,99 @@ def perimeter_excess(shape_sd_m, radius_m, *, shares=None):
     return float(np.mean(found)), float(np.std(found, ddof=1))
 
 
+@dataclass(frozen=True)
+class Ring:
+    """Radii read round one level.
+
+    Attributes
+    ----------
+    azimuth_rad, radius_m : ndarray, shape (n,)
+    noise_m2 : ndarray, shape (n, n)
+    """
+
+    azimuth_rad: np.ndarray
+    radius_m: np.ndarray
+    noise_m2: np.ndarray
+
+
+def seen_excess(amplitudes, radius_m, rings):
+    """Mean and standard deviation of the excess over walls that agree with radii read round them.
+
+    Parameters
+    ----------
+    amplitudes : Amplitudes
+        Of the walls, and how well they are known.
+    radius_m : float
+    rings : sequence of Ring
+        Each has a radius and a centre of its own.
+
+    Returns
+    -------
+    mean, sd : float
+        Of P^2 / (4 pi A) - 1 of a level.
+
+    Notes
+    -----
+    Sizes and outlines are drawn from a fixed seed, for one ring after another. A drawn outline f
+    moves to what the ring has read of it (conditional simulation, Matheron),
+
+        f + K V^-1 (y - f at the sites - noise),
+
+    and the hull of that is measured: waves that the points show are those that they show, shorter
+    ones are drawn. How a wall spreads its variance over these is an assumption: of their part of
+    the excess, which is what the most likely outline K V^-1 y lacks of the mean, no more than the
+    mean is taken as known, so that its standard deviation is as large (the exponential
+    distribution, of most entropy above 0), beside the scatter of the draws.
+
+    Examples
+    --------
+    >>> from tankcal.geometry.field.amplitudes import assumed_amplitudes
+    >>> def ring_of(count):
+    ...     turn = 2 * np.pi * np.arange(count) / count
+    ...     return Ring(turn, 6.5 + 0.01 * np.cos(2 * turn), 1e-8 * np.eye(count))
+    >>> _, few = seen_excess(assumed_amplitudes(), 6.5, [ring_of(12)])
+    >>> _, many = seen_excess(assumed_amplitudes(), 6.5, [ring_of(120)])
+    >>> many < few / 2
+    True
+    """
+    modes = _modes_of(radius_m)
+    spectra, rng, found = mode_shares(modes, radius_m), np.random.default_rng(0), []
+    nodes = NODES_OF_WAVE * (len(modes) + 2)
+    turn = FULL_TURN * np.arange(nodes) / nodes
+    chosen = np.unique(np.linspace(0, len(rings) - 1, MOST_RINGS).astype(int))
+    known = [_Known(rings[i], turn, radius_m) for i in chosen]
+    for number, sizes in enumerate(_drawn_sizes(amplitudes, rng)):
+        outline = _outline(rng, sum(sizes[one] * spectra[one] for one in sizes), radius_m)
+        found.append(_excess_of(known[number % len(known)].moved(outline, sizes, rng)))
+    sizes = _sizes_of(amplitudes.variances_m2)
+    seen = [_excess_of(one.moved(np.full(nodes, radius_m), sizes)) for one in known]
+    unseen = max(np.mean(found) - np.mean(seen), 0.0)
+    return float(np.mean(found)), float(np.hypot(np.std(found, ddof=1), unseen))
+
+
+class _Known:
+    """What one ring makes of outlines at azimuths."""
+
+    def __init__(self, ring, turn_rad, radius_m):
+        self._ring, self._turn = ring, turn_rad
+        at = ring.azimuth_rad
+        self._to_turn = azimuth_correlations(turn_rad, at, radius_m)
+        self._among = azimuth_correlations(at, at, radius_m)
+        free = np.column_stack([np.ones(len(at)), np.sin(at), np.cos(at)])
+        self._noise = ring.noise_m2 + LEAST_M**2 * np.eye(len(at))
+        self._free = FREE_M**2 * free @ free.T
+        self._root = np.linalg.cholesky(self._noise)
+
+    def moved(self, outline_m, sizes, rng=None):
+        """An outline as it is after the ring was read; rng: with the noise of that."""
+        read = np.interp(self._ring.azimuth_rad, self._turn, outline_m, period=FULL_TURN)
+        if rng is not None:
+            read = read + self._root @ rng.normal(size=len(read))
+        whole = self._free + self._noise + sum(sizes[one] * self._among[one] for one in sizes)
+        pull = scipy.linalg.solve(whole, self._ring.radius_m - read, assume_a="pos")
+        return outline_m + sum(sizes[one] * (self._to_turn[one] @ pull) for one in sizes)
+
+
 def tangent_excess(amplitudes, radius_m):
     """By how much the tangents of walls stand farther out than their radii at the same azimuth.
 
@@ -96,23 +193,35 @@ def tangent_excess(amplitudes, radius_m):
     >>> 0 < mean < 1e-3
     True
     """
-    modes = _modes_of(radius_m)
-    spectra = mode_shares(modes, radius_m)
-    chosen = [i for i, one in enumerate(COMPONENTS) if one.shape in spectra]
-    spread = amplitudes.log_covariance[np.ix_(chosen, chosen)]
-    logs = np.log(amplitudes.variances_m2[chosen])
-    rng = np.random.default_rng(0)
-    drawn = rng.multivariate_normal(logs, spread, size=DRAWS, method="eigh")
+    spectra, rng = mode_shares(_modes_of(radius_m), radius_m), np.random.default_rng(0)
     means, spreads = [], []
-    for row in np.exp(drawn):
-        pairs = zip(row, chosen, strict=True)
-        variances = sum(size * spectra[COMPONENTS[i].shape] for size, i in pairs)
+    for sizes in _drawn_sizes(amplitudes, rng):
+        variances = sum(sizes[one] * spectra[one] for one in sizes)
         radii = _outline(rng, variances, radius_m)
         at = len(radii) // TANGENTS * np.arange(TANGENTS)
         excess = _support_at(at, radii) - radii[at]
         means.append(excess.mean())
         spreads.append(excess.var())
     return float(np.mean(means)), float(np.std(means, ddof=1)), float(np.sqrt(np.mean(spreads)))
+
+
+def _drawn_sizes(amplitudes, rng):
+    """Variances of "oval" and "seam" of DRAWS walls, as unsure as the amplitudes are, m2."""
+    chosen = [i for i, one in enumerate(COMPONENTS) if one.shape in ("oval", "seam")]
+    spread = amplitudes.log_covariance[np.ix_(chosen, chosen)]
+    logs = np.log(amplitudes.variances_m2[chosen])
+    drawn = np.zeros((DRAWS, len(COMPONENTS)))
+    drawn[:, chosen] = np.exp(rng.multivariate_normal(logs, spread, size=DRAWS, method="eigh"))
+    return [_sizes_of(row) for row in drawn]
+
+
+def _sizes_of(variances_m2):
+    """{"oval", "seam": variance of all components of that shape, m2}."""
+    found = {"oval": 0.0, "seam": 0.0}
+    for one, size in zip(COMPONENTS, variances_m2, strict=True):
+        if one.shape in found:
+            found[one.shape] += float(size)
+    return found
 
 
 def _modes_of(radius_m):

@@ -89,7 +89,7 @@ def _of_levels(job, wall):
     short = [
         course.name
         for index, course in enumerate(job.courses)
-        if courses.count(index) < least
+        if 0 < courses.count(index) < least  # else straps or lines tell it
         and not any(one.group.degree for one in wall.sections if one.group.course == index)
     ]
     if short:

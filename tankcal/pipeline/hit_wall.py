@@ -12,8 +12,9 @@ from tankcal.pipeline.cause_correlations import told_causes
 from tankcal.pipeline.misread_hits import refuse_other_units
 from tankcal.pipeline.wall import find_wall, joints_of, s_transform
 from tankcal.sections import coordinates_of
-from tankcal.survey.poses import poses_of
-from tankcal.survey.sighting import sight
+from tankcal.survey import wall_points
+from tankcal.survey.poses import covariance_with_points, poses_of
+from tankcal.survey.sighting import Beside, sight
 
 
 def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
@@ -29,7 +30,8 @@ def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
     told = told_causes(job, wall)
     free = {one.name: one.value for one in told if np.isinf(one.u_before)}
     if free:
-        job, sighting = _as_points(job, sight(job.hits, sighting.poses, free))
+        again = sight(job.hits, sighting.poses, free)
+        job, sighting = _as_points(job, replace(again, beside=sighting.beside))
         wall = find_wall(job, progress, dof, amplitudes)
         told = told_causes(job, wall)
     return job, replace(sighting, told=told), wall
@@ -55,17 +57,30 @@ def sight_wall(job, adjustment, progress):
         nominal_m=job.tank.nominal_diameter_m / 2,
         is_inside=job.survey.side == "inside",
     )
-    sighting = sight(job.hits, poses)
+    sighting = replace(sight(job.hits, poses), beside=_targets_beside(job, poses, adjustment))
     _refuse_side(job, sighting)
     _refuse_unknown_offset(job, sighting)
     return _as_points(job, sighting)
 
 
 def _as_points(job, sighting):
-    """The job with the hits that count as its points, all on one side of the wall."""
+    """The job with the hits that count as its points, all on one side of the wall, and then its
+    targets.
+    """
     sighting = _on_one_side(job, sighting)
-    used = take_points(sighting.points, np.flatnonzero(~job.hits.check))
+    counted = np.flatnonzero(~job.hits.check)
+    used = take_points(sighting.points, counted)
+    if sighting.beside is not None:
+        used = sighting.beside.after(used, sighting.by_poses[coordinates_of(counted)])
     return replace(job, points=s_transform(used)), sighting
+
+
+def _targets_beside(job, poses, adjustment):
+    """`Beside` of the targets that targets.csv names; None: it names none."""
+    if adjustment is None or job.measurements.targets is None:
+        return None
+    points = wall_points(adjustment, job.measurements, job.survey.side)
+    return Beside(points, covariance_with_points(job.hits, poses, adjustment, points.names))
 
 
 def take_points(points, chosen):

@@ -1,5 +1,6 @@
 """Warnings of reference lines: offsets that were set aside, lines that moved, too few of them."""
 
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -21,6 +22,8 @@ UNLIKE_SDS = 3.0  # of a collimation, from what its certificate says
 OFF_AXIS_M, OFF_AXIS_SDS = 0.01, 6.0  # of a level's centre, from the straight axis
 OFF_LEVEL_M = 0.003  # of a strap's radius, from the levels of its course
 SCALE_OF_MEDIAN = 1.4826
+CRITICAL_LEAN = 3.72  # of two slopes together: a chi-square of two exceeds it in 0.1 %
+VERTICALS = 1e-4  # m/m: how alike the verticals of a plummet and of the points are, 20"
 FEWEST_LEVELS, FEWEST_ALIKE = 5, 4  # to tell a level, or a copied line, from the others
 
 
@@ -58,6 +61,96 @@ def check_lines(job, wall):
         *_of_plummets(job),
         *(_of_straps(job, wall, levels) if isinstance(wall, StrappedWall) else ()),
     )
+
+
+@dataclass(frozen=True)
+class LeanTest:
+    """The lean that lines show against the lean of the points.
+
+    Attributes
+    ----------
+    of_lines, of_points : ndarray, shape (2,)
+        Slope of the axis towards +x and +y.
+    w : float
+        Length of the difference over its standard deviation.
+    mirrored_w : float
+        The same with azimuths of lines that grow anticlockwise.
+    sd : float
+        Mean standard deviation of a component of the difference.
+    """
+
+    of_lines: np.ndarray
+    of_points: np.ndarray
+    w: float
+    mirrored_w: float
+    sd: float
+
+    @property
+    def turned_rad(self):
+        """Angle from the lean of the lines to that of the points, clockwise."""
+        before, after = (np.arctan2(*one) for one in (self.of_lines, self.of_points))
+        return float((after - before + np.pi) % (2 * np.pi) - np.pi)
+
+
+def compare_leans(lean, shell):
+    """`LeanTest` of the `Lean` of lines against that of a `Shell`; None: one is not known.
+
+    w = sqrt(d' C^-1 d) of the difference d of both slopes; C is the sum of their covariances and
+    VERTICALS squared.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> from tankcal.survey.reference_line import Lean
+    >>> points = dict(slope=(-3e-3, 1e-3), slope_cofactor=1e-8 * np.eye(2), tilt_known=True)
+    >>> test = compare_leans(Lean(3e-3, 1e-3, 1e-4), SimpleNamespace(**points))
+    >>> round(test.w, 1), round(test.mirrored_w, 1)
+    (34.6, 0.0)
+    """
+    if not (shell.tilt_known and np.isfinite(lean.sd)):
+        return None
+    lines, points = np.array([lean.x, lean.y]), np.array(shell.slope)
+    spread = shell.slope_cofactor + (lean.sd**2 + VERTICALS**2) * np.eye(2)
+    away = np.stack([points - lines, points - lines * [-1, 1]])
+    w, mirrored = np.sqrt(np.sum(away * np.linalg.solve(spread, away.T).T, axis=1)).tolist()
+    return LeanTest(lines, points, w, mirrored, float(np.sqrt(np.trace(spread) / 2)))
+
+
+def check_leans(job, wall):
+    """`Problem`s of a `Wall` whose lines lean otherwise than its points."""
+    if job.lines is None:
+        return
+    test = compare_leans(levels_and_lean(job, wall.read)[1], wall.shell)
+    if test is None or test.w <= CRITICAL_LEAN:
+        return
+    size_of_lines, size = np.hypot(*test.of_lines), np.hypot(*test.of_points)
+    told = {
+        "lines": 1000 * size_of_lines,
+        "to_lines": np.degrees(np.arctan2(*test.of_lines)) % 360,
+        "points": 1000 * size,
+        "to_points": np.degrees(np.arctan2(*test.of_points)) % 360,
+        "w": test.w,
+    }
+    found = message(
+        "leans_differ",
+        "the lines show a lean of {lines:.2f} mm/m towards {to_lines:.0f} deg, the points one of"
+        " {points:.2f} mm/m towards {to_points:.0f} deg (w = {w:.1f})",
+        **told,
+    )
+    if test.mirrored_w <= CRITICAL_LEAN:
+        cause = message(
+            "leans_mirrored", "do the azimuths of the lines grow anticlockwise? Then both agree"
+        )
+    elif abs(size_of_lines - size) <= CRITICAL_LEAN * test.sd:
+        cause = message(
+            "leans_turned",
+            "do the lines count from another azimuth? Turned by {turn:+.0f} deg both agree",
+            turn=np.degrees(test.turned_rad),
+        )
+    else:
+        cause = message("leans_unlike", "was the plummet, or the network, upright?")
+    text = message("leans_with_cause", "{found}: {cause}", found=found, cause=cause)
+    yield Problem("lines.csv", text, column="azimuth_deg")
 
 
 def _set_aside(job, wall):

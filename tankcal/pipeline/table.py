@@ -13,7 +13,7 @@ from tankcal.pipeline.cloud_checks import check_clouds
 from tankcal.pipeline.cloud_wall import Clouded
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
 from tankcal.pipeline.hit_checks import check_hits
-from tankcal.pipeline.line_checks import check_lines
+from tankcal.pipeline.line_checks import check_leans, check_lines
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.strapping_checks import check_strapped, check_straps_beside_points
@@ -170,6 +170,7 @@ def _doubts_of_survey(job, survey, top_m):
             *check_wall(job, survey),
             *beside,
             *check_lines(job, survey.read),
+            *check_leans(job, survey),
         )
     if isinstance(survey, StrappedWall):
         return (*check_strapped(job, survey), *check_lines(job, survey))

@@ -162,9 +162,9 @@ def _of_levels(job, wall):
         )
         yield Problem(job.tangents.file, text)
     courses = [section.group.course for section in wall.sections]
-    least = limits_of(RULES)["levels_a_course"]
-    short = [
-        course.name for index, course in enumerate(job.courses) if courses.count(index) < least
+    names, least = [one.name for one in job.courses], limits_of(RULES)["levels_a_course"]
+    short = [  # of those that were sighted: straps or lines tell the others
+        name for index, name in enumerate(names) if 0 < courses.count(index) < least
     ]
     if short:
         text = message(

@@ -33,6 +33,13 @@ class Unbound:
     offsets: np.ndarray
     poses: np.ndarray
 
+    @property
+    def first_apart(self):
+        """Number of the first ring whose centre is no part of an outline: 0 where set-ups may move,
+        for then a common shift of centres and set-ups is of neither; None: there is no such ring.
+        """
+        return 0 if self.poses.shape[1] else None
+
     def padded(self, more):
         """The same with more readings, which nothing of it moves."""
         return Unbound(*(np.pad(one, ((0, more), (0, 0))) for one in (self.offsets, self.poses)))

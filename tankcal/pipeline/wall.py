@@ -33,7 +33,7 @@ from tankcal.pipeline.wall_readings import (
     inputs_read_with,
     noise_by_inputs,
 )
-from tankcal.pipeline.wall_straps import PointsOfWall, Straps, join_readings
+from tankcal.pipeline.wall_straps import PointsOfWall, Straps, join_readings, told_courses
 from tankcal.sections import (
     Section,
     coordinates_of,
@@ -216,8 +216,10 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     sites, means = _sites(groups, samples, nominal, _welds(job))
     radius = means @ np.concatenate([one.radius_m for one in samples])
     noise = (means @ scipy.sparse.block_diag(_blocks(samples)) @ means.T).toarray()
-    if amplitudes is None:
-        amplitudes = estimate_amplitudes(sites, radius, noise, nominal, estimate_noise=estimated)
+    is_known = amplitudes is not None
+    if not is_known:
+        alone = sites.take(np.ones(len(sites), dtype=bool))  # without courses that have no point
+        amplitudes = estimate_amplitudes(alone, radius, noise, nominal, estimate_noise=estimated)
     if amplitudes.noise != 1.0:  # it may be half a gigabyte
         covariance, noise = covariance * amplitudes.noise, noise * amplitudes.noise
         to_fit = _to_fit(job, shell, accepted, groups, covariance)
@@ -231,13 +233,15 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         noise = by_points @ (covariance @ by_points.T)  # between sections, too
         noise = noise.toarray() if scipy.sparse.issparse(noise) else noise
     if not is_read:
+        apart = unbound.first_apart if job.points.unbound else None
         sites = unbound.shared_by(sites) if job.points.unbound else sites
         if by_inputs:
             noise = noise + noise_by_inputs(job.inputs, by_inputs, len(radius))
-        field, read, straps = WallField(sites, radius, noise, amplitudes, nominal), None, None
+        field = WallField(sites, radius, noise, amplitudes, nominal, plumbed=apart)
+        read = straps = None
     else:
         points = PointsOfWall(sites, radius, noise, unbound, by_inputs)
-        read, straps = join_readings(job, points, amplitudes, joints)
+        read, straps = join_readings(job, points, amplitudes, joints, is_known=is_known)
         field, more = read.field, len(read.accepted)
         by_points = _padded(by_points, more)
         by_inputs = {name: np.pad(one, (0, more)) for name, one in by_inputs.items()}
@@ -386,13 +390,15 @@ def _groups(job, shell, wall, joints):
         groups = group_by_name(names, height, lambda z: course_of(z, joints), azimuth, joints)
     else:
         groups = group_by_height(height, azimuth, course_of(height, joints), joints)
-    _refuse_weak(groups, job.courses, height, points)
+    _refuse_weak(job, groups, height)
     return groups
 
 
-def _refuse_weak(groups, courses, height, points):
-    """Raise InputError for sections of too few points or too tall, and courses without any."""
-    problems = []
+def _refuse_weak(job, groups, height):
+    """Raise InputError for sections of too few points or too tall, and courses that neither points
+    nor straps nor lines tell.
+    """
+    problems, courses = [], job.courses
     for group in groups:
         count, tall = len(group.members), np.ptp(height[group.members])
         if count < FEWEST_POINTS:
@@ -419,7 +425,7 @@ def _refuse_weak(groups, courses, height, points):
                     height_m=height_m,
                 )
             )
-    seen = {group.course for group in groups}
+    seen = told_courses(job, {group.course for group in groups})
     problems += [
         message(
             "course_without_section",
@@ -431,7 +437,7 @@ def _refuse_weak(groups, courses, height, points):
         if index not in seen
     ]
     if problems:
-        raise InputError([Problem(origin_of(points), text) for text in problems])
+        raise InputError([Problem(origin_of(job.points), text) for text in problems])
 
 
 def _azimuths(job, shell, wall):

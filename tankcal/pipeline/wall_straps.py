@@ -11,11 +11,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.linalg
 
+from tankcal.geometry.field.amplitudes import estimate_amplitudes
 from tankcal.geometry.field.blunders import Tested
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.estimate import LEVELS, WallField
 from tankcal.geometry.field.sites import Sites
-from tankcal.geometry.girth import perimeter_excess
+from tankcal.geometry.girth import Ring, perimeter_excess, seen_excess
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.tanks import insets_of
@@ -32,7 +33,10 @@ from tankcal.pipeline.wall_readings import (
 )
 from tankcal.quadrature import panels
 from tankcal.survey.network.reliability import noncentrality
+from tankcal.survey.reference_line import courses_told
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
+
+MOST_OF_RING = 200  # points of a ring that are asked what the wall looks like
 
 
 @dataclass(frozen=True)
@@ -43,15 +47,30 @@ class AreaTerm:
     sd: float
 
 
-def area_term(shape_sd_m, amplitudes, nominal_m):
+def area_term(shape_sd_m, amplitudes, nominal_m, points=None):
     """`AreaTerm` of a wall, and the standard deviation of its radius that it follows from.
 
     shape_sd_m  as declared; None: of the ovality and the seams that it has by its amplitudes
+    points      `PointsOfWall`, whose outlines it has where none is declared; None: of a plan
     """
-    if shape_sd_m is None:
+    is_declared = shape_sd_m is not None
+    if not is_declared:
         waves = [one.shape in ("oval", "seam") for one in COMPONENTS]
         shape_sd_m = float(np.sqrt(amplitudes.variances_m2[waves].sum()))
-    return AreaTerm(*perimeter_excess(shape_sd_m, nominal_m)), shape_sd_m
+    if is_declared or points is None:
+        return AreaTerm(*perimeter_excess(shape_sd_m, nominal_m)), shape_sd_m
+    return AreaTerm(*seen_excess(amplitudes, nominal_m, _rings_of(points))), shape_sd_m
+
+
+def _rings_of(points):
+    """`Ring`s of points, of no more than MOST_OF_RING each."""
+    found, sites = [], points.sites
+    for ring in np.unique(sites.ring[sites.ring >= 0]):
+        mine = np.flatnonzero(sites.ring == ring)
+        mine = mine[:: -(-len(mine) // MOST_OF_RING)]
+        noise = points.noise_m2[np.ix_(mine, mine)]
+        found.append(Ring(sites.azimuth_rad[mine], points.radius_m[mine], noise))
+    return found
 
 
 @dataclass(frozen=True)
@@ -144,7 +163,17 @@ class PointsOfWall:
     by_inputs: dict = field(default_factory=dict)
 
 
-def join_readings(job, points, amplitudes, joints_m):
+def told_courses(job, seen):
+    """Indices of the courses that points (of a set of them), straps or reference lines tell."""
+    place, strapped, read = {one.name: i for i, one in enumerate(job.courses)}, (), ()
+    if job.strapping is not None:
+        strapped = (one.course for one in job.strapping.straps if not one.check)
+    if job.lines is not None:
+        read = (one.course for one in job.lines.offsets if not one.check)
+    return courses_told(seen, {place[one] for one in strapped}, {place[one] for one in read})
+
+
+def join_readings(job, points, amplitudes, joints_m, *, is_known=True):
     """The field of a wall from its points, its straps and its offsets from reference lines.
 
     Parameters
@@ -155,6 +184,8 @@ def join_readings(job, points, amplitudes, joints_m):
     amplitudes : Amplitudes
         Of the wall, as its points tell them.
     joints_m : ndarray, shape (courses + 1,)
+    is_known : bool
+        False: where points do not lie on every course the amplitudes are found again, from all.
 
     Returns
     -------
@@ -166,12 +197,13 @@ def join_readings(job, points, amplitudes, joints_m):
     nominal, names = job.tank.nominal_diameter_m / 2, [one.name for one in job.courses]
     inner = np.array([one.thickness_m + one.paint_m for one in job.courses])
     inner *= job.survey.side == "inside"
+    zero = job.datum.plate_level_m
     taped, readings, places = None, [], []
     if job.strapping is not None:
         given = job.strapping
         reduced = reduce_straps(given, job.survey.shell_temperature_c, 2 * nominal)
         places = [i for i, one in enumerate(reduced) if not one.strap.check]
-        term, shape = area_term(given.shape_sd_m, amplitudes, nominal)
+        term, shape = area_term(given.shape_sd_m, amplitudes, nominal, points)
         readings = readings_of_straps([reduced[i] for i in places], names, term)
         taped = reduced, term, shape
     if job.lines is not None:
@@ -179,7 +211,8 @@ def join_readings(job, points, amplitudes, joints_m):
         offsets, of_offsets = _offsets_of(job.lines, names, insets, points.sites)
         readings, places = readings + offsets, places + of_offsets
     readings = [_on_surface(one, inner[one.course], job.survey.side) for one in readings]
-    zero = job.datum.plate_level_m
+    if not is_known and len(np.unique(points.sites.course)) < len(names):
+        amplitudes = None
     field, tested, readings = _joined_field(job, points, readings, amplitudes, (joints_m, zero))
     read = ReadWall(
         joints_m, zero, tuple(readings), np.array(places, dtype=int), tested, field, inner_m=inner
@@ -199,7 +232,8 @@ def _joined_field(job, points, readings, amplitudes, heights):
     """`WallField` of points and accepted readings, `Tested` of these, and they, about the centres
     of their levels.
 
-    heights  joints, and the table's zero above the bottom, m
+    amplitudes  None: those that all of them tell
+    heights     joints, and the table's zero above the bottom, m
     """
     n, k, nominal = len(points.radius_m), len(readings), job.tank.nominal_diameter_m / 2
     sites = sites_of(readings, *heights)
@@ -218,10 +252,16 @@ def _joined_field(job, points, readings, amplitudes, heights):
     may = [job.snooping and (is_bound or one.of == "offsets") for one in readings]
     may_go = np.append(np.zeros(n), may)
 
+    apart = points.unbound.first_apart
+    if apart is None:
+        apart = int(points.sites.ring.max(initial=-1)) + 1
+
     def field_of(accepted):
         some = np.flatnonzero(accepted)
-        own = noise[np.ix_(some, some)]
-        return WallField(both.take(accepted), radius[some], own, amplitudes, nominal)
+        own, size = noise[np.ix_(some, some)], amplitudes
+        if size is None:
+            size = estimate_amplitudes(both.take(accepted), radius[some], own, nominal)
+        return WallField(both.take(accepted), radius[some], own, size, nominal, plumbed=apart)
 
     radius, every = np.append(points.radius_m, [one.radius_m for one in readings]), np.ones(n + k)
     field = field_of(every > 0)

@@ -132,7 +132,8 @@ def _setups(result):
     setup = np.array(hits.setup)
     counted = setup[~hits.check]  # the order of the job's points
     used = np.zeros(len(counted), dtype=bool)
-    used[result.wall.accepted] = True
+    accepted = result.wall.accepted
+    used[accepted[accepted < len(counted)]] = True  # targets come after the hits
     found, first = [], {}
     for place, (name, _) in enumerate(poses.keys):
         first.setdefault(name, place)
@@ -182,9 +183,9 @@ def shared_of(told, certificates, told_m):
 
 def _rings(result):
     job, wall = result.job, result.wall
-    least = least_hits(job)
+    least, count = least_hits(job), np.count_nonzero(~job.hits.check)
     heights = np.array([section.group.height_m for section in wall.sections])
-    z = job.points.xyz_m[wall.shell.reason != "", 2] - job.datum.bottom_z_m
+    z = job.points.xyz_m[:count][wall.shell.reason[:count] != "", 2] - job.datum.bottom_z_m
     nearest = np.argmin(np.abs(z[:, None] - heights), axis=1) if len(z) else np.zeros(0, dtype=int)
     rejected = np.bincount(nearest, minlength=len(heights))
     return [
@@ -192,7 +193,7 @@ def _rings(result):
             section=section.group.name,
             course=job.courses[section.group.course].name,
             level_m=section.group.height_m - result.zero_m,
-            hits=len(section.group.members),
+            hits=np.count_nonzero(wall.accepted[section.group.members] < count),
             rejected=rejected[place],
             least=least,
         )

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
+from tankcal.pipeline.wall_straps import mean_radii
 from tankcal.record.schema import Saved, filled_from, key
 from tankcal.sections import coordinates_of
 
@@ -327,7 +328,9 @@ def _of_sections(rejected_z_m, result, index, shape):
         "sections": [section.group.name for section in own],
         "points": sum(len(section.group.members) for section in own),
         "rejected": np.count_nonzero(in_course),
-        "radius_m": np.mean([section.circle.radius_m for section in own]),
+        "radius_m": np.mean([section.circle.radius_m for section in own])
+        if own
+        else mean_radii(result.wall.field)[index],  # by straps or lines alone
     }
 
 

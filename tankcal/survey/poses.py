@@ -88,7 +88,44 @@ def _unplaced(hits, tools, prior):
 
 def _in_network(hits, poses, adjustment):
     """The poses with those of set-ups that the network has, and what it says of instruments."""
-    adjusted, survey = adjustment.adjusted, adjustment.adjusted.survey
+    adjusted = adjustment.adjusted
+    tied, place, circle, mine, where = _numbers(hits, poses, adjustment)
+    p, t = len(poses.keys), len(tied)
+    covariance = poses.covariance.copy()
+    covariance[np.ix_(where, where)] = adjustment.cov_scale * adjusted.joint_covariance(
+        place, orientation_rad=circle, scale=mine, offset_m=mine
+    )
+    xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
+    heights = np.array([hits.setups[poses.keys[i][0]].height_m for i in tied])
+    xyz[tied] = adjusted.xyz_m[place] + heights[:, None] * [0, 0, 1]
+    zero[tied] = adjusted.nuisance("orientation_rad")[circle]
+    scale, offset = poses.scale.copy(), poses.offset_m.copy()
+    for at, number in zip((where[4 * t : 4 * t + len(mine)] - 4 * p) // 2, mine, strict=True):
+        scale[at], offset[at] = (adjusted.nuisance(of)[number] for of in ("scale", "offset_m"))
+    ties = [NETWORK if i in tied else WALL for i in range(p)]
+    return Poses(poses.keys, xyz, zero, poses.instruments, scale, offset, covariance, tuple(ties))
+
+
+def covariance_with_points(hits, poses, adjustment, names):
+    """(u, 3 k) covariance of all that `Poses.covariance` is of with the coordinates of points of
+    the same network, by their names.
+    """
+    _, place, circle, mine, where = _numbers(hits, poses, adjustment)
+    numbers = dict(zip(adjustment.names, adjustment.there, strict=True))
+    beside = [numbers[one] for one in names]
+    whole = adjustment.cov_scale * adjustment.adjusted.joint_covariance(
+        [*beside, *place], orientation_rad=circle, scale=mine, offset_m=mine
+    )
+    found = np.zeros((len(poses.covariance), 3 * len(beside)))
+    found[where] = whole[3 * len(beside) :, : 3 * len(beside)]
+    return found
+
+
+def _numbers(hits, poses, adjustment):
+    """What a network has of poses: which of them, numbers of their stations, of their circles and
+    of instruments there, and where all of these unknowns stand among those of `Poses`.
+    """
+    survey = adjustment.adjusted.survey
     points = dict(zip(adjustment.names, adjustment.there, strict=True))
     circles = {name: number for number, name in enumerate(survey.set_names)}
     first = {}
@@ -101,29 +138,12 @@ def _in_network(hits, poses, adjustment):
     place = [points[stations[poses.keys[i][0]]] for i in tied]
     circle = [circles.get(poses.keys[i], first[poses.keys[i][0]]) for i in tied]
     ranged = {one.name: number for number, one in enumerate(survey.instruments)}
-    mine = [ranged[name] for name in poses.instruments if name in ranged]
-    whole = adjustment.cov_scale * adjusted.joint_covariance(
-        place, orientation_rad=circle, scale=mine, offset_m=mine
-    )
-    p, t, m, tied = len(poses.keys), len(tied), len(mine), np.array(tied, dtype=int)
-    where = np.zeros(len(whole), dtype=int)  # of each unknown of the network among those of Poses
-    where[: 3 * t] = (4 * tied[:, None] + np.arange(3)).ravel()
-    where[3 * t : 4 * t] = 4 * tied + 3
     tools = [i for i, name in enumerate(poses.instruments) if name in ranged]
-    at = 4 * p + 2 * np.array(tools, dtype=int)
-    where[4 * t : 4 * t + m], where[4 * t + m :] = at, at + 1
-    covariance = poses.covariance.copy()
-    covariance[np.ix_(where, where)] = whole
-    xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
-    heights = np.array([hits.setups[poses.keys[i][0]].height_m for i in tied])
-    xyz[tied] = adjusted.xyz_m[place] + heights[:, None] * [0, 0, 1]
-    zero[tied] = adjusted.nuisance("orientation_rad")[circle]
-    scale, offset = poses.scale.copy(), poses.offset_m.copy()
-    for i in tools:
-        number = ranged[poses.instruments[i]]
-        scale[i], offset[i] = (adjusted.nuisance(of)[number] for of in ("scale", "offset_m"))
-    ties = [NETWORK if i in tied else WALL for i in range(p)]
-    return Poses(poses.keys, xyz, zero, poses.instruments, scale, offset, covariance, tuple(ties))
+    mine = [ranged[poses.instruments[i]] for i in tools]
+    at = np.array(tied, dtype=int)
+    tool = 4 * len(poses.keys) + 2 * np.array(tools, dtype=int)
+    stations = (4 * at[:, None] + np.arange(3)).ravel()
+    return at, place, circle, mine, np.concatenate([stations, 4 * at + 3, tool, tool + 1])
 
 
 def _refuse_sets(hits, poses, untied):

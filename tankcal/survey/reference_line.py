@@ -175,6 +175,28 @@ class Lean:
     sd: float
 
 
+def courses_told(seen, strapped, read):
+    """Set of the courses whose radius is told: by points, by a tape, or carried there by lines.
+
+    A line carries the radius of each course that it reads to all others, so that one of them is
+    enough.
+
+    Parameters
+    ----------
+    seen, strapped, read : set
+        Courses with points, with straps, with offsets from reference lines.
+
+    Examples
+    --------
+    >>> sorted(courses_told({1}, {4}, {1, 2, 3}))
+    [1, 2, 3, 4]
+    >>> sorted(courses_told({1}, set(), {2, 3}))
+    [1]
+    """
+    told = set(seen) | set(strapped)
+    return told | set(read) if told & set(read) else told
+
+
 def level_names(offsets):
     """(n,) number of the level of each offset: those of a course within SAME_LEVEL_M are one."""
     levels, numbers = [], []

@@ -64,6 +64,55 @@ class Poses:
 
 
 @dataclass(frozen=True)
+class Beside:
+    """Targets of the wall beside sights that name none.
+
+    Attributes
+    ----------
+    points : Points
+        k targets on the wall, as the network has them.
+    with_poses : ndarray, shape (u, 3 k)
+        Covariance of all that `Poses.covariance` is of with their coordinates, m2.
+    """
+
+    points: Points
+    with_poses: np.ndarray
+
+    def after(self, sights, by_poses):
+        """`Points` of n sights, and then of the targets: with one covariance, and each cause once.
+
+        by_poses  (3 n, u) derivative of the sights
+        """
+        own, count = self.points, len(sights.names)
+        across = by_poses @ self.with_poses
+        covariance = np.block([[sights.covariance_m2, across], [across.T, own.covariance_m2]])
+        more = 3 * len(own.names)
+
+        def longer(column):
+            return np.pad(column, (0, more))
+
+        causes = {(one.name, one.what): replace(one, column_m=longer(one.column_m))
+                  for one in sights.causes}  # fmt: skip
+        for one in own.causes:
+            key, column = (one.name, one.what), np.pad(one.column_m, (3 * count, 0))
+            known = causes.get(key)
+            both = column if known is None else known.column_m + column
+            causes[key] = replace(known or one, column_m=both)
+        return replace(
+            sights,
+            names=sights.names + own.names,
+            xyz_m=np.vstack([sights.xyz_m, own.xyz_m]),
+            covariance_m2=covariance,
+            section=sights.section + own.section,
+            generatrix=sights.generatrix + own.generatrix,
+            rows=sights.rows + (None,) * len(own.names),
+            causes=tuple(causes.values()),
+            unbound=tuple(replace(one, column_m=longer(one.column_m)) for one in sights.unbound),
+            by_inputs={name: longer(one) for name, one in sights.by_inputs.items()},
+        )
+
+
+@dataclass(frozen=True)
 class Sighting:
     """Hits as points, and how they came about.
 
@@ -84,6 +133,10 @@ class Sighting:
         {instrument: offset that the wall told of it}, m, as it was taken off.
     told : tuple of ToldCause
         What the wall says of offsets and scales; (): it was not asked yet.
+    by_poses : ndarray, shape (3 n, u)
+        Derivative of the points by all that `Poses.covariance` is of.
+    beside : Beside or None
+        Targets of the wall from the same network.
     """
 
     points: Points
@@ -94,6 +147,8 @@ class Sighting:
     normal: np.ndarray
     told_m: dict = field(default_factory=dict)
     told: tuple = ()
+    by_poses: np.ndarray | None = None
+    beside: "Beside | None" = None
 
 
 def sight(hits, poses, told_m=None):
@@ -161,7 +216,7 @@ def sight(hits, poses, told_m=None):
         unbound=tuple(unbound),
         file=hits.file,
     )
-    return Sighting(points, poses, pose, np.arccos(cosine), inside, normal, told_m)
+    return Sighting(points, poses, pose, np.arccos(cosine), inside, normal, told_m, by_poses=by)
 
 
 def _rows(hits):

@@ -1,9 +1,11 @@
 """The same tank by every method: within U of the truth, and of each other.
 
-Walls that are no model of the package, surveyed by points, tape, reference lines, bare hits, and
-bare hits with a tape, each with the errors of its crew and its instruments.
+Walls that are no model of the package, surveyed by points, tape, reference lines, bare hits (tied
+or not), tangents, and by several of them together, each with the errors of its crew and its
+instruments.
 """
 
+from dataclasses import replace
 from functools import partial
 from itertools import combinations
 
@@ -12,11 +14,14 @@ import pytest
 from generated_hits import hit_job
 from generated_lines import plumbed_job
 from generated_strapping import shape_of, strapped_job
+from generated_tangents import tangent_job
 from generated_walls import FAMILIES, job_of, make_wall, survey
+from joined_jobs import lines_of, ring_job, sighted, untied_job, whole_job
 from test_coverage_of_walls import judged
 
 from tankcal.pipeline.hit_wall import sight_wall
 from tankcal.pipeline.strapped_wall import find_strapped_wall
+from tankcal.pipeline.tangent_wall import touch_wall
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall import find_wall
 
@@ -48,12 +53,41 @@ def by_hits(rng, wall, folder, straps):
     return body_of(job, find_wall(job, quiet))
 
 
+def by_tangents(rng, wall, folder, lines=False):
+    job, poses, tools = tangent_job(rng, wall, folder=folder / "sights", stations=8)
+    if lines:
+        job = replace(job, lines=lines_of(rng, wall, folder))
+    job, _, found = touch_wall(job, poses, tools, quiet)
+    return body_of(job, found)
+
+
+def by_ring(rng, wall, folder, beside):
+    job = ring_job(rng, wall, folder=folder, beside=beside)
+    return body_of(job, find_wall(job, quiet))
+
+
+def by_all(rng, wall, folder):
+    job = sighted(whole_job(rng, wall, folder=folder, hits=16, lines=16))
+    return body_of(job, find_wall(job, quiet))
+
+
+def by_untied_hits(rng, wall, folder):
+    job = sighted(untied_job(rng, wall, folder=folder))
+    return body_of(job, find_wall(job, quiet))
+
+
 METHODS = {
     "points": by_points,
     "tape": by_tape,
     "lines": by_lines,
     "hits": partial(by_hits, straps=False),
     "hits and tape": partial(by_hits, straps=True),
+    "untied hits": by_untied_hits,
+    "hits, tape and lines": by_all,
+    "a ring of points and lines": partial(by_ring, beside="lines"),
+    "a ring of points and tape": partial(by_ring, beside="straps"),
+    "tangents": by_tangents,
+    "tangents and lines": partial(by_tangents, lines=True),
 }
 
 

@@ -152,10 +152,39 @@ def test_two_setups_tied_by_targets(tmp_path):
     assert noisy.sighting.poses.ties == ("network", "network")
 
 
+def test_targets_of_the_wall_beside_hits(tmp_path):
+    """Exact geometry: four targets on the wall count, too, and a slip of one is set aside."""
+    parts = tied_parts()
+    parts.tables["targets"] = [["point"], *([name] for name in "ABCD")]
+    result = run(tmp_path / "sound", parts)
+    assert result.job.points.names[-4:] == tuple("ABCD")
+    assert len(result.accepted) == len(parts.tables["wall_hits"]) - 1 + 4
+    assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=2e-5)  # one at a joint
+    parts.tables["targets"] = [["point", "offset_mm"], *([n, 50.0 * (n == "B")] for n in "ABCD")]
+    moved = run(tmp_path / "moved", parts)
+    assert np.flatnonzero(moved.wall.shell.reason != "").tolist() == [len(moved.job.hits) + 1]
+    from tankcal.record import record_of
+
+    of_hits = record_of(moved)["hits"]
+    assert sum(one["hits"] for one in of_hits["setups"]) == len(moved.job.hits)
+    assert sum(one["hits"] for one in of_hits["rings"]) == len(moved.job.hits)
+
+
+def test_targets_that_nothing_observes_are_refused_beside_hits(tmp_path):
+    parts = parts_of()
+    parts.tables["targets"] = [["point"], ["A"]]
+    assert "targets.csv" in {one[0] for one in problems_of(tmp_path, parts)}
+
+
 @pytest.mark.slow
-def test_hits_after_the_network_are_named_points_in_it(tmp_path):
-    """Second method: the same readings as targets of their own, all in one adjustment."""
+@pytest.mark.parametrize("beside", [(), ("A", "B", "C", "D")])
+def test_hits_after_the_network_are_named_points_in_it(tmp_path, beside):
+    """Second method: the same readings as targets of their own, all in one adjustment; targets of
+    the network that are on the wall come after the hits.
+    """
     parts = tied_parts(np.random.default_rng(5))
+    if beside:
+        parts.tables["targets"] = [["point"], *([name] for name in beside)]
     parts.registers["instruments"]["TS"] |= {"u_incidence_mm": 0.0, "u_scale_ppm": 20.0}
     job = tankcal.load(write_folder(tmp_path / "hits", parts))
     hits = tankcal.run(job, simulated=False)
@@ -168,10 +197,12 @@ def test_hits_after_the_network_are_named_points_in_it(tmp_path):
         parts.tables["directions"].append([setup, name, row[of["direction_deg"]], 5.0])
         parts.tables["zenith_angles"].append([setup, name, row[of["zenith_deg"]], 5.0])
         parts.tables["slope_distances"].append([setup, name, row[of["distance_m"]], 1.0])
+    parts.tables["targets"] += [[name] for name in beside]
     named = tankcal.load(write_folder(tmp_path / "named", parts))
     points = wall_points(adjust_survey(named.measurements), named.measurements, "inside")
-    count = len(rows)
-    found = hits.sighting.points
+    count, found = len(rows) + len(beside), hits.sighting.points
+    if beside:
+        found = hits.sighting.beside.after(found, hits.sighting.by_poses)
     # the frames differ: inner constraints hold all points there, the stations and targets here
     assert len(points.names) == count
     names = hits.job.points.names

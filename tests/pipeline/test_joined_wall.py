@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import test_tangent_wall as of_tangents
 from generated_hits import Surface, even_aims
 from job_builder import write_folder
 from test_hit_wall import (
@@ -15,9 +16,12 @@ from test_hit_wall import (
     LEVELS,
     NOISY,
     SLOPE,
+    TAPE,
     circle,
+    girth_of,
     oval,
     parts_of,
+    problems_of,
     run,
     strapped,
     volume_of,
@@ -26,23 +30,28 @@ from test_hit_wall import (
 import tankcal
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
+from tankcal.pipeline.line_checks import check_leans, compare_leans, levels_and_lean
 from tankcal.survey.reference_line import ARCSEC
 
 KAPPA, COUNT = 15 * ARCSEC, 12
 
 
-def plumbed(parts, radius=oval, sd_m=0.0, seed=2, *, inside=False, levels=LEVELS):
-    """The parts with offsets from lines that stand upright, read on both faces along rays."""
+def plumbed(parts, radius=oval, sd_m=0.0, seed=2, *, inside=False, levels=LEVELS, outer=None):
+    """The parts with offsets from lines that stand upright, read on both faces along rays.
+
+    outer  `Surface` outside; None: plates outside of the radius about the foot
+    """
     rng = np.random.default_rng(seed)
-    surface = Surface(radius, FOOT, SLOPE)
+    surface = outer or Surface(radius, FOOT, SLOPE)
     turn = 2 * np.pi * np.arange(COUNT) / COUNT
     ray = np.column_stack([np.sin(turn), np.cos(turn)])
-    start = np.array(FOOT) + levels[0] * np.array(SLOPE)
+    start = np.array(surface.foot_m) + levels[0] * np.array(surface.slope)
     constants = rng.uniform(0.1, 0.3, COUNT)
     rows = [["line", "course", "level_m", "offset_mm", "s_mm", "face"]]
     for z in levels:
         plate = parts.tables["courses"][int(z // 2) + 1][2] / 1000
-        away = [_distance(surface, start, one, z) + plate * (not inside) for one in ray]
+        more = plate * (not inside and outer is None)
+        away = [_distance(surface, start, one, z) + more for one in ray]
         for face, lean in ((1, KAPPA), (2, -KAPPA)):
             size = np.array(away) - 6.5 - (z - levels[0]) * lean
             read = constants + size * (1 if inside else -1) + sd_m * rng.normal(size=COUNT)
@@ -131,6 +140,89 @@ def test_a_line_read_once_is_controlled_by_nothing(tmp_path):
     assert np.isinf(read.tested.sd_m).all()
 
 
+def one_ring(parts, level=LEVELS[0]):
+    """The parts with points of one level alone."""
+    points = parts.tables["points"]
+    parts.tables["points"] = [points[0], *(row for row in points[1:] if abs(row[3] - level) < 0.1)]
+    return parts
+
+
+def strapped_above(parts, radius=oval):
+    """The parts with two straps of each course but the first."""
+    rows = [
+        [f"{z}", str(int(z // 2) + 1), z, girth_of(radius, z) + np.pi * TAPE, 0.5, "T"]
+        for z in LEVELS[2:]
+    ]
+    parts = strapped(parts, radius)
+    parts.tables["circumferences"][1:] = rows
+    return parts
+
+
+@pytest.mark.parametrize("tell", [plumbed, strapped_above])
+def test_one_ring_of_points_serves_where_lines_or_straps_tell_the_rest(tmp_path, tell):
+    """Exact geometry: the ring tells the radius, lines or straps all other courses."""
+    result = run(tmp_path, one_ring(as_points(tell(parts_of()), sd_mm=(1e-3, 1e-3, 1e-3))))
+    assert len(result.wall.sections) == 1
+    assert abs(result.table.volume_m3[-1] - volume_of(oval)) < result.table.U_m3[-1]
+    rel = 2e-5 if tell is plumbed else 2e-4  # the area term of waves between 12 points
+    assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=rel)
+
+
+def test_a_lean_that_lines_show_is_no_part_of_an_outline(tmp_path, monkeypatch):
+    """Exact geometry: a shell that leans by 2 % has horizontal cuts as large as an upright one."""
+    monkeypatch.setitem(globals(), "SLOPE", (0.02, 0.0))
+    result = run(tmp_path, one_ring(as_points(plumbed(parts_of()), sd_mm=(1e-3, 1e-3, 1e-3))))
+    assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=2e-5)
+
+
+def test_courses_that_no_line_carries_a_radius_to_are_refused(tmp_path):
+    """Lines on courses of which no points and no tape tell one carry nothing."""
+    parts = one_ring(as_points(plumbed(parts_of(), levels=LEVELS[2:])))
+    assert {one[0] for one in problems_of(tmp_path, parts)} == {"courses.csv"}
+
+
+def test_the_lean_of_lines_is_that_of_the_points(tmp_path):
+    """Exact geometry: both are the slope of the shell."""
+    result = run(tmp_path, plumbed(parts_of()))
+    test = compare_leans(levels_and_lean(result.job, result.read)[1], result.wall.shell)
+    np.testing.assert_allclose([test.of_lines, test.of_points], [SLOPE, SLOPE], atol=5e-5)
+    assert test.w < 1
+    assert not list(check_leans(result.job, result.wall))
+
+
+@pytest.mark.parametrize(("azimuth", "cause"), [
+    (lambda i: -30 * i % 360, "leans_mirrored"), (lambda i: 30 * (i + 2) % 360, "leans_turned"),
+])  # fmt: skip
+def test_azimuths_of_lines_in_another_frame_are_named(tmp_path, azimuth, cause):
+    """Planted: lines numbered anticlockwise, or counted from another zero."""
+    parts = plumbed(as_points(parts_of()), sd_m=3e-4)
+    lines = parts.tables["lines"]
+    parts.tables["lines"] = [
+        [*lines[0], "azimuth_deg"], *([*row, azimuth(i)] for i, row in enumerate(lines[1:]))
+    ]  # fmt: skip
+    result = run(tmp_path, parts)
+    (told,) = check_leans(result.job, result.wall)
+    assert told.text.values["text"].values["cause"].code == cause
+    assert str(told) in map(str, result.warnings)
+
+
+@pytest.mark.slow
+def test_lines_beside_tangents_agree_on_an_exact_wall(tmp_path):
+    """Exact geometry: sights that touch, offsets along rays; a level that tangents alone saw, and
+    courses that lines alone saw.
+    """
+    outer = Surface(of_tangents.oval, of_tangents.FOOT, of_tangents.SLOPE)
+    rows = of_tangents.sights(of_tangents.oval, of_tangents.Circle(), levels=LEVELS[:4])
+    parts = plumbed(of_tangents.parts_of(rows, seed=None), outer=outer)
+    result = run(tmp_path, parts)
+    assert result.read.tested.accepted.all()
+    assert result.read.collimations["ZL"][0] == pytest.approx(KAPPA, rel=2e-2)
+    assert {one.group.course for one in result.wall.sections} == {0, 1}
+    truth = of_tangents.inside_of(of_tangents.oval)
+    assert result.table.volume_m3[-1] == pytest.approx(truth, rel=3e-5)
+    assert abs(result.table.volume_m3[-1] - truth) < result.table.U_m3[-1]
+
+
 def dense(result):
     """(values, covariance, size) of a joined wall by one adjustment of everything.
 
@@ -205,9 +297,10 @@ def dense(result):
     return found, root @ root.T, columns
 
 
-def test_points_straps_and_offsets_are_one_dense_adjustment(tmp_path):
+@pytest.mark.parametrize("seen", [lambda parts: parts, one_ring])
+def test_points_straps_and_offsets_are_one_dense_adjustment(tmp_path, seen):
     """Second method: estimates and covariances to 1e-9, linearised at the same place."""
-    parts = plumbed(as_points(strapped(parts_of())), sd_m=5e-4)
+    parts = plumbed(seen(as_points(strapped(parts_of()))), sd_m=5e-4)
     job = tankcal.load(write_folder(tmp_path, parts))
     job = replace(job, snooping=False)
     result = tankcal.run(job, simulated=False)

@@ -57,6 +57,9 @@ class WallField:
         Shapes of components that the estimate states; the others are in the doubt alone. Without
         any each course is a cylinder of its mean radius, as standards of strapping have it; with
         "mean" alone a surface of revolution.
+    plumbed : int, optional
+        Rings from this number on do not stand off the axis, but off a plumb line, or off set-ups
+        that may move: where they are is no part of an outline.
     """
 
     sites: Sites
@@ -65,6 +68,7 @@ class WallField:
     amplitudes: Amplitudes
     nominal_m: float
     stated: tuple = SHAPES
+    plumbed: int | None = None
 
     @property
     def grid_rad(self):
@@ -222,12 +226,13 @@ class WallField:
 
     @cached_property
     def _circles(self):
-        """(courses, g) the free radius less the mean, about the mean centre of the rings."""
+        """(courses, g) the free radius less the mean, about the mean centre of its rings."""
         free, radii = self._solved[0], self._columns[1]
         turn = np.stack([np.sin(self.grid_rad), np.cos(self.grid_rad)])
-        found = []
+        found, most = [], np.inf if self.plumbed is None else self.plumbed
         for start, members in zip(radii, self._members, strict=True):
-            members = members[self.sites.ring[members] >= 0]
+            ring = self.sites.ring[members]
+            members = members[(ring >= 0) & (ring < most)]
             if not len(members) or "oval" not in self.stated:
                 found.append(np.full(len(self.grid_rad), free[start]))
                 continue

@@ -94,7 +94,7 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
         if tables["welds"] is not None:
             check_welds(tables["welds"], courses, log)
         if points is not None:
-            check_cylinder(points, courses, values, raw, log)
+            check_cylinder(points, tables, values, raw, log)
         check_bottom(values, tables["bottom"], points, extent, raw, log)
         check_roof(values["roof"], extent, raw, log)
     elif has_rows(points):

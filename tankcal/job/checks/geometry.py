@@ -4,6 +4,7 @@ import numpy as np
 
 from tankcal.job.checking import UNIT_FACTOR, course_heights, places_of, tell
 from tankcal.messages import message
+from tankcal.survey.reference_line import courses_told
 
 MIN_POINTS_PER_COURSE = 5
 FEW_POINTS_PER_COURSE = 10
@@ -12,8 +13,11 @@ DOUBTFUL_EXTENT = 1.5  # points wider than the tank by more: feet, or many point
 LARGEST_SPHERE_M = 100
 
 
-def check_cylinder(points, courses, values, raw, log):
-    """Points, drawing and courses of a vertical tank, and enough points in each course."""
+def check_cylinder(points, tables, values, raw, log):
+    """Points, drawing and courses of a vertical tank, and enough points in each course that
+    neither straps nor lines tell.
+    """
+    courses = tables["courses"]
     xyz = places_of(points)
     unplaced = points.skipped + len(points.rows) - len(xyz)
     tank, bottom = values["tank"], values["datum"]["bottom_z_m"]
@@ -31,7 +35,7 @@ def check_cylinder(points, courses, values, raw, log):
     if not same_unit or bottom is None or heights is None:
         return
     edges = bottom + np.concatenate([[0.0], np.cumsum(heights)])
-    _check_points_in_courses(xyz[:, 2], unplaced, edges, courses, raw, log)
+    _check_points_in_courses(xyz[:, 2], unplaced, edges, tables, raw, log)
 
 
 def check_scan(points, values, kind, raw, log):
@@ -120,8 +124,9 @@ def check_extent(points, column, extent, key, nominal, log):
     return False
 
 
-def _check_points_in_courses(z, unplaced, edges, courses, raw, log):
+def _check_points_in_courses(z, unplaced, edges, tables, raw, log):
     """Enough points in each course, even if all points that could not be read lie there?"""
+    courses = tables["courses"]
     if not np.any((z >= edges[0]) & (z <= edges[-1])):
         expected = message(
             "no_point_on_shell",
@@ -135,7 +140,12 @@ def _check_points_in_courses(z, unplaced, edges, courses, raw, log):
         tell(log.problem, raw, "datum", "bottom_z_m", expected)
         return
     counts, _ = np.histogram(z, bins=edges)
+    names = np.array(courses.of("course"))
+    seen = set(names[counts + unplaced >= MIN_POINTS_PER_COURSE].tolist())
+    told = courses_told(seen, _courses_of(tables["circumferences"]), _courses_of(tables["offsets"]))
     for row, name, count in zip(courses.rows, courses.of("course"), counts, strict=True):
+        if name in told - seen and not count:
+            continue
         if count + unplaced < MIN_POINTS_PER_COURSE:
             expected = message(
                 "too_few_points_in_course",
@@ -154,3 +164,11 @@ def _check_points_in_courses(z, unplaced, edges, courses, raw, log):
                 advised=FEW_POINTS_PER_COURSE,
             )
             log.warning(courses.file, expected, row, "course")
+
+
+def _courses_of(table):
+    """Names of the courses in the rows of a table that count."""
+    if table is None:
+        return set()
+    pairs = zip(table.of("course"), table.of("use"), strict=True)
+    return {name for name, use in pairs if use != "check"}

@@ -47,14 +47,20 @@ def check_hits(values, tables, registers, raw, log):
             fewest=FEWEST_HITS,
         )
         log.problem(hits.file, expected)
-    for name in ("points", "targets"):
-        if has_rows(tables[name]):
-            expected = message(
-                "beside_hits",
-                "given together with wall hits; expected only one of them: tankcal does not join"
-                " them yet",
-            )
-            log.problem(tables[name].file, expected)
+    if has_rows(tables["points"]):
+        expected = message(
+            "beside_hits",
+            "given together with wall hits; expected only one of them: tankcal does not join"
+            " them yet",
+        )
+        log.problem(tables["points"].file, expected)
+    if has_rows(tables["targets"]) and not has_survey(tables):
+        expected = message(
+            "targets_without_network",
+            "given together with wall hits, but nothing observes these targets; expected"
+            " directions and distances to them (directions.csv, slope_distances.csv)",
+        )
+        log.problem(tables["targets"].file, expected)
     told = frozenset((problem.file, problem.row) for problem in log.problems)
     files = SurveyFiles(values, tables, registers, raw, log, told)
     for table in (hits, control):

@@ -31,7 +31,7 @@ def check_tangents(values, tables, registers, raw, log):
     if len(table.rows) > MOST_TANGENTS:
         log.problem(table.file, too_many_tangents(len(table.rows)))
         return
-    for name in ("points", "targets", "wall_hits", "offsets"):
+    for name in ("points", "targets", "wall_hits"):
         if has_rows(tables[name]):
             expected = message(
                 "beside_tangents",
