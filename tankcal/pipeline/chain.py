@@ -7,7 +7,6 @@ from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from tankcal.errors import HeightError, InputError, Problem
 from tankcal.job import Job
@@ -51,6 +50,7 @@ from tankcal.text.digits import decimals_of_height, fixed
 from tankcal.text.display import table_html, volume_text
 
 if TYPE_CHECKING:
+    import pandas
     from matplotlib.figure import Figure
 
 MILLIMETRE, PARTS = 0.001, 10  # of a step of the tables that proportional parts are for
@@ -208,13 +208,15 @@ class Result:
         return self.strapped if self.wall is None else self.wall.read
 
     @property
-    def capacity(self) -> pd.DataFrame:
+    def capacity(self) -> "pandas.DataFrame":
         """The capacity table, with the U that every paper states: the columns of capacity.csv.
 
         height_m, volume_m3 and u_m3, the standard uncertainty; k, not a number where U is not k u
         but Monte Carlo's; U_m3, low_m3 and high_m3; interval, "gum" or "monte_carlo": whose these
         are; with a floating roof for_use.
         """
+        import pandas  # takes long to load, and no result needs it
+
         table, stated = self.table, self.intervals
         columns = {
             "height_m": table.height_m,
@@ -228,7 +230,7 @@ class Result:
         }
         if table.critical_m is not None:
             columns["for_use"] = table.for_use(table.height_m)
-        return pd.DataFrame(columns)
+        return pandas.DataFrame(columns)
 
     def at(self, height_m: float) -> Quantity:
         """Volume at a dip, with the U that is stated (`capacity.Quantity`); HeightError outside."""
