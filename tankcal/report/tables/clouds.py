@@ -189,8 +189,8 @@ SHARE_OF_U = Table(
     "cloud_share_of_U",
     (
         Column("what", words="parts_of_U", sheet="cloud_what", width=30, on=""),
-        Column("u_m3", "m3", u="u_m3", sheet="cloud_u", on=""),
-        Column("U_m3", "m3", u="U_m3", sheet="cloud_U", on=""),
+        Column("u_m3", "m3", u="u_m3", sheet="standard_m3", on=""),
+        Column("U_m3", "m3", u="U_m3", sheet="expanded_m3", on=""),
     ),
     rows=_share_of_U,
 )
