@@ -117,13 +117,12 @@ def facts(paper):
 
 
 def blocks_of_tables(paper):
-    """The declared tables that have rows, scans and files in two each: they are wide."""
-    twice = {tables.FILES.name: "cloud_digests", tables.SCANS.name: "cloud_points"}
+    """The declared tables that have rows; that of scans is wide, and set as two."""
     for table in tables.TABLES:
         if table is not tables.SHARE_OF_U and table.rows(paper.record):
             yield paper.show(table)
-            if table.name in twice:
-                yield paper.show(table, on=twice[table.name])
+            if table is tables.SCANS:
+                yield paper.show(table, on="cloud_points")
 
 
 def cells_of_map(record):

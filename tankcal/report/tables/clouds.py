@@ -18,18 +18,16 @@ def _count(key, **more):
 _SCAN = _column("scan", "scan", width=10)
 _W = Column("w", decimals=2, heading="tangent_w", sheet="tangent_w")
 _COURSE = Column("course", sheet="course", width=9)
-_COUNTED = (_count("delivered"), _count("left_out"))
 
 FILES = Table(
     "cloud_files",
     (
-        _column("cloud", "name", width=10, on="cloud_files cloud_digests"),
-        Column("file", sheet="file", width=24, on="cloud_files"),
-        _column("format", "format", width=9, on="cloud_files"),
-        Column("bytes", decimals=0, sheet="bytes", on="cloud_files"),
-        *(_count(key, on="cloud_files") for key in ("scans", "declared", "delivered", "left_out",
-                                                    "of_wall")),
-        Column("sha256", sheet="sha256", width=68, on="cloud_digests"),
+        _column("cloud", "name", width=10),
+        Column("file", sheet="file", width=24),
+        _column("format", "format", width=9),
+        Column("bytes", decimals=0, sheet="bytes"),
+        *map(_count, ("scans", "declared", "delivered", "left_out", "of_wall")),
+        Column("sha256", sheet="sha256", width=68, on=""),
     ),
     rows=lambda record: record["clouds"]["files"],
 )  # fmt: skip
