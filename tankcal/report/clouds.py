@@ -117,12 +117,12 @@ def facts(paper):
 
 
 def blocks_of_tables(paper):
-    """The declared tables that have rows; that of scans is wide, and set as two."""
-    for table in tables.TABLES:
-        if table is not tables.SHARE_OF_U and table.rows(paper.record):
-            yield paper.show(table)
-            if table is tables.SCANS:
-                yield paper.show(table, on="cloud_points")
+    """The declared tables that have rows; U is among the facts."""
+    return [
+        paper.show(table)
+        for table in tables.TABLES
+        if table is not tables.SHARE_OF_U and table.rows(paper.record)
+    ]
 
 
 def cells_of_map(record):

@@ -27,7 +27,6 @@ FILES = Table(
         _column("format", "format", width=9),
         Column("bytes", decimals=0, sheet="bytes"),
         *map(_count, ("scans", "declared", "delivered", "left_out", "of_wall")),
-        Column("sha256", sheet="sha256", width=68, on=""),
     ),
     rows=lambda record: record["clouds"]["files"],
 )  # fmt: skip
@@ -35,21 +34,30 @@ FILES = Table(
 SCANS = Table(
     "cloud_scans",
     (
-        replace(_SCAN, on="cloud_scans cloud_points"),
-        _column("scanner", "scanner", width=14, on="cloud_scans"),
-        _column("side", "side", words="sides", width=14, on="cloud_scans"),
-        _column("tie", "tie", words="ties_of_scans", width=12, on="cloud_scans"),
-        _column("is_assumed", "assumed", width=10, on=""),
-        *(Column(f"{axis}_m", "m", decimals=3, heading=f"hit_{axis}", sheet=f"hit_{axis}_m",
-                 on="cloud_scans") for axis in "xyz"),
-        _column("s_translation_mm", "s_translation", "image mm", 2, on="cloud_scans"),
-        _column("s_rotation_arcsec", "s_rotation", "arcsec", 1, on="cloud_scans"),
-        _count("targets", on="cloud_scans"),
-        *(_count(key, on="cloud_points") for key in ("left_out", "delivered", "outside", "beyond",
-                                                     "of_wall", "readings")),
+        _SCAN,
+        _column("scanner", "scanner", width=14),
+        _column("side", "side", words="sides", width=14),
+        _column("tie", "tie", words="ties_of_scans", width=12),
+        *(Column(f"{axis}_m", "m", decimals=3, heading=f"hit_{axis}", sheet=f"hit_{axis}_m")
+          for axis in "xyz"),
+        _column("s_translation_mm", "s_translation", "image mm", 2),
+        _column("s_rotation_arcsec", "s_rotation", "arcsec", 1),
+        _count("targets"),
+    ),
+    rows=lambda record: [
+        one | {"tie": "assumed" if one["is_assumed"] else one["tie"]}
+        for one in record["clouds"]["scans"]
+    ],
+)  # fmt: skip
+
+POINTS = Table(
+    "cloud_points",
+    (
+        _SCAN,
+        *map(_count, ("left_out", "delivered", "outside", "beyond", "of_wall", "readings")),
     ),
     rows=lambda record: record["clouds"]["scans"],
-)  # fmt: skip
+)
 
 
 def _scanners(record):
@@ -194,6 +202,6 @@ SHARE_OF_U = Table(
 )
 
 TABLES = (
-    *(FILES, SCANS, SCANNERS, SHARED, TARGETS, OVERLAPS, COURSES, OBSTRUCTIONS),
+    *(FILES, SCANS, POINTS, SCANNERS, SHARED, TARGETS, OVERLAPS, COURSES, OBSTRUCTIONS),
     *(JOINTS, WELDS, SHARE_OF_U),
 )
