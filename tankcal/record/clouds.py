@@ -1,12 +1,16 @@
 """The part of the record that says what clouds showed: files, scans, what hides the wall."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from tankcal.pipeline.cloud_checks import overlaps_of
+from tankcal.record.cloud_map import CloudMap, map_of
 from tankcal.record.hits import SharedByHits, shared_of
 from tankcal.record.schema import Saved, key
 
 ARCSEC = np.pi / 180 / 3600
+SHARED = {"instrument_offset", "instrument_scale", "incidence", "registration"}  # kinds of inputs
 
 
 class CloudFileRead(Saved):
@@ -20,6 +24,9 @@ class CloudFileRead(Saved):
     unit_m: float = key("metres of one unit of its coordinates")
     scans: int = key("in the file")
     declared: int | None = key("points that its header says it holds; null: it does not say")
+    delivered: int = key("points with a return, outside of the boxes that are left out")
+    left_out: int = key("points in those boxes")
+    of_wall: int = key("of those delivered, points that means of the wall were taken from")
 
 
 class ScanRegistered(Saved):
@@ -39,7 +46,9 @@ class ScanRegistered(Saved):
     targets: int = key("that its pose was taken from")
     delivered: int = key("points with a return, outside of the boxes that are left out")
     left_out: int = key("points in those boxes")
-    of_wall: int = key("of these, points that means of the wall were taken from")
+    outside: int = key("of those delivered, points above, below or far from the wall")
+    beyond: int = key("of those delivered, points near it, but further than its band")
+    of_wall: int = key("of those delivered, points that means of the wall were taken from")
     readings: int = key("means of cells that the wall was taken from")
 
 
@@ -99,6 +108,32 @@ class ObstructionSeen(Saved):
     far_m: float | None = key("the same: 95 %")
 
 
+class JointSeen(Saved):
+    """A step of the radius that the cells show, beside the joints of the job."""
+
+    height_m: float = key("above the table's zero")
+    step_mm: float = key("of the radius: above less below")
+    nearest_m: float | None = key("height of the nearest joint of the job; null: it has none")
+
+
+class WeldSeen(Saved):
+    """A narrow valley or ridge over a course, such as a vertical weld."""
+
+    course: str = key("name")
+    azimuth_deg: float = key("clockwise from +y")
+    depth_mm: float = key("of the wall beside it, inwards positive")
+
+
+class SharedPart(Saved):
+    """The uncertainty of the top of the table with and without what points have in common."""
+
+    u_m3: float = key("standard uncertainty, as in the table")
+    U_m3: float = key("expanded uncertainty, k by its degrees of freedom")
+    shared_u_m3: float = key("of offset, scale, bias by incidence and registration together")
+    without_u_m3: float = key("of all others")
+    without_U_m3: float = key("the same expanded, by a k of their own")
+
+
 class CloudsRecord(Saved):
     """Clouds of the wall, and what they share."""
 
@@ -111,7 +146,11 @@ class CloudsRecord(Saved):
     overlaps: list[ScansCompared] = key("of scans on one side of the wall")
     courses: list[CourseSeen] = key("from the bottom up")
     obstructions: list[ObstructionSeen] = key("as the cells show them")
+    joints: list[JointSeen] = key("steps of the radius that were found; upright tanks")
+    welds: list[WeldSeen] = key("that were found")
     shared: list[SharedByHits] = key("offsets and scales, before and after the wall; upright tanks")
+    shared_part: SharedPart = key("of U at the top of the table")
+    map: CloudMap = key("the wall unrolled")
 
 
 def clouds_of(result):
@@ -143,13 +182,25 @@ def clouds_of(result):
             for place, share in enumerate(clouded.cells.masked_share)
         ],
         obstructions=[_obstruction(one, result) for one in clouded.cells.obstructions],
+        joints=[_joint(one, result) for one in clouded.cells.joints],
+        welds=[
+            WeldSeen(
+                course=_course(result.job, one.course),
+                azimuth_deg=float(np.degrees(one.azimuth_rad)),
+                depth_mm=1000 * one.depth_m,
+            )
+            for one in clouded.cells.welds
+        ],
         shared=shared_of(clouded.told, certificates, clouded.beamed.told_m),
+        shared_part=shared_part_of(result.table),
+        map=map_of(clouded.cells, _zero_m(result)),
     )
 
 
 def _files(clouds, clouded):
-    found = []
+    found, cells = [], clouded.cells
     for file, hashed in zip(clouds.files, clouded.files, strict=True):
+        mine = slice(file.first, file.first + len(file.header.scans))
         counts = [one.declared for one in file.header.scans]
         found.append(
             CloudFileRead(
@@ -161,6 +212,9 @@ def _files(clouds, clouded):
                 unit_m=file.unit_m,
                 scans=len(counts),
                 declared=None if None in counts else sum(counts),
+                delivered=int(cells.delivered[mine].sum()),
+                left_out=int(clouded.left_out[mine].sum()),
+                of_wall=int(cells.of_wall[mine].sum()),
             )
         )
     return found
@@ -192,6 +246,8 @@ def _scans(result):
                 targets=tied.get(one.name, 0),
                 delivered=int(cells.delivered[place]),
                 left_out=int(clouded.left_out[place]),
+                outside=int(cells.outside[place]),
+                beyond=int(cells.beyond[place]),
                 of_wall=int(cells.of_wall[place]),
                 readings=int(readings[place]),
             )
@@ -231,8 +287,7 @@ def _course(job, place):
 
 
 def _obstruction(one, result):
-    bottom = result.job.datum.bottom_z_m or 0.0
-    low, high = np.array(one.height_m) - bottom - result.zero_m
+    low, high = np.array(one.height_m) - _zero_m(result)
     near, far = (float(d) if np.isfinite(d) else None for d in one.distance_m)
     return ObstructionSeen(
         guess=one.guess,
@@ -242,4 +297,37 @@ def _obstruction(one, result):
         top_m=float(high),
         near_m=near,
         far_m=far,
+    )
+
+
+def _zero_m(result):
+    """Height of the table's zero in the frame of the cells; of tanks without a bottom 0."""
+    return (result.job.datum.bottom_z_m or 0.0) + result.zero_m
+
+
+def _joint(one, result):
+    low = _zero_m(result)
+    return JointSeen(
+        height_m=one.height_m - low,
+        step_mm=1000 * one.step_m,
+        nearest_m=one.nearest_m - low if np.isfinite(one.nearest_m) else None,
+    )
+
+
+def shared_part_of(table):
+    """`SharedPart` of the top row of a capacity table.
+
+    Inputs that were found together ("a & b") count as shared where one of them is.
+    """
+    shared, others = [], []
+    for source in table.sources:
+        is_shared = not SHARED.isdisjoint(source.kind.split(" & "))
+        (shared if is_shared else others).append(source)
+    shared, others = (replace(table, sources=tuple(one)) for one in (shared, others))
+    return SharedPart(
+        u_m3=float(table.u_m3[-1]),
+        U_m3=float(table.U_m3[-1]),
+        shared_u_m3=float(shared.u_m3[-1]),
+        without_u_m3=float(others.u_m3[-1]),
+        without_U_m3=float(others.U_m3[-1]),
     )

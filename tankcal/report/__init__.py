@@ -19,6 +19,7 @@ _NOT_IN_ALL = (
     "lines",
     "hits",
     "tangents",
+    "clouds",
 )
 _PARTS = (
     ("certificate.pdf", "certificate"),

@@ -16,7 +16,11 @@ from tankcal.text.digits import NOTHING
 
 MIME = "application/vnd.tankcal.block+json"
 ALIGNMENTS = ("left", "center", "right", "decimal")
-WEB_ONLY = ("calculator", "tank_view")  # kinds that the PDF leaves out (report/web makes them)
+WEB_ONLY = (
+    "calculator",
+    "tank_view",
+    "cloud_map",
+)  # kinds that the PDF leaves out (report/web makes them)
 
 
 @dataclass(frozen=True)

@@ -99,6 +99,8 @@ def _instruments(paper):
     for one in (setup for sights in sighted if sights for setup in sights["setups"]):
         if one["instrument"]:
             used[one["instrument"]] = one["certificate"]
+    for one in (paper.record.get("clouds") or {}).get("scanners", ()):
+        used[one["scanner"]] = one["certificate"]
     for one in strapping["tapes"] if strapping else ():
         used[one["tape"]] = one["certificate"]
         if one["master"]:

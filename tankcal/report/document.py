@@ -114,6 +114,7 @@ _KEYS = {
     "figure": {"caption", "alt", "width", "svg"},
     "calculator": {"text", "unit", "height_m", "volume", "U", "deliveries"},
     "tank_view": {"text", "shell", "solid", "reason"},
+    "cloud_map": {"text", "columns", "tenths", "azimuth_deg", "height_m", "limit_mm", "hidden"},
 }
 
 

@@ -21,6 +21,22 @@ def _method(paper, row):
     return method_line(paper.words, adjustment) if adjustment else None
 
 
+def _scanned(paper, row):
+    """What a cloud is, with its number of points as told: none of them counts as independent."""
+    clouds = paper.record.get("clouds")
+    if not clouds:
+        return None
+    scans = clouds["scans"]
+    return paper.word(
+        "texts.cloud_method",
+        scans=len(scans),
+        files=len(clouds["files"]),
+        wall=sum(one["of_wall"] for one in scans),
+        read=sum(one["delivered"] for one in scans),
+        means=sum(one["readings"] for one in scans),
+    )
+
+
 def _volume(paper, row):
     return paper.plain(row["nominal_volume"], "m³")
 
@@ -107,6 +123,7 @@ SURVEY = Table(
     "survey",
     (
         Column("survey_method", text=_method, sheet=True),
+        Column("scanned", text=_scanned, sheet=True),
         Column("survey_side", words="sides", sheet=True),
         Column("shell_temperature", "degC", digits=3, sheet=True,
                in_sheet={"digits": None, "decimals": 1}),

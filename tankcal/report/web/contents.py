@@ -2,6 +2,11 @@
 
 from html import escape
 
+_WIDGETS = {
+    "calculator": ("calculator", 2),
+    "tank_view": ("view", 1),
+    "cloud_map": ("cloud_map", 2),
+}
 _DEEPEST = 2  # level of a heading that stands in the contents
 
 
@@ -21,8 +26,8 @@ def with_ids(blocks, words):
             block = named(block, 0, block["title"])
         elif kind == "heading" and block["level"] <= _DEEPEST:
             block = named(block, block["level"], block["text"])
-        elif kind in ("calculator", "tank_view"):
-            name, depth = ("calculator", 2) if kind == "calculator" else ("view", 1)
+        elif kind in _WIDGETS:
+            name, depth = _WIDGETS[kind]
             block = named(block, depth, words[name])
         elif kind == "markdown":
             nodes = [

@@ -176,4 +176,5 @@ _WRITERS = {
     "markdown": _markdown,
     "calculator": _paragraph,
     "tank_view": _paragraph,
+    "cloud_map": _paragraph,
 }

@@ -13,7 +13,7 @@ from tankcal.report.web.contents import contents_html, with_ids
 from tankcal.report.web.elements import block_html
 from tankcal.report.web.packing import script_data
 from tankcal.report.web.tables import PIECE, framed_table, searchable_table
-from tankcal.report.web.widgets import calculator_html, view_html
+from tankcal.report.web.widgets import calculator_html, map_html, view_html
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.shipped import shipped_folder
 from tankcal.text.words import load_words
@@ -22,6 +22,7 @@ _SCRIPTS = {
     "": ("numbers.js", "look.js"),
     "columns_table": ("finder.js",),
     "calculator": ("deliveries.js", "calculator.js"),
+    "cloud_map": ("map.js",),
     "tank_view": ("matrices.js", "meshes.js", "scene.js", "view.js"),
 }
 
@@ -89,6 +90,8 @@ def _written(blocks, words):
             yield calculator_html(block, words)
         elif kind == "tank_view":
             yield view_html(block, words)
+        elif kind == "cloud_map":
+            yield map_html(block, words)
         else:
             yield block_html(block)
 

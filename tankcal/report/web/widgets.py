@@ -52,6 +52,23 @@ def view_html(block, words):
     )
 
 
+def map_html(block, words):
+    """The wall unrolled: a map whose cells tell their departure."""
+    data = {key: block[key] for key in block if key not in ("kind", "text", "id")}
+    return (
+        f'<section class="widget" id="map" hidden><h3 id="{block["id"]}">'
+        f"{escape(words['cloud_map'])}</h3><p>{escape(words['cloud_map_text'])}</p>"
+        '<div class="fields"><p>'
+        f'<label for="map-limit">{escape(words["cloud_limit"])}</label> '
+        '<input type="range" id="map-limit" min="0" max="100" value="50"> '
+        '<output for="map-limit" id="map-full"></output></p></div>'
+        '<canvas class="map" tabindex="0" role="img" '
+        f'aria-label="{escape(words["cloud_map_alt"])}"></canvas>'
+        '<p class="answer" id="map-told" role="status">\u00a0</p>'
+        f"{_data('map', data)}</section>"
+    )
+
+
 def _view_controls(words):
     choices = "".join(
         f'<option value="{value}">{escape(words[f"from_{value}"])}</option>'

@@ -10,6 +10,7 @@ from tankcal.report.workbook.capacity import capacity_sheet
 from tankcal.report.workbook.certificate import certificate_sheet
 from tankcal.report.workbook.charts import charts_sheets
 from tankcal.report.workbook.papers import (
+    clouds_sheet,
     corrections_sheet,
     courses_sheet,
     hits_sheet,
@@ -47,6 +48,13 @@ _SHOWN_OF_TANK = (
     "other_densities",
     "dip_calculator",
 )
+_OF_SURVEYS = {  # sheets of what a wall was surveyed with, by the part of the record
+    "strapping": strapping_sheet,
+    "lines": lines_sheet,
+    "hits": hits_sheet,
+    "tangents": tangents_sheet,
+    "clouds": clouds_sheet,
+}
 _SHOWN_OF_SURVEY = ("adjustment", "points", "provenance")
 
 
@@ -78,14 +86,9 @@ def _sheets_of_tank(book, record):
     factor_sheet(book, record)
     if record["courses"]:
         courses_sheet(book, record)
-    if record.get("strapping"):
-        strapping_sheet(book, record)
-    if record.get("lines"):
-        lines_sheet(book, record)
-    if record.get("hits"):
-        hits_sheet(book, record)
-    if record.get("tangents"):
-        tangents_sheet(book, record)
+    for key, sheet_of in _OF_SURVEYS.items():
+        if record.get(key):
+            sheet_of(book, record)
     corrections_sheet(book, record)
     inside_sheet(book, record)
     budget_sheet(book, record)

@@ -1,6 +1,6 @@
 """The working papers: courses, corrections, choices and provenance."""
 
-from tankcal.report.tables import hits, lines, strapping, tangents, tank
+from tankcal.report.tables import clouds, hits, lines, strapping, tangents, tank
 from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
@@ -74,6 +74,17 @@ def tangents_sheet(book, record):
     tables = [
         (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
         for table in (tangents.SETUPS, tangents.LEVELS, tangents.READINGS)
+    ]
+    write_tables(book, sheet, _HEAD_ROW, tables)
+
+
+def clouds_sheet(book, record):
+    """Files and scans of clouds, what their points share, targets, and what hides the wall."""
+    sheet = book.sheet("clouds", book.word("texts.clouds_subtitle"), landscape=True)
+    tables = [
+        (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
+        for table in clouds.TABLES
+        if table.rows(record)
     ]
     write_tables(book, sheet, _HEAD_ROW, tables)
 

@@ -1,0 +1,130 @@
+"""Point clouds on paper: U with and without what points share, and the wall unrolled."""
+
+from math import ceil
+
+import matplotlib
+import numpy as np
+from matplotlib.patches import Rectangle
+
+from tankcal.pipeline.plots import GREY, WIDTH, Drawing, styled
+from tankcal.report.tables import clouds as tables
+
+FULL_COLOUR = 98  # percentile of the departures, in size
+LEAST_LIMIT_MM = 0.5
+HIDDEN, EDGE = "#c9ced4", "#1b1b1b"
+
+
+def departures_mm(record):
+    """(rows, columns) departures of the map of a record, mm; nan where the wall is hidden."""
+    told = record["clouds"]["map"]["departure_tenths_mm"]
+    return np.array(told, dtype=float) / 10  # of None nan
+
+
+def limit_mm(record):
+    """The departure that has the last colour, a whole number of half millimetres."""
+    size = np.abs(departures_mm(record))
+    size = size[np.isfinite(size)]
+    wanted = float(np.percentile(size, FULL_COLOUR)) if len(size) else 0.0
+    return max(LEAST_LIMIT_MM, ceil(2 * wanted) / 2)
+
+
+def joints_m(record):
+    """Heights of the ends of the courses above the table's zero, m; [] of other tanks."""
+    courses = record["courses"]
+    zero = record["capacity"]["zero_m"]
+    ends = [one["bottom_m"] for one in courses] + [one["top_m"] for one in courses[-1:]]
+    return [float(one - zero) for one in ends]
+
+
+def of_turn(one):
+    """(from, to) azimuths of an obstruction as drawn from 0 to 360, one or two pieces."""
+    low, high = one["azimuth_from_deg"], one["azimuth_to_deg"]
+    return [(low, min(high, 360.0))] + ([(0.0, high - 360)] if high > 360 else [])
+
+
+@styled
+def cloud_map(paper):
+    """The wall unrolled: departures coloured, hidden cells hatched, what hides it outlined."""
+    record = paper.record
+    drawn = record["clouds"]["map"]
+    upright = record["job"]["tank"]["kind"] == "vertical"
+    heights, turns = drawn["height_edges_m"], drawn["azimuth_edges_deg"]
+    limit = limit_mm(record)
+    figure = Drawing(figsize=(WIDTH, 3.0))
+    ax = figure.subplots()
+    with matplotlib.rc_context({"hatch.linewidth": 0.4, "hatch.color": GREY}):
+        ax.add_patch(
+            Rectangle(
+                (0, heights[0]), 360, heights[-1] - heights[0], facecolor=HIDDEN, hatch="//////",
+                edgecolor=GREY, linewidth=0, rasterized=True, zorder=0,
+            )
+        )  # fmt: skip
+    shown = ax.pcolormesh(
+        turns, heights, np.ma.masked_invalid(departures_mm(record)), cmap="RdBu_r", vmin=-limit,
+        vmax=limit, rasterized=True, zorder=1,
+    )  # fmt: skip
+    ax.hlines(joints_m(record), 0, 360, color=GREY, linewidth=0.5, zorder=2)
+    _obstructions(ax, record["clouds"]["obstructions"])
+    _welds(ax, record)
+    ax.set(xlim=(0, 360), xticks=range(0, 361, 45), ylim=(heights[0], heights[-1]))
+    ax.set_xlabel(paper.word("axes.azimuth" if upright else "axes.cloud_turn"))
+    lying = record["job"]["tank"]["kind"] == "horizontal"
+    ax.set_ylabel(paper.word("axes.cloud_along" if lying else "axes.height"))
+    bar = figure.colorbar(shown, ax=ax, pad=0.02, aspect=30, extend="both")
+    bar.set_label(paper.word("axes.cloud_departure"))
+    figure.subplots_adjust(left=0.075, right=1.04, bottom=0.14, top=0.98)
+    return figure
+
+
+def _obstructions(ax, found):
+    for one in found:
+        for low, high in of_turn(one):
+            ax.add_patch(
+                Rectangle(
+                    (low, one["bottom_m"]), high - low, one["top_m"] - one["bottom_m"],
+                    fill=False, edgecolor=EDGE, linewidth=0.8, zorder=3,
+                )
+            )  # fmt: skip
+
+
+def _welds(ax, record):
+    ends = {one["course"]: one for one in record["courses"]}
+    zero = record["capacity"]["zero_m"]
+    for one in record["clouds"]["welds"]:
+        course = ends.get(one["course"])
+        if course:
+            ax.vlines(
+                one["azimuth_deg"], course["bottom_m"] - zero, course["top_m"] - zero, color=EDGE,
+                linewidth=0.6, linestyle=(0, (4, 3)), zorder=3,
+            )  # fmt: skip
+
+
+def facts(paper):
+    """U at the top of the table with and without what points share, and the registration."""
+    clouds = paper.record["clouds"]
+    part, dof = clouds["shared_part"], clouds["registration_dof"]
+    told = {
+        "cloud_U": part["U_m3"],
+        "cloud_without_U": part["without_U_m3"],
+        "cloud_shared_u": part["shared_u_m3"],
+    }
+    chi2 = paper.number(clouds["registration_chi2"], decimals=1)
+    tied = f"{chi2} / {paper.number(dof, decimals=0)}" if dof else None
+    return paper.facts(
+        [(key, paper.number(value, "m3", u=value or None)) for key, value in told.items()]
+        + [("cloud_registration", tied)]
+    )
+
+
+def blocks_of_tables(paper):
+    """The declared tables that have rows; U is among the facts."""
+    return [
+        paper.show(table)
+        for table in tables.TABLES
+        if table is not tables.SHARE_OF_U and table.rows(paper.record)
+    ]
+
+
+def cells_of_map(record):
+    """How many cells of the wall the map shows."""
+    return int(np.isfinite(departures_mm(record)).sum())
