@@ -64,8 +64,8 @@ bench: $(VENV)/full ## time and memory of the main job, walls, tables of 1 mm ro
 	$(BIN)/python benchmarks/uncertainty.py
 	$(BIN)/python benchmarks/monte_carlo.py 9500 $(ROUNDS)
 	$(BIN)/python benchmarks/wall.py
-	$(BIN)/python benchmarks/rings.py
 	$(BIN)/python benchmarks/clouds.py
+	$(BIN)/python benchmarks/cloud_cells.py
 	$(BIN)/python benchmarks/planning.py $(ROUNDS)
 
 peer: $(VENV)/full ## the adjustment against C++ Ceres (needs libceres-dev)

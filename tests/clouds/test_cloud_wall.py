@@ -28,10 +28,10 @@ def _find(*scans, **options):
     return find_cloud_wall(passes_of(scans), **given)
 
 
-def _histograms(distance_m, points=30, noise=1.0, bins=50, bin_m=0.004):
+def _histograms(distance_m, points=30, noise=1.0, bins=50, bin_m=0.004, seed=5):
     """Counts (rows, columns, bins) of walls at given distances, normal to a bin's width."""
     edges = np.arange(bins + 1) - bins / 2
-    rng = np.random.default_rng(5)
+    rng = np.random.default_rng(seed)
     counts = np.zeros((*distance_m.shape, bins), dtype=np.int64)
     for place in np.ndindex(distance_m.shape):
         values = distance_m[place] / bin_m + rng.normal(0, noise / 2, points)
@@ -65,10 +65,11 @@ def test_wall_of_a_cell_is_what_its_neighbours_show():  # property: the other mo
     assert grown.two_modes.sum() == 100
 
 
+@pytest.mark.slow
 def test_seam_of_30_mm_stays():  # closed form: a cusp 0.4 m wide over the whole height
     arc = 0.13 * (np.arange(80) - 40.3 + np.linspace(-0.5, 0.5, 60)[:, None, None])
-    form = -0.03 * np.maximum(0, 1 - np.abs(np.tile(arc, (40, 1))) / 0.2)
-    counts = sum(_histograms(part, points=1) for part in form)
+    form = -0.03 * np.maximum(0, 1 - np.abs(np.tile(arc, (8, 1))) / 0.2)
+    counts = sum(_histograms(part, points=1, seed=i) for i, part in enumerate(form))
     assert np.all(_grow(counts).why == IS_WALL)
 
 
@@ -91,6 +92,7 @@ def test_round_cylinder():  # closed form
     assert_array_equal(wall.delivered, [60_000, 60_000])
 
 
+@pytest.mark.slow
 def test_pieces_change_no_byte_of_the_wall():  # property
     scan = _cylinder(20_000)
     whole = _find(scan)
@@ -168,7 +170,7 @@ def _broken(scan, value):
         (np.ones((50_000, 3)), "cloud_nothing_upright", {}),
         (np.random.default_rng(1).normal(2, 3, (50_000, 3)), "cloud_nothing_upright", {}),
         (_cylinder()[:, [2, 0, 1]] - [0, 10, 18], "cloud_lies", {"joints_m": [0.0, 6.0]}),
-        (_cylinder(), "cloud_wall_too_small", {"kind": "sphere", "joints_m": None}),
+        (_cylinder(), "no_sphere_in_cloud", {"kind": "sphere", "joints_m": None}),
     ],
 )
 def test_what_is_no_wall_is_told(scan, code, options):
@@ -194,8 +196,9 @@ def test_sphere_and_lying_cylinder():  # closed form
 INSIDE = ((2.3, 0.7, 1.6), (-2.2, -1.5, 1.6), (0.7, -3.0, 4.0))
 SCENES = {
     "stairs, pipes, a second surface at 20 mm": (5, {"pipes": 10, "second": (0.05, 0.02)}),
-    "pipes on a fifth, a second surface at 200 mm": (6, {"pipes": 20, "second": (0.05, 0.2)}),
+    "40 pipes, a second surface at 200 mm": (6, {"pipes": 40, "second": (0.05, 0.2)}),
     "a second surface at 60 mm in 0.5 %": (4, {"pipes": 5, "second": (0.005, 0.06)}),
+    "one scan, 60 pipes": (11, {"pipes": 60}),
     "a sector is missing": (9, {"pipes": 5, "gap": (1.0, 2.0)}),
     "courses of other radii": (3, {"step_m": (0.0, 0.004, -0.003, 0.005)}),
 }
@@ -225,7 +228,8 @@ def test_clutter_moves_no_radius(name, figure):  # simulation: rays, not the mod
     seed, given = SCENES[name]
     rng = np.random.default_rng(seed)
     scene = make_scene(rng, stairs=True, **given)
-    scans = [take_scan(rng, scene, place, 250_000) for place in INSIDE]
+    places = INSIDE[:1] if name.startswith("one scan") else INSIDE
+    scans = [take_scan(rng, scene, place, 750_000 // len(places)) for place in places]
     wall = find_cloud_wall(
         passes_of([xyz for xyz, _ in scans]), radius_m=7.5, joints_m=scene.joints_m
     )
@@ -234,7 +238,7 @@ def test_clutter_moves_no_radius(name, figure):  # simulation: rays, not the mod
         sound.add(xyz[kind == WALL], number)
         every.add(xyz, number)
     by_hand = wall_of_cells(sound, wall.joints_m, wall.sides)
-    counts = [sum(one.counts(i).sum(axis=2) for i in range(3)) for one in (sound, every)]
+    counts = [sum(one.counts(i).sum(axis=2) for i in range(len(scans))) for one in (sound, every)]
     is_truly = (counts[0] >= 8) & (counts[0] >= counts[1] / 2)
     kept = wall.is_wall.any(axis=0)[is_truly].mean()
     bias = _mean_of_courses(_errors(scene, wall), scene.courses)
@@ -243,23 +247,27 @@ def test_clutter_moves_no_radius(name, figure):  # simulation: rays, not the mod
     figure(name + "bias of a course", f"{1e3 * np.abs(bias).max():.3f} mm")
     figure(name + "against clutter taken out by hand", f"{1e3 * np.abs(bias - hand).max():.3f} mm")
     figure(name + "wall kept", f"{100 * kept:.2f} %")
+    figure(name + "masked", f"{100 * wall.masked_share.mean():.0f} %")
     assert np.abs(bias).max() < 2e-4
     assert np.abs(bias - hand).max() < 3e-4
     assert kept >= 0.98
 
 
+SMALL, RAYS = {"radius_m": 4.0, "courses": 3}, 400_000
+
+
 @pytest.mark.slow
 def test_buckle_and_seams_of_a_scan_are_kept():  # simulation
-    scene = Scene(buckle=(3.0, 5.0, 0.06, 2.0))
-    scan, _ = take_scan(np.random.default_rng(1), scene, (1.0, -0.5, 3.0), 600_000)
-    wall = find_cloud_wall(passes_of([scan]), radius_m=7.5, joints_m=scene.joints_m)
+    scene = Scene(**SMALL, buckle=(3.0, 3.0, 0.06, 2.0))
+    scan, _ = take_scan(np.random.default_rng(1), scene, (0.5, -0.3, 3.0), RAYS, even=False)
+    wall = find_cloud_wall(passes_of([scan]), radius_m=4.0, joints_m=scene.joints_m)
     height, turn = wall.along_m[0], wall.turn_rad[0]
-    buckle = np.hypot((turn - 3.0) * 7.5, height - 5.0) < 0.9
-    seam = np.abs(turn - 1.0) * 7.5 < 0.2
+    buckle = np.hypot((turn - 3.0) * 4, height - 3.0) < 0.9
+    seam = np.abs(turn - 1.0) * 4 < 0.2
     for place in (buckle, seam):
         assert wall.is_wall[0][place & np.isfinite(height)].mean() > 0.98
     assert np.abs([one.azimuth_rad - 1.0 for one in wall.welds]).min() < 0.02
-    assert len([one for one in wall.welds if abs(one.azimuth_rad - 1.0) < 0.02]) == 4
+    assert len([one for one in wall.welds if abs(one.azimuth_rad - 1.0) < 0.02]) == 3
 
 
 @pytest.mark.slow
@@ -272,25 +280,26 @@ def test_outside_and_inside_are_told_apart():  # simulation: a plate of 12 mm
 @pytest.mark.slow
 def test_what_stands_before_the_wall_is_proposed():  # simulation
     rng = np.random.default_rng(7)
-    scene = Scene(pipes=[(2.0, 0.3, 0.15, 1.0, 7.0)], nozzles=[(5.0, 1.0, 0.4, 0.25)], buckle=None)
-    scan, _ = take_scan(rng, scene, (0.5, 0.5, 3.0), 800_000)
-    wall = find_cloud_wall(passes_of([scan]), radius_m=7.5, joints_m=scene.joints_m)
+    pipe, nozzle = (2.0, 0.3, 0.2, 1.0, 5.0), (5.0, 1.0, 0.4, 0.25)
+    scene = Scene(**SMALL, pipes=[pipe], nozzles=[nozzle], buckle=None)
+    scan, _ = take_scan(rng, scene, (0.5, 0.5, 3.0), RAYS, even=False)
+    wall = find_cloud_wall(passes_of([scan]), radius_m=4.0, joints_m=scene.joints_m)
     pipe, nozzle = wall.obstructions[:2]
     if nozzle.guess == "pipe":
         pipe, nozzle = nozzle, pipe
     assert (pipe.guess, nozzle.guess) == ("pipe", "nozzle")
     assert pipe.height_m[0] < 1.5
-    assert pipe.height_m[1] > 6.5
-    assert -0.7 < pipe.distance_m[0] < pipe.distance_m[1] < -0.2
+    assert pipe.height_m[1] > 4.5
+    assert -0.8 < pipe.distance_m[0] < pipe.distance_m[1] < -0.2
     assert abs(np.mean(nozzle.azimuth_rad) - 5.0) < 0.05
     assert nozzle.deadwood_row[0].startswith("nozzle")
 
 
 @pytest.mark.slow
 def test_joints_of_other_radii_are_proposed():  # simulation
-    scene = Scene(step_m=(0.0, 0.005, -0.004, 0.006), buckle=None, bulge_m=0.002)
-    scan, _ = take_scan(np.random.default_rng(8), scene, (0.5, 0.5, 3.0), 600_000)
-    wall = find_cloud_wall(passes_of([scan]), radius_m=7.5, joints_m=scene.joints_m)
-    assert_allclose([one.height_m for one in wall.joints], [2.0, 4.0, 6.0], atol=1e-9)
-    assert_allclose([one.nearest_m for one in wall.joints], [2.0, 4.0, 6.0], atol=1e-9)
-    assert_allclose([one.step_m for one in wall.joints], [0.005, -0.009, 0.01], atol=1e-3)
+    scene = Scene(**SMALL, step_m=(0.0, 0.005, -0.004), buckle=None, bulge_m=0.002)
+    scan, _ = take_scan(np.random.default_rng(8), scene, (0.5, 0.5, 3.0), RAYS, even=False)
+    wall = find_cloud_wall(passes_of([scan]), radius_m=4.0, joints_m=scene.joints_m)
+    assert_allclose([one.height_m for one in wall.joints], [2.0, 4.0], atol=1e-9)
+    assert_allclose([one.nearest_m for one in wall.joints], [2.0, 4.0], atol=1e-9)
+    assert_allclose([one.step_m for one in wall.joints], [0.005, -0.009], atol=1e-3)

@@ -181,23 +181,30 @@ def _sphere(xyz_m, radius_m):
         away = np.abs(np.linalg.norm(judges - centre, axis=1) - radius_m)
         best = max(best, (float(np.mean(away < WIDE * radius_m)), tuple(centre)))
     if best[1] is None or best[0] < LEAST_ON_SPHERE:
-        raise SolutionError(
-            message(
-                "no_sphere_in_cloud",
-                "no sphere within {band:.0f} % of the nominal radius {nominal_m:.3f} m holds a "
-                "third of the points (best {share:.0f} %): check the diameter and the unit",
-                band=100 * WIDE,
-                nominal_m=radius_m,
-                share=100 * max(best[0], 0.0),
-            )
-        )
+        raise _no_sphere(radius_m, best[0], WIDE)
     centre, radius = np.array(best[1]), radius_m
     for band in SPHERE_BANDS:
         away = np.abs(np.linalg.norm(judges - centre, axis=1) - radius)
         chosen = judges[away < band * radius_m]
         fit = fit_sphere(chosen, np.ones(3 * len(chosen)))
         centre, radius = fit.centre_m, fit.radius_m
+    share = np.mean(np.abs(np.linalg.norm(judges - centre, axis=1) - radius) < CLEAR_BAND * radius)
+    if share < LEAST_ON_SPHERE:
+        raise _no_sphere(radius_m, share, CLEAR_BAND)
     return SphereSurface(centre + middle, radius)
+
+
+def _no_sphere(radius_m, share, band):
+    return SolutionError(
+        message(
+            "no_sphere_in_cloud",
+            "no sphere within {band:.0f} % of the nominal radius {nominal_m:.3f} m holds a third "
+            "of the points (best {share:.0f} %): check the diameter and the unit",
+            band=100 * band,
+            nominal_m=radius_m,
+            share=100 * max(share, 0.0),
+        )
+    )
 
 
 def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad):
