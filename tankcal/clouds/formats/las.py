@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.clouds.contents import ScanHeader
+from tankcal.clouds.contents import WHOLE, ScanHeader
 from tankcal.clouds.formats.files import (
     EXTENT_LIMIT,
     Piece,
     count_mismatch,
     cut_short,
     no_points,
+    ranges_of,
     require_library,
 )
 from tankcal.clouds.formats.isolation import decoded_frames
@@ -54,12 +55,25 @@ def describe(file):
     return header.format, (ScanHeader("", header.count),)
 
 
-def pieces(file, chunk):
-    """The points of a file as `Piece`s."""
+def shares(file, points_each):
+    """Ranges of points; of LAZ they begin with its chunks, for these alone can be sought."""
     header = read_header(file)
-    box = _Box(file, header)
+    if header.laszip is None:
+        return ranges_of(header.count, points_each)
+    compressor, size = _chunks_in(header.laszip)
+    if compressor == 1 or size == VARIABLE:
+        return (WHOLE,)
+    return ranges_of(header.count, max(1, points_each // size) * size)
+
+
+def pieces(file, chunk, share=WHOLE):
+    """The points of a share of a file as `Piece`s."""
+    header = read_header(file)
+    first = share.first
+    count = header.count - first if share.count is None else share.count
+    box = _Box(file, header, first)
     blocks = _las_blocks if header.laszip is None else _laz_blocks
-    for integers in blocks(file, header, chunk):
+    for integers in blocks(file, header, chunk, first, count):
         columns = np.empty((3, len(integers)))  # contiguous: several times as fast as rows
         for i, column in enumerate(columns):
             np.multiply(integers[:, i], header.scale[i], out=column)
@@ -276,12 +290,16 @@ def _check_laszip(file, parts, data):
         )
 
 
+def _chunks_in(data):
+    """The compressor of a LASzip record, and the points of its chunks."""
+    return struct.unpack_from("<H", data)[0], struct.unpack_from("<I", data, 12)[0]
+
+
 def _check_chunk_table(file, parts, data):
     """The table lies in the file, and has as many chunks as points and bytes have room for."""
-    compressor = struct.unpack_from("<H", data)[0]
+    compressor, size = _chunks_in(data)
     if compressor == 1:  # one stream of points, no chunks
         return
-    size = struct.unpack_from("<I", data, 12)[0]
     with file.path.open("rb") as stream:
         stream.seek(parts.first)
         place = int.from_bytes(stream.read(8), "little", signed=True)
@@ -324,8 +342,8 @@ def _chunks_of(count, size):
 class _Box:
     """Points lie in the box of their header; a changed scale moves them out."""
 
-    def __init__(self, file, header):
-        self.file, self.done = file, 0
+    def __init__(self, file, header, done):
+        self.file, self.done = file, done
         slack = 10 * header.scale + 1e-9 * np.maximum(np.abs(header.low), np.abs(header.high))
         self.low, self.high = header.low - slack, header.high + slack
         self.is_blank = not (header.low.any() or header.high.any())  # some writers leave 0
@@ -348,27 +366,28 @@ class _Box:
         self.done += len(xyz)
 
 
-def _las_blocks(file, header, chunk):
+def _las_blocks(file, header, chunk, first, count):
     record = np.dtype(
         {"names": ["xyz"], "formats": ["(3,)<i4"], "offsets": [0], "itemsize": header.record}
     )
     with file.path.open("rb") as stream:
-        stream.seek(header.first)
-        for done in range(0, header.count, chunk):
-            wanted = min(chunk, header.count - done)
+        stream.seek(header.first + first * header.record)
+        for done in range(0, count, chunk):
+            wanted = min(chunk, count - done)
             found = np.fromfile(stream, record, wanted)
             if len(found) < wanted:
-                raise count_mismatch(file, header.count, done + len(found))
+                raise count_mismatch(file, header.count, first + done + len(found))
             yield found["xyz"]
 
 
-def _laz_blocks(file, header, chunk):
+def _laz_blocks(file, header, chunk, first, count):
     request = {
         "kind": "laz",
         "path": str(file.path),
         "first": header.first,
         "record": header.record,
-        "count": header.count,
+        "skip": first,
+        "count": count,
         "laszip": header.laszip.hex(),
         "chunk": chunk,
     }
