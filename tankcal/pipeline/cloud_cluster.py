@@ -10,10 +10,12 @@ import importlib.util
 import logging
 import os
 import socket
+import struct
 import tempfile
 import time
 import uuid
 import warnings
+from urllib.parse import urlsplit
 
 import tankcal
 from tankcal.clouds import count_about
@@ -29,6 +31,7 @@ FEWEST_EACH, MOST_EACH = 1 << 20, 1 << 23  # points of a share
 SHARES_OF_WORKER = 6
 FAN = 8  # parts that are added at once
 WORKER_BYTES = 1 << 30  # of memory that a worker of this machine may take
+LENGTH, LONGEST_GREETING = struct.Struct("<Q"), 1 << 20  # bytes of the first message of a scheduler
 CONNECT_S, ALONE_S, LOOK_S = 5, 30, 0.5  # to connect; without any worker; between looks
 
 
@@ -91,6 +94,7 @@ def _client_of(workers):
     with contextlib.ExitStack() as stack:
         if isinstance(workers, str):
             address = workers
+            _greet(address)
         else:
             memory = {"pause": False, "spill": False, "target": False}
             settings = {f"distributed.worker.memory.{name}": of for name, of in memory.items()}
@@ -108,18 +112,35 @@ def _client_of(workers):
             )
         try:
             client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
-        except (OSError, ValueError, TypeError, RuntimeError, ImportError) as error:
-            raise _refusal(
-                message(
-                    "cluster_no_answer",
-                    "no scheduler of dask answers at {address} ({reason}); expected such as "
-                    "tcp://192.168.1.20:8786, where `dask scheduler` runs",
-                    address=str(address),
-                    reason=type(error).__name__,
-                )
-            ) from error
+        except Exception as error:  # whatever a port that is none of dask comes up with
+            raise _no_answer(address, error) from error
         _check_workers(client, workers)
         yield client
+
+
+def _greet(address):
+    """InputError where nothing at an address greets as a scheduler of dask does.
+
+    A greeting begins with its length; of a port that speaks otherwise dask would take a number of
+    bytes that no memory holds, and of one that is silent it waits for long.
+    """
+    try:
+        found = urlsplit(address if "://" in address else f"tcp://{address}")
+        if found.scheme not in ("tcp", "tls") or not (found.hostname and found.port):
+            raise ValueError(address)
+        with socket.create_connection((found.hostname, found.port), CONNECT_S) as stream:
+            if found.scheme == "tls":
+                return
+            stream.settimeout(CONNECT_S)
+            head = b""
+            while len(head) < LENGTH.size:
+                if not (more := stream.recv(LENGTH.size - len(head))):
+                    raise ConnectionError
+                head += more
+        if LENGTH.unpack(head)[0] > LONGEST_GREETING:
+            raise ConnectionError
+    except (OSError, ValueError) as error:
+        raise _no_answer(address, error) from error
 
 
 def _check_workers(client, workers):
@@ -290,6 +311,18 @@ def _tally_of(placing, share, topic, number):
 
 def _version():
     return tankcal.__version__
+
+
+def _no_answer(address, error):
+    return _refusal(
+        message(
+            "cluster_no_answer",
+            "no scheduler of dask answers at {address} ({reason}); expected such as "
+            "tcp://192.168.1.20:8786, where `dask scheduler` runs",
+            address=str(address),
+            reason=getattr(error, "strerror", None) or type(error).__name__,
+        )
+    )
 
 
 def _no_workers():
