@@ -32,7 +32,7 @@ SHARES_OF_WORKER = 6
 FAN = 8  # parts that are added at once
 WORKER_BYTES = 1 << 30  # of memory that a worker of this machine may take
 LENGTH, LONGEST_GREETING = struct.Struct("<Q"), 1 << 20  # bytes of the first message of a scheduler
-CONNECT_S, ALONE_S, LOOK_S = 5, 30, 0.5  # to connect; without any worker; between looks
+CONNECT_S, ALONE_S, LOOK_S = 5, 30, 0.05  # to connect; without any worker; between looks
 
 
 @contextlib.contextmanager
@@ -190,13 +190,13 @@ class ClusterPasses:
     def _reduced(self, part_of, added, *sizes):
         """What the shares give, added in a tree."""
         shares = self.placing.shares(self._points_each())
+        about = sum(one.points for one in shares)
         topic = f"tankcal-{uuid.uuid4().hex}"
         read = {}
 
-        def note(event):
+        def note(event):  # of a share that is read again, its last word counts
             number, count = event[1]
             read[number] = count
-            self.telling.tell(sum(read.values()), sum(one.points for one in shares))
 
         placing = self.client.scatter(self.placing, broadcast=True, hash=False)
         level = [
@@ -214,7 +214,9 @@ class ClusterPasses:
             ]
         self.client.subscribe_topic(topic, note)
         try:
-            found, tally = self._result_of(level[0])
+            found, tally = self._result_of(
+                level[0], lambda: self.telling.tell(sum([*read.values()]), about)
+            )
         finally:
             self.client.unsubscribe_topic(topic)
         tally.check(self.placing)
@@ -228,11 +230,12 @@ class ClusterPasses:
         workers = max(len(self.client.scheduler_info(n_workers=-1)["workers"]), 1)
         return int(min(max(points / workers / SHARES_OF_WORKER, FEWEST_EACH), MOST_EACH))
 
-    def _result_of(self, future):
+    def _result_of(self, future, tell):
         """The result of a future; InputError in one line for what keeps it from coming."""
         alone_since = None
         while not future.done():
-            time.sleep(LOOK_S / 5)
+            time.sleep(LOOK_S)
+            tell()
             if self.client.scheduler_info(n_workers=-1)["workers"]:
                 alone_since = None
                 continue
