@@ -183,12 +183,7 @@ def _fingerprint(file):
 
 
 def _nominal_radius_m(job):
-    size = job.tank.nominal_diameter_m
-    if job.horizontal is not None:
-        size = job.horizontal.width_m or size
-    if job.sphere is not None:
-        size = job.sphere.diameter_m or size
-    return size / 2
+    return job.tank.nominal_diameter_m / 2
 
 
 def _refuse_places(job, registration, surface):

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from generated_hits import Tool
-from job_builder import write_folder
+from job_builder import job_parts, write_folder
 from scanned_tanks import (
     COURSE_M,
     COURSES,
@@ -190,3 +190,39 @@ def test_the_example_is_the_wall_that_it_was_made_of():
     assert [one["declared"] for one in clouds["files"]] == [16016, 16016]
     assert [one["delivered"] for one in clouds["scans"]] == [16016, 16016]
     assert not any(one["removed"] for one in clouds["targets"])
+
+
+def _scanned_solid(folder, kind, xyz, **settings):
+    """Result of a solid that was scanned once from near its middle."""
+    parts = job_parts(kind=kind, settings={"survey.side": "inside", **settings})
+    at = np.array([0.3, -0.2, 0.4])
+    pose = np.eye(4)
+    pose[:3, 3] = at
+    parts.extra_files["a.xyz"] = xyz_text(xyz - at)
+    exact = {"s_translation_mm": 0.0, "s_rotation_arcsec": 0.0}
+    given = {"file": "a.xyz", "unit": "m", "u_offset_mm": 0.5, "u_scale_ppm": 0.0, **exact}
+    parts.registers["clouds"] = {"A": {**given, "pose": pose.tolist()}}
+    return tankcal.run(tankcal.load(write_folder(folder / "job", parts)))
+
+
+@pytest.mark.slow
+def test_a_sphere_and_a_lying_cylinder(tmp_path, few):
+    """Closed form: diameters and volumes of exact solids with noise."""
+    rng = np.random.default_rng(4)
+    turn, along = rng.uniform(0, 2 * np.pi, 60_000), rng.uniform(-5, 5, 60_000)
+    r = 1.2 + 1e-3 * rng.normal(size=len(turn))
+    lying = np.column_stack([r * np.cos(turn), along, r * np.sin(turn)])
+    settings = {"horizontal.diameter_m": None, "horizontal.azimuth_deg": 0.0}
+    settings |= {"horizontal.dip_from_a_m": 5.0, "tank.nominal_diameter_m": 2.4}
+    found = _scanned_solid(tmp_path / "lying", "horizontal", lying, **settings)
+    assert found.scan.values[0] == pytest.approx(2.4, abs=3e-4)
+    (tmp_path / "ball").mkdir()
+    ray = rng.normal(size=(200_000, 3))
+    ray /= np.linalg.norm(ray, axis=1)[:, None]
+    ball = ray * (5 + 1e-3 * rng.normal(size=(len(ray), 1)))
+    settings = {"sphere.diameter_m": None, "tank.nominal_diameter_m": 10.0}
+    found = _scanned_solid(tmp_path / "ball", "sphere", ball, **settings)
+    assert found.scan.values[0] == pytest.approx(10.0, abs=3e-4)
+    offset = next(one for one in found.budget().lines if one.name == "instrument_offset")
+    own = np.sqrt(offset.share) * found.table.u_m3[-1]
+    assert own == pytest.approx(np.pi * 10**2 * 5e-4, rel=0.02)  # area times 0.5 mm

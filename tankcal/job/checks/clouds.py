@@ -4,7 +4,7 @@ import numpy as np
 
 import tankcal.clouds
 from tankcal.errors import InputError
-from tankcal.job.checking import has_rows, name_twice
+from tankcal.job.checking import has_rows, is_not_given, missing_beside, name_twice, tell
 from tankcal.job.checks.extent import has_clouds, has_hits, has_survey, has_tangents, tells_by_tape
 from tankcal.job.contract.clouds import (
     DOCUMENTED,
@@ -15,6 +15,7 @@ from tankcal.job.contract.clouds import (
     UNITS_M,
 )
 from tankcal.job.contract.shorthand import FREE
+from tankcal.job.entries import kind_of
 from tankcal.job.tables import unreadable_file
 from tankcal.messages import message
 
@@ -32,15 +33,18 @@ def check_clouds(values, tables, registers, raw, log):
         return
     file = raw.registers["clouds"].file
     _refuse_beside(tables, log)
+    size = ("tank", "nominal_diameter_m")
+    if values is not None and kind_of(raw) != "vertical" and is_not_given(raw, *size):
+        tell(log.problem, raw, *size, missing_beside(file))  # of an upright one it always is
     headers = {name: _header(raw, name, one, log) for name, one in given.items()}
     names = {name: scans_of(name, headers[name]) for name in given if headers[name] is not None}
     counts = _count_targets(targets, names, len(names) == len(given), log)
     for name, one in given.items():
-        tell = _teller(raw, file, name, log)
+        tell_of = _teller(raw, file, name, log)
         if headers[name] is not None:
-            _check_poses(one, headers[name], tell)
-        _check_places(one, tell)
-        _check_errors(one, [counts.get(scan, 0) for scan in names.get(name, ())], tables, tell)
+            _check_poses(one, headers[name], tell_of)
+        _check_places(one, tell_of)
+        _check_errors(one, [counts.get(scan, 0) for scan in names.get(name, ())], tables, tell_of)
     _refuse_unlike(raw, file, given, log)
     if has_rows(targets):
         _warn_lonely(tables, targets, log)
