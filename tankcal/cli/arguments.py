@@ -61,7 +61,7 @@ def parse_count(text):
 
 
 def parse_cluster(text):
-    """Who reads clouds: "local", a number of workers, or the address of a scheduler."""
+    """Who reads clouds: "auto", "local", a number of workers, or the address of a scheduler."""
     if WHOLE_NUMBER.fullmatch(text):
         if int(text) > MOST_WORKERS:
             raise refuse_argument(
@@ -73,11 +73,11 @@ def parse_cluster(text):
                 )
             )
         return int(text)
-    if text != "local" and ":" not in text:
+    if text not in ("auto", "local") and ":" not in text:
         raise refuse_argument(
             message(
                 "option_cluster",
-                "found {text!r}; expected local, a number of workers, or an address such as "
+                "found {text!r}; expected auto, local, a number of workers, or an address such as "
                 "tcp://192.168.1.20:8786",
                 text=text,
             )
