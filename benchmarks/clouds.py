@@ -1,38 +1,92 @@
-"""Files of scanners read to their end: time and memory of each format.
+"""Files of scanners to the cells of a wall, end to end: time and memory of each format.
 
-    python benchmarks/clouds.py [POINTS] [FORMAT ...]        (default: 1 000 000 of all formats)
+    python benchmarks/clouds.py [POINTS] [FORMAT ...] [--cluster N]    (default: 1 000 000 of all)
 
-The goals for 1e8 points on two cores, reading and cells of the wall together: LAS 60 s, LAZ 180 s,
-E57 90 s, peak 500 MB. Files are made in a temporary folder, of one noisy wall written again and
-again; each format is read in a process of its own. Seconds of processor are of the reader and the
-child that decodes for it; so are the peaks of memory, added.
+Described, read twice, placed by a pose, sampled and summed up in cells, as a job does it, in this
+process (N = 0, the default) or by N workers. The goals for 1e8 points on two cores: LAS 60 s, LAZ
+180 s, E57 90 s, peak 500 MB. Files are made in a temporary folder ($TMPDIR), of one noisy wall
+written again and again. Seconds of processor are of all processes, the peak of memory is the
+largest sum of what all of them hold (proportional set sizes, looked at five times a second).
 """
 
-import resource
+import argparse
+import os
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from pathlib import Path
 
 import numpy as np
 
-from tankcal.clouds import describe_cloud, read_cloud
+from tankcal.clouds import describe_cloud
+from tankcal.clouds.wall import find_cloud_wall
+from tankcal.job.model.clouds import CloudFile
+from tankcal.pipeline.cloud_cluster import open_passes
+from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
+from tankcal.survey.scans import ScanSetup
+from tankcal.survey.wall_hits import RangingInstrument
 
 BLOCK = 1_000_000
 RADIUS_M, HEIGHT_M, NOISE_M = 6.5, 9.5, 0.002
 
 
-def main(points, kinds):
+def main(points, kinds, workers):
     """Print a line for each format."""
     with tempfile.TemporaryDirectory() as folder:
         for kind in kinds:
             path = Path(folder) / f"wall.{kind}"
             # each in a process of its own: a child counts the memory of a parent as its own
-            for task in ("--write", "--read"):
-                command = [sys.executable, __file__, task, str(path), str(points)]
-                subprocess.run(command, check=True)
+            subprocess.run([sys.executable, __file__, "--write", path, str(points)], check=True)
+            measure([sys.executable, __file__, "--run", path, str(workers)])
             path.unlink()
+
+
+def measure(command):
+    """Run a command; print its line with seconds and memory of it and all of its children."""
+    start = time.perf_counter()
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    held, done = [0.0], threading.Event()
+
+    def look():
+        while not done.wait(0.2):
+            held.append(sum(map(megabytes, family(child.pid))))
+
+    watch = threading.Thread(target=look)
+    watch.start()
+    line = child.stdout.read().strip()
+    _, status, usage = os.wait4(child.pid, 0)
+    done.set()
+    watch.join()
+    seconds = time.perf_counter() - start
+    print(
+        f"{line}, {usage.ru_utime + usage.ru_stime:.1f} s of processor in all, "
+        f"{seconds:.1f} s by the clock, peak {max(held):.0f} MB",
+        flush=True,
+    )
+    if status:
+        sys.exit(1)
+
+
+def family(pid):
+    """Numbers of a process and all of its children."""
+    try:
+        own = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        threads = Path(f"/proc/{pid}/task").iterdir()
+        own += [one for task in threads for one in (task / "children").read_text().split()]
+    except OSError:
+        return {pid}
+    return {pid, *(one for child in set(own) for one in family(int(child)))}
+
+
+def megabytes(pid):
+    """What a process holds, what it shares with others divided among them."""
+    try:
+        rows = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
+    except OSError:
+        return 0.0
+    return sum(int(row.split()[1]) for row in rows if row.startswith("Pss:")) / 1024
 
 
 def wall(points):
@@ -138,35 +192,53 @@ WRITERS = {
 }
 
 
-def read(path):
-    """Read a file to its end and print what it took."""
-    start, total = time.perf_counter(), np.zeros(3)
-    header = describe_cloud(path)
-    described = time.perf_counter() - start
-    points = 0
-    for part in read_cloud(header):
-        points += len(part.xyz_m)
-        total += part.xyz_m.sum(axis=0)
-    seconds = time.perf_counter() - start
-    own, child = (
-        resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    )
-    cpu = sum(one.ru_utime + one.ru_stime for one in (own, child))
-    peaks = [one.ru_maxrss / 1024 for one in (own, child)]
+class Posed:
+    """A registration that turns and shifts one scan, as a job's would."""
+
+    rotation, place_m = np.eye(3)[None], np.array([[10.0, 20.0, 0.0]])
+
+
+class OneCloud:
+    """The clouds of a job of one file."""
+
+    def __init__(self, path):
+        header = describe_cloud(path)
+        self.files = (CloudFile("A", path.name, header, 1.0, 0, np.zeros((0, 6))),)
+        self.scans, self.ranging = (ScanSetup("A", "S"),), {"S": RangingInstrument("S")}
+
+
+def run(path, workers):
+    """Find the wall of a file and print what it took."""
+    clouds = OneCloud(path)
+    start, steps = time.perf_counter(), []
+    telling = Telling(lambda text: steps.append(time.perf_counter()))
+    with open_passes(Placing.of(clouds, Posed), Reading(workers), telling) as passes:
+        opened = time.perf_counter()
+        wall = find_cloud_wall(
+            passes,
+            radius_m=RADIUS_M,
+            joints_m=np.linspace(0, HEIGHT_M, 6),
+            progress=telling.step,
+        )
+        end = time.perf_counter()
+    header = clouds.files[0].header
     print(
-        f"{header.format}: {points} points, {header.bytes / 1e6:.0f} MB, {seconds:.1f} s by the "
-        f"clock ({described:.1f} s of them for the header), {cpu:.1f} s of processor, peak "
-        f"{sum(peaks):.0f} MB ({peaks[0]:.0f} + {peaks[1]:.0f} of the child), mean z "
-        f"{total[2] / points:.4f} m",
-        flush=True,
+        f"{header.format}: {wall.delivered[0]} points, {header.bytes / 1e6:.0f} MB, {workers} "
+        f"workers ({opened - start:.1f} s to start), {wall.grid.rows} x {wall.grid.columns} cells, "
+        f"sample {steps[1] - opened:.1f} s, cells {end - steps[1]:.1f} s"
     )
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--read"]:
-        read(Path(sys.argv[2]))
+    if sys.argv[1:2] == ["--run"]:
+        run(Path(sys.argv[2]), int(sys.argv[3]))
     elif sys.argv[1:2] == ["--write"]:
         path = Path(sys.argv[2])
         WRITERS[path.suffix[1:]](path, int(sys.argv[3]))
     else:
-        main(int(float((sys.argv[1:2] or ["1e6"])[0])), sys.argv[2:] or list(WRITERS))
+        parser = argparse.ArgumentParser()
+        parser.add_argument("points", nargs="?", type=float, default=1e6)
+        parser.add_argument("formats", nargs="*", default=[*WRITERS])
+        parser.add_argument("--cluster", type=int, default=0)
+        asked = parser.parse_args()
+        main(int(asked.points), asked.formats, asked.cluster)

@@ -92,6 +92,9 @@ class InputError(TankcalError):
         self.problems = tuple([problems] if isinstance(problems, Problem) else problems)
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
+    def __reduce__(self):  # so that it comes from another process with its problems
+        return type(self), (self.problems,)
+
     @property
     def texts(self):
         """The lines of its problems, as Messages."""

@@ -7,6 +7,8 @@ from tankcal.messages import message
 from tankcal.text.languages import LANGUAGES
 from tankcal.text.numerals import NUMBER, WHOLE_NUMBER
 
+MOST_WORKERS = 256  # on one machine
+
 
 def add_language(parser):
     """--language, of what a command without a job prints."""
@@ -56,6 +58,31 @@ def parse_count(text):
             message("option_whole", "found {text!r}; expected a whole number", text=text)
         )
     return int(text)
+
+
+def parse_cluster(text):
+    """Who reads clouds: "auto", "local", a number of workers, or the address of a scheduler."""
+    if WHOLE_NUMBER.fullmatch(text):
+        if int(text) > MOST_WORKERS:
+            raise refuse_argument(
+                message(
+                    "option_workers",
+                    "found {text!r}; expected at most {most} workers on one machine",
+                    text=text,
+                    most=MOST_WORKERS,
+                )
+            )
+        return int(text)
+    if text not in ("auto", "local") and ":" not in text:
+        raise refuse_argument(
+            message(
+                "option_cluster",
+                "found {text!r}; expected auto, local, a number of workers, or an address such as "
+                "tcp://192.168.1.20:8786",
+                text=text,
+            )
+        )
+    return text
 
 
 def refuse_argument(text):

@@ -1,8 +1,10 @@
 """`tankcal run` and `tankcal demo`: a job computed, its results written."""
 
+from functools import partial
 from pathlib import Path
 
 import tankcal
+from tankcal.cli.arguments import parse_cluster
 from tankcal.cli.machine import add_json, print_json, problem_of
 from tankcal.cli.reporting import add_letterhead, letterhead_of
 from tankcal.cli.showing import (
@@ -74,6 +76,15 @@ def _add_run(commands):
         action="store_true",
         help="write record and CSV files only; tankcal report makes workbook and papers of them",
     )
+    run.add_argument(
+        "--cluster",
+        metavar="WHERE",
+        type=parse_cluster,
+        default="auto",
+        help="who reads point clouds: local (a worker for each core), a number of workers (0: "
+        "none), or the address of a dask scheduler (default: workers on this machine where they "
+        "pay); the results are the same",
+    )
     run.add_argument("--quiet", action="store_true", help="no progress, only problems")
     add_json(run)
     run.set_defaults(command=_run)
@@ -82,7 +93,7 @@ def _add_run(commands):
 def _run(options):
     source = Path(options.job)
     out = Path(options.out) if options.out else _default_out(source)
-    compute = _adjust if options.only == "adjustment" else _compute
+    compute = _adjust if options.only == "adjustment" else partial(_compute, options.cluster)
     tell = _tell_machine if options.machine else _tell
     quiet = options.quiet or options.machine
     papers = letterhead_of(options), not options.no_papers
@@ -98,7 +109,7 @@ def _default_out(source):
 def _demo(options):
     from tankcal.text.shipped import shipped_folder
 
-    _compute(shipped_folder("examples") / "silva-1995", Path(options.out), options.quiet)
+    _compute(None, shipped_folder("examples") / "silva-1995", Path(options.out), options.quiet)
 
 
 def _tell(out, paths, warnings, result, adjustment):
@@ -154,14 +165,14 @@ def _fit(adjustment):
     }
 
 
-def _compute(source, out, quiet, strict=False, papers=(), tell=_tell):
+def _compute(cluster, source, out, quiet, strict=False, papers=(), tell=_tell):
     prepare_for_small_work()
     from tankcal.report import outputs
 
     show = Progress(quiet)
     job = read_job(source, show)
     outputs.refuse_foreign(out)
-    result = tankcal.run(job, show.step, part_progress=show.part)
+    result = tankcal.run(job, show.step, part_progress=show.part, cluster=cluster)
     adjustment = result.adjustment
     if strict:
         _refuse_failed(adjustment)

@@ -1,12 +1,16 @@
 """What the terminal shows, in the language of the job: progress, warnings, lists of files."""
 
 import os
+import shutil
 import sys
+import time
 
 from tankcal.messages import Message, message
 from tankcal.text.languages import DEFAULT, nearest_language
 
 _LOCALE = ("LC_ALL", "LC_MESSAGES", "LANG")  # the first that is set counts
+JUDGED_S, MILLION = 2.0, 1_000_000  # of a step, before the time left is told
+TO_THE_END = "\x1b[K"  # a terminal clears the rest of the line
 _spoken = {}  # the words of the language that is spoken; nothing: English as it was made
 
 
@@ -104,13 +108,38 @@ def print_paths(out, paths):
         print(f"  {path}")
 
 
+def how_far(done, total, fresh, seconds):
+    """How much of a long step is done, and how long it will still take; of millions, their rate.
+
+    fresh  of `done`, what was done within so many seconds
+    """
+    left = ""
+    if seconds >= JUDGED_S and fresh > 0 and done < total:
+        rest = (total - done) * seconds / fresh
+        if rest < 100:
+            left = message("part_seconds_left", ", about {count:.0f} s left", count=rest)
+        else:
+            left = message("part_minutes_left", ", about {count:.0f} min left", count=rest / 60)
+    if total < MILLION:
+        return message("part_done", "{done}/{total}{left}", done=done, total=total, left=left)
+    return message(
+        "part_millions_done",
+        "{done:.1f}/{total:.1f} million, {rate:.1f} million/s{left}",
+        done=done / MILLION,
+        total=total / MILLION,
+        rate=fresh / MILLION / max(seconds, 1e-3),
+        left=left,
+    )
+
+
 class Progress:
     """One line on standard error a step; a long step counts on in its own line on a terminal."""
 
     def __init__(self, quiet):
         self.quiet = quiet
         self.live = sys.stderr.isatty()
-        self.now = None
+        self.now, self.began = None, (0.0, 0)
+        self._line = ""
 
     def step(self, text):
         self.part(text, 0, 0)
@@ -122,8 +151,16 @@ class Progress:
         if text != self.now:
             self.end()
             print(line, end="" if self.live else "\n", file=sys.stderr, flush=True)
+            self._line, self.began = line, (time.monotonic(), done)
         if self.live and total:
-            print(f"\r{line} {done}/{total}", end="", file=sys.stderr, flush=True)
+            began, first = self.began
+            so_far = say_in_language(how_far(done, total, done - first, time.monotonic() - began))
+            width = shutil.get_terminal_size().columns - 1
+            if self._line and len(self._line) + 1 + len(so_far) > width:
+                print(file=sys.stderr)  # one that wraps could not be written over
+                self._line = ""
+            shown = f"{self._line} {so_far}".lstrip()[:width]
+            print(f"\r{shown}{TO_THE_END}", end="", file=sys.stderr, flush=True)
         self.now = text
 
     def end(self):

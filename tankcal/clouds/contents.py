@@ -48,6 +48,28 @@ class CloudHeader:
 
 
 @dataclass(frozen=True)
+class CloudPiece:
+    """A part of a file that is read on its own, so that a file can be shared out.
+
+    Attributes
+    ----------
+    scan : int or None
+        The only scan that is read; None: all.
+    first : int
+        Records passed over; of text, bytes.
+    count : int or None
+        Records that are read; of text, bytes; None: to the end.
+    """
+
+    scan: int | None = None
+    first: int = 0
+    count: int | None = None
+
+
+WHOLE = CloudPiece()
+
+
+@dataclass(frozen=True)
 class CloudChunk:
     """Some points of one scan.
 

@@ -4,8 +4,9 @@ import time
 
 import numpy as np
 
-from tankcal.clouds.contents import CloudChunk, CloudHeader
-from tankcal.clouds.formats import describe_file, read_pieces
+from tankcal.clouds.contents import WHOLE, CloudChunk, CloudHeader
+from tankcal.clouds.formats import describe_file, read_pieces, share_out
+from tankcal.clouds.formats.columns import rows_about
 from tankcal.clouds.formats.files import EXTENT_LIMIT, count_mismatch, open_cloud
 from tankcal.messages import message
 
@@ -44,7 +45,46 @@ def describe_cloud(path):
     return CloudHeader(file.path, kind, file.bytes, scans)
 
 
-def read_cloud(header, *, unit_m=1.0, chunk=1 << 20, progress=None):
+def pieces_of(header, points_each):
+    """The pieces of a described file, each read on its own; together they are the file.
+
+    Parameters
+    ----------
+    header
+        `CloudHeader` of `describe_cloud`.
+    points_each : int
+        About how many points a piece has: LAS, LAZ, PLY of binary numbers and text in columns
+        are cut so; E57 has a piece for each scan, and PTX, PTS and PLY of text are one.
+
+    Returns
+    -------
+    tuple of CloudPiece
+
+    Raises
+    ------
+    InputError
+        As `read_cloud` raises it for a file that changed.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "wall.xyz"
+    >>> _ = path.write_text("6.5 0 1\\n0 6.5 1\\n0 6.5 2\\n")
+    >>> header = describe_cloud(path)
+    >>> [one.first for one in pieces_of(header, 1)]
+    [0, 16]
+    """
+    file = _unchanged(header)
+    return _guarded(file, lambda: share_out(file, points_each))
+
+
+def count_about(header):
+    """How many points a described file has: as it declares or, of text, by its first lines."""
+    declared = [scan.declared for scan in header.scans]
+    return rows_about(open_cloud(header.path)) if None in declared else sum(declared)
+
+
+def read_cloud(header, *, piece=WHOLE, unit_m=1.0, chunk=1 << 18, progress=None):
     """The points of a described file, a chunk at a time; memory does not grow with the file.
 
     Points without a return are counted as read and left out. A pose is not applied.
@@ -53,12 +93,15 @@ def read_cloud(header, *, unit_m=1.0, chunk=1 << 20, progress=None):
     ----------
     header
         `CloudHeader` of `describe_cloud`.
+    piece : CloudPiece, optional
+        Of `pieces_of`: what is read of it.
     unit_m : optional
         Length of one unit of the file, m (0.001 for millimetres).
     chunk : optional
         Most points at a time.
     progress : callable, optional
-        progress(points read, points in all or None, name of the file), a few times a second.
+        progress(points read, points in all or None, name of the file), a few times a second and
+        at the end; with a piece, those of the piece.
 
     Yields
     ------
@@ -79,6 +122,20 @@ def read_cloud(header, *, unit_m=1.0, chunk=1 << 20, progress=None):
     ...     print(part.scan, part.xyz_m)
     0 [[6.5005 0.     1.    ]]
     """
+    file = _unchanged(header)
+    count = _Count(file, header.scans, piece, progress)
+    check = _Check(file, unit_m, piece)
+    parts = iter(read_pieces(file, chunk, piece))
+    while (found := _guarded(file, lambda: next(parts, None))) is not None:
+        count.add(found)
+        xyz = check.metres(found)
+        if len(xyz):
+            yield CloudChunk(found.scan, xyz)
+    count.finish()
+
+
+def _unchanged(header):
+    """The `CloudFile` of a header; InputError where it has another size now."""
     file = open_cloud(header.path)
     if file.bytes != header.bytes:
         raise file.refusal(
@@ -89,15 +146,7 @@ def read_cloud(header, *, unit_m=1.0, chunk=1 << 20, progress=None):
                 now=file.bytes,
             )
         )
-    count = _Count(file, header.scans, progress)
-    check = _Check(file, unit_m)
-    parts = iter(read_pieces(file, chunk))
-    while (piece := _guarded(file, lambda: next(parts, None))) is not None:
-        count.add(piece)
-        xyz = check.metres(piece)
-        if len(xyz):
-            yield CloudChunk(piece.scan, xyz)
-    count.finish()
+    return file
 
 
 def _guarded(file, task):
@@ -113,11 +162,16 @@ def _guarded(file, task):
 class _Count:
     """Records read of each scan, against what was declared; tells the progress."""
 
-    def __init__(self, file, scans, progress):
+    def __init__(self, file, scans, piece, progress):
         self.file, self.scans, self.progress = file, scans, progress
         self.read = [0] * len(scans)
-        declared = [scan.declared for scan in scans]
-        self.total = None if None in declared else sum(declared)
+        self.declared = [scan.declared for scan in scans]
+        self.first = 0
+        if piece.scan is not None:
+            self.declared = [n if i == piece.scan else 0 for i, n in enumerate(self.declared)]
+        elif piece.count is not None and self.declared[0] is not None:
+            self.first, self.declared = piece.first, [piece.count]
+        self.total = None if None in self.declared else sum(self.declared)
         self.told = time.monotonic()
 
     def add(self, piece):
@@ -139,17 +193,17 @@ class _Count:
         self.progress(sum(self.read), self.total, self.file.name)
 
     def _compare(self, scan, is_done):
-        declared, read = self.scans[scan].declared, self.read[scan]
+        declared, read = self.declared[scan], self.read[scan]
         if declared is not None and (read > declared or (is_done and read < declared)):
-            raise count_mismatch(self.file, declared, read)
+            raise count_mismatch(self.file, self.scans[scan].declared, self.first + read)
 
 
 class _Check:
     """Coordinates that are finite, near each other, fine enough, in metres."""
 
-    def __init__(self, file, unit_m):
+    def __init__(self, file, unit_m, piece):
         self.file, self.unit_m = file, unit_m
-        self.done, self.first = 0, None
+        self.done, self.first = piece.first, None
 
     def metres(self, piece):
         """float64 (n, 3), m; InputError for what can be no point of a wall."""

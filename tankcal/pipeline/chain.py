@@ -11,6 +11,7 @@ import numpy as np
 from tankcal.errors import HeightError, InputError, Problem
 from tankcal.job import Job
 from tankcal.messages import message
+from tankcal.pipeline.cloud_passes import Reading
 from tankcal.pipeline.cloud_wall import Clouded
 from tankcal.pipeline.corrections import Correction, corrections_of
 from tankcal.pipeline.read_wall import ReadWall
@@ -281,6 +282,7 @@ def run(
     *,
     part_progress: Callable[[str, int, int], None] | None = None,
     simulated: bool | None = None,
+    cluster: int | str | None = None,
 ) -> Result:
     """Compute a job: adjusted points, wall and axis, parts of the tank, table with covariance.
 
@@ -295,6 +297,10 @@ def run(
     simulated : bool, optional
         Whether the table is simulated, too; None: as the job says. One without any uncertainty
         never is.
+    cluster : int or str, optional
+        Who reads clouds: None, this process; a number of workers on this machine; "local", as
+        many as it has cores; "auto", these where it pays; the address of a scheduler of dask.
+        The result is the same.
 
     Returns
     -------
@@ -303,7 +309,8 @@ def run(
     Raises
     ------
     InputError
-        When a course is left with too few points.
+        When a course is left with too few points, when clouds cannot be read, or when a cluster
+        does not answer.
     SolutionError
         When the survey does not determine the points, the vertical or the scale, or when there is
         no wall.
@@ -319,10 +326,11 @@ def run(
     """
     _refuse_other(job, "run")
     with _telling(job):
-        return _run(job, progress or (lambda text: None), part_progress, simulated)
+        reading = Reading(cluster, part_progress)
+        return _run(job, progress or (lambda text: None), part_progress, simulated, reading)
 
 
-def _run(job, progress, part_progress, simulated):
+def _run(job, progress, part_progress, simulated, reading):
     if job.tank is None:
         raise InputError(
             Problem(
@@ -330,7 +338,7 @@ def _run(job, progress, part_progress, simulated):
                 message("no_tank", "the job has no tank: only its survey can be adjusted"),
             )
         )
-    found = find_survey(job, progress)
+    found = find_survey(job, progress, reading=reading)
     job, survey, adjustment = found.job, found.survey, found.adjustment
     wall = survey if isinstance(survey, Wall) else None
     made = compute_table(job, survey, progress)

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-import tankcal.clouds
 from tankcal.clouds import wall as cells_of_clouds
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.checks.clouds import offset_untold
@@ -13,11 +12,12 @@ from tankcal.job.model import InputFile
 from tankcal.job.tables import unreadable_file
 from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import told_causes
+from tankcal.pipeline.cloud_cluster import open_passes
+from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
 from tankcal.pipeline.hit_wall import through_wall
 from tankcal.pipeline.scan import fit_scan
 from tankcal.pipeline.wall import find_wall, joints_of, s_transform
 from tankcal.survey.beams import Beamed, points_of_beams
-from tankcal.survey.readings import certified_distance_m
 from tankcal.survey.registration import Registration, register
 from tankcal.survey.scans import KnownTargets
 
@@ -26,6 +26,7 @@ MOST_READINGS = 1200  # whose full covariance is kept
 FAR_AWAY = 20.0  # radii: no scanner that sees a wall stands further from it
 BLOCK = 1 << 20
 STEP_M = 1.0  # along the normal of a surface
+IN_PROCESS = Reading()
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,9 @@ class Clouded:
     left_out: np.ndarray | None = None
 
 
-def find_wall_in_clouds(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
+def find_wall_in_clouds(
+    job, adjustment, progress, dof=np.inf, *, amplitudes=None, reading=IN_PROCESS
+):
     """The job with means of its clouds as points, `Clouded`, and the `Wall` or `Scan` of them.
 
     Offsets that nothing but a tape tells are taken off, and the wall is found once more.
@@ -70,13 +73,15 @@ def find_wall_in_clouds(job, adjustment, progress, dof=np.inf, *, amplitudes=Non
     progress : callable
     dof, amplitudes
         As in `find_wall`.
+    reading : Reading, optional
+        By how many workers files are read; None: in this process.
 
     Raises
     ------
     InputError
         For clouds without a wall, targets under wrong names, a scanner on the other side.
     """
-    job, clouded = points_of_clouds(job, adjustment, progress)
+    job, clouded = points_of_clouds(job, adjustment, progress, reading)
     if job.tank.kind != "vertical":
         return job, clouded, fit_scan(job, dof)
     wall = find_wall(job, progress, dof, amplitudes)
@@ -89,7 +94,7 @@ def find_wall_in_clouds(job, adjustment, progress, dof=np.inf, *, amplitudes=Non
     return job, replace(clouded, told=told), wall
 
 
-def points_of_clouds(job, adjustment, progress):
+def points_of_clouds(job, adjustment, progress, reading=IN_PROCESS):
     """The job with means of its clouds as points, and their `Clouded`."""
     registration = registered(job, adjustment)
     progress(
@@ -100,17 +105,18 @@ def points_of_clouds(job, adjustment, progress):
             scans=len(job.clouds.scans),
         )
     )
-    files = tuple(_fingerprint(one) for one in job.clouds.files)
-    passes = Passes(job.clouds, registration)
-    found = cells_of_clouds.find_cloud_wall(
-        passes,
-        radius_m=_nominal_radius_m(job),
-        joints_m=tuple(job.datum.bottom_z_m + joints_of(job)) if job.courses else None,
-        kind=job.tank.kind,
-        azimuth_rad=(job.horizontal.azimuth_rad if job.horizontal else None) or 0.0,
-        sides=job.clouds.sides,
-        progress=progress,
-    )
+    telling = Telling(progress, reading.part_progress)
+    with open_passes(Placing.of(job.clouds, registration), reading, telling) as passes:
+        files = tuple(_fingerprint(one) for one in job.clouds.files)
+        found = cells_of_clouds.find_cloud_wall(
+            passes,
+            radius_m=_nominal_radius_m(job),
+            joints_m=tuple(job.datum.bottom_z_m + joints_of(job)) if job.courses else None,
+            kind=job.tank.kind,
+            azimuth_rad=(job.horizontal.azimuth_rad if job.horizontal else None) or 0.0,
+            sides=job.clouds.sides,
+            progress=telling.step,
+        )
     _refuse_places(job, registration, found.surface)
     readings = cells_of_clouds.readings_of(found, MOST_READINGS)
     job = replace(job, files=(*job.files, *files))
@@ -162,49 +168,6 @@ def normals_of(surface, xyz_m):
     u, turn, distance = surface.places(np.array(xyz_m))
     away = surface.points(u, turn, distance + STEP_M) - surface.points(u, turn, distance)
     return away / np.linalg.norm(away, axis=1, keepdims=True)
-
-
-class Passes:
-    """Readings of all files, as often as they are asked for.
-
-    Each gives (scan, places (n, 3) in the frame of the tank); `left_out` counts the points of each
-    scan in boxes, of the last one.
-    """
-
-    def __init__(self, clouds, registration):
-        self.clouds, self.registration = clouds, registration
-        self.left_out = np.zeros(len(clouds.scans), dtype=int)
-
-    def __call__(self):
-        """A fresh iterator over all points."""
-        self.left_out = np.zeros(len(self.clouds.scans), dtype=int)
-        for file in self.clouds.files:
-            for chunk in tankcal.clouds.read_cloud(file.header, unit_m=file.unit_m):
-                scan = file.first + chunk.scan
-                xyz = _placed(chunk.xyz_m, self.clouds, scan, self.registration)
-                if len(file.leave_out_m):
-                    kept = ~_is_in_boxes(xyz, file.leave_out_m)
-                    self.left_out[scan] += len(xyz) - np.count_nonzero(kept)
-                    xyz = xyz[kept]
-                if len(xyz):
-                    yield scan, xyz
-
-
-def _placed(xyz_m, clouds, scan, registration):
-    given = clouds.scans[scan]
-    tool = clouds.ranging[given.scanner]
-    beam = xyz_m - given.beam_from_m
-    if tool.correction or tool.correction_m:
-        distance = np.maximum(np.linalg.norm(beam, axis=1), 1e-9)
-        beam = beam * (certified_distance_m(distance, tool) / distance)[:, None]
-    return beam @ registration.rotation[scan].T + registration.place_m[scan]
-
-
-def _is_in_boxes(xyz_m, boxes_m):
-    inside = np.zeros(len(xyz_m), dtype=bool)
-    for box in boxes_m:
-        inside |= np.all((xyz_m >= box[:3]) & (xyz_m <= box[3:]), axis=1)
-    return inside
 
 
 def _fingerprint(file):

@@ -12,7 +12,7 @@ from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.model import Job
 from tankcal.job.tables import in_book
 from tankcal.messages import message
-from tankcal.pipeline.cloud_wall import Clouded, find_wall_in_clouds
+from tankcal.pipeline.cloud_wall import IN_PROCESS, Clouded, find_wall_in_clouds
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
 from tankcal.pipeline.hit_wall import find_hit_wall
 from tankcal.pipeline.scan import Scan, fit_scan
@@ -54,7 +54,7 @@ class Surveyed:
     clouded: Clouded | None = None
 
 
-def find_survey(job, progress, amplitudes=None):
+def find_survey(job, progress, amplitudes=None, reading=IN_PROCESS):
     """`Surveyed` of a job: its survey adjusted, its wall found.
 
     Parameters
@@ -65,6 +65,8 @@ def find_survey(job, progress, amplitudes=None):
     amplitudes : Amplitudes, optional
         Of the components of an upright wall where they are known beforehand; None: the readings
         tell them.
+    reading : Reading, optional
+        How files of clouds are read.
 
     Raises
     ------
@@ -90,7 +92,7 @@ def find_survey(job, progress, amplitudes=None):
             )
         elif job.clouds is not None:
             job, clouded, survey = find_wall_in_clouds(
-                job, adjustment, progress, dof, amplitudes=amplitudes
+                job, adjustment, progress, dof, amplitudes=amplitudes, reading=reading
             )
         else:
             survey = _survey(job, progress, dof, amplitudes)

@@ -2,11 +2,22 @@
 
 import re
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
-from tankcal.clouds.contents import ScanHeader
+from tankcal.clouds.contents import WHOLE, CloudPiece, ScanHeader
 from tankcal.clouds.formats.counted_text import looks_as_pts, looks_as_ptx
 from tankcal.clouds.formats.files import Piece, no_points
-from tankcal.clouds.formats.lines import COMMENTS, NUMBER, Layout, Lines, parse_rows, shown
+from tankcal.clouds.formats.lines import (
+    BLOCK,
+    COMMENTS,
+    LONGEST_LINE,
+    NUMBER,
+    Layout,
+    Lines,
+    parse_rows,
+    shown,
+)
+from tankcal.errors import InputError
 from tankcal.messages import message
 
 JUDGED = 50  # lines that tell separator and columns
@@ -40,24 +51,74 @@ def describe(file):
     return "xyz", (ScanHeader("", None),)
 
 
-def pieces(file, chunk):
-    """Points of a file."""
-    layout, heading = _find_layout(file)
-    is_empty = True
+def rows_about(file):
+    """About how many rows a file of text has, by those at its start."""
+    return file.bytes * max(file.start.count(b"\n"), 1) / len(file.start)
+
+
+def shares(file, points_each):
+    """Ranges of bytes that end with a line, about so many rows each; the first has the heading."""
+    _, heading = _find_layout(file)
+    each = max(1, round(points_each * file.bytes / rows_about(file)))
+    edges = [0]
     with file.path.open("rb") as stream:
-        lines = Lines(file, stream)
-        if heading:
+        for _ in range(heading):
+            stream.readline(LONGEST_LINE)
+        place = stream.tell() + each
+        while place < file.bytes:
+            stream.seek(place)
+            if stream.readline(LONGEST_LINE).endswith(b"\n") and stream.tell() < file.bytes:
+                edges.append(stream.tell())
+            place = max(stream.tell(), place) + each
+    edges.append(file.bytes)
+    return tuple(CloudPiece(None, a, b - a) for a, b in pairwise(edges))
+
+
+def pieces(file, chunk, share=WHOLE):
+    """Points of a share of a file."""
+    layout, heading = _find_layout(file)
+    is_empty = share == WHOLE
+    with file.path.open("rb") as stream:
+        stream.seek(share.first)
+        lines = Lines(file, stream if share.count is None else _Part(stream, share.count))
+        if heading and not share.first:
             lines.take(heading)
         while True:
             block, row = lines.take(chunk)
             if not block:
                 break
-            xyz = parse_rows(file, block, row, layout)
+            try:
+                xyz = parse_rows(file, block, row, layout)
+            except InputError:  # its row counts from the start of the file
+                parse_rows(file, block, row + _lines_before(file, share.first), layout)
+                raise
             if len(xyz):
                 is_empty = False
                 yield Piece(0, xyz, len(xyz))
     if is_empty:
         raise no_points(file)
+
+
+class _Part:
+    """A stream that ends after so many bytes."""
+
+    def __init__(self, stream, left):
+        self.stream, self.left = stream, left
+
+    def read(self, size):
+        """At most so many bytes."""
+        found = self.stream.read(min(size, self.left))
+        self.left -= len(found)
+        return found
+
+
+def _lines_before(file, place):
+    """Lines that end before a place."""
+    with file.path.open("rb") as stream:
+        part, count = _Part(stream, place), 0
+        while block := part.read(BLOCK):
+            count += block.count(b"\n")
+    return count
 
 
 def _first_lines(file):

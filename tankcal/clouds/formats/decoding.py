@@ -77,6 +77,8 @@ def laz_chunks(request):
     with open(request["path"], "rb") as stream:
         stream.seek(request["first"])
         reader = lazrs.LasZipDecompressor(stream, laszip, selection)
+        if request["skip"]:
+            reader.seek(request["skip"])
         place = np.dtype(
             {"names": ["xyz"], "formats": ["(3,)<i4"], "offsets": [0], "itemsize": record}
         )

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tankcal.clouds.contents import ScanHeader
+from tankcal.clouds.contents import WHOLE, CloudPiece, ScanHeader
 from tankcal.clouds.formats.e57_xml import parse_xml
 from tankcal.clouds.formats.files import Piece, cut_short, no_points, require_library
 from tankcal.clouds.formats.isolation import decoded_frames
@@ -18,7 +18,7 @@ LONGEST_XML = 1 << 26
 SECTION = struct.Struct("<B7xQQQ")  # of points: id, length, places of data and of index
 CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
-WHOLE = 1 << 63
+LARGEST = 1 << 63
 UNIT_QUATERNION = 1e-3  # from 1, of the length of a quaternion
 
 
@@ -39,8 +39,15 @@ def describe(file):
     return "e57", tuple(scan.header for scan in scans)
 
 
-def pieces(file, chunk):
-    """The points of a file as `Piece`s."""
+def shares(file, points_each):
+    """A scan each: libe57 cannot begin within one."""
+    return tuple(
+        CloudPiece(number) for number, scan in enumerate(read_scans(file)) if scan.header.declared
+    )
+
+
+def pieces(file, chunk, share=WHOLE):
+    """The points of a share of a file as `Piece`s."""
     scans = read_scans(file)
     request = {
         "kind": "e57",
@@ -48,13 +55,13 @@ def pieces(file, chunk):
         "chunk": chunk,
         "scans": [
             {
-                "count": scan.header.declared,
+                "count": scan.header.declared if share.scan in (None, number) else 0,
                 "fields": scan.fields,
                 "state": scan.state,
                 "type": scan.type,
                 "is_spherical": scan.fields == SPHERICAL,
             }
-            for scan in scans
+            for number, scan in enumerate(scans)
         ],
     }
     for frame in decoded_frames(file, request):
@@ -172,7 +179,7 @@ def _bits(node):
     if node.kind == "Float":
         return 32 if node.is_single else 64
     if node.kind in ("Integer", "ScaledInteger"):
-        low, high = node.whole("minimum", -WHOLE), node.whole("maximum", WHOLE - 1)
+        low, high = node.whole("minimum", -LARGEST), node.whole("maximum", LARGEST - 1)
         return max(high - low, 0).bit_length()
     return 8  # a text: its length at least
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tankcal.clouds.contents import CloudPiece
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
@@ -64,6 +65,13 @@ class Piece:
     scan: int
     xyz: np.ndarray
     read: int
+
+
+def ranges_of(count, each):
+    """`CloudPiece`s of so many records each, the last of what is left."""
+    return tuple(
+        CloudPiece(None, first, min(each, count - first)) for first in range(0, count, each)
+    )
 
 
 def open_cloud(path):

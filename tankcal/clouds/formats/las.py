@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.clouds.contents import ScanHeader
+from tankcal.clouds.contents import WHOLE, ScanHeader
 from tankcal.clouds.formats.files import (
     EXTENT_LIMIT,
     Piece,
     count_mismatch,
     cut_short,
     no_points,
+    ranges_of,
     require_library,
 )
 from tankcal.clouds.formats.isolation import decoded_frames
@@ -54,21 +55,31 @@ def describe(file):
     return header.format, (ScanHeader("", header.count),)
 
 
-def pieces(file, chunk):
-    """The points of a file as `Piece`s."""
+def shares(file, points_each):
+    """Ranges of points; of LAZ they begin with its chunks, for these alone can be sought."""
     header = read_header(file)
-    box = _Box(file, header)
+    if header.laszip is None:
+        return ranges_of(header.count, points_each)
+    compressor, size = _chunks_in(header.laszip)
+    if compressor == 1 or size == VARIABLE:
+        return (WHOLE,)
+    return ranges_of(header.count, max(1, points_each // size) * size)
+
+
+def pieces(file, chunk, share=WHOLE):
+    """The points of a share of a file as `Piece`s."""
+    header = read_header(file)
+    first = share.first
+    count = header.count - first if share.count is None else share.count
+    box = _Box(file, header, first)
     blocks = _las_blocks if header.laszip is None else _laz_blocks
-    for integers in blocks(file, header, chunk):
+    for integers in blocks(file, header, chunk, first, count):
         columns = np.empty((3, len(integers)))  # contiguous: several times as fast as rows
         for i, column in enumerate(columns):
             np.multiply(integers[:, i], header.scale[i], out=column)
             column += header.offset[i]
         box.check(columns.T)
         yield Piece(0, columns.T, len(integers))
-    if box.done != header.count:  # said first: a box without some of its points is no surprise
-        raise count_mismatch(file, header.count, box.done)
-    box.finish()
 
 
 def read_header(file):
@@ -278,12 +289,16 @@ def _check_laszip(file, parts, data):
         )
 
 
+def _chunks_in(data):
+    """The compressor of a LASzip record, and the points of its chunks."""
+    return struct.unpack_from("<H", data)[0], struct.unpack_from("<I", data, 12)[0]
+
+
 def _check_chunk_table(file, parts, data):
     """The table lies in the file, and has as many chunks as points and bytes have room for."""
-    compressor = struct.unpack_from("<H", data)[0]
+    compressor, size = _chunks_in(data)
     if compressor == 1:  # one stream of points, no chunks
         return
-    size = struct.unpack_from("<I", data, 12)[0]
     with file.path.open("rb") as stream:
         stream.seek(parts.first)
         place = int.from_bytes(stream.read(8), "little", signed=True)
@@ -324,28 +339,24 @@ def _chunks_of(count, size):
 
 
 class _Box:
-    """Points fill the box of their header; a changed scale or offset moves them out of it, or in.
+    """Points lie in the box of their header; a changed scale or offset moves them out."""
 
-    Some writers round the box, some leave zeros.
-    """
-
-    def __init__(self, file, header):
-        self.file, self.header, self.done = file, header, 0
-        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
-        self.slack = (
+    def __init__(self, file, header, done):
+        self.file, self.done = file, done
+        slack = (
             10 * header.scale
             + 1e-9 * np.maximum(np.abs(header.low), np.abs(header.high))
-            + 1e-3 * (header.high - header.low)
+            + 1e-3 * (header.high - header.low)  # some writers round the box
         )
-        self.is_blank = not (header.low.any() or header.high.any())
+        self.low, self.high = header.low - slack, header.high + slack
+        self.is_blank = not (header.low.any() or header.high.any())  # some leave zeros
 
     def check(self, xyz):
         """InputError for a point outside."""
-        low, high = xyz.min(axis=0), xyz.max(axis=0)
-        self.low, self.high = np.minimum(self.low, low), np.maximum(self.high, high)
-        least, most = self.header.low - self.slack, self.header.high + self.slack
-        if not (self.is_blank or (np.all(low >= least) and np.all(high <= most))):
-            i = int(np.flatnonzero(((xyz < least) | (xyz > most)).any(axis=1))[0])
+        is_inside = np.all(xyz.min(axis=0) >= self.low) and np.all(xyz.max(axis=0) <= self.high)
+        if not (self.is_blank or is_inside):
+            out = ((xyz < self.low) | (xyz > self.high)).any(axis=1)
+            i = int(np.flatnonzero(out)[0])
             raise self.file.refusal(
                 message(
                     "cloud_file_las_outside",
@@ -357,46 +368,29 @@ class _Box:
             )
         self.done += len(xyz)
 
-    def finish(self):
-        """InputError where the points of the whole file do not reach the sides of the box."""
-        is_full = np.all(self.low <= self.header.low + self.slack)
-        is_full = is_full and np.all(self.high >= self.header.high - self.slack)
-        if not (self.is_blank or is_full):
-            raise self.file.refusal(
-                message(
-                    "cloud_file_las_unfilled",
-                    "its points lie from {low} to {high}, those of the header from {least} to "
-                    "{most}: damaged, or its header was not brought up to date; write it anew with "
-                    "a program that does so",
-                    low=_written(self.low),
-                    high=_written(self.high),
-                    least=_written(self.header.low),
-                    most=_written(self.header.high),
-                )
-            )
 
-
-def _las_blocks(file, header, chunk):
+def _las_blocks(file, header, chunk, first, count):
     record = np.dtype(
         {"names": ["xyz"], "formats": ["(3,)<i4"], "offsets": [0], "itemsize": header.record}
     )
     with file.path.open("rb") as stream:
-        stream.seek(header.first)
-        for done in range(0, header.count, chunk):
-            wanted = min(chunk, header.count - done)
+        stream.seek(header.first + first * header.record)
+        for done in range(0, count, chunk):
+            wanted = min(chunk, count - done)
             found = np.fromfile(stream, record, wanted)
             if len(found) < wanted:
-                raise count_mismatch(file, header.count, done + len(found))
+                raise count_mismatch(file, header.count, first + done + len(found))
             yield found["xyz"]
 
 
-def _laz_blocks(file, header, chunk):
+def _laz_blocks(file, header, chunk, first, count):
     request = {
         "kind": "laz",
         "path": str(file.path),
         "first": header.first,
         "record": header.record,
-        "count": header.count,
+        "skip": first,
+        "count": count,
         "laszip": header.laszip.hex(),
         "chunk": chunk,
     }

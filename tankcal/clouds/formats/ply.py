@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.clouds.contents import ScanHeader
-from tankcal.clouds.formats.files import Piece, count_mismatch, no_points
+from tankcal.clouds.contents import WHOLE, ScanHeader
+from tankcal.clouds.formats.files import Piece, count_mismatch, no_points, ranges_of
 from tankcal.clouds.formats.lines import Layout, Lines, parse_rows, shown, skip_lines
 from tankcal.messages import message
 
@@ -73,13 +73,19 @@ def describe(file):
     return "ply", (ScanHeader("", read_header(file).vertex.count),)
 
 
-def pieces(file, chunk):
-    """The vertices of a file."""
+def shares(file, points_each):
+    """Ranges of binary vertices; text is read as a whole."""
+    header = read_header(file)
+    return (WHOLE,) if header.order is None else ranges_of(header.vertex.count, points_each)
+
+
+def pieces(file, chunk, share=WHOLE):
+    """The vertices of a share of a file."""
     header = read_header(file)
     return (
         _text_pieces(file, header, chunk)
         if header.order is None
-        else _binary_pieces(file, header, chunk)
+        else _binary_pieces(file, header, chunk, share)
     )
 
 
@@ -171,17 +177,18 @@ def _check_vertices(file, header):
         raise count_mismatch(file, vertex.count, room)
 
 
-def _binary_pieces(file, header, chunk):
-    record, count = header.record(header.vertex), header.vertex.count
+def _binary_pieces(file, header, chunk, share):
+    record, first = header.record(header.vertex), share.first
+    count = header.vertex.count - first if share.count is None else share.count
     columns = [f"f{i}" for i in header.columns]
     kinds = {header.vertex.types[i] for i in header.columns}
     kind = np.float32 if "f4" in kinds else np.float64
     with file.path.open("rb") as stream:
-        stream.seek(header.start)
+        stream.seek(header.start + first * record.itemsize)
         for done in range(0, count, chunk):
             rows = np.fromfile(stream, record, min(chunk, count - done))
             if len(rows) < min(chunk, count - done):
-                raise count_mismatch(file, count, done + len(rows))
+                raise count_mismatch(file, header.vertex.count, first + done + len(rows))
             found = np.empty((3, len(rows)), kind)
             for row, column in zip(found, columns, strict=True):
                 row[:] = rows[column]

@@ -1,6 +1,15 @@
 """From points of scans to cells of the wall: what is wall, what stands before it."""
 
 from tankcal.clouds.wall.finding import CloudWall, find_cloud_wall
+from tankcal.clouds.wall.passes import Passes, cells_of, sample_of
 from tankcal.clouds.wall.readings import CloudReadings, readings_of
 
-__all__ = ["CloudReadings", "CloudWall", "find_cloud_wall", "readings_of"]
+__all__ = [
+    "CloudReadings",
+    "CloudWall",
+    "Passes",
+    "cells_of",
+    "find_cloud_wall",
+    "readings_of",
+    "sample_of",
+]

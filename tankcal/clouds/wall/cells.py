@@ -20,6 +20,7 @@ MOST_IN_BIN = 1 << 24  # beyond, the sum of units would run into the count
 PLACE = 1 << 16  # parts of a cell that places in it are counted in
 FAR_M, FAR_BINS = 1.2, 48  # what stands before and behind the wall: reach and number of bins
 GRID_LIMIT = 1 << 20  # places of the table that looks rows up; beyond, by bisection
+SUMMED = ("sums", "turn", "along", "far", "delivered", "outside", "beyond")
 
 
 @dataclass(frozen=True)
@@ -114,10 +115,27 @@ class WallCells:
         for start in range(0, len(xyz_m), PIECE):
             self._add(xyz_m[start : start + PIECE], scan)
 
+    def packed(self):
+        """{name: places and values of what is not 0}: a piece of a file fills few of the bins."""
+        found = {}
+        for name in SUMMED:
+            flat = getattr(self, name).ravel()
+            places = np.flatnonzero(flat)
+            found[name] = (
+                places.astype(np.uint32 if len(flat) <= 1 << 32 else np.int64),
+                flat[places],
+            )
+        return found
+
+    def add_packed(self, packed):
+        """Add what `packed` gave of the sums of other points: same surface, grid and scans."""
+        for name, (places, values) in packed.items():
+            getattr(self, name).reshape(-1)[places] += values
+
     def merged(self, other):
         """The sums of the points of both: same surface, grid and scans."""
         both = WallCells(self.surface, self.grid, self.scans)
-        for name in ("sums", "turn", "along", "far", "delivered", "outside", "beyond"):
+        for name in SUMMED:
             np.add(getattr(self, name), getattr(other, name), out=getattr(both, name))
         return both
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tankcal.clouds.wall.cells import FINE_BITS, PLACE, CellGrid, WallCells
+from tankcal.clouds.wall.cells import FINE_BITS, PLACE, CellGrid
 from tankcal.clouds.wall.features import (
     Joint,
     Obstruction,
@@ -29,14 +29,13 @@ from tankcal.clouds.wall.growing import (
     off_trend,
     spread_between,
 )
-from tankcal.clouds.wall.sampling import PointSample
+from tankcal.clouds.wall.passes import Passes
 from tankcal.clouds.wall.start import FILE, find_surface
 from tankcal.errors import InputError, Problem
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 
 SAMPLE = 500_000
-FARTHEST_M = 1e8  # of coordinates: doubles tell 15 nm there
 ROW_M, COLUMN_M, FEWEST_COLUMNS = 0.05, 0.15, 360  # of a cell, where memory and points allow
 MEMORY_BYTES = 256 << 20  # of the sums of all scans
 POINTS_OF_CELL = 40  # that a cell should get, were they even over the wall: they never are
@@ -121,8 +120,9 @@ def find_cloud_wall(
 
     Parameters
     ----------
-    passes : callable
-        Gives a fresh iterator of (scan number, xyz (n, 3) in the frame of the tank, m).
+    passes : callable, or an object as `passes.Passes` is
+        Gives a fresh iterator of (scan number, xyz (n, 3) in the frame of the tank, m); or takes
+        the sample and the sums of all points itself.
     radius_m : float
         Nominal, within 3 % of the wall's.
     joints_m : sequence of float, optional
@@ -154,9 +154,8 @@ def find_cloud_wall(
     """
     progress = progress or (lambda text: None)
     progress(message("cloud_first_pass", "looking for the wall in a sample of the points"))
-    sample = PointSample(SAMPLE)
-    for scan, xyz in passes():
-        sample.add(_checked(xyz, scan), scan)
+    passes = Passes(passes) if callable(passes) else passes
+    sample = passes.sample(SAMPLE)
     some = sample.points()
     surface, ends = find_surface(
         some,
@@ -187,29 +186,8 @@ def find_cloud_wall(
             columns=grid.columns,
         )
     )
-    cells = WallCells(surface, grid, scans)
-    for scan, xyz in passes():
-        cells.add(xyz, scan)
+    cells = passes.cells(surface, grid, scans)
     return wall_of_cells(cells, joints, tuple(sides or ["one"] * scans))
-
-
-def _checked(xyz_m, scan):
-    """Points as float64 (n, 3), all finite."""
-    xyz_m = np.asarray(xyz_m, dtype=float)
-    if xyz_m.ndim != 2 or xyz_m.shape[1] != 3:
-        raise ValueError(f"points of scan {scan} have shape {xyz_m.shape}; expected (n, 3)")
-    bad = np.flatnonzero(~(np.abs(xyz_m) < FARTHEST_M).all(axis=1))
-    if len(bad):
-        text = message(
-            "cloud_not_finite",
-            "scan {scan} has points that cannot be, the first of them {point}; expected "
-            "coordinates of less than {most:g} m",
-            scan=scan + 1,
-            point=str(tuple(xyz_m[bad[0]].tolist())),
-            most=FARTHEST_M,
-        )
-        raise InputError(Problem(FILE, text))
-    return xyz_m
 
 
 def _share_near(xyz_m, surface, ends_m, band_m):

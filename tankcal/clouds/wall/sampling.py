@@ -35,7 +35,7 @@ class PointSample:
             self._key.append(key[taken])
             self._waiting += len(taken)
             if self._waiting > self.most:
-                self._reduce()
+                self.reduce()
 
     def merged(self, other):
         """The sample of the points of both."""
@@ -49,11 +49,12 @@ class PointSample:
 
     def points(self):
         """(k, 3) points, in the order of their numbers."""
-        self._reduce()
+        self.reduce()
         order = np.lexsort((*self._xyz[0].T, self._key[0]))
         return self._xyz[0][order]
 
-    def _reduce(self):
+    def reduce(self):
+        """Let go of points that are not in the sample."""
         xyz, key = np.vstack(self._xyz), np.concatenate(self._key)
         if len(key) > self.most:
             best = np.argpartition(key, self.most - 1)[: self.most]

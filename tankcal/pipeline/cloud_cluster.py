@@ -1,0 +1,341 @@
+"""The passes over a job's clouds by workers of dask, on this machine or on others.
+
+Each share of a file is read by one worker, which gives back its sample or its sums; these are added
+in a tree. They are whole numbers and samples that know no order, so the record has the same bytes
+with any number of workers and any shares. This is the only module that knows of dask.
+"""
+
+import contextlib
+import importlib.util
+import logging
+import os
+import socket
+import struct
+import tempfile
+import time
+import uuid
+import warnings
+from urllib.parse import urlsplit
+
+import tankcal
+from tankcal.clouds import count_about
+from tankcal.clouds.wall.cells import WallCells
+from tankcal.clouds.wall.passes import cells_of, sample_of
+from tankcal.errors import InputError, Problem, TankcalError
+from tankcal.messages import message
+from tankcal.pipeline.cloud_passes import JobPasses, Tally
+
+OPTION = "--cluster"
+PAYS = 60_000_000  # points from which local workers pay: docs/clouds.md has what was measured
+FEWEST_EACH, MOST_EACH = 1 << 20, 1 << 23  # points of a share
+SHARES_OF_WORKER = 6
+FAN = 8  # parts that are added at once
+WORKER_BYTES = 1 << 30  # of memory that a worker of this machine may take
+LENGTH, LONGEST_GREETING = struct.Struct("<Q"), 1 << 20  # bytes of the first message of a scheduler
+CONNECT_S, ALONE_S, LOOK_S = 5, 30, 0.05  # to connect; without any worker; between looks
+
+
+@contextlib.contextmanager
+def open_passes(placing, reading, telling):
+    """The passes over clouds as `Reading` asks for them: in this process or by workers.
+
+    Raises
+    ------
+    InputError
+        Where dask is not installed, or an address does not answer.
+    """
+    workers = _workers_for(placing, reading.cluster)
+    if workers == 0:
+        yield JobPasses(placing, telling)
+        return
+    if importlib.util.find_spec("distributed") is None:
+        raise _refusal(
+            message(
+                "cluster_no_library",
+                "needs the library distributed, which is not installed; expected: "
+                "pip install 'tankcal[cluster]'",
+            )
+        )
+    with _quiet(), _client_of(workers) as client:
+        yield ClusterPasses(client, placing, telling, isinstance(workers, str))
+
+
+def _workers_for(placing, cluster):
+    """Number of local workers, 0: none; or an address."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    if cluster == "auto":
+        if cores < 2 or importlib.util.find_spec("distributed") is None:
+            return 0
+        points = sum(count_about(file.header) for file in placing.files)
+        return cores if points >= PAYS else 0
+    return {None: 0, "local": cores}.get(cluster, cluster)
+
+
+@contextlib.contextmanager
+def _quiet():
+    """Without what dask logs and warns of: problems are told in words."""
+    logger = logging.getLogger("distributed")
+    before = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logger.setLevel(before)
+
+
+@contextlib.contextmanager
+def _client_of(workers):
+    """A client of local workers, or of the scheduler at an address."""
+    import dask
+    from distributed import Client, LocalCluster
+
+    with contextlib.ExitStack() as stack:
+        if isinstance(workers, str):
+            address = workers
+            _greet(address)
+        else:
+            memory = {"pause": False, "spill": False, "target": False}
+            settings = {f"distributed.worker.memory.{name}": of for name, of in memory.items()}
+            stack.enter_context(dask.config.set(settings))
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tankcal-"))
+            address = stack.enter_context(
+                LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    memory_limit=WORKER_BYTES,
+                    dashboard_address=None,
+                    local_directory=folder,
+                    silence_logs=logging.CRITICAL + 1,
+                )
+            )
+        try:
+            client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
+        except Exception as error:  # whatever a port that is none of dask comes up with
+            raise _no_answer(address, error) from error
+        _check_workers(client, workers)
+        yield client
+
+
+def _greet(address):
+    """InputError where nothing at an address greets as a scheduler of dask does.
+
+    A greeting begins with its length; of a port that speaks otherwise dask would take a number of
+    bytes that no memory holds, and of one that is silent it waits for long.
+    """
+    try:
+        found = urlsplit(address if "://" in address else f"tcp://{address}")
+        if found.scheme not in ("tcp", "tls") or not (found.hostname and found.port):
+            raise ValueError(address)
+        with socket.create_connection((found.hostname, found.port), CONNECT_S) as stream:
+            if found.scheme == "tls":
+                return
+            stream.settimeout(CONNECT_S)
+            head = b""
+            while len(head) < LENGTH.size:
+                if not (more := stream.recv(LENGTH.size - len(head))):
+                    raise ConnectionError
+                head += more
+        if LENGTH.unpack(head)[0] > LONGEST_GREETING:
+            raise ConnectionError
+    except (OSError, ValueError) as error:
+        raise _no_answer(address, error) from error
+
+
+def _check_workers(client, workers):
+    """InputError where there are no workers, or some of another version of tankcal."""
+    try:
+        client.wait_for_workers(1, timeout=CONNECT_S if isinstance(workers, str) else ALONE_S)
+    except TimeoutError as error:
+        raise _no_workers() from error
+    for worker, version in client.run(_version, on_error="return").items():
+        if version != tankcal.__version__:
+            raise _refusal(
+                message(
+                    "cluster_other_version",
+                    "worker {worker} has tankcal {found}; expected {version}, as here",
+                    worker=worker,
+                    found=version if isinstance(version, str) else type(version).__name__,
+                    version=tankcal.__version__,
+                )
+            )
+
+
+class ClusterPasses:
+    """Both passes by workers (see `tankcal.clouds.wall.passes`).
+
+    Attributes
+    ----------
+    left_out : ndarray of int, shape (scans,)
+        Points in boxes that are left out, of the last pass.
+    """
+
+    def __init__(self, client, placing, telling, is_elsewhere, points_each=None):
+        self.client, self.placing, self.telling = client, placing, telling
+        self.is_elsewhere, self.points_each = is_elsewhere, points_each
+        self.left_out = None
+
+    def sample(self, most):
+        """`PointSample` of at most so many points."""
+        return self._reduced(_sample_part, _add_samples, most)
+
+    def cells(self, surface, grid, scans):
+        """`WallCells` of all points."""
+        packed = self._reduced(_cells_part, _add_cells, surface, grid, scans)
+        cells = WallCells(surface, grid, scans)
+        cells.add_packed(packed)
+        return cells
+
+    def _reduced(self, part_of, added, *sizes):
+        """What the shares give, added in a tree."""
+        shares = self.placing.shares(self._points_each())
+        about = sum(one.points for one in shares)
+        topic = f"tankcal-{uuid.uuid4().hex}"
+        read = {}
+
+        def note(event):  # of a share that is read again, its last word counts
+            number, count = event[1]
+            read[number] = count
+
+        placing = self.client.scatter(self.placing, broadcast=True, hash=False)
+        level = [
+            self.client.submit(
+                part_of, placing, share, topic, number, *sizes, key=f"{topic}-0-{number}"
+            )
+            for number, share in enumerate(shares)
+        ]
+        depth = 0
+        while len(level) > 1:
+            depth += 1
+            level = [
+                self.client.submit(added, level[i : i + FAN], *sizes, key=f"{topic}-{depth}-{i}")
+                for i in range(0, len(level), FAN)
+            ]
+        self.client.subscribe_topic(topic, note)
+        try:
+            found, tally = self._result_of(
+                level[0], lambda: self.telling.tell(sum([*read.values()]), about)
+            )
+        finally:
+            self.client.unsubscribe_topic(topic)
+        tally.check(self.placing)
+        self.left_out = tally.left_out
+        return found
+
+    def _points_each(self):
+        if self.points_each:
+            return self.points_each
+        points = sum(count_about(file.header) for file in self.placing.files)
+        workers = max(len(self.client.scheduler_info(n_workers=-1)["workers"]), 1)
+        return int(min(max(points / workers / SHARES_OF_WORKER, FEWEST_EACH), MOST_EACH))
+
+    def _result_of(self, future, tell):
+        """The result of a future; InputError in one line for what keeps it from coming."""
+        alone_since = None
+        while not future.done():
+            time.sleep(LOOK_S)
+            tell()
+            if self.client.scheduler_info(n_workers=-1)["workers"]:
+                alone_since = None
+                continue
+            alone_since = alone_since or time.monotonic()
+            if time.monotonic() - alone_since > ALONE_S:
+                raise _no_workers()
+        try:
+            return future.result()
+        except TankcalError:
+            raise
+        except Exception as error:  # whatever dask, a network or another machine comes up with
+            raise _refusal(
+                message(
+                    "cluster_failed",
+                    "its workers came to no end ({reason}): did one run out of memory, or was the "
+                    "scheduler ended?",
+                    reason=type(error).__name__,
+                )
+            ) from error
+
+
+def _sample_part(placing, share, topic, number, most):
+    """`PointSample` of a share, and its `Tally`."""
+    tally = _tally_of(placing, share, topic, number)
+    sample = sample_of(placing.points([share], tally), most)
+    sample.reduce()
+    return sample, tally
+
+
+def _cells_part(placing, share, topic, number, surface, grid, scans):
+    """Packed sums of a share, and its `Tally`."""
+    tally = _tally_of(placing, share, topic, number)
+    cells = cells_of(placing.points([share], tally), surface, grid, scans)
+    return cells.packed(), tally
+
+
+def _add_samples(parts, most):
+    """Several samples as one."""
+    (sample, _), *others = parts
+    tally = Tally.added([one for _, one in parts])
+    for other, _ in others:
+        sample = sample.merged(other)
+        sample.reduce()
+    return sample, tally
+
+
+def _add_cells(parts, surface, grid, scans):
+    """Several packed sums as one."""
+    cells = WallCells(surface, grid, scans)
+    for packed, _ in parts:
+        cells.add_packed(packed)
+    return cells.packed(), Tally.added([one for _, one in parts])
+
+
+def _tally_of(placing, share, topic, number):
+    """A `Tally` that tells the client how far it is; InputError where this machine has no file."""
+    from distributed import get_worker
+
+    path = placing.files[share.file].header.path
+    if not path.exists():
+        raise InputError(
+            Problem(
+                path.name,
+                message(
+                    "cluster_no_file",
+                    "the worker on {machine} does not find it as {path}; expected it under the "
+                    "same path on all machines of the cluster",
+                    machine=socket.gethostname(),
+                    path=str(path),
+                ),
+            )
+        )
+    worker = get_worker()
+    return placing.tally(lambda read: worker.log_event(topic, (number, read)))
+
+
+def _version():
+    return tankcal.__version__
+
+
+def _no_answer(address, error):
+    return _refusal(
+        message(
+            "cluster_no_answer",
+            "no scheduler of dask answers at {address} ({reason}); expected such as "
+            "tcp://192.168.1.20:8786, where `dask scheduler` runs",
+            address=str(address),
+            reason=getattr(error, "strerror", None) or type(error).__name__,
+        )
+    )
+
+
+def _no_workers():
+    return _refusal(
+        message(
+            "cluster_no_workers",
+            "the cluster has no workers; expected one at least, by `dask worker ADDRESS`",
+        )
+    )
+
+
+def _refusal(text):
+    return InputError(Problem(OPTION, text))
