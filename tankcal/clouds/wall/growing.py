@@ -35,7 +35,7 @@ class Grown:
     low, high : ndarray of int, shape (rows, columns)
         First and last bin that is averaged over.
     other : ndarray of int, shape (rows, columns)
-        Bin of the largest mode that is not wall, -1: there is none.
+        Bin of the largest mode that is not taken for wall, -1: there is none.
     surfaces : tuple
         (share of the cells, mean distance in bins) of surfaces that are not wall, of two modes in
         one cell ("behind") or in cells of their own; largest first.
@@ -89,7 +89,7 @@ def grow_wall(counts, *, column_m, row_m, bin_m, joined_rows=()):
     reach = np.maximum((runs.high[run] - runs.low[run] + 1) // 2, REFINE_BINS)
     low[has] = np.maximum(runs.low[run] - reach, 0)
     high[has] = np.minimum(runs.high[run] + reach, counts.shape[2] - 1)
-    other, two = _others(runs, sound, wall, chosen, has, total.size)
+    other, two = _others(runs, sound, chosen, has, total.size)
     return Grown(
         why.reshape(shape),
         low.reshape(shape),
@@ -281,10 +281,10 @@ def _one_of_each_cell(runs, wall, shape):
     return chosen
 
 
-def _others(runs, sound, wall, chosen, has, cells):
-    """(cells,) bin of the largest mode that is not wall, and whether it stands beside the wall."""
+def _others(runs, sound, chosen, has, cells):
+    """(cells,) bin of the largest mode beside that of the wall, and whether it has both."""
     other, two = np.full(cells, -1), np.zeros(cells, dtype=bool)
-    rest = np.flatnonzero(sound & ~wall)
+    rest = np.flatnonzero(sound & (chosen[runs.cell] != np.arange(len(runs.cell))))
     order = rest[np.argsort(runs.count[rest], kind="stable")]
     other[runs.cell[order]] = runs.middle[order].astype(np.int64)
     two[runs.cell[rest]] = True
