@@ -58,9 +58,9 @@ def refuse_two_surfaces(grown, counts, cells):
     first, other = _two_distances(grown, counts, grid)
     text = message(
         "cloud_two_surfaces",
-        "found two surfaces all round the tank: {first_m:.3f} m in {first:.0f} % of the cells and "
-        "{second_m:.3f} m in {second:.0f} %; expected one wall: insulation, a double wall, or "
-        "scans of both sides told as one (side)",
+        "found two surfaces where one was expected: {first_m:.3f} m in {first:.0f} % of the cells "
+        "and {second_m:.3f} m in {second:.0f} %: insulation, a double wall, or scans of both sides "
+        "told as one (side)",
         first_m=cells.surface.radius_m + first,
         first=100 * np.count_nonzero(wall) / seen,
         second_m=cells.surface.radius_m + other,
