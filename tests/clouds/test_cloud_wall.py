@@ -303,3 +303,27 @@ def test_joints_of_other_radii_are_proposed():  # simulation
     assert_allclose([one.height_m for one in wall.joints], [2.0, 4.0], atol=1e-9)
     assert_allclose([one.nearest_m for one in wall.joints], [2.0, 4.0], atol=1e-9)
     assert_allclose([one.step_m for one in wall.joints], [0.005, -0.009], atol=1e-3)
+
+
+def _leaved(part, gap=0.06, seed=3, sector=False):
+    """Scans that show a wall and another one 60 mm before it, in a part of the points or turn."""
+    scan = _cylinder(160_000)
+    away = scan[:, :2] - [10, 20]
+    inner = np.random.default_rng(seed).uniform(size=len(scan)) < part
+    if sector:
+        inner = np.arctan2(*away.T) % FULL_TURN < part * FULL_TURN
+    scan[inner, :2] = [10, 20] + away[inner] * (1 - gap / 3)
+    return scan
+
+
+@pytest.mark.slow(after=4)
+@pytest.mark.parametrize("sector", [False, True])
+@pytest.mark.parametrize("part", [0.35, 0.5, 0.65])
+@pytest.mark.parametrize("gap", [0.03, 0.06])
+def test_radii_of_a_double_wall_are_told(part, gap, sector):  # closed form
+    with pytest.raises(InputError) as raised:
+        _find(_leaved(part, gap, sector=sector))
+    told = raised.value.problems[0].expected
+    assert told.code == "cloud_two_surfaces"
+    radii = sorted(told.values[name] for name in ("first_m", "second_m"))
+    assert_allclose(radii, [3.0 - gap, 3.0], atol=1e-3)

@@ -16,11 +16,12 @@ from tankcal.clouds.wall.features import (
     find_obstructions,
     find_welds,
 )
-from tankcal.clouds.wall.growing import OFF_TREND, WALL, grow_wall, off_trend, spread_between
+from tankcal.clouds.wall.growing import OFF_TREND, WALL, grow_wall, off_trend
 from tankcal.clouds.wall.refusals import refuse_no_wall, refuse_two_surfaces
 from tankcal.geometry.outlines import FULL_TURN
 
 LEAST_SD_M = 5e-5  # no mean of a cell is told better
+APART_M, FEWEST_TOLD = 0.4, 20  # cells that noise along a line does not tie; that a scatter needs
 
 
 @dataclass(frozen=True)
@@ -159,8 +160,10 @@ class _Found:
         for i in mine:
             self.is_wall[i] = (grown.why == WALL) & (self.count[i] >= 3)
             self.radius[i][~self.is_wall[i]] = np.nan
-            self.scatter[i] = _scatter(self.radius[i])
-            least = max(LEAST_SD_M, float(np.nan_to_num(self.scatter[i])))
+            course = np.searchsorted(joints_m[1:-1], _middles(grid), side="right")
+            width, row_m = float(np.median(column_m)), float(np.median(np.diff(grid.edges_m)))
+            self.scatter[i] = _scatter(self.radius[i], course, row_m, width)
+            least = max(LEAST_SD_M, self.scatter[i])
             self.sd[i] = np.maximum(self.sd[i], least)
         return grown
 
@@ -219,8 +222,24 @@ def _together(radius, sd, count):
         return mean, np.sqrt((np.nan_to_num(sd) ** 2 * share**2).sum(axis=0))
 
 
-def _scatter(radius):
-    """Sd of the mean of a cell as its neighbours show it, the smaller of along rows and columns."""
-    around = radius - (np.roll(radius, 1, axis=1) + np.roll(radius, -1, axis=1)) / 2
-    up = radius[1:-1] - (radius[:-2] + radius[2:]) / 2 if len(radius) > 2 else around
-    return min(one for one in (spread_between(around), spread_between(up), np.inf) if one > 0)
+def _scatter(radius, course, row_m, column_m):
+    """Sd of the mean of a cell as its neighbours show it: the largest of those told along rows and
+    along columns, by cells side by side and by cells that noise along a line does not tie.
+
+    m2 - (m1 + m3) / 2 has the variance 1.5 s2. What all of a row or of a column show alike is the
+    form of the wall, such as a bulge, and taken off. Columns are not followed over a joint.
+    """
+    parts = [(np.vstack([radius.T, radius.T]), column_m, "round")]  # columns go on round
+    parts += [(radius[course == one], row_m, "up") for one in np.unique(course)]
+    found = {}
+    for values, size_m, way in parts:
+        most = (len(values) - 1) // 2
+        for lag in {1, min(max(1, round(APART_M / size_m)), most)} - {0}:
+            e = values[lag:-lag] - (values[: -2 * lag] + values[2 * lag :]) / 2
+            e = e[np.isfinite(e).any(axis=1)]
+            if len(e):
+                e = e - np.nanmedian(e, axis=1, keepdims=True)
+                found.setdefault((way, lag), []).append(e[np.isfinite(e)])
+    told = [np.concatenate(one) for one in found.values()]
+    told = [1.4826 * np.median(np.abs(e)) for e in told if len(e) >= FEWEST_TOLD]
+    return float(max(told, default=0.0) / np.sqrt(1.5))

@@ -20,6 +20,7 @@ LEAST_SHARE = 0.1  # of the points of a cell, of a mode that counts
 STEEPEST = 0.35  # slope of a wall: a mode is no wider than this over its cell
 NOISE_BINS = 5  # that a mode of a flat wall may hold
 LEAST_PATCH, PATCH_STEP_M, PATCH_SLOPE = 20, 0.012, 0.01  # of parts that masked cells cut off
+TOUCHING = 1.2  # cells between a patch and the wall that it meets
 TREND, LEAST_TREND_M = 3.0, 0.002  # sds from the neighbours' trend, and never less than this
 REFINE_BINS = 2  # beside a mode that its mean may reach, at least
 
@@ -222,6 +223,11 @@ def _joined_patches(runs, label, shape, column_m, row_m, bin_m):
             if np.count_nonzero(known) < LEAST_PATCH / 2:
                 continue
             allowed = PATCH_STEP_M + PATCH_SLOPE * np.median(gap[known])
+            beside = known & (gap <= TOUCHING * max(row_m, float(column_m.max())))
+            if np.count_nonzero(beside) >= LEAST_PATCH / 2 and (
+                np.median(np.abs(step[beside])) * bin_m > PATCH_STEP_M
+            ):
+                continue  # it meets the wall, with a step
             if np.median(np.abs(step[known])) * bin_m <= allowed:
                 joined.append(one)
         if not joined:

@@ -5,10 +5,12 @@ import numpy as np
 from tankcal.clouds.wall.growing import EMPTY, FEW, FEWEST, REFINE_BINS, WALL
 from tankcal.clouds.wall.start import FILE
 from tankcal.errors import InputError, Problem
+from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 
 TWO_SURFACES, SECTORS, SECTORS_WITH = 0.10, 36, 0.6  # cells with two modes; where they are
 RIVAL = 0.15  # of the cells, of one surface that hangs together beside the wall
+LEAST_TURN = 0.15  # of the columns, for an axis of their own
 LEAST_WALL = 0.25  # of the cells in which anything is seen
 
 
@@ -81,10 +83,27 @@ def _two_distances(grown, counts, grid):
     other = _mean_distances(counts, *near, grid)
     both = wall & second
     if 2 * np.count_nonzero(both) < np.count_nonzero(second):
-        return np.nanmedian(mine[wall]), np.nanmedian(other[second])
+        return _about_their_axis(mine, wall), _about_their_axis(other, second)
     inner = np.nanmedian(np.fmin(mine, other)[both])
     outer = np.nanmedian(np.fmax(mine, other)[both])
     return (inner, outer) if np.median((mine - other)[both]) < 0 else (outer, inner)
+
+
+def _about_their_axis(distance_m, chosen):
+    """Median distance of some cells about the axis that they have, which is not that of both."""
+    columns = distance_m.shape[1]
+    chosen = chosen & np.isfinite(distance_m)
+    values, column = distance_m[chosen], np.nonzero(chosen)[1]
+    if len(np.unique(column)) < columns * LEAST_TURN:
+        return np.median(values)
+    turn = column * (FULL_TURN / columns)
+    design = np.column_stack([np.sin(turn), np.cos(turn), np.ones(len(turn))])
+    near = np.ones(len(values), dtype=bool)
+    for _ in range(3):
+        solution = np.linalg.lstsq(design[near], values[near], rcond=None)[0]
+        away = np.abs(values - design @ solution)
+        near = away <= 4 * np.median(away) + 1e-6
+    return np.median(values - design[:, :2] @ solution[:2])
 
 
 def _mean_distances(counts, low, high, grid):
