@@ -46,6 +46,7 @@ class Scene:
     film: tuple | None = None  # x, y, radius, z of liquid, share of no return, of the mirror's
     line_noise: tuple | None = None  # sd in m, and degrees over which it hangs together, of a line
     alike: int = 1  # lines beside each other with the same noise
+    is_sphere: bool = False  # about the middle of the heights, with waves of the form
 
     @property
     def height_m(self):
@@ -150,7 +151,7 @@ def _direction(turn, rise):
 def _trace(scene, origin, d, floor=True):
     """Range (inf: none), what is met, and cosine of the incidence of each ray."""
     inside = np.hypot(*(origin[:2] - scene.axis(origin[2]))) < scene.radius_m
-    t, cosine = _wall(scene, origin, d, inside)
+    t, cosine = _ball(scene, origin, d) if scene.is_sphere else _wall(scene, origin, d, inside)
     kind = np.full(len(d), WALL)
 
     def meet(other, what):
@@ -165,6 +166,7 @@ def _trace(scene, origin, d, floor=True):
             for pit in scene.pits:
                 t, kind = _through_pit(scene, origin, d, pit, t, kind)
         levels = [0.0] * (floor and scene.floor is None) + [scene.height_m] * bool(inside)
+        levels *= not scene.is_sphere
         for level in levels:
             fall = (level - origin[2]) / d[:, 2]
             meet(np.where(fall > 0, fall, np.inf), FLOOR)
@@ -195,6 +197,26 @@ def _trace(scene, origin, d, floor=True):
             hit = away < radius if part == 1.0 else np.abs(away - radius) < 0.02
             meet(np.where(hit, other, np.inf), CLUTTER)
     return t, kind, cosine
+
+
+def ball_radius(scene, unit):
+    """Distance of the wall of a sphere from its centre, in directions (n, 3)."""
+    x, y, z = unit.T
+    return (
+        scene.radius_m + 0.006 * (3 * z * z - 1) / 2 + 0.004 * x * y + 0.003 * z * (x * x - y * y)
+    )
+
+
+def _ball(scene, origin, d):
+    """Range from inside to a wall about the middle of the heights, and cosine of the incidence."""
+    start = origin - [*scene.centre, scene.height_m / 2]
+    along = d @ start
+    t = -along + np.sqrt(along**2 - start @ start + scene.radius_m**2)
+    for _ in range(NEWTON):
+        p = start + t[:, None] * d
+        r = np.linalg.norm(p, axis=1)
+        t = t - (r - ball_radius(scene, p / r[:, None]))
+    return t, np.abs(np.sum(p * d, axis=1) / r)
 
 
 def _floor(scene, origin, d):
