@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 FULL_TURN = 2 * np.pi
-WALL, CLUTTER, MIXED, SECOND, FLOOR = range(5)
+WALL, CLUTTER, MIXED, SECOND, FLOOR, MIRROR = range(6)
 NEWTON = 12
 
 
@@ -39,6 +39,14 @@ class Scene:
     nozzles: list = field(default_factory=list)  # azimuth, z, radius, stand-off
     second: tuple | None = None  # share of the points, distance before the wall
     gap: tuple | None = None  # azimuths between which nothing is seen
+    floor: object = None  # z of the bottom at x, y; None: level at 0
+    pits: list = field(default_factory=list)  # x, y, radius, depth
+    rods: list = field(default_factory=list)  # two ends (3,) and a radius: columns, coils
+    boxes: list = field(default_factory=list)  # low corner (3,), high corner (3,)
+    film: tuple | None = None  # x, y, radius, z of liquid, share of no return, of the mirror's
+    line_noise: tuple | None = None  # sd in m, and degrees over which it hangs together, of a line
+    alike: int = 1  # lines beside each other with the same noise
+    is_sphere: bool = False  # about the middle of the heights, with waves of the form
 
     @property
     def height_m(self):
@@ -110,6 +118,9 @@ def take_scan(rng, scene, position, rays, *, noise_m=0.002, beam_rad=3e-4, even=
     t, kind, cosine = _trace(scene, origin, _direction(turn, rise))
     jitter = rng.normal(0, beam_rad, (2, len(turn)))
     other, _, _ = _trace(scene, origin, _direction(turn + jitter[0], rise + jitter[1]))
+    if scene.film is not None:
+        t, kind = _mirrored(rng, scene, origin, _direction(turn, rise), t, kind)
+        other = np.where(np.isin(kind, (FLOOR, MIRROR)), t, other)
     hit = np.isfinite(t)
     t, other, turn, rise, kind, cosine = (one[hit] for one in (t, other, turn, rise, kind, cosine))
     share = rng.uniform(0, 1, len(turn))
@@ -122,6 +133,8 @@ def take_scan(rng, scene, position, rays, *, noise_m=0.002, beam_rad=3e-4, even=
         t = np.where(ghost, t - before / np.maximum(cosine, 0.1), t)
         kind = np.where(ghost, SECOND, kind)
     t = t + rng.normal(0, 1, len(t)) * noise_m * (0.7 + t / 30) / np.sqrt(np.maximum(cosine, 0.05))
+    if scene.line_noise is not None:
+        t = t + _line_noise(rng, scene, turn, rise, count)
     seen = t < 60
     xyz = origin + t[:, None] * _direction(turn, rise)
     if scene.gap is not None:
@@ -135,10 +148,10 @@ def _direction(turn, rise):
     return np.column_stack([level * np.sin(turn), level * np.cos(turn), np.sin(rise)])
 
 
-def _trace(scene, origin, d):
+def _trace(scene, origin, d, floor=True):
     """Range (inf: none), what is met, and cosine of the incidence of each ray."""
     inside = np.hypot(*(origin[:2] - scene.axis(origin[2]))) < scene.radius_m
-    t, cosine = _wall(scene, origin, d, inside)
+    t, cosine = _ball(scene, origin, d) if scene.is_sphere else _wall(scene, origin, d, inside)
     kind = np.full(len(d), WALL)
 
     def meet(other, what):
@@ -148,7 +161,13 @@ def _trace(scene, origin, d):
         cosine = np.where(nearer, 0.7, cosine)
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        for level in (0.0, scene.height_m) if inside else (0.0,):
+        if scene.floor is not None and floor:
+            meet(_floor(scene, origin, d), FLOOR)
+            for pit in scene.pits:
+                t, kind = _through_pit(scene, origin, d, pit, t, kind)
+        levels = [0.0] * (floor and scene.floor is None) + [scene.height_m] * bool(inside)
+        levels *= not scene.is_sphere
+        for level in levels:
             fall = (level - origin[2]) / d[:, 2]
             meet(np.where(fall > 0, fall, np.inf), FLOOR)
     sign = -1.0 if inside else 1.0
@@ -156,6 +175,10 @@ def _trace(scene, origin, d):
         r = scene.radius_m + sign * (off + radius)
         middle = np.add(scene.axis(0.0), (r * np.sin(azimuth), r * np.cos(azimuth)))
         meet(_upright(origin, d, middle, radius, low, high), CLUTTER)
+    for low, high, radius in scene.rods:
+        meet(_rod(origin, d, np.array(low), np.array(high), radius), CLUTTER)
+    for low, high in scene.boxes:
+        meet(_box(origin, d, np.array(low), np.array(high)), CLUTTER)
     if scene.stairs is not None:
         first, turn, off, wide = scene.stairs
         other, azimuth, z = _shell(scene, origin, d, scene.radius_m + sign * off, inside)
@@ -174,6 +197,108 @@ def _trace(scene, origin, d):
             hit = away < radius if part == 1.0 else np.abs(away - radius) < 0.02
             meet(np.where(hit, other, np.inf), CLUTTER)
     return t, kind, cosine
+
+
+def ball_radius(scene, unit):
+    """Distance of the wall of a sphere from its centre, in directions (n, 3)."""
+    x, y, z = unit.T
+    return (
+        scene.radius_m + 0.006 * (3 * z * z - 1) / 2 + 0.004 * x * y + 0.003 * z * (x * x - y * y)
+    )
+
+
+def _ball(scene, origin, d):
+    """Range from inside to a wall about the middle of the heights, and cosine of the incidence."""
+    start = origin - [*scene.centre, scene.height_m / 2]
+    along = d @ start
+    t = -along + np.sqrt(along**2 - start @ start + scene.radius_m**2)
+    for _ in range(NEWTON):
+        p = start + t[:, None] * d
+        r = np.linalg.norm(p, axis=1)
+        t = t - (r - ball_radius(scene, p / r[:, None]))
+    return t, np.abs(np.sum(p * d, axis=1) / r)
+
+
+def _floor(scene, origin, d):
+    """Range to a bottom that is any smooth function of x and y."""
+    down = np.where(d[:, 2] < -1e-3, d[:, 2], np.nan)
+    t = (np.float64(scene.floor(*scene.axis(0.0))) - origin[2]) / down
+    for _ in range(4 * NEWTON):
+        x, y = origin[0] + t * d[:, 0], origin[1] + t * d[:, 1]
+        miss = origin[2] + t * down - scene.floor(x, y)
+        t = t - np.clip(miss / down, -1.0, 1.0) * 0.8
+    within = np.hypot(x - scene.centre[0], y - scene.centre[1]) < scene.radius_m + 0.5
+    return np.where((t > 0) & (np.abs(miss) < 1e-5) & within, t, np.inf)
+
+
+def _through_pit(scene, origin, d, pit, t, kind):
+    """Rays that meet the bottom within a round pit go on to its floor or its side."""
+    px, py, radius, depth = pit
+    x, y = origin[0] + t * d[:, 0], origin[1] + t * d[:, 1]
+    into = (kind == FLOOR) & (np.hypot(x - px, y - py) < radius)
+    x, y, way = x[into] - px, y[into] - py, d[into]
+    fall = -(depth / way[:, 2])
+    a, b = way[:, 0] ** 2 + way[:, 1] ** 2, x * way[:, 0] + y * way[:, 1]
+    side = (-b + np.sqrt(np.maximum(b**2 - a * (x**2 + y**2 - radius**2), 0))) / np.maximum(
+        a, 1e-12
+    )
+    t, kind = t.copy(), kind.copy()
+    t[into] += np.minimum(fall, side)
+    kind[into] = CLUTTER
+    return t, kind
+
+
+def _rod(origin, d, low, high, radius):
+    """Range to the side of a round rod between two points."""
+    length = np.linalg.norm(high - low)
+    along = (high - low) / length
+    across, start = d - np.outer(d @ along, along), origin - low
+    off = start - (start @ along) * along
+    a, b = np.sum(across**2, axis=1), across @ off
+    root = b**2 - a * (off @ off - radius**2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = np.where(root > 0, (-b - np.sqrt(np.maximum(root, 0))) / a, np.inf)
+        place = start @ along + t * (d @ along)
+    return np.where((t > 0) & (place > 0) & (place < length), t, np.inf)
+
+
+def _box(origin, d, low, high):
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first, second = (low - origin) / d, (high - origin) / d
+    near = np.max(np.minimum(first, second), axis=1)
+    far = np.min(np.maximum(first, second), axis=1)
+    return np.where((near > 0) & (near < far), near, np.inf)
+
+
+def _mirrored(rng, scene, origin, d, t, kind):
+    """A film of liquid: its face is seen, or nothing, or what stands over it, upside down."""
+    px, py, radius, level, dark, mirror = scene.film
+    fall = (level - origin[2]) / np.where(d[:, 2] < -1e-3, d[:, 2], np.nan)
+    x, y = origin[0] + fall * d[:, 0], origin[1] + fall * d[:, 1]
+    wet = (np.hypot(x - px, y - py) < radius) & (fall > 0) & (fall <= t + 1e-9)
+    below = np.array([origin[0], origin[1], 2 * level - origin[2]])
+    image, _, _ = _trace(scene, below, d * [1, 1, -1], floor=False)
+    lot = rng.uniform(0, 1, len(t))
+    t = np.where(wet, fall, t)
+    kind = np.where(wet, FLOOR, kind)
+    t = np.where(wet & (lot < dark), np.inf, t)
+    shown = wet & (lot >= dark) & (lot < dark + mirror)
+    return np.where(shown, image, t), np.where(shown, MIRROR, kind)
+
+
+def _line_noise(rng, scene, turn, rise, count):
+    """Noise that hangs together along each upright line of a scan over some degrees."""
+    sd, reach = scene.line_noise
+    line = np.round(turn * count / np.pi).astype(int) // scene.alike
+    step = np.radians(reach) / 3
+    knots = rng.normal(0, 1, (line.max() + 1, int(np.pi / step) + 8))
+    at = (rise + np.pi / 2) / step + 3
+    whole = np.floor(at).astype(int)
+    total, weight = 0.0, 0.0
+    for k in range(-3, 4):  # a bell over the knots
+        share = np.exp(-(((at - whole - k) / 1.5) ** 2))
+        total, weight = total + share * knots[line, whole + k], weight + share**2
+    return sd * total / np.sqrt(weight)
 
 
 def _upright(origin, d, middle, radius, low, high):

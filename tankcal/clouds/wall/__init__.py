@@ -1,6 +1,7 @@
 """From points of scans to cells of the wall: what is wall, what stands before it."""
 
-from tankcal.clouds.wall.finding import CloudWall, find_cloud_wall
+from tankcal.clouds.wall.deciding import CloudWall
+from tankcal.clouds.wall.finding import find_cloud_wall
 from tankcal.clouds.wall.passes import Passes, cells_of, sample_of
 from tankcal.clouds.wall.readings import CloudReadings, readings_of
 

@@ -15,6 +15,8 @@ from tankcal.geometry.outlines import FULL_TURN
 JOINT_ROWS, LEAST_STEP_M, SURE_STEP = 4, 0.002, 5.0  # rows on each side of a step; its size
 WELD_M, WELD_REACH_M, LEAST_WELD_M = 0.6, 1.5, 0.003  # width, of what is level beside it, depth
 SURE_WELD = 5.0
+# of a weld: width at half its depth, cells that it is looked for in, depth in a third of its course
+HALF_DEPTH_M, WELD_CELLS, RUNS_ON = 0.3, 12, 0.6
 CLOSED_CELLS = 2  # between parts of one obstruction
 SMALLEST_CELLS, LEAST_FAR = 6, 3
 PIPE_WIDTH_M, RING_ARC, RING_HEIGHT_M, NOZZLE_M = 1.0, np.pi / 3, 0.6, 1.5
@@ -121,23 +123,47 @@ def find_welds(radius_m, course, column_m):
     found = []
     for one in np.unique(course):
         mine = course == one
-        profile = _medians((radius_m[mine] - _medians(radius_m[mine])[:, None]).T)
         width = float(np.median(column_m[mine]))
         reach = max(2, round(WELD_REACH_M / width))
-        level = _moving_median(profile, reach)
-        depth = level - profile
+        beside = radius_m[mine] - _medians(radius_m[mine])[:, None]
+        depth = _depths(beside, reach)
+        thirds = [_depths(part, reach) for part in np.array_split(beside, 3) if len(part)]
         noise = max(1.4826 * np.nanmedian(np.abs(depth)), 1e-4) if np.isfinite(depth).any() else 1.0
         apart = max(1, round(WELD_M / width))
         left = np.nan_to_num(np.abs(depth))
         while left.max() > max(LEAST_WELD_M, SURE_WELD * noise):
             i = int(np.argmax(left))
-            half = max(1, apart // 2)
-            flank = depth[[(i - half) % len(depth), (i + half) % len(depth)]]
-            if not np.nanmax(np.append(flank * np.sign(depth[i]), 0.0)) > abs(depth[i]) / 2:
+            if _is_narrow(depth, i, width) and all(_runs_on(one, i, depth[i]) for one in thirds):
                 turn = (i + 0.5) * FULL_TURN / len(depth)
                 found.append(Weld(int(one), float(turn), float(depth[i])))
             left[np.arange(i - apart, i + apart + 1) % len(left)] = 0.0
     return tuple(found)
+
+
+def _depths(beside_m, reach):
+    """(columns,) how far the median of some rows lies inside of the columns beside it."""
+    profile = _medians(beside_m.T)
+    return _moving_median(profile, reach) - profile
+
+
+def _is_narrow(depth, i, width):
+    """Is what is deep here no wider than a weld at half of its depth?"""
+    there = depth[(i + np.arange(-WELD_CELLS, WELD_CELLS + 1)) % len(depth)] / depth[i]
+    wide = 0.0
+    for side in (there[WELD_CELLS::-1], there[WELD_CELLS:]):
+        under = np.flatnonzero(~(side > 0.5))
+        if not len(under):
+            return False
+        k = under[0]
+        part = (side[k - 1] - 0.5) / (side[k - 1] - side[k]) if np.isfinite(side[k]) else 1.0
+        wide += (k - 1 + part) * width
+    return wide < max(HALF_DEPTH_M, 1.5 * width)
+
+
+def _runs_on(depth, i, whole):
+    """Does a part of the course show it, too, here or in the column beside? A buckle ends."""
+    near = depth[(i + np.arange(-1, 2)) % len(depth)] / whole
+    return not np.isfinite(near).any() or np.nanmax(near) > RUNS_ON
 
 
 def find_obstructions(seen, grown, cells, column_m):

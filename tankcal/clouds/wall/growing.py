@@ -20,6 +20,7 @@ LEAST_SHARE = 0.1  # of the points of a cell, of a mode that counts
 STEEPEST = 0.35  # slope of a wall: a mode is no wider than this over its cell
 NOISE_BINS = 5  # that a mode of a flat wall may hold
 LEAST_PATCH, PATCH_STEP_M, PATCH_SLOPE = 20, 0.012, 0.01  # of parts that masked cells cut off
+TOUCHING = 1.2  # cells between a patch and the wall that it meets
 TREND, LEAST_TREND_M = 3.0, 0.002  # sds from the neighbours' trend, and never less than this
 REFINE_BINS = 2  # beside a mode that its mean may reach, at least
 
@@ -35,7 +36,7 @@ class Grown:
     low, high : ndarray of int, shape (rows, columns)
         First and last bin that is averaged over.
     other : ndarray of int, shape (rows, columns)
-        Bin of the largest mode that is not wall, -1: there is none.
+        Bin of the largest mode that is not taken for wall, -1: there is none.
     surfaces : tuple
         (share of the cells, mean distance in bins) of surfaces that are not wall, of two modes in
         one cell ("behind") or in cells of their own; largest first.
@@ -89,7 +90,7 @@ def grow_wall(counts, *, column_m, row_m, bin_m, joined_rows=()):
     reach = np.maximum((runs.high[run] - runs.low[run] + 1) // 2, REFINE_BINS)
     low[has] = np.maximum(runs.low[run] - reach, 0)
     high[has] = np.minimum(runs.high[run] + reach, counts.shape[2] - 1)
-    other, two = _others(runs, sound, wall, chosen, has, total.size)
+    other, two = _others(runs, sound, chosen, has, total.size)
     return Grown(
         why.reshape(shape),
         low.reshape(shape),
@@ -222,6 +223,11 @@ def _joined_patches(runs, label, shape, column_m, row_m, bin_m):
             if np.count_nonzero(known) < LEAST_PATCH / 2:
                 continue
             allowed = PATCH_STEP_M + PATCH_SLOPE * np.median(gap[known])
+            beside = known & (gap <= TOUCHING * max(row_m, float(column_m.max())))
+            if np.count_nonzero(beside) >= LEAST_PATCH / 2 and (
+                np.median(np.abs(step[beside])) * bin_m > PATCH_STEP_M
+            ):
+                continue  # it meets the wall, with a step
             if np.median(np.abs(step[known])) * bin_m <= allowed:
                 joined.append(one)
         if not joined:
@@ -281,10 +287,10 @@ def _one_of_each_cell(runs, wall, shape):
     return chosen
 
 
-def _others(runs, sound, wall, chosen, has, cells):
-    """(cells,) bin of the largest mode that is not wall, and whether it stands beside the wall."""
+def _others(runs, sound, chosen, has, cells):
+    """(cells,) bin of the largest mode beside that of the wall, and whether it has both."""
     other, two = np.full(cells, -1), np.zeros(cells, dtype=bool)
-    rest = np.flatnonzero(sound & ~wall)
+    rest = np.flatnonzero(sound & (chosen[runs.cell] != np.arange(len(runs.cell))))
     order = rest[np.argsort(runs.count[rest], kind="stable")]
     other[runs.cell[order]] = runs.middle[order].astype(np.int64)
     two[runs.cell[rest]] = True

@@ -86,21 +86,7 @@ def _standing(xyz_m, ends_m, radius_m, frame):
     xyz = xyz_m @ frame.T
     inside = xyz[(xyz[:, 2] > ends_m[0]) & (xyz[:, 2] < ends_m[1])]
     if len(inside) < FEWEST:
-        low, high = np.percentile(xyz[:, 2], [0.5, 99.5])
-        raise SolutionError(
-            message(
-                "cloud_beside_shell",
-                "{count} of {all} points stand between the bottom ({bottom_m:.3f} m) and the top "
-                "({top_m:.3f} m) of the shell; found heights of {low_m:.3f} to {high_m:.3f} m: "
-                "check the frame, the unit and bottom_z_m",
-                count=len(inside),
-                all=len(xyz),
-                bottom_m=ends_m[0],
-                top_m=ends_m[1],
-                low_m=low,
-                high_m=high,
-            )
-        )
+        raise _beside_shell(xyz, ends_m, len(inside))
     middle = np.array([*np.median(inside[:, :2], axis=0), (ends_m[0] + ends_m[1]) / 2])
     local, joints = inside - middle, np.array(ends_m) - middle[2]
     squares = _upright_squares(local, joints, radius_m)
@@ -126,6 +112,24 @@ def _standing(xyz_m, ends_m, radius_m, frame):
         float(np.median(found.places(some[shell.reason == ""])[2])),
         shell.slope,
         frame,
+    )
+
+
+def _beside_shell(xyz, ends_m, count):
+    low, high = np.percentile(xyz[:, 2], [0.5, 99.5])
+    return SolutionError(
+        message(
+            "cloud_beside_shell",
+            "{count} of {all} points stand between the bottom ({bottom_m:.3f} m) and the top "
+            "({top_m:.3f} m) of the shell; found heights of {low_m:.3f} to {high_m:.3f} m: "
+            "check the frame, the unit and bottom_z_m",
+            count=count,
+            all=len(xyz),
+            bottom_m=ends_m[0],
+            top_m=ends_m[1],
+            low_m=low,
+            high_m=high,
+        )
     )
 
 

@@ -1,0 +1,114 @@
+"""Cells that show no wall, or two of them: refused in words."""
+
+import numpy as np
+
+from tankcal.clouds.wall.growing import EMPTY, FEW, FEWEST, REFINE_BINS, WALL
+from tankcal.clouds.wall.start import FILE
+from tankcal.errors import InputError, Problem
+from tankcal.geometry.outlines import FULL_TURN
+from tankcal.messages import message
+
+TWO_SURFACES, SECTORS, SECTORS_WITH = 0.10, 36, 0.6  # cells with two modes; where they are
+RIVAL = 0.15  # of the cells, of one surface that hangs together beside the wall
+LEAST_TURN = 0.15  # of the columns, for an axis of their own
+LEAST_WALL = 0.25  # of the cells in which anything is seen
+
+
+def refuse_no_wall(grown, cells):
+    """Raise InputError where few of the cells in which anything is seen are wall."""
+    something = (grown.why.ravel() != EMPTY) | np.any(cells.far >= FEWEST, axis=1)
+    seen = max(np.count_nonzero(something), 1)
+    share = np.count_nonzero(grown.why == WALL) / seen
+    if share >= LEAST_WALL:
+        return
+    if np.count_nonzero(grown.why == FEW) > seen / 2:
+        text = message(
+            "cloud_too_sparse",
+            "found fewer than {least} points in most cells of the wall ({rows} x {columns}); "
+            "expected a denser cloud: bring its points as points.csv",
+            least=FEWEST,
+            rows=cells.grid.rows,
+            columns=cells.grid.columns,
+        )
+    else:
+        text = message(
+            "cloud_wall_too_small",
+            "only {share:.1f} % of the cells in which anything is seen show a wall near the radius "
+            "{radius_m:.3f} m; expected {least:.0f} % at least: check tank.kind, the unit, the "
+            "frame and what stands before the wall",
+            share=100 * share,
+            radius_m=cells.surface.radius_m,
+            least=100 * LEAST_WALL,
+        )
+    raise InputError(Problem(FILE, text))
+
+
+def refuse_two_surfaces(grown, counts, cells):
+    """Raise InputError where a second surface goes round with the wall, or rivals it in size.
+
+    counts  (rows, columns, bins) that the wall was grown in
+    """
+    grid, wall = cells.grid, grown.why == WALL
+    seen = max(np.count_nonzero(wall | grown.two_modes | (grown.other >= 0)), 1)
+    second = grown.other >= 0
+    sector = np.arange(grid.columns) * SECTORS // grid.columns
+    parts = np.bincount(sector, second.mean(axis=0), SECTORS) / np.bincount(sector)
+    share = np.count_nonzero(second) / seen
+    all_round = share >= TWO_SURFACES and np.mean(parts >= TWO_SURFACES) >= SECTORS_WITH
+    if not all_round and not (grown.surfaces and grown.surfaces[0][0] >= RIVAL):
+        return
+    first, other = _two_distances(grown, counts, grid)
+    text = message(
+        "cloud_two_surfaces",
+        "found two surfaces where one was expected: {first_m:.3f} m in {first:.0f} % of the cells "
+        "and {second_m:.3f} m in {second:.0f} %: insulation, a double wall, or scans of both sides "
+        "told as one (side)",
+        first_m=cells.surface.radius_m + first,
+        first=100 * np.count_nonzero(wall) / seen,
+        second_m=cells.surface.radius_m + other,
+        second=100 * share,
+    )
+    raise InputError(Problem(FILE, text))
+
+
+def _two_distances(grown, counts, grid):
+    """Medians of what is taken for the wall and of the second surface, m.
+
+    Where neither has most of the points the choice may change from cell to cell; of two modes in
+    one cell the inner one is of the inner surface.
+    """
+    wall, second = grown.why == WALL, grown.other >= 0
+    mine = _mean_distances(counts, grown.low, grown.high, grid)
+    near = grown.other - REFINE_BINS, grown.other + REFINE_BINS
+    other = _mean_distances(counts, *near, grid)
+    both = wall & second
+    if 2 * np.count_nonzero(both) < np.count_nonzero(second):
+        return _about_their_axis(mine, wall), _about_their_axis(other, second)
+    inner = np.nanmedian(np.fmin(mine, other)[both])
+    outer = np.nanmedian(np.fmax(mine, other)[both])
+    return (inner, outer) if np.median((mine - other)[both]) < 0 else (outer, inner)
+
+
+def _about_their_axis(distance_m, chosen):
+    """Median distance of some cells about the axis that they have, which is not that of both."""
+    columns = distance_m.shape[1]
+    chosen = chosen & np.isfinite(distance_m)
+    values, column = distance_m[chosen], np.nonzero(chosen)[1]
+    if len(np.unique(column)) < columns * LEAST_TURN:
+        return np.median(values)
+    turn = column * (FULL_TURN / columns)
+    design = np.column_stack([np.sin(turn), np.cos(turn), np.ones(len(turn))])
+    near = np.ones(len(values), dtype=bool)
+    for _ in range(3):
+        solution = np.linalg.lstsq(design[near], values[near], rcond=None)[0]
+        away = np.abs(values - design @ solution)
+        near = away <= 4 * np.median(away) + 1e-6
+    return np.median(values - design[:, :2] @ solution[:2])
+
+
+def _mean_distances(counts, low, high, grid):
+    """(rows, columns) mean distance of the points between two bins of each cell, m."""
+    number = np.arange(grid.bins)
+    part = np.where((number >= low[..., None]) & (number <= high[..., None]), counts, 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return (part @ number / part.sum(axis=2) + 0.5) * grid.bin_m - grid.band_m
