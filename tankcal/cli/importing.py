@@ -61,6 +61,18 @@ def add(commands):
             help=f"time of the {what} reading, such as 2026-07-14T09:00, for files without times",
         )
     parser.add_argument(
+        "--codes",
+        choices=("before", "after"),
+        help="code blocks of GSI (words 41 to 49) were stored before or after their readings "
+        "(default: they are told, and not used)",
+    )
+    parser.add_argument(
+        "--station-code",
+        metavar="CODE",
+        help="the code whose blocks begin a station in GSI: word 42 its name, word 43 the height "
+        "of the instrument in millimetres",
+    )
+    parser.add_argument(
         "--no-control", action="store_true", help="write no known coordinates to control.csv"
     )
     parser.add_argument(
@@ -110,6 +122,8 @@ def _import(options):
         begin=options.begin,
         end=options.end,
         no_control=options.no_control,
+        codes=options.codes,
+        station_code=options.station_code,
     )
     found = import_fieldbooks(options.names, options.out, choices, replace_tables=options.replace)
     if options.machine:

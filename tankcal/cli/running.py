@@ -7,6 +7,7 @@ import tankcal
 from tankcal.cli.arguments import parse_cluster
 from tankcal.cli.machine import add_json, print_json, problem_of
 from tankcal.cli.reporting import add_letterhead, letterhead_of
+from tankcal.cli.set_aside import lines_set_aside
 from tankcal.cli.showing import (
     Progress,
     marks,
@@ -22,7 +23,6 @@ from tankcal.messages import message
 from tankcal.text.digits import decimals_of_height, fixed, format_significant, format_with_u
 
 DECIMALS_WITHOUT_U = 3  # of a volume in m3: litres
-NAMED = 5  # points that are set aside
 
 
 def add(commands):
@@ -122,8 +122,8 @@ def _tell(out, paths, warnings, result, adjustment):
         say(_summary(adjustment))
     if result is not None:
         say(_capacity(result))
-        for line in _points_set_aside(result):
-            say(line)
+    for line in lines_set_aside(result, adjustment):
+        say(line)
     print_paths(out, paths)
     print_doubts(doubts)
 
@@ -179,23 +179,6 @@ def _compute(cluster, source, out, quiet, strict=False, papers=(), tell=_tell):
     paths = outputs.write(result, out, show.part, *papers)
     show.end()
     tell(out, paths, result.warnings, result, adjustment)
-
-
-def _points_set_aside(result):
-    """One line: the first points that are not of the wall, where there are any."""
-    if result.accepted is None:
-        return
-    names, kept = result.job.points.names, {int(i) for i in result.accepted}
-    gone = [name for i, name in enumerate(names) if i not in kept]
-    if len(gone) > NAMED:
-        yield message(
-            "set_aside_and_more",
-            "  set aside: {names} and {more} more, in the working papers",
-            names=gone[:NAMED],
-            more=len(gone) - NAMED,
-        )
-    elif gone:
-        yield message("set_aside_points", "  set aside: {names}", names=gone)
 
 
 def _capacity(result):

@@ -26,7 +26,7 @@ class SetUp:
     station   name of the point below it; "": the file names none
     height_m  of the instrument above the point, None: not given
     xyz_m     east, north and height of the point, None: not given
-    is_told   whether the file says anything of it; else only readings tell that there is one
+    is_told   whether a record of the file begins it; else only readings tell that there is one
     """
 
     station: str

@@ -2,15 +2,18 @@
 
 An instrument writes each kind of number with the same decimals, zeros at the end too. A number with
 FEWER decimals less than the median of its kind was not written by it. What counts is what stands
-there, not the value: 290.0000 is whole, 290. is not.
+there, not the value: 290.0000 is whole, 290. is not. Books of two programs, or of records that are
+written in two ways, have two numbers of decimals, each of them often: these are read as they stand.
 """
 
 import re
+from collections import Counter
 from statistics import median
 
 from tankcal.messages import message
 
 FEWER = 3  # decimals; fewer where the median has fewer than these are not judged
+OFTEN, SHARE = 3, 0.1  # so many numbers, and that part of a field, are a way of writing
 
 
 def tell_cut_numbers(book, log):
@@ -21,14 +24,31 @@ def tell_cut_numbers(book, log):
         usual = median(decimals)
         if usual < FEWER or _is_without_zeros(texts, decimals, usual):
             continue
+        counts = Counter(decimals)
+        ways = {one for one, times in counts.items() if times >= max(OFTEN, SHARE * len(texts))}
+        short = [one for one in sorted(ways) if one <= usual - FEWER]
+        if short:
+            text = message(
+                "ways_of_writing",
+                "numbers of {column} with {short} and with {usual:.0f} decimals, each often: read"
+                " as they stand",
+                column=column,
+                short=", ".join(map(str, short)),
+                usual=usual,
+            )
+            book.note(text)
         for (text, row), count in zip(texts, decimals, strict=True):
-            if count <= usual - FEWER and row not in told:
+            if count <= usual - FEWER and count not in ways and row not in told:
                 expected = message(
                     "cut_short",
-                    "found {text!r}; expected {usual:.0f} decimals as elsewhere in the file: cut"
-                    " short?",
+                    "found {text!r} with {count} decimals; expected {usual:.0f}, as {many} of the"
+                    " {all} numbers of this field have at least: cut short? If it is meant, write"
+                    " its zeros",
                     text=text[:40],
+                    count=count,
                     usual=usual,
+                    many=sum(one >= usual for one in decimals),
+                    all=len(texts),
                 )
                 log.problem(book.file, expected, row, column)
 

@@ -19,11 +19,12 @@ _MARKS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff",
 _JOBXML = re.compile(r"<(\w+:)?JOBFile[\s>]")
 
 
-def read_book(file, data, log, wanted=None, described=None):
+def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
     """FieldBook of the bytes of a file, or None after telling the log why it cannot be read.
 
     wanted     one of FORMATS; None: by its content
     described  Profile of plain tables, or None
+    custom     gsi.Custom: what code blocks of GSI mean
     """
     text = _text(file, data, log)
     if text is None:
@@ -45,15 +46,17 @@ def read_book(file, data, log, wanted=None, described=None):
     if found == "jxl":
         return jobxml.read(data, file, log)
     for row, line in enumerate(text.split("\n"), 1):
-        if len(line) > MAX_LINE:
+        if len(line) > MAX_LINE and not (found == "gsi" and gsi.LINE.match(line)):
             expected = message("line_too_long", "a line of more than {most} characters; expected a"
                                " field book", most=MAX_LINE)  # fmt: skip
             log.problem(file, expected, row)
             return None
     if found == "csv":
         book = profile.read(text, file, log, described)
+    elif found == "gsi":
+        book = gsi.read(text, file, log, custom)
     else:
-        book = {"gsi": gsi, "rw5": rw5, "sdr": sdr}[found].read(text, file, log)
+        book = {"rw5": rw5, "sdr": sdr}[found].read(text, file, log)
     tell_cut_numbers(book, log)
     return book
 

@@ -1,13 +1,15 @@
 """Leica GSI-8 and GSI-16: words of a two-figure index, a unit and a signed value.
 
-Each line is a block; digit 6 of a word is its unit. Slope distances are what the instrument made of
-them: its prism constant and ppm are in them already (words 51, 58, 59 only say which).
+A block begins with word 11 or 41, mostly on a line of its own; digit 6 of a word is its unit. Slope
+distances are what the instrument made of them: its prism constant and ppm are in them already
+(words 51, 58, 59 only say which). Blocks of words 41 to 49 are codes: whether of the readings
+before or after them, or of a station, is the surveyor's custom, and no file says it.
 """
 
 import datetime
 import math
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from tankcal.fieldbooks.book import (
     DEGREES,
@@ -17,6 +19,7 @@ from tankcal.fieldbooks.book import (
     KnownPoint,
     plain_name,
     refuse_minutes,
+    refuse_number,
 )
 from tankcal.messages import message
 
@@ -34,18 +37,38 @@ ANGLES = {"2": ("gon", 1e5), "3": ("deg", 1e5), "4": ("dms", 1e5), "5": ("mil", 
 OF_TARGET, OF_STATION = ("81", "82", "83"), ("84", "85", "86")
 TEXTS = ("11", *(f"7{digit}" for digit in range(1, 10)))
 LENGTH_WORDS = ("31", "32", "33", *OF_TARGET, *OF_STATION, "87", "88")
-KNOWN = (*TEXTS, *LENGTH_WORDS, "12", "13", "17", "19", "21", "22", "51", "58", "59")
+CODES = tuple(f"4{digit}" for digit in range(1, 10))
+KNOWN = (*TEXTS, *CODES, *LENGTH_WORDS, "12", "13", "17", "19", "21", "22", "51", "58", "59")
+SHOWN = 3  # code blocks
+FILLER = re.compile(r"[-?]*")  # what some instruments write for no code
 EARLIEST, LATEST = 1980, 2200  # years
 SAME_M = 0.001  # heights of an instrument, coordinates of a station
 UNLIKE_M = 0.003  # between the horizontal distance of the file and that of slope and angle
 
 
-def read(text, file, log):
+@dataclass(frozen=True)
+class Custom:
+    """What code blocks mean to the surveyor.
+
+    codes    "before": of the readings that follow, up to the next block; "after": of those since
+             the block before it; None: of none
+    station  code whose block begins a station: word 42 its name, word 43 the height of the
+             instrument in millimetres; None: no code does
+    """
+
+    codes: str | None = None
+    station: str | None = None
+
+
+UNSAID = Custom()
+
+
+def read(text, file, log, custom=UNSAID):
     """FieldBook of the text of a GSI file."""
     book, state = FieldBook(file, "gsi"), _State()
     for row, line in enumerate(text.split("\n"), 1):
-        line = line.strip("\r\x1a \t")
-        if not line:
+        line = line.lstrip(" \t").rstrip("\r\x1a\t")
+        if not line.strip():
             continue
         words = _words(line)
         if words is None:
@@ -55,10 +78,14 @@ def read(text, file, log):
                 " others",
             )
             log.problem(file, expected, row)
-        elif words[0][0] == "41":
-            book.leave_out(message("gsi_code_blocks", "code blocks (words 41 to 49)"), row)
-        else:
-            _take(book, log, row, words, state)
+            continue
+        for block in _blocks(words):
+            if block[0][0] == "41":
+                _take_code(book, log, row, block, state, custom)
+            else:
+                _take(book, log, row, block, state)
+    if state.blocks:
+        _say_codes(book, state.blocks)
     return book
 
 
@@ -67,6 +94,11 @@ class _State:
 
     height = prism = None
     year = time = None
+    code = ""  # of the code block that holds
+    first = 0  # shot after the last code block
+
+    def __init__(self):
+        self.blocks = []  # (text, row) of code blocks that nobody explained
 
 
 def _words(line):
@@ -74,13 +106,76 @@ def _words(line):
     width = 16 if line.startswith("*") else 8
     body = line.lstrip("*")
     step = 7 + width + 1
-    parts = [body[start : start + step].rstrip() for start in range(0, len(body), step)]
+    parts = [body[start : start + step] for start in range(0, len(body), step)]
+    parts = [one if one[step - 1 :].strip() else one[: step - 1] for one in parts if one.strip()]
     if not all(len(one) == 7 + width and _WORD.fullmatch(one) for one in parts):
-        parts = body.split()
+        parts = [one.lstrip("*") for one in body.split()]
         if not all(len(one) == 7 + width and _WORD.fullmatch(one) for one in parts):
             return None
     matches = [_WORD.fullmatch(one) for one in parts]
-    return [(one[1], one[2], one[5], one[6] + one[7]) for one in matches]
+    return [(one[1], one[2] + one[3] + one[4], one[5], one[6] + one[7]) for one in matches]
+
+
+def _blocks(words):
+    """The blocks of a line: some programs write several, each begins with its number."""
+    found = [[words[0]]]
+    for one in words[1:]:
+        if one[0] in ("11", "41") and (one[1] + one[2]).isdigit():
+            found.append([])
+        found[-1].append(one)
+    return found
+
+
+def _take_code(book, log, row, words, state, custom):
+    """A code block: a station, the code of readings, or told as it stands."""
+    given = _known_words(book, log, row, words)
+    if given is None:
+        return
+    texts = [_text(given[one]) if one in given else "" for one in CODES]
+    code = " ".join(one for one in texts if one.strip("0"))
+    if custom.station is not None and texts[0].upper() == plain_name(custom.station).upper():
+        _begin_station(book, log, row, texts[1], given.get("43"), state)
+    elif custom.codes == "before":
+        state.code = code
+    elif custom.codes == "after":
+        for place in range(state.first, len(book.shots)):
+            shot = book.shots[place]
+            book.shots[place] = replace(shot, code=shot.code or code)
+    else:
+        state.blocks.append((code, row))
+    state.first = len(book.shots)
+
+
+def _begin_station(book, log, row, name, word, state):
+    """A set-up from a code block; its height of the instrument stands in millimetres."""
+    height = None
+    if word is not None:
+        digits = word[1][1:]
+        if not (digits.isascii() and digits.isdigit()):
+            refuse_number(log, book.file, row, word[1])
+            return
+        height = float(word[1]) / 1000
+    if not name.strip("0"):
+        text = message("gsi_station_name", "a code block of a station without word 42; expected"
+                       " the name of the station there")  # fmt: skip
+        log.problem(book.file, text, row)
+        return
+    book.stand(name, height, None, row)
+    state.height, state.code = None, ""
+
+
+def _say_codes(book, blocks):
+    shown = [one for one, _ in blocks if one][:SHOWN]
+    text = message(
+        "gsi_codes_not_used",
+        "code blocks (words 41 to 49): {count}, the first in row {row}: {shown}: of which readings"
+        " they are no file says: --codes before or after makes them their codes, --station-code"
+        " the beginning of stations",
+        count=len(blocks),
+        row=str(blocks[0][1]),
+        shown="; ".join(one[:40] for one in shown) or "-",
+    )
+    book.note(text)
 
 
 def _take(book, log, row, words, state):
@@ -104,8 +199,9 @@ def _take(book, log, row, words, state):
     if "87" in values:
         state.height = values["87"]
     if is_reading:
-        code = " ".join(_text(given[one]) for one in TEXTS[1:] if one in given)
-        _take_shot(book, log, row, name, values, code, state)
+        texts = [_text(given[one]) for one in (*TEXTS[1:], *CODES) if one in given]
+        code = " ".join(one for one in texts if not FILLER.fullmatch(one))
+        _take_shot(book, log, row, name, values, code or state.code, state)
     elif all(one in values for one in OF_TARGET[:2]):
         xyz = tuple(values.get(one) for one in OF_TARGET)
         book.known.append(KnownPoint(name, xyz, row))
@@ -116,9 +212,9 @@ def _take(book, log, row, words, state):
 def _known_words(book, log, row, words):
     """{index: (unit, signed value)} of the words that are read; None: one stands twice (told)."""
     given = {}
-    for index, digit, unit, value in words:
-        if digit.isdigit() and index != "11":
-            what = message("gsi_level_word", "words {word} of a level", word=index + digit)
+    for index, digits, unit, value in words:
+        if digits[0].isdigit() and index not in ("11", "41"):
+            what = message("gsi_level_word", "words {word} of a level", word=index + digits[0])
             book.leave_out(what, row)
         elif index not in KNOWN:
             book.leave_out(message("gsi_word", "words {word}", word=index), row)

@@ -8,6 +8,7 @@ from pathlib import Path
 from tankcal.fieldbooks.book import MOST_M, NO_YEAR
 from tankcal.fieldbooks.detection import MAX_BYTES, read_book
 from tankcal.fieldbooks.faces import reduce_faces
+from tankcal.fieldbooks.gsi import Custom
 from tankcal.fieldbooks.profile import read_profile
 from tankcal.fieldbooks.rows import check_rows, make_rows
 from tankcal.fieldbooks.sorting import sort_readings
@@ -44,6 +45,11 @@ class Choices:
         Times of the first and the last reading, for files without times.
     no_control : bool
         Known coordinates are not written.
+    codes : str or None
+        Code blocks of GSI are codes of the readings that follow ("before") or of those since the
+        block before ("after"); None: they are told, and not used.
+    station_code : str or None
+        Code whose blocks begin a station in a GSI file.
     """
 
     hits: tuple = ()
@@ -59,6 +65,8 @@ class Choices:
     begin: datetime.datetime | None = None
     end: datetime.datetime | None = None
     no_control: bool = False
+    codes: str | None = None
+    station_code: str | None = None
 
 
 @dataclass
@@ -163,6 +171,7 @@ def _read_all(files, choices, log):
         if described is None:
             return []
     books, seen = [], {}
+    custom = Custom(choices.codes, choices.station_code)
     for path in map(Path, files):
         data = read_bytes(path, log, MAX_BYTES)
         if data is not None and data in seen:
@@ -171,7 +180,8 @@ def _read_all(files, choices, log):
             log.problem(path.name, text)
             continue
         seen[data] = path.name
-        book = None if data is None else read_book(path.name, data, log, choices.format, described)
+        book = None if data is None else read_book(path.name, data, log, choices.format, described,
+                                                   custom)  # fmt: skip
         if book is not None:
             books.append(book)
     return books
@@ -303,12 +313,13 @@ def _check_ties(chosen, choices, log):
 def _stations(known, stands, chosen, log):
     """{point: (xyz, file, row)} that the job needs: stations, and targets that tie."""
     used = [one.station for one, _ in stands.values()] + [one.shot.point for one in chosen.ties]
-    found = {}
+    found, told = {}, set()
     for point in dict.fromkeys(used):
         for xyz, file, row in known.get(point, ()):
             before = found.setdefault(point, (xyz, file, row))
             pairs = [(a, b) for a, b in zip(before[0], xyz, strict=True) if None not in (a, b)]
-            if any(abs(a - b) > SAME_M for a, b in pairs):
+            if any(abs(a - b) > SAME_M for a, b in pairs) and (point, xyz) not in told:
+                told.add((point, xyz))
                 text = message(
                     "imported_known_twice",
                     "point {point!r} has other coordinates than in row {row} of {file}; expected"

@@ -42,7 +42,7 @@ class _State:
     station = back = height = rod = None
     azimuth = circle = None  # of the backsight
     key = None  # of the set-up
-    is_told = False  # has there been a record OC or LS?
+    is_told = False  # has there been a record OC?
     date = None  # of the last note that has one
     follows_shot = False  # is a time that stands here that of the last reading?
     kind = None  # of horizontal angle in this set-up: "turned" or "azimuth"
@@ -76,7 +76,6 @@ def _take(book, log, row, line, state):
         state.back = fields.get("BP")
         state.azimuth, state.circle = (_angle(fields.get(one), state) for one in ("BS", "BC"))
     elif kind == "LS":
-        state.is_told = True
         if "HI" in fields:
             state.height = _length(book, log, row, fields["HI"], state)
         if "HR" in fields:

@@ -23,7 +23,10 @@ HEADER = re.compile(r"00..SDR(33|2)", re.IGNORECASE)
 ANGLES, LENGTHS = {"1": "deg", "2": "gon", "4": "mil"}, {"1": "m", "2": "ft"}
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _STAMP = re.compile(r"(\d\d?)-([A-Za-z]{3})-(\d\d(?:\d\d)?)\s+(\d\d?):(\d\d)(?::(\d\d))?")
-_CONSTANT = re.compile(r"P\.?C\.?\s*mm[^:]*:\s*([+-]?[0-9.]+)", re.IGNORECASE)
+_CONSTANT = re.compile(r"(?:P\.?C\.?\s*mm[^:]*|\bPrism):\s*([+-]?[0-9.]+)", re.IGNORECASE)
+# What the mount and the vertical circle are, before the three constants at the end of record 01.
+# Not by its column: names of 17 characters are written where 16 have room.
+_FLAGS = re.compile(r"\d([12])(?:\s+[+-]?\d*\.\d*)*\s*$")
 OTHERS = ("04", "05", "10", "12")  # collimation, atmosphere, job: said by other records
 
 
@@ -46,6 +49,8 @@ def read(text, file, log):
         if not line.strip() or line.strip("\x03").isspace():
             continue
         kind, way = line[:2], line[2:4]
+        if line.strip("\x03 ") == "0000":  # ends a file
+            continue
         if kind == "00":
             _take_header(book, log, row, line, state)
         elif state.length is None:
@@ -99,7 +104,8 @@ def _take(book, log, row, line, state):
 
 
 def _take_instrument(book, _log, _row, line, state):
-    state.from_zenith = line[50:51] != "2"
+    flags = _FLAGS.search(line[5:][-80:])
+    state.from_zenith = flags is None or flags[1] == "1"
     book.instrument = " ".join(line[5:21].split())
 
 

@@ -140,7 +140,13 @@ def warn_of(chosen, names, stands, reports):
     found = []
     for place, name in names.items():
         stand, file = stands[place]
-        if not stand.is_told:
+        if not stand.is_told and stand.height_m is not None:
+            text = message("station_of_readings", "set-up {setup}: no record of a station in the"
+                           " file, only the height of the instrument: its point is named by the"
+                           " readings or not at all, and a second stand that the file does not"
+                           " name would not show; look at setups.csv", setup=name)  # fmt: skip
+            found.append(Problem(file, text, stand.row))
+        elif not stand.is_told:
             text = message("no_station", "set-up {setup}: no station in the file, so its point and"
                            " the height of the instrument are unknown: fill them into setups.csv"
                            " before you run the job", setup=name)  # fmt: skip

@@ -58,13 +58,17 @@ def shown(value):
     return _printable(f"'{clipped}'" if isinstance(value, str) else clipped)
 
 
-def nearest(word, known):
-    """' (did you mean x?)' when one of the known words is close to `word`, else ''."""
+def meant(word, known):
+    """The known word that is close to `word`, or None."""
     spelt = {one.lower(): one for one in known}
     close = difflib.get_close_matches(str(word)[:80].lower(), [*spelt], n=1, cutoff=0.6)
-    return (
-        message("did_you_mean", " (did you mean {spelt}?)", spelt=spelt[close[0]]) if close else ""
-    )
+    return spelt[close[0]] if close else None
+
+
+def nearest(word, known):
+    """' (did you mean x?)' when one of the known words is close to `word`, else ''."""
+    found = meant(word, known)
+    return message("did_you_mean", " (did you mean {spelt}?)", spelt=found) if found else ""
 
 
 def _printable(text):

@@ -31,7 +31,16 @@ from tankcal.job.folder import (
 from tankcal.job.folder import read_register as read_register_file
 from tankcal.job.measuring import make_measurements
 from tankcal.job.rule_files import find_rule
-from tankcal.job.tables import REGISTERS, Log, RawJob, Value, fingerprint, nearest, read_bytes
+from tankcal.job.tables import (
+    REGISTERS,
+    Log,
+    RawJob,
+    Value,
+    fingerprint,
+    meant,
+    nearest,
+    read_bytes,
+)
 from tankcal.job.tables import TABLES as JOB_FILES
 from tankcal.messages import message
 from tankcal.planning.assembly import assemble_plan, limits_of
@@ -151,8 +160,8 @@ def _read(folder, log):
     parsed = None if data is None else parsed_toml(PLAN_FILE, data, log)
     log.stop_if_problems()
     text, (whole, rows) = decode(PLAN_FILE, data, log), parsed
+    rows, text = _refuse_misspelt(whole, rows, text, log)
     own = {name: whole.pop(name) for name in (*SINGLE, *REPEATED) if name in whole}
-    _refuse_misspelt(whole, rows, text, log)
     _refuse_nothing_measured(own, log)
     settings, sections = flattened(PLAN_FILE, whole, rows, log)
     needed = () if is_wall_plan(own) else ("pattern",)
@@ -191,18 +200,34 @@ def _read(folder, log):
 
 
 def _refuse_misspelt(whole, rows, text, log):
-    """A problem for each section whose name is like one of a plan; it is taken out of `whole`."""
+    """A problem for each section whose name is like one of a plan; (rows, text) as it was meant.
+
+    It is read on under the name that was meant, so that nothing is told of a section that is
+    missing; twice the same, or in brackets of another kind, it is taken out of `whole`.
+    """
     of_jobs = {name.partition(".")[0] for name in KEYS}
-    for name in [one for one in whole if one not in of_jobs]:
+    known = (*of_jobs, *SINGLE, *REPEATED)
+    for name in [one for one in whole if one not in known]:
         entries = whole[name] if isinstance(whole[name], list) else [whole[name]]
-        known = (*of_jobs, *SINGLE, *REPEATED)
-        if not nearest(name, known) or not all(isinstance(one, dict) for one in entries):
+        right = meant(name, known)
+        if right is None or not all(isinstance(one, dict) for one in entries):
             continue
         places = _rows_of(re.escape(name), text)
         row = places[0][0] if places else rows.get(name)
-        column = f"[[{name}]]" if isinstance(whole[name], list) else f"[{name}]"
+        is_list = isinstance(whole[name], list)
+        column = f"[[{name}]]" if is_list else f"[{name}]"
         log.problem(PLAN_FILE, unknown_section(name, known), row, column)
-        del whole[name]
+        entries = whole.pop(name)
+        if right not in whole and is_list == (right in REPEATED):
+            whole[right] = entries
+            rows = rows | {
+                right + key[len(name) :]: row
+                for key, row in rows.items()
+                if key == name or key.startswith(f"{name}.")
+            }
+            pattern = rf"(?m)^(\s*\[+\s*){re.escape(name)}(\s*\]+)"
+            text = re.sub(pattern, lambda found, right=right: found[1] + right + found[2], text)
+    return rows, text
 
 
 def _refuse_nothing_measured(own, log):

@@ -21,6 +21,9 @@ FORMS = (  # tables of each, read in one go, and the rows that a sheet has room 
     (("thickness",), 8),
     (("tape_checks",), 4),
 )
+ROWS_BESIDE = {("tangents", "directions"): 20}  # where another form stands on the same page
+HEIGHTS_OF = ("tangents", "wall-hits")  # surveys whose stations are told from the bottom
+ROWS_OF_HEIGHTS = 4
 IN_THE_OFFICE = ("use", "s_mm", "s_arcsec", "note")  # columns that nobody fills in on site
 UNIT_OF_CIRCLE = "_deg"  # of three columns of one angle the one that stands for all
 UNITS_OF_CIRCLES = "gon / ° / ° ′ ″"  # as the circle shows it: the others are struck out
@@ -76,9 +79,26 @@ def sheets(survey, language):
         titles = [texts.words["input"]["titles"][name] for name in names]
         found += [
             blocks.heading("; ".join(titles)),
-            blocks.form([_column(texts, field) for field in _columns(names)], rows),
-        ]
+            blocks.form([_column(texts, field) for field in _columns(names)],
+                        ROWS_BESIDE.get((survey, names[0]), rows)),
+        ]  # fmt: skip
+        if names == ("setups",) and survey in HEIGHTS_OF:
+            found += _heights(paper, texts)
     return [*found, blocks.signature([paper.word("forms.signed")])]
+
+
+def _heights(paper, texts):
+    """A form for the height of stations above the bottom: it becomes z_m of control.csv."""
+    columns = [
+        (texts.words["input"]["labels"]["station"], "", WIDE["name"]),
+        (paper.word("forms.height"), "m", WIDE["name"]),
+        (paper.word("forms.how_found"), "", WIDE["text"]),
+    ]
+    return [
+        blocks.heading(paper.word("forms.heights")),
+        blocks.paragraph(paper.word("forms.heights_become")),
+        blocks.form(columns, ROWS_OF_HEIGHTS),
+    ]
 
 
 def _code(survey):

@@ -50,7 +50,51 @@ def test_gsi8_in_gon_with_millimetres(tmp_path):
         ["EST1", "180.000", "81.000", "6.600"],
     ]
     assert list(tables["control"][0].values()) == ["EST1", "1.000", "2.000", "-0.500"]
-    assert {"gsi_code_blocks", "ppm_in_distances"} <= codes(found.summary)
+    assert {"gsi_codes_not_used", "ppm_in_distances"} <= codes(found.summary)
+
+
+CODED = (
+    "410001+00000021 42....+0000EST1 43....+00001500 \n"
+    "110002+00000101 21.322+10000000 22.322+10000000 31..00+00006500 \n"
+    "410003+WALL     42....+00000000 43....+00000000 \n"
+    "110004+00000102 21.322+20000000 22.322+09000000 31..00+00006600 71....+---?---- \n"
+    "410005+00000021 42....+0000EST2 43....+00001700 \n"
+    "110006+00000103 21.322+20000000 22.322+09000000 31..00+00006600 41....+0000WALL \n"
+)
+
+
+@pytest.mark.parametrize(("choices", "hits"), [
+    ({"codes": "before"}, [("EST1", "180.000"), ("EST2", "180.000")]),
+    ({"codes": "after"}, [("EST1", "90.000"), ("EST2", "180.000")]),
+    ({}, [("EST2", "180.000")]),
+])  # fmt: skip
+def test_code_blocks_of_gsi_mean_what_the_surveyor_says(tmp_path, choices, hits):
+    found, tables = read(tmp_path, CODED, station_code="21", **choices)
+    assert [(one["setup"], one["direction_deg"]) for one in tables["wall_hits"]] == hits
+    assert [one["instrument_height_m"] for one in tables["setups"]][-1] == "1.700"
+    assert ("gsi_codes_not_used" in codes(found.summary)) == (not choices)
+
+
+def test_a_station_of_a_code_block_has_a_name_and_digits_for_its_height(tmp_path):
+    text = CODED.replace("42....+0000EST1", "42....+00000000").replace("+00001700", "+000017,0")
+    with pytest.raises(InputError) as told:
+        read(tmp_path, text, station_code="21")
+    assert [(one.expected.code, one.row) for one in told.value.problems] == [
+        ("gsi_station_name", 1), ("no_plain_number", 5)
+    ]  # fmt: skip
+
+
+def test_several_blocks_of_gsi_on_one_line(tmp_path):
+    """As a file came whose ends of lines were lost; more than a line of other formats may have."""
+    lines = CODED.splitlines()
+    wanted = read(tmp_path, CODED, station_code="21")[1]
+    assert read(tmp_path, "".join(lines), station_code="21")[1] == wanted
+    wide = "".join(
+        f"*11{n:04d}+{n:016d} 21.322+{n * 100000:016d} 22.322+{10000000:016d} 31..00+{6500:016d} "
+        for n in range(1, 101)
+    )
+    assert len(wide) > 4000
+    assert len(read(tmp_path, wide, hits=("*",))[1]["wall_hits"]) == 100
 
 
 def test_gsi_sexagesimal_and_face_2(tmp_path):
@@ -234,6 +278,22 @@ def test_sdr33_as_published(tmp_path):
     assert {"computed_points", "import_applied"} <= codes(found.summary)
 
 
+@pytest.mark.parametrize(("zero", "zenith"), [("1", "90.000"), ("2", "0.000")])
+def test_sdr33_of_spectra_precision(tmp_path, zero, zenith):
+    """A name of 17 characters moves what follows it; the last record is 0000 (shapes as seen)."""
+    text = (
+        "\n00NMSDR33V04-01     000027-Sep-18 14:20:113121\n"
+        f'01KI1Nikon FOCUS 6W 5"900722Nikon FOCUS 6W 5"9007221{zero}     0.000     0.000\n'
+        "13NMTemp:20C Press:1013hPa Prism:-30 02-Aug-2018 14:18:36\n"
+        "02KI               A4.773           -2.422          0.044           0.000           \n"
+        "09F1               A               16.730           90.00000000     10.00000000     WALL\n"
+        "0000\n"
+    )
+    found, tables = read(tmp_path, text)
+    assert [one["zenith_deg"] for one in tables["wall_hits"]] == [zenith]
+    assert "-30 mm" in found.summary[1]
+
+
 def test_means_beside_faces_are_left_out_of_sdr(tmp_path):
     head = "00NMSDR33V04-01     000014-Jul-26 08:55 111111\n" + f"02TP{'A':>16}" + "0.0".ljust(
         16) * 4 + "\n"  # fmt: skip
@@ -277,10 +337,9 @@ def test_a_file_without_a_station_says_what_to_fill_in(tmp_path, name, left_out)
     found, tables = read(tmp_path, text)
     assert codes(found.warnings) == {"no_station"}
     assert [one["setup"] for one in tables["setups"]] == ["1"]
-    text = "".join(line for line in lines if not line.startswith("LS"))
-    assert codes(read(tmp_path, text)[0].warnings) == (
-        {"no_instrument_height"} if name == "rw5" else set()
-    )
+    for start, wanted in (("LS", {"no_instrument_height"}), ("OC", {"station_of_readings"})):
+        text = "".join(line for line in lines if not line.startswith(start))
+        assert codes(read(tmp_path, text)[0].warnings) == (wanted if name == "rw5" else set())
 
 
 def test_a_missing_station_of_jobxml_is_one_problem(tmp_path):

@@ -125,6 +125,18 @@ def test_round_numbers_are_no_cut_ones(tmp_path):
     assert told(path, tmp_path / "csv", profile=profile) is None
 
 
+@pytest.mark.parametrize(("many", "refused"), [(1, 1), (2, 2), (10, 2), (11, 0), (40, 0)])
+def test_two_ways_of_writing_are_no_cut_numbers(tmp_path, many, refused):
+    """So many of 104 distances have 1 decimal: from a tenth of them on it is a way of writing."""
+    text, count = re.subn(r"SD(\d+[.]\d)\d+", r"SD\1", WRITERS["rw5"](one_stand()), count=many)
+    assert count == many
+    path = tmp_path / "book.rw5"
+    path.write_text(text, encoding="utf-8")
+    found = told(path, tmp_path / "out") or []
+    assert {one.expected.code for one in found} <= {"cut_short", "more_problems"}
+    assert min(len(found), 2) == refused
+
+
 def test_a_table_without_a_profile(tmp_path):
     text = WRITERS["csv"](one_stand())
     assert problems_of(tmp_path, text) == [("format_unknown", None)]

@@ -35,9 +35,11 @@ from tankcal.planning.wall.foreseen_tables import tangent_sight
 from tankcal.planning.wall.model import PlannedStrap, even_radius_m, evenness_of_limbs
 from tankcal.planning.wall.nominal_readings import with_nominal_readings
 from tankcal.planning.wall.prediction import foresee_table
-from tankcal.planning.wall.reading import changed
+from tankcal.planning.wall.reading import changed, tables_of
 from tankcal.record.wall_plan import WALL_PLAN, plain_of_wall
 from tankcal.report.planning import wall_files
+from tankcal.report.planning.wall_files import form_of_wall
+from tankcal.report.planning.wall_rows import field_tables_of_wall
 
 LINES, HITS, TANGENTS = (
     EXAMPLE.parent / f"plan-{name}" for name in ("reference-line", "wall-hits", "tangents")
@@ -96,6 +98,11 @@ def fill(folder, job, settings):
             {"direction_deg": np.degrees(a), "zenith_deg": np.degrees(z), "distance_m": d}
             for a, z, d in rows
         ]
+    if job.hits is not None:
+        values["control_readings"] = [
+            {"direction_deg": np.degrees(one.direction_rad), "time": f"2026-07-01T09:{k:02d}"}
+            for k, one in enumerate(job.hits.control)
+        ]
     for name, read in values.items():
         path = folder / f"{name}.csv"
         lines = [one for one in path.read_text(encoding="utf-8").splitlines() if one[0] != "#"]
@@ -103,7 +110,7 @@ def fill(folder, job, settings):
         assert len(rows) == len(read)
         for row, one in zip(rows, read, strict=True):
             for key, value in one.items():
-                row[headings.index(key)] = repr(float(value))
+                row[headings.index(key)] = value if key == "time" else repr(float(value))
         with open(path, "w", newline="", encoding="utf-8") as file:
             csv.writer(file).writerows([headings, *rows])
 
@@ -449,6 +456,7 @@ def test_bad_input_is_one_line_each(tmp_path, name, capsys):
         assert place in {(one.file, one.column) for one in error.value.problems}
 
 
+CONTROL = "[control_targets]\nevery_min = 45\n[limits]"
 TOLD = [  # of a plan, what is changed in it, the whole line in the column
     (HITS, "hits = 20 ", "hits = 2 ", "hits[1].hits: found 2; expected 3 or more"),
     (HITS, "hits = 20 ", "hits = 400 ", "hits: 4000 hits; expected at most 2500"),
@@ -459,6 +467,8 @@ TOLD = [  # of a plan, what is changed in it, the whole line in the column
     (LINES, "count = 12", "count = 1", "plan.toml, row"),
     (LINES, "[[straps]]", "[[strap]]", "[[strap]]: unknown section (did you mean straps?)"),
     (HITS, "hits = 20 ", "spread_deg = 0\nhits = 20 ", "found 0; expected a number above 0"),
+    (LINES, "[limits]", CONTROL, "control_targets: given without [[hits]]; expected set-ups of"),
+    (HITS, "[limits]", CONTROL.replace("45", "0"), "found 0; expected a number from 5 to 240"),
 ]
 
 
@@ -472,12 +482,66 @@ def test_what_is_told_names_the_key_and_what_it_may_be(tmp_path, source, old, ne
 
 
 def test_a_plan_without_any_section_is_told_of_all_kinds(tmp_path):
-    names = ("[[straps]]", "[[strap]]"), ("[lines]", "[line]")
+    folder = plan_of(tmp_path / "plan", LINES)
+    text = (folder / "plan.toml").read_text(encoding="utf-8")
+    for section in ("[[straps]]", "[lines]"):
+        start = text.index(section)
+        text = text[:start] + text[text.index("\n[", start) + 1 :]
+    while "[[straps]]" in text:
+        start = text.index("[[straps]]")
+        text = text[:start] + text[text.index("\n[", start) + 1 :]
+    (folder / "plan.toml").write_text(text, encoding="utf-8")
     with pytest.raises(InputError) as error:
-        load_plan(plan_of(tmp_path / "plan", LINES, *names))
-    nothing, *misspelt = sorted(lines(error.value.problems), key=len, reverse=True)
+        load_plan(folder)
+    (nothing,) = lines(error.value.problems)
     assert nothing.startswith("plan.toml: nothing is measured; expected a [pattern] of targets, or")
-    assert {one.partition("mean ")[2] for one in misspelt} == {"straps?)", "lines?)"}
+
+
+MISSPELT = [  # of a plan, sections, how they are spelt
+    (LINES, {"[[straps]]": "[[strap]]", "[lines]": "[line]"}),
+    (HITS, {"[[hits]]": "[[hit]]", "[limits]": "[limit]", "[datum]": "[dattum]"}),
+    (TANGENTS, {"[tangents]": "[tangent]", "[traverse]": "[travers]", "[costs]": "[cost]"}),
+]
+
+
+@pytest.mark.parametrize(("source", "names"), MISSPELT)
+def test_a_misspelt_section_is_told_once_and_read_as_it_was_meant(tmp_path, source, names):
+    """What is wrong within it is told in the same run, in its row."""
+    folder = plan_of(tmp_path / "plan", source, *names.items())
+    with pytest.raises(InputError) as error:
+        load_plan(folder)
+    assert len(error.value.problems) == len(names)
+    assert {one.partition("mean ")[2] for one in lines(error.value.problems)} == {
+        f"{name.strip('[]')}?)" for name in names
+    }
+    path = folder / "plan.toml"
+    text = path.read_text(encoding="utf-8").replace("at_percent = [20, 80]", "at_percent = [200]")
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        load_plan(folder)
+    rows = {one.row for one in error.value.problems if "at_percent" in (one.column or "")}
+    wanted = [n for n, line in enumerate(text.splitlines(), 1) if line == "at_percent = [200]"]
+    assert rows == set(wanted)
+
+
+@pytest.mark.parametrize(("more", "times"), [
+    ("", [0, 17, 34]),
+    ("[control_targets]\ntargets = 3\nevery_min = 15\nminutes = 40\n", [0, 13, 26, 40]),
+])  # fmt: skip
+def test_control_targets_are_read_at_the_start_again_and_at_the_end(tmp_path, more, times):
+    """Closed form: 200 hits of 10 s are 34 minutes; no two rounds are further apart than asked."""
+    folder = plan_of(tmp_path / "plan", HITS, ("[limits]", more + "[limits]"))
+    plan = load_plan(folder)
+    table = tables_of(plan)["control_readings"]
+    at = {column: [row[k] for row in table.rows] for k, column in enumerate(table.headings)}
+    targets = 3 if more else 2
+    assert len(set(at["target"])) == targets
+    assert [60 * int(one[11:13]) + int(one[14:16]) for one in at["time"][::targets]] == times
+    assert len(plan.job.hits.control) == targets * len(times)
+    (rows, _) = field_tables_of_wall(plan)["control_targets"]
+    assert [one["after_min"] for one in rows[::targets]] == times
+    (empty,) = (form_of_wall(plan).given[name] for name in ("control_readings",))
+    assert {one["time"] for one in empty} == {one["distance_m"] for one in empty} == {""}
 
 
 def test_three_hits_at_two_heights_are_enough(tmp_path):

@@ -31,7 +31,9 @@ def test_every_table_of_readings_has_a_sheet(survey, language):
     titles = [one["text"] for one in found if one["kind"] == "heading"]
     words = texts_in(language).words["input"]
     tables = [table for table in SURVEYS[survey] if table not in OF_THE_OFFICE]
-    told = "; ".join(titles).split("; ")
+    of_heights = texts_in(language).words["forms"]["heights"]
+    assert (of_heights in titles) == (survey in ("tangents", "wall-hits"))
+    told = "; ".join(one for one in titles if one != of_heights).split("; ")
     assert sorted(told) == sorted(words["titles"][table] for table in tables)
     forms = [one for one in found if one["kind"] == "form"]
     assert len(forms) == len(titles)

@@ -80,6 +80,11 @@ TIES = (
     count("targets", message("plan_note_ties", "that neighbours share"), True, 20),
     *(one for one in RANGING if one.name in ("s_mm", "s_arcsec")),
 )
+CONTROL_TARGETS = (
+    count("targets", "of each set-up; blank: 2", high=20),
+    number("every_min", "minutes between their readings at most; blank: 20", 5, 240),
+    number("minutes", "that the hits of a set-up take; blank: 10 seconds each", 1, 1440),
+)
 TANGENTS = (
     count(
         "stations",
@@ -136,6 +141,7 @@ WALL = (
 SINGLE = {
     "lines": LINES,
     "setup_ties": TIES,
+    "control_targets": CONTROL_TARGETS,
     "tangents": TANGENTS,
     "traverse": TRAVERSE,
     "wall": WALL,

@@ -3,6 +3,7 @@
 What is read does not stand in them as a nominal tank would have it: `nominal_readings` says that.
 """
 
+import datetime
 from itertools import islice
 
 import numpy as np
@@ -15,6 +16,8 @@ from tankcal.job.tables import Table
 
 STEEPEST = np.radians(55.0)  # incidence in plan, of a set-up that says nothing of what it sees
 TIE_HEIGHTS_M = (0.4, 1.4, 2.4)  # above the instrument's foot: of targets that set-ups share
+FIRST_ROUND = datetime.datetime(2000, 1, 1)  # of control targets: only what lies between counts
+CONTROL_SIGHT = {"zenith_deg": 88.0, "distance_m": 10.0}
 
 
 class Foreseen:
@@ -44,6 +47,7 @@ class Foreseen:
             found["wall_hits"] = self._hits(), MOST_HITS
             found["setups"] = self._setups(), MOST_HITS
             found["control"] = self._stations(), MOST_HITS
+            found["control_readings"] = self._control_readings(), MOST_HITS
             if self.design.ties is not None:
                 found |= {name: (rows, MOST_HITS) for name, rows in self._ties().items()}
         if self.design.tangents is not None:
@@ -139,6 +143,17 @@ class Foreseen:
                     for aim in aims:
                         there = [self.radius_m * np.sin(aim), self.radius_m * np.cos(aim), z]
                         yield {"setup": name, "course": course} | _sight(station, there)
+
+    def _control_readings(self):
+        """All control targets of a set-up, round by round; where they stand the crew will see."""
+        control = self.design.control
+        for ring, name, turn in self._rings():
+            for minutes in control.times_min(ring):
+                time = (FIRST_ROUND + datetime.timedelta(minutes=float(minutes))).isoformat()
+                for number in range(control.targets):
+                    aim = np.degrees(turn) + 360 * number / control.targets
+                    target = {"setup": name, "target": f"K{name}-{number + 1}"}
+                    yield target | CONTROL_SIGHT | {"direction_deg": aim % 360, "time": time[:16]}
 
     def _azimuths(self, ring, turn):
         """(hits,) about the axis: even over the whole turn, or over what a set-up sees of it."""

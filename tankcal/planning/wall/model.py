@@ -12,6 +12,7 @@ from tankcal.job.tables import RawJob, Value
 from tankcal.planning.model import Limits
 
 USUAL_AT = (20.0, 80.0)  # percent of a course's height: where its rows are read
+SECONDS_PER_HIT = 10.0  # aim, range and store
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,25 @@ class PlannedHits:
 
 
 @dataclass(frozen=True)
+class PlannedControl:
+    """Targets that each set-up of hits reads at its start, again and again, and at its end.
+
+    every_min  minutes between two readings of a target, at most
+    minutes    that the hits of a set-up take; None: SECONDS_PER_HIT each
+    """
+
+    targets: int = 2
+    every_min: float = 20.0
+    minutes: float | None = None
+
+    def times_min(self, ring):
+        """(rounds,) minutes after the first hit when a set-up of a `PlannedHits` reads them."""
+        hits = ring.hits * len(ring.at_percent) * len(ring.courses)
+        minutes = self.minutes or np.ceil(hits * SECONDS_PER_HIT / 60)
+        return np.linspace(0.0, minutes, int(np.ceil(minutes / self.every_min)) + 1)
+
+
+@dataclass(frozen=True)
 class PlannedTangents:
     """A traverse round the tank, from whose stations both limbs are sighted at the same parts of
     each course.
@@ -119,7 +139,8 @@ def even_radius_m(stations, radius_m, nominal_m, least_m):
 class Design:
     """What will be measured.
 
-    ties  (targets that neighbouring set-ups share, s_mm, s_arcsec); None: the wall alone ties them
+    ties     (targets that neighbouring set-ups share, s_mm, s_arcsec); None: the wall alone ties
+    control  targets that show whether a set-up moved
     """
 
     straps: tuple[PlannedStrap, ...] = ()
@@ -127,6 +148,7 @@ class Design:
     hits: tuple[PlannedHits, ...] = ()
     ties: tuple | None = None
     tangents: PlannedTangents | None = None
+    control: PlannedControl = PlannedControl()
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from tankcal.planning.wall.foreseen_tables import Foreseen
 from tankcal.planning.wall.model import (
     USUAL_AT,
     Design,
+    PlannedControl,
     PlannedHits,
     PlannedLines,
     PlannedStrap,
@@ -37,6 +38,7 @@ CLEAR_M, MOST_SECTIONS = 0.5, 50
 LIMBS = ("left", "right")
 UNEVEN = 0.15  # of limbs: nearer to each other than that, they are the same place, about
 USUAL_HEIGHT_M = 1.6  # of an instrument above the bottom
+SELDOM_MIN = 30.0  # between readings of control targets
 FEWEST_AZIMUTHS = 3  # that a circle goes through
 OF_POINTS = ("pattern", "photo_rings", "setup_rings", "tapes", "obstacles")
 
@@ -145,11 +147,31 @@ def _check_lines_and_ties(given, log):
     if ties.filled and not given.repeated["hits"]:
         expected = message("plan_ties_alone", "given without [[hits]]; expected set-ups to be tied")
         log.problem(PLAN_FILE, expected, ties.row, "setup_ties")
+    _check_control(given, log)
     if ties.filled:
         for key in ("s_mm", "s_arcsec"):
             if key not in ties.filled:
                 expected = message("plan_number_missing", "missing; expected a number above 0")
                 ties.tell(log.problem, key, expected)
+
+
+def _check_control(given, log):
+    control = given.single["control_targets"]
+    if control.filled and not given.repeated["hits"]:
+        expected = message(
+            "plan_control_alone",
+            "given without [[hits]]; expected set-ups of hits that read control targets",
+        )
+        log.problem(PLAN_FILE, expected, control.row, "control_targets")
+    elif control["every_min"] is not None and control["every_min"] > SELDOM_MIN:
+        expected = message(
+            "plan_control_seldom",
+            "control targets every {every:g} minutes; expected 15 to {most:g}: a tripod that sinks"
+            " in between is seen late",
+            every=control["every_min"],
+            most=SELDOM_MIN,
+        )
+        control.tell(log.warning, "every_min", expected)
 
 
 def _check_tangents(given, nominal_m, log):
@@ -254,6 +276,7 @@ def design_of(given, courses):
         lines=_lines(given.single["lines"]),
         hits=tuple(_hits(one, courses) for one in given.repeated["hits"]),
         ties=_ties(given.single["setup_ties"]),
+        control=_control(given.single["control_targets"]),
         tangents=_tangents(given.single["tangents"], given.single["traverse"]),
     )
 
@@ -300,6 +323,14 @@ def _ties(entry):
     if not entry.filled:
         return None
     return int(entry["targets"]), entry["s_mm"], entry["s_arcsec"]
+
+
+def _control(entry):
+    given = {"targets": entry["targets"], "every_min": entry["every_min"]}
+    given = {key: value for key, value in given.items() if value is not None}
+    if "targets" in given:
+        given["targets"] = int(given["targets"])
+    return PlannedControl(**given, minutes=entry["minutes"])
 
 
 def _tangents(entry, traverse):

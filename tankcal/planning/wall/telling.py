@@ -12,6 +12,7 @@ MADE = {  # tables that a design makes, and the section that they are told of
     "wall_hits.csv": "hits",
     "setups.csv": "hits",
     "control.csv": "hits",
+    "control_readings.csv": "control_targets",
     "directions.csv": "setup_ties",
     "zenith_angles.csv": "setup_ties",
     "slope_distances.csv": "setup_ties",

@@ -9,7 +9,7 @@ from tankcal.report.planning.files import write_capacity, write_effects
 from tankcal.text.languages import DEFAULT
 
 GIVEN = (*AS_GIVEN, "obstructions", "thickness", "tape_checks")
-READ = ("reading_m", "offset_mm", "direction_deg", "zenith_deg", "distance_m")  # left blank
+READ = ("reading_m", "offset_mm", "direction_deg", "zenith_deg", "distance_m", "time")  # left blank
 
 
 def write_wall(paper, folder, fingerprints):

@@ -86,6 +86,7 @@ def wall_sheets(paper):
         "circumferences": "circumferences",
         "sight_lines": "offsets",
         "hit_setups": "hits",
+        "control_targets": "control_targets",
         "tangent_stations": "tangents",
     }
     found = [*paper.head("field_sheets"), paper.facts(_counts(paper))]

@@ -1,8 +1,11 @@
 """What a crew will read of a wall, row by row: straps, lines, offsets, hits, set-ups, tangents."""
 
+import datetime
+
 import numpy as np
 
 from tankcal.planning.wall.nominal_readings import place_stations
+from tankcal.planning.wall.reading import tables_of
 from tankcal.report.plain import Column
 
 HEIGHT = Column("height_m", "m", decimals=3)
@@ -11,6 +14,7 @@ IN_COURSE = Column("height_in_course_m", "m", decimals=3)
 COURSE, COUNT = Column("course"), Column("readings", decimals=0)
 AZIMUTH = Column("azimuth_rad", "rad deg", decimals=1)
 INSTRUMENT, AS_READ = Column("instrument"), Column("value", nothing="_" * 14, words="marks")
+BY_PEN = {"nothing": "_" * 11, "words": "marks"}  # filled in on site
 SD = Column("sd_m", "mm", decimals=2)
 SD_ARCSEC = Column("sd_rad", "rad arcsec", decimals=1, heading="sd_m")
 STRAPS = (
@@ -24,12 +28,15 @@ SETUPS = (
 )  # fmt: skip
 HITS = (COURSE, IN_COURSE, HEIGHT, Column("setups", decimals=0), Column("hits", decimals=0))
 TIES = (Column("point"), Column("setup"))
+CONTROL = (
+    Column("setup"), Column("point"), Column("after_min", decimals=0), Column("time", **BY_PEN),
+    Column("direction", **BY_PEN), Column("zenith", **BY_PEN), Column("distance", **BY_PEN),
+)  # fmt: skip
 STANDS = (
     *SETUPS[:-1],
     Column("expected_m", "m", decimals=2, heading="from_neighbours"),
     INSTRUMENT,
 )
-BY_PEN = {"nothing": "_" * 11, "words": "marks"}  # filled in on site
 TRAVERSE = (
     Column("setup"), Column("to"), Column("expected_m", "m", decimals=2),
     Column("direction", **BY_PEN), Column("zenith", **BY_PEN), Column("distance", **BY_PEN),
@@ -55,6 +62,7 @@ def field_tables_of_wall(plan):
         "hit_setups": (_setups(plan), SETUPS),
         "hit_levels": (_hits(plan), HITS),
         "shared_targets": (_ties(plan), TIES),
+        "control_targets": (_control(plan), CONTROL),
         "tangent_stations": (_stands(plan), STANDS),
         "traverse": (_traverse(plan), TRAVERSE),
         "tangents": (_tangents(plan), TANGENTS),
@@ -151,6 +159,20 @@ def _hits(plan):
                     }
                 )
         foot += course.height_m
+    return rows
+
+
+def _control(plan):
+    """Each reading of a control target, and when it is due after the first."""
+    table = tables_of(plan).get("control_readings")
+    rows, first = [], {}
+    for cells in () if table is None else table.rows:
+        row = dict(zip(table.headings, cells, strict=True))
+        time = datetime.datetime.fromisoformat(row["time"])
+        since = time - first.setdefault(row["setup"], time)
+        rows.append(
+            {"setup": row["setup"], "point": row["target"], "after_min": since.seconds / 60}
+        )
     return rows
 
 
