@@ -22,6 +22,7 @@ from tankcal.geometry.clutter import (
 )
 from tankcal.geometry.field.blunders import find_blunders
 from tankcal.geometry.field.sites import Sites
+from tankcal.geometry.seams import find_seams
 from tankcal.messages import message
 
 WIDE_BAND, WALL_BAND = 0.03, 0.01  # of the nominal radius: start, and largest believed deviation
@@ -30,6 +31,7 @@ SAMPLES = 1000  # three-point circles tried; with half the points clutter one in
 BELIEVED_M = 0.013  # from the smooth form: what departs less is left to the field to judge
 LEAST_PART = 0.5  # of the points between bottom and top that the wall must hold
 WIDEST_SLOPE = 0.05  # sd of the slope before anything is measured: tanks hardly lean by more
+NEAR_M = 0.3  # from the wall: what stands there may be told by its side alone
 VAGUE_TILT = 2e-3  # sd above which the tilt counts as not determined by the points
 
 
@@ -162,13 +164,16 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
         found = find_form(local, course, zeta, wall, upright, relative, 1e-9, least)
     in_band, axis = wall, found.axis
     w, residual, wall = found.w, found.residual, found.wall
-    wall = wall | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
     if snooping:
+        seams = _seams(
+            local, course, candidates, in_band, found, len(joints_m) - 1, nominal_radius_m
+        )
+        wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
         tested = _by_field(
             local, course, zeta, in_band, wall, axis, relative, nominal_radius_m, welds_rad
         )
         wall[in_band], w[in_band], residual[in_band] = tested.accepted, tested.w, tested.departure_m
-        wall = wall | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
+        wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
     reason[(reason == "") & ~wall] = "snooping"
     if wall.sum() < LEAST_PART * candidates.sum():
         raise SolutionError(
@@ -212,13 +217,38 @@ def _by_field(local, course, zeta, in_band, wall, axis, relative, nominal_radius
 def _buckles(local, in_band, axis, departure_m, wall, nominal_radius_m):
     """(n,) points that were rejected, but belong to a buckle of the wall."""
     tested, back = np.flatnonzero(in_band), np.zeros(len(local), dtype=bool)
-    offset, _ = distances_from_axis(local[tested], axis)
-    turn = np.arctan2(offset[:, 0], offset[:, 1])
-    for start in (0.0, np.pi):  # so that no patch is cut where the turn begins
-        arc = nominal_radius_m * ((turn + start) % (2 * np.pi))
-        place = np.column_stack([arc, local[tested, 2]])
+    for place in _unrolled(local[tested], axis, nominal_radius_m):
         back[tested] |= find_buckles(place, departure_m[tested], ~wall[tested])
     return back
+
+
+def _seams(local, course, candidates, in_band, form, courses, nominal_radius_m):
+    """(n,) points of the wall's band that belong to a seam, up the whole shell or up a course.
+
+    What stands further off is looked at as well: of a pipe the band may hold its sides alone.
+    """
+    distance, wall = distances_from_axis(local, form.axis)[1], form.wall
+    radii = _mean_radii(distance[wall], course[wall], courses, nominal_radius_m)
+    departure = np.where(in_band, form.residual, distance - radii[course])
+    near = np.flatnonzero(candidates & (np.abs(departure) < NEAR_M))
+    found = np.zeros(len(local), dtype=bool)
+    for place in _unrolled(local[near], form.axis, nominal_radius_m):
+        for band in (near >= 0, *np.equal.outer(np.unique(course[near]), course[near])):
+            own = near[band]
+            rejected = ~form.wall[own] & ~found[own]
+            found[own] |= find_seams(place[band], departure[own], rejected, form.noise)
+    return found & in_band
+
+
+def _unrolled(local, axis, nominal_radius_m):
+    """(n, 2) places along the arc and upwards, twice: a patch that one cuts in two, the other has
+    whole.
+    """
+    offset, _ = distances_from_axis(local, axis)
+    turn = np.arctan2(offset[:, 0], offset[:, 1])
+    for start in (0.0, np.pi):
+        arc = nominal_radius_m * ((turn + start) % (2 * np.pi))
+        yield np.column_stack([arc, local[:, 2]])
 
 
 def _within_course(z_m, course, joints_m):
