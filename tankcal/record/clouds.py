@@ -301,7 +301,12 @@ def _obstruction(one, result):
 
 
 def _zero_m(result):
-    """Height of the table's zero in the frame of the cells; of tanks without a bottom 0."""
+    """Height of the table's zero in the frame of the cells; of lying tanks 0, along the axis."""
+    kind, surface = result.job.tank.kind, result.clouded.cells.surface
+    if kind == "sphere":  # the lowest point of the inside
+        return surface.centre_m[2] - surface.radius_m
+    if kind != "vertical":
+        return 0.0
     return (result.job.datum.bottom_z_m or 0.0) + result.zero_m
 
 

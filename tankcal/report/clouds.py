@@ -11,7 +11,7 @@ from tankcal.report.tables import clouds as tables
 
 FULL_COLOUR = 98  # percentile of the departures, in size
 LEAST_LIMIT_MM = 0.5
-HIDDEN, EDGE = "#c9ced4", "#1b1b1b"
+HIDDEN, EDGE, WELD = "#c9ced4", "#1b1b1b", "#e08a00"
 
 
 def departures_mm(record):
@@ -47,7 +47,7 @@ def cloud_map(paper):
     """The wall unrolled: departures coloured, hidden cells hatched, what hides it outlined."""
     record = paper.record
     drawn = record["clouds"]["map"]
-    upright = record["job"]["tank"]["kind"] == "vertical"
+    lying = record["job"]["tank"]["kind"] == "horizontal"
     heights, turns = drawn["height_edges_m"], drawn["azimuth_edges_deg"]
     limit = limit_mm(record)
     figure = Drawing(figsize=(WIDTH, 3.0))
@@ -67,8 +67,7 @@ def cloud_map(paper):
     _obstructions(ax, record["clouds"]["obstructions"])
     _welds(ax, record)
     ax.set(xlim=(0, 360), xticks=range(0, 361, 45), ylim=(heights[0], heights[-1]))
-    ax.set_xlabel(paper.word("axes.azimuth" if upright else "axes.cloud_turn"))
-    lying = record["job"]["tank"]["kind"] == "horizontal"
+    ax.set_xlabel(paper.word("axes.cloud_turn" if lying else "axes.azimuth"))
     ax.set_ylabel(paper.word("axes.cloud_along" if lying else "axes.height"))
     bar = figure.colorbar(shown, ax=ax, pad=0.02, aspect=30, extend="both")
     bar.set_label(paper.word("axes.cloud_departure"))
@@ -94,8 +93,8 @@ def _welds(ax, record):
         course = ends.get(one["course"])
         if course:
             ax.vlines(
-                one["azimuth_deg"], course["bottom_m"] - zero, course["top_m"] - zero, color=EDGE,
-                linewidth=0.6, linestyle=(0, (4, 3)), zorder=3,
+                one["azimuth_deg"], course["bottom_m"] - zero, course["top_m"] - zero, color=WELD,
+                linewidth=0.9, linestyle=(0, (4, 3)), zorder=3,
             )  # fmt: skip
 
 
@@ -109,7 +108,7 @@ def facts(paper):
         "cloud_shared_u": part["shared_u_m3"],
     }
     chi2 = paper.number(clouds["registration_chi2"], decimals=1)
-    tied = f"{chi2} / {paper.number(dof, decimals=0)}" if dof else None
+    tied = f"{chi2} / {paper.number(dof, decimals=0)}" if clouds["targets"] else None
     return paper.facts(
         [(key, paper.number(value, "m3", u=value or None)) for key, value in told.items()]
         + [("cloud_registration", tied)]
