@@ -67,6 +67,7 @@ bench: $(VENV)/full ## time and memory of the main job, walls, tables of 1 mm ro
 	$(BIN)/python benchmarks/wall.py
 	$(BIN)/python benchmarks/clouds.py
 	$(BIN)/python benchmarks/cloud_cells.py
+	$(BIN)/python benchmarks/cloud_peers.py
 	$(BIN)/python benchmarks/planning.py $(ROUNDS)
 
 peer: $(VENV)/full ## the adjustment against C++ Ceres (needs libceres-dev)

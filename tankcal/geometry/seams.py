@@ -26,9 +26,9 @@ def find_seams(place_m, departure_m, rejected, noise_m):
     """Mark rejected points that are a narrow seam of the wall.
 
     Rejected points of one sign that hang together up the wall, 1.2 m at least, are a seam when they
-    are wider than 1.5 times their depth, and the strip has points of every depth: in its flank, from
-    0.15 to 0.6 of the depth, a quarter at least of what depths evenly taken would put there. That
-    part of the flank that the scatter of the wall hides is not asked for.
+    are wider than 1.5 times their depth, and the strip has points of every depth: in its flank,
+    from 0.15 to 0.6 of the depth, a quarter at least of what depths evenly taken would put there.
+    That part of the flank that the scatter of the wall hides is not asked for.
 
     Parameters
     ----------

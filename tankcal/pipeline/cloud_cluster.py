@@ -6,6 +6,7 @@ with any number of workers and any shares. This is the only module that knows of
 """
 
 import contextlib
+import ctypes
 import importlib.util
 import logging
 import os
@@ -15,6 +16,7 @@ import tempfile
 import time
 import uuid
 import warnings
+from functools import cache
 from urllib.parse import urlsplit
 
 import tankcal
@@ -26,12 +28,13 @@ from tankcal.messages import message
 from tankcal.pipeline.cloud_passes import JobPasses, Tally
 
 OPTION = "--cluster"
-PAYS = 60_000_000  # points from which local workers pay: docs/clouds.md has what was measured
+PAYS, FEWEST_CORES = 200_000_000, 4  # points and cores from which local workers pay: docs/clouds.md
 FEWEST_EACH, MOST_EACH = 1 << 20, 1 << 23  # points of a share
 SHARES_OF_WORKER = 6
 FAN = 8  # parts that are added at once
 WORKER_BYTES = 1 << 30  # of memory that a worker of this machine may take
 LENGTH, LONGEST_GREETING = struct.Struct("<Q"), 1 << 20  # bytes of the first message of a scheduler
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, KEPT_BYTES = -1, -3, 8 << 20  # of mallopt(3)
 CONNECT_S, ALONE_S, LOOK_S = 5, 30, 0.05  # to connect; without any worker; between looks
 
 
@@ -57,18 +60,22 @@ def open_passes(placing, reading, telling):
             )
         )
     with _quiet(), _client_of(workers) as client:
-        yield ClusterPasses(client, placing, telling, isinstance(workers, str))
+        yield ClusterPasses(client, placing, telling)
 
 
 def _workers_for(placing, cluster):
     """Number of local workers, 0: none; or an address."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    cores = _cores()
     if cluster == "auto":
-        if cores < 2 or importlib.util.find_spec("distributed") is None:
+        if cores < FEWEST_CORES or importlib.util.find_spec("distributed") is None:
             return 0
         points = sum(count_about(file.header) for file in placing.files)
         return cores if points >= PAYS else 0
     return {None: 0, "local": cores}.get(cluster, cluster)
+
+
+def _cores():
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
 @contextlib.contextmanager
@@ -114,7 +121,8 @@ def _client_of(workers):
             client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
         except Exception as error:  # whatever a port that is none of dask comes up with
             raise _no_answer(address, error) from error
-        _check_workers(client, workers)
+        with _failures_told():
+            _check_workers(client, workers)
         yield client
 
 
@@ -171,18 +179,20 @@ class ClusterPasses:
         Points in boxes that are left out, of the last pass.
     """
 
-    def __init__(self, client, placing, telling, is_elsewhere, points_each=None):
+    def __init__(self, client, placing, telling, points_each=None):
         self.client, self.placing, self.telling = client, placing, telling
-        self.is_elsewhere, self.points_each = is_elsewhere, points_each
+        self.points_each = points_each
         self.left_out = None
 
     def sample(self, most):
         """`PointSample` of at most so many points."""
-        return self._reduced(_sample_part, _add_samples, most)
+        with _failures_told():
+            return self._reduced(_sample_part, _add_samples, most)
 
     def cells(self, surface, grid, scans):
         """`WallCells` of all points."""
-        packed = self._reduced(_cells_part, _add_cells, surface, grid, scans)
+        with _failures_told():
+            packed = self._reduced(_cells_part, _add_cells, surface, grid, scans)
         cells = WallCells(surface, grid, scans)
         cells.add_packed(packed)
         return cells
@@ -198,10 +208,9 @@ class ClusterPasses:
             number, count = event[1]
             read[number] = count
 
-        placing = self.client.scatter(self.placing, broadcast=True, hash=False)
         level = [
             self.client.submit(
-                part_of, placing, share, topic, number, *sizes, key=f"{topic}-0-{number}"
+                part_of, self.placing, share, topic, number, *sizes, key=f"{topic}-0-{number}"
             )
             for number, share in enumerate(shares)
         ]
@@ -218,7 +227,8 @@ class ClusterPasses:
                 level[0], lambda: self.telling.tell(sum([*read.values()]), about)
             )
         finally:
-            self.client.unsubscribe_topic(topic)
+            with contextlib.suppress(Exception):  # of a scheduler that is gone
+                self.client.unsubscribe_topic(topic)
         tally.check(self.placing)
         self.left_out = tally.left_out
         return found
@@ -242,19 +252,25 @@ class ClusterPasses:
             alone_since = alone_since or time.monotonic()
             if time.monotonic() - alone_since > ALONE_S:
                 raise _no_workers()
-        try:
-            return future.result()
-        except TankcalError:
-            raise
-        except Exception as error:  # whatever dask, a network or another machine comes up with
-            raise _refusal(
-                message(
-                    "cluster_failed",
-                    "its workers came to no end ({reason}): did one run out of memory, or was the "
-                    "scheduler ended?",
-                    reason=type(error).__name__,
-                )
-            ) from error
+        return future.result()
+
+
+@contextlib.contextmanager
+def _failures_told():
+    """InputError in one line for whatever dask, a network or another machine comes up with."""
+    try:
+        yield
+    except TankcalError:
+        raise
+    except Exception as error:
+        raise _refusal(
+            message(
+                "cluster_failed",
+                "its workers came to no end ({reason}): did one run out of memory, or was the "
+                "scheduler ended?",
+                reason=type(error).__name__,
+            )
+        ) from error
 
 
 def _sample_part(placing, share, topic, number, most):
@@ -308,8 +324,20 @@ def _tally_of(placing, share, topic, number):
                 ),
             )
         )
+    _keep_memory()
     worker = get_worker()
     return placing.tally(lambda read: worker.log_event(topic, (number, read)))
+
+
+@cache
+def _keep_memory():
+    """Let malloc keep what is free: workers of dask are told to give it back at once, and each
+    array of a few hundred kilobytes would then be made of fresh pages: LAS took twice the time.
+    """
+    with contextlib.suppress(OSError, AttributeError, TypeError):  # another system than Linux
+        malloc = ctypes.CDLL(None).mallopt
+        malloc(M_MMAP_THRESHOLD, KEPT_BYTES)
+        malloc(M_TRIM_THRESHOLD, 2 * KEPT_BYTES)
 
 
 def _version():
