@@ -109,7 +109,11 @@ def _flat(x, y):
     return 0.001 * x + 0 * y
 
 
-FORMS = {"cone down": _cone, "dish": _dish, "buckled plates": _buckled, "film": _flat}
+FORMS = {"cone down": _cone, "dish": _dish, "buckled plates": _buckled}
+FILMS = {  # x, y, radius and height of water, shares of no return and of mirror images
+    "film": (4.0, 0.0, 3.6, 0.001, 0.5, 0.3),
+    "film that gives no points": (2.0, 0.0, 5.4, 0.001, 0.5, 0.5),
+}
 PIT, ROUND, SQUARE = (3.0, -2.5, 0.5, 0.45), (2.0, 0.0, 0.15), (-1.0, 5.0, 0.15)
 THIN = (-2.0, 3.0, 0.12)
 COIL = ((-4.0, -5.0, 0.15), (4.0, -5.0, 0.15), 0.04), ((-4.0, -4.6, 0.15), (4.0, -4.6, 0.15), 0.04)
@@ -123,13 +127,13 @@ def _scene(name):
     posts = [((x, y, -1.0), (x, y, 8.0), r) for x, y, r in (ROUND, THIN)]
     x, y, half = SQUARE
     scene = Scene(
-        floor=FORMS[name],
+        floor=FORMS.get(name, _flat),
         stairs=(4.0, 2.0, 0.5, 0.25),
         pipes=[(0.5, 0.1, 0.15, 0.0, 8.0)],
         rods=[*posts, *COIL],
         boxes=[DEBRIS, ((x - half, y - half, -1.0), (x + half, y + half, 8.0))],
-        pits=[PIT] * (name != "film"),
-        film=(4.0, 0.0, 3.6, 0.001, 0.5, 0.3) if name == "film" else None,
+        pits=[PIT] * (name in FORMS),
+        film=FILMS.get(name),
     )
     places = ((2.3, 0.7, 1.6), (-2.2, -1.5, 1.6), (0.7, -3.0, 4.0))
     scans = [take_scan(rng, scene, place, 250_000)[0] for place in places]
@@ -153,7 +157,7 @@ def _volumes(scene, bottom):
 
 
 @pytest.mark.slow(after=4)
-@pytest.mark.parametrize("name", FORMS)
+@pytest.mark.parametrize("name", [*FORMS, *FILMS])
 def test_volume_under_the_first_course(name, figure):  # simulation: rays
     scene, wall, bottom, _ = _scene(name)
     volume, expanded, truth = _volumes(scene, bottom)
@@ -162,8 +166,9 @@ def test_volume_under_the_first_course(name, figure):  # simulation: rays
     figure(f"bottom of a cloud, {name}: volume off", f"{share:.4f} % of the tank")
     assert abs(volume - truth) < 2e-4 * tank
     assert expanded < 2e-4 * tank
-    assert bottom.seen_share > 0.95
-    assert (bottom.mirrored > 500) == (name == "film")
+    assert bottom.seen_share > (0.6 if "gives no" in name else 0.95)
+    assert (bottom.mirrored > 500) == (name in FILMS)
+    assert len(bottom.pits) == (name in FORMS)
     assert np.abs(np.nanmean(wall.radius_m) - R) < 0.01
 
 

@@ -15,6 +15,7 @@ PIECE = 1 << 16
 BIN_M = 0.01  # of heights near the bottom
 CELL_M, MOST_ACROSS = 0.25, 72  # of the plan; no more cells than these across
 STACK_M = 0.1  # height of the counts up to the top
+LEAST_REACH_M, REACH = 1.0, 0.12  # of heights near the bottom; of the radius
 SKIN_M = 0.1  # before the mean wall, that is left to the wall
 FOOT_M = 0.25  # under the bottom of the shell, from where on no wall can be
 
@@ -90,11 +91,11 @@ def floor_grid(surface, bottom_m, top_m, *, below_m=None, above_m=None, cell_m=N
     bottom_m, top_m : float
         Heights of the ends of the shell, m.
     below_m, above_m : float, optional
-        None: a tenth of the diameter, and 1 m at least, but no more above than half of the shell.
+        None: 0.12 of the radius, and 1 m at least, but no more above than half of the shell.
     cell_m : float, optional
         None: 0.25 m, more where the tank is wider than 18 m.
     """
-    reach = max(1.0, 0.2 * surface.radius_m)
+    reach = max(LEAST_REACH_M, REACH * surface.radius_m)
     return FloorGrid(
         surface,
         float(bottom_m),
