@@ -113,7 +113,7 @@ def _words(line):
         if not all(len(one) == 7 + width and _WORD.fullmatch(one) for one in parts):
             return None
     matches = [_WORD.fullmatch(one) for one in parts]
-    return [(one[1], one[2] + one[3] + one[4], one[5], one[6] + one[7]) for one in matches]
+    return [(one[1], one[2] + one[3] + one[4], one[5], one[6] + one[7]) for one in matches] or None
 
 
 def _blocks(words):

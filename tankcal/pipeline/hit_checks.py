@@ -5,7 +5,8 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.shell import course_of
-from tankcal.messages import list_some, message
+from tankcal.messages import message
+from tankcal.pipeline.level_checks import courses_with_few, girth_m, levels_with_few
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.control_drift import repeats_of
@@ -19,7 +20,7 @@ GON = FULL_TURN / 400
 
 def least_hits(job):
     """How many hits a section of a tank of that circumference should have."""
-    return limit_at(RULES, "hits", "least", np.pi * job.tank.nominal_diameter_m)
+    return limit_at(RULES, "hits", "least", girth_m(job))
 
 
 def check_hits(job, wall, sighting):
@@ -73,30 +74,24 @@ def _scatter_of(hits, setup):
 
 def _of_levels(job, wall):
     least = least_hits(job)
-    few = [one.group.name for one in wall.sections if len(one.group.members) < least]
+    few = levels_with_few(wall, least)
     if few:
         text = message(
             "few_hits",
             "sections {sections} have fewer than {least} hits, as many as a circumference of"
             " {girth_m:.0f} m asks for",
-            sections=list_some(few, SHOWN),
+            sections=few,
             least=least,
-            girth_m=np.pi * job.tank.nominal_diameter_m,
+            girth_m=girth_m(job),
         )
         yield Problem(job.hits.file, text)
-    courses = [section.group.course for section in wall.sections]
     least = limits_of(RULES)["sets_a_course"]
-    short = [
-        course.name
-        for index, course in enumerate(job.courses)
-        if 0 < courses.count(index) < least  # else straps or lines tell it
-        and not any(one.group.degree for one in wall.sections if one.group.course == index)
-    ]
+    short = courses_with_few(job, wall, least, slopes_count=True)
     if short:
         text = message(
             "few_levels_of_hits",
             "courses {courses} were hit at fewer than {least} levels: nothing shows a taper there",
-            courses=list_some(short, SHOWN),
+            courses=short,
             least=least,
         )
         yield Problem(job.hits.file, text)

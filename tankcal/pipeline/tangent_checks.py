@@ -10,8 +10,9 @@ from tankcal.geometry.field.amplitudes import estimate_amplitudes
 from tankcal.geometry.field.blunders import restricted_precision
 from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.shell import course_of
-from tankcal.messages import list_some, message
+from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import noise_of_wall
+from tankcal.pipeline.level_checks import courses_with_few, girth_m, levels_with_few
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.network.reliability import noncentrality
@@ -54,7 +55,7 @@ class TangentTests:
 
 def least_tangents(job):
     """How many tangents a level of a tank of that circumference should have."""
-    return limit_at(RULES, "tangents", "least", np.pi * job.tank.nominal_diameter_m)
+    return limit_at(RULES, "tangents", "least", girth_m(job))
 
 
 def judge_tangents(job, wall, touching):
@@ -150,28 +151,25 @@ def check_tangents(job, wall, touching):
 
 def _of_levels(job, wall):
     least = least_tangents(job)
-    few = [one.group.name for one in wall.sections if len(one.group.members) < least]
+    few = levels_with_few(wall, least)
     if few:
         text = message(
             "few_tangents",
             "levels {levels} have fewer than {least} tangents, as many as a circumference of"
             " {girth_m:.0f} m asks for",
-            levels=list_some(few, SHOWN),
+            levels=few,
             least=least,
-            girth_m=np.pi * job.tank.nominal_diameter_m,
+            girth_m=girth_m(job),
         )
         yield Problem(job.tangents.file, text)
-    courses = [section.group.course for section in wall.sections]
-    names, least = [one.name for one in job.courses], limits_of(RULES)["levels_a_course"]
-    short = [  # of those that were sighted: straps or lines tell the others
-        name for index, name in enumerate(names) if 0 < courses.count(index) < least
-    ]
+    least = limits_of(RULES)["levels_a_course"]
+    short = courses_with_few(job, wall, least)
     if short:
         text = message(
             "few_levels_of_tangents",
             "courses {courses} were sighted at fewer than {least} levels: nothing shows a taper"
             " there",
-            courses=list_some(short, SHOWN),
+            courses=short,
             least=least,
         )
         yield Problem(job.tangents.file, text)

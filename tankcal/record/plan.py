@@ -135,28 +135,30 @@ def plain_of(prediction, simulated=None, job=()):
 
     simulated  `simulations.Simulated`, or None        job  [{file, sha256}] of the empty job
     """
-    table = prediction.table
     found = filled_from(
         PlanFile,
         prediction,
         survey=_survey(prediction),
-        limit=PlanLimit(
-            prediction.plan.limits.relative_u,
-            prediction.plan.limits.of,
-            prediction.relative_u,
-            prediction.meets,
-        ),
-        table=filled_from(PlannedTable, table),
-        sources=[
-            PlannedSource(one.kind, np.linalg.norm(one.columns_m3[-1])) for one in table.sources
-        ],
-        worst_deliveries=[
-            filled_from(PlannedDelivery, one) for one in prediction.tabled.stated.worst
-        ],
         precision=filled_from(PlannedPrecision, prediction.precision),
-        warnings=warnings_of(prediction.warnings),
+        **parts_of_any_plan(prediction),
     )
     return to_plain(replace(found, simulated=filled_from(SimulatedPlan, simulated), job=job))
+
+
+def parts_of_any_plan(prediction):
+    """{key: its value} of what files of all plans have: limit, table, sources, warnings."""
+    table, limits = prediction.table, prediction.plan.limits
+    return {
+        "limit": PlanLimit(limits.relative_u, limits.of, prediction.relative_u, prediction.meets),
+        "table": filled_from(PlannedTable, table),
+        "sources": [
+            PlannedSource(one.kind, np.linalg.norm(one.columns_m3[-1])) for one in table.sources
+        ],
+        "worst_deliveries": [
+            filled_from(PlannedDelivery, one) for one in prediction.tabled.stated.worst
+        ],
+        "warnings": warnings_of(prediction.warnings),
+    }
 
 
 def _survey(prediction):

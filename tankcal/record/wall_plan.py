@@ -1,7 +1,5 @@
 """The prediction of a wall by tape, lines, hits or tangents as it is saved: plan.json."""
 
-import numpy as np
-
 from tankcal.planning.wall.changes import wall_count
 from tankcal.planning.wall.prediction import CourseOutlook, ReadingsOutlook
 from tankcal.record.plain_data import to_plain
@@ -11,10 +9,11 @@ from tankcal.record.plan import (
     PlannedDelivery,
     PlannedSource,
     PlannedTable,
+    parts_of_any_plan,
 )
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import Saved, filled_from, key
-from tankcal.record.texts import WarningRecord, warnings_of
+from tankcal.record.texts import WarningRecord
 
 WALL_PLAN = SavedFormat("tankcal-wall-plan", 1, "plan.json")  # so far one version
 
@@ -52,23 +51,12 @@ class WallPlanFile(Saved, kw_only=True):
 
 def plain_of_wall(prediction, job=()):
     """The `WallPlanFile` of a WallPrediction, as plain data; job: [{file, sha256}] of its job."""
-    table, plan = prediction.table, prediction.plan
     found = filled_from(
         WallPlanFile,
         prediction,
-        survey=survey_of(plan),
-        limit=PlanLimit(
-            plan.limits.relative_u, plan.limits.of, prediction.relative_u, prediction.meets
-        ),
-        table=filled_from(PlannedTable, table),
-        sources=[
-            PlannedSource(one.kind, np.linalg.norm(one.columns_m3[-1])) for one in table.sources
-        ],
-        worst_deliveries=[
-            filled_from(PlannedDelivery, one) for one in prediction.tabled.stated.worst
-        ],
-        warnings=warnings_of(prediction.warnings),
+        survey=survey_of(prediction.plan),
         job=job,
+        **parts_of_any_plan(prediction),
     )
     return to_plain(found)
 

@@ -82,6 +82,9 @@ def test_a_station_of_a_code_block_has_a_name_and_digits_for_its_height(tmp_path
     assert [(one.expected.code, one.row) for one in told.value.problems] == [
         ("gsi_station_name", 1), ("no_plain_number", 5)
     ]  # fmt: skip
+    with pytest.raises(InputError) as told:
+        read(tmp_path, CODED + "*\n", station_code="21")
+    assert [(one.expected.code, one.row) for one in told.value.problems] == [("no_gsi_line", 7)]
 
 
 def test_several_blocks_of_gsi_on_one_line(tmp_path):

@@ -67,8 +67,10 @@ def test_a_crew_writes_set_ups_and_the_traverse_before_its_tangents(language):
     words = texts_in(language).words["input"]
     titles = [one["text"] for one in found if one["kind"] == "heading"]
     order = ["setups", "stadia", "directions", "tangents", "circumferences", "obstructions"]
-    assert [one.split("; ")[0] for one in titles] == [words["titles"][name] for name in order]
-    traverse = [one for one in found if one["kind"] == "form"][2]["columns"]
+    setups, *others = (words["titles"][name] for name in order)
+    heights = texts_in(language).words["forms"]["heights"]
+    assert [one.split("; ")[0] for one in titles] == [setups, heights, *others]
+    traverse = [one for one in found if one["kind"] == "form"][3]["columns"]
     units = [one["unit"] for one in traverse]
     assert units == ["", "", "", UNITS_OF_CIRCLES, UNITS_OF_CIRCLES, "m", "m"]
 

@@ -1,16 +1,13 @@
 """What record, papers and workbook say of bare wall hits, of the shipped example."""
 
 import numpy as np
-import openpyxl
 import pytest
+from paper_words import assert_tables_have_words, cells_of_sheet, instruments_said
 
 import tankcal
 from tankcal.record import record_of
-from tankcal.report import workbook
-from tankcal.report.plain import PlainPaper
 from tankcal.report.tables import hits
 from tankcal.text.languages import LANGUAGES
-from tankcal.text.words import load_words, translate_record
 
 
 @pytest.fixture(scope="module")
@@ -55,41 +52,23 @@ def test_control_targets_count_from_their_first_reading(record):
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_every_table_has_words(record, language):
-    words = load_words(language)
-    paper, said = PlainPaper(words), translate_record(words, record)
     tables = (
         *(hits.SETUPS, hits.SHARED, hits.RINGS, hits.INCIDENCE),
         *(hits.CONTROL, hits.DRIFTS, hits.COMPARED),
     )
-    for table in tables:
-        assert table.rows(said)
-        assert paper.word(f"captions.{table.name}")
-        for column in table.columns:
-            assert paper.word(f"table_headings.{column.heading or column.key}")
+    assert_tables_have_words(record, tables, language)
 
 
 @pytest.mark.slow
 def test_the_workbook_has_a_sheet(record, tmp_path):
-    workbook.write(record, tmp_path / "capacity.xlsx")
-    book = openpyxl.load_workbook(tmp_path / "capacity.xlsx")
-    sheet = book["Wall hits"]
-    cells = [cell.value for row in sheet.iter_rows() for cell in row if cell.value is not None]
+    cells = cells_of_sheet(record, tmp_path / "capacity.xlsx", "Wall hits")
     assert "TS-4" in cells
     assert "Offset of the instrument" in cells
     assert cells.count("I") == 1 + 9 + 1 + 6
 
 
 def test_straps_beside_hits_are_on_the_certificate(record):
-    from tankcal.report.certificate import _instruments
-
-    class Paper:
-        def __init__(self):
-            self.record, self.words = record, load_words("en")
-
-        def word(self, key, **values):
-            return PlainPaper(self.words).word(key, **values)
-
-    said = _instruments(Paper())
+    said = instruments_said(record)
     assert "TS 4/2026" in said
     assert "T 12/2026" in said
     assert {one["code"]: one["value"] for one in record["choices"]}["straps"] == "beside_points"

@@ -3,16 +3,13 @@
 import json
 from pathlib import Path
 
-import openpyxl
 import pytest
+from paper_words import assert_tables_have_words, cells_of_sheet, instruments_said
 
 import tankcal
 from tankcal.record import record_of
-from tankcal.report import workbook
-from tankcal.report.plain import PlainPaper
 from tankcal.report.tables import tangents
 from tankcal.text.languages import LANGUAGES
-from tankcal.text.words import load_words, translate_record
 
 EXAMPLE = Path("examples/tangents")
 
@@ -57,34 +54,18 @@ def test_every_set_up_and_level_is_there(record):
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_every_table_has_words(record, language):
-    words = load_words(language)
-    paper, said = PlainPaper(words), translate_record(words, record)
-    for table in (tangents.SETUPS, tangents.LEVELS, tangents.READINGS):
-        assert table.rows(said)
-        assert paper.word(f"captions.{table.name}")
-        for column in table.columns:
-            assert paper.word(f"table_headings.{column.heading or column.key}")
+    tables = tangents.SETUPS, tangents.LEVELS, tangents.READINGS
+    assert_tables_have_words(record, tables, language)
 
 
 @pytest.mark.slow
 def test_the_workbook_has_a_sheet(record, tmp_path):
-    workbook.write(record, tmp_path / "capacity.xlsx")
-    sheet = openpyxl.load_workbook(tmp_path / "capacity.xlsx")["Tangents"]
-    cells = [cell.value for row in sheet.iter_rows() for cell in row if cell.value is not None]
+    cells = cells_of_sheet(record, tmp_path / "capacity.xlsx", "Tangents")
     assert cells.count("I1") == 1 + 20
     assert {"left", "right", "TS"} <= set(cells)
 
 
 def test_instruments_of_tangents_are_on_the_certificate(record):
-    from tankcal.report.certificate import _instruments
-
-    class Paper:
-        def __init__(self):
-            self.record, self.words = record, load_words("en")
-
-        def word(self, key, **values):
-            return PlainPaper(self.words).word(key, **values)
-
-    said = _instruments(Paper())
+    said = instruments_said(record)
     assert "TS-2026-03" in said
     assert "B-2025-17" in said

@@ -1,27 +1,29 @@
 """Tables of bare wall hits: set-ups, what their hits share, rings, control targets, incidence."""
 
+from tankcal.report.tables.sights import (
+    CHECKS,
+    COURSE,
+    DEPARTURE,
+    INSTRUMENT,
+    LEAST,
+    LEVEL,
+    PLACE,
+    ROW,
+    SETUP,
+    counts_of,
+)
 from tankcal.report.tables.table import Column, Table
 
-_SETUP = Column("setup", heading="hit_setup", sheet="hit_setup", width=10)
-_INSTRUMENT = Column("instrument", heading="hit_instrument", sheet="hit_instrument", width=14)
 _SECTION = Column("section", sheet="section", width=10)
-_COUNTS = (
-    Column("hits", decimals=0, heading="hits_used", sheet="hits_used"),
-    Column("rejected", decimals=0, heading="hits_rejected", sheet="hits_rejected"),
-)
+_COUNTS = counts_of("hits")
 
 SETUPS = Table(
     "hit_setups",
     (
-        _SETUP,
-        Column("station", heading="hit_station", sheet="hit_station", width=10),
-        _INSTRUMENT,
-        Column("x_m", "m", decimals=3, heading="hit_x", sheet="hit_x_m"),
-        Column("y_m", "m", decimals=3, heading="hit_y", sheet="hit_y_m"),
-        Column("z_m", "m", decimals=3, heading="hit_z", sheet="hit_z_m"),
+        *PLACE,
         Column("tie", words="ties_of_setups", heading="hit_tie", sheet="hit_tie", width=16),
         *_COUNTS,
-        Column("checks", decimals=0, heading="hits_compared", sheet="hits_compared"),
+        CHECKS,
     ),
     rows=lambda record: record["hits"]["setups"],
 )  # fmt: skip
@@ -29,7 +31,7 @@ SETUPS = Table(
 SHARED = Table(
     "hit_shared",
     (
-        _INSTRUMENT,
+        INSTRUMENT,
         Column("certificate", heading="tape_certificate", sheet="tape_certificate", width=14),
         Column("what", words="inputs", heading="hit_shared_what", sheet="hit_shared_what",
                width=22),
@@ -48,10 +50,10 @@ RINGS = Table(
     "hit_rings",
     (
         _SECTION,
-        Column("course", sheet="course", width=9),
-        Column("level_m", "m", decimals=3, sheet="strap_level_m"),
+        COURSE,
+        LEVEL,
         *_COUNTS,
-        Column("least", decimals=0, heading="hits_least", sheet="hits_least"),
+        LEAST,
     ),
     rows=lambda record: record["hits"]["rings"],
 )  # fmt: skip
@@ -69,7 +71,7 @@ INCIDENCE = Table(
 CONTROL = Table(
     "hit_control",
     (
-        _SETUP,
+        SETUP,
         Column("target", heading="hit_target", sheet="hit_target", width=10),
         Column("elapsed_h", decimals=2, heading="control_hours", sheet="control_hours"),
         Column("direction_rad", "rad arcsec", decimals=1, heading="control_direction",
@@ -85,7 +87,7 @@ CONTROL = Table(
 DRIFTS = Table(
     "hit_drifts",
     (
-        _SETUP,
+        SETUP,
         Column("hours", decimals=2, heading="drift_hours", sheet="drift_hours"),
         Column("direction_rad_h", "rad arcsec", decimals=2, heading="drift_direction",
                sheet="drift_direction_arcsec"),
@@ -98,11 +100,10 @@ DRIFTS = Table(
 COMPARED = Table(
     "hit_compared",
     (
-        _SETUP,
-        Column("row", decimals=0, heading="hit_row", sheet="hit_row", width=8),
+        SETUP,
+        ROW,
         _SECTION,
-        Column("departure_m", "mm", decimals=2, heading="line_departure",
-               sheet="line_departure_mm"),
+        DEPARTURE,
     ),
     rows=lambda record: record["hits"]["compared"],
 )  # fmt: skip
