@@ -237,8 +237,8 @@ def scene_parts(scene, rng, rays):
     rows = [[str(i + 1), scene.course_m, 8.0] for i in range(scene.courses)]
     parts = Parts(settings, {"courses": [["course", "height_m", "thickness_mm"], *rows]})
     parts.registers["clouds"] = {}
-    exact = {"u_offset_mm": 0.0, "u_scale_ppm": 0.0}
-    exact |= {"s_translation_mm": 0.0, "s_rotation_arcsec": 0.0}
+    exact = {"u_offset_mm": 0.01, "u_scale_ppm": 0.0}
+    exact |= {"s_translation_mm": 0.01, "s_rotation_arcsec": 0.01}
     for name, place in (("A", (1.0, -0.5, 1.6)), ("B", (-1.2, 0.8, 1.7))):
         at, pose = np.array([*np.add(scene.axis(place[2]), place[:2]), place[2]]), np.eye(4)
         pose[:3, 3] = at
