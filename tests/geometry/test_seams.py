@@ -115,9 +115,8 @@ def test_two_seams_of_a_scan_are_in_its_table(course, tmp_path, figure):
     """40 mm, 0.4 m wide in all: with the smooth form alone 80 % of them went, and 90 ppm."""
     seams = pair(-0.04, 0.4, "cosine", course)
     gone, _, off, expanded = of_scan(1, seams, [], tmp_path)
-    figure(
-        f"two seams of 40 mm, {course}: rejected, ppm off, U", f"{gone} {off:.1f} {expanded:.1f}"
-    )
+    told = f"{gone:.3f} {off:.1f} {expanded:.1f}"
+    figure(f"two seams of 40 mm, course {course}: rejected, ppm off, U", told)
     assert gone < 0.05
     assert abs(off) < expanded
 
