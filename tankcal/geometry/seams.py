@@ -23,12 +23,13 @@ DEEPER = 1.4  # times the depth: what departs by more is not of the seam
 
 
 def find_seams(place_m, departure_m, rejected, noise_m):
-    """Mark rejected points that are a narrow seam of the wall.
+    """Mark points that are of a narrow seam of the wall.
 
     Rejected points of one sign that hang together up the wall, 1.2 m at least, are a seam when they
     are wider than 1.5 times their depth, and the strip has points of every depth: in its flank,
     from 0.15 to 0.6 of the depth, a quarter at least of what depths evenly taken would put there.
-    That part of the flank that the scatter of the wall hides is not asked for.
+    That part of the flank that the scatter of the wall hides is not asked for. All points of the
+    strip are marked then, those of its flanks as well.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ def find_seams(place_m, departure_m, rejected, noise_m):
     >>> groove = 0.04 * np.maximum(1 - abs(x - 1) / 0.2, 0)
     >>> pipe = 0.06 * (abs(x - 3) < 0.06)
     >>> found = find_seams(np.column_stack([x, z]), pipe - groove, groove + pipe > 0.013, 0.001)
-    >>> int(found.sum()), int(found[pipe > 0].sum())
+    >>> int(found[groove > 0.013].sum()), int(found[pipe > 0].sum())
     (273, 0)
     """
     found = np.zeros(len(rejected), dtype=bool)
@@ -88,7 +89,9 @@ def _is_slender(width_m, height_m):
 
 def _is_seam(strip_m, depth, deepest, noise_m):
     """depth (k,) of all points about the strip"""
-    if np.ptp(strip_m[:, 0]) < WIDER * deepest:
+    arc, height = (strip_m - strip_m.mean(axis=0)).T
+    leaning = arc - height * (arc @ height) / (height @ height)
+    if np.ptp(leaning) < WIDER * deepest:
         return False
     low, high = max(FLANK[0] * deepest, SIGMA * noise_m), FLANK[1] * deepest
     if low >= high:

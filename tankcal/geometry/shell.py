@@ -165,9 +165,7 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
     in_band, axis = wall, found.axis
     w, residual, wall = found.w, found.residual, found.wall
     if snooping:
-        seams = _seams(
-            local, course, candidates, in_band, found, len(joints_m) - 1, nominal_radius_m
-        )
+        seams = _seams(local, course, candidates, in_band, found, nominal_radius_m)
         wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
         tested = _by_field(
             local, course, zeta, in_band, wall, axis, relative, nominal_radius_m, welds_rad
@@ -222,13 +220,13 @@ def _buckles(local, in_band, axis, departure_m, wall, nominal_radius_m):
     return back
 
 
-def _seams(local, course, candidates, in_band, form, courses, nominal_radius_m):
+def _seams(local, course, candidates, in_band, form, nominal_radius_m):
     """(n,) points of the wall's band that belong to a seam, up the whole shell or up a course.
 
     What stands further off is looked at as well: of a pipe the band may hold its sides alone.
     """
     distance, wall = distances_from_axis(local, form.axis)[1], form.wall
-    radii = _mean_radii(distance[wall], course[wall], courses, nominal_radius_m)
+    radii = _mean_radii(distance[wall], course[wall], course.max() + 1, nominal_radius_m)
     departure = np.where(in_band, form.residual, distance - radii[course])
     near = np.flatnonzero(candidates & (np.abs(departure) < NEAR_M))
     found = np.zeros(len(local), dtype=bool)

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from generated_clouds import FULL_TURN, Scene, take_scan
 from generated_hits import Tool
-from job_builder import job_parts, write_folder
+from job_builder import SETTINGS, Parts, job_parts, write_folder
 from scanned_tanks import (
     COURSE_M,
     COURSES,
@@ -235,3 +236,44 @@ def test_a_sphere_and_a_lying_cylinder(tmp_path, few):
     offset = next(one for one in found.budget().lines if one.name == "instrument_offset")
     own = np.sqrt(offset.share) * found.table.u_m3[-1]
     assert own == pytest.approx(np.pi * 10**2 * 5e-4, rel=0.02)  # area times 0.5 mm
+
+
+def scene_parts(scene, rng, rays):
+    """Parts of a tank that was scanned twice, from known places inside."""
+    settings = {**SETTINGS, "survey.side": "inside", "table.step_m": 0.1}
+    settings |= {"tank.nominal_diameter_m": 2 * scene.radius_m}
+    settings |= {"tank.nominal_height_m": scene.height_m}
+    rows = [[str(i + 1), scene.course_m, 8.0] for i in range(scene.courses)]
+    parts = Parts(settings, {"courses": [["course", "height_m", "thickness_mm"], *rows]})
+    parts.registers["clouds"] = {}
+    exact = {"u_offset_mm": 0.01, "u_scale_ppm": 0.0}
+    exact |= {"s_translation_mm": 0.01, "s_rotation_arcsec": 0.01}
+    for name, place in (("A", (1.0, -0.5, 1.6)), ("B", (-1.2, 0.8, 1.7))):
+        at, pose = np.array([*np.add(scene.axis(place[2]), place[:2]), place[2]]), np.eye(4)
+        pose[:3, 3] = at
+        parts.extra_files[f"{name}.xyz"] = xyz_text(take_scan(rng, scene, place, rays)[0] - at)
+        given = {"file": f"{name}.xyz", "unit": "m", "scanner": "S", "pose": pose.tolist()}
+        parts.registers["clouds"][name] = given | exact
+    return parts
+
+
+@pytest.mark.slow
+def test_narrow_seams_and_a_buckle_of_a_cloud_are_in_its_table(tmp_path, figure):
+    """Simulation by rays; seams of 40 mm, 0.2 m wide, a buckle of 60 mm; volume by integration."""
+    seams, buckle = ((1.0, -0.04, 0.2), (3.7, -0.04, 0.2)), (3.0, 5.0, 0.06, 2.0)
+    scene = Scene(seams=seams, buckle=buckle)
+    parts = scene_parts(scene, np.random.default_rng(1), 300_000)
+    found = tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)), simulated=False)
+    xyz, rejected = found.job.points.xyz_m, found.wall.shell.reason != ""
+    turn = np.arctan2(xyz[:, 0], xyz[:, 1])
+    away = [np.abs((turn - at + np.pi) % FULL_TURN - np.pi) for at in (1.0, 3.7, 3.0)]
+    mine = 7.5 * np.minimum(away[0], away[1]) < 0.4
+    mine |= np.hypot(7.5 * away[2], xyz[:, 2] - 5.0) < 0.8
+    assert mine.sum() > 40
+    assert not np.any(rejected[mine])
+    azimuth, z = FULL_TURN * (np.arange(4000) + 0.5) / 4000, (np.arange(400) + 0.5) / 50
+    radii = scene.radius(*(one.ravel() for one in np.meshgrid(azimuth, z)))
+    truth, top = np.pi * np.mean(radii**2) * scene.height_m, found.at(scene.height_m)
+    off, expanded = 1e6 * (top.value_m3 / truth - 1), 1e6 * top.U_m3 / truth
+    figure("seams and a buckle in a cloud: ppm off, U", f"{off:.1f} {expanded:.1f}")
+    assert abs(off) < expanded
