@@ -156,10 +156,11 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
         normalised = ww + aw @ step
         v_before, v = v, minus_qb @ whiten(normalised, transposed=True)
         of_unknowns = np.abs(step) * np.linalg.norm(aw, axis=0)
-        before, size = size, max(of_unknowns.max(initial=0.0), np.max(np.abs(v - v_before) / sd))
+        moved = np.concatenate([of_unknowns, np.abs(v - v_before) / sd])
+        before, size = size, moved.max(initial=0.0)
         limit = tolerance * len(w) ** 0.5
         only_rounding_left = size > before / 2 and size < 1e4 * limit
-        if size < limit or only_rounding_left:
+        if size <= limit or only_rounding_left:
             return Adjustment(
                 unknowns=x,
                 cofactor=cofactor,

@@ -127,6 +127,13 @@ def test_one_scan_alone_is_the_frame_with_its_lean():
     )
 
 
+def test_exact_scans_of_an_exact_scanner_leave_nothing_to_adjust():
+    scans = [ScanSetup(name, "S", s_translation_m=0.0, s_rotation_rad=0.0) for name in "AB"]
+    found = register(scans, {"S": RangingInstrument("S", u_scale=0.0, u_offset_m=0.0)})
+    assert found.ties == ("frame", "declared")
+    assert found.sd_of(1) == (0.0, 0.0)
+
+
 def test_a_declared_pose_beside_targets_is_not_used_twice():
     """Property: three targets or more tell the pose, whatever was declared."""
     setups, targets, known, _ = surveyed(np.random.default_rng(5))
