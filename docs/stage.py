@@ -37,7 +37,7 @@ DOORS = {  # rooms of the reference, in the order in which a job goes through th
             "field.amplitudes",
             "field.estimate",
             "buckles",
-            "rings",
+            "seams",
             "rotations",
         )
     ),
@@ -61,6 +61,7 @@ DOORS = {  # rooms of the reference, in the order in which a job goes through th
     "Calibrations of cameras": ("tankcal.calibration",),
     "Planning": ("tankcal.planning",),
     "Field books": ("tankcal.fieldbooks",),
+    "Clouds": ("tankcal.clouds", "tankcal.clouds.wall", "tankcal.clouds.inside"),
     "Linter": ("tankcal.linter",),
 }
 TWICE = {"tankcal.survey": "Adjustment", "tankcal.linter": "lint"}  # told with `tankcal`
