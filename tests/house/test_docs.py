@@ -22,6 +22,14 @@ WITH_EXAMPLES = sorted(
 )
 
 
+def test_rooms_of_the_reference_are_there():
+    """`docs/stage.py` names them; the site fails without one, and is made last of all."""
+    named = re.search(r"^DOORS = .*?^}", (ROOT / "docs/stage.py").read_text(), re.M | re.S).group()
+    rooms = {}
+    exec(named, rooms)
+    assert [one for group in rooms["DOORS"].values() for one in group if not is_there(one)] == []
+
+
 def anchors(page):
     """The anchors of a page's headings, as git hosts make them."""
     headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), flags=re.M)
