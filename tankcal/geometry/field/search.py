@@ -1,7 +1,9 @@
 """The lowest point of a smooth function of a dozen logarithms, by few evaluations of it.
 
 Steps with an inverse curvature that each step improves (Broyden 1970, Fletcher 1970, Goldfarb 1970,
-Shanno 1970), kept whole, and begun from how far each logarithm may go.
+Shanno 1970), kept whole, and begun from how far each logarithm may go: not from the square of it,
+or a size of which little is known beforehand takes the first step for all, also where another one
+explains the wall as well.
 
 Source: Nocedal & Wright 2006, chapter 6.
 """
@@ -11,7 +13,7 @@ import numpy as np
 MOST_STEPS, LONGEST = 200, 2.0  # of a search; of a logarithm in one step
 SHORTEN, SHORTEST = 0.4, 1e-3  # a step that leads up, and how short it may become
 ENOUGH = 1e-4  # of the descent that the slope promises
-BEGIN = 0.15  # of the squared reach: inverse curvature before anything is known
+BEGIN = 0.15  # of the reach: inverse curvature before anything is known
 
 
 def descend(function, start, reach, bounds, tolerance):
@@ -38,7 +40,7 @@ def descend(function, start, reach, bounds, tolerance):
     array([1. , 0.5])
     """
     low, high = np.transpose(bounds)
-    x, inverse = np.clip(start, low, high), np.diag(BEGIN * np.square(reach))
+    x, inverse = np.clip(start, low, high), np.diag(BEGIN * np.asarray(reach))
     value, slope = function(x)
     for _ in range(MOST_STEPS):
         free = ~((x <= low) & (slope > 0) | (x >= high) & (slope < 0))
