@@ -24,7 +24,6 @@ from tankcal.survey.scans import KnownTargets
 FILE, TARGETS = "clouds.toml", "scan_targets.csv"
 MOST_READINGS = 1200  # whose full covariance is kept
 FAR_AWAY = 20.0  # radii: no scanner that sees a wall stands further from it
-BLOCK = 1 << 20
 STEP_M = 1.0  # along the normal of a surface
 IN_PROCESS = Reading()
 
@@ -171,12 +170,10 @@ def normals_of(surface, xyz_m):
 
 
 def _fingerprint(file):
-    """`InputFile` of a file of a scanner, read once in blocks."""
-    digest = hashlib.sha256()
+    """`InputFile` of a file of a scanner, whose content is never held whole."""
     try:
         with open(file.header.path, "rb") as stream:
-            while block := stream.read(BLOCK):
-                digest.update(block)
+            digest = hashlib.file_digest(stream, "sha256")
     except OSError as error:
         raise InputError(Problem(file.file, unreadable_file(error))) from error
     return InputFile(file.file, digest.hexdigest(), file.header.bytes)

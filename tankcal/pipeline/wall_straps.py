@@ -67,6 +67,7 @@ def _rings_of(points):
     found, sites = [], points.sites
     for ring in np.unique(sites.ring[sites.ring >= 0]):
         mine = np.flatnonzero(sites.ring == ring)
+        mine = mine[np.argsort(sites.azimuth_rad[mine] % FULL_TURN)]  # what is drawn hangs on it
         mine = mine[:: -(-len(mine) // MOST_OF_RING)]
         noise = points.noise_m2[np.ix_(mine, mine)]
         found.append(Ring(sites.azimuth_rad[mine], points.radius_m[mine], noise))
@@ -173,7 +174,7 @@ def told_courses(job, seen):
     return courses_told(seen, {place[one] for one in strapped}, {place[one] for one in read})
 
 
-def join_readings(job, points, amplitudes, joints_m, *, is_known=True):
+def join_readings(job, points, amplitudes, joints_m, *, is_known):
     """The field of a wall from its points, its straps and its offsets from reference lines.
 
     Parameters
@@ -185,7 +186,8 @@ def join_readings(job, points, amplitudes, joints_m, *, is_known=True):
         Of the wall, as its points tell them.
     joints_m : ndarray, shape (courses + 1,)
     is_known : bool
-        False: where points do not lie on every course the amplitudes are found again, from all.
+        Whether the amplitudes are known beforehand, as those of a plan; False: where points do not
+        lie on every course they are found again, from all.
 
     Returns
     -------
@@ -203,7 +205,8 @@ def join_readings(job, points, amplitudes, joints_m, *, is_known=True):
         given = job.strapping
         reduced = reduce_straps(given, job.survey.shell_temperature_c, 2 * nominal)
         places = [i for i, one in enumerate(reduced) if not one.strap.check]
-        term, shape = area_term(given.shape_sd_m, amplitudes, nominal, points)
+        seen = None if is_known else points  # those of a plan are nominal and show no form
+        term, shape = area_term(given.shape_sd_m, amplitudes, nominal, seen)
         readings = readings_of_straps([reduced[i] for i in places], names, term)
         taped = reduced, term, shape
     if job.lines is not None:
