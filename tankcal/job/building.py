@@ -113,6 +113,7 @@ def not_for_this_kind(kind):
 def _tell_missing_tables(raw, tables, kind, log):
     if kind == "vertical":
         _tell_sights_missing(raw, tables, log)
+        _tell_clouds_missing(raw, tables, log)
     for name in REQUIRED_TABLES.get(kind, ()):
         measured = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
         elsewhere = name == "points" and measured
@@ -138,6 +139,14 @@ def _tell_sights_missing(raw, tables, log):
     for name in ("wall_hits", "tangents"):
         if raw.tables.get(name) is not None:
             log.problem(raw.tables[name].file, _IN_PLACE_OF_POINTS[name])
+
+
+def _tell_clouds_missing(raw, tables, log):
+    """An empty register of clouds, beside the survey that their targets belong to."""
+    elsewhere = has_rows(tables["points"]) or has_rows(tables["targets"]) or is_sighted(tables)
+    register = raw.registers.get("clouds")
+    if register is not None and has_survey(tables) and not register.entries and not elsewhere:
+        log.problem(register.file, _NO_CLOUD)
 
 
 _IN_PLACE_OF_POINTS = {

@@ -3,8 +3,11 @@
 Truth: the files as they were written.
 """
 
+import shutil
+
 import numpy as np
 import pytest
+from conftest import EXAMPLE
 from job_builder import assert_same_job, write_book, write_folder
 from scanned_tanks import SCANS, scanned_parts
 
@@ -42,6 +45,15 @@ def test_clouds_are_read_in_si(tmp_path):
     assert len(clouds.targets) == 10
     assert clouds.targets[0].sd_m == 5e-4
     np.testing.assert_allclose(clouds.control.covariance_m2, 9e-8 * np.eye(15))
+
+
+def test_an_empty_register_beside_its_survey_is_told(tmp_path):
+    folder = shutil.copytree(EXAMPLE.parent / "cloud", tmp_path / "job")
+    (folder / "clouds.toml").write_text("")
+    with pytest.raises(InputError) as refused:
+        tankcal.load(folder)
+    (line,) = [str(one) for one in refused.value.problems]
+    assert line.startswith("clouds.toml: ")
 
 
 def test_pose_is_in_the_unit_of_the_file(tmp_path):
