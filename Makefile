@@ -19,7 +19,7 @@ else
 	$(BIN)/tankcal demo --out demo-results
 endif
 
-test: $(VENV)/full ## the tests that take no more than a second each (about two minutes)
+test: $(VENV)/full ## the tests that take no more than half a second each (under two minutes)
 	$(BIN)/pytest
 
 test-slow: $(VENV)/full ## the others: papers of all kinds, many cases, studies at a twentieth of their size

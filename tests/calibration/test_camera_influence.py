@@ -158,6 +158,7 @@ def test_a_wrong_principal_distance_stretches_the_depth(figure):
     figure("bias of z by c one percent too long, 200 m above ground, m", round(check.mean_m, 3))
 
 
+@pytest.mark.slow
 def test_the_check_points_are_those_of_the_record():
     # second method: the record of the same adjustment
     job = flight(1.0, False, GROUND)
@@ -201,6 +202,7 @@ def test_a_small_wrong_k1_has_the_depth_of_its_parallax():
         assert d[i, 2] == pytest.approx(depth * change / parallax, rel=0.05, abs=2e-4)
 
 
+@pytest.mark.slow
 def test_free_is_the_same_from_every_start():
     # property: start values do not matter; here stations are known to 1 cm, rotations free
     starts = (changed("near", c=0.002, K1=1e-4), changed("far", c=-0.05, x0=0.02, K1=-1e-3))

@@ -77,6 +77,9 @@ def texts_of_paper(result, folder, language=None):
     return [text for block in blocks_of_cells(notebook) for text in shown_in(block)]
 
 
+SLOW_FIXTURES = {"result", "results"}  # seconds each
+
+
 @pytest.fixture(params=KINDS)
 def result(request, results):
     return results[request.param] | {"made_from": MADE_FROM}
@@ -149,6 +152,7 @@ def test_limits_of_ones_own_keep_their_texts(product):
     assert "as signed" in text
 
 
+@pytest.mark.slow
 def test_an_axis_of_less_than_a_decade_has_no_decimals():
     from matplotlib.figure import Figure
 

@@ -206,6 +206,7 @@ def test_a_lens_that_hardly_changes_gains_nothing(figure):
     figure("depth of field, K within 3 %: largest change of a point, mm", f"{1e3 * size:.3f}")
 
 
+@pytest.mark.slow
 def test_points_without_a_depth_are_left():
     """What is not adjusted, or lies behind the lens, keeps its image; it is counted."""
     measurements, _ = simulated(seed=1)

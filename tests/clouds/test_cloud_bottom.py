@@ -156,7 +156,7 @@ def _volumes(scene, bottom):
     return part.volume_m3([0.5])[0], 2 * u, truth
 
 
-@pytest.mark.slow(after=4)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*FORMS, *FILMS])
 def test_volume_under_the_first_course(name, figure):  # simulation: rays
     scene, wall, bottom, _ = _scene(name)
@@ -172,7 +172,7 @@ def test_volume_under_the_first_course(name, figure):  # simulation: rays
     assert np.abs(np.nanmean(wall.radius_m) - R) < 0.01
 
 
-@pytest.mark.slow(after=4)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cone down", "buckled plates"])
 def test_what_stands_in_the_tank(name):  # simulation: rays
     scene, _, bottom, things = _scene(name)

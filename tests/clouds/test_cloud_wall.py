@@ -100,6 +100,7 @@ def test_pieces_change_no_byte_of_the_wall():  # property
     assert pieces.radius_m.tobytes() == whole.radius_m.tobytes()
 
 
+@pytest.mark.slow
 def test_sd_of_a_cell_is_its_scatter():  # simulation: the truth is a cylinder
     wall = _find(_cylinder(200_000, noise=0.003))
     error = wall.radius_m[wall.is_wall] - 3.0
@@ -107,6 +108,7 @@ def test_sd_of_a_cell_is_its_scatter():  # simulation: the truth is a cylinder
     assert 0.8 < ratio < 1.2
 
 
+@pytest.mark.slow
 def test_readings_are_even():  # property
     wall = _find(_cylinder(), _cylinder(seed=2))
     readings = readings_of(wall, most=400)
@@ -319,7 +321,7 @@ def _leaved(part, gap=0.06, seed=3, sector=False):
     return scan
 
 
-@pytest.mark.slow(after=4)
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("sector", [False, True])
 @pytest.mark.parametrize("part", [0.35, 0.5, 0.65])
 @pytest.mark.parametrize("gap", [0.03, 0.06])
@@ -441,7 +443,7 @@ def test_sd_of_readings_holds_for_waves_of_noise(name, figure):  # simulation: r
     assert ratio < 1.1
 
 
-@pytest.mark.slow(after=4)
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0.8, 1.2, 1.6])
 def test_buckle_is_no_weld(size):  # simulation: rays; seams of this scene are told elsewhere
     scene = Scene(**SMALL, buckle=(3.0, 3.0, 0.05, size), seams=())

@@ -277,6 +277,7 @@ def test_a_child_that_wants_all_memory(tmp_path, monkeypatch):
     assert "more memory" in died(tmp_path, monkeypatch, code)
 
 
+@pytest.mark.slow
 def test_a_child_that_gives_fewer_or_more_points(tmp_path, monkeypatch):
     code = WORK + (
         "from tankcal.clouds.formats import decoding\n"

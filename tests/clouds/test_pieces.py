@@ -31,6 +31,7 @@ def test_pieces_are_the_file(tmp_path, kind, each):  # invariance
     assert (len(pieces) > 1) == (kind in SOUGHT and each < 103)
 
 
+@pytest.mark.slow
 def test_laz_is_cut_at_its_chunks(tmp_path):  # invariance
     write_las(tmp_path / "wall.laz", some_wall(120_000))
     header = describe_cloud(tmp_path / "wall.laz")

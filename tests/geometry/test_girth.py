@@ -71,6 +71,7 @@ def test_points_that_show_the_form_tell_its_excess():
     assert sd < 1e-3 * mean
 
 
+@pytest.mark.slow
 def test_points_that_show_nothing_leave_what_is_assumed():
     """Second method: the expectation over all walls of that size, as before any survey."""
     mean, sd = seen_excess(amplitudes_of(common_ovality=0.01), 6.5, [ring_of(8, 10.0)])

@@ -27,6 +27,7 @@ def clutter(rng, n=60):
     return np.vstack([near, [[33.0, 21.0, 12.4], [30.0, 20.0, 12.9], [60.0, 60.0, 1.4]]])
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.002, -0.001), (0.03, 0.0)])
 def test_clutter_is_separated_and_tilt_found(tilt):
     rng = np.random.default_rng(7)
@@ -42,12 +43,14 @@ def test_clutter_is_separated_and_tilt_found(tilt):
     assert shell.noise_m == pytest.approx(0.003, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_vertical_dent_is_form_and_not_clutter():
     rng = np.random.default_rng(8)
     shell = find_shell(wall(rng, dent=0.035), JOINTS, 6.5)
     assert np.sum(shell.reason != "") <= 4
 
 
+@pytest.mark.slow
 def test_a_single_blunder_is_found_by_its_normalised_residual():
     xyz = wall(np.random.default_rng(9))
     radius = np.hypot(*(xyz[17, :2] - (30, 20)))
@@ -124,6 +127,7 @@ def test_points_of_large_declared_sd_are_not_blunders():
     assert np.sum(find_shell(xyz, JOINTS, 6.5).reason != "") > 20  # what the sds are for
 
 
+@pytest.mark.slow
 def test_spiral_stair_leaves_wall_points_accepted():
     """20 steps over a third of the turn, 20 to 60 mm off a wall of 15 mm ovality."""
     rng = np.random.default_rng(15)
@@ -179,6 +183,7 @@ def three_rings(wider_m, seed):
     return np.vstack(pieces)
 
 
+@pytest.mark.slow
 def test_a_barrel_of_three_rings_keeps_its_points():
     """The ring at mid height is 6 mm wider than its neighbours: no taper, and no blunder."""
     even, barrel = (find_shell(three_rings(wider, 1), JOINTS, 6.5) for wider in (0.0, 0.006))

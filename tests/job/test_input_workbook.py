@@ -213,6 +213,7 @@ def test_rules_hold_numbers_to_the_bounds_of_the_contract():
     )
 
 
+@pytest.mark.slow
 def test_the_language_of_the_form_is_that_of_the_papers(tmp_path):
     path = write_input_workbook(tmp_path / "tank.xlsx", language="pt-BR")
     fill_form(path, SETTINGS, job_parts().tables)

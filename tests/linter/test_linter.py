@@ -633,6 +633,7 @@ def test_no_heading(tmp_path):
     assert report.errors == 0
 
 
+@pytest.mark.slow
 def test_thousands_marks(tmp_path):
     heading = "Altura (cm);Volume (L)\n"
     everywhere = lint_text(tmp_path, heading + pairs(volume=lambda v: f"{v:,}".replace(",", ".")))

@@ -30,6 +30,7 @@ def test_a_cylinder_comes_out_exactly(tmp_path):
     assert np.all(found.wall.shell.reason == "")
 
 
+@pytest.mark.slow
 def test_an_inside_survey_keeps_its_radius(tmp_path):
     found = result_of(tmp_path, settings={"survey.side": "inside"})
     assert found.capacity.volume_m3.iloc[-1] == pytest.approx(np.pi * 6.5**2 * 9.5, rel=1e-6)
@@ -56,6 +57,7 @@ def test_two_rings_in_a_course_give_exact_frustum(tmp_path):
     assert found.capacity.volume_m3.iloc[-1] == pytest.approx(exact, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_tilt_enters_once(tmp_path):
     """A cylinder of radius r and axis length 9.5 m holds pi r^2 9.5, however it leans.
 
@@ -131,6 +133,7 @@ def test_covariance_equal_to_sds_gives_same_table(tmp_path):
     assert full.table.volume_m3 == pytest.approx(by_sd.table.volume_m3, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_fully_correlated_sections_add_linearly(tmp_path):
     """One common radial error of 1 mm: u of the points = lateral area x 1 mm (closed form)."""
     write_job(tmp_path / "a")

@@ -63,6 +63,7 @@ def contribution(result, kind):
     return np.linalg.norm(np.concatenate(found))
 
 
+@pytest.mark.slow
 def test_wall_seen_from_wrong_side_is_refused(job, survey):
     job = replace(job, measurements=with_control(survey))
     assert job.survey.side == "outside"
@@ -133,6 +134,7 @@ def test_undetermined_unknowns_are_reported_at_once():
     refuse_undetermined(replace(report, vertical=True, scale=True))
 
 
+@pytest.mark.slow
 def test_heights_of_a_free_frame_are_warned_of(job, survey):
     result = run(replace(job, measurements=without_control(survey, settings=INNER)))
     told = [str(one) for one in result.warnings if one.column == "datum.bottom_z_m"]

@@ -138,6 +138,7 @@ def test_shares_that_lost_points_are_told(placing):
         tally.check(placing)
 
 
+@pytest.mark.slow
 def test_a_problem_of_a_file_comes_from_a_worker_in_its_words(client, placing, tmp_path):
     path = write_cloud(tmp_path / "wall.xyz", some_wall(500))
     path.write_text(path.read_text().replace("\n", "\nx y z\n", 1))

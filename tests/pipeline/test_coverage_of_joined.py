@@ -47,6 +47,7 @@ def found_of(rng, family, rings, folder, method="hits, straps and lines"):
     return judged(wall, body_of(job, find_wall(job, lambda text: None)), family, rings)
 
 
+@pytest.mark.slow
 def test_where_untied_set_ups_stood_is_no_part_of_an_outline(tmp_path):
     """Invariance: a common shift of set-ups and centres moves no radius, so outlines have no first
     wave (it once made a tank 3700 ppm too large).

@@ -107,6 +107,7 @@ def test_one_setup_gives_the_table(tmp_path):
     assert abs(offset.contribution) == pytest.approx(2 * 5e-4 / 6.5 * 1063, rel=0.12)
 
 
+@pytest.mark.slow
 def test_a_workbook_is_the_same_job(tmp_path):
     parts = parts_of(tool=NOISY, seed=1)
     book = tankcal.load(write_book(tmp_path / "job.xlsx", parts))
@@ -145,6 +146,7 @@ def tied_parts(rng=None, offset_m=0.0):
     return parts
 
 
+@pytest.mark.slow
 def test_two_setups_tied_by_targets(tmp_path):
     result = run(tmp_path, tied_parts())
     assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=2e-6)
@@ -153,6 +155,7 @@ def test_two_setups_tied_by_targets(tmp_path):
     assert noisy.sighting.poses.ties == ("network", "network")
 
 
+@pytest.mark.slow
 def test_targets_of_the_wall_beside_hits(tmp_path):
     """Exact geometry: four targets on the wall count, too, and a slip of one is set aside."""
     parts = tied_parts()
@@ -224,6 +227,7 @@ def test_hits_after_the_network_are_named_points_in_it(tmp_path, beside):
         np.testing.assert_allclose(turns @ cause.column_m, twin.column_m, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_straps_tell_an_unknown_offset(tmp_path):
     parts = strapped(parts_of(tool=Tool(offset_m=0.002)))
     del parts.registers["instruments"]["TS"]["u_offset_mm"]
@@ -263,6 +267,7 @@ def test_straps_and_hits_are_one_least_squares_solution(tmp_path):
     assert n == 8 * 24 + 2
 
 
+@pytest.mark.slow
 def test_straps_of_an_outside_survey_by_points(tmp_path):
     """Points and straps see the same outside: plates are taken off once."""
     parts = strapped(parts_of(tool=NOISY, seed=3))
@@ -308,6 +313,7 @@ def test_a_thinner_plate_moves_a_strap_inside_once(tmp_path):
     assert -lines["plate_thickness"].sensitivity == pytest.approx(grown, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_a_gauge_of_plates_bears_on_the_straps_alone(tmp_path):
     """Inside hits do not see the plate: only that of the strapped course counts, and by its sd."""
     parts = strapped(parts_of())
@@ -323,6 +329,7 @@ def test_a_gauge_of_plates_bears_on_the_straps_alone(tmp_path):
     assert abs(gauge.contribution) == pytest.approx(0.1 * abs(plate.sensitivity), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_hits_beside_welds_are_left_out(tmp_path):
     parts = parts_of()
     clear = run(tmp_path, parts)
@@ -411,6 +418,7 @@ def radii_of(result):
     ]
 
 
+@pytest.mark.slow
 def test_lines_by_total_station(tmp_path):
     """The page's radii and lean; it leaves out the eccentricity, 0.006 mm at the top."""
     result = run(tmp_path, line_parts())
@@ -456,6 +464,7 @@ def arc_parts(setups=4, seed=None, wide=1.7, control=True):
     return parts
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("control", [True, False])
 def test_set_ups_that_the_wall_alone_ties(tmp_path, control):
     result = run(tmp_path, arc_parts(control=control))
@@ -466,6 +475,7 @@ def test_set_ups_that_the_wall_alone_ties(tmp_path, control):
     assert abs(noisy.table.volume_m3[-1] - volume_of(oval)) < noisy.table.U_m3[-1]
 
 
+@pytest.mark.slow
 def test_untied_set_ups_start_from_certified_distances(tmp_path):
     """A constant of the certificate, such as that of a reflector that was set: the same tank."""
     first = run(tmp_path / "a", arc_parts(seed=3))
@@ -479,6 +489,7 @@ def test_untied_set_ups_start_from_certified_distances(tmp_path):
     assert second.table.U_m3[-1] == pytest.approx(first.table.U_m3[-1], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_the_frame_of_untied_set_ups_is_a_choice(tmp_path):
     """Stations given elsewhere, turned: the same volume and U."""
     parts = arc_parts(seed=3)
@@ -595,6 +606,7 @@ def test_hits_from_the_other_side_are_refused(tmp_path):
     assert problems_of(tmp_path, parts) == [(file, None, column)]
 
 
+@pytest.mark.slow
 def test_a_wrong_strap_is_set_aside(tmp_path):
     parts = strapped(parts_of(tool=NOISY, seed=4))
     parts.registers["instruments"]["TS"]["u_offset_mm"] = 0.3
@@ -607,6 +619,7 @@ def test_a_wrong_strap_is_set_aside(tmp_path):
     assert line in [str(one) for one in lines_set_aside(result, None)]
 
 
+@pytest.mark.slow
 def test_an_offset_of_another_reflector_is_named(tmp_path):
     parts = strapped(parts_of(tool=replace(NOISY, offset_m=0.003), seed=4))
     parts.registers["instruments"]["TS"]["u_offset_mm"] = 0.4

@@ -89,6 +89,7 @@ def as_points(parts, sd_mm=(1.0, 0.7, 0.5), seed=4):
     return parts
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("inside", [False, True])
 def test_lines_beside_hits_agree_on_an_exact_wall(tmp_path, inside):
     """Exact geometry, on either side: nothing is set aside, and the plummet's lean comes out."""
@@ -104,6 +105,7 @@ def test_lines_beside_hits_agree_on_an_exact_wall(tmp_path, inside):
     assert result.read.collimations["ZL"][0] == pytest.approx(KAPPA, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_lines_show_a_course_that_hits_saw_at_one_level(tmp_path):
     """U is less with them, and a taper that no hit saw comes out."""
 
@@ -120,6 +122,7 @@ def test_lines_show_a_course_that_hits_saw_at_one_level(tmp_path):
     assert abs(both.table.volume_m3[-1] - volume_of(cone)) < both.table.U_m3[-1]
 
 
+@pytest.mark.slow
 def test_a_misread_offset_beside_hits_is_named(tmp_path):
     parts = plumbed(parts_of(tool=NOISY, seed=1), sd_m=5e-4)
     parts.tables["offsets"][40][3] += 30.0
@@ -128,6 +131,7 @@ def test_a_misread_offset_beside_hits_is_named(tmp_path):
     assert ("offsets.csv", "offset_mm") in {(one.file, one.column) for one in result.warnings}
 
 
+@pytest.mark.slow
 def test_a_line_read_once_is_controlled_by_nothing(tmp_path):
     """Its constant takes the reading up: it is neither tested nor set aside."""
     parts = plumbed(parts_of(circle, tool=NOISY, seed=1), circle, levels=LEVELS[:1])
@@ -158,6 +162,7 @@ def strapped_above(parts, radius=oval):
     return parts
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("tell", [plumbed, strapped_above])
 def test_one_ring_of_points_serves_where_lines_or_straps_tell_the_rest(tmp_path, tell):
     """Exact geometry: the ring tells the radius, lines or straps all other courses."""
@@ -168,6 +173,7 @@ def test_one_ring_of_points_serves_where_lines_or_straps_tell_the_rest(tmp_path,
     assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=rel)
 
 
+@pytest.mark.slow
 def test_a_lean_that_lines_show_is_no_part_of_an_outline(tmp_path, monkeypatch):
     """Exact geometry: a shell that leans by 2 % has horizontal cuts as large as an upright one."""
     monkeypatch.setitem(globals(), "SLOPE", (0.02, 0.0))
@@ -181,6 +187,7 @@ def test_courses_that_no_line_carries_a_radius_to_are_refused(tmp_path):
     assert {one[0] for one in problems_of(tmp_path, parts)} == {"courses.csv"}
 
 
+@pytest.mark.slow
 def test_the_lean_of_lines_is_that_of_the_points(tmp_path):
     """Exact geometry: both are the slope of the shell."""
     result = run(tmp_path, plumbed(parts_of()))
@@ -190,6 +197,7 @@ def test_the_lean_of_lines_is_that_of_the_points(tmp_path):
     assert not list(check_leans(result.job, result.wall))
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(("azimuth", "cause"), [
     (lambda i: -30 * i % 360, "leans_mirrored"), (lambda i: 30 * (i + 2) % 360, "leans_turned"),
 ])  # fmt: skip
@@ -297,6 +305,7 @@ def dense(result):
     return found, root @ root.T, columns
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("seen", [lambda parts: parts, one_ring])
 def test_points_straps_and_offsets_are_one_dense_adjustment(tmp_path, seen):
     """Second method: estimates and covariances to 1e-9, linearised at the same place."""

@@ -106,6 +106,7 @@ def test_a_plummet_that_nobody_describes(tmp_path):
         wall_of(parts, tmp_path / "one")
 
 
+@pytest.mark.slow
 def test_a_given_collimation_is_weighted_with_both_faces(tmp_path):
     """Second method: the two estimates, by the certificate and by the faces, in their weights."""
     free = wall_of(cones(), tmp_path / "free").collimations["ZL"]
@@ -136,6 +137,7 @@ def test_two_plummets_and_a_misread_first_offset(tmp_path):
     assert found["ZM"][0] == pytest.approx(2 * KAPPA, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_unknowns_that_nothing_binds_are_as_wide_ones(tmp_path):
     """Second method: constants of lines and collimation as inputs of a vast uncertainty."""
     field = wall_of(cones(sd_m=5e-4), tmp_path).field
@@ -157,6 +159,7 @@ def test_unknowns_that_nothing_binds_are_as_wide_ones(tmp_path):
     assert field.shared[1] == pytest.approx(normal[-shared.shape[1] :, -shared.shape[1] :])
 
 
+@pytest.mark.slow
 def test_plates_are_taken_off_once(tmp_path):
     """Lines outside: a thinner plate is a larger inside. Lines inside do not see it at all."""
     for inside, expected in ((False, (0, 1, 0)), (True, (0, 0, 0))):
@@ -171,6 +174,7 @@ def test_plates_are_taken_off_once(tmp_path):
         assert found[1] - found[0] == pytest.approx(5e-4 * np.array(expected), abs=2e-7)
 
 
+@pytest.mark.slow
 def test_lines_inside_share_the_plate_of_the_strapped_course(tmp_path):
     """Differences: all plates thicker by 0.1 mm, with the readings as they are."""
     jobs = []
@@ -290,7 +294,7 @@ def told_of(parts, folder):
     return {one.expected.code for one in result.warnings if one.file not in ("job.toml",)}
 
 
-@pytest.mark.slow(after=3)
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("code", PLANTED)
 def test_planted_errors_are_named(tmp_path, code):
     parts = cones(sd_m=3e-4)
@@ -298,6 +302,7 @@ def test_planted_errors_are_named(tmp_path, code):
     assert code.split()[0] in told_of(parts, tmp_path)
 
 
+@pytest.mark.slow
 def test_a_sound_survey_is_not_doubted(tmp_path):
     assert told_of(cones(sd_m=3e-4), tmp_path) <= {"undeclared"}
 

@@ -53,6 +53,9 @@ def simulated(result, pairs=(), **goal):
     )
 
 
+SLOW_FIXTURES = {"tank", "sphere"}  # seconds each
+
+
 @pytest.fixture(scope="module")
 def sphere(tmp_path_factory):
     """A sphere whose only uncertainty is the height of the dips: 4 mm, normal."""
@@ -144,6 +147,7 @@ def test_student_and_rectangular_inputs_have_their_exact_law(tmp_path, figure):
     assert worst < 0.01
 
 
+@pytest.mark.slow
 def test_a_declared_sd_is_u_of_the_budget_and_sd_of_the_draws(tmp_path):
     """The u of the budget was sd sqrt((dof - 2)/dof), 17.3 for 30 with 3 degrees of freedom."""
     result = run(
@@ -165,6 +169,7 @@ def test_a_declared_sd_is_u_of_the_budget_and_sd_of_the_draws(tmp_path):
     assert top.k == pytest.approx(Z)  # an sd is known: its degrees of freedom are a shape
 
 
+@pytest.mark.slow
 def test_input_of_three_dof_gives_student_interval(tmp_path):
     rows = [("scale", 10000, "ppm", "A", "normal", 3), ("plate_thickness", 0, "mm")]
     result = run(tmp_path / "job", uncertainty=rows, sd_mm=0.05, settings={"table.step_m": 1.0})
@@ -242,6 +247,7 @@ def test_slopes_are_those_of_the_tank_with_its_inputs_moved(tank, figure):
     assert len(tried) >= 3
 
 
+@pytest.mark.slow
 def test_curvature_by_temperature_and_expansion(tmp_path):
     settings = {"survey.shell_temperature_c": 30.0, "table.step_m": 0.1}
     result = run(tmp_path / "job", settings=settings)
@@ -260,6 +266,7 @@ def test_curvature_by_temperature_and_expansion(tmp_path):
         assert column == pytest.approx(exact[pair], rel=2e-3), pair
 
 
+@pytest.mark.slow
 def test_inputs_declared_by_dips_add_no_curvature(tmp_path):
     """Deadwood and roof go with the table's zero: moving it leaves them where the dips are."""
     parts = {
@@ -279,6 +286,7 @@ def test_inputs_declared_by_dips_add_no_curvature(tmp_path):
     assert np.all(found.judged.validated[1:])
 
 
+@pytest.mark.slow
 def test_a_bottom_measured_by_liquid_goes_with_the_dips(tmp_path):
     """Its volumes were measured by dips: above it the zero's error moves the increments alone."""
     volumes = [(0.0, 0.0, 0.0), (0.2, 26.0, 0.02), (0.5, 66.0, 0.02)]
@@ -328,6 +336,7 @@ def test_correlation_leaves_other_inputs_unchanged(tmp_path, r):
     )
 
 
+@pytest.mark.slow
 def test_u_of_a_cauchy_input_is_infinite_in_every_row(tmp_path):
     rows = [("scale", 100.0, "ppm", "A", "normal", 1)]
     settings = {"table.step_m": 0.5, "sphere.diameter_m": 4.0}

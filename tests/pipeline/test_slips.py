@@ -400,6 +400,7 @@ def test_certificate_without_doubts_has_no_doubtful_section(tmp_path):
 # ---- a survey
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     ("kind", "within", "without"),
     [

@@ -79,6 +79,7 @@ def with_span(parts, span_m=10.0, count=None, **tape):
     return parts
 
 
+@pytest.mark.slow
 def test_a_free_span_reaches_the_table(tmp_path):
     """Differences: two spans of 10 m at 60 N take 2 x 0.463 mm off one of two circumferences."""
     plain = result_of(strapped_parts(), tmp_path / "plain")
@@ -162,6 +163,7 @@ def test_a_reading_is_tested_against_all_others(tmp_path):
     assert np.all(np.isfinite(np.delete(w, 4)))
 
 
+@pytest.mark.slow
 def test_a_tape_on_the_shell_expands_with_it(tmp_path):
     """Differences: what a warmer shell does to the volumes, the tape's own expansion in it."""
     jobs = [

@@ -87,6 +87,9 @@ def problems_of(folder, parts):
     return [(one.file, one.row, one.column) for one in error.value.problems]
 
 
+SLOW_FIXTURES = {"noisy"}  # seconds each
+
+
 @pytest.fixture(scope="module")
 def noisy(tmp_path_factory):
     return run(tmp_path_factory.mktemp("noisy") / "job", parts_of())
@@ -190,6 +193,7 @@ def test_compared_tangents_are_not_adjusted(tmp_path):
     assert len(result.accepted) == 112
 
 
+@pytest.mark.slow
 def test_exchanged_limbs_are_told(tmp_path):
     rows = sights(levels=(1.0, 3.0, 5.0, 7.0))
     rows[5]["side"] = "right" if rows[5]["side"] == "left" else "left"

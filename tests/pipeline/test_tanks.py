@@ -255,6 +255,7 @@ def test_without_the_tilt_heights_are_along_the_axis(tmp_path):
     assert found.at(2.0).value_m3 == pytest.approx(PLAN * 2.0, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_heights_expand_only_on_request(tmp_path):
     warm = {"survey.shell_temperature_c": -80.0 + 40.0, "table.height_expansion": True}
     found = inside_cylinder(tmp_path / "job", warm)
@@ -291,6 +292,7 @@ def test_a_centimetre_table_of_a_lying_tank_errs_by_three_litres(tmp_path):
     assert found.straightness.largest_m3 == pytest.approx(0.003, abs=5e-4)  # published: 3 L
 
 
+@pytest.mark.slow
 def test_proportional_parts_go_from_joint_to_joint(tmp_path):
     found = inside_cylinder(tmp_path / "job")
     assert [zone.bottom_m for zone in found.proportional_parts] == pytest.approx(
@@ -348,6 +350,7 @@ def test_a_closed_tank_is_full_at_the_last_whole_millimetre(tmp_path):
     assert found.table.volume_m3[-1] == pytest.approx(np.pi / 6 * 11.9994**3, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_nominal_volume_far_off_is_warned_of(tmp_path):
     found = inside_cylinder(tmp_path / "job", {"tank.nominal_volume_m3": 2000.0})
     assert any("differ by 37 %" in warning.expected for warning in found.warnings)

@@ -117,6 +117,7 @@ def test_a_free_network(plan, figure):
     assert covariance @ columns == pytest.approx(points.covariance_m2 @ columns, abs=1e-13)
 
 
+@pytest.mark.slow
 def test_nominal_places_are_good_enough(figure):
     """The issue's number: within 1 % of the adjustment of the example, with nominal targets on a
     true circle, stations and tapes rounded to 0.1 m and directions to 1 deg."""
@@ -231,6 +232,7 @@ def test_a_bad_point_is_weak_and_a_hidden_one_is_not_determined(plan):
     assert all(np.isfinite(one.sd_m).all() for one in found.weak)
 
 
+@pytest.mark.slow
 def test_more_precise_images_make_the_points_more_precise(plan, prediction):
     """Property: where all readings are twice as good, all sds are halved."""
     halved = replace(
@@ -265,6 +267,7 @@ def test_a_total_station_plan(tmp_path):
     assert ("direction", "") in kinds
 
 
+@pytest.mark.slow
 def test_an_inside_plan(tmp_path):
     """Stations within the tank see the wall all around; nothing is taken off for plates."""
     text = (PLAN / "plan.toml").read_text()

@@ -296,6 +296,7 @@ def test_the_command_line_with_a_bad_plan(changed, capsys):
     assert "limits.relative_u" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_command_line_with_a_limit_that_nothing_meets(changed, capsys, monkeypatch):
     monkeypatch.setattr(helping, "changes_of", lambda *of: ())
     folder = changed(("relative_u = 0.002", "relative_u = 0.0001"))

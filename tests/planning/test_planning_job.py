@@ -28,6 +28,9 @@ from tankcal.report.planning import empty_job
 TWICE = ('name = "V1"\nkind = "vertical"\n', 'name = "V1"\nkind = "vertical"\nreadings = 2\n')
 
 
+SLOW_FIXTURES = {"planned"}  # seconds each
+
+
 @pytest.fixture(scope="module")
 def planned(tmp_path_factory):
     """A prediction whose first tape is read twice, and the folder of its empty job."""

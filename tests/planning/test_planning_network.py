@@ -72,6 +72,7 @@ def test_observed_values_do_not_matter(pair):
     assert other.point_sd_m == pytest.approx(predicted.point_sd_m, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_missing_datum_is_reported_as_by_adjustment():
     _, survey = at_adjusted(PHOTOS)
     bare = replace(survey, observations=survey.observations[1:])

@@ -107,6 +107,7 @@ def test_where_a_camera_points_to(angles):
     assert view_of_rotation(rotation_of_view(*angles)) == pytest.approx(np.array(angles), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_turns_and_rolls_are_those_of_the_plan(tmp_path):
     pairs = ("rolls_deg = [0]", "rolls_deg = [0, 90]\ndirections_deg = [-10, 10]")
     found = predict(load_plan(changed_plan(tmp_path, pairs)))
@@ -125,6 +126,7 @@ def test_kinds_and_lengths_of_tapes(prediction):
     assert listed["H1"]["expected_m"] == pytest.approx(6.9)
 
 
+@pytest.mark.slow
 def test_a_field_sheet_of_set_ups(tmp_path):
     found = predict(load_plan(with_setups(tmp_path)))
     tables = field_tables(found)
@@ -137,6 +139,7 @@ def test_a_field_sheet_of_set_ups(tmp_path):
     assert "Set-ups sighted" in text
 
 
+@pytest.mark.slow
 def test_lines_side_by_side_are_read_down(prediction):
     (block,) = [one.data for one in sheets(PlanPaper(prediction))
                 if one.data.get("caption") == "Lines of targets"]  # fmt: skip

@@ -112,6 +112,7 @@ def test_an_obstacle_takes_rays_and_nothing_else(plan):
     assert (hidden.on_photo[opposite] == free.on_photo[opposite]).all()
 
 
+@pytest.mark.slow
 def test_exposures_from_one_place_are_one_ray(tmp_path):
     """Property: rolled exposures add no ray; what one station alone sees is left out, and told."""
     rolled = ("rolls_deg = [0]", "rolls_deg = [0, 90]")

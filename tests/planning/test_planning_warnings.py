@@ -32,6 +32,7 @@ def told(folder):
     return lines(predict(load_plan(folder)).warnings)
 
 
+@pytest.mark.slow
 def test_plan_gives_the_warnings_of_its_run(prediction):
     """Second method: the chain itself, of the job with the values that the plan computes."""
     measurements = draw_measurements(prediction.plan, prediction.measurements, prediction.predicted)

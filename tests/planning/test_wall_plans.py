@@ -380,6 +380,7 @@ def test_an_even_ring_touches_the_wall_evenly(stations):
     assert evenness_of_limbs(stations, radius, 6.0) == pytest.approx(0.5)
 
 
+@pytest.mark.slow
 def test_limbs_on_the_same_places_are_told(tmp_path):
     """Nine stations at 12.5 m see nine places of this wall, and U is wider than of eight."""
     folder = plan_of(tmp_path / "plan", TANGENTS, ("stations = 8", "stations = 9"))

@@ -15,6 +15,7 @@ def record(example_record):
     return load(example_record)
 
 
+@pytest.mark.slow
 def test_it_is_strict_json_and_comes_back(example_result, tmp_path):
     record = record_of(example_result)
     save(record, tmp_path / "record.json")
@@ -105,6 +106,7 @@ def test_no_path_of_a_machine_is_in_the_record(example_record):
     assert str(ROOT) not in example_record.read_text()
 
 
+@pytest.mark.slow
 def test_undeclared_values_are_stated(tmp_path):
     write_job(tmp_path / "job", uncertainty=[("scale", 20, "ppm")])
     record = record_of(tankcal.run(tankcal.load(tmp_path / "job")))

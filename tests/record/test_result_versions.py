@@ -54,6 +54,7 @@ def test_no_key_of_a_result_comes_or_goes_without_the_version(kind, results):
     assert_is_of_its_schema(result, CAMERA)
 
 
+@pytest.mark.slow
 def test_no_key_of_a_plan_comes_or_goes_without_the_version():
     from plan_folders import PLAN as EXAMPLE
 

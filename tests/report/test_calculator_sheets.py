@@ -16,6 +16,9 @@ from tankcal.text.words import load_words
 pytestmark = pytest.mark.filterwarnings("ignore:.*extension is not supported:UserWarning")
 
 
+SLOW_FIXTURES = {"record", "roofed", "path"}  # seconds each
+
+
 @pytest.fixture(scope="module")
 def record(tmp_path_factory):
     return example_with_rows(0.2, tmp_path_factory.mktemp("example"))[1]

@@ -45,7 +45,7 @@ def test_every_table_of_readings_has_a_sheet(survey, language):
     assert not said & {words["labels"].get(name, "?") for name in IN_THE_OFFICE}
 
 
-@pytest.mark.slow(after=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("survey", OF_SHELLS)
 def test_new_writes_them(tmp_path, survey, capsys):
     assert main(["new", str(tmp_path / "mine"), "--survey", survey]) == 0

@@ -9,6 +9,8 @@ from tankcal.record import record_of
 from tankcal.report.tables import hits
 from tankcal.text.languages import LANGUAGES
 
+SLOW_FIXTURES = {"result", "record"}  # seconds each
+
 
 @pytest.fixture(scope="module")
 def result():

@@ -282,6 +282,7 @@ def test_an_uncertainty_has_two_digits_in_litres_too(paper):
 # ---- the field table
 
 
+@pytest.mark.slow
 def test_the_field_table_has_every_row_without_uncertainty(example_record):
     """What a gauger carries: every row of the table, dips and litres alone, and the zero."""
     found = of_part(paper_blocks(example_record, ("field_table.ipynb",)), "field-table")

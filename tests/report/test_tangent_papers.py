@@ -14,6 +14,9 @@ from tankcal.text.languages import LANGUAGES
 EXAMPLE = Path("examples/tangents")
 
 
+SLOW_FIXTURES = {"result", "record"}  # seconds each
+
+
 @pytest.fixture(scope="module")
 def result():
     return tankcal.run(tankcal.load(EXAMPLE), simulated=False)

@@ -17,6 +17,9 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*extension is not supported:Use
 SAME = 1e-15  # XlsxWriter stores 16 significant digits
 
 
+SLOW_FIXTURES = {"book", "record"}  # seconds each
+
+
 @pytest.fixture(scope="module")
 def record(tmp_path_factory):
     path = write_uncertain_record(tmp_path_factory.mktemp("uncertain"))

@@ -98,6 +98,7 @@ def test_vectors_of_a_job(tmp_path, correlated):
     assert sum(one.redundancy for one in adjustment.readings) == pytest.approx(9, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_wrong_vector_is_found_whole(tmp_path):
     """A blunder of 0.3 m in one component: that vector goes, as a whole, and no other."""
 
@@ -112,6 +113,7 @@ def test_a_wrong_vector_is_found_whole(tmp_path):
     assert {(one.file, one.row) for one in removed} == {("vectors.csv", 4)}
 
 
+@pytest.mark.slow
 def test_blunders_with_correlated_readings(tmp_path):
     """A distance fifty times too long goes; correlated ones of its table stay themselves."""
     length = {one: np.linalg.norm(np.subtract(PLACES[one[1]], PLACES[one[0]])) for one in LINES}

@@ -115,6 +115,7 @@ def test_the_order_of_rows(surveyed, figure):
     assert removed[0] == removed[1]
 
 
+@pytest.mark.slow(after=1)
 def test_the_names_of_points(surveyed):
     measurements, before = surveyed
     names = {name: f"{len(before.names) - i:03d}x" for i, name in enumerate(before.names)}

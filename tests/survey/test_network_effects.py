@@ -56,6 +56,7 @@ def biased(survey, source, row, value, by):
     return replace(survey, observations=tuple(observations))
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("datum", CASES)
 def test_effect_of_an_undetected_blunder(datum, figure):
     """Second method: a hundredth of the bias put in, adjusted again."""

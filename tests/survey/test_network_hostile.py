@@ -68,6 +68,7 @@ def scene(xyz, stations, azimuth, tilt, roll, free=(), control=(), tapes=(), noi
     )
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_plane_at_right_angles_does_not_determine_c(noise):
     """Closed form: a photo of a plane at right angles knows c over the distance only."""
@@ -141,6 +142,7 @@ def test_two_points_of_control_leave_a_rotation_open():
         adjust(survey)
 
 
+@pytest.mark.slow
 def test_a_camera_from_very_far_away():
     """A narrow bundle tells c and distance apart by noise only: no sd of metres is given."""
     far = scene(TANK, FOUR * [1, 200, 1], **LEVEL, free={0}, control=SPREAD)

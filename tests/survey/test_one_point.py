@@ -86,6 +86,7 @@ def test_mixtures_that_fix_a_point(text):
     assert assert_sound(shots_of(text)) == "found"
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     ("text", "told"),
     [
@@ -121,6 +122,7 @@ def test_both_places_are_named_and_an_approximation_decides():
 PLAN_STEP, SPACE_STEP = draws(41, 13), draws(139, 43)  # of the studies
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_some_of_all_combinations(count):
     """Every so many of all combinations; the studies below run more of them."""

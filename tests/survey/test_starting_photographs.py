@@ -118,6 +118,7 @@ def test_control_observations_and_images_are_enough(share):
     assert adjusted.xyz_m == pytest.approx(adjust(survey).xyz_m, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_a_fixed_photo_anchors_the_frame():
     survey, truth = photographed()
     start = unknown(replace(survey, observations=survey.observations[1:]))
@@ -145,6 +146,7 @@ def test_two_points_and_two_heights_are_enough():
     assert found.photos.rotation == pytest.approx(rotation, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_plumb_lines_and_an_azimuth_turn_a_free_piece():
     from test_starting_networks import azimuths, distances
 
@@ -214,6 +216,7 @@ def test_bad_start_values_of_all_photos_are_replaced():
     assert adjust(found).xyz_m == pytest.approx(adjust(survey).xyz_m, abs=1e-7)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("turn_deg", [0, 40, 180])
 def test_nominal_coordinates_in_another_frame_than_control(turn_deg):
     """Nominal places are decimetres off and turned against the control, which decides."""
@@ -336,6 +339,7 @@ def test_large_surveys_start_from_nothing(photos, points, blunders, figure):
     assert np.abs(found.photos.xyz_m - stations).max() < 0.1
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("scale", [1.0, 10.0, 40.0])
 def test_one_oriented_photo_and_a_coordinate_of_another(scale):
     """Simulation: the other photo's x alone says how large all is, whatever unit it comes in."""

@@ -42,6 +42,7 @@ def test_finds_the_truth_without_noise():
     assert np.abs(places(found, truth)).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_same_as_the_network_adjustment(photos, adjustment):
     """Second method: the simulated survey adjusted directly, from its own start values."""
     survey, _ = photographed()
@@ -485,6 +486,7 @@ def test_fixed_and_weighted_orientation_of_photos(photos):
     assert turned[0] == pytest.approx(angles[0], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_second_system_of_control(photos):
     """Simulation: control in a turned and shifted system helps, and its transformation is found."""
     measurements, truth = photos

@@ -73,6 +73,7 @@ def test_quantities_that_depend_on_the_datum(photos):
     assert depends_on_datum(bare, line).all()
 
 
+@pytest.mark.slow
 def test_minimal_takes_control_that_is_far_apart(photos):
     """As many coordinates as the defect; the sds are nowhere near Silva's 1.37 m."""
     found = chosen(photos, "minimal")
@@ -172,6 +173,7 @@ def test_fixed_control_is_held_exactly(photos):
     assert 0.7 < found.sigma0 < 1.3
 
 
+@pytest.mark.slow
 def test_a_coordinate_may_be_unknown_or_approximate(photos):
     """Blank values and blank sds: such coordinates do not act, all others do."""
     xyz, sd = photos.control.xyz_m.copy(), photos.control.sd_m.copy()
@@ -247,6 +249,7 @@ def test_inner_constraints_with_fully_held_control(photos):
     )
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("datum", ["minimal", "fixed_photo"])
 def test_held_control_that_a_datum_releases_is_reported(photos, datum):
     photo = {"fixed_photo": "S0"} if datum == "fixed_photo" else {}

@@ -44,6 +44,7 @@ def test_swapped_x_and_y_of_a_control_point(photos, sd):
     assert "x and y seem to be swapped" in text
 
 
+@pytest.mark.slow
 def test_distances_in_other_units(photos):
     value = photos.readings[0].value * [1, 1, 1, 1000, 1, 1 / 0.3048, 0.1, 1]
     text = told(changed(photos, "distances", value=value))
@@ -82,6 +83,7 @@ def test_a_mirrored_photo(photos, how):
     assert "image_points.csv: photo S2: its image points fit if the image is mirrored" in text
 
 
+@pytest.mark.slow
 def test_a_photo_upside_down_is_a_photo_like_any_other(photos):
     """Property: turned by half a turn it is only another kappa; the answer is the same."""
     images = photos.image_points

@@ -155,6 +155,7 @@ def test_a_search_keeps_what_it_found_when_a_step_fails(photos):
     assert not [str(one) for one in found.warnings if "nothing was set aside" in str(one)]
 
 
+@pytest.mark.slow
 def test_one_bad_reading_of_three_is_found_without_any_other():
     """Closed form: two distances fix a point, each read three times, one of the six 1 m off."""
     xyz = {"A": (0.0, 0.0), "B": (10.0, 0.0), "C": (5.0, 8.0)}
@@ -185,6 +186,7 @@ def test_only_values_that_one_reading_contradicts_are_torn_apart():
     assert np.array_equal(torn[6:9], label[6:9])
 
 
+@pytest.mark.slow
 def test_detectable_bias_of_reading_set_aside(stations):
     """Property: nearly the figure that the sound reading has in the adjustment with it."""
     sound = {(one.file, one.row): one for one in adjust_survey(stations).readings}
@@ -210,6 +212,7 @@ def intersection(stations):
     return adjust_survey(Measurements(control=control, readings=(azimuths,)))
 
 
+@pytest.mark.slow
 def test_wrong_ray_of_three_cannot_be_identified():
     """Closed form: with one redundant ray all three have the same |w|."""
     found = intersection("ABC")
@@ -240,6 +243,7 @@ def test_whatever_may_be_wrong_instead_explains_it_as_well():
     assert not any("may equally be" in str(one) for one in found.warnings)
 
 
+@pytest.mark.slow
 def test_strict_refuses_what_is_in_doubt(tmp_path, capsys):
     """The first of two readings of a line, or the second: nobody knows."""
     (tmp_path / "job.toml").write_text("[adjustment]\n")
@@ -321,6 +325,7 @@ def test_agreeing_reading_is_taken_back(seed):
     assert all(abs(one.w) > 3.29 for one in found.removed)
 
 
+@pytest.mark.slow
 def test_every_held_coordinate_has_a_row_with_its_test(stations):
     """Property: the row of a held coordinate says what adjusting without it says."""
     measurements = held(stations, error_m=0.004)
@@ -405,6 +410,7 @@ def test_every_held_coordinate_that_explains_as_much_is_named(error_m):
     assert named == expected
 
 
+@pytest.mark.slow
 def test_wrong_corner_that_costs_readings_is_questioned():
     text = told(corners(0.2))
     assert text.startswith("the search for blunders would set ")

@@ -181,6 +181,7 @@ def test_excess_over_valleys_is_less_than_that_of_convex_walls():
     assert found[1] < found[0]
 
 
+@pytest.mark.slow
 def test_mean_support_is_the_perimeter_of_the_hull():
     """Second method: Cauchy's formula against the hull of the same outline as a polygon."""
     rng, count = np.random.default_rng(4), 16384

@@ -165,6 +165,9 @@ class Bundle:
         return np.concatenate([camera, np.tile([2e-3] * 6, len(self.photos)), rest])
 
 
+SLOW_FIXTURES = {"camera"}  # seconds each
+
+
 @pytest.fixture(scope="module")
 def camera():
     """Bundle, Adjustment, and its unknowns in the order of the bundle."""

@@ -187,6 +187,7 @@ def test_the_uncertainty_of_the_whole_second_method():
     assert np.sqrt(computed) == pytest.approx(np.sqrt(variance), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_the_noise_is_estimated_where_none_is_given():
     """Simulation: noise of 4 mm on a cone, nothing else."""
     rng = np.random.default_rng(3)
