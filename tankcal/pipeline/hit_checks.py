@@ -143,6 +143,8 @@ def causes_unlike_certificates(wall, told, file="instruments.toml"):
     if not told or (wall.straps is None and not wall.by_inputs):
         return
     for one in told:
+        if not np.isfinite(one.u_before) and one.what == "instrument_offset":
+            yield from _strange_offset(one, file)
         if not np.isfinite(one.u_before) or abs(one.value) <= UNLIKE_SDS * one.u_before:
             continue
         ratio = abs(one.value) / one.u_before
@@ -171,3 +173,19 @@ def causes_unlike_certificates(wall, told, file="instruments.toml"):
                 ),
             )
         yield Problem(file, text, None, f"{one.name}.{key}")
+
+
+def _strange_offset(one, file):
+    """An offset that nobody certified, and that is larger than instruments have."""
+    most = limits_of(RULES)["most_offset_mm"] / 1000
+    if abs(one.value) > most:
+        text = message(
+            "offset_strange",
+            "straps and wall make the offset of {name} {value_mm:+.2f} mm; on a bare wall it is"
+            " seldom more than {most_mm:g} mm: was the constant of a reflector set, is a strap"
+            " misread, or are circumferences those of the inside?",
+            name=one.name,
+            value_mm=1000 * one.value,
+            most_mm=1000 * most,
+        )
+        yield Problem(file, text, None, f"{one.name}.u_offset_mm")

@@ -21,6 +21,8 @@ FILE, RULES = "offsets.csv", "reference_line"
 UNLIKE_SDS = 3.0  # of a collimation, from what its certificate says
 OFF_AXIS_M, OFF_AXIS_SDS = 0.01, 6.0  # of a level's centre, from the straight axis
 OFF_LEVEL_M = 0.003  # of a strap's radius, from the levels of its course
+STEPS_IN, STEPS_IN_SDS = -0.4, 2.0  # of a plate's step that the wall steps in: no build does
+FEWEST_COURSES, LEAST_STEP_M = 4, 1e-3  # whose plates tell that, and by how much these differ
 SCALE_OF_MEDIAN = 1.4826
 CRITICAL_LEAN = 3.72  # of two slopes together: a chi-square of two exceeds it in 0.1 %
 VERTICALS = 1e-4  # m/m: how alike the verticals of a plummet and of the points are, 20"
@@ -310,28 +312,77 @@ def _of_plummets(job):
 
 def _of_straps(job, wall, levels):
     """Straps that the lines contradict: unlike the levels of their course by more than a bulge."""
-    reference = next(one.course for one in job.lines.offsets if one.reference)
-    radii = {}
+    reference = next(one for one in job.lines.offsets if one.reference)
+    risen = {reference.course: [(reference.level_m, 0.0)]}
+    for one in levels:
+        risen.setdefault(one.course, []).append((one.level_m, one.rise_m))
+    zeros = {}  # radius at the reference level, by each strap
     for place, reading in zip(
         wall.straps.adjusted, wall.readings, strict=False
     ):  # straps come first
-        radii.setdefault(wall.reduced[place].strap.course, []).append((reading.radius_m, place))
-    if reference not in radii:
+        strap = wall.reduced[place].strap
+        if strap.course in risen:
+            nearest = min(risen[strap.course], key=lambda one: abs(one[0] - strap.level_m))
+            zeros.setdefault(strap.course, []).append((reading.radius_m - nearest[1], strap))
+    if reference.course not in zeros:
         return
-    zero = np.mean([radius for radius, _ in radii[reference]])
-    for course, those in radii.items():
-        risen = [one.rise_m for one in levels if one.course == course]
-        for radius, place in those if risen and course != reference else ():
-            away = radius - zero - np.mean(risen)
-            if abs(away) > OFF_LEVEL_M:
-                strap = wall.reduced[place].strap
-                text = message(
-                    "strap_against_lines",
-                    "circumference {name!r} gives a radius that is {away_mm:+.1f} mm off what the"
-                    " lines carry up from course {course!r}: is it misread, or is the side of the"
-                    " lines the other one?",
-                    name=strap.name,
-                    away_mm=1000 * away,
-                    course=reference,
-                )
-                yield Problem("circumferences.csv", text, row=strap.row, column="reading_m")
+    own = sorted(zeros.pop(reference.course), key=lambda one: one[0])
+    apart, (first, second) = own[-1][0] - own[0][0], (own[0][1], own[-1][1])
+    if apart > OFF_LEVEL_M and first.name != second.name:  # of repeats another check tells
+        text = message(
+            "straps_apart_by_lines",
+            "circumferences {first!r} and {second!r} of course {course!r} differ by {apart_mm:.1f}"
+            " mm of radius beyond what the lines show between their levels: is one of them misread"
+            " or over an obstruction?",
+            first=first.name,
+            second=second.name,
+            course=reference.course,
+            apart_mm=1000 * apart,
+        )
+        yield Problem("circumferences.csv", text, row=second.row, column="reading_m")
+    zero = np.mean([radius for radius, _ in own])
+    for radius, strap in (one for those in zeros.values() for one in those):
+        if abs(radius - zero) > OFF_LEVEL_M:
+            text = message(
+                "strap_against_lines",
+                "circumference {name!r} gives a radius that is {away_mm:+.1f} mm off what the"
+                " lines carry up from course {course!r}: is it misread, or is the side of the"
+                " lines the other one?",
+                name=strap.name,
+                away_mm=1000 * (radius - zero),
+                course=reference.course,
+            )
+            yield Problem("circumferences.csv", text, row=strap.row, column="reading_m")
+    if not zeros:
+        yield from _of_sign(job, levels)
+
+
+def _of_sign(job, levels):
+    """Lines that make the wall narrower where its plates are thicker: a sign or a side is wrong.
+
+    Seen from outside the wall steps out with its plates, from inside it does not, unless they are
+    flush outside. Nothing else tells the sign where one course alone was strapped.
+    """
+    reference = next(one.course for one in job.lines.offsets if one.reference)
+    rises = {reference: [0.0]}
+    for one in levels:
+        rises.setdefault(one.course, []).append(one.rise_m)
+    known = [one for one in job.courses if one.name in rises]
+    plates = np.array([one.thickness_m + one.paint_m for one in known])
+    if len(known) < FEWEST_COURSES or np.ptp(plates) < LEAST_STEP_M:
+        return
+    risen = np.array([np.mean(rises[one.name]) for one in known])
+    steps = plates - plates.mean()
+    slope = float(risen @ steps / (steps @ steps))
+    left = risen - risen.mean() - slope * steps
+    sd = float(np.sqrt(left @ left / (len(known) - 2) / (steps @ steps)))
+    if slope < STEPS_IN and slope < -STEPS_IN_SDS * sd:
+        text = message(
+            "lines_turned_about",
+            "where the plates are thicker the wall comes out further in ({slope:+.1f} of their"
+            " step, sd {sd:.1f}): was the scale read from its other end, is the sign of the offsets"
+            " or the side of the lines the other one, or are the plates flush outside?",
+            slope=slope,
+            sd=sd,
+        )
+        yield Problem(FILE, text, column="offset_mm")

@@ -1,7 +1,7 @@
 """Warnings of a strapping: what a sound crew on a sound tank hardly brings home.
 
-Causes are named where one fits: courses exchanged, a temperature in Fahrenheit, a reading copied,
-a reading of the inside, a strap that is off by itself.
+Causes are named where one fits: courses exchanged, a reading of the inside, a strap that is off by
+itself. What the tapes and their readings say of themselves: `tape_checks`.
 """
 
 from itertools import combinations, pairwise
@@ -13,11 +13,15 @@ from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import check_side
 from tankcal.pipeline.survey_limits import limit_at
+from tankcal.pipeline.tape_checks import check_tapes
 
 FILE = "circumferences.csv"
-FAHRENHEIT_K = 8.0  # from the shell's: so near a temperature in Fahrenheit is that of the shell
-UNLIKE_K = 20.0  # a tape that is warmer or colder than its shell by more
 NOMINAL_SHARE = 1 / 500  # of the radius: a course that departs by more from the nominal one
+FLUSH, LEAST_STEP_M = (
+    0.5,
+    1e-3,
+)  # of the plate's step that the outside shows; of plates that show it
+NEAR_PLATE, NEAR_PLATE_M = 0.1, 1e-3  # of a plate: so near it is what is missing
 EXCHANGED_SHARE, EXCHANGED_M = 0.5, 1.5e-3  # of the steps between courses: left, and saved
 APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
 
@@ -31,7 +35,7 @@ def check_strapped(job, wall):
     """`Problem`s of a wall that straps alone, or straps and lines, show."""
     straps = wall.straps
     return (
-        *_of_temperatures(job, straps),
+        *check_tapes(job, straps),
         *_of_repeats(straps),
         *_of_pairs(job, straps),
         *_of_courses(job, straps),
@@ -43,7 +47,7 @@ def check_strapped(job, wall):
 def check_straps_beside_points(job, straps):
     """`Problem`s of straps round a wall that points show."""
     return (
-        *_of_temperatures(job, straps),
+        *check_tapes(job, straps),
         *_of_repeats(straps),
         *_of_contradicted(straps),
     )
@@ -83,35 +87,8 @@ def _problem(text, strap=None, column="reading_m"):
     return Problem(FILE, text, row=None if strap is None else strap.row, column=column)
 
 
-def _of_temperatures(job, straps):
-    shell = job.survey.shell_temperature_c
-    for one in straps.reduced:
-        tape = one.strap.temperature_c
-        if tape is None or shell is None or abs(tape - shell) <= UNLIKE_K:
-            continue
-        celsius = (tape - 32) / 1.8
-        if abs(celsius - shell) <= FAHRENHEIT_K:
-            text = message(
-                "tape_in_fahrenheit",
-                "{tape:g} degrees Celsius of the tape, and {shell:g} of the shell: {celsius:.0f}"
-                " would be near it; is it in Fahrenheit?",
-                tape=tape,
-                shell=shell,
-                celsius=celsius,
-            )
-        else:
-            text = message(
-                "tape_unlike_shell",
-                "{tape:g} degrees Celsius of the tape, and {shell:g} of the shell: a tape that"
-                " lies on the shell has its temperature",
-                tape=tape,
-                shell=shell,
-            )
-        yield _problem(text, one.strap, "temperature_c")
-
-
 def _of_repeats(straps):
-    """Repeats that differ by more than they may, and repeats that are equal to the last digit."""
+    """Repeats that differ by more than they may."""
     by_name = {}
     for one in straps.reduced:
         by_name.setdefault(one.strap.name, []).append(one)
@@ -130,25 +107,6 @@ def _of_repeats(straps):
                 limit_mm=1000 * limit,
             )
             yield _problem(text, several[int(np.argmax(found))].strap)
-    copied = _copied([one.strap for one in straps.reduced])
-    for first, second in copied:
-        text = message(
-            "reading_copied",
-            "{reading_m:g} m again, as in row {row}, to the last digit: was it copied?",
-            reading_m=second.reading_m,
-            row=first.row,
-        )
-        yield _problem(text, second)
-
-
-def _copied(straps):
-    """Pairs of readings that are equal to the last digit: of four digits a metre that is rare."""
-    seen, found = {}, []
-    for strap in straps:
-        first = seen.setdefault((strap.reading_m, strap.course), strap)
-        if first is not strap:
-            found.append((first, strap))
-    return found
 
 
 def _of_pairs(job, straps):
@@ -186,7 +144,7 @@ def _of_courses(job, straps):
     inside, names = straps.radius_m - plates, [course.name for course in job.courses]
     nominal = job.tank.nominal_diameter_m / 2
     median = float(np.median(inside))
-    if abs(median - nominal) > NOMINAL_SHARE * nominal:
+    if abs(median - nominal) > NOMINAL_SHARE * nominal or _looks_inside(job, straps, plates):
         if abs(median + np.median(plates) - nominal) < abs(median - nominal) / 4:
             text = message(
                 "circumference_of_inside",
@@ -231,6 +189,25 @@ def _of_courses(job, straps):
                 steps_mm=1000 * steps,
             )
             yield _problem(text, column="course")
+
+
+def _looks_inside(job, straps, plates_m):
+    """Whether the courses are short of the nominal radius by their plates, and no thinner plate
+    makes the outside smaller: circumferences of the inside, or plates that are flush outside. Where
+    one course alone was strapped, or all plates are alike, whether its plate is what is missing.
+    """
+    if job.diameter_is is not None:  # `check_side` looks to the plate
+        return False
+    missing = job.tank.nominal_diameter_m / 2 - (straps.radius_m - plates_m)
+    of_plates = plates_m - plates_m.mean()
+    strapped = {one.strap.course for one in straps.reduced}
+    if len(strapped) < len(plates_m) or np.ptp(plates_m) < LEAST_STEP_M:
+        first = next(i for i, one in enumerate(job.courses) if one.name in strapped)
+        near = max(NEAR_PLATE_M, NEAR_PLATE * plates_m[first])
+        return abs(float(np.median(missing)) - plates_m[first]) < near
+    slope = straps.radius_m @ of_plates / (of_plates @ of_plates)  # 1 where they are flush inside
+    away = float(np.median(missing) - np.median(plates_m))
+    return slope < FLUSH and abs(away) < float(np.median(missing)) / 4
 
 
 def _of_first_course(job, straps):
