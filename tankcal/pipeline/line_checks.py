@@ -7,6 +7,7 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
+from tankcal.pipeline.line_departures import check_lines_apart, check_scale, check_sign
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.survey.reference_line import (
@@ -21,8 +22,6 @@ FILE, RULES = "offsets.csv", "reference_line"
 UNLIKE_SDS = 3.0  # of a collimation, from what its certificate says
 OFF_AXIS_M, OFF_AXIS_SDS = 0.01, 6.0  # of a level's centre, from the straight axis
 OFF_LEVEL_M = 0.003  # of a strap's radius, from the levels of its course
-STEPS_IN, STEPS_IN_SDS = -0.4, 2.0  # of a plate's step that the wall steps in: no build does
-FEWEST_COURSES, LEAST_STEP_M = 4, 1e-3  # whose plates tell that, and by how much these differ
 SCALE_OF_MEDIAN = 1.4826
 CRITICAL_LEAN = 3.72  # of two slopes together: a chi-square of two exceeds it in 0.1 %
 VERTICALS = 1e-4  # m/m: how alike the verticals of a plummet and of the points are, 20"
@@ -57,6 +56,8 @@ def check_lines(job, wall):
         *_set_aside(job, wall),
         *_moved(job),
         *_copied(job),
+        *check_lines_apart(job, wall.collimations),
+        *check_scale(job),
         *_too_few(job, wall),
         *_off_axis(job, levels, lean),
         *_of_scope(job, lean),
@@ -354,35 +355,4 @@ def _of_straps(job, wall, levels):
             )
             yield Problem("circumferences.csv", text, row=strap.row, column="reading_m")
     if not zeros:
-        yield from _of_sign(job, levels)
-
-
-def _of_sign(job, levels):
-    """Lines that make the wall narrower where its plates are thicker: a sign or a side is wrong.
-
-    Seen from outside the wall steps out with its plates, from inside it does not, unless they are
-    flush outside. Nothing else tells the sign where one course alone was strapped.
-    """
-    reference = next(one.course for one in job.lines.offsets if one.reference)
-    rises = {reference: [0.0]}
-    for one in levels:
-        rises.setdefault(one.course, []).append(one.rise_m)
-    known = [one for one in job.courses if one.name in rises]
-    plates = np.array([one.thickness_m + one.paint_m for one in known])
-    if len(known) < FEWEST_COURSES or np.ptp(plates) < LEAST_STEP_M:
-        return
-    risen = np.array([np.mean(rises[one.name]) for one in known])
-    steps = plates - plates.mean()
-    slope = float(risen @ steps / (steps @ steps))
-    left = risen - risen.mean() - slope * steps
-    sd = float(np.sqrt(left @ left / (len(known) - 2) / (steps @ steps)))
-    if slope < STEPS_IN and slope < -STEPS_IN_SDS * sd:
-        text = message(
-            "lines_turned_about",
-            "where the plates are thicker the wall comes out further in ({slope:+.1f} of their"
-            " step, sd {sd:.1f}): was the scale read from its other end, is the sign of the offsets"
-            " or the side of the lines the other one, or are the plates flush outside?",
-            slope=slope,
-            sd=sd,
-        )
-        yield Problem(FILE, text, column="offset_mm")
+        yield from check_sign(job, levels)
