@@ -166,7 +166,10 @@ def test_targets_of_the_wall_beside_hits(tmp_path):
     assert np.flatnonzero(moved.wall.shell.reason != "").tolist() == [len(moved.job.hits) + 1]
     from tankcal.record import record_of
 
-    of_hits = record_of(moved)["hits"]
+    record = record_of(moved)
+    (aside,) = record["rejected"]
+    assert (aside["point"], aside["row"]) == ("B", 3)  # of targets.csv
+    of_hits = record["hits"]
     assert sum(one["hits"] for one in of_hits["setups"]) == len(moved.job.hits)
     assert sum(one["hits"] for one in of_hits["rings"]) == len(moved.job.hits)
 
