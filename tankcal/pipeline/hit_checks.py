@@ -7,7 +7,12 @@ from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.shell import course_of
 from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import noise_of_wall
-from tankcal.pipeline.level_checks import courses_with_few, girth_m, levels_with_few
+from tankcal.pipeline.level_checks import (
+    check_nominal,
+    courses_with_few,
+    girth_m,
+    levels_with_few,
+)
 from tankcal.pipeline.moved_setups import critical_of_setup, moved_setups
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.wall import joints_of
@@ -35,7 +40,8 @@ def check_hits(job, wall, sighting):
         *_of_courses(job, sighting),
         *_of_incidence(sighting),
         *_of_setups(job, wall, sighting),
-        *causes_unlike_certificates(wall, sighting.told),
+        *check_nominal(job, wall, job.hits.file),
+        *causes_unlike_certificates(wall, sighting.told, taken_off_m=sighting.told_m),
     )
 
 
@@ -190,15 +196,17 @@ def _of_setups(job, wall, sighting):
         yield Problem("setups.csv", text, job.hits.setups[name].row, "setup")
 
 
-def causes_unlike_certificates(wall, told, file="instruments.toml"):
+def causes_unlike_certificates(wall, told, file="instruments.toml", *, taken_off_m):
     """Offsets and scales that straps, or hits from the other side, make out to be unlike their
     certificates, which stand in a file.
+
+    taken_off_m  {instrument: offset that was taken off its readings before}, m
     """
     if not told or (wall.straps is None and not wall.by_inputs):
         return
     for one in told:
         if not np.isfinite(one.u_before) and one.what == "instrument_offset":
-            yield from _strange_offset(one, file)
+            yield from _strange_offset(one, taken_off_m.get(one.name, 0.0), file)
         if not np.isfinite(one.u_before) or abs(one.value) <= UNLIKE_SDS * one.u_before:
             continue
         ratio = abs(one.value) / one.u_before
@@ -229,17 +237,18 @@ def causes_unlike_certificates(wall, told, file="instruments.toml"):
         yield Problem(file, text, None, f"{one.name}.{key}")
 
 
-def _strange_offset(one, file):
+def _strange_offset(one, taken_off_m, file):
     """An offset that nobody certified, and that is larger than instruments have."""
     most = limits_of(RULES)["most_offset_mm"] / 1000
-    if abs(one.value) > most:
+    value = one.value + taken_off_m
+    if abs(value) > most:
         text = message(
             "offset_strange",
             "straps and wall make the offset of {name} {value_mm:+.2f} mm; on a bare wall it is"
             " seldom more than {most_mm:g} mm: was the constant of a reflector set, is a strap"
             " misread, or are circumferences those of the inside?",
             name=one.name,
-            value_mm=1000 * one.value,
+            value_mm=1000 * value,
             most_mm=1000 * most,
         )
         yield Problem(file, text, None, f"{one.name}.u_offset_mm")

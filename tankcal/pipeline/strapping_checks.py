@@ -17,11 +17,8 @@ from tankcal.pipeline.tape_checks import check_tapes
 
 FILE = "circumferences.csv"
 NOMINAL_SHARE = 1 / 500  # of the radius: a course that departs by more from the nominal one
-FLUSH, LEAST_STEP_M = (
-    0.5,
-    1e-3,
-)  # of the plate's step that the outside shows; of plates that show it
-NEAR_PLATE, NEAR_PLATE_M = 0.1, 1e-3  # of a plate: so near it is what is missing
+FLUSH, LEAST_STEP_M = 0.5, 1e-3  # of a step of plates that the outside shows; that shows it
+SHORT_BY_PLATES = 0.5, 1.5  # of a plate: so short of the nominal radius
 EXCHANGED_SHARE, EXCHANGED_M = 0.5, 1.5e-3  # of the steps between courses: left, and saved
 APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
 
@@ -144,8 +141,10 @@ def _of_courses(job, straps):
     inside, names = straps.radius_m - plates, [course.name for course in job.courses]
     nominal = job.tank.nominal_diameter_m / 2
     median = float(np.median(inside))
-    if abs(median - nominal) > NOMINAL_SHARE * nominal or _looks_inside(job, straps, plates):
-        if abs(median + np.median(plates) - nominal) < abs(median - nominal) / 4:
+    steps_inside = _steps_inside(job, straps, plates)
+    if abs(median - nominal) > NOMINAL_SHARE * nominal or steps_inside:
+        by_plates = abs(median + np.median(plates) - nominal) < abs(median - nominal) / 4
+        if by_plates or steps_inside:
             text = message(
                 "circumference_of_inside",
                 "the courses come out {miss_mm:+.0f} mm of radius from the nominal one, about"
@@ -191,23 +190,20 @@ def _of_courses(job, straps):
             yield _problem(text, column="course")
 
 
-def _looks_inside(job, straps, plates_m):
-    """Whether the courses are short of the nominal radius by their plates, and no thinner plate
-    makes the outside smaller: circumferences of the inside, or plates that are flush outside. Where
-    one course alone was strapped, or all plates are alike, whether its plate is what is missing.
+def _steps_inside(job, straps, plates_m):
+    """Whether the courses are short of the nominal radius by about their plates, and the outside
+    does not step with these: circumferences of the inside, or plates that are flush outside.
     """
-    if job.diameter_is is not None:  # `check_side` looks to the plate
-        return False
-    missing = job.tank.nominal_diameter_m / 2 - (straps.radius_m - plates_m)
-    of_plates = plates_m - plates_m.mean()
     strapped = {one.strap.course for one in straps.reduced}
     if len(strapped) < len(plates_m) or np.ptp(plates_m) < LEAST_STEP_M:
-        first = next(i for i, one in enumerate(job.courses) if one.name in strapped)
-        near = max(NEAR_PLATE_M, NEAR_PLATE * plates_m[first])
-        return abs(float(np.median(missing)) - plates_m[first]) < near
-    slope = straps.radius_m @ of_plates / (of_plates @ of_plates)  # 1 where they are flush inside
-    away = float(np.median(missing) - np.median(plates_m))
-    return slope < FLUSH and abs(away) < float(np.median(missing)) / 4
+        return False
+    if job.diameter_is is not None:  # `check_side` looks to the plate
+        return False
+    steps = plates_m - plates_m.mean()
+    slope = straps.radius_m @ steps / (steps @ steps)  # 1 where they are flush inside
+    short = job.tank.nominal_diameter_m / 2 - float(np.median(straps.radius_m - plates_m))
+    low, high = SHORT_BY_PLATES
+    return slope < FLUSH and low < short / float(np.median(plates_m)) < high
 
 
 def _of_first_course(job, straps):

@@ -8,7 +8,12 @@ from tankcal.errors import Problem
 from tankcal.geometry.shell import course_of
 from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import noise_of_wall
-from tankcal.pipeline.level_checks import courses_with_few, girth_m, levels_with_few
+from tankcal.pipeline.level_checks import (
+    check_nominal,
+    courses_with_few,
+    girth_m,
+    levels_with_few,
+)
 from tankcal.pipeline.moved_setups import critical_of_setup, moved_setups, tested
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.wall import joints_of
@@ -95,6 +100,7 @@ def check_tangents(job, wall, touching):
         *_of_levels(job, wall),
         *_of_heights(job, touching),
         *_of_setups(job, tests),
+        *check_nominal(job, wall, job.tangents.file),
     )
 
 
