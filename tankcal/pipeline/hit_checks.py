@@ -23,6 +23,7 @@ RULES, CONTROL = "wall_hits", "control_readings.csv"
 UNLIKE_SDS = 3.0  # of an offset or a scale from its certificate, of an angle from its repeat
 OVER_JOINT_M = 0.02  # a hit of a course may lie so far beyond it
 SUSPECT = 3.0  # test quantity of the worst set-up, from which it is tested by all others
+MOVED_M = 4e-3  # of its hits or its station: less looks like the form of the wall
 SHOWN = 5
 GON = FULL_TURN / 400
 
@@ -181,7 +182,8 @@ def _of_setups(job, wall, sighting):
     tests = moved_setups(wall.field, whole, names[at], np.column_stack([turn, normal]), SUSPECT)
     name = max(tests, key=lambda one: tests[one][0])
     w, turned, shift = tests[name]
-    if w > critical_of_setup(len(tests)):
+    moved_m = max(float(np.hypot(*shift)), abs(turned) * float(np.median(np.hypot(*away.T))))
+    if w > critical_of_setup(len(tests)) and moved_m > MOVED_M:
         text = message(
             "hits_of_moved_setup",
             "the hits from set-up {setup!r} contradict all others (w = {w:.1f}), as if its circle"

@@ -15,7 +15,7 @@ FILE, RULES = "offsets.csv", "reference_line"
 STEPS_IN, STEPS_IN_SDS = -0.4, 2.0  # of a plate's step that the wall steps in: no build does
 FEWEST_COURSES, LEAST_STEP_M = 4, 1e-3  # whose plates tell that, and by how much these differ
 FEWEST_LINES = 6  # of which one is told from the others
-APART, APART_M = 4.0, 4e-3  # times the rms of most lines, and at least: a line that is apart
+APART, APART_M = 5.0, 6e-3  # times the rms of most lines, and at least: a line that is apart
 
 
 def check_scale(job):

@@ -19,7 +19,7 @@ FILE = "circumferences.csv"
 NOMINAL_SHARE = 1 / 500  # of the radius: a course that departs by more from the nominal one
 FLUSH, LEAST_STEP_M = 0.5, 1e-3  # of a step of plates that the outside shows; that shows it
 SHORT_BY_PLATES = 0.5, 1.5  # of a plate: so short of the nominal radius
-EXCHANGED_SHARE, EXCHANGED_M = 0.5, 1.5e-3  # of the steps between courses: left, and saved
+EXCHANGED_SHARE, EXCHANGED_M = 0.4, 1.5e-3  # of the steps between courses: left, and saved
 APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
 
 
@@ -170,7 +170,9 @@ def _of_courses(job, straps):
             yield _problem(text, column="course")
     outside, saved = straps.radius_m, []
     steps = _steps(inside)
-    for i, k in combinations(range(len(inside)), 2):
+    strapped = {one.strap.course for one in straps.reduced}
+    both = [i for i, name in enumerate(names) if name in strapped]  # lines tell the others
+    for i, k in combinations(both, 2):
         turned = outside.copy()
         turned[[i, k]] = outside[[k, i]]
         saved.append((_steps(turned - plates), i, k))
