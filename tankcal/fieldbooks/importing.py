@@ -5,6 +5,7 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from tankcal.errors import Problem
 from tankcal.fieldbooks.book import MOST_M, NO_YEAR
 from tankcal.fieldbooks.detection import MAX_BYTES, read_book
 from tankcal.fieldbooks.faces import reduce_faces
@@ -154,8 +155,20 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
     found.paths, standing = write_tables(folder, tables, replace=replace_tables)
     found.summary = summarise(books, chosen, unused, names, stands, reports, (known, stations),
                               standing)  # fmt: skip
-    found.warnings = warn_of(chosen, names, stands, reports)
+    found.warnings = [*_unused_customs(choices, books), *warn_of(chosen, names, stands, reports)]
     return found
+
+
+def _unused_customs(choices, books):
+    """Choices about code blocks that no file has, for none is GSI."""
+    if any(book.format == "gsi" for book in books):
+        return
+    given = (("--codes", choices.codes), ("--station-code", choices.station_code))
+    for option, value in given:
+        if value is not None:
+            text = message("option_of_gsi", "without effect: none of the files is GSI, and other"
+                           " formats say themselves what a code belongs to")  # fmt: skip
+            yield Problem(option, text)
 
 
 def _check_times(choices, log):

@@ -60,7 +60,7 @@ def check_clouds(job, survey, clouded):
         *_of_overlaps(job, clouded),
         *_of_hidden(job, clouded),
         *_of_assumed(job, clouded),
-        *causes_unlike_certificates(survey, clouded.told, FILE),
+        *causes_unlike_certificates(survey, clouded.told, FILE, taken_off_m=clouded.beamed.told_m),
     )
 
 

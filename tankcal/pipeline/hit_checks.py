@@ -6,14 +6,24 @@ from tankcal.errors import Problem
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.shell import course_of
 from tankcal.messages import message
-from tankcal.pipeline.level_checks import courses_with_few, girth_m, levels_with_few
+from tankcal.pipeline.cause_correlations import noise_of_wall
+from tankcal.pipeline.level_checks import (
+    check_nominal,
+    courses_with_few,
+    girth_m,
+    levels_with_few,
+)
+from tankcal.pipeline.moved_setups import critical_of_setup, moved_setups
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.control_drift import repeats_of
+from tankcal.survey.sighting import NETWORK
 
 RULES, CONTROL = "wall_hits", "control_readings.csv"
 UNLIKE_SDS = 3.0  # of an offset or a scale from its certificate, of an angle from its repeat
 OVER_JOINT_M = 0.02  # a hit of a course may lie so far beyond it
+SUSPECT = 3.0  # test quantity of the worst set-up, from which it is tested by all others
+MOVED_M = 4e-3  # of its hits or its station: less looks like the form of the wall
 SHOWN = 5
 GON = FULL_TURN / 400
 
@@ -30,7 +40,9 @@ def check_hits(job, wall, sighting):
         *_of_levels(job, wall),
         *_of_courses(job, sighting),
         *_of_incidence(sighting),
-        *causes_unlike_certificates(wall, sighting.told),
+        *_of_setups(job, wall, sighting),
+        *check_nominal(job, wall, job.hits.file),
+        *causes_unlike_certificates(wall, sighting.told, taken_off_m=sighting.told_m),
     )
 
 
@@ -56,7 +68,7 @@ def _of_control(job):
                 text = message(
                     "control_moved",
                     "set-up {setup!r} reads target {target!r} {apart:+.1f} {unit} from its first"
-                    " reading, over the limit of {limit:g} {unit}: did the instrument move?",
+                    " reading, over the limit of {limit:.3g} {unit}: did the instrument move?",
                     setup=one.setup,
                     target=one.target,
                     apart=values[worst] / per,
@@ -109,15 +121,26 @@ def _of_courses(job, sighting):
         index = names.index(name)
         if not joints[index] - OVER_JOINT_M <= z[place] <= joints[index + 1] + OVER_JOINT_M:
             there = names[int(course_of(z[place], joints))]
+            there = "" if there == name else there  # beyond the bottom or the top
             wrong.setdefault((name, there), []).append(place)
     for (name, there), places in wrong.items():
-        text = message(
-            "hits_of_other_course",
-            "{count} hits are said to be of course {course!r}, but lie at the height of course"
-            " {there!r}: is the name wrong, or bottom_z_m, or the height of the instrument?",
-            count=len(places),
-            course=name,
-            there=there,
+        text = (
+            message(
+                "hits_beyond_ends",
+                "{count} hits are said to be of course {course!r}, but lie beyond the end of the"
+                " shell: is bottom_z_m right, and the height of the instrument?",
+                count=len(places),
+                course=name,
+            )
+            if not there
+            else message(
+                "hits_of_other_course",
+                "{count} hits are said to be of course {course!r}, but lie at the height of course"
+                " {there!r}: is the name wrong, or bottom_z_m, or the height of the instrument?",
+                count=len(places),
+                course=name,
+                there=there,
+            )
         )
         yield Problem(job.hits.file, text, job.hits.rows[places[0]], "course")
 
@@ -136,13 +159,56 @@ def _of_incidence(sighting):
         yield Problem(sighting.points.file, text, sighting.points.rows[flat[0]])
 
 
-def causes_unlike_certificates(wall, told, file="instruments.toml"):
+def _of_setups(job, wall, sighting):
+    """The set-up of a network whose hits contradict those of all others most, where one does.
+
+    Where the wall alone ties set-ups nothing tells that one moved.
+    """
+    names = np.array(job.hits.setup)[~job.hits.check]
+    if len(set(names.tolist())) < 2 or any(one != NETWORK for one in sighting.poses.ties):
+        return
+    order = np.concatenate([one.group.members for one in wall.sections])
+    at = wall.accepted[order]  # of each reading of the field, among the points
+    if len(wall.field.radius_m) - len(wall.readings) != len(at):  # several in a cell
+        return
+    hits = at < len(names)  # targets come after them
+    if not hits.all():
+        return
+    whole = wall.field.covariance_m2 + noise_of_wall(wall) - wall.field.noise_m2
+    counted = np.flatnonzero(~job.hits.check)[at]
+    away = (sighting.points.xyz_m - sighting.poses.xyz_m[sighting.pose])[counted, :2]
+    normal = sighting.normal[counted, :2]
+    turn = normal[:, 0] * away[:, 1] - normal[:, 1] * away[:, 0]
+    tests = moved_setups(wall.field, whole, names[at], np.column_stack([turn, normal]), SUSPECT)
+    name = max(tests, key=lambda one: tests[one][0])
+    w, turned, shift = tests[name]
+    moved_m = max(float(np.hypot(*shift)), abs(turned) * float(np.median(np.hypot(*away.T))))
+    if w > critical_of_setup(len(tests)) and moved_m > MOVED_M:
+        text = message(
+            "hits_of_moved_setup",
+            "the hits from set-up {setup!r} contradict all others (w = {w:.1f}), as if its circle"
+            " were turned by {turn_arcsec:+.0f} seconds of arc, or its station moved by"
+            " {shift_mm:.1f} mm: was it disturbed, has it another zero, or are its hits those of"
+            " another set-up?",
+            setup=name,
+            w=w,
+            turn_arcsec=float(np.degrees(turned) * 3600),
+            shift_mm=1000 * float(np.hypot(*shift)),
+        )
+        yield Problem("setups.csv", text, job.hits.setups[name].row, "setup")
+
+
+def causes_unlike_certificates(wall, told, file="instruments.toml", *, taken_off_m):
     """Offsets and scales that straps, or hits from the other side, make out to be unlike their
     certificates, which stand in a file.
+
+    taken_off_m  {instrument: offset that was taken off its readings before}, m
     """
     if not told or (wall.straps is None and not wall.by_inputs):
         return
     for one in told:
+        if not np.isfinite(one.u_before) and one.what == "instrument_offset":
+            yield from _strange_offset(one, taken_off_m.get(one.name, 0.0), file)
         if not np.isfinite(one.u_before) or abs(one.value) <= UNLIKE_SDS * one.u_before:
             continue
         ratio = abs(one.value) / one.u_before
@@ -171,3 +237,20 @@ def causes_unlike_certificates(wall, told, file="instruments.toml"):
                 ),
             )
         yield Problem(file, text, None, f"{one.name}.{key}")
+
+
+def _strange_offset(one, taken_off_m, file):
+    """An offset that nobody certified, and that is larger than instruments have."""
+    most = limits_of(RULES)["most_offset_mm"] / 1000
+    value = one.value + taken_off_m
+    if abs(value) > most:
+        text = message(
+            "offset_strange",
+            "straps and wall make the offset of {name} {value_mm:+.2f} mm; on a bare wall it is"
+            " seldom more than {most_mm:g} mm: was the constant of a reflector set, is a strap"
+            " misread, or are circumferences those of the inside?",
+            name=one.name,
+            value_mm=1000 * value,
+            most_mm=1000 * most,
+        )
+        yield Problem(file, text, None, f"{one.name}.u_offset_mm")

@@ -2,9 +2,13 @@
 
 import numpy as np
 
-from tankcal.messages import list_some
+from tankcal.errors import Problem
+from tankcal.job.plausibility import DIAMETER_MISS, MIDDLE, OUTSIDE
+from tankcal.messages import list_some, message
+from tankcal.pipeline.wall_straps import mean_radii
 
 SHOWN = 5  # names in a message
+NOMINAL_SHARE = 1 / 500  # of the radius: a shell that departs by more from the nominal one
 
 
 def levels_with_few(wall, least):
@@ -34,3 +38,23 @@ def courses_with_few(job, wall, least, *, slopes_count=False):
 def girth_m(job):
     """Nominal circumference, by which a level asks for so many hits or tangents."""
     return np.pi * job.tank.nominal_diameter_m
+
+
+def check_nominal(job, wall, file):
+    """`Problem`s of a shell that is not as large as on its drawing, in hits or tangents of a file.
+
+    An offset or a scale that nothing else controls goes into the radius, and shows here alone.
+    """
+    plates = np.array([one.thickness_m + one.paint_m for one in job.courses])
+    inside = mean_radii(wall.field) - plates * (job.survey.side == "outside")
+    drawn = {MIDDLE: 0.5, OUTSIDE: 1.0}.get(job.diameter_is, 0.0) * plates[0]
+    nominal = job.tank.nominal_diameter_m / 2
+    miss = float(np.median(inside)) - (nominal - drawn)
+    if NOMINAL_SHARE * nominal < abs(miss) <= DIAMETER_MISS * nominal:  # more: another check tells
+        text = message(
+            "wall_unlike_nominal",
+            "the courses come out {miss_mm:+.0f} mm of radius from the nominal one: is the offset"
+            " or the scale of the instrument wrong, or the length of the bar?",
+            miss_mm=1000 * miss,
+        )
+        yield Problem(file, text)

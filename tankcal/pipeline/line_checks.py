@@ -7,6 +7,7 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
+from tankcal.pipeline.line_departures import check_lines_apart, check_scale, check_sign
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.survey.reference_line import (
@@ -55,6 +56,8 @@ def check_lines(job, wall):
         *_set_aside(job, wall),
         *_moved(job),
         *_copied(job),
+        *check_lines_apart(job, wall.collimations),
+        *check_scale(job),
         *_too_few(job, wall),
         *_off_axis(job, levels, lean),
         *_of_scope(job, lean),
@@ -310,28 +313,46 @@ def _of_plummets(job):
 
 def _of_straps(job, wall, levels):
     """Straps that the lines contradict: unlike the levels of their course by more than a bulge."""
-    reference = next(one.course for one in job.lines.offsets if one.reference)
-    radii = {}
+    reference = next(one for one in job.lines.offsets if one.reference)
+    risen = {reference.course: [(reference.level_m, 0.0)]}
+    for one in levels:
+        risen.setdefault(one.course, []).append((one.level_m, one.rise_m))
+    zeros = {}  # radius at the reference level, by each strap
     for place, reading in zip(
         wall.straps.adjusted, wall.readings, strict=False
     ):  # straps come first
-        radii.setdefault(wall.reduced[place].strap.course, []).append((reading.radius_m, place))
-    if reference not in radii:
+        strap = wall.reduced[place].strap
+        if strap.course in risen:
+            nearest = min(risen[strap.course], key=lambda one: abs(one[0] - strap.level_m))
+            zeros.setdefault(strap.course, []).append((reading.radius_m - nearest[1], strap))
+    if reference.course not in zeros:
         return
-    zero = np.mean([radius for radius, _ in radii[reference]])
-    for course, those in radii.items():
-        risen = [one.rise_m for one in levels if one.course == course]
-        for radius, place in those if risen and course != reference else ():
-            away = radius - zero - np.mean(risen)
-            if abs(away) > OFF_LEVEL_M:
-                strap = wall.reduced[place].strap
-                text = message(
-                    "strap_against_lines",
-                    "circumference {name!r} gives a radius that is {away_mm:+.1f} mm off what the"
-                    " lines carry up from course {course!r}: is it misread, or is the side of the"
-                    " lines the other one?",
-                    name=strap.name,
-                    away_mm=1000 * away,
-                    course=reference,
-                )
-                yield Problem("circumferences.csv", text, row=strap.row, column="reading_m")
+    own = sorted(zeros.pop(reference.course), key=lambda one: one[0])
+    apart, (first, second) = own[-1][0] - own[0][0], (own[0][1], own[-1][1])
+    if apart > OFF_LEVEL_M and first.name != second.name:  # of repeats another check tells
+        text = message(
+            "straps_apart_by_lines",
+            "circumferences {first!r} and {second!r} of course {course!r} differ by {apart_mm:.1f}"
+            " mm of radius beyond what the lines show between their levels: is one of them misread"
+            " or over an obstruction?",
+            first=first.name,
+            second=second.name,
+            course=reference.course,
+            apart_mm=1000 * apart,
+        )
+        yield Problem("circumferences.csv", text, row=second.row, column="reading_m")
+    zero = np.mean([radius for radius, _ in own])
+    for radius, strap in (one for those in zeros.values() for one in those):
+        if abs(radius - zero) > OFF_LEVEL_M:
+            text = message(
+                "strap_against_lines",
+                "circumference {name!r} gives a radius that is {away_mm:+.1f} mm off what the"
+                " lines carry up from course {course!r}: is it misread, or is the side of the"
+                " lines the other one?",
+                name=strap.name,
+                away_mm=1000 * (radius - zero),
+                course=reference.course,
+            )
+            yield Problem("circumferences.csv", text, row=strap.row, column="reading_m")
+    if not zeros:
+        yield from check_sign(job, levels)

@@ -54,7 +54,8 @@ def refuse_misread(tangents, poses, nominal_m):
             for factor in (GON_IN_DEG, DEG_IN_GON, BACKWARDS)
         }
         best = min(tried, key=tried.get)
-        if np.isfinite(tried[best]) and not tried[best] > CLOSER * before:
+        most = CLOSER * before if np.isfinite(before) else LEAST * nominal_m
+        if np.isfinite(tried[best]) and not tried[best] > most:
             row = tangents.rows[tangents.setup.index(name)] if tangents.rows else None
             problems.append(Problem(tangents.file, _text(best), row, "direction"))
     if problems:

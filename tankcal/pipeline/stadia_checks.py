@@ -9,6 +9,7 @@ from tankcal.messages import message
 from tankcal.pipeline.survey_limits import limits_of
 
 KIND = "stadia"  # of an instrument
+UNLIKE_SDS = 3.0  # of the difference of two readings of a base
 
 
 def check_bases(measurements):
@@ -24,13 +25,13 @@ def check_bases(measurements):
             if name in bars:
                 key = tuple(sorted((table.start[i], table.end[i])))
                 row = table.rows[i] if table.rows else None
-                reading = table.start[i], float(table.value[i]), row, table.file
+                reading = table.start[i], float(table.value[i]), row, table.file, float(table.sd[i])
                 bases.setdefault(key, []).append(reading)
     return tuple(chain.from_iterable(_of_base(*item) for item in bases.items()))
 
 
 def _of_base(ends, readings):
-    starts, lengths, rows, files = zip(*readings, strict=True)
+    starts, lengths, rows, files, sds = zip(*readings, strict=True)
     if len(set(starts)) < 2:
         text = message(
             "base_from_one_end",
@@ -40,13 +41,14 @@ def _of_base(ends, readings):
             second=ends[1],
         )
         yield Problem(files[0], text, rows[0], "to")
-    limit, spread = limits_of("tangents")["base_mm"] / 1000, float(np.ptp(lengths))
+    scatter = UNLIKE_SDS * np.sqrt(2) * float(np.median(sds))  # of long bases more than the limit
+    limit, spread = max(limits_of("tangents")["base_mm"] / 1000, scatter), float(np.ptp(lengths))
     if spread > limit * (1 + 1e-9):
         worst = int(np.argmax(np.abs(np.array(lengths) - np.median(lengths))))
         text = message(
             "base_differs",
             "the base {first} to {second} comes out {spread_mm:.1f} mm apart, over the limit of"
-            " {limit_mm:g} mm: did the stadia or the theodolite move, or is an angle wrong?",
+            " {limit_mm:.2g} mm: did the stadia or the theodolite move, or is an angle wrong?",
             first=ends[0],
             second=ends[1],
             spread_mm=1000 * spread,

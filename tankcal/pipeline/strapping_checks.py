@@ -1,7 +1,7 @@
 """Warnings of a strapping: what a sound crew on a sound tank hardly brings home.
 
-Causes are named where one fits: courses exchanged, a temperature in Fahrenheit, a reading copied,
-a reading of the inside, a strap that is off by itself.
+Causes are named where one fits: courses exchanged, a reading of the inside, a strap that is off by
+itself. What the tapes and their readings say of themselves: `tape_checks`.
 """
 
 from itertools import combinations, pairwise
@@ -13,12 +13,13 @@ from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import check_side
 from tankcal.pipeline.survey_limits import limit_at
+from tankcal.pipeline.tape_checks import check_tapes
 
 FILE = "circumferences.csv"
-FAHRENHEIT_K = 8.0  # from the shell's: so near a temperature in Fahrenheit is that of the shell
-UNLIKE_K = 20.0  # a tape that is warmer or colder than its shell by more
 NOMINAL_SHARE = 1 / 500  # of the radius: a course that departs by more from the nominal one
-EXCHANGED_SHARE, EXCHANGED_M = 0.5, 1.5e-3  # of the steps between courses: left, and saved
+FLUSH, LEAST_STEP_M = 0.5, 1e-3  # of a step of plates that the outside shows; that shows it
+SHORT_BY_PLATES = 0.5, 1.5  # of a plate: so short of the nominal radius
+EXCHANGED_SHARE, EXCHANGED_M = 0.4, 1.5e-3  # of the steps between courses: left, and saved
 APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
 
 
@@ -31,7 +32,7 @@ def check_strapped(job, wall):
     """`Problem`s of a wall that straps alone, or straps and lines, show."""
     straps = wall.straps
     return (
-        *_of_temperatures(job, straps),
+        *check_tapes(job, straps),
         *_of_repeats(straps),
         *_of_pairs(job, straps),
         *_of_courses(job, straps),
@@ -43,7 +44,7 @@ def check_strapped(job, wall):
 def check_straps_beside_points(job, straps):
     """`Problem`s of straps round a wall that points show."""
     return (
-        *_of_temperatures(job, straps),
+        *check_tapes(job, straps),
         *_of_repeats(straps),
         *_of_contradicted(straps),
     )
@@ -83,35 +84,8 @@ def _problem(text, strap=None, column="reading_m"):
     return Problem(FILE, text, row=None if strap is None else strap.row, column=column)
 
 
-def _of_temperatures(job, straps):
-    shell = job.survey.shell_temperature_c
-    for one in straps.reduced:
-        tape = one.strap.temperature_c
-        if tape is None or shell is None or abs(tape - shell) <= UNLIKE_K:
-            continue
-        celsius = (tape - 32) / 1.8
-        if abs(celsius - shell) <= FAHRENHEIT_K:
-            text = message(
-                "tape_in_fahrenheit",
-                "{tape:g} degrees Celsius of the tape, and {shell:g} of the shell: {celsius:.0f}"
-                " would be near it; is it in Fahrenheit?",
-                tape=tape,
-                shell=shell,
-                celsius=celsius,
-            )
-        else:
-            text = message(
-                "tape_unlike_shell",
-                "{tape:g} degrees Celsius of the tape, and {shell:g} of the shell: a tape that"
-                " lies on the shell has its temperature",
-                tape=tape,
-                shell=shell,
-            )
-        yield _problem(text, one.strap, "temperature_c")
-
-
 def _of_repeats(straps):
-    """Repeats that differ by more than they may, and repeats that are equal to the last digit."""
+    """Repeats that differ by more than they may."""
     by_name = {}
     for one in straps.reduced:
         by_name.setdefault(one.strap.name, []).append(one)
@@ -130,25 +104,6 @@ def _of_repeats(straps):
                 limit_mm=1000 * limit,
             )
             yield _problem(text, several[int(np.argmax(found))].strap)
-    copied = _copied([one.strap for one in straps.reduced])
-    for first, second in copied:
-        text = message(
-            "reading_copied",
-            "{reading_m:g} m again, as in row {row}, to the last digit: was it copied?",
-            reading_m=second.reading_m,
-            row=first.row,
-        )
-        yield _problem(text, second)
-
-
-def _copied(straps):
-    """Pairs of readings that are equal to the last digit: of four digits a metre that is rare."""
-    seen, found = {}, []
-    for strap in straps:
-        first = seen.setdefault((strap.reading_m, strap.course), strap)
-        if first is not strap:
-            found.append((first, strap))
-    return found
 
 
 def _of_pairs(job, straps):
@@ -186,8 +141,10 @@ def _of_courses(job, straps):
     inside, names = straps.radius_m - plates, [course.name for course in job.courses]
     nominal = job.tank.nominal_diameter_m / 2
     median = float(np.median(inside))
-    if abs(median - nominal) > NOMINAL_SHARE * nominal:
-        if abs(median + np.median(plates) - nominal) < abs(median - nominal) / 4:
+    steps_inside = _steps_inside(job, straps, plates)
+    if abs(median - nominal) > NOMINAL_SHARE * nominal or steps_inside:
+        by_plates = abs(median + np.median(plates) - nominal) < abs(median - nominal) / 4
+        if by_plates or steps_inside:
             text = message(
                 "circumference_of_inside",
                 "the courses come out {miss_mm:+.0f} mm of radius from the nominal one, about"
@@ -213,7 +170,9 @@ def _of_courses(job, straps):
             yield _problem(text, column="course")
     outside, saved = straps.radius_m, []
     steps = _steps(inside)
-    for i, k in combinations(range(len(inside)), 2):
+    strapped = {one.strap.course for one in straps.reduced}
+    both = [i for i, name in enumerate(names) if name in strapped]  # lines tell the others
+    for i, k in combinations(both, 2):
         turned = outside.copy()
         turned[[i, k]] = outside[[k, i]]
         saved.append((_steps(turned - plates), i, k))
@@ -231,6 +190,22 @@ def _of_courses(job, straps):
                 steps_mm=1000 * steps,
             )
             yield _problem(text, column="course")
+
+
+def _steps_inside(job, straps, plates_m):
+    """Whether the courses are short of the nominal radius by about their plates, and the outside
+    does not step with these: circumferences of the inside, or plates that are flush outside.
+    """
+    strapped = {one.strap.course for one in straps.reduced}
+    if len(strapped) < len(plates_m) or np.ptp(plates_m) < LEAST_STEP_M:
+        return False
+    if job.diameter_is is not None:  # `check_side` looks to the plate
+        return False
+    steps = plates_m - plates_m.mean()
+    slope = straps.radius_m @ steps / (steps @ steps)  # 1 where they are flush inside
+    short = job.tank.nominal_diameter_m / 2 - float(np.median(straps.radius_m - plates_m))
+    low, high = SHORT_BY_PLATES
+    return slope < FLUSH and low < short / float(np.median(plates_m)) < high
 
 
 def _of_first_course(job, straps):

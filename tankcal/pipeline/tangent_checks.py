@@ -1,24 +1,25 @@
 """How tangents agree with the wall and with each other, and what is to be said about it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
 
 from tankcal.errors import Problem
-from tankcal.geometry.field.amplitudes import estimate_amplitudes
-from tankcal.geometry.field.blunders import restricted_precision
-from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.shell import course_of
 from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import noise_of_wall
-from tankcal.pipeline.level_checks import courses_with_few, girth_m, levels_with_few
+from tankcal.pipeline.level_checks import (
+    check_nominal,
+    courses_with_few,
+    girth_m,
+    levels_with_few,
+)
+from tankcal.pipeline.moved_setups import critical_of_setup, moved_setups, tested
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.network.reliability import noncentrality
 
 RULES = "tangents"
-ALPHA = 0.001  # of the test of a set-up, over the number of set-ups
 SHOWN = 5
 SUSPECT = 2.0  # test quantity of the worst set-up, from which it is tested by all others
 MANY_LEVELS = 0.5  # of them, off: it is the heights as a whole
@@ -42,7 +43,7 @@ class TangentTests:
     mdb_m : ndarray, shape (n,)
         Smallest blunder of the tangent's distance that the test finds; nan: no test was made.
     setups : dict
-        {set-up: (w of a disturbed set-up, its turn rad, or its shift (2,) m)}.
+        {set-up: (w of a disturbed set-up, its turn rad, or its shift (2,) m)} (`moved_setups`).
     """
 
     used: np.ndarray
@@ -73,70 +74,23 @@ def judge_tangents(job, wall, touching):
     at = counted[wall.accepted[order]]  # of each reading of the field, among all sights
     field = wall.field
     whole = field.covariance_m2 + noise_of_wall(wall) - field.noise_m2
-    precision, pull = _tested(field, whole, sites)
+    precision, pull = tested(field, whole, sites)
     weight = np.maximum(np.diag(precision), 1e-300)
     departure[at], w[at] = pull / weight, pull / np.sqrt(weight)
     own = (job.tangents.sd_rad * touching.length_m) ** 2 + touching.excess[2] ** 2
     redundancy[at] = np.clip(own[at] * weight, 0, 1)
     mdb[at] = noncentrality() / np.sqrt(weight)
-    names = np.array(job.tangents.setup)[at]
-    setups = {
-        name: _as_if_moved(touching, at, names == name, precision, pull)
-        for name in dict.fromkeys(job.tangents.setup)
-        if np.any(names == name)
-    }
-    suspect = max(setups, key=lambda one: setups[one][0])
-    if setups[suspect][0] > SUSPECT:
-        mine = names == suspect
-        other = _without(field, whole - field.covariance_m2, mine)
-        if other is not None:
-            setups[suspect] = _as_if_moved(touching, at, mine, *_tested(field, other, sites))
+    setups = moved_setups(
+        field, whole, np.array(job.tangents.setup)[at], _columns(touching, at), SUSPECT
+    )
     return TangentTests(used, departure, w, redundancy, mdb, setups)
 
 
-def _tested(field, whole, count):
-    """P and P y of the first readings of a field (`field.blunders`)."""
-    precision = restricted_precision(whole, free_design(field.sites)[0])
-    pull = precision @ (field.radius_m - field.radius_m.mean())
-    return precision[:count, :count], pull[:count]
-
-
-def _without(field, more_m2, mine):
-    """Covariance of the readings with amplitudes that those of a set-up do not tell; None: the
-    others tell nothing.
-
-    A set-up that was moved looks like a form of the wall, if it is asked itself how large that is.
-    """
-    keep = np.ones(len(field.radius_m), dtype=bool)
-    keep[: len(mine)] = ~mine
-    noise = (field.noise_m2 + more_m2)[np.ix_(keep, keep)]
-    if len(np.unique(field.sites.course[keep])) < len(np.unique(field.sites.course)):
-        return None
-    known = estimate_amplitudes(
-        field.sites.take(keep), field.radius_m[keep], noise, field.nominal_m
-    )
-    return replace(field, amplitudes=known).covariance_m2 + more_m2
-
-
-def _as_if_moved(touching, at, mine, precision, pull):
-    """(w, turn, shift) of a set-up whose readings are mine: of all that may move at once, and of
-    its circle, or its station, alone.
-    """
+def _columns(touching, at):
+    """(k, 3) derivative of tangents by the turn of the circle and the shift of the station."""
     f = touching.normal_rad[at]
     length = np.where(touching.seen_right[at], 1.0, -1.0) * touching.length_m[at]
-    columns = np.column_stack([length, np.sin(f), np.cos(f)]) * mine[:, None]
-    scale = np.maximum(np.abs(columns).max(axis=0), 1e-9)
-    columns = columns / scale
-    normal, right = columns.T @ precision @ columns, columns.T @ pull
-    statistic = float(right @ np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ right)
-    turn = right[0] / max(normal[0, 0], 1e-300) / scale[0]
-    shift = np.linalg.pinv(normal[1:, 1:], rcond=1e-6, hermitian=True) @ right[1:] / scale[1:]
-    return np.sqrt(max(statistic, 0.0)), float(turn), tuple(shift.tolist())
-
-
-def critical_of_setup(count):
-    """Test quantity from which one of so many set-ups counts as disturbed."""
-    return float(np.sqrt(chdtri(3, ALPHA / max(count, 1))))
+    return np.column_stack([length, np.sin(f), np.cos(f)])
 
 
 def check_tangents(job, wall, touching):
@@ -146,6 +100,7 @@ def check_tangents(job, wall, touching):
         *_of_levels(job, wall),
         *_of_heights(job, touching),
         *_of_setups(job, tests),
+        *check_nominal(job, wall, job.tangents.file),
     )
 
 

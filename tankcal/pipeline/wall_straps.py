@@ -36,6 +36,7 @@ from tankcal.survey.network.reliability import noncentrality
 from tankcal.survey.reference_line import courses_told
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 
+FEWEST_CIRCUMFERENCES = 3  # where they alone tell an offset: of two nobody knows which is wrong
 MOST_OF_RING = 200  # points of a ring that are asked what the wall looks like
 
 
@@ -252,7 +253,8 @@ def _joined_field(job, points, readings, amplitudes, heights):
     }
     noise = scipy.linalg.block_diag(points.noise_m2, noise_of(readings))
     noise += noise_by_inputs(job.inputs, columns, n + k)
-    may = [job.snooping and (is_bound or one.of == "offsets") for one in readings]
+    straps_may = is_bound or _circumferences(job) >= FEWEST_CIRCUMFERENCES
+    may = [job.snooping and (straps_may or one.of == "offsets") for one in readings]
     may_go = np.append(np.zeros(n), may)
 
     apart = points.unbound.first_apart
@@ -275,6 +277,13 @@ def _joined_field(job, points, readings, amplitudes, heights):
     field, tested = settle_readings(field, field_of, (both, radius, noise), may_go)
     parts = (tested.accepted, tested.departure_m, tested.w, tested.sd_m)
     return field, Tested(*(one[n:] for one in parts)), readings
+
+
+def _circumferences(job):
+    """How many were strapped and count; repeats are one."""
+    if job.strapping is None:
+        return 0
+    return len({one.name for one in job.strapping.straps if not one.check})
 
 
 def _straps_of(job, read, taped, inner_m):

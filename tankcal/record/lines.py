@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
-from tankcal.pipeline.line_checks import levels_and_lean
+from tankcal.pipeline.line_checks import compare_leans, levels_and_lean
 from tankcal.record.schema import Saved, key
 from tankcal.survey.reference_line import collimation_by_faces
 
@@ -72,6 +72,13 @@ class LinesRecord(Saved):
     lean_y: float | None = key("the same towards +y")
     lean_azimuth_rad: float | None = key("where it leans to, clockwise from +y")
     lean_sd: float | None = key("standard uncertainty of both, by the scatter of the centres")
+    points_lean_x: float | None = key(
+        "lean that points beside the lines show, towards +x; null: none do", default=None
+    )
+    points_lean_y: float | None = key("the same towards +y", default=None)
+    lean_w: float | None = key(
+        "length of the difference of both leans over its standard deviation", default=None
+    )
 
 
 def lines_of(result):
@@ -82,6 +89,7 @@ def lines_of(result):
     offsets = _offsets(result)
     levels, lean = levels_and_lean(result.job, result.read)
     names = [course.name for course in result.job.courses]
+    test = None if result.wall is None else compare_leans(lean, result.wall.shell)
     return LinesRecord(
         offsets=offsets,
         lines=_lines(given, offsets),
@@ -104,6 +112,9 @@ def lines_of(result):
         lean_y=lean.y,
         lean_azimuth_rad=np.arctan2(lean.x, lean.y) % FULL_TURN,
         lean_sd=lean.sd,
+        points_lean_x=None if test is None else float(test.of_points[0]),
+        points_lean_y=None if test is None else float(test.of_points[1]),
+        lean_w=None if test is None else test.w,
     )
 
 

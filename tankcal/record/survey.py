@@ -219,12 +219,20 @@ def rejected_of(result):
         w, reason = residual_m / result.scan.noise_m, ["far_off"] * len(points.names)
     else:
         return []
+    of_targets = _rows_of_targets(result.job)
     return [
         RejectedPoint(
-            points.names[i], *points.xyz_m[i], residual_m[i], w[i], reason[i], points.rows[i]
+            points.names[i], *points.xyz_m[i], residual_m[i], w[i], reason[i],
+            of_targets.get(points.names[i]) if points.rows[i] is None else points.rows[i],
         )
         for i in found
-    ]
+    ]  # fmt: skip
+
+
+def _rows_of_targets(job):
+    """{target: row of targets.csv}; beside hits their rows are none of the hits' file."""
+    given = None if job.measurements is None else job.measurements.targets
+    return {} if given is None else dict(zip(given.point, given.rows, strict=False))
 
 
 def sections_of(result):

@@ -275,3 +275,13 @@ def test_spoilt_field_books_are_told(tmp_path):
 @pytest.mark.study
 def test_very_many_spoilt_field_books(tmp_path):
     assert_told(tmp_path, range(1000, 1000 + MANY))
+
+
+@pytest.mark.parametrize(("name", "is_told"), [("rw5", True), ("gsi", False)])
+def test_choices_about_code_blocks_are_told_where_no_file_has_them(tmp_path, name, is_told):
+    path = tmp_path / "book"
+    path.write_text(WRITERS[name](one_stand()))
+    choices = Choices(codes="before", station_code="21")
+    found = import_fieldbooks([path], tmp_path / "out", choices)
+    told = [one.file for one in found.warnings if one.expected.code == "option_of_gsi"]
+    assert told == (["--codes", "--station-code"] if is_told else [])

@@ -107,5 +107,5 @@ def test_the_excess_of_generated_walls_is_within_its_standard_uncertainty(tmp_pa
     held = [np.mean(one < 1.96) for one in away]
     figure("the same over its standard uncertainty, rms", f"{parts[0]:.2f} {parts[1]:.2f}")
     figure("the same, held", f"{held[0]:.2f} {held[1]:.2f}")
-    assert parts[0] < 0.8 * parts[1]  # 1 but for single seams narrower than the points are apart
+    assert parts[0] < 1.8  # 1 but for single seams narrower than the points are apart
     assert held[0] >= max(0.85, held[1])

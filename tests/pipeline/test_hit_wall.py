@@ -169,7 +169,10 @@ def test_targets_of_the_wall_beside_hits(tmp_path):
     assert np.flatnonzero(moved.wall.shell.reason != "").tolist() == [len(moved.job.hits) + 1]
     from tankcal.record import record_of
 
-    of_hits = record_of(moved)["hits"]
+    record = record_of(moved)
+    (aside,) = record["rejected"]
+    assert (aside["point"], aside["row"]) == ("B", 3)  # of targets.csv
+    of_hits = record["hits"]
     assert sum(one["hits"] for one in of_hits["setups"]) == len(moved.job.hits)
     assert sum(one["hits"] for one in of_hits["rings"]) == len(moved.job.hits)
 
@@ -225,6 +228,40 @@ def test_hits_after_the_network_are_named_points_in_it(tmp_path, beside):
     assert shares == {"instrument_offset", "instrument_scale"}
     for cause, twin in zip(one.causes, other.causes, strict=True):
         np.testing.assert_allclose(turns @ cause.column_m, twin.column_m, atol=1e-12)
+
+
+def told_codes(result):
+    return {one.expected.code for one in result.warnings}
+
+
+def test_an_offset_of_no_bare_wall_is_told(tmp_path):
+    """The constant of a reflector: the straps tell it, and the table is right all the same."""
+    for offset_m, is_told in ((0.0344, True), (0.002, False)):
+        parts = strapped(parts_of(tool=Tool(offset_m=offset_m)))
+        del parts.registers["instruments"]["TS"]["u_offset_mm"]
+        result = run(tmp_path / str(offset_m), parts)
+        assert ("offset_strange" in told_codes(result)) == is_told
+        assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=2e-5)
+
+
+def test_a_wall_unlike_the_nominal_one_is_told(tmp_path):
+    """Nothing else shows an offset that was declared: 1 in 500 of the radius is 13 mm."""
+    for offset_m, is_told in ((0.0344, True), (0.002, False)):
+        result = run(tmp_path / str(offset_m), parts_of(tool=Tool(offset_m=offset_m)))
+        assert ("wall_unlike_nominal" in told_codes(result)) == is_told
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 0.5])
+def test_a_set_up_whose_circle_was_turned_before_its_hits_is_named(tmp_path, turn_deg):
+    """Two set-ups: that one of them moved is told, either may be it."""
+    parts = tied_parts(np.random.default_rng(4))
+    header, *rows = parts.tables["wall_hits"]
+    setup, direction = header.index("setup"), header.index("direction_deg")
+    for row in rows:
+        row[direction] = (row[direction] + turn_deg * (row[setup] == "II")) % 360
+    told = [one for one in run(tmp_path, parts).warnings if one.column == "setup"]
+    named = [(one.file, one.expected.code) for one in told]
+    assert named == ([("setups.csv", "hits_of_moved_setup")] if turn_deg else [])
 
 
 @pytest.mark.slow

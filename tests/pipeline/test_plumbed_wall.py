@@ -271,6 +271,29 @@ def other_side(parts):
         row[1] = "inside"
 
 
+def other_sign(parts):
+    """Plates as thick as the outside steps: the inside is a cylinder."""
+    for row, outer in zip(parts.tables["courses"][1:], RADII, strict=True):
+        row[2] = 1000 * (outer - RADII[-1]) + 5.0
+    for row in rows_of(parts):
+        row[3] = -row[3]
+
+
+def other_end_of_one(parts):
+    for row in rows_of(parts):
+        row[3] = 500 - row[3] if row[0] == "L4" else row[3]
+
+
+def centimetres(parts):
+    for row in rows_of(parts):
+        row[3] /= 10
+
+
+def misread_by_a_decimetre(parts):
+    """All readings of the strap at the other level of the strapped course."""
+    parts.tables["circumferences"].append(["1c", "1", 0.9, 2 * np.pi * RADII[0] + 0.1, 0.3, "T-12"])
+
+
 def nothing(parts):
     pass
 
@@ -285,6 +308,10 @@ PLANTED = {
     "collimation_unlike_certificate": certified,
     "strap_against_lines": strapped_above,
     "strap_against_lines by side": other_side,
+    "lines_turned_about": other_sign,
+    "line_apart": other_end_of_one,
+    "offsets_small": centimetres,
+    "straps_apart_by_lines": misread_by_a_decimetre,
     "too_small_for_lines": lambda parts: parts.settings.update({"tank.nominal_diameter_m": 7.9}),
 }
 

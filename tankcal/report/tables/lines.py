@@ -72,3 +72,15 @@ PLUMMETS = Table(
         for one in record["lines"]["plummets"]
     ],
 )  # fmt: skip
+
+
+def lean_of_points(paper):
+    """Facts, [(label, text)]: the lean that points beside the lines show, and the test of both."""
+    record = paper.record["lines"]
+    if record.get("lean_w") is None:  # nor of records that were saved before it was kept
+        return []
+    leans = [
+        (key, paper.number(record[key], "mm/m", decimals=2))
+        for key in ("points_lean_x", "points_lean_y")
+    ]
+    return [*leans, ("lean_w", paper.number(record["lean_w"], decimals=1))]

@@ -1,0 +1,98 @@
+"""Set-ups that were disturbed after the network: tested by the form that all others show.
+
+A circle that was turned, or a station that was moved, changes all sights of a set-up to a wall
+together, and no single one departs from its neighbours. With P the precision of the readings y of
+the wall, without what is free, and A their derivative by the turn and the shift of a set-up,
+
+    s = (A' P A)^-1 A' P y,     w^2 = s' A' P A s,  a chi-square of three where nothing moved.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import chdtri
+
+from tankcal.geometry.field.amplitudes import estimate_amplitudes
+from tankcal.geometry.field.blunders import restricted_precision
+from tankcal.geometry.field.sites import free_design
+
+ALPHA = 0.001  # of the test of a set-up, over the number of set-ups
+
+
+def moved_setups(field, whole, names, columns, suspect_from):
+    """How much each set-up looks as if it had moved.
+
+    Parameters
+    ----------
+    field : WallField
+        Its first readings are those of set-ups.
+    whole : ndarray, shape (n, n)
+        Covariance of its readings, of the wall and their own.
+    names : ndarray of str, shape (k,)
+        Set-ups of the first k readings.
+    columns : ndarray, shape (k, 3)
+        Derivative of these by the turn of the set-up's circle, rad, and its shift in x and y, m.
+    suspect_from : float
+        Test quantity of the worst set-up, from which it is tested by all others alone.
+
+    Returns
+    -------
+    dict
+        {set-up: (w, its turn alone rad, its shift alone (2,) m)}.
+    """
+    count = len(names)
+    precision, pull = tested(field, whole, count)
+    found = {
+        name: _as_if_moved(columns, names == name, precision, pull)
+        for name in dict.fromkeys(names.tolist())
+    }
+    suspect = max(found, key=lambda one: found[one][0])
+    if found[suspect][0] > suspect_from:
+        mine = names == suspect
+        other = _without(field, whole - field.covariance_m2, mine)
+        if other is not None:
+            found[suspect] = _as_if_moved(columns, mine, *tested(field, other, count))
+    return found
+
+
+def tested(field, whole, count):
+    """P and P y of the first readings of a field (`field.blunders`)."""
+    precision = restricted_precision(whole, free_design(field.sites)[0])
+    pull = precision @ (field.radius_m - field.radius_m.mean())
+    return precision[:count, :count], pull[:count]
+
+
+def _without(field, more_m2, mine):
+    """Covariance of the readings with amplitudes that those of a set-up do not tell; None: the
+    others tell nothing.
+
+    A set-up that was moved looks like a form of the wall, if it is asked itself how large that is.
+    """
+    keep = np.ones(len(field.radius_m), dtype=bool)
+    keep[: len(mine)] = ~mine
+    noise = (field.noise_m2 + more_m2)[np.ix_(keep, keep)]
+    if len(np.unique(field.sites.course[keep])) < len(np.unique(field.sites.course)):
+        return None
+    known = estimate_amplitudes(
+        field.sites.take(keep), field.radius_m[keep], noise, field.nominal_m
+    )
+    return replace(field, amplitudes=known).covariance_m2 + more_m2
+
+
+def _as_if_moved(columns, mine, precision, pull):
+    """(w, turn, shift) of a set-up whose readings are mine: of all that may move at once, and of
+    its circle, or its station, alone.
+    """
+    columns = columns * mine[:, None]
+    scale = np.maximum(np.abs(columns).max(axis=0), 1e-9)
+    columns = columns / scale
+    normal, right = columns.T @ precision @ columns, columns.T @ pull
+    statistic = float(right @ np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ right)
+    turn = right[0] / max(normal[0, 0], 1e-300) / scale[0]
+    shift = np.linalg.pinv(normal[1:, 1:], rcond=1e-6, hermitian=True) @ right[1:] / scale[1:]
+    return np.sqrt(max(statistic, 0.0)), float(turn), tuple(shift.tolist())
+
+
+def critical_of_setup(count):
+    """Test quantity from which one of so many set-ups counts as disturbed."""
+    return float(np.sqrt(chdtri(3, ALPHA / max(count, 1))))

@@ -1,0 +1,216 @@
+"""Warnings of tapes and of how they were read: units, certificates, readings that were copied."""
+
+from itertools import combinations
+
+import numpy as np
+from scipy.special import erf
+from scipy.stats import binom, poisson
+
+from tankcal.errors import Problem
+from tankcal.messages import message
+
+FILE, TAPES = "circumferences.csv", "instruments.toml"
+FAHRENHEIT_K = 8.0  # from the shell's: so near a temperature in Fahrenheit is that of the shell
+UNLIKE_K = 20.0  # a tape that is warmer or colder than its shell by more
+CERTIFIED_C = (0.0, 40.0)  # temperatures that certificates are for
+PULL = 2.0  # a pull so many times that of the certificate, or one part in so many of it
+UNITS_N = {"kgf": 9.80665, "lbf": 4.4482216}
+THICKNESS_M = (5e-5, 1.2e-3)  # of tapes
+STIFFNESS_N = (1e5, 5e6)  # of tapes: 0.5 to 25 mm2 of steel
+LARGEST_CORRECTION = 5e-4
+BY_CHANCE = 0.02  # as many equal repeats, or more, so rarely come by chance
+
+
+def check_tapes(job, straps):
+    """`Problem`s of the tapes of a strapping and of their readings, whatever the wall is."""
+    return (
+        *_of_temperatures(job, straps),
+        *_of_pulls(straps),
+        *_of_certificates(straps),
+        *_of_copies([one.strap for one in straps.reduced]),
+    )
+
+
+def _of_temperatures(job, straps):
+    shell = job.survey.shell_temperature_c
+    for one in straps.reduced:
+        tape = one.strap.temperature_c
+        if tape is None or shell is None or abs(tape - shell) <= UNLIKE_K:
+            continue
+        celsius = (tape - 32) / 1.8
+        if abs(celsius - shell) <= FAHRENHEIT_K:
+            text = message(
+                "tape_in_fahrenheit",
+                "{tape:g} degrees Celsius of the tape, and {shell:g} of the shell: {celsius:.0f}"
+                " would be near it; is it in Fahrenheit?",
+                tape=tape,
+                shell=shell,
+                celsius=celsius,
+            )
+        else:
+            text = message(
+                "tape_unlike_shell",
+                "{tape:g} degrees Celsius of the tape, and {shell:g} of the shell: a tape that"
+                " lies on the shell has its temperature",
+                tape=tape,
+                shell=shell,
+            )
+        yield Problem(FILE, text, one.strap.row, "temperature_c")
+
+
+def _of_pulls(straps):
+    """Pulls that are no multiple of that of the certificate that a crew would choose: one line for
+    each tape and pull.
+    """
+    certified, seen = {tape.name: tape.tension_n for tape, _ in straps.tapes}, set()
+    for one in straps.reduced:
+        pull, of_tape = one.strap.tension_n, certified.get(one.strap.tape)
+        if not (pull and of_tape) or 1 / PULL <= pull / of_tape <= PULL:
+            continue
+        if (one.strap.tape, pull) in seen:
+            continue
+        seen.add((one.strap.tape, pull))
+        text = message(
+            "pull_unlike_certificate",
+            "{pull_n:g} N, and {certified_n:g} N in the certificate of {tape!r}: is one of them in"
+            " {units}?",
+            pull_n=pull,
+            certified_n=of_tape,
+            tape=one.strap.tape,
+            units=_units_near(pull, of_tape),
+        )
+        yield Problem(FILE, text, one.strap.row, "tension_n")
+
+
+def _units_near(first_n, second_n):
+    """Names of the units in which the smaller of two forces would be like the larger."""
+    low, high = sorted((first_n, second_n))
+    near = [name for name, size in UNITS_N.items() if 1 / PULL <= size * low / high <= PULL]
+    return " / ".join(near or UNITS_N)
+
+
+def _of_certificates(straps):
+    """What no tape is: its certified temperature, thickness, section, and correction."""
+    for tape, _ in straps.tapes:
+        temperature = tape.temperature_c
+        if temperature is not None and not _within(temperature, CERTIFIED_C):
+            celsius = (temperature - 32) / 1.8
+            text = message(
+                "certified_temperature_strange",
+                "{found:g} degrees Celsius; certificates are for {low:g} to {high:g} ({celsius:.0f}"
+                " if it is in Fahrenheit)",
+                found=temperature,
+                low=CERTIFIED_C[0],
+                high=CERTIFIED_C[1],
+                celsius=celsius,
+            )
+            yield Problem(TAPES, text, column=f"{tape.name}.certified_temperature_c")
+        if not _within(tape.thickness_m, THICKNESS_M):
+            text = message(
+                "tape_thickness_strange",
+                "{found_mm:g} mm; tapes are {low_mm:g} to {high_mm:g} mm thick",
+                found_mm=1000 * tape.thickness_m,
+                low_mm=1000 * THICKNESS_M[0],
+                high_mm=1000 * THICKNESS_M[1],
+            )
+            yield Problem(TAPES, text, column=f"{tape.name}.thickness_mm")
+        if np.isfinite(tape.stiffness_n) and not _within(tape.stiffness_n, STIFFNESS_N):
+            text = message(
+                "tape_stiffness_strange",
+                "section_mm2 times e_gpa: 50 N stretch this tape by {found:.0f} ppm, others by"
+                " {low:.0f} to {high:.0f} ppm",
+                found=5e7 / tape.stiffness_n,
+                low=5e7 / STIFFNESS_N[1],
+                high=5e7 / STIFFNESS_N[0],
+            )
+            yield Problem(TAPES, text, column=f"{tape.name}.section_mm2")
+        if abs(tape.correction) > LARGEST_CORRECTION:
+            text = message(
+                "tape_correction_strange",
+                "{found_ppm:+.0f} ppm; no sound tape is off by more than {most_ppm:.0f} ppm: it is"
+                " a number, not a percentage or millimetres",
+                found_ppm=1e6 * tape.correction,
+                most_ppm=1e6 * LARGEST_CORRECTION,
+            )
+            yield Problem(TAPES, text, column=f"{tape.name}.correction")
+
+
+def _within(value, limits):
+    return limits[0] <= value <= limits[1]
+
+
+def _of_copies(straps):
+    """Readings equal to the last digit, more of them than chance makes: of one circumference, or
+    all readings of a circumference those of another one.
+    """
+    by_name, digit = {}, _digit_m(straps)
+    for strap in straps:
+        by_name.setdefault(strap.name, []).append(strap)
+    again, chances = [], []
+    for several in by_name.values():
+        for place, strap in enumerate(several[1:], 1):
+            equal = [one for one in several[:place] if one.reading_m == strap.reading_m]
+            again += [(equal[0], strap)] if equal else []
+            chances.append(min(1.0, place * chance_of_equal(strap.sd_m, digit)))
+    if again and binom.sf(len(again) - 1, len(chances), np.mean(chances)) < BY_CHANCE:
+        yield from (_copied(*pair) for pair in again)
+    yield from _of_copied_circumferences(tuple(by_name.values()), digit)
+
+
+def _of_copied_circumferences(read, digit_m):
+    """Circumferences (lists of straps) whose readings are all those of another one.
+
+    Of a single reading only those of its own course are compared.
+    """
+    girths = [each[0].reading_m for each in read]
+    near = chance_of_equal(max(np.std(girths), digit_m), digit_m)
+    found, expected = [], 0.0
+    for first, second in combinations(read, 2):
+        if len(first) != len(second):
+            continue
+        if len(first) == 1 and first[0].course != second[0].course:
+            continue
+        expected += near * np.prod([chance_of_equal(one.sd_m, digit_m) for one in first[1:]])
+        if [one.reading_m for one in first] == [one.reading_m for one in second]:
+            found.append(_copied(first[0], second[0]))
+    if found and poisson.sf(len(found) - 1, expected) < BY_CHANCE:
+        yield from found
+
+
+def chance_of_equal(sd_m, digit_m):
+    """Probability that two readings of this standard deviation are equal once they are rounded.
+
+    Parameters
+    ----------
+    sd_m, digit_m : float
+        Of one reading; to which it is rounded.
+
+    Returns
+    -------
+    float
+        The mean of max(0, 1 - abs(d) / digit) over their normal differences d.
+
+    Examples
+    --------
+    >>> round(chance_of_equal(0.5e-3, 0.1e-3), 3), round(chance_of_equal(0.5e-3, 1e-3), 2)
+    (0.056, 0.49)
+    """
+    reach = digit_m / (np.sqrt(2) * sd_m)
+    falls = np.sqrt(2 / np.pi) / reach * -np.expm1(-(reach**2) / 2)
+    return float(erf(reach / np.sqrt(2)) - falls)
+
+
+def _digit_m(straps):
+    """The last digit that a crew wrote."""
+    most = max(len(f"{one.reading_m:.6f}".rstrip("0").partition(".")[2]) for one in straps)
+    return 10.0**-most
+
+
+def _copied(first, second):
+    text = message(
+        "reading_copied",
+        "{reading_m:g} m again, as in row {row}, to the last digit: was it copied?",
+        reading_m=second.reading_m,
+        row=first.row,
+    )
+    return Problem(FILE, text, second.row, "reading_m")
