@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtri
 
+from tankcal.adjust import noncentrality
 from tankcal.errors import Problem
 from tankcal.geometry.field.amplitudes import estimate_amplitudes
 from tankcal.geometry.field.blunders import restricted_precision
@@ -15,7 +16,6 @@ from tankcal.pipeline.cause_correlations import noise_of_wall
 from tankcal.pipeline.level_checks import courses_with_few, girth_m, levels_with_few
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.wall import joints_of
-from tankcal.survey.network.reliability import noncentrality
 
 RULES = "tangents"
 ALPHA = 0.001  # of the test of a set-up, over the number of set-ups
