@@ -42,7 +42,7 @@ class Meter:
     flow_min_m3_h: float | None = None
     flow_max_m3_h: float | None = None
     factor_after: float | None = None
-    row: int | None = None
+    row: int | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
@@ -95,6 +95,9 @@ class Metering:
         Standard uncertainty of expansion_per_k.
     u_temperature_c : float
         Standard deviation of one temperature.
+    u_radius_m : float or None
+        Of an upright tank that liquid alone tells: standard deviation of each course's radius from
+        half the nominal diameter; None: without a nominal diameter.
     file : str
         Of the rows, for messages.
     meters_file : str
@@ -125,6 +128,7 @@ class Metering:
     certified: str = "joint"
     u_expansion_per_k: float = 0.0
     u_temperature_c: float = 0.0
+    u_radius_m: float | None = None
     file: str = field(default="liquid.csv", compare=False)
     meters_file: str = field(default="meters.toml", compare=False)
 
