@@ -14,6 +14,8 @@ from tankcal.messages import message
 from tankcal.pipeline.cloud_passes import Reading
 from tankcal.pipeline.cloud_wall import Clouded
 from tankcal.pipeline.corrections import Correction, corrections_of
+from tankcal.pipeline.liquid import LiquidResult, measure_by_liquid
+from tankcal.pipeline.liquid_geometry import filled_with
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
@@ -79,6 +81,8 @@ class Result:
         Tangents as points of the wall, and where they were sighted from.
     clouded : cloud_wall.Clouded or None
         Clouds as points of the wall: their scans, cells and what hides the wall.
+    liquid : liquid.LiquidResult or None
+        What metered runs say of the tank, beside its geometry.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -134,6 +138,7 @@ class Result:
     sighting: Sighting | None = None
     touching: Touching | None = None
     clouded: Clouded | None = None
+    liquid: LiquidResult | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -341,7 +346,11 @@ def _run(job, progress, part_progress, simulated, reading):
     found = find_survey(job, progress, reading=reading)
     job, survey, adjustment = found.job, found.survey, found.adjustment
     wall = survey if isinstance(survey, Wall) else None
-    made = compute_table(job, survey, progress)
+    measured = None
+    if job.liquid is not None:
+        progress(message("adjusting_liquid", "adjusting the runs by liquid with the geometry"))
+        measured = measure_by_liquid(job, survey)
+    made = compute_table(job, survey, progress, measured and measured.body)
     body, zero, table = made.body, made.zero_m, made.table
     progress(message("stating", "stating volumes and deliveries"))
     stated = statements(job, table, made.straightness.largest_m3)
@@ -353,6 +362,7 @@ def _run(job, progress, part_progress, simulated, reading):
         pairs = pairs_to_simulate(stated, job, body, table)
         simulation = simulate_table(job, survey, body, zero, table, pairs, progress=part_progress)
         intervals = simulation.intervals(table)
+    liquid = measured and measured.result(made.levels_m)
     return Result(
         job=job,
         wall=wall,
@@ -363,7 +373,7 @@ def _run(job, progress, part_progress, simulated, reading):
         straightness=made.straightness,
         proportional_parts=_parts(job, made, intervals.U_m3),
         corrections=corrections_of(job, survey, made.over_m),
-        by_density=_by_density(job, survey, made.levels_m, zero),
+        by_density=_by_density(job, survey, made.levels_m, zero, measured),
         stated=stated,
         simulation=simulation,
         intervals=intervals,
@@ -376,6 +386,7 @@ def _run(job, progress, part_progress, simulated, reading):
         sighting=found.sighting,
         touching=found.touching,
         clouded=found.clouded,
+        liquid=liquid,
     )
 
 
@@ -468,18 +479,15 @@ def _parts(job, made, U_m3):
     return proportional_parts(made.volume_m3, edges, spec.step_m, PARTS, bound_m3)
 
 
-def _by_density(job, survey, levels, zero_m):
+def _by_density(job, survey, levels, zero_m, measured):
     """The same rows for each further density of the liquid: another head, another draught."""
     found = {}
     for density in job.table.other_densities_kg_m3:
-        filled = _filled_with(job, density)
-        body = body_of(filled, survey, uncertain=False)
+        filled = filled_with(job, density)
+        if measured is None:
+            body = body_of(filled, survey, uncertain=False)
+        else:
+            body = measured.body_for(density)
         found[density] = body.volume_m3(levels)
         refuse_falling(filled, body, zero_m, levels - zero_m, found[density])
     return found
-
-
-def _filled_with(job, density):
-    """The job of a tank that holds another liquid, in which its floating roof floats."""
-    roof = job.roof and replace(job.roof, reference_density_kg_m3=density)
-    return replace(job, table=replace(job.table, liquid_density_kg_m3=density), roof=roof)

@@ -1,0 +1,374 @@
+"""Calibration by liquid in a job: its steps, what they say of the tank, and which body is printed.
+
+measured = measure_by_liquid(job, survey)     None: nothing was metered
+measured.body                                  the one that the table is made of
+result = measured.result(levels_m)             `LiquidResult`, beside the rows of the table
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import gammaincc
+
+from tankcal.adjust import noncentrality
+from tankcal.pipeline.liquid_adjustment import (
+    BOTTOM,
+    FLEX,
+    RUNS,
+    LiquidFound,
+    adjust_liquid,
+)
+from tankcal.pipeline.liquid_alone import filled_range_m, geometry_alone, geometry_beside
+from tankcal.pipeline.liquid_body import join_body
+from tankcal.pipeline.liquid_geometry import filled_with
+from tankcal.pipeline.liquid_naming import alternatives_of
+from tankcal.pipeline.liquid_tables import BesideTable, beside_table, or_none
+from tankcal.pipeline.tanks import body_of, zero_height
+from tankcal.tank.body import Body
+from tankcal.tank.liquid import Verdict, name_causes
+from tankcal.tank.liquid.readings import batch_sd_m3
+
+
+@dataclass(frozen=True)
+class LiquidSteps:
+    """Steps between dips that count, (n,) each; volumes in m3.
+
+    Attributes
+    ----------
+    row : ndarray of int
+        Row of the input at its end.
+    run, meter : tuple of str
+    from_dip_m, to_dip_m : ndarray
+        nan: from the empty tank.
+    indicated_m3, by_factor_m3, by_meter_temperature_m3, by_shell_m3, by_tank_temperature_m3,
+    by_head_m3 : ndarray
+        As the meter showed it, and what brings it to the reference: the table's temperature and its
+        liquid.
+    reference_m3 : ndarray
+        Their sum.
+    misclosure_m3, misclosure_sd_m3, misclosure_w : ndarray
+        Liquid less geometry before the adjustment, its standard deviation, and their ratio.
+    residual_m3, sd_m3, redundancy, w : ndarray
+        Of the batch in the joint adjustment: what is left of it, its standard deviation before,
+        which part of an error shows, and the test of it.
+    detectable_m3 : ndarray
+        Smallest error of the batch that the test would show; inf: none.
+    """
+
+    row: np.ndarray
+    run: tuple
+    meter: tuple
+    from_dip_m: np.ndarray
+    to_dip_m: np.ndarray
+    indicated_m3: np.ndarray
+    by_factor_m3: np.ndarray
+    by_meter_temperature_m3: np.ndarray
+    by_shell_m3: np.ndarray
+    by_tank_temperature_m3: np.ndarray
+    by_head_m3: np.ndarray
+    reference_m3: np.ndarray
+    misclosure_m3: np.ndarray
+    misclosure_sd_m3: np.ndarray
+    misclosure_w: np.ndarray
+    residual_m3: np.ndarray
+    sd_m3: np.ndarray
+    redundancy: np.ndarray
+    w: np.ndarray
+    detectable_m3: np.ndarray
+
+
+@dataclass(frozen=True)
+class LiquidDips:
+    """Dips that count, (d,) each: row, run, dip, residual, sd before, redundancy, w."""
+
+    row: np.ndarray
+    run: tuple
+    dip_m: np.ndarray
+    residual_m: np.ndarray
+    sd_m: np.ndarray
+    redundancy: np.ndarray
+    w: np.ndarray
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its standard uncertainty, before and after."""
+
+    name: str
+    before: float
+    u_before: float
+    after: float
+    u_after: float
+
+
+@dataclass(frozen=True)
+class LiquidResult:
+    """What metered runs and geometry say of a tank.
+
+    Attributes
+    ----------
+    certified : {"joint", "liquid", "geometry"}
+        Whose table is printed.
+    steps : LiquidSteps
+    dips : LiquidDips
+    runs : tuple of Estimate
+        The effect of each run, relative.
+    run_sd, run_dof : float or None
+        Of the run effect, with its degrees of freedom (inf: declared); None: there is none.
+    factors : tuple of Estimate
+        Of each meter.
+    bottom_flex : Estimate or None
+        m3 per metre of head.
+    bottom_m3 : Estimate or None
+        The volume below the first dip beyond geometry's; None: geometry says it.
+    sizes : tuple of Estimate
+        Inputs of the geometry that liquid moved, in SI.
+    chi2, dof, probability : float
+        Of all misclosures together, and the probability of a larger one.
+    detectable_radius_m : float or None
+        Smallest offset of all radii that the liquid would have shown; None: it has no meaning.
+    causes : tuple of Verdict
+        Of misclosures, the likeliest first; those with `is_named` are told.
+    filled_m : tuple of (float, float)
+        Lowest and highest dip that counts.
+    tables : dict of {str: BesideTable}
+        "geometry", "liquid" (None where liquid alone does not tell the tank) and "joint".
+    """
+
+    certified: str
+    steps: LiquidSteps
+    dips: LiquidDips
+    runs: tuple[Estimate, ...]
+    run_sd: float | None
+    run_dof: float | None
+    factors: tuple[Estimate, ...]
+    bottom_flex: Estimate | None
+    bottom_m3: Estimate | None
+    sizes: tuple[Estimate, ...]
+    chi2: float
+    dof: int
+    probability: float
+    detectable_radius_m: float | None
+    causes: tuple[Verdict, ...]
+    filled_m: tuple[float, float]
+    tables: dict[str, BesideTable]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A tank that liquid measured, before its table is made.
+
+    Attributes
+    ----------
+    job : Job
+    survey : object
+    joint : LiquidFound
+    alone : LiquidFound or None
+        None where liquid alone does not tell the tank.
+    body : Body
+        Of the table that is printed.
+    """
+
+    job: object
+    survey: object
+    joint: LiquidFound
+    alone: LiquidFound | None
+    body: Body
+
+    def body_for(self, density_kg_m3):
+        """The same for another liquid of the table."""
+        if self.job.liquid.certified == "geometry":
+            return body_of(filled_with(self.job, density_kg_m3), self.survey)
+        return join_body(self._printed.known, density_kg_m3)
+
+    @property
+    def _printed(self):
+        return self.alone if self.job.liquid.certified == "liquid" else self.joint
+
+    def result(self, levels_m):
+        """`LiquidResult` beside the rows of a table."""
+        return _result(self, np.asarray(levels_m, dtype=float))
+
+
+def measure_by_liquid(job, survey):
+    """`Measured` tank of a job; None where nothing was metered.
+
+    Raises
+    ------
+    InputError, SolutionError
+        As `liquid_adjustment.adjust_liquid`.
+    """
+    if job.liquid is None:
+        return None
+    joint = adjust_liquid(geometry_beside(job, survey))
+    certified = job.liquid.certified
+
+    def adjust_alone():
+        return adjust_liquid(geometry_alone(job, survey))
+
+    alone = adjust_alone() if certified == "liquid" else or_none(adjust_alone)
+    if certified == "geometry":
+        body = body_of(job, survey)
+    else:
+        body = join_body((alone if certified == "liquid" else joint).known)
+    return Measured(job, survey, joint, alone, body)
+
+
+def _result(measured, levels):
+    job, found = measured.job, measured.joint
+    adjusted, run = found.adjusted, found.run_effect
+    causes = name_causes(adjusted, alternatives_of(found))
+    radii = next((one for one in causes if one.cause.kind == "radii"), None)
+    detectable = radii.detectable if radii and np.isfinite(radii.detectable) else None
+    return LiquidResult(
+        certified=job.liquid.certified,
+        steps=_steps(found),
+        dips=_dips(found),
+        runs=_runs(found),
+        run_sd=None if run is None else run.sd,
+        run_dof=None if run is None else run.dof,
+        factors=_factors(found),
+        bottom_flex=_one(found, FLEX, found.known.flex_sd),
+        bottom_m3=_one(found, BOTTOM, 1.0, is_free=True),
+        sizes=_sizes(found),
+        chi2=adjusted.chi2,
+        dof=adjusted.dof,
+        probability=float(gammaincc(adjusted.dof / 2, adjusted.chi2 / 2)) if adjusted.dof else 1.0,
+        detectable_radius_m=detectable,
+        causes=causes,
+        filled_m=filled_range_m(job.liquid),
+        tables=_tables(measured, levels),
+    )
+
+
+def _tables(measured, levels):
+    job, probability = measured.job, measured.job.table.coverage_probability
+    low, high = filled_range_m(job.liquid)
+    dips = levels - zero_height(job, measured.survey)
+    inside = (dips >= low - 1e-9) & (dips <= high + 1e-9)
+    joint, alone = join_body(measured.joint.known), None
+    if measured.alone is not None:
+        body = join_body(measured.alone.known)
+        alone = beside_table("liquid", body, levels, probability, inside)
+    geometry = measured.joint.known.geometry.moved_to({}).body()
+    return {
+        "geometry": beside_table("geometry", geometry, levels, probability),
+        "liquid": alone,
+        "joint": beside_table("joint", joint, levels, probability),
+    }
+
+
+def _steps(found):
+    metering, fill, before = found.known.geometry.job.liquid, found.fill, found.before
+    rows = metering.row[fill.dip_row]
+    dips = metering.dip_m[fill.dip_row]
+    by_head = _by_head(found)
+    batch = next(one for one in found.adjusted.noise if one.kind == "meter_repeatability")
+    sd = batch_sd_m3(metering, fill, before)
+    deviates, redundancy, w = found.adjusted.residuals(batch)
+    _, _, detectable = _tested(found.adjusted)
+    return LiquidSteps(
+        row=rows[fill.end],
+        run=tuple(fill.runs[i] for i in fill.run),
+        meter=tuple(metering.meter[fill.dip_row[i]] for i in fill.end),
+        from_dip_m=np.where(fill.from_empty, np.nan, dips[fill.start]),
+        to_dip_m=dips[fill.end],
+        indicated_m3=before.indicated_m3,
+        by_factor_m3=before.by_factor_m3,
+        by_meter_temperature_m3=before.by_meter_temperature_m3,
+        by_shell_m3=before.by_shell_m3,
+        by_tank_temperature_m3=before.by_tank_temperature_m3,
+        by_head_m3=by_head,
+        reference_m3=before.increment_m3 + by_head,
+        misclosure_m3=before.misclosure_m3,
+        misclosure_sd_m3=found.before_sd_m3,
+        misclosure_w=before.misclosure_m3 / found.before_sd_m3,
+        residual_m3=-deviates * sd,
+        sd_m3=sd,
+        redundancy=redundancy,
+        w=w,
+        detectable_m3=detectable,
+    )
+
+
+def _tested(adjusted):
+    """(size, w, smallest detectable) of an error of each batch by itself."""
+    size, sd, w = adjusted.test(np.eye(len(adjusted.misclosure_m3)))
+    return size, w, noncentrality() * sd
+
+
+def _by_head(found):
+    """(n,) what the geometry's increments gain from the calibrating liquid to the table's."""
+    geometry, fill = found.known.geometry, found.fill
+    volumes = geometry.body().volume_m3(found.loaded.level_m)
+    return fill.differences() @ (volumes - found.loaded.volume_m3)
+
+
+def _dips(found):
+    metering, fill = found.known.geometry.job.liquid, found.fill
+    rows = fill.dip_row
+    sd = metering.s_dip_m[rows]
+    effect = next((one for one in found.adjusted.noise if one.kind == "dip_readings"), None)
+    nothing = np.zeros(len(rows))
+    deviates, redundancy, w = nothing, nothing, nothing
+    if effect is not None:
+        deviates, redundancy, w = found.adjusted.residuals(effect)
+    return LiquidDips(
+        row=metering.row[rows],
+        run=tuple(metering.run[i] for i in rows),
+        dip_m=metering.dip_m[rows],
+        residual_m=deviates * sd,
+        sd_m=sd,
+        redundancy=redundancy,
+        w=w,
+    )
+
+
+def _runs(found):
+    place, run = found.adjusted.place(RUNS), found.run_effect
+    if place.stop == place.start:
+        return tuple(Estimate(name, 0.0, 0.0, 0.0, 0.0) for name in found.fill.runs)
+    pairs = zip(found.adjusted.estimate[place], found.adjusted.sd[place], strict=True)
+    return tuple(
+        Estimate(name, 0.0, run.sd, float(run.sd * z), float(run.sd * sd))
+        for name, (z, sd) in zip(found.fill.runs, pairs, strict=True)
+    )
+
+
+def _factors(found):
+    metering, place = found.known.geometry.job.liquid, found.adjusted.place("meter_factor")
+    z, sd = found.adjusted.estimate[place], found.adjusted.sd[place]
+    told = []
+    for number, name in enumerate(found.fill.meters):
+        meter = metering.meters[name]
+        after, left = (z[number], sd[number]) if len(z) else (0.0, 1.0)
+        told.append(
+            Estimate(
+                name,
+                meter.factor,
+                meter.u_factor * meter.factor,
+                float(meter.factor * (1 + meter.u_factor * after)),
+                float(meter.u_factor * meter.factor * left),
+            )
+        )
+    return tuple(told)
+
+
+def _one(found, kind, u, *, is_free=False):
+    place = found.adjusted.place(kind)
+    if place.stop == place.start:
+        return None
+    z, sd = found.adjusted.estimate[place][0], found.adjusted.sd[place][0]
+    return Estimate(kind, 0.0, np.inf if is_free else u, float(u * z), float(u * sd))
+
+
+def _sizes(found):
+    """Inputs that were moved: by how much, with their u."""
+    adjusted, told = found.adjusted, []
+    columns = adjusted.effects[0].columns
+    for place, deviate in found.known.moved:
+        seen = columns @ place.row
+        left = float(place.row @ place.row - seen @ adjusted.weight @ seen)
+        u = place.u * np.sqrt(max(left, 0.0))
+        told.append(Estimate(place.name, 0.0, place.u, float(place.u * deviate), float(u)))
+    return tuple(told)

@@ -1,0 +1,307 @@
+"""Metered runs of a job adjusted with its geometry: what liquid and geometry make of the tank.
+
+found = adjust_liquid(Geometry(job, survey))
+body = join_body(found.known)
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.job.tables import SETTINGS_FILE
+from tankcal.messages import message
+from tankcal.pipeline.liquid_body import Known
+from tankcal.pipeline.liquid_geometry import (
+    Geometry,
+    Loaded,
+    column_of,
+    load_geometry,
+    places_of,
+    stacked,
+)
+from tankcal.tank.liquid import (
+    Effect,
+    Fill,
+    LiquidAdjustment,
+    Reduced,
+    RunEffect,
+    adjust_steps,
+    estimate_run_effect,
+    fill_of,
+    reading_effects,
+    reduce_steps,
+)
+from tankcal.tank.liquid.readings import ReadingEffects
+from tankcal.tank.liquid.reduction import load_densities
+from tankcal.uncertainty import Source
+
+MOST_ROUNDS, SETTLED = 30, 1e-3  # steps to the joint values; the last, in sds
+HALVINGS = 12  # of a step that leads to no tank
+BOTTOM, FLEX, RUNS = "bottom_volume", "bottom_flex", "run_effect"
+OUTSIDE_M = 0.001  # that a dip may stand above or below the tank
+
+
+@dataclass(frozen=True)
+class LiquidFound:
+    """Metered runs, adjusted with one geometry.
+
+    Attributes
+    ----------
+    known : Known
+    fill : Fill
+    reduced : Reduced
+        Against the geometry, its sizes where liquid has them.
+    loaded : Loaded
+    readings : ReadingEffects
+    adjusted : LiquidAdjustment
+    run_effect : RunEffect or None
+        None: there is none.
+    misclosure_m3 : ndarray, shape (n,)
+        Against the geometry as it was before, with the covariance before.
+    before : Reduced
+        Against that geometry.
+    """
+
+    known: Known
+    fill: Fill
+    reduced: Reduced
+    loaded: Loaded
+    readings: ReadingEffects
+    adjusted: LiquidAdjustment
+    run_effect: RunEffect | None
+    before: Reduced
+    before_sd_m3: np.ndarray
+
+
+def adjust_liquid(geometry):
+    """`LiquidFound` of the metered runs of a job beside a `Geometry`.
+
+    Raises
+    ------
+    InputError
+        For dips outside the tank, and for a run effect that nothing tells.
+    SolutionError
+        When steps cannot be adjusted, or sizes do not settle.
+    """
+    metering = geometry.job.liquid
+    fill = fill_of(metering)
+    first, sd = None, np.inf
+    for _ in range(MOST_ROUNDS):
+        found = _adjusted_at(geometry, metering, fill)
+        first = first or found
+        names = geometry.movable
+        if not names:
+            break
+        wanted, sd = _moves_of(found, names)
+        step = max(abs(wanted[n] - geometry.moves.get(n, 0.0)) / sd[n] for n in names)
+        if step < SETTLED:
+            break
+        geometry = _stepped(geometry, wanted)
+    else:
+        raise SolutionError(
+            message(
+                "liquid_does_not_settle",
+                "the sizes of the tank do not settle with the runs by liquid: check the sizes in "
+                "job.toml, their uncertainty, and the units of volumes and dips",
+            )
+        )
+    _refuse_dips_outside(geometry, fill)
+    return replace(found, before=first.before, before_sd_m3=first.before_sd_m3)
+
+
+def _adjusted_at(geometry, metering, fill):
+    """`LiquidFound` with the geometry linear where it is now."""
+    densities = np.append(metering.density_kg_m3, load_densities(metering, fill))
+    rows = fill.dip_row
+    loaded = load_geometry(geometry, densities, metering.dip_m[rows], metering.shell_c[rows])
+    reduced = reduce_steps(metering, fill, loaded.volume_m3, loaded.growth)
+    about = loaded.volume_m3, loaded.area_m2 * loaded.growth, loaded.growth
+    readings = reading_effects(metering, fill, reduced, *about)
+    over = fill.differences(reduced.carried)
+    sources = tuple(one.weighted(over) for one in loaded.sources)
+    places = places_of(sources, geometry.job.inputs)
+    moved = tuple(
+        (places[name], change / places[name].u)
+        for name, change in geometry.moves.items()
+        if name in places
+    )
+    misclosure = reduced.misclosure_m3.copy()
+    for place, deviate in moved:
+        misclosure += deviate * column_of(sources, place)
+    effects = [Effect("geometry", stacked(sources, len(fill))), *readings.common]
+    effects += _of_the_bottom(geometry, metering, fill, loaded, over)
+    by_density = over @ (loaded.by_density * metering.u_density_kg_m3)
+    if np.any(by_density):
+        effects.append(Effect("calibration_density", by_density[:, None]))
+    run = _run_effect(metering, fill, misclosure, readings, effects)
+    if run is not None and run.sd > 0:
+        effects.append(Effect(RUNS, readings.run_m3 * run.sd))
+    adjusted = adjust_steps(misclosure, readings.noise, effects)
+    known = _known(geometry, (loaded, sources, moved), adjusted, (metering, fill, run))
+    every = [one.columns for one in (*readings.noise, *effects) if not one.is_free]
+    return LiquidFound(
+        known, fill, reduced, loaded, readings, adjusted, run, reduced,
+        np.linalg.norm(np.hstack(every), axis=1),
+    )  # fmt: skip
+
+
+def _of_the_bottom(geometry, metering, fill, loaded, over):
+    """What lies below the first dip, where no geometry tells it, and what the bottom gives."""
+    found = []
+    if metering.flex_sd_m3_per_m:
+        head = over @ np.maximum(loaded.level_m, 0.0)
+        found.append(Effect(FLEX, metering.flex_sd_m3_per_m * head[:, None]))
+    if bottom_is_free(geometry.job, fill):
+        found.append(Effect(BOTTOM, over.sum(axis=1, keepdims=True), is_free=True))
+    return found
+
+
+def bottom_is_free(job, fill):
+    """Whether a run from the empty tank measures what lies below the first dip, and nothing else.
+
+    A bottom that was surveyed, or is declared as a cone or a dish, says that itself.
+    """
+    untold = job.bottom.form in ("flat", "leaning") or not job.switches.bottom
+    return job.tank.kind == "vertical" and untold and bool(np.any(fill.from_empty))
+
+
+def _run_effect(metering, fill, misclosure, readings, effects):
+    if metering.run_sd is not None:
+        return RunEffect(metering.run_sd, np.inf, metering.run_sd)
+    without = adjust_steps(misclosure, readings.noise, effects)
+    found = estimate_run_effect(without.weight, misclosure, readings.run_m3)
+    if found is None:
+        expected = message(
+            "run_effect_untold",
+            "blank; expected by how much whole runs differ (0: not at all): the runs do not show "
+            "it themselves",
+        )
+        raise InputError(Problem(SETTINGS_FILE, expected, column="liquid.run_ppm"))
+    return found
+
+
+def _known(geometry, of_geometry, adjusted, of_liquid):
+    loaded, sources, moved = of_geometry
+    metering, fill, run = of_liquid
+    place = adjusted.place("geometry")
+    bottom, flex = adjusted.place(BOTTOM), adjusted.place(FLEX)
+    has_bottom, has_flex = bottom.stop > bottom.start, flex.stop > flex.start
+    by_flex = next((one.columns[:, 0] for one in adjusted.effects if one.kind == FLEX), None)
+    sd = metering.flex_sd_m3_per_m
+    return Known(
+        geometry=geometry,
+        z=adjusted.estimate[place],
+        gain=adjusted.gain[place],
+        sources=sources,
+        liquid=_sources_of_liquid(adjusted, metering, fill, run),
+        moved=moved,
+        first_m=float(np.min(loaded.level_m)) if has_bottom else None,
+        bottom_m3=float(adjusted.estimate[bottom][0]) if has_bottom else 0.0,
+        bottom_gain=adjusted.gain[bottom][0] if has_bottom else None,
+        flex=float(sd * adjusted.estimate[flex][0]) if has_flex else 0.0,
+        flex_sd=sd if has_flex else 0.0,
+        flex_gain=sd * adjusted.gain[flex][0] if has_flex else None,
+        flex_column=by_flex,
+        density_kg_m3=metering.density_kg_m3,
+    )
+
+
+def _sources_of_liquid(adjusted, metering, fill, run):
+    """Sources of what liquid itself leaves uncertain, columns by the misclosures."""
+    found = [Source(one.kind, one.columns) for one in adjusted.noise]
+    for one in adjusted.effects:
+        if one.kind == "meter_factor":
+            found += _of_meters(one, metering, fill)
+        elif one.kind == RUNS:
+            kind = "B" if np.isinf(run.dof) else "A"
+            found.append(Source(RUNS, one.columns, run.dof, type=kind))
+        elif one.kind in COMMON:
+            u, unit, value = COMMON[one.kind](metering)
+            found.append(Source(one.kind, one.columns, u=u, unit=unit, type="B", estimate=value))
+    return tuple(found)
+
+
+COMMON = {
+    "dip_zero": lambda one: (1000 * one.u_dip_zero_m, "mm", 0.0),
+    "liquid_expansion": lambda one: (one.u_expansion_per_k, "1/K", one.expansion_per_k),
+    "calibration_density": lambda one: (one.u_density_kg_m3, "kg/m3", one.density_kg_m3),
+}
+
+
+def _of_meters(effect, metering, fill):
+    found = []
+    for name, column in zip(fill.meters, effect.columns.T, strict=True):
+        meter = metering.meters[name]
+        u, note = 1e6 * meter.u_factor, meter.certificate or name
+        found.append(Source("meter_factor", column[:, None], u=u, unit="ppm", type="B", note=note))
+    return found
+
+
+def _moves_of(found, names):
+    """({input: its move in all}, {input: sd}) that the adjustment asks for, SI."""
+    adjusted, places = found.adjusted, {}
+    for place in places_of(found.known.sources, found.known.geometry.job.inputs).values():
+        places[place.name] = place
+    wanted, sds = {}, {}
+    geometry = adjusted.effects[0].columns
+    for name in names:
+        place = places[name]
+        wanted[name] = float(place.u * (place.row @ found.known.z))
+        seen = geometry @ place.row
+        left = max(float(place.row @ place.row - seen @ adjusted.weight @ seen), 1e-12)
+        sds[name] = place.u * np.sqrt(left)
+    return wanted, sds
+
+
+def _stepped(geometry, wanted):
+    """The geometry there, or part of the way where there is no such tank."""
+    share = 1.0
+    for _ in range(HALVINGS):
+        moves = {
+            name: geometry.moves.get(name, 0.0) + share * (value - geometry.moves.get(name, 0.0))
+            for name, value in wanted.items()
+        }
+        moved = geometry.moved_to(moves)
+        try:
+            moved.body()
+        except SolutionError:
+            share /= 2
+            continue
+        return moved
+    raise SolutionError(
+        message(
+            "no_tank_by_liquid",
+            "the runs by liquid ask for sizes that make no tank: check the sizes in job.toml, and "
+            "the units of volumes and dips",
+        )
+    )
+
+
+def _refuse_dips_outside(geometry, fill):
+    metering, body = geometry.job.liquid, geometry.body()
+    levels = metering.dip_m[fill.dip_row] + geometry.zero_m + geometry.shift_m
+    low, high = body.lowest_m, body.highest_m
+    problems = [
+        Problem(
+            metering.file,
+            message(
+                "dip_outside_filled",
+                "found {dip:g}; expected {low:.4g} to {high:.4g} m, the dips of the tank",
+                dip=float(metering.dip_m[row]),
+                low=low - geometry.zero_m - geometry.shift_m,
+                high=high - geometry.zero_m - geometry.shift_m,
+            ),
+            int(metering.row[row]),
+            "dip_m",
+        )
+        for row, level in zip(fill.dip_row, levels, strict=True)
+        if not low - OUTSIDE_M <= level <= high + OUTSIDE_M
+    ]
+    if problems:
+        raise InputError(problems)
+
+
+def geometry_of(job, survey):
+    """`Geometry` of a job and what was surveyed."""
+    return Geometry(job, survey)
