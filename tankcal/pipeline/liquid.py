@@ -113,8 +113,8 @@ class LiquidResult:
     dips : LiquidDips
     runs : tuple of Estimate
         The effect of each run, relative.
-    run_sd, run_dof : float or None
-        Of the run effect, with its degrees of freedom (inf: declared); None: there is none.
+    run_sd, run_dof : float
+        Of the run effect, relative, with its degrees of freedom (inf: declared).
     factors : tuple of Estimate
         Of each meter.
     bottom_flex : Estimate or None
@@ -139,8 +139,8 @@ class LiquidResult:
     steps: LiquidSteps
     dips: LiquidDips
     runs: tuple[Estimate, ...]
-    run_sd: float | None
-    run_dof: float | None
+    run_sd: float
+    run_dof: float
     factors: tuple[Estimate, ...]
     bottom_flex: Estimate | None
     bottom_m3: Estimate | None
@@ -225,8 +225,8 @@ def _result(measured, levels):
         steps=_steps(found),
         dips=_dips(found),
         runs=_runs(found),
-        run_sd=None if run is None else run.sd,
-        run_dof=None if run is None else run.dof,
+        run_sd=run.sd,
+        run_dof=run.dof,
         factors=_factors(found),
         bottom_flex=_one(found, FLEX, found.known.flex_sd),
         bottom_m3=_one(found, BOTTOM, 1.0, is_free=True),

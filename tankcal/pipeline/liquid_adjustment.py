@@ -13,7 +13,6 @@ from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
 from tankcal.pipeline.liquid_body import Known
 from tankcal.pipeline.liquid_geometry import (
-    Geometry,
     Loaded,
     column_of,
     load_geometry,
@@ -37,7 +36,9 @@ from tankcal.tank.liquid.reduction import load_densities
 from tankcal.uncertainty import Source
 
 MOST_ROUNDS, SETTLED = 30, 1e-3  # steps to the joint values; the last, in sds
-HALVINGS = 12  # of a step that leads to no tank
+HALVINGS = 12  # of a step that leads to no tank, or to a worse fit
+RUN_ROUNDS, RUN_SETTLED = 4, 0.01  # of the run effect with the sizes; its last change, relative
+ROUNDING = 1e-9  # of a fit
 BOTTOM, FLEX, RUNS = "bottom_volume", "bottom_flex", "run_effect"
 OUTSIDE_M = 0.001  # that a dip may stand above or below the tank
 
@@ -55,12 +56,11 @@ class LiquidFound:
     loaded : Loaded
     readings : ReadingEffects
     adjusted : LiquidAdjustment
-    run_effect : RunEffect or None
-        None: there is none.
-    misclosure_m3 : ndarray, shape (n,)
-        Against the geometry as it was before, with the covariance before.
+    run_effect : RunEffect
     before : Reduced
-        Against that geometry.
+        Against the geometry as it was before; before_sd_m3 (n,) of its misclosures.
+    misfit : float
+        Chi-square with the sizes held where they are, and of the sizes.
     """
 
     known: Known
@@ -69,9 +69,10 @@ class LiquidFound:
     loaded: Loaded
     readings: ReadingEffects
     adjusted: LiquidAdjustment
-    run_effect: RunEffect | None
+    run_effect: RunEffect
     before: Reduced
     before_sd_m3: np.ndarray
+    misfit: float
 
 
 def adjust_liquid(geometry):
@@ -84,34 +85,64 @@ def adjust_liquid(geometry):
     SolutionError
         When steps cannot be adjusted, or sizes do not settle.
     """
-    metering = geometry.job.liquid
-    fill = fill_of(metering)
-    first, sd = None, np.inf
-    for _ in range(MOST_ROUNDS):
-        found = _adjusted_at(geometry, metering, fill)
-        first = first or found
-        names = geometry.movable
-        if not names:
-            break
-        wanted, sd = _moves_of(found, names)
-        step = max(abs(wanted[n] - geometry.moves.get(n, 0.0)) / sd[n] for n in names)
-        if step < SETTLED:
-            break
-        geometry = _stepped(geometry, wanted)
-    else:
-        raise SolutionError(
-            message(
-                "liquid_does_not_settle",
-                "the sizes of the tank do not settle with the runs by liquid: check the sizes in "
-                "job.toml, their uncertainty, and the units of volumes and dips",
-            )
-        )
-    _refuse_dips_outside(geometry, fill)
+    fill = fill_of(geometry.job.liquid)
+    found = first = _adjusted_at(geometry, fill, _run_effect)
+    if geometry.movable:
+        for _ in range(RUN_ROUNDS):
+            before = found.run_effect
+            found = _settled(found, fill)
+            found = _adjusted_at(found.known.geometry, fill, _run_effect)
+            if abs(found.run_effect.sd - before.sd) <= RUN_SETTLED * before.sd:
+                break
+    _refuse_dips_outside(found.known.geometry, fill)
     return replace(found, before=first.before, before_sd_m3=first.before_sd_m3)
 
 
-def _adjusted_at(geometry, metering, fill):
+def _settled(found, fill):
+    """The same with the sizes where liquid has them, by steps that never fit worse."""
+
+    def same_run(*_):
+        return found.run_effect
+
+    names = found.known.geometry.movable
+    for _ in range(MOST_ROUNDS):
+        at = found.known.geometry.moves
+        wanted, sd = _moves_of(found, names)
+        if max(abs(wanted[name] - at.get(name, 0.0)) / sd[name] for name in names) < SETTLED:
+            return found
+        better = _better(found, wanted, fill, same_run)
+        if better is None:
+            break
+        found = better
+    raise SolutionError(
+        message(
+            "liquid_does_not_settle",
+            "the sizes of the tank do not settle with the runs by liquid: check the sizes in "
+            "job.toml, their uncertainty, and the units of volumes and dips",
+        )
+    )
+
+
+def _better(found, wanted, fill, run_effect):
+    """The best `LiquidFound` on the way to what is wanted; None: nothing there fits better."""
+    geometry, best = found.known.geometry, None
+    at = {name: geometry.moves.get(name, 0.0) for name in wanted}
+    for share in (0.5**halving for halving in range(HALVINGS)):
+        moves = {name: at[name] + share * (value - at[name]) for name, value in wanted.items()}
+        try:
+            one = _adjusted_at(geometry.moved_to(moves), fill, run_effect)
+        except SolutionError:  # no such tank
+            continue
+        if best is not None and one.misfit >= best.misfit:
+            break
+        if one.misfit <= found.misfit * (1 + ROUNDING) + ROUNDING:
+            best = one
+    return best
+
+
+def _adjusted_at(geometry, fill, run_effect):
     """`LiquidFound` with the geometry linear where it is now."""
+    metering = geometry.job.liquid
     densities = np.append(metering.density_kg_m3, load_densities(metering, fill))
     rows = fill.dip_row
     loaded = load_geometry(geometry, densities, metering.dip_m[rows], metering.shell_c[rows])
@@ -122,9 +153,7 @@ def _adjusted_at(geometry, metering, fill):
     sources = tuple(one.weighted(over) for one in loaded.sources)
     places = places_of(sources, geometry.job.inputs)
     moved = tuple(
-        (places[name], change / places[name].u)
-        for name, change in geometry.moves.items()
-        if name in places
+        (places[name], geometry.moves.get(name, 0.0) / places[name].u) for name in geometry.movable
     )
     misclosure = reduced.misclosure_m3.copy()
     for place, deviate in moved:
@@ -134,16 +163,35 @@ def _adjusted_at(geometry, metering, fill):
     by_density = over @ (loaded.by_density * metering.u_density_kg_m3)
     if np.any(by_density):
         effects.append(Effect("calibration_density", by_density[:, None]))
-    run = _run_effect(metering, fill, misclosure, readings, effects)
-    if run is not None and run.sd > 0:
+    run = run_effect(metering, misclosure, readings, effects)
+    if run.sd > 0:
         effects.append(Effect(RUNS, readings.run_m3 * run.sd))
     adjusted = adjust_steps(misclosure, readings.noise, effects)
-    known = _known(geometry, (loaded, sources, moved), adjusted, (metering, fill, run))
     every = [one.columns for one in (*readings.noise, *effects) if not one.is_free]
     return LiquidFound(
-        known, fill, reduced, loaded, readings, adjusted, run, reduced,
-        np.linalg.norm(np.hstack(every), axis=1),
-    )  # fmt: skip
+        known=_known(geometry, (loaded, sources, moved), adjusted, (metering, fill, run)),
+        fill=fill,
+        reduced=reduced,
+        loaded=loaded,
+        readings=readings,
+        adjusted=adjusted,
+        run_effect=run,
+        before=reduced,
+        before_sd_m3=np.linalg.norm(np.hstack(every), axis=1),
+        misfit=_misfit(adjusted, reduced, sources, moved),
+    )
+
+
+def _misfit(adjusted, reduced, sources, moved):
+    """Chi-square of the misclosures with the moved inputs held where they are, and of these."""
+    if not moved:
+        return adjusted.chi2
+    held = np.stack([column_of(sources, place) for place, _ in moved], axis=1)
+    every = [one.columns for one in (*adjusted.noise, *adjusted.effects)]
+    whole = np.hstack(every)
+    covariance = whole @ whole.T - held @ held.T
+    y, deviates = reduced.misclosure_m3, np.array([deviate for _, deviate in moved])
+    return float(y @ np.linalg.solve(covariance, y) + deviates @ deviates)
 
 
 def _of_the_bottom(geometry, metering, fill, loaded, over):
@@ -166,7 +214,8 @@ def bottom_is_free(job, fill):
     return job.tank.kind == "vertical" and untold and bool(np.any(fill.from_empty))
 
 
-def _run_effect(metering, fill, misclosure, readings, effects):
+def _run_effect(metering, misclosure, readings, effects):
+    """`RunEffect` as declared, else as the runs show it."""
     if metering.run_sd is not None:
         return RunEffect(metering.run_sd, np.inf, metering.run_sd)
     without = adjust_steps(misclosure, readings.noise, effects)
@@ -254,30 +303,6 @@ def _moves_of(found, names):
     return wanted, sds
 
 
-def _stepped(geometry, wanted):
-    """The geometry there, or part of the way where there is no such tank."""
-    share = 1.0
-    for _ in range(HALVINGS):
-        moves = {
-            name: geometry.moves.get(name, 0.0) + share * (value - geometry.moves.get(name, 0.0))
-            for name, value in wanted.items()
-        }
-        moved = geometry.moved_to(moves)
-        try:
-            moved.body()
-        except SolutionError:
-            share /= 2
-            continue
-        return moved
-    raise SolutionError(
-        message(
-            "no_tank_by_liquid",
-            "the runs by liquid ask for sizes that make no tank: check the sizes in job.toml, and "
-            "the units of volumes and dips",
-        )
-    )
-
-
 def _refuse_dips_outside(geometry, fill):
     metering, body = geometry.job.liquid, geometry.body()
     levels = metering.dip_m[fill.dip_row] + geometry.zero_m + geometry.shift_m
@@ -300,8 +325,3 @@ def _refuse_dips_outside(geometry, fill):
     ]
     if problems:
         raise InputError(problems)
-
-
-def geometry_of(job, survey):
-    """`Geometry` of a job and what was surveyed."""
-    return Geometry(job, survey)

@@ -23,7 +23,7 @@ SIZES = ("diameter", "length", "end_depth", "tilt", "dip_position", "datum", "sc
 
 
 def geometry_beside(job, survey):
-    """`Geometry` that is adjusted with the runs of a job; sizes that nothing speaks for are wide."""
+    """`Geometry` that is adjusted with the runs of a job; sizes nothing speaks for are wide."""
     if job.tank.kind == "vertical" or job.points is not None:
         return Geometry(job, survey)
     if any(one.name in SIZES for one in job.inputs):

@@ -179,7 +179,7 @@ class JointBody(Body):
 
 
 def join_body(known, density_kg_m3=None):
-    """`JointBody` of what liquid makes of a geometry; density of the table's liquid, None: its own."""
+    """`JointBody` of what liquid makes of a geometry; density of the liquid, None: the table's."""
     geometry, zero = known.geometry, known.geometry.shift_m
     plain = geometry.body(density_kg_m3)
     slim, weights = _slimmed(plain, known)
