@@ -15,6 +15,7 @@ from tankcal.pipeline.cloud_passes import Reading
 from tankcal.pipeline.cloud_wall import Clouded
 from tankcal.pipeline.corrections import Correction, corrections_of
 from tankcal.pipeline.liquid import LiquidResult, measure_by_liquid
+from tankcal.pipeline.liquid_checks import check_liquid_result
 from tankcal.pipeline.liquid_geometry import filled_with
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.scan import Scan
@@ -379,7 +380,11 @@ def _run(job, progress, part_progress, simulated, reading):
         intervals=intervals,
         rule=verdict_of(job, body, table, intervals, simulation),
         warnings=_warnings(
-            job, adjustment, found.sighting or found.touching or found.clouded, survey, made
+            (job, liquid),
+            adjustment,
+            found.sighting or found.touching or found.clouded,
+            survey,
+            made,
         ),
         adjustment=adjustment,
         strapped=survey if isinstance(survey, StrappedWall) else None,
@@ -390,7 +395,8 @@ def _run(job, progress, part_progress, simulated, reading):
     )
 
 
-def _warnings(job, adjustment, sighting, survey, made):
+def _warnings(asked, adjustment, sighting, survey, made):
+    job, liquid = asked
     of_survey = ()
     if adjustment is not None:
         left_open = open_questions(job, adjustment.datum, adjustment.causes)
@@ -399,6 +405,7 @@ def _warnings(job, adjustment, sighting, survey, made):
         *job.warnings,
         *of_survey,
         *check_table(job, survey, made, sighting),
+        *check_liquid_result(job, liquid),
         *incomplete_certificate(job),
     )
     return placed(job, warnings)

@@ -76,10 +76,18 @@ class LiquidSteps:
     w: np.ndarray
     detectable_m3: np.ndarray
 
+    @property
+    def sd(self):
+        """Standard deviation of each batch, m3."""
+        return self.sd_m3
+
 
 @dataclass(frozen=True)
 class LiquidDips:
-    """Dips that count, (d,) each: row, run, dip, residual, sd before, redundancy, w."""
+    """Dips that count, (d,) each: row, run, dip, residual, sd before, redundancy, w.
+
+    residual_m is what is to be added to a dip.
+    """
 
     row: np.ndarray
     run: tuple
@@ -88,6 +96,11 @@ class LiquidDips:
     sd_m: np.ndarray
     redundancy: np.ndarray
     w: np.ndarray
+
+    @property
+    def sd(self):
+        """As of `LiquidSteps`, in m."""
+        return self.sd_m
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,14 @@ SIZES = ("diameter", "length", "end_depth", "tilt", "dip_position", "datum", "sc
 
 def geometry_beside(job, survey):
     """`Geometry` that is adjusted with the runs of a job; sizes nothing speaks for are wide."""
+    if isinstance(survey, NominalWall):
+        return Geometry(job, survey, told_by_liquid=SIZES)
     if job.tank.kind == "vertical" or job.points is not None:
         return Geometry(job, survey)
     if any(one.name in SIZES for one in job.inputs):
         return Geometry(job, survey)
-    return Geometry(replace(job, inputs=(*job.inputs, *_wide(job))), survey)
+    wide = replace(job, inputs=(*job.inputs, *_wide(job)))
+    return Geometry(wide, survey, told_by_liquid=SIZES)
 
 
 def geometry_alone(job, survey):
@@ -41,10 +44,11 @@ def geometry_alone(job, survey):
             survey=replace(bare.survey, liquid_level_m=None, liquid_density_kg_m3=None),
         )  # fmt: skip
         wall = survey if isinstance(survey, NominalWall) else find_nominal_wall(bare)
-        return Geometry(bare, wall)
+        return Geometry(bare, wall, told_by_liquid=(*SIZES, "course_heights"))
     if isinstance(survey, Scan):
         bare, survey = replace(sized_job(bare, survey), points=None), None
-    return Geometry(replace(bare, inputs=(*kept, *_wide(bare))), survey)
+    wide = replace(bare, inputs=(*kept, *_wide(bare)))
+    return Geometry(wide, survey, told_by_liquid=SIZES)
 
 
 def _wide(job):

@@ -122,8 +122,9 @@ class JointBody(Body):
         return plain + self._correction_m3(moved)
 
     def undeclared(self):
-        """Those of geometry."""
-        return self.plain.undeclared()
+        """Those of geometry, but for what liquid tells where nobody surveyed the wall."""
+        told = self.known.geometry.told_by_liquid
+        return tuple(name for name in self.plain.undeclared() if name not in told)
 
     def sources(self, levels_m):
         """One `Source` for each cause: those of geometry, then those of liquid."""

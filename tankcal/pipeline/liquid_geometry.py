@@ -30,11 +30,14 @@ class Geometry:
     survey : Wall, StrappedWall, NominalWall, Scan, mesh or None
     moves : dict
         {input: by how much it is moved, SI}.
+    told_by_liquid : tuple of str
+        Inputs that need no declared u: the dips themselves say what they do.
     """
 
     job: object
     survey: object
     moves: dict = field(default_factory=dict)
+    told_by_liquid: tuple = ()
 
     @property
     def movable(self):
