@@ -44,11 +44,9 @@ def metered_job(kind, folder, *, dips, runs=2, registers=None, **settings):
         rows += metered_rows(
             dips, np.round(np.diff(nominal(np.array(dips, dtype=float))), 3), f"run {run + 1}"
         )
-    day = 0
+    start = np.datetime64("2026-05-04T06:00")
     for number, row in enumerate(rows):
-        day = number // len(dips)
-        minutes = 30 * (number % len(dips))
-        row[8] = f"2026-05-{4 + day:02d}T{6 + minutes // 60:02d}:{minutes % 60:02d}"
+        row[8] = str(start + np.timedelta64(30 * number, "m"))
     parts.tables["liquid"] = [list(HEADINGS), *rows]
     parts.registers["meters"]["M"] |= {"factor_after": None} | (registers or {})
     meter = parts.registers["meters"]["M"]

@@ -40,6 +40,7 @@ LEAST_GAIN, MOST_LEFT = 1e-7, 1e-2  # of a fit: by a step, and by all that could
 HALVINGS = 12  # of a step that leads to no tank, or to a worse fit
 RUN_ROUNDS, RUN_SETTLED = 4, 0.01  # of the run effect with the sizes; its last change, relative
 ROUNDING = 1e-9  # of a fit
+LOST = 1e-12  # of the largest effect of readings: less is none
 BOTTOM, FLEX, RUNS = "bottom_volume", "bottom_flex", "run_effect"
 OUTSIDE_M = 0.001  # that a dip may stand above or below the tank
 
@@ -265,7 +266,7 @@ def _known(geometry, of_geometry, adjusted, of_liquid):
 
 def _sources_of_liquid(adjusted, metering, fill, run):
     """Sources of what liquid itself leaves uncertain, columns by the misclosures."""
-    found = [Source(one.kind, one.columns) for one in adjusted.noise]
+    found = [Source(one.kind, _telling(adjusted, one.columns)) for one in adjusted.noise]
     for one in adjusted.effects:
         if one.kind == "meter_factor":
             found += _of_meters(one, metering, fill)
@@ -276,6 +277,15 @@ def _sources_of_liquid(adjusted, metering, fill, run):
             u, unit, value = COMMON[one.kind](metering)
             found.append(Source(one.kind, one.columns, u=u, unit=unit, type="B", estimate=value))
     return tuple(found)
+
+
+def _telling(adjusted, columns):
+    """(n, r) the same readings in as few columns as any estimate can tell apart."""
+    names = [one.kind for one in adjusted.effects]
+    used = [adjusted.place(kind) for kind in ("geometry", BOTTOM, FLEX) if kind in names]
+    seen = np.vstack([adjusted.gain[place] for place in used]) @ columns
+    _, size, turn = np.linalg.svd(seen, full_matrices=False)
+    return columns @ turn[size > LOST * np.max(size, initial=0.0)].T
 
 
 COMMON = {
