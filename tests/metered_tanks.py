@@ -3,7 +3,11 @@
 import numpy as np
 from job_builder import SETTINGS, Parts, _courses, strapped_parts
 
-HEADINGS = ["run", "meter", "volume_m3", "dip_m", "meter_temperature_c", "tank_temperature_c", "shell_temperature_c", "flow_m3_h", "time", "use"]
+HEADINGS = [
+    *("run", "meter", "volume_m3", "dip_m"),
+    *("meter_temperature_c", "tank_temperature_c", "shell_temperature_c"),
+    *("flow_m3_h", "time", "use"),
+]
 METER = {
     "factor": 1.0005,
     "u_factor_ppm": 400.0,
