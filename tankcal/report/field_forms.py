@@ -37,7 +37,7 @@ OTHER_UNITS = ("_gon", "_dms")
 WIDE = {"name": 1.5, "text": 2.0}  # shares of the width, beside one of a number
 FACTS = ("tank", "date", "crew", "weather", "shell_temperature", "instruments", "masters")
 FACTS_OF_LIQUID = ("tank", "date", "crew", "weather", "calibrating_liquid", "dipped_by")
-ROWS_OF_METERS, ROWS_OF_VALVES = 3, 4
+ROWS_OF_METERS, ROWS_OF_VALVES = 5, 8
 
 
 def is_filled_by_pen(survey):
@@ -80,6 +80,7 @@ def sheets(survey, language):
         blocks.paragraph(paper.word("forms.how")),
     ]
     if survey == METERED:
+        found.append(blocks.paragraph(paper.word("forms.batches")))
         found += [*_meters(paper, texts), *_valves(paper)]
     forms = [(names, rows) for names, rows in FORMS if set(names) <= set(SURVEYS[survey])]
     if any(_is_angle(field) for names, _ in forms for field in _columns(names)):
@@ -87,13 +88,11 @@ def sheets(survey, language):
     for names, rows in forms:
         titles = [texts.words["input"]["titles"][name] for name in names]
         columns = [_column(texts, field) for field in _columns(names)]
+        found.append(blocks.heading("; ".join(titles)))
         if names == ("liquid",):  # a meter shows a sum, of which the office takes differences
-            columns.insert(2, (paper.word("forms.meter_shows"), "", 1.3))
-            found.append(blocks.paragraph(paper.word("forms.batches")))
-        found += [
-            blocks.heading("; ".join(titles)),
-            blocks.form(columns, ROWS_BESIDE.get((survey, names[0]), rows)),
-        ]
+            columns = [(heading, unit, 1.0) for heading, unit, _ in columns]
+            columns.insert(2, (paper.word("forms.meter_shows"), "", WIDE["name"]))
+        found.append(blocks.form(columns, ROWS_BESIDE.get((survey, names[0]), rows)))
         if names == ("setups",) and survey in HEIGHTS_OF:
             found += _heights(paper, texts)
     return [*found, blocks.signature([paper.word("forms.signed")])]
