@@ -25,6 +25,7 @@ def check_liquid_result(job, found):
     return (
         *_disagreement(job.liquid, found),
         *_single_readings(job.liquid, found),
+        *_compared(job.liquid, found),
         *_bottom(job, found),
         *_alone(job.liquid, found),
     )
@@ -72,6 +73,22 @@ def _single_readings(metering, found):
                            "{size:+.4f} m3, {w:.1f} standard deviations",
                            size=size, w=w)  # fmt: skip
         yield Problem(metering.file, text, int(row), column)
+
+
+def _compared(metering, found):
+    """Dips that are only compared, and differ."""
+    checks = found.checks
+    if checks is None:
+        return
+    for place in np.flatnonzero(np.abs(checks.w) > CRITICAL):
+        text = message(
+            "check_dip_differs",
+            "a dip to compare: {difference:+.1f} mm from what all that counts says, {w:.1f} "
+            "standard deviations",
+            difference=1000 * checks.difference_m[place],
+            w=abs(checks.w[place]),
+        )
+        yield Problem(metering.file, text, int(checks.row[place]), "dip_m")
 
 
 def _bottom(job, found):

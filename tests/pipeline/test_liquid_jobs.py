@@ -153,6 +153,22 @@ def test_a_geometry_of_one_adjustment_is_linear():
     assert_allclose(volumes[0], volumes[1], atol=2e-3)
 
 
+def test_a_dip_that_is_only_compared(upright):
+    """A dip 20 mm off changes nothing, and its difference is told."""
+    metering, survey = upright.liquid, find_survey(upright, lambda text: None).survey
+    used = np.arange(len(metering)) != 5
+    results = []
+    for off in (0.0, 0.020):
+        dips = metering.dip_m + off * ~used
+        job = replace(upright, liquid=replace(metering, used=used, dip_m=dips))
+        results.append(measure_by_liquid(job, survey).result(np.array([2.0])))
+    first, second = results
+    assert_allclose(first.tables["joint"].volume_m3, second.tables["joint"].volume_m3, rtol=1e-12)
+    assert first.checks.row.tolist() == [metering.row[5]]
+    assert abs(first.checks.difference_m[0]) < 4 * first.checks.sd_m[0]
+    assert_allclose(second.checks.difference_m - first.checks.difference_m, 0.020, atol=1e-4)
+
+
 FAULTS = {
     "meter": Fault("meter", 0.002),
     "dip": Fault("dip", 0.010, 5),
