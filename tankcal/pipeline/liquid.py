@@ -54,8 +54,8 @@ class LiquidSteps:
     misclosure_m3, misclosure_sd_m3, misclosure_w : ndarray
         Liquid less geometry before the adjustment, its standard deviation, and their ratio.
     residual_m3, sd_m3, redundancy, w : ndarray
-        Of the batch in the joint adjustment: what is left of it, its standard deviation before,
-        which part of an error shows, and the test of it.
+        Of the batch in the joint adjustment: what it lacks, its standard deviation before, which
+        part of an error shows, and the test of it.
     detectable_m3 : ndarray
         Smallest error of the batch that the test would show; inf: none.
     """
@@ -330,10 +330,8 @@ def _steps(found):
     rows = metering.row[fill.dip_row]
     dips = metering.dip_m[fill.dip_row]
     by_head = _by_head(found)
-    batch = next(one for one in found.adjusted.noise if one.kind == "meter_repeatability")
     sd = batch_sd_m3(metering, fill, before)
-    deviates, redundancy, w = found.adjusted.residuals(batch)
-    _, _, detectable = _tested(found.adjusted)
+    size, sd_of_size, w = found.adjusted.test(-np.eye(len(fill)))
     return LiquidSteps(
         row=rows[fill.end],
         run=tuple(fill.runs[i] for i in fill.run),
@@ -350,18 +348,12 @@ def _steps(found):
         misclosure_m3=before.misclosure_m3,
         misclosure_sd_m3=found.before_sd_m3,
         misclosure_w=before.misclosure_m3 / found.before_sd_m3,
-        residual_m3=-deviates * sd,
+        residual_m3=size * (sd / sd_of_size) ** 2,
         sd_m3=sd,
-        redundancy=redundancy,
+        redundancy=(sd / sd_of_size) ** 2,
         w=w,
-        detectable_m3=detectable,
+        detectable_m3=noncentrality() * sd_of_size,
     )
-
-
-def _tested(adjusted):
-    """(size, w, smallest detectable) of an error of each batch by itself."""
-    size, sd, w = adjusted.test(np.eye(len(adjusted.misclosure_m3)))
-    return size, w, noncentrality() * sd
 
 
 def _by_head(found):

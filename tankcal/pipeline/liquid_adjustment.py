@@ -91,6 +91,13 @@ def adjust_liquid(geometry):
         When steps cannot be adjusted.
     """
     fill = fill_of(geometry.job.liquid)
+    if not len(fill):
+        expected = message(
+            "no_steps_by_liquid",
+            "fewer than two levels count: no step was measured; expected two dips or more, or an "
+            "empty start and a dip",
+        )
+        raise InputError(Problem(geometry.job.liquid.file, expected))
     found = first = adjusted_at(geometry, fill, _run_effect)
     if geometry.movable:
         for _ in range(RUN_ROUNDS):

@@ -67,10 +67,10 @@ def _single_readings(metering, found):
         if column == "dip_m":
             text = message("dip_disagrees", "the dip differs from what all other steps say by "
                            "{size:+.1f} mm, {w:.1f} standard deviations",
-                           size=1000 * size, w=w)  # fmt: skip
+                           size=-1000 * size, w=w)  # fmt: skip
         else:
-            text = message("batch_disagrees", "the batch differs from what all other steps say by "
-                           "{size:+.4f} m3, {w:.1f} standard deviations",
+            text = message("batch_disagrees", "the batch lacks {size:+.4f} m3 by all other "
+                           "steps, {w:.1f} standard deviations",
                            size=size, w=w)  # fmt: skip
         yield Problem(metering.file, text, int(row), column)
 

@@ -1,7 +1,7 @@
 """Are planted faults of a calibration by liquid named? Simulated jobs, filled by mass.
 
-Kind of truth: simulation, the truth physical. Where a fault shows (the largest |w| over 4) the right
-cause is among those named in 80 % or more; causes that look alike are named together.
+Kind of truth: simulation, the truth physical. Where a fault shows (the largest |w| over 4) the
+right cause is among those named in 80 % or more; causes that look alike are named together.
 """
 
 from dataclasses import replace
