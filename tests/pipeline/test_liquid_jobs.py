@@ -141,6 +141,15 @@ def test_the_table_that_is_printed(certified):
 
 
 @pytest.mark.slow
+def test_corrections_add_up_to_the_table():
+    result = run(tankcal.load(EXAMPLES / "liquid"))
+    made = sum(one.size_m3 for one in result.corrections if one.code != "tilt")
+    gross = result.gross.volume_m3(np.array([result.gross.height_m]))[0]
+    assert_allclose(gross + made, result.table.volume_m3[-1], atol=1e-6)
+    assert result.corrections[-1].code == "liquid"
+
+
+@pytest.mark.slow
 def test_a_geometry_of_one_adjustment_is_linear():
     """Invariance: the joint table does not change when geometry starts elsewhere."""
     job = tankcal.load(EXAMPLES / "liquid-lying")
