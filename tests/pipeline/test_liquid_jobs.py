@@ -16,6 +16,7 @@ from metered_tanks import HEADINGS, metered_parts, metered_rows
 from numpy.testing import assert_allclose
 
 import tankcal
+from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.liquid import measure_by_liquid
 from tankcal.pipeline.liquid_adjustment import adjust_liquid
 from tankcal.pipeline.liquid_alone import geometry_alone, geometry_beside
@@ -85,6 +86,23 @@ def test_a_body_is_of_one_piece(tmp_path, kind):
     assert_allclose(measured.body.area_m2(levels), (up - down) / 2e-5, rtol=1e-5)
     volumes, _, sources = measured.body.rows(levels)
     assert np.all(np.abs(volumes - NOMINAL[kind](levels)) < 4 * combine(sources, 7).u)
+
+
+def test_correlated_sizes(tmp_path):
+    """Closed form: the columns of inputs that are correlated make the variance of their parts."""
+    job = metered_job("horizontal", tmp_path / "job", dips=[0.2, 0.6, 1.0, 1.4, 1.8],
+                      horizontal__dip_from_a_m=1.5)  # fmt: skip
+    job = fill(np.random.default_rng(1), job, NOMINAL["horizontal"], 2.4)
+    sizes = (("diameter", 0.01), ("length", 0.03), ("datum", 0.003))
+    inputs = tuple(DeclaredInput(name, u, "mm", 1000 * u) for name, u in sizes)
+    job = replace(job, inputs=inputs, correlations=(("diameter", "length", 0.7),))
+    measured, levels = measure_by_liquid(job, None), np.array([0.5, 1.2, 2.0])
+    both = next(one for one in measured.body.sources(levels) if one.parts)
+    parts = np.stack([one.columns_m3[:, 0] for one in both.parts], axis=1)
+    variance = np.einsum("ri,ij,rj->r", parts, both.correlation, parts)
+    assert_allclose(np.sum(both.columns_m3**2, axis=1), variance, rtol=1e-9)
+    volumes = measured.body.volume_m3(levels)
+    assert np.all(np.abs(volumes - NOMINAL["horizontal"](levels)) < 0.05)
 
 
 def test_joint_body_of_a_shell(upright):
