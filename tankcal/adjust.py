@@ -17,6 +17,7 @@ from itertools import count
 import numpy as np
 import scipy.linalg
 import scipy.sparse
+from scipy.special import ndtri
 
 from tankcal.errors import SolutionError
 from tankcal.messages import message
@@ -24,6 +25,11 @@ from tankcal.messages import message
 ALPHA, POWER = 0.001, 0.80  # of every test of single readings, and of the blunder it can show
 CRITICAL = 3.29  # of a test statistic: ALPHA, two-sided normal, to the digits of the field
 SMALLEST_PIVOT = 1e-12  # of normal equations with ones in the diagonal: below it is rounding
+
+
+def noncentrality(alpha=ALPHA, power=POWER):
+    """delta0 of a two-sided test of the normal distribution; 4.13 for 0.001 and 0.80."""
+    return float(ndtri(1 - alpha / 2) + ndtri(power))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from tankcal.errors import SHEET
 from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
 from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_all
-from tankcal.job.checks.extent import has_survey, is_sighted, is_strapped
+from tankcal.job.checks.extent import has_survey, is_metered, is_sighted, is_strapped
 from tankcal.job.clouds import make_clouds
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.contract.clouds import KINDS as OF_CLOUDS
@@ -14,6 +14,7 @@ from tankcal.job.covariance import read_covariance
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
 from tankcal.job.hits import make_hits
 from tankcal.job.lines import make_lines
+from tankcal.job.liquid import make_metering
 from tankcal.job.measuring import make_measurements
 from tankcal.job.rule_files import find_rule
 from tankcal.job.strapping import make_strapping
@@ -21,6 +22,7 @@ from tankcal.job.tables import (
     CLOUD_TABLES,
     COVARIANCE_FILE,
     HITS_TABLES,
+    LIQUID_TABLES,
     REGISTERS,
     STRAPPING_TABLES,
     SURVEY_TABLES,
@@ -54,8 +56,15 @@ def job_of(raw, log, is_whole=True):
     lines, hits = make_lines(tables, registers), make_hits(tables, registers)
     tangents = make_tangents(tables, registers)
     clouds = make_clouds(values, tables, registers, raw)
+    liquid = make_metering(values, tables, registers, raw)
     return replace(
-        made, strapping=strapping, lines=lines, hits=hits, tangents=tangents, clouds=clouds
+        made,
+        strapping=strapping,
+        lines=lines,
+        hits=hits,
+        tangents=tangents,
+        clouds=clouds,
+        liquid=liquid,
     )
 
 
@@ -65,7 +74,7 @@ def _read_tables(raw, registers, is_whole, log):
     A table of a survey that is there but empty is None, too. Clouds make a table, one row a file.
     """
     kind = kind_of(raw)
-    allowed = None if kind is None else TABLES_OF_KIND[kind]
+    allowed = None if kind is None else TABLES_OF_KIND[kind] + LIQUID_TABLES
     if kind is not None and "points" in allowed:
         allowed += SURVEY_TABLES
     if kind == "vertical":
@@ -116,7 +125,7 @@ def _tell_missing_tables(raw, tables, kind, log):
         _tell_clouds_missing(raw, tables, log)
     for name in REQUIRED_TABLES.get(kind, ()):
         measured = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
-        elsewhere = name == "points" and measured
+        elsewhere = name == "points" and (measured or is_metered(tables))
         if name in raw.tables or elsewhere:
             continue
         if name == "points" and "clouds" in raw.registers:
@@ -152,6 +161,10 @@ def _tell_clouds_missing(raw, tables, log):
 _IN_PLACE_OF_POINTS = {
     "wall_hits": message("no_rows_of_hits", "no rows; expected a sight to the wall in each"),
     "tangents": message("no_rows_of_tangents", "no rows; expected a sight to a limb in each"),
+    "liquid": message(
+        "no_rows_of_liquid",
+        "no rows; expected the start of each run, and a row for each batch and the dip after it",
+    ),
     "circumferences": message(
         "no_circumferences", "no rows; expected a reading of the tape on each course at least"
     ),

@@ -89,6 +89,13 @@ CIRCUMFERENCE_MISS, CIRCUMFERENCE_SDS = 4e-4, 3.0
 DRAWN_MISS, DRAWN_MISS_M = 1e-3, 0.004  # of an inside diameter that is known from the drawing
 OTHER_SIDE = (0.6, 1.6)  # of two plates: a miss that the other side of the wall explains
 
+LIQUID_C = {AMBIENT: (-30.0, 50.0), HEATED: (-30.0, 250.0), REFRIGERATED: (-200.0, 50.0)}
+LIQUID_EXPANSION_PER_K = (5e-5, 2.5e-3)  # water at 8 degrees, liquefied gas
+METER_OVER_TANK_K, SHELL_OVER_LIQUID_K = 10.0, 25.0
+TANK_C_STEP_K = 2.0  # of the liquid in the tank from dip to dip
+METER_DRIFT, MUCH_METER_DRIFT = 2e-4, 5e-4  # of a factor, before and after
+BATCH_SD = 1e-3  # sd of a batch by its meter, over the batch
+
 TAKES_ROOM = (
     *("coil", "pipe", "tube", "column", "pillar", "ladder", "stair", "agitator", "mixer", "beam"),
     *("serpentina", "tubo", "tubulação", "coluna", "pilar", "escada", "agitador", "viga"),
@@ -110,6 +117,7 @@ class Plausible:
     slip     what slip of the hand is told by it
     against  what the number is compared with
     codes    of the messages that tell it
+    verified False: a limit of a standard that was read at second hand, not in its source
     """
 
     what: str
@@ -117,6 +125,7 @@ class Plausible:
     slip: str
     against: str
     codes: tuple[str, ...]
+    verified: bool = True
 
 
 def least_course_mm(diameter_m, head_m, density=LIGHT, shell="carbon_steel"):
@@ -464,6 +473,56 @@ TABLE = (
         "slope distances 0.1 % too long",
         "the adjusted survey",
         ("check_reading_off", "check_point_off", "control_scale"),
+    ),
+    Plausible(
+        "liquid.csv: meter_temperature_c, tank_temperature_c, shell_temperature_c",
+        f"{_c(LIQUID_C[AMBIENT])}; checks.service heated {_c(LIQUID_C[HEATED])}, refrigerated"
+        f" {_c(LIQUID_C[REFRIGERATED])}; meter within {METER_OVER_TANK_K:g} K of the liquid in the"
+        f" tank, shell within {SHELL_OVER_LIQUID_K:g} K",
+        "degrees Fahrenheit, columns exchanged",
+        "one another",
+        ("metered_temperature_strange", "temperatures_far_apart"),
+    ),
+    Plausible(
+        "liquid.tank_temperature_c",
+        f"from dip to dip within {TANK_C_STEP_K:g} K",
+        "liquid in layers, read at one height",
+        "the dip before it",
+        ("tank_temperature_jumps",),
+        verified=False,
+    ),
+    Plausible(
+        "liquid.expansion_per_k",
+        f"{LIQUID_EXPANSION_PER_K[0]:g} to {LIQUID_EXPANSION_PER_K[1]:g} 1/K",
+        "that of the shell, ten times too small",
+        "",
+        ("liquid_expands_strangely",),
+    ),
+    Plausible(
+        "meters.toml: factor_after",
+        f"within {100 * METER_DRIFT:g} % of the factor before, at most"
+        f" {100 * MUCH_METER_DRIFT:g} %",
+        "a meter that changed",
+        "factor",
+        ("meter_drifted", "meter_changed"),
+        verified=False,
+    ),
+    Plausible(
+        "liquid.flow_m3_h",
+        "within the range that the meter was proved for",
+        "litres per minute, a valve hardly open",
+        "flow_min_m3_h, flow_max_m3_h of meters.toml",
+        ("flow_out_of_range",),
+        verified=False,
+    ),
+    Plausible(
+        "liquid.volume_m3",
+        f"standard deviation of a batch by its meter at most {100 * BATCH_SD:g} % of it; well"
+        " above a bottom and well within a lying tank 0.7 to 1.4 times what the nominal sizes hold"
+        " between its dips, most of them over 5 or under 0.2 times a problem",
+        "litres, gallons, barrels, a batch missing, a valve that passes, a dip misread",
+        "meters.toml, nominal sizes",
+        ("batch_too_small", "batch_unlike_sizes", "batches_in_other_unit"),
     ),
 )
 CODES = frozenset(code for one in TABLE for code in one.codes)

@@ -30,9 +30,15 @@ STRAPPING_TABLES = (
 HITS_TABLES = ("wall_hits", "control_readings")
 TANGENT_TABLES = ("tangents",)
 CLOUD_TABLES = ("scan_targets",)
+LIQUID_TABLES = ("liquid",)
 TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + CLOUD_TABLES
-TABLES += SURVEY_TABLES
-REGISTERS = {"cameras": "camera", "instruments": "instrument", "clouds": "cloud"}  # what each lists
+TABLES += LIQUID_TABLES + SURVEY_TABLES
+REGISTERS = {  # what each lists
+    "cameras": "camera",
+    "instruments": "instrument",
+    "clouds": "cloud",
+    "meters": "meter",
+}
 SETTINGS_FILE = "job.toml"
 SETTINGS_SHEET = "job"
 REFUSED_FILE = "image_points_refused.csv"  # written beside image_points.csv, never read
@@ -201,7 +207,7 @@ class RawJob:
     covariance  bytes of points_cov.npz, or None
     files       (name, SHA-256, bytes) of each file read
     folder      Path of the folder of job.toml or of the workbook
-    registers   {"cameras", "instruments" or "clouds": Register}
+    registers   {"cameras", "instruments", "clouds" or "meters": Register}
     """
 
     source: str

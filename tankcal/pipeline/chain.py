@@ -13,7 +13,17 @@ from tankcal.job import Job
 from tankcal.messages import message
 from tankcal.pipeline.cloud_passes import Reading
 from tankcal.pipeline.cloud_wall import Clouded
-from tankcal.pipeline.corrections import Correction, corrections_of
+from tankcal.pipeline.corrections import (
+    Correction,
+    correction_by_liquid,
+    corrections_of,
+    gross_at_top,
+)
+from tankcal.pipeline.liquid import measure_by_liquid
+from tankcal.pipeline.liquid_checks import check_liquid_result
+from tankcal.pipeline.liquid_geometry import filled_with
+from tankcal.pipeline.liquid_result import LiquidResult
+from tankcal.pipeline.nominal_wall import NominalWall
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
@@ -79,6 +89,10 @@ class Result:
         Tangents as points of the wall, and where they were sighted from.
     clouded : cloud_wall.Clouded or None
         Clouds as points of the wall: their scans, cells and what hides the wall.
+    liquid : liquid.LiquidResult or None
+        What metered runs say of the tank, beside its geometry.
+    nominal : nominal_wall.NominalWall or None
+        The wall of the drawing, of an upright tank that only liquid tells.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -134,6 +148,8 @@ class Result:
     sighting: Sighting | None = None
     touching: Touching | None = None
     clouded: Clouded | None = None
+    liquid: LiquidResult | None = None
+    nominal: NominalWall | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -194,7 +210,7 @@ class Result:
     @property
     def gross(self) -> ShellVolume | None:
         """The shell as surveyed, without any correction (`volumes.ShellVolume`); else None."""
-        wall = self.wall or self.strapped
+        wall = self.wall or self.strapped or self.nominal
         return None if wall is None else shell_volume(wall)
 
     @property
@@ -341,7 +357,11 @@ def _run(job, progress, part_progress, simulated, reading):
     found = find_survey(job, progress, reading=reading)
     job, survey, adjustment = found.job, found.survey, found.adjustment
     wall = survey if isinstance(survey, Wall) else None
-    made = compute_table(job, survey, progress)
+    measured = None
+    if job.liquid is not None:
+        progress(message("adjusting_liquid", "adjusting the runs by liquid with the geometry"))
+        measured = measure_by_liquid(job, survey)
+    made = compute_table(job, survey, progress, measured and measured.body)
     body, zero, table = made.body, made.zero_m, made.table
     progress(message("stating", "stating volumes and deliveries"))
     stated = statements(job, table, made.straightness.largest_m3)
@@ -353,6 +373,7 @@ def _run(job, progress, part_progress, simulated, reading):
         pairs = pairs_to_simulate(stated, job, body, table)
         simulation = simulate_table(job, survey, body, zero, table, pairs, progress=part_progress)
         intervals = simulation.intervals(table)
+    liquid = measured and measured.result(made.levels_m)
     return Result(
         job=job,
         wall=wall,
@@ -362,24 +383,31 @@ def _run(job, progress, part_progress, simulated, reading):
         table=table,
         straightness=made.straightness,
         proportional_parts=_parts(job, made, intervals.U_m3),
-        corrections=corrections_of(job, survey, made.over_m),
-        by_density=_by_density(job, survey, made.levels_m, zero),
+        corrections=_corrections(job, survey, made, liquid),
+        by_density=_by_density(job, survey, made.levels_m, zero, measured),
         stated=stated,
         simulation=simulation,
         intervals=intervals,
         rule=verdict_of(job, body, table, intervals, simulation),
         warnings=_warnings(
-            job, adjustment, found.sighting or found.touching or found.clouded, survey, made
+            (job, liquid),
+            adjustment,
+            found.sighting or found.touching or found.clouded,
+            survey,
+            made,
         ),
         adjustment=adjustment,
         strapped=survey if isinstance(survey, StrappedWall) else None,
         sighting=found.sighting,
         touching=found.touching,
         clouded=found.clouded,
+        liquid=liquid,
+        nominal=survey if isinstance(survey, NominalWall) else None,
     )
 
 
-def _warnings(job, adjustment, sighting, survey, made):
+def _warnings(asked, adjustment, sighting, survey, made):
+    job, liquid = asked
     of_survey = ()
     if adjustment is not None:
         left_open = open_questions(job, adjustment.datum, adjustment.causes)
@@ -388,6 +416,7 @@ def _warnings(job, adjustment, sighting, survey, made):
         *job.warnings,
         *of_survey,
         *check_table(job, survey, made, sighting),
+        *check_liquid_result(job, liquid),
         *incomplete_certificate(job),
     )
     return placed(job, warnings)
@@ -468,18 +497,23 @@ def _parts(job, made, U_m3):
     return proportional_parts(made.volume_m3, edges, spec.step_m, PARTS, bound_m3)
 
 
-def _by_density(job, survey, levels, zero_m):
+def _corrections(job, survey, made, liquid):
+    found = corrections_of(job, survey, made.over_m)
+    if liquid is None or liquid.certified == "geometry":
+        return found
+    gross = gross_at_top(job, survey, made.over_m)
+    return (*found, correction_by_liquid(found, gross, float(made.table.volume_m3[-1])))
+
+
+def _by_density(job, survey, levels, zero_m, measured):
     """The same rows for each further density of the liquid: another head, another draught."""
     found = {}
     for density in job.table.other_densities_kg_m3:
-        filled = _filled_with(job, density)
-        body = body_of(filled, survey, uncertain=False)
+        filled = filled_with(job, density)
+        if measured is None:
+            body = body_of(filled, survey, uncertain=False)
+        else:
+            body = measured.body_for(density)
         found[density] = body.volume_m3(levels)
         refuse_falling(filled, body, zero_m, levels - zero_m, found[density])
     return found
-
-
-def _filled_with(job, density):
-    """The job of a tank that holds another liquid, in which its floating roof floats."""
-    roof = job.roof and replace(job.roof, reference_density_kg_m3=density)
-    return replace(job, table=replace(job.table, liquid_density_kg_m3=density), roof=roof)

@@ -5,11 +5,11 @@ from functools import cached_property
 
 import numpy as np
 
+from tankcal.adjust import noncentrality
 from tankcal.geometry.field.blunders import Tested, restricted_precision
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import free_design
 from tankcal.pipeline.wall_readings import columns_of, shared_effects
-from tankcal.survey.network.reliability import noncentrality
 
 
 @dataclass(frozen=True)

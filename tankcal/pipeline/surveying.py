@@ -15,6 +15,7 @@ from tankcal.messages import message
 from tankcal.pipeline.cloud_wall import IN_PROCESS, Clouded, find_wall_in_clouds
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
 from tankcal.pipeline.hit_wall import find_hit_wall
+from tankcal.pipeline.nominal_wall import find_nominal_wall
 from tankcal.pipeline.scan import Scan, fit_scan
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.survey_warnings import refuse_undetermined
@@ -133,6 +134,8 @@ def _survey(job, progress, dof, amplitudes):
     """What was surveyed: a wall of courses, a mesh, the scan of another wall; None: sizes alone."""
     if job.strapping is not None and job.points is None:
         return find_strapped_wall(job, progress, amplitudes)
+    if job.tank.kind == "vertical" and job.points is None and job.liquid is not None:
+        return find_nominal_wall(job, progress)
     if job.tank.kind == "vertical":
         return find_wall(job, progress, dof, amplitudes)
     if job.mesh is not None:

@@ -81,7 +81,7 @@ class ComputedTable:
         return _exact(self.body, self.zero_m)(dips_m)
 
 
-def compute_table(job, survey, progress=lambda text: None):
+def compute_table(job, survey, progress=lambda text: None, body=None):
     """Compute the capacity table of a job, with the covariance of its rows.
 
     Parameters
@@ -91,6 +91,8 @@ def compute_table(job, survey, progress=lambda text: None):
         What was found of the tank; None where declared sizes alone describe it.
     progress : callable, optional
         Called with a line of text as each step begins.
+    body : Body, optional
+        The tank where more is known of it (by liquid); None: as the survey has it.
 
     Returns
     -------
@@ -102,8 +104,9 @@ def compute_table(job, survey, progress=lambda text: None):
         When the capacity falls with rising dips: see `refuse_falling`.
     """
     progress(message("integrating", "integrating volumes"))
-    with threads_for(MOST_SITES):
-        body = body_of(job, survey)
+    if body is None:
+        with threads_for(MOST_SITES):
+            body = body_of(job, survey)
     zero = zero_height(job, survey)
     progress(message("propagating", "propagating the covariance to every row of the table"))
     spec = job.table

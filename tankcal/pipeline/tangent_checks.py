@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.adjust import noncentrality
 from tankcal.errors import Problem
 from tankcal.geometry.shell import course_of
 from tankcal.messages import message
@@ -17,7 +18,6 @@ from tankcal.pipeline.level_checks import (
 from tankcal.pipeline.moved_setups import critical_of_setup, moved_setups, tested
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.wall import joints_of
-from tankcal.survey.network.reliability import noncentrality
 
 RULES = "tangents"
 SHOWN = 5

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy.linalg
 
+from tankcal.adjust import noncentrality
 from tankcal.geometry.field.amplitudes import estimate_amplitudes
 from tankcal.geometry.field.blunders import Tested
 from tankcal.geometry.field.components import COMPONENTS
@@ -32,7 +33,6 @@ from tankcal.pipeline.wall_readings import (
     sites_of,
 )
 from tankcal.quadrature import panels
-from tankcal.survey.network.reliability import noncentrality
 from tankcal.survey.reference_line import courses_told
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 

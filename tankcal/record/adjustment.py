@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 from scipy.special import gammaincinv
 
-from tankcal.adjust import ALPHA, CRITICAL, POWER
+from tankcal.adjust import ALPHA, CRITICAL, POWER, noncentrality
 from tankcal.record.adjusted import (
     AdjustedCamera,
     AdjustedInstrument,
@@ -31,7 +31,7 @@ from tankcal.record.images import (
 )
 from tankcal.record.schema import Columns, Saved, filled_from, key
 from tankcal.record.texts import Text, text_of
-from tankcal.survey.network.reliability import UNCONTROLLED, noncentrality, tau_limit
+from tankcal.survey.network.reliability import UNCONTROLLED, tau_limit
 from tankcal.survey.results import DatumReport, GroupOfReadings, Reading
 
 CONFIDENCE = 0.95  # of the global test and of the intervals of variance factors

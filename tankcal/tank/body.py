@@ -5,7 +5,7 @@ input that several parts share (a scale, the table's zero) moves all of them at 
 column of the covariance, the sum of their derivatives times its standard uncertainty.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -350,6 +350,8 @@ class Body:
     estimates: dict = field(default_factory=dict)
     shell: ShellPart | None = None
 
+    is_bent = True  # whether second derivatives by the declared inputs are worth a simulation
+
     @property
     def breakpoints_m(self):
         """Levels at which the free surface jumps: joints, edges of what stands or floats inside."""
@@ -396,6 +398,14 @@ class Body:
         ends = self.lowest_m, self.highest_m
         return sum(part.moved_m3(levels, step_m, *ends) for part in self.parts)
 
+    def only_shell(self):
+        """The body of the shell of courses alone."""
+        return replace(self, parts=(self.shell,))
+
+    def surveyed_sources(self, levels_m):
+        """What is left uncertain of the shell itself, declared inputs apart."""
+        return self.shell.sources(levels_m)
+
     def undeclared(self):
         """Names of the inputs that move some volume of the tank and have no declared u.
 
@@ -411,6 +421,18 @@ class Body:
     def sources(self, levels_m):
         """One `Source` for each cause of uncertainty: the parts' own, then what was declared."""
         return self._sources(self._inside(levels_m), self.derivatives(levels_m))
+
+    def sources_by(self, levels_m, inputs, without=()):
+        """`sources` in which every declared input of `inputs` has its line, zeros where it does not
+        move this body, or is one of `without`.
+
+        Two bodies of one tank (loaded by two liquids) then give the same sources in the same order.
+        """
+        derivatives = self.derivatives(levels_m)
+        for name in inputs:
+            by = derivatives.get(name, np.zeros(len(levels_m)))
+            derivatives[name] = np.zeros_like(by) if name in without else by
+        return self._sources(self._inside(levels_m), derivatives)
 
     def rows(self, levels_m):
         """(volumes, areas, sources) of a table, each as its own method gives it, at one go.

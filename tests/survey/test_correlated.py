@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from scipy.special import chdtri
 
-from tankcal.adjust import CRITICAL
+from tankcal.adjust import CRITICAL, noncentrality
 from tankcal.survey.network import Survey, adjust
-from tankcal.survey.network.reliability import noncentrality
 from tankcal.survey.network.separability import alternatives
 from tankcal.survey.observations import (
     Block,

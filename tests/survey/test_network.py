@@ -11,6 +11,7 @@ from networks import INTERIOR, SCOPE, by_total_station, photographed
 import tankcal.camera.imaging
 import tankcal.solver.compiled
 import tankcal.solver.elimination
+from tankcal.adjust import noncentrality
 from tankcal.camera.model import CONVENTIONS, Form
 from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import rotation_of_angles
@@ -26,7 +27,7 @@ from tankcal.survey.network.quality import (
     estimate_variance_components,
     precision,
 )
-from tankcal.survey.network.reliability import noncentrality, tau_limit
+from tankcal.survey.network.reliability import tau_limit
 from tankcal.survey.observations import ControlCoordinates, Distances, HeightDifferences, PlumbLines
 
 

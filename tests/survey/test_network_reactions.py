@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from networks import photographed
 
+from tankcal.adjust import noncentrality
 from tankcal.survey.network import Survey, adjust
 from tankcal.survey.network.reactions import reactions
-from tankcal.survey.network.reliability import noncentrality
 from tankcal.survey.observations import ControlCoordinates, Distances, HeightDifferences
 
 HELD = np.array([1, 7, 13, 19, 25, 31, 37, 43])

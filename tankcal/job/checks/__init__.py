@@ -12,13 +12,15 @@ from tankcal.job.checks.extent import (
     extent_of,
     has_survey,
     has_wall_points,
+    is_metered,
     is_sighted,
     is_strapped,
 )
 from tankcal.job.checks.geometry import check_cylinder, check_scan
 from tankcal.job.checks.hits import check_hits
 from tankcal.job.checks.lines import check_lines
-from tankcal.job.checks.plausible import check_plausible
+from tankcal.job.checks.liquid import check_liquid
+from tankcal.job.checks.plausible import check_metering, check_plausible
 from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.strapping import check_strapping
 from tankcal.job.checks.survey import check_survey
@@ -43,7 +45,7 @@ def check_all(values, tables, registers, raw, is_whole, log):
 
     values     of the settings, or None: unreadable
     tables     {name: ColumnValues, or None: not there}
-    registers  {"cameras", "instruments" or "clouds": {name: {key: value}}}
+    registers  {"cameras", "instruments", "clouds" or "meters": {name: {key: value}}}
     is_whole   False: the survey alone is asked for, whatever there is of the tank
     """
     if is_whole:
@@ -54,6 +56,9 @@ def check_all(values, tables, registers, raw, is_whole, log):
             check_hits(values, tables, registers, raw, log)
             check_tangents(values, tables, registers, raw, log)
         check_clouds(values, tables, registers, raw, log)
+        check_liquid(values, tables, registers, raw, log)
+        if values is not None:
+            check_metering(values, tables, registers, raw, log)
     check_survey(values, tables, registers, raw, is_whole, log)
 
 
@@ -67,7 +72,7 @@ def check_tank(values, tables, raw, log):
         check_settings(values, tables, extent, kind, raw, log)
         check_plausible(values, tables, extent, kind, raw, log)
     elsewhere = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
-    needs_points = kind == "vertical" and not elsewhere
+    needs_points = kind == "vertical" and not (elsewhere or is_metered(tables))
     if points is not None and (needs_points or has_rows(points)):
         check_points(points, log)
     if values is not None:

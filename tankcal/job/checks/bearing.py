@@ -4,6 +4,7 @@ from tankcal.job.checks.extent import (
     has_clouds,
     has_hits,
     has_wall_points,
+    is_metered_alone,
     is_strapped,
     may_be_hit_from_both_sides,
 )
@@ -104,6 +105,7 @@ def _has_own_offset(tables):
         has_hits(tables)
         or has_clouds(tables)
         or (is_strapped(tables) and not has_wall_points(tables))
+        or is_metered_alone(tables)
     )
 
 

@@ -38,6 +38,16 @@ def has_clouds(tables):
     return has_rows(tables.get("clouds"))
 
 
+def is_metered(tables):
+    """Was metered liquid filled in, or drawn off, between dips?"""
+    return has_rows(tables.get("liquid"))
+
+
+def is_metered_alone(tables):
+    """Is liquid all that tells the tank, beside the sizes of its drawing?"""
+    return is_metered(tables) and not (has_wall_points(tables) or is_strapped(tables))
+
+
 def is_sighted(tables):
     """Does the wall come from sights that name no target, or from scans?"""
     return has_hits(tables) or has_tangents(tables) or has_clouds(tables)

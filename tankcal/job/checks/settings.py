@@ -156,6 +156,7 @@ DENSITIES = (
     ("table", "liquid_density_kg_m3"),
     ("table", "other_densities_kg_m3"),
     ("roof", "reference_density_kg_m3"),
+    ("liquid", "density_kg_m3"),
 )
 
 

@@ -12,6 +12,7 @@ from tankcal.job.contract import (
     deadwood,
     hits,
     lines,
+    liquid,
     points,
     roof,
     stadia,
@@ -33,15 +34,15 @@ from tankcal.text.form_words import NOTES
 
 SECTIONS = (
     *("tank", "survey", "datum", "table", "horizontal", "sphere", "mesh", "bottom", "roof"),
-    *("shell", "strapping", "corrections", "material", "checks"),
+    *("shell", "strapping", "liquid", "corrections", "material", "checks"),
     *("adjustment", "adjustment.camera", "certificate"),
     "csv",
 )
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {one.__name__.rpartition(".")[2]: one.COLUMNS for one in _TABLES}
 COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS | stadia.COLUMNS
-COLUMNS |= clouds.COLUMNS | SURVEY_COLUMNS
-_KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS
+COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | SURVEY_COLUMNS
+_KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "roof": roof.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
 
@@ -52,6 +53,7 @@ SURVEYS = ADJUSTED_SURVEYS | {
     "triangulation": (*stadia.COLUMNS, *stadia.BESIDE),
     "tangents": (*tangents.COLUMNS, *tangents.BESIDE),
     "cloud": (*clouds.COLUMNS, *clouds.BESIDE),
+    "liquid": tuple(liquid.COLUMNS),
 }
 
 REQUIRED_TABLES = {"vertical": ("points", "courses")}

@@ -1,10 +1,11 @@
-"""The keys of cameras.toml, instruments.toml, clouds.toml and [adjustment.camera]."""
+"""The keys of cameras.toml, instruments.toml, clouds.toml, meters.toml, [adjustment.camera]."""
 
 from tankcal.camera.comparator import KINDS as TRANSFORMATIONS
 from tankcal.camera.model import AFFINITIES, CONVENTIONS
 from tankcal.job.contract.clouds import CLOUD
 from tankcal.job.contract.hits import RANGING
 from tankcal.job.contract.lines import PLUMMET
+from tankcal.job.contract.liquid import METER
 from tankcal.job.contract.shorthand import FREE
 from tankcal.job.contract.stadia import BAR
 from tankcal.job.contract.strapping import TAPE
@@ -243,11 +244,13 @@ SHORT_KEYS = {
     | {sd_key(name): f"s_{name}" for name in ("c", "x0", "y0")},
     "instruments": {},
     "clouds": {},
+    "meters": {},
 }
 REGISTER_KEYS = {
     "cameras": CAMERA,
     "instruments": (*INSTRUMENT, *TAPE, *PLUMMET, *RANGING, *BAR),
     "clouds": CLOUD,
+    "meters": METER,
 }
 REGISTERS_OF_SURVEY = {
     "photos": ("cameras", "instruments"),
@@ -258,6 +261,7 @@ REGISTERS_OF_SURVEY = {
     "tangents": ("instruments",),
     "triangulation": ("instruments",),
     "cloud": ("clouds", "instruments"),
+    "liquid": ("meters",),
 }
 # keys of [adjustment] that need photographs
 OF_PHOTOS = ("fixed_photo", "image_sd_um", "reading_limit_um", "depth_of_field", "image_weights")

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from tankcal.job.model.clouds import Clouds
+from tankcal.job.model.liquid import Meter, Metering
 from tankcal.job.model.parts import (
     Bottom,
     Course,
@@ -43,6 +44,8 @@ __all__ = [
     "Job",
     "Material",
     "Mesh",
+    "Meter",
+    "Metering",
     "Points",
     "Roof",
     "Sphere",
@@ -110,6 +113,8 @@ class Job:
         Sights to the limbs of the tank, in place of points.
     clouds : Clouds or None
         Files of scanners, in place of points.
+    liquid : Metering or None
+        Runs of metered liquid, beside a survey or alone.
     """
 
     tank: Tank | None
@@ -144,3 +149,4 @@ class Job:
     hits: WallHits | None = None
     tangents: Tangents | None = None
     clouds: Clouds | None = None
+    liquid: Metering | None = None

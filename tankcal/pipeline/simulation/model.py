@@ -85,7 +85,8 @@ class Model:
         self.parts = slice(0, self.rows), slice(self.rows, None)
         self.levels = np.minimum(table.height_m + zero_m, body.highest_m)
         self.inputs = coordinates([one.mapped(self._both) for one in table.sources])
-        u = {one.name: one.u for one in body.declared if one.name in self.inputs.place and one.u}
+        declared = body.declared if body.is_bent else ()
+        u = {one.name: one.u for one in declared if one.name in self.inputs.place and one.u}
         self.datum_m = u.get("datum", 0.0)
         self.curved = curvature(job, survey, body, self.levels, u, table.u_m3)
         self.quadratic = self._quadratic()

@@ -1,7 +1,7 @@
 """From a checked job to the body of its tank: every part, with the corrections that are on."""
 
 from tankcal.pipeline.tanks.common import thermal_scale
-from tankcal.pipeline.tanks.solid import solid_body, solid_zero
+from tankcal.pipeline.tanks.solid import sized_job, solid_body, solid_zero
 from tankcal.pipeline.tanks.vertical import (
     critical_zone,
     insets_of,
@@ -15,6 +15,7 @@ __all__ = [
     "critical_zone",
     "insets_of",
     "shell_volume",
+    "sized_job",
     "thermal_scale",
     "zero_height",
 ]

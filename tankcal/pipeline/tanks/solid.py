@@ -13,7 +13,7 @@ from tankcal.tank.solids import LyingTank, Sphere
 
 def solid_body(job, survey, switches):
     scale = thermal_scale(job, switches)
-    job = _with_scan(job, survey)
+    job = sized_job(job, survey)
     given = job.horizontal or job.sphere
     plate = 0.0
     if given and job.survey.side == "outside" and switches.plate:
@@ -82,7 +82,7 @@ def solid_as_surveyed(job, names, values):
     return _lying(sized.horizontal, plate, 1.0)
 
 
-def _with_scan(job, scan):
+def sized_job(job, scan):
     """The job with the sizes that its points gave."""
     return job if job.points is None else _with_sizes(job, scan.names, scan.values)
 

@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse
 
-from tankcal.adjust import ALPHA, POWER
+from tankcal.adjust import ALPHA, POWER, noncentrality
 from tankcal.solver.effects import constraint_reactions, sparse_rows
-from tankcal.survey.network.reliability import Residuals, noncentrality
+from tankcal.survey.network.reliability import Residuals
 
 HELD = "held coordinates"  # source of their Residuals; rows are 3 point + axis
 UNTESTED = 1e-10  # share of R'R in C'C below which only rounding is left of it

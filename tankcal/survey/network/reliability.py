@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtri, ndtri, stdtrit
 
-from tankcal.adjust import ALPHA, POWER
+from tankcal.adjust import ALPHA, POWER, noncentrality
 from tankcal.solver.effects import constraint_reactions, own_leverage, own_responses, responses
 from tankcal.survey.network.blocks import test_values
 
@@ -99,11 +99,6 @@ class Residuals:
     def elsewhere_m(self):
         """See above."""
         return self._effects[1]
-
-
-def noncentrality(alpha=ALPHA, power=POWER):
-    """delta0 of a two-sided test of the normal distribution; 4.13 for 0.001 and 0.80."""
-    return float(ndtri(1 - alpha / 2) + ndtri(power))
 
 
 def tau_limit(alpha, dof):

@@ -1,0 +1,332 @@
+"""Do the rows of liquid.csv follow one another? Starts, signs, dips, temperatures, units."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.job.checking import UNIT_FACTOR
+from tankcal.job.checks.sized_volumes import volume_by_sizes
+from tankcal.job.contract.liquid import TEMPERATURES
+from tankcal.messages import message
+
+ABOVE_TOP_M, ABOVE_TOP = 0.05, 0.03  # sizes of a drawing are not the tank's
+BELOW_BOTTOM_M = 0.3
+CHECK = "check"
+TELLING = 20.0  # a step whose level changes by so many sds of a dip may be told by sizes
+UNLIKE = (0.7, 1.4)  # volume of a batch over that by sizes
+GUESSES = (  # (least and most ratio, code of the unit)
+    (700.0, 1400.0, message("in_litres", ": is it in litres?")),
+    (190.0, 360.0, message("in_gallons", ": is it in US gallons?")),
+    (5.0, 8.0, message("in_barrels", ": is it in barrels?")),
+    (25.0, 46.0, message("in_cubic_feet", ": is it in cubic feet?")),
+)
+
+
+@dataclass(frozen=True)
+class Step:
+    """What went in between two dips that are used: place of the second row, and both dips."""
+
+    place: int
+    volume_m3: float
+    before_m: float
+    after_m: float
+
+
+def place_runs(table):
+    """{run: places of its rows} of liquid.csv, in the order of its rows."""
+    places = {}
+    for place, run in enumerate(table.of("run")):
+        if run is not None:
+            places.setdefault(run, []).append(place)
+    return places
+
+
+def steps_of(table):
+    """Steps of all runs, those without both dips left out; volumes to dips not used are added."""
+    volumes, dips, uses = (table.of(name) for name in ("volume_m3", "dip_m", "use"))
+    found = []
+    for places in place_runs(table).values():
+        before, volume = None, 0.0
+        for k, place in enumerate(places):
+            if k and volume is not None:
+                volume = None if volumes[place] is None else volume + volumes[place]
+            if uses[place] == CHECK:
+                continue
+            if None not in (before, dips[place], volume):
+                found.append(Step(place, volume, before, dips[place]))
+            before, volume = dips[place], 0.0
+    return found
+
+
+def check_runs(table, values, tables, extent, raw, log):
+    """Problems of rows one by one, of each run, and of the dips against the tank's sizes.
+
+    values, extent  None: the settings cannot be read
+    """
+    runs = place_runs(table)
+    if not table.skipped:
+        broken = _check_order(table, log)
+        for run, places in runs.items():
+            _check_start(table, run, places, log)
+            _check_batches(table, run, places, log)
+            _check_times(table, places, log)
+        _check_signs(table, broken, log)
+    _check_temperatures(table, runs, log)
+    if extent is not None and _check_levels(table, extent, log):
+        _check_units(table, volume_by_sizes(values, tables, raw), extent, values, log)
+
+
+def _check_order(table, log):
+    """Problems of runs that are taken up again; the names of these."""
+    last, seen, broken = None, {}, []
+    for row, run in zip(table.rows, table.of("run"), strict=True):
+        if run is not None and run != last and run in seen:
+            expected = message(
+                "run_apart",
+                "run {run!r} ended in row {last}; expected its rows one after the other, or another"
+                " name",
+                run=run,
+                last=seen[run],
+            )
+            log.problem(table.file, expected, row, "run")
+            broken.append(run)
+        last, seen[run] = run, row
+    return broken
+
+
+def _check_start(table, run, places, log):
+    first, row = places[0], table.rows[places[0]]
+    volume = table.of("volume_m3")[first]
+    if volume:
+        expected = message(
+            "run_without_start",
+            "found {volume:g} in the first row of run {run!r}; expected 0 there: it has the dip"
+            " that the run starts from, the batches follow",
+            volume=volume,
+            run=run,
+        )
+        log.problem(table.file, expected, row, "volume_m3")
+    elif len(places) == 1:
+        expected = message(
+            "run_of_one_row",
+            "run {run!r} has one row; expected its start and a batch at least",
+            run=run,
+        )
+        log.problem(table.file, expected, row, "run")
+    if table.of("use")[first] == CHECK:
+        expected = message(
+            "start_not_used", "found check; expected adjust: the run counts from its first dip"
+        )
+        log.problem(table.file, expected, row, "use")
+
+
+def _check_batches(table, run, places, log):
+    volumes, dips = table.of("volume_m3"), table.of("dip_m")
+    for place in places[1:]:
+        row = table.rows[place]
+        if dips[place] is None and not log.has(table.file, row, "dip_m"):
+            expected = message(
+                "dip_missing_in_run",
+                "blank; expected the dip: only the first row of a run may have none, where the tank"
+                " was empty and dry",
+            )
+            log.problem(table.file, expected, row, "dip_m")
+        if volumes[place] == 0:
+            expected = message(
+                "batch_of_nothing",
+                "found 0 within run {run!r}; expected what the meter showed since the row above; of"
+                " a dip that was read again give the mean, for a new run another name",
+                run=run,
+            )
+            log.problem(table.file, expected, row, "volume_m3")
+
+
+def _check_times(table, places, log):
+    times, last = table.of("time"), None
+    for place in places:
+        if times[place] is None:
+            continue
+        if last is not None and times[place] < last:
+            expected = message(
+                "dip_before_its_batch",
+                "earlier than the row above of the same run; expected rows in the order of the"
+                " work",
+            )
+            log.warning(table.file, expected, table.rows[place], "time")
+        last = times[place]
+
+
+def _check_signs(table, broken, log):
+    """Problems of dips that do not follow the sign of the batch; runs in pieces are told."""
+    runs = table.of("run")
+    for step in steps_of(table):
+        if runs[step.place] in broken:
+            continue
+        rise = step.after_m - step.before_m
+        shown = {"after": step.after_m, "before": step.before_m, "volume": step.volume_m3}
+        if step.volume_m3 > 0 and rise <= 0:
+            expected = message(
+                "dip_does_not_rise",
+                "found {after:g} after {before:g} and {volume:g} m3 more; expected a higher dip: is"
+                " one misread, or was the tank drawn off?",
+                **shown,
+            )
+        elif step.volume_m3 < 0 and rise >= 0:
+            expected = message(
+                "dip_does_not_fall",
+                "found {after:g} after {before:g} and {volume:g} m3; expected a lower dip: is one"
+                " misread, or the sign of the volume?",
+                **shown,
+            )
+        else:
+            continue
+        log.problem(table.file, expected, table.rows[step.place], "dip_m")
+
+
+def _check_temperatures(table, runs, log):
+    """Each of them in all rows that need it or in none, and those of the liquid together."""
+    dips = table.of("dip_m")
+    starts = {places[0] for places in runs.values()}
+    of_batches = [place for place in range(len(table.rows)) if place not in starts]
+    of_dips = [place for place in range(len(table.rows)) if dips[place] is not None]
+    absent = []
+    for column in TEMPERATURES:
+        given = table.of(column)
+        if table.columns[column] is None:
+            absent.append(column)
+            continue
+        needed = of_batches if column.startswith("meter") else of_dips
+        blank = [
+            table.rows[place]
+            for place in needed
+            if given[place] is None and not log.has(table.file, table.rows[place], column)
+        ]
+        if blank:
+            expected = message(
+                "temperature_in_some_rows",
+                "blank in {count} of {all} rows that need it; expected it in all of them, or in"
+                " none (no correction)",
+                count=len(blank),
+                all=len(needed),
+            )
+            log.problem(table.file, expected, blank[0], column)
+    of_liquid = [column for column in TEMPERATURES[:2] if column in absent]
+    if len(of_liquid) == 1:
+        (missing,) = of_liquid
+        (other,) = set(TEMPERATURES[:2]) - {missing}
+        expected = message(
+            "one_temperature_of_liquid",
+            "blank, but {other} is given; expected both or none: a batch is brought from the one to"
+            " the other",
+            other=other,
+        )
+        log.problem(table.file, expected, None, missing)
+    elif absent:
+        expected = message(
+            "volumes_not_reduced",
+            "no readings of {columns}: nothing is corrected for them",
+            columns=absent,
+        )
+        log.warning(table.file, expected)
+
+
+def _check_levels(table, extent, log):
+    """Problems of dips that are not in the tank; False where one is told."""
+    dips, lowest, top = table.numbers("dip_m"), extent.lowest_m, extent.top_m
+    if top is None and extent.height_m is not None:
+        top = 1.2 * extent.height_m  # the table's zero is not known
+    sound = True
+    for row, dip in zip(table.rows, dips, strict=True):
+        if top is not None and dip > top + max(ABOVE_TOP_M, ABOVE_TOP * top):
+            expected = message(
+                "dip_above_tank",
+                "found {dip:g}; expected at most {top:.4g} m, the top of the tank{hint}",
+                dip=dip,
+                top=top,
+                hint=_unit_of_dip(dip, top),
+            )
+        elif lowest is not None and dip < lowest - BELOW_BOTTOM_M:
+            expected = message(
+                "dip_below_tank",
+                "found {dip:g}; expected at least {lowest:.4g} m, the bottom of the tank",
+                dip=dip,
+                lowest=lowest,
+            )
+        else:
+            continue
+        log.problem(table.file, expected, row, "dip_m")
+        sound = False
+    return sound
+
+
+def _unit_of_dip(dip, top):
+    for scale, hint in (
+        (3.3, message("dip_in_feet", ": is it in feet?")),
+        (100.0, message("dip_in_centimetres", ": is it in centimetres?")),
+    ):
+        if dip <= scale * top:
+            return hint
+    return ""
+
+
+def _check_units(table, volume, extent, values, log):
+    """Batches against what the tank of the drawing holds between their dips.
+
+    volume  function of a dip, m3, or None: the sizes are not known
+    """
+    steps = [] if volume is None else steps_of(table)
+    usual = values["liquid"]["s_dip_mm"]
+    sds = [(sd or usual or 0.0) / 1000 for sd in table.of("s_dip_mm")]
+    told = []
+    for step in steps:
+        held = volume(step.after_m) - volume(step.before_m)
+        is_clear = abs(step.after_m - step.before_m) > TELLING * sds[step.place]
+        if is_clear and held * step.volume_m3 > 0:
+            told.append((step, held, step.volume_m3 / held))
+    if not told:
+        return
+    ratio = float(np.median([ratio for *_, ratio in told]))
+    if not 1 / UNIT_FACTOR < ratio < UNIT_FACTOR:
+        expected = message(
+            "batches_in_other_unit",
+            "most batches are {ratio:.3g} times what a tank of these sizes holds between their"
+            " dips; expected cubic metres{hint}",
+            ratio=ratio,
+            hint=_unit_of_volume(ratio),
+        )
+        log.problem(table.file, expected, None, "volume_m3")
+        return
+    for step, held, ratio in told:
+        inside = _is_clear_of_ends(step, extent, values)
+        if inside and not UNLIKE[0] < ratio < UNLIKE[1]:
+            expected = message(
+                "batch_unlike_sizes",
+                "{found_m3:g} m3 from a dip of {before_m:g} m to {after_m:g} m, where a tank of"
+                " these sizes holds {held_m3:.4g} m3: a batch missing, a dip misread, a valve that"
+                " passed?",
+                found_m3=step.volume_m3,
+                before_m=step.before_m,
+                after_m=step.after_m,
+                held_m3=held,
+            )
+            log.warning(table.file, expected, table.rows[step.place], "volume_m3")
+
+
+def _is_clear_of_ends(step, extent, values):
+    """Is a step where sizes that are a little wrong tell its volume all the same?"""
+    low, high = sorted((step.before_m, step.after_m))
+    if values["tank"]["kind"] == "vertical":
+        shell = values["datum"]["bottom_z_m"]
+        highest = [z for z in (shell, values["bottom"]["centre_z_m"]) if z is not None]
+        zero = values["datum"]["dip_plate_z_m"]
+        zero = shell if zero is None else zero
+        return zero is not None and low >= max(highest, default=zero) - zero
+    height = extent.height_m
+    return height is not None and 0.15 * height < low and high < 0.85 * height
+
+
+def _unit_of_volume(ratio):
+    for low, high, hint in GUESSES:
+        if low < ratio < high:
+            return hint
+    return ""

@@ -1,0 +1,33 @@
+"""Liquid observes the wall: metered steps as observations of the volumes of a tank.
+
+    fill = fill_of(metering)                                  steps between the dips that count
+    reduced = reduce_steps(fill, volume_m3, growth)           each against the volumes of a geometry
+    found = adjust_steps(reduced.misclosure_m3, noise, effects)
+    found.gain, found.test(column), run_effect(found, columns), name_causes(found, alternatives)
+
+Plain arrays throughout: nothing here knows a job. Source: ISO 4269:2001 and API Std 2555 (methods,
+by their catalogue pages); the mathematics is in docs/liquid.md.
+"""
+
+from tankcal.tank.liquid.adjustment import Effect, LiquidAdjustment, adjust_steps
+from tankcal.tank.liquid.naming import Alternative, Verdict, name_causes
+from tankcal.tank.liquid.readings import ReadingEffects, reading_effects
+from tankcal.tank.liquid.reduction import Fill, Reduced, fill_of, reduce_steps
+from tankcal.tank.liquid.run_effect import RunEffect, estimate_run_effect
+
+__all__ = [
+    "Alternative",
+    "Effect",
+    "Fill",
+    "LiquidAdjustment",
+    "ReadingEffects",
+    "Reduced",
+    "RunEffect",
+    "Verdict",
+    "adjust_steps",
+    "estimate_run_effect",
+    "fill_of",
+    "name_causes",
+    "reading_effects",
+    "reduce_steps",
+]
