@@ -8,6 +8,7 @@ from scipy.special import chdtrc, chdtri
 from tankcal.adjust import ALPHA
 from tankcal.errors import Problem
 from tankcal.messages import message
+from tankcal.pipeline.cloud_bottom import check_inside
 from tankcal.pipeline.cloud_wall import FILE, TARGETS, normals_of
 from tankcal.pipeline.hit_checks import causes_unlike_certificates
 from tankcal.survey.beams import points_of_beams
@@ -60,6 +61,7 @@ def check_clouds(job, survey, clouded):
         *_of_overlaps(job, clouded),
         *_of_hidden(job, clouded),
         *_of_assumed(job, clouded),
+        *check_inside(job, clouded.inside),
         *causes_unlike_certificates(survey, clouded.told, FILE),
     )
 

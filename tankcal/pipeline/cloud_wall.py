@@ -12,8 +12,10 @@ from tankcal.job.model import InputFile
 from tankcal.job.tables import unreadable_file
 from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import told_causes
+from tankcal.pipeline.cloud_bottom import CloudInside, find_inside, with_bottom
 from tankcal.pipeline.cloud_cluster import open_passes
 from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
+from tankcal.pipeline.cloud_units import refusal_of_units
 from tankcal.pipeline.hit_wall import through_wall
 from tankcal.pipeline.scan import fit_scan
 from tankcal.pipeline.wall import find_wall, joints_of, s_transform
@@ -46,6 +48,8 @@ class Clouded:
         What an upright wall says of offsets and scales.
     left_out : ndarray of int, shape (scans,)
         Points of each scan in boxes that are left out.
+    inside : CloudInside or None
+        Bottom and things inside; None: not asked for.
     """
 
     files: tuple
@@ -55,6 +59,7 @@ class Clouded:
     beamed: Beamed
     told: tuple = ()
     left_out: np.ndarray | None = None
+    inside: CloudInside | None = None
 
 
 def find_wall_in_clouds(
@@ -90,6 +95,7 @@ def find_wall_in_clouds(
         job, clouded = _as_points(job, clouded, free)
         wall = find_wall(job, progress, dof, amplitudes)
         told = told_causes(job, wall)
+        job = with_bottom(job, clouded.inside, clouded.registration, told)
     return job, replace(clouded, told=told), wall
 
 
@@ -105,22 +111,36 @@ def points_of_clouds(job, adjustment, progress, reading=IN_PROCESS):
         )
     )
     telling = Telling(progress, reading.part_progress)
-    with open_passes(Placing.of(job.clouds, registration), reading, telling) as passes:
+    placing = Placing.of(job.clouds, registration)
+    with open_passes(placing, reading, telling) as passes:
         files = tuple(_fingerprint(one) for one in job.clouds.files)
-        found = cells_of_clouds.find_cloud_wall(
-            passes,
-            radius_m=_nominal_radius_m(job),
-            joints_m=tuple(job.datum.bottom_z_m + joints_of(job)) if job.courses else None,
-            kind=job.tank.kind,
-            azimuth_rad=(job.horizontal.azimuth_rad if job.horizontal else None) or 0.0,
-            sides=job.clouds.sides,
-            progress=telling.step,
-        )
-    _refuse_places(job, registration, found.surface)
+        found = _wall_of_cells(job, placing, passes, telling)
+        _refuse_places(job, registration, found.surface)
+        inside = find_inside(job, passes, found, telling)
     readings = cells_of_clouds.readings_of(found, MOST_READINGS)
     job = replace(job, files=(*job.files, *files))
-    clouded = Clouded(files, registration, found, readings, None, left_out=passes.left_out)
+    job = with_bottom(job, inside, registration)
+    clouded = Clouded(
+        files, registration, found, readings, None, left_out=passes.left_out, inside=inside
+    )
     return _as_points(job, clouded)
+
+
+def _wall_of_cells(job, placing, passes, telling):
+    """`CloudWall`; InputError with the unit that would explain that there is none."""
+    joints = tuple(job.datum.bottom_z_m + joints_of(job)) if job.courses else None
+    sizes = {
+        "kind": job.tank.kind,
+        "radius_m": _nominal_radius_m(job),
+        "azimuth_rad": (job.horizontal.azimuth_rad if job.horizontal else None) or 0.0,
+    }
+    try:
+        return cells_of_clouds.find_cloud_wall(
+            passes, joints_m=joints, sides=job.clouds.sides, progress=telling.step, **sizes
+        )
+    except InputError as refused:
+        ends = (joints[0], joints[-1]) if joints else None
+        raise refusal_of_units(placing, {**sizes, "ends_m": ends}, refused) from refused
 
 
 def registered(job, adjustment):
