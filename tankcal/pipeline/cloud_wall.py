@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.clouds import wall as cells_of_clouds
+from tankcal.clouds.wall.growing import EMPTY, FEW, FEWEST
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.checks.clouds import offset_untold
 from tankcal.job.model import InputFile
@@ -25,6 +26,7 @@ from tankcal.survey.scans import KnownTargets
 
 FILE, TARGETS = "clouds.toml", "scan_targets.csv"
 MOST_READINGS = 1200  # whose full covariance is kept
+FEWEST_MEANS = 5  # of a course: a section has as many points
 FAR_AWAY = 20.0  # radii: no scanner that sees a wall stands further from it
 STEP_M = 1.0  # along the normal of a surface
 IN_PROCESS = Reading()
@@ -118,6 +120,7 @@ def points_of_clouds(job, adjustment, progress, reading=IN_PROCESS):
         _refuse_places(job, registration, found.surface)
         inside = find_inside(job, passes, found, telling)
     readings = cells_of_clouds.readings_of(found, MOST_READINGS)
+    _refuse_empty_courses(job, found, readings)
     job = replace(job, files=(*job.files, *files))
     job = with_bottom(job, inside, registration)
     clouded = Clouded(
@@ -228,6 +231,31 @@ def _refuse_places(job, registration, surface):
                     side=job.clouds.sides[scan],
                 )
                 problems.append(Problem(FILE, text, column=f"{file.name}.side"))
+    if problems:
+        raise InputError(problems)
+
+
+def _refuse_empty_courses(job, found, readings):
+    """Raise InputError for courses of which too few means of cells are, with the reason."""
+    means = np.bincount(readings.course, minlength=len(job.courses))
+    middle = (found.grid.edges_m[:-1] + found.grid.edges_m[1:]) / 2
+    problems = []
+    for place, course in enumerate(job.courses):
+        if means[place] >= FEWEST_MEANS:
+            continue
+        low, high = found.joints_m[place : place + 2]
+        mine = (middle > low) & (middle < high)
+        few = np.all([np.isin(one[mine], (EMPTY, FEW)) for one in found.why.values()], axis=0)
+        text = message(
+            "course_without_cells",
+            "nothing of the wall of course {course!r} can be used: {few:.0f} % of its cells have"
+            " fewer than {least} points, before the others something stands; expected a denser"
+            " cloud, or a scanner that stands nearer and sees it",
+            course=course.name,
+            few=100 * np.mean(few),
+            least=FEWEST,
+        )
+        problems.append(Problem(FILE, text))
     if problems:
         raise InputError(problems)
 

@@ -281,6 +281,17 @@ def scene_parts(scene, rng, rays):
 
 
 @pytest.mark.slow
+def test_a_course_that_few_points_are_of_is_named(tmp_path):
+    """60 000 rays each from two places: the top course has some four points in a cell of a scan."""
+    parts = scene_parts(Scene(), np.random.default_rng(1), 60_000)
+    with pytest.raises(InputError) as refused:
+        tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)))
+    (said,) = [str(one) for one in refused.value.problems]
+    assert "nothing of the wall of course '4' can be used" in said
+    assert "of its cells have fewer than 6 points" in said
+
+
+@pytest.mark.slow
 def test_narrow_seams_and_a_buckle_of_a_cloud_are_in_its_table(tmp_path, figure):
     """Simulation by rays; seams of 40 mm, 0.2 m wide, a buckle of 60 mm; volume by integration."""
     seams, buckle = ((1.0, -0.04, 0.2), (3.7, -0.04, 0.2)), (3.0, 5.0, 0.06, 2.0)
