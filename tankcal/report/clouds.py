@@ -122,7 +122,7 @@ def _facts_of_inside(paper):
         return []
     side = paper.number(inside["cell_m"], "m", decimals=2)
     found = [
-        ("cloud_bottom_share", paper.number(inside["seen_share"], "share", decimals=0)),
+        ("cloud_bottom_share", paper.number(inside["seen_share"], "share", decimals=1)),
         ("cloud_bottom_cells", f"{paper.number(inside['cells'], decimals=0)} × {side}"),
         ("cloud_bottom_scatter", paper.number(inside["scatter_mm"], "image mm", decimals=2)),
         ("cloud_bottom_mirrored", paper.number(inside["mirrored"], decimals=0)),

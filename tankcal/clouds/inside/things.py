@@ -19,7 +19,7 @@ from tankcal.errors import SolutionError
 from tankcal.geometry.circles import fit_circle
 
 LEAST_POINTS, LEAST_CELLS = 3, 3  # of a cell and level that is held, of a thing
-CLEAR_M, ROOF_M, WALL_M = 0.05, 0.2, 1.0  # off the bottom, under the top, off the wall
+CLEAR_M, ROOF_M, WALL_M = 0.05, 0.2, 0.2  # off the bottom, under the top, off the wall
 STANDING, WIDEST_CELLS = 0.5, 6  # of the height; across a column
 SAMPLE, SLAB_M, SLAB_POINTS, FEWEST = 40_000, 0.5, 600, 30
 TRIES, BAND_M, THIN_M, THICK_M = 150, 0.006, 0.015, 1.0  # circles through three points
