@@ -281,6 +281,18 @@ def scene_parts(scene, rng, rays):
 
 
 @pytest.mark.slow
+def test_a_scan_that_shows_no_wall_is_warned_of(tmp_path, few):
+    """One of two files in feet, declared as metres: the other shows the wall, this one nothing."""
+    parts = scanned_parts(np.random.default_rng(6), with_tool(TOOL))
+    own = np.array([line.split() for line in parts.extra_files["A.xyz"].split("\n")[:-1]])
+    parts.extra_files["A.xyz"] = xyz_text(own.astype(float) * 0.3048)
+    found = tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)), simulated=False)
+    said = [one for one in warnings_of(found) if "are of the wall; expected 1.0 % or more" in one]
+    assert len(said) == 1
+    assert "scan 'A'" in said[0]
+
+
+@pytest.mark.slow
 def test_a_course_that_few_points_are_of_is_named(tmp_path):
     """60 000 rays each from two places: the top course has some four points in a cell of a scan."""
     parts = scene_parts(Scene(), np.random.default_rng(1), 60_000)
