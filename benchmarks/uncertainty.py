@@ -30,9 +30,10 @@ from scipy.linalg import block_diag
 
 from tankcal.geometry.field.estimate import LEVELS
 from tankcal.job import DeclaredInput
-from tankcal.tank.body import Body, ShellPart, survey_factors
+from tankcal.tank.body import Body, ShellPart
 from tankcal.tank.capacity import Capacity
 from tankcal.tank.courses import CourseShape, gauss_levels
+from tankcal.tank.factors import survey_factors
 from tankcal.tank.fittings import deadwood
 from tankcal.tank.volumes import ShellVolume
 

@@ -18,7 +18,7 @@ from tankcal.cli.showing import (
     say,
     warn,
 )
-from tankcal.errors import SolutionError
+from tankcal.errors import Problem, SolutionError
 from tankcal.messages import message
 from tankcal.text.digits import decimals_of_height, fixed, format_significant, format_with_u
 
@@ -93,7 +93,7 @@ def _add_run(commands):
 def _run(options):
     source = Path(options.job)
     out = Path(options.out) if options.out else _default_out(source)
-    compute = _adjust if options.only == "adjustment" else partial(_compute, options.cluster)
+    compute = partial(_adjust if options.only == "adjustment" else _compute, options.cluster)
     tell = _tell_machine if options.machine else _tell
     quiet = options.quiet or options.machine
     papers = letterhead_of(options), not options.no_papers
@@ -178,7 +178,16 @@ def _compute(cluster, source, out, quiet, strict=False, papers=(), tell=_tell):
         _refuse_failed(adjustment)
     paths = outputs.write(result, out, show.part, *papers)
     show.end()
-    tell(out, paths, result.warnings, result, adjustment)
+    warnings = (*result.warnings, *_idle_cluster(cluster, result.job.clouds))
+    tell(out, paths, warnings, result, adjustment)
+
+
+def _idle_cluster(cluster, clouds):
+    """A warning for workers that were asked for, where there are no clouds for them to read."""
+    if cluster in (None, "auto", 0) or clouds is not None:
+        return ()
+    text = message("cluster_idle", "without effect: no point cloud is read")
+    return (Problem("--cluster", text),)
 
 
 def _capacity(result):
@@ -220,7 +229,7 @@ def _capacity(result):
     )
 
 
-def _adjust(source, out, quiet, strict, papers, tell=_tell):
+def _adjust(cluster, source, out, quiet, strict, papers, tell=_tell):
     prepare_for_small_work()
     from tankcal.report import outputs
 
@@ -232,7 +241,8 @@ def _adjust(source, out, quiet, strict, papers, tell=_tell):
         _refuse_failed(adjustment)
     paths = outputs.write_adjustment(job, adjustment, out, show.part, *papers)
     show.end()
-    tell(out, paths, dict.fromkeys((*job.warnings, *adjustment.warnings)), None, adjustment)
+    warnings = (*job.warnings, *adjustment.warnings, *_idle_cluster(cluster, None))
+    tell(out, paths, dict.fromkeys(warnings), None, adjustment)
 
 
 def _refuse_failed(adjustment):

@@ -8,11 +8,13 @@ from scipy.special import chdtrc, chdtri
 from tankcal.adjust import ALPHA
 from tankcal.errors import Problem
 from tankcal.messages import message
+from tankcal.pipeline.cloud_bottom import check_inside
 from tankcal.pipeline.cloud_wall import FILE, TARGETS, normals_of
 from tankcal.pipeline.hit_checks import causes_unlike_certificates
 from tankcal.survey.beams import points_of_beams
 
 HIDDEN = 0.25  # of the cells of a course: what lies behind is a guess of the form alone
+LEAST_OF_WALL = 0.01  # of the points of a scan
 FEWEST_CELLS = 20  # in common, before two scans are compared
 MOST_CELLS = 150  # of an overlap that are compared
 LEAST_M = 2e-4  # cells of two scans may differ so much without a reason that a scan knows
@@ -58,8 +60,10 @@ def check_clouds(job, survey, clouded):
     return (
         *_of_targets(clouded.registration),
         *_of_overlaps(job, clouded),
+        *_of_idle_scans(job, clouded),
         *_of_hidden(job, clouded),
         *_of_assumed(job, clouded),
+        *check_inside(job, clouded.inside),
         *causes_unlike_certificates(survey, clouded.told, FILE, taken_off_m=clouded.beamed.told_m),
     )
 
@@ -157,6 +161,24 @@ def _of_targets(registration):
                 w=one.w,
             )
             yield Problem(TARGETS, text, one.row)
+
+
+def _of_idle_scans(job, clouded):
+    """Scans that show hardly anything of the wall that the others show."""
+    cells = clouded.cells
+    for place, scan in enumerate(job.clouds.scans):
+        share = cells.of_wall[place] / max(cells.delivered[place], 1)
+        if share < LEAST_OF_WALL:
+            text = message(
+                "scan_without_wall",
+                "{percent:.1f} % of the points of scan {scan!r} are of the wall; expected"
+                " {least:.1f} % or more: are its unit and its pose right, and is it a scan of this"
+                " tank?",
+                percent=100 * share,
+                scan=scan.name,
+                least=100 * LEAST_OF_WALL,
+            )
+            yield Problem(FILE, text)
 
 
 def _of_hidden(job, clouded):

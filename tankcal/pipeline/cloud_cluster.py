@@ -197,6 +197,11 @@ class ClusterPasses:
         cells.add_packed(packed)
         return cells
 
+    def gather(self, taken_of, *sizes):
+        """What taken_of(points, *sizes) takes of all points; two of it have `merged`."""
+        with _failures_told():
+            return self._reduced(_taken_part, _add_taken, taken_of, *sizes)
+
     def _reduced(self, part_of, added, *sizes):
         """What the shares give, added in a tree."""
         shares = self.placing.shares(self._points_each())
@@ -286,6 +291,20 @@ def _cells_part(placing, share, topic, number, surface, grid, scans):
     tally = _tally_of(placing, share, topic, number)
     cells = cells_of(placing.points([share], tally), surface, grid, scans)
     return cells.packed(), tally
+
+
+def _taken_part(placing, share, topic, number, taken_of, *sizes):
+    """What is taken of a share, and its `Tally`."""
+    tally = _tally_of(placing, share, topic, number)
+    return taken_of(placing.points([share], tally), *sizes), tally
+
+
+def _add_taken(parts, *_):
+    """What was taken of several shares as one."""
+    (taken, _), *others = parts
+    for other, _ in others:
+        taken = taken.merged(other)
+    return taken, Tally.added([one for _, one in parts])
 
 
 def _add_samples(parts, most):

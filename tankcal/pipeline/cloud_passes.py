@@ -183,13 +183,14 @@ class JobPasses:
 
     def sample(self, most):
         """`PointSample` of at most so many points."""
-        return self._gather(sample_of, most)
+        return self.gather(sample_of, most)
 
     def cells(self, surface, grid, scans):
         """`WallCells` of all points."""
-        return self._gather(cells_of, surface, grid, scans)
+        return self.gather(cells_of, surface, grid, scans)
 
-    def _gather(self, taken_of, *sizes):
+    def gather(self, taken_of, *sizes):
+        """What taken_of(points, *sizes) takes of all points."""
         shares = self.placing.shares()
         about = sum(one.points for one in shares)
         tally = self.placing.tally(lambda read: self.telling.tell(read, about))

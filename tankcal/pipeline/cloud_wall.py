@@ -6,14 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.clouds import wall as cells_of_clouds
+from tankcal.clouds.wall.growing import EMPTY, FEW, FEWEST
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.checks.clouds import offset_untold
 from tankcal.job.model import InputFile
 from tankcal.job.tables import unreadable_file
 from tankcal.messages import message
 from tankcal.pipeline.cause_correlations import told_causes
+from tankcal.pipeline.cloud_bottom import CloudInside, find_inside, with_bottom
 from tankcal.pipeline.cloud_cluster import open_passes
 from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
+from tankcal.pipeline.cloud_units import refusal_of_units
 from tankcal.pipeline.hit_wall import through_wall
 from tankcal.pipeline.scan import fit_scan
 from tankcal.pipeline.wall import find_wall, joints_of, s_transform
@@ -23,6 +26,7 @@ from tankcal.survey.scans import KnownTargets
 
 FILE, TARGETS = "clouds.toml", "scan_targets.csv"
 MOST_READINGS = 1200  # whose full covariance is kept
+FEWEST_MEANS = 5  # of a course: a section has as many points
 FAR_AWAY = 20.0  # radii: no scanner that sees a wall stands further from it
 STEP_M = 1.0  # along the normal of a surface
 IN_PROCESS = Reading()
@@ -46,6 +50,8 @@ class Clouded:
         What an upright wall says of offsets and scales.
     left_out : ndarray of int, shape (scans,)
         Points of each scan in boxes that are left out.
+    inside : CloudInside or None
+        Bottom and things inside; None: not asked for.
     """
 
     files: tuple
@@ -55,6 +61,7 @@ class Clouded:
     beamed: Beamed
     told: tuple = ()
     left_out: np.ndarray | None = None
+    inside: CloudInside | None = None
 
 
 def find_wall_in_clouds(
@@ -90,6 +97,7 @@ def find_wall_in_clouds(
         job, clouded = _as_points(job, clouded, free)
         wall = find_wall(job, progress, dof, amplitudes)
         told = told_causes(job, wall)
+        job = with_bottom(job, clouded.inside, clouded.registration, told)
     return job, replace(clouded, told=told), wall
 
 
@@ -105,22 +113,37 @@ def points_of_clouds(job, adjustment, progress, reading=IN_PROCESS):
         )
     )
     telling = Telling(progress, reading.part_progress)
-    with open_passes(Placing.of(job.clouds, registration), reading, telling) as passes:
+    placing = Placing.of(job.clouds, registration)
+    with open_passes(placing, reading, telling) as passes:
         files = tuple(_fingerprint(one) for one in job.clouds.files)
-        found = cells_of_clouds.find_cloud_wall(
-            passes,
-            radius_m=_nominal_radius_m(job),
-            joints_m=tuple(job.datum.bottom_z_m + joints_of(job)) if job.courses else None,
-            kind=job.tank.kind,
-            azimuth_rad=(job.horizontal.azimuth_rad if job.horizontal else None) or 0.0,
-            sides=job.clouds.sides,
-            progress=telling.step,
-        )
-    _refuse_places(job, registration, found.surface)
+        found = _wall_of_cells(job, placing, passes, telling)
+        _refuse_places(job, registration, found.surface)
+        inside = find_inside(job, passes, found, telling)
     readings = cells_of_clouds.readings_of(found, MOST_READINGS)
+    _refuse_empty_courses(job, found, readings)
     job = replace(job, files=(*job.files, *files))
-    clouded = Clouded(files, registration, found, readings, None, left_out=passes.left_out)
+    job = with_bottom(job, inside, registration)
+    clouded = Clouded(
+        files, registration, found, readings, None, left_out=passes.left_out, inside=inside
+    )
     return _as_points(job, clouded)
+
+
+def _wall_of_cells(job, placing, passes, telling):
+    """`CloudWall`; InputError with the unit that would explain that there is none."""
+    joints = tuple(job.datum.bottom_z_m + joints_of(job)) if job.courses else None
+    sizes = {
+        "kind": job.tank.kind,
+        "radius_m": _nominal_radius_m(job),
+        "azimuth_rad": (job.horizontal.azimuth_rad if job.horizontal else None) or 0.0,
+    }
+    try:
+        return cells_of_clouds.find_cloud_wall(
+            passes, joints_m=joints, sides=job.clouds.sides, progress=telling.step, **sizes
+        )
+    except InputError as refused:
+        ends = (joints[0], joints[-1]) if joints else None
+        raise refusal_of_units(placing, {**sizes, "ends_m": ends}, refused) from refused
 
 
 def registered(job, adjustment):
@@ -208,6 +231,31 @@ def _refuse_places(job, registration, surface):
                     side=job.clouds.sides[scan],
                 )
                 problems.append(Problem(FILE, text, column=f"{file.name}.side"))
+    if problems:
+        raise InputError(problems)
+
+
+def _refuse_empty_courses(job, found, readings):
+    """Raise InputError for courses of which too few means of cells are, with the reason."""
+    means = np.bincount(readings.course, minlength=len(job.courses))
+    middle = (found.grid.edges_m[:-1] + found.grid.edges_m[1:]) / 2
+    problems = []
+    for place, course in enumerate(job.courses):
+        if means[place] >= FEWEST_MEANS:
+            continue
+        low, high = found.joints_m[place : place + 2]
+        mine = (middle > low) & (middle < high)
+        few = np.all([np.isin(one[mine], (EMPTY, FEW)) for one in found.why.values()], axis=0)
+        text = message(
+            "course_without_cells",
+            "nothing of the wall of course {course!r} can be used: {few:.0f} % of its cells have"
+            " fewer than {least} points, before the others something stands; expected a denser"
+            " cloud, or a scanner that stands nearer and sees it",
+            course=course.name,
+            few=100 * np.mean(few),
+            least=FEWEST,
+        )
+        problems.append(Problem(FILE, text))
     if problems:
         raise InputError(problems)
 

@@ -159,6 +159,10 @@ def _of_shell(job, wall):
     )
 
 
+SURVEYED_BOTTOM = message(
+    "surveyed_bottom",
+    "volume between the surveyed surface and the plane of the bottom of the shell",
+)
 BOTTOM_FORMULAS = {
     "flat": "",
     "leaning": message("leaning_bottom", "plane square to the leaning axis of the shell"),
@@ -168,10 +172,8 @@ BOTTOM_FORMULAS = {
     "dish": message(
         "dish_bottom", "π H (3 r² + H²)/6 for a round shell; computed with the shell's own outline"
     ),
-    "points": message(
-        "surveyed_bottom",
-        "volume between the surveyed surface and the plane of the bottom of the shell",
-    ),
+    "points": SURVEYED_BOTTOM,
+    "cloud": SURVEYED_BOTTOM,
     "liquid": message(
         "measured_bottom",
         "measured volumes up to the highest measured level, increments of the shell above it",

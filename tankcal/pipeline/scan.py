@@ -12,7 +12,7 @@ from tankcal.pipeline.cross_checks import refuse_misfit
 from tankcal.pipeline.scanned_wall import SCALE_OF_MEDIAN, Fitted, agreeing, offsets, scanned_wall
 from tankcal.pipeline.survey_warnings import origin_of
 from tankcal.sections import covariance_of
-from tankcal.tank.body import Factor
+from tankcal.tank.factors import Factor
 from tankcal.tank.surveyed_form import SurveyedForm
 
 FAR = 5.0  # standard deviations: a point further off is not of the wall

@@ -35,7 +35,7 @@ from tankcal.pipeline.survey_warnings import noise_is_estimated
 from tankcal.pipeline.tanks.common import told_by
 from tankcal.pipeline.tanks.solid import solid_as_surveyed
 from tankcal.sections import coordinates_of
-from tankcal.tank.body import Factor, survey_factors
+from tankcal.tank.factors import Factor, survey_factors
 from tankcal.tank.surveyed_form import NODES, SurveyedForm, node_levels
 from tankcal.uncertainty import factor_of
 

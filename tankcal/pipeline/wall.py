@@ -44,7 +44,7 @@ from tankcal.sections import (
     sample_of,
 )
 from tankcal.solver.threads import threads_for
-from tankcal.tank.body import survey_factors
+from tankcal.tank.factors import survey_factors
 
 
 @dataclass(frozen=True)

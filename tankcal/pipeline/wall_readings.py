@@ -12,7 +12,7 @@ import numpy as np
 from tankcal.geometry.field.blunders import MOST_ROUNDS, restricted_precision, snoop_wall
 from tankcal.geometry.field.sites import Sites, free_design
 from tankcal.survey.reference_line import level_names
-from tankcal.tank.body import Factor
+from tankcal.tank.factors import Factor
 
 UNCONTROLLED = 1e-6  # of a reading's variance: what the others leave of it where there are none
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.pipeline.cloud_checks import overlaps_of
+from tankcal.record.cloud_inside import InsideSeen, inside_of
 from tankcal.record.cloud_map import CloudMap, map_of
 from tankcal.record.hits import SharedByHits, shared_of
 from tankcal.record.schema import Saved, key
@@ -151,6 +152,11 @@ class CloudsRecord(Saved):
     shared: list[SharedByHits] = key("offsets and scales, before and after the wall; upright tanks")
     shared_part: SharedPart = key("of U at the top of the table")
     map: CloudMap = key("the wall unrolled")
+    inside: InsideSeen | None = key(
+        "bottom and things; left out where the bottom is not taken from the scans",
+        default=None,
+        optional=True,
+    )
 
 
 def clouds_of(result):
@@ -194,6 +200,7 @@ def clouds_of(result):
         shared=shared_of(clouded.told, certificates, clouded.beamed.told_m),
         shared_part=shared_part_of(result.table),
         map=map_of(clouded.cells, _zero_m(result)),
+        inside=inside_of(result, _zero_m(result)),
     )
 
 

@@ -111,8 +111,26 @@ def facts(paper):
     tied = f"{chi2} / {paper.number(dof, decimals=0)}" if clouds["targets"] else None
     return paper.facts(
         [(key, paper.number(value, "m3", u=value or None)) for key, value in told.items()]
-        + [("cloud_registration", tied)]
+        + [("cloud_registration", tied), *_facts_of_inside(paper)]
     )
+
+
+def _facts_of_inside(paper):
+    """The bottom as scans from inside show it, and a roof; [] where nobody asked for it."""
+    inside = paper.record["clouds"].get("inside")
+    if inside is None:
+        return []
+    side = paper.number(inside["cell_m"], "m", decimals=2)
+    found = [
+        ("cloud_bottom_share", paper.number(inside["seen_share"], "share", decimals=1)),
+        ("cloud_bottom_cells", f"{paper.number(inside['cells'], decimals=0)} × {side}"),
+        ("cloud_bottom_scatter", paper.number(inside["scatter_mm"], "image mm", decimals=2)),
+        ("cloud_bottom_mirrored", paper.number(inside["mirrored"], decimals=0)),
+    ]
+    if inside["roof_share"] is not None:
+        ends = (paper.number(inside[key], "m", decimals=2) for key in ("roof_low_m", "roof_high_m"))
+        found.append(("cloud_roof", " – ".join(ends)))
+    return found
 
 
 def blocks_of_tables(paper):

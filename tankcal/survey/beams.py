@@ -66,6 +66,50 @@ def points_of_beams(xyz_m, sd_m, scan, normal, registration, tools, *, file="", 
         Its points have their whole covariance; an offset that nothing has told is among their
         `unbound`, not in it.
     """
+    shared = shared_by_beams(xyz_m, scan, normal, registration, tools, told_m=told_m)
+    n = len(xyz_m)
+    columns = np.column_stack([one.column_m for one in shared.causes] or [np.zeros(3 * n)])
+    covariance = columns @ columns.T
+    covariance[np.diag_indices(3 * n)] += np.repeat(sd_m**2, 3)
+    names = tuple(registration.scans[i].name for i in scan)
+    points = Points(
+        names=tuple(f"{name} {i + 1}" for i, name in enumerate(names)),
+        xyz_m=shared.xyz_m,
+        sd_m=None,
+        covariance_m2=covariance,
+        section=(None,) * n,
+        generatrix=(None,) * n,
+        rows=tuple(range(1, n + 1)),
+        causes=shared.causes,
+        from_adjustment=True,
+        unbound=shared.unbound,
+        file=file,
+    )
+    return Beamed(points, np.arccos(shared.cosine), told_m or {})
+
+
+@dataclass(frozen=True)
+class Shared:
+    """What places in scans have in common.
+
+    Attributes
+    ----------
+    xyz_m : ndarray, shape (n, 3)
+        The places, with the told offsets taken off.
+    causes, unbound : tuple of Cause
+        As those of `Points`.
+    cosine : ndarray, shape (n,)
+        Of the incidence.
+    """
+
+    xyz_m: np.ndarray
+    causes: tuple
+    unbound: tuple
+    cosine: np.ndarray
+
+
+def shared_by_beams(xyz_m, scan, normal, registration, tools, *, told_m=None):
+    """`Shared` of places in scans; arguments as of `points_of_beams`."""
     told_m = told_m or {}
     n, s = len(xyz_m), len(registration.scans)
     tool = tool_of(registration)[scan]
@@ -85,24 +129,8 @@ def points_of_beams(xyz_m, sd_m, scan, normal, registration, tools, *, file="", 
     by = by.reshape(3 * n, -1)
     causes, unbound = _of_scanners(registration, tools, by, scan, ray, cosine)
     causes += _of_scans(registration, by, causes)
-    columns = np.column_stack([one.column_m for one in causes]) if causes else np.zeros((3 * n, 0))
-    covariance = columns @ columns.T
-    covariance[np.diag_indices(3 * n)] += np.repeat(sd_m**2, 3)
-    names = tuple(registration.scans[i].name for i in scan)
-    points = Points(
-        names=tuple(f"{name} {i + 1}" for i, name in enumerate(names)),
-        xyz_m=registration.place_m[scan] + beam,
-        sd_m=None,
-        covariance_m2=covariance,
-        section=(None,) * n,
-        generatrix=(None,) * n,
-        rows=tuple(range(1, n + 1)),
-        causes=tuple(causes),
-        from_adjustment=True,
-        unbound=tuple(unbound),
-        file=file,
-    )
-    return Beamed(points, np.arccos(cosine), told_m)
+    xyz = registration.place_m[scan] + beam
+    return Shared(xyz, tuple(causes), tuple(unbound), cosine)
 
 
 def tool_of(registration):

@@ -9,108 +9,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tankcal.tank.factors import Factor, join_shared
 from tankcal.tank.parts import Part, sum_derivatives
 from tankcal.tank.surveyed_form import SurveyedForm
 from tankcal.tank.volumes import ShellVolume
-from tankcal.uncertainty import Source, declared_source, factor_of, group_correlated
+from tankcal.uncertainty import declared_source, group_correlated
 
 OWN_SCALE = "instrument_scale"  # kind of a cause that stands for the input "scale"
 MEASURED = ("diameter", "length", "end_depth", "dip_position", "plate_thickness")  # at its warmth
 ROUNDED_M = 0.001  # that the last dip of a table, a whole millimetre, stands above the top at most
 LEVELS = 9  # from empty to full, at which inputs are asked whether they move the volume
-LEAST_SHARE = 1e-6  # rounding of the share that a named cause has in the covariance
-
-
-@dataclass(frozen=True)
-class Factor:
-    """One cause of what a survey leaves uncertain, over what the survey gave.
-
-    Attributes
-    ----------
-    kind : str
-        "points", "bulge", "ovality", "seams", or what a named cause is ("instrument_scale").
-    columns : ndarray, shape (f, c)
-        Factor of the covariance of a shell's features or of a solid's inputs.
-    dof, u, unit, type, note, is_default
-        As in `uncertainty.Source`.
-    """
-
-    kind: str
-    columns: np.ndarray
-    dof: float = np.inf
-    u: float | None = None
-    unit: str | None = None
-    type: str = "A"
-    note: str = ""
-    is_default: bool = False
-
-    def source(self, columns_m3):
-        """The `Source` of (rows, c) columns that its own columns make in a table."""
-        return Source(
-            self.kind,
-            columns_m3,
-            self.dof,
-            self.u,
-            self.unit,
-            type=self.type,
-            note=self.note,
-            is_default=self.is_default,
-        )
-
-
-def survey_factors(covariance, dof=np.inf, causes=(), effects=()):
-    """`Factor`s of what a survey leaves uncertain: the points, then every named cause.
-
-    With F F' the covariance and e = F a the rest is F (I - A A') F', which is never negative.
-
-    Parameters
-    ----------
-    covariance : ndarray, shape (f, f)
-        Of all causes together: the rest L L' + sum of e e' over the effects.
-    dof : optional
-        Degrees of freedom of the covariance.
-    causes : optional
-        With name, what, u, unit, is_assumed (`surveys.Cause`); effects: (f,) of one u of each.
-        Those of one name and kind make one `Factor`.
-
-    Raises
-    ------
-    ValueError
-        For effects that are larger than the covariance.
-    """
-    whole = factor_of(covariance)
-    if len(causes) == 0:
-        return (Factor("points", whole, dof),)
-    shares = whole.T @ np.column_stack(effects) / np.sum(whole**2, axis=0)[:, None]
-    turn, size, _ = np.linalg.svd(shares)
-    if size.max(initial=0.0) > 1 + LEAST_SHARE:
-        raise ValueError("a named cause is larger than the covariance that contains it")
-    left = np.ones(len(turn))
-    left[: len(size)] = np.sqrt(np.maximum(1 - size**2, 0.0))
-    rest = whole @ (turn * left)
-    return (
-        Factor("points", rest[:, left > 0], dof),
-        *(
-            Factor(
-                one.what,
-                np.column_stack(columns),
-                u=one.u,
-                unit=one.unit,
-                type="B",
-                note=one.name,
-                is_default=one.is_assumed,
-            )
-            for one, columns in _by_name(causes, effects)
-        ),
-    )
-
-
-def _by_name(causes, effects):
-    """The first cause of each name and kind, with the effects of all of that name and kind."""
-    found = {}
-    for cause, effect in zip(causes, effects, strict=True):
-        found.setdefault((cause.what, cause.name), (cause, []))[1].append(effect)
-    return tuple(found.values())
 
 
 @dataclass(frozen=True)
@@ -409,13 +317,16 @@ class Body:
     def undeclared(self):
         """Names of the inputs that move some volume of the tank and have no declared u.
 
-        The scale of an instrument that was adjusted along stands for the scale of the survey.
+        The scale of an instrument that was adjusted along stands for the scale of the survey, what
+        the heights of a bottom share for its height.
         """
         levels = np.linspace(self.lowest_m, self.highest_m, LEVELS)
         moved = self.derivatives(levels)
         known = {one.name for one in self.declared}
         if any(one.kind == OWN_SCALE for part in self.parts for one in part.sources(levels)):
             known.add("scale")
+        if any(part.has_own_height for part in self.parts):
+            known.add("bottom")
         return tuple(name for name, by in moved.items() if name not in known and _bears(by))
 
     def sources(self, levels_m):
@@ -447,7 +358,7 @@ class Body:
         return self.volume_m3(levels_m), area, self._sources(inside, sum_derivatives(derivatives))
 
     def _sources(self, levels_m, derivatives):
-        own = [source for part in self.parts for source in part.sources(levels_m)]
+        own = join_shared([part.sources(levels_m) for part in self.parts])
         alone = {
             one.name: declared_source(one, derivatives[one.name], self.estimates.get(one.name))
             for one in self.declared

@@ -187,10 +187,16 @@ class SurfaceBottom(Part):
         Over the plan (`terrain.Surface`).
     survey : SurveyedSurface or None
         `soundings.SurveyedSurface`, or None for a plate of a given slope.
+    shared : tuple of factors.Factor
+        What the heights of the points have in common: columns (n, c), m.
+    has_own_height : bool
+        Whether this is all that is uncertain about its height.
     """
 
     surface: Surface
     survey: SurveyedSurface | None = None
+    shared: tuple = ()
+    has_own_height: bool = False
     kind = "bottom"
 
     @property
@@ -243,9 +249,11 @@ class SurfaceBottom(Part):
         at_edges[0] = 0.0
         _, wet = self.surface.volume_and_area(as_levels(levels_m))
         share = np.column_stack([np.interp(wet, at_edges, unit) for unit in np.eye(len(edges))[1:]])
+        by_points = share @ self.survey.by_points_m2
         return (
             Source("bottom_points", share @ self.survey.noise_m3, self.survey.noise_dof),
             Source("bottom_form", share @ self.survey.form_m3, self.survey.form_dof),
+            *(one.source(by_points @ one.columns) for one in self.shared),
         )
 
     @property
@@ -275,7 +283,7 @@ def leaning_bottom(footprint, slope):
     return SurfaceBottom(surface(plan, faces, -plan @ slope / (1 + slope @ slope)))
 
 
-def surveyed_bottom(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0)):
+def surveyed_bottom(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0), shared=None):
     """The bottom through surveyed points, smoothed by what they can tell.
 
     Parameters
@@ -288,6 +296,8 @@ def surveyed_bottom(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0)):
         Standard deviations of z; None: noise and waves are estimated as one.
     slope : array_like, shape (2,), optional
         (dx/dz, dy/dz) of the shell's axis.
+    shared : sequence of factors.Factor, optional
+        What the heights have in common, over the points; None: nothing says it.
 
     Returns
     -------
@@ -299,4 +309,4 @@ def surveyed_bottom(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0)):
         As `soundings.surveyed_surface`.
     """
     survey = surveyed_surface(footprint, xyz_m, sd_m, slope)
-    return SurfaceBottom(survey.surface, survey)
+    return SurfaceBottom(survey.surface, survey, tuple(shared or ()), shared is not None)

@@ -25,10 +25,14 @@ class Part(Protocol):
     moves_with_zero : bool
         Whether it was declared by dips. It then has no derivative by "datum": wherever the table's
         zero is, the same dips have the same volume.
+    has_own_height : bool
+        Of a bottom: whether its sources say how well its height is known, as those of one in scans
+        do; the input "bottom" is not missed then.
     """
 
     kind: str = "wall"
     moves_with_zero: bool = False
+    has_own_height: bool = False
 
     @abstractmethod
     def volume_m3(self, levels_m) -> np.ndarray:

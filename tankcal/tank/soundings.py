@@ -41,6 +41,7 @@ class SurveyedSurface:
     form_m2_per_m    b: variance of a height difference is 2 b distance
     waves_sd_m       of waves finer than the points; with the noise when this is not given
     w                (n,) of each point: how far it lies off what the others predict, over its sd
+    by_points_m2     (e, n) derivative of the volumes below the edges by the heights of the points
     """
 
     surface: Surface
@@ -52,6 +53,7 @@ class SurveyedSurface:
     form_m2_per_m: float
     waves_sd_m: float
     w: np.ndarray
+    by_points_m2: np.ndarray
 
 
 def surveyed_surface(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0)):
@@ -100,6 +102,7 @@ def surveyed_surface(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0)):
         form_m2_per_m=float(kriging.form_m2 / size),
         waves_sd_m=float(np.sqrt(kriging.waves_m2)),
         w=kriging.left_out(xyz[:, 2]),
+        by_points_m2=-shown,
     )
 
 

@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from conftest import EXAMPLE
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from job_builder import write_job
@@ -348,3 +349,11 @@ def test_tank_without_uncertainty_is_reported(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "45.239 m3 at 2.400 m, no uncertainty stated" in said
     assert "U = 0" not in said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("cluster", "told"), [("2", 1), ("local", 1), ("auto", 0), ("0", 0)])
+def test_workers_without_clouds_are_told(cluster, told, tmp_path, capsys):
+    words = ["run", str(EXAMPLE.parent / "total-station"), "--only", "adjustment", "--no-papers"]
+    assert main([*words, "--cluster", cluster, "--out", str(tmp_path / "out")]) == 0
+    assert capsys.readouterr().err.count("--cluster: without effect") == told

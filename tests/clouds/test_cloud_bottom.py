@@ -116,6 +116,7 @@ FILMS = {  # x, y, radius and height of water, shares of no return and of mirror
 }
 PIT, ROUND, SQUARE = (3.0, -2.5, 0.5, 0.45), (2.0, 0.0, 0.15), (-1.0, 5.0, 0.15)
 THIN = (-2.0, 3.0, 0.12)
+PIPE = (7.25 * np.sin(0.5), 7.25 * np.cos(0.5), 0.15)  # 0.1 m before the wall
 COIL = ((-4.0, -5.0, 0.15), (4.0, -5.0, 0.15), 0.04), ((-4.0, -4.6, 0.15), (4.0, -4.6, 0.15), 0.04)
 DEBRIS = (-3.0, -3.0, -0.4), (-2.6, -2.0, 0.25)
 
@@ -178,8 +179,8 @@ def test_what_stands_in_the_tank(name):  # simulation: rays
     scene, _, bottom, things = _scene(name)
     columns = [one for one in things if one.kind == "column"]
     boxes = [one for one in things if one.kind == "box"]
-    assert len(columns) == 2
-    for x, y, radius in (ROUND, THIN):
+    assert len(columns) == 3
+    for x, y, radius in (ROUND, THIN, PIPE):
         one = min(columns, key=lambda it: np.hypot(it.low_m[0] - x, it.low_m[1] - y))
         tall = 8.0 - float(scene.floor(x, y))
         assert abs(one.radius_m - radius) < 2 * one.u_radius_m < 0.004

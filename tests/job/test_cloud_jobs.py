@@ -8,7 +8,7 @@ import shutil
 import numpy as np
 import pytest
 from conftest import EXAMPLE
-from job_builder import assert_same_job, write_book, write_folder
+from job_builder import assert_same_job, job_parts, write_book, write_folder
 from scanned_tanks import SCANS, scanned_parts
 
 import tankcal
@@ -175,6 +175,16 @@ def test_clouds_stand_for_points(tmp_path):
     parts.tables["points"] = [["point", "x_m", "y_m", "z_m"], ["P", 1.0, 2.0, 3.0]]
     said = "\n".join(told(tmp_path, parts))
     assert "points.csv: given together with a cloud" in said
+
+
+@pytest.mark.parametrize("side", [None, "outside"])
+def test_a_bottom_of_a_cloud_needs_a_scan_from_inside(tmp_path, side):
+    parts = small() if side is None else small(side=side)
+    if side is None:
+        parts = job_parts()
+    parts.settings["bottom.form"] = "cloud"
+    said = told(tmp_path, parts)
+    assert any("bottom.form: found cloud; expected a scan from inside" in one for one in said)
 
 
 def test_targets_without_clouds_and_lonely_targets_are_warned_of(tmp_path):

@@ -202,6 +202,29 @@ def test_the_example_is_the_wall_that_it_was_made_of():
     assert neck["bottom_m"] < truth["neck"]["z_m"] < neck["top_m"]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("declared", "true", "size"),
+    [("m", "mm", 1e3), ("mm", "m", 1e-3), ("m", "ft", 1 / 0.3048), ("m", "in", 1 / 0.0254),
+     ("ft", "m", 0.3048), ("in", "mm", 25.4)],
+)  # fmt: skip
+def test_a_file_in_another_unit_is_named(tmp_path, declared, true, size):
+    """Property: both files are written in a unit of their own, one of them is declared wrongly."""
+    parts = scanned_parts(np.random.default_rng(6), with_tool(TOOL), columns=120, rows=25)
+    metres = {"m": 1.0, "mm": 1e-3, "ft": 0.3048, "in": 0.0254}
+    for name in SCANS:
+        own = np.array([line.split() for line in parts.extra_files[f"{name}.xyz"].split("\n")[:-1]])
+        unit = true if name == "A" else "mm"
+        parts.extra_files[f"{name}.xyz"] = xyz_text(own.astype(float) / metres[unit])
+        parts.registers["clouds"][name]["unit"] = declared if name == "A" else "mm"
+    assert metres[declared] / metres[true] == pytest.approx(size)
+    with pytest.raises(InputError) as refused:
+        tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)))
+    said = [str(one) for one in refused.value.problems]
+    assert len(said) == 1
+    assert f"if the coordinates of A.xyz are {true}: found {declared}" in said[0]
+
+
 def _scanned_solid(folder, kind, xyz, **settings):
     """Result of a solid that was scanned once from near its middle."""
     parts = job_parts(kind=kind, settings={"survey.side": "inside", **settings})
@@ -255,6 +278,29 @@ def scene_parts(scene, rng, rays):
         given = {"file": f"{name}.xyz", "unit": "m", "scanner": "S", "pose": pose.tolist()}
         parts.registers["clouds"][name] = given | exact
     return parts
+
+
+@pytest.mark.slow
+def test_a_scan_that_shows_no_wall_is_warned_of(tmp_path, few):
+    """One of two files in feet, declared as metres: the other shows the wall, this one nothing."""
+    parts = scanned_parts(np.random.default_rng(6), with_tool(TOOL))
+    own = np.array([line.split() for line in parts.extra_files["A.xyz"].split("\n")[:-1]])
+    parts.extra_files["A.xyz"] = xyz_text(own.astype(float) * 0.3048)
+    found = tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)), simulated=False)
+    said = [one for one in warnings_of(found) if "are of the wall; expected 1.0 % or more" in one]
+    assert len(said) == 1
+    assert "scan 'A'" in said[0]
+
+
+@pytest.mark.slow
+def test_a_course_that_few_points_are_of_is_named(tmp_path):
+    """60 000 rays each from two places: the top course has some four points in a cell of a scan."""
+    parts = scene_parts(Scene(), np.random.default_rng(1), 60_000)
+    with pytest.raises(InputError) as refused:
+        tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)))
+    (said,) = [str(one) for one in refused.value.problems]
+    assert "nothing of the wall of course '4' can be used" in said
+    assert "of its cells have fewer than 6 points" in said
 
 
 @pytest.mark.slow

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from jacobians import assert_derivative
 
-from tankcal.tank.body import Factor, SolidPart
+from tankcal.tank.body import SolidPart
+from tankcal.tank.factors import Factor
 from tankcal.tank.solids import End, LyingTank, Sphere
 from tankcal.tank.surveyed_form import NODES, SurveyedForm, node_levels
 

@@ -10,7 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from tankcal.clouds.inside.floor_cells import BIN_M, FloorCells, floor_grid
+from tankcal.clouds.inside.floor_cells import (
+    BIN_M,
+    OVER_M,
+    STACK_M,
+    FloorCells,
+    floor_cells_of,
+    floor_grid,
+)
 from tankcal.clouds.wall.growing import (
     FEWEST,
     WALL,
@@ -18,6 +25,7 @@ from tankcal.clouds.wall.growing import (
     off_trend,
     spread_between,
 )
+from tankcal.clouds.wall.passes import Passes
 from tankcal.clouds.wall.start import FILE
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
@@ -29,6 +37,24 @@ CLEAR_BINS = 5  # under the bottom, from which on something is another thing
 LEAST_PIT_CELLS, LEAST_PIT_M = 2, 0.05
 FEWEST_OF_BLOCK = 9  # cells that a quadratic is laid through
 MIRROR_BINS, MIRRORED = 3, 0.5  # how near the thing above, and how much of what is below
+ROOF_POINTS, ROOF_SHARE = 3, 0.3  # of a cell over the shell; of the plan, from which it is a roof
+
+
+@dataclass(frozen=True)
+class RoofSeen:
+    """What closes the tank over its shell; no part of a table.
+
+    Attributes
+    ----------
+    share : float
+        Of the plan that shows it.
+    low_m, high_m : float
+        Heights between which 90 % of its points lie, in the frame of the points, m.
+    """
+
+    share: float
+    low_m: float
+    high_m: float
 
 
 @dataclass(frozen=True)
@@ -51,6 +77,7 @@ class Pit:
     top_m: float
     area_m2: float
     u_area_m2: float
+    kind, box_m3, points = "pit", None, None
 
     @property
     def deadwood_row(self):
@@ -84,6 +111,10 @@ class CloudBottom:
     seen_share : float
         Of the cells of the plan.
     pits : tuple of Pit
+    by_scan : ndarray, shape (across, across, scans)
+        Points of each scan about the bottom in each cell.
+    roof : RoofSeen or None
+        None: hardly anything is seen over the shell.
     cells : FloorCells
     """
 
@@ -97,18 +128,22 @@ class CloudBottom:
     scatter_m: float
     seen_share: float
     pits: tuple[Pit, ...]
+    by_scan: np.ndarray
+    roof: RoofSeen | None
     cells: FloorCells
 
 
-def find_cloud_bottom(passes, cloud_wall, *, below_m=None, above_m=None, cell_m=None):
+def find_cloud_bottom(passes, cloud_wall, sides=None, *, below_m=None, above_m=None, cell_m=None):
     """The bottom that the points of scans from inside show.
 
     Parameters
     ----------
-    passes : callable
+    passes : callable, or an object as `passes.Passes` is
         As for `find_cloud_wall`.
     cloud_wall : CloudWall
         Of an upright tank.
+    sides : sequence of str, optional
+        "inside" or "outside" for each scan: others than those from inside are passed over.
     below_m, above_m, cell_m : float, optional
         As for `floor_grid`.
 
@@ -123,10 +158,10 @@ def find_cloud_bottom(passes, cloud_wall, *, below_m=None, above_m=None, cell_m=
     """
     joints = cloud_wall.joints_m
     sizes = {"below_m": below_m, "above_m": above_m, "cell_m": cell_m}
-    cells = FloorCells(floor_grid(cloud_wall.surface, joints[0], joints[-1], **sizes))
-    for _, xyz in passes():
-        cells.add(xyz)
-    return bottom_of_cells(cells)
+    grid = floor_grid(cloud_wall.surface, joints[0], joints[-1], **sizes)
+    inside = [one != "outside" for one in sides or cloud_wall.sides]
+    passes = Passes(passes) if callable(passes) else passes
+    return bottom_of_cells(passes.gather(floor_cells_of, grid, inside))
 
 
 def bottom_of_cells(cells):
@@ -159,8 +194,19 @@ def bottom_of_cells(cells):
         scatter_m=scatter,
         seen_share=seen,
         pits=_pits(np.where(mirror, np.nan, low), share, level, grid),
+        by_scan=cells.counts_of_scans(grown.low, grown.high),
+        roof=_roof(cells, in_plan),
         cells=cells,
     )
+
+
+def _roof(cells, in_plan):
+    share = float(np.mean(cells.over.reshape(in_plan.shape)[in_plan] >= ROOF_POINTS))
+    if share < ROOF_SHARE:
+        return None
+    level = np.searchsorted(np.cumsum(cells.roof), np.array([0.05, 0.95]) * cells.roof.sum())
+    low, high = cells.grid.top_m - OVER_M + (level + 0.5) * STACK_M
+    return RoofSeen(share, float(low), float(high))
 
 
 def _plan(grid):
@@ -203,7 +249,8 @@ def _refuse(z, is_bottom, rim, seen, grid):
         text = message(
             "cloud_no_bottom",
             "only {share:.0f} % of the plan shows a bottom between {low_m:.2f} m and {high_m:.2f} "
-            "m; expected {least:.0f} % at least: scans from inside, with dry steel under them",
+            "m; expected {least:.0f} % at least: scans from inside, with dry steel under them, and "
+            "no box of leave_out over it",
             share=100 * seen,
             low_m=grid.low_m,
             high_m=grid.bottom_m + grid.above_m,
@@ -273,11 +320,14 @@ class BottomPoints:
     sd_m : ndarray, shape (n,)
         Of the height: that of one cell, however many it is the mean of.
     cells : ndarray of int, shape (n,)
+    share : ndarray, shape (n, scans)
+        Of each scan in the height.
     """
 
     xyz_m: np.ndarray
     sd_m: np.ndarray
     cells: np.ndarray
+    share: np.ndarray
 
 
 def bottom_points(bottom, most=400):
@@ -301,7 +351,10 @@ def bottom_points(bottom, most=400):
         window = np.s_[low[0] : high[0], low[1] : high[1]]
         xyz[i, 2] = _height_at(xyz[i], bottom.xyz_m[window][shown[window]])
     variance = np.bincount(place, bottom.sd_m[column, row] ** 2) / cells
-    return BottomPoints(xyz, np.sqrt(variance), cells)
+    of_scans = bottom.by_scan[column, row].astype(float)
+    of_scans /= np.maximum(of_scans.sum(axis=1, keepdims=True), 1)
+    share = np.column_stack([np.bincount(place, one) / cells for one in of_scans.T])
+    return BottomPoints(xyz, np.sqrt(variance), cells, share)
 
 
 def _height_at(middle, xyz):

@@ -2,6 +2,8 @@
 
 Near the bottom each cell has a histogram of heights with the sums of heights and places, in whole
 numbers that add; up to the top of the shell it has counts, by which what stands inside is found.
+Of each scan it has counts in coarse classes, for what its points share, and over all heights above
+the shell how many there are: a roof.
 """
 
 from dataclasses import dataclass
@@ -18,6 +20,8 @@ STACK_M = 0.1  # height of the counts up to the top
 LEAST_REACH_M, REACH = 1.0, 0.12  # of heights near the bottom; of the radius
 SKIN_M = 0.1  # before the mean wall, that is left to the wall
 FOOT_M = 0.25  # under the bottom of the shell, from where on no wall can be
+COARSE = 10  # bins of a class that the points of each scan are counted in
+OVER_M = 0.2  # under the top of the shell, from where on a roof may be
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,11 @@ class FloorGrid:
         return int(np.ceil((self.below_m + self.top_m - self.bottom_m) / STACK_M - 1e-9))
 
     @property
+    def roof_levels(self):
+        """Classes of heights over the shell, as high as it is wide at most."""
+        return int(np.ceil((OVER_M + 2 * self.surface.radius_m) / STACK_M))
+
+    @property
     def low_m(self):
         """Height of the lowest bin, m."""
         return self.bottom_m - self.below_m
@@ -82,6 +91,11 @@ class FloorGrid:
         return self.across**2 * (3 * 8 * self.bins + 4 * self.levels)
 
 
+def reach_of_floor(radius_m):
+    """How far under the bottom of a shell of this radius its bottom is looked for, m."""
+    return max(LEAST_REACH_M, REACH * radius_m)
+
+
 def floor_grid(surface, bottom_m, top_m, *, below_m=None, above_m=None, cell_m=None):
     """`FloorGrid` of a shell.
 
@@ -95,7 +109,7 @@ def floor_grid(surface, bottom_m, top_m, *, below_m=None, above_m=None, cell_m=N
     cell_m : float, optional
         None: 0.25 m, more where the tank is wider than 18 m.
     """
-    reach = max(LEAST_REACH_M, REACH * surface.radius_m)
+    reach = reach_of_floor(surface.radius_m)
     return FloorGrid(
         surface,
         float(bottom_m),
@@ -117,6 +131,12 @@ class FloorCells:
         Sums of x and y within the cell, in its 2**16th.
     stack : ndarray of uint32, shape (across**2, levels)
         Counts up to the top of the shell.
+    by_scan : ndarray of uint32, shape (scans, across**2, classes)
+        Counts of each scan near the bottom, in classes of COARSE bins.
+    over : ndarray of uint32, shape (across**2,)
+        Counts from OVER_M under the top of the shell on.
+    roof : ndarray of int64, shape (roof_levels,)
+        The same in all cells, by height.
     under : ndarray of uint32, shape (across**2,)
         Counts below the lowest bin.
     delivered, inside : int
@@ -125,14 +145,17 @@ class FloorCells:
         Points in line with the wall, but under it.
     """
 
-    NAMES = ("sums", "places", "stack", "under", "tally")
+    NAMES = ("sums", "places", "stack", "by_scan", "over", "roof", "under", "tally")
 
-    def __init__(self, grid):
-        self.grid = grid
+    def __init__(self, grid, scans=1):
+        self.grid, self.scans = grid, scans
         cells = grid.across**2
         self.sums = np.zeros((cells, grid.bins), dtype=np.int64)
         self.places = np.zeros((2, cells, grid.bins), dtype=np.int64)
         self.stack = np.zeros((cells, grid.levels), dtype=np.uint32)
+        self.by_scan = np.zeros((scans, cells, -(-grid.bins // COARSE)), dtype=np.uint32)
+        self.over = np.zeros(cells, dtype=np.uint32)
+        self.roof = np.zeros(grid.roof_levels, dtype=np.int64)
         self.under = np.zeros(cells, dtype=np.uint32)
         self.tally = np.zeros(3, dtype=np.int64)
         self._corner = grid.corner_m
@@ -152,15 +175,15 @@ class FloorCells:
         """Points in line with the wall, but under it."""
         return int(self.tally[2])
 
-    def add(self, xyz_m):
-        """Add points (n, 3)."""
+    def add(self, xyz_m, scan=0):
+        """Add points (n, 3) of one scan."""
         self.tally[0] += len(xyz_m)
         for start in range(0, len(xyz_m), PIECE):
-            self._add(np.asarray(xyz_m[start : start + PIECE], dtype=float))
+            self._add(np.asarray(xyz_m[start : start + PIECE], dtype=float), scan)
 
     def merged(self, other):
         """The sums of the points of both, of the same grid."""
-        both = FloorCells(self.grid)
+        both = FloorCells(self.grid, self.scans)
         for name in self.NAMES:
             np.add(getattr(self, name), getattr(other, name), out=getattr(both, name))
         return both
@@ -170,6 +193,16 @@ class FloorCells:
     def counts(self):
         """(across, across, bins) points; the first axis is along x."""
         return (self.sums >> 32).reshape(self.grid.across, self.grid.across, -1)
+
+    def counts_of_scans(self, low, high):
+        """(across, across, scans) points in the classes that bins low to high, each (across,
+        across), of each cell reach into.
+        """
+        number = np.arange(self.by_scan.shape[2])
+        first, last = (one.ravel()[:, None] // COARSE for one in (low, high))
+        within = (number >= first) & (number <= last)
+        counts = np.einsum("scb,cb->cs", self.by_scan, within)
+        return counts.reshape(self.grid.across, self.grid.across, self.scans)
 
     def means(self, within):
         """x, y, z (across, across) means over some bins (across, across, bins), nan: none; and
@@ -194,20 +227,22 @@ class FloorCells:
         shape = grid.across, grid.across
         return *(one.reshape(shape) for one in (*xy, z, spread)), count.reshape(shape)
 
-    def _add(self, xyz_m):
+    def _add(self, xyz_m, scan):
         grid = self.grid
         away = grid.surface.places(xyz_m)[2]
         at_wall = np.abs(away) <= SKIN_M
         self.tally[2] += np.count_nonzero(at_wall & (xyz_m[:, 2] < grid.bottom_m - FOOT_M))
         mine = away < -SKIN_M
         self.tally[1] += np.count_nonzero(mine)
-        mine &= xyz_m[:, 2] < grid.top_m
         x, y, z = xyz_m[mine].T
         x, y = (x - self._corner[0]) / grid.cell_m, (y - self._corner[1]) / grid.cell_m
         column, row = x.astype(np.int64), y.astype(np.int64)
         sound = (column >= 0) & (column < grid.across) & (row >= 0) & (row < grid.across)
         x, y, z, column, row = (one[sound] for one in (x, y, z, column, row))
         cell = column * grid.across + row
+        self._add_over(cell, z)
+        below = z < grid.top_m
+        x, y, z, column, row, cell = (one[below] for one in (x, y, z, column, row, cell))
         deep = z < grid.low_m
         np.add.at(self.under, cell[deep], np.uint32(1))
         x, y, z, column, row, cell = (one[~deep] for one in (x, y, z, column, row, cell))
@@ -218,5 +253,21 @@ class FloorCells:
         fine, cell = fine[near], cell[near]
         place = cell * grid.bins + (fine >> FINE_BITS)
         np.add.at(self.sums.ravel(), place, COUNT + (fine & (FINE - 1)))
+        np.add.at(self.by_scan[scan], (cell, (fine >> FINE_BITS) // COARSE), np.uint32(1))
         for sums, part, whole in zip(self.places, (x, y), (column, row), strict=True):
             np.add.at(sums.ravel(), place, ((part[near] - whole[near]) * PLACE).astype(np.int64))
+
+    def _add_over(self, cell, z):
+        level = (z - (self.grid.top_m - OVER_M)) / STACK_M
+        over = (level >= 0) & (level < len(self.roof))
+        np.add.at(self.over, cell[over], np.uint32(1))
+        np.add.at(self.roof, level[over].astype(np.int64), 1)
+
+
+def floor_cells_of(points, grid, from_inside):
+    """`FloorCells` of an iterator of (scan, points); from_inside: whether each scan stood there."""
+    cells = FloorCells(grid, len(from_inside))
+    for scan, xyz in points:
+        if from_inside[scan]:
+            cells.add(xyz, scan)
+    return cells

@@ -13,12 +13,13 @@ from scipy import ndimage
 
 from tankcal.clouds.inside.bottom import level_everywhere
 from tankcal.clouds.inside.floor_cells import STACK_M
+from tankcal.clouds.wall.passes import Passes
 from tankcal.clouds.wall.sampling import PointSample
 from tankcal.errors import SolutionError
 from tankcal.geometry.circles import fit_circle
 
 LEAST_POINTS, LEAST_CELLS = 3, 3  # of a cell and level that is held, of a thing
-CLEAR_M, ROOF_M, WALL_M = 0.05, 0.2, 1.0  # off the bottom, under the top, off the wall
+CLEAR_M, ROOF_M, WALL_M = 0.05, 0.2, 0.2  # off the bottom, under the top, off the wall
 STANDING, WIDEST_CELLS = 0.5, 6  # of the height; across a column
 SAMPLE, SLAB_M, SLAB_POINTS, FEWEST = 40_000, 0.5, 600, 30
 TRIES, BAND_M, THIN_M, THICK_M = 150, 0.006, 0.015, 1.0  # circles through three points
@@ -70,31 +71,85 @@ class Thing:
         return name, self.low_m[2], self.high_m[2], -self.volume_m3, self.u_volume_m3
 
 
-def find_things(passes, bottom):
+@dataclass(frozen=True)
+class ThingCells:
+    """Which thing is in which cell.
+
+    Attributes
+    ----------
+    grid : FloorGrid
+    label : ndarray of int, shape (across, across, levels)
+        Its number, 0: none.
+    clear_m : ndarray, shape (across, across)
+        Height under which a point is of the bottom.
+    from_inside : sequence of bool
+        Whether each scan stood inside.
+    """
+
+    grid: object
+    label: np.ndarray
+    clear_m: np.ndarray
+    from_inside: tuple
+
+    @property
+    def count(self):
+        """Of the things."""
+        return int(self.label.max(initial=0))
+
+
+class ThingSamples:
+    """A `PointSample` of each of so many things."""
+
+    def __init__(self, count):
+        self.samples = [PointSample(SAMPLE) for _ in range(count)]
+
+    def merged(self, other):
+        """Those of the points of both."""
+        both = ThingSamples(0)
+        pairs = zip(self.samples, other.samples, strict=True)
+        both.samples = [one.merged(more) for one, more in pairs]
+        for one in both.samples:
+            one.reduce()
+        return both
+
+
+def things_of(points, cells):
+    """`ThingSamples` of an iterator of (scan, points), by `ThingCells`."""
+    found, label = ThingSamples(cells.count), cells.label
+    for scan, xyz in points:
+        if not cells.from_inside[scan]:
+            continue
+        place = _places(xyz, cells.grid)
+        known = np.all((place >= 0) & (place < label.shape), axis=1)
+        xyz, place = xyz[known], place[known]
+        mine = label[tuple(place.T)]
+        mine[xyz[:, 2] < cells.clear_m[place[:, 0], place[:, 1]]] = 0
+        for one in np.unique(mine[mine > 0]):
+            found.samples[one - 1].add(xyz[mine == one], scan)
+    return found
+
+
+def find_things(passes, bottom, sides=None):
     """`Thing` tuple of what stands off the wall, the tallest first.
 
     Parameters
     ----------
-    passes : callable
+    passes : callable, or an object as `passes.Passes` is
         As for `find_cloud_wall`; read once more.
     bottom : CloudBottom
+    sides : sequence of str, optional
+        As for `find_cloud_bottom`.
     """
     grid = bottom.grid
     level = level_everywhere(bottom.xyz_m[..., 2], bottom.is_bottom)
     label, standing = _labels(bottom, level)
-    count = int(label.max(initial=0))
-    samples = [PointSample(SAMPLE) for _ in range(count)]
-    clear = level + CLEAR_M
-    for scan, xyz in passes():
-        place = _places(xyz, grid)
-        known = np.all((place >= 0) & (place < label.shape), axis=1)
-        xyz, place = xyz[known], place[known]
-        mine = label[tuple(place.T)]
-        mine[xyz[:, 2] < clear[place[:, 0], place[:, 1]]] = 0
-        for one in np.unique(mine[mine > 0]):
-            samples[one - 1].add(xyz[mine == one], scan)
+    inside = tuple(one != "outside" for one in sides or ["inside"] * bottom.cells.scans)
+    passes = Passes(passes) if callable(passes) else passes
+    cells = ThingCells(grid, label, level + CLEAR_M, inside)
+    if not cells.count:
+        return ()
     found = []
-    for one, sample in enumerate(samples, start=1):
+    for one, sample in enumerate(passes.gather(things_of, cells).samples, start=1):
         xyz = sample.points()
         if len(xyz) >= FEWEST:
             column = _column(xyz, level, grid) if one <= standing else None

@@ -1,8 +1,9 @@
 """The two passes over the points of scans: what is taken of them, here or shared out.
 
-`find_cloud_wall` asks an object for `sample(most)` and `cells(surface, grid, scans)`; `Passes` goes
-over all points in this process. Whoever shares points out makes both of parts, with `sample_of` and
-`cells_of`, and adds these: samples and sums are the same whatever the parts and their order.
+`find_cloud_wall` asks an object for `sample(most)` and `cells(surface, grid, scans)`, who looks for
+more for `gather(taken_of, ...)`; `Passes` goes over all points in this process. Whoever shares
+points out makes these of parts, with `sample_of` and `cells_of`, and adds them: samples and sums
+are the same whatever the parts and their order.
 """
 
 from dataclasses import dataclass
@@ -37,6 +38,10 @@ class Passes:
     def cells(self, surface, grid, scans):
         """`WallCells` of all points."""
         return cells_of(self.points(), surface, grid, scans)
+
+    def gather(self, taken_of, *sizes):
+        """What taken_of(points, *sizes) takes of all points; two of it have `merged`."""
+        return taken_of(self.points(), *sizes)
 
 
 def sample_of(points, most):

@@ -21,7 +21,7 @@ DIAGNOSED = 60_000  # points that a cause is looked for with
 AROUND, FITTED_LEVELS = 72, 24  # cells of the points that the axis is fitted to
 WIDE = 0.03  # of the radius: how far from the first circle points may be of the wall
 FEWEST = 500  # points between the ends of the shell
-UNITS = {"mm": 1000.0, "cm": 100.0, "ft": 1 / 0.3048, "in": 1 / 0.0254, "km": 0.001}
+UNITS = {"mm": 1000.0, "cm": 100.0, "ft": 1 / 0.3048, "in": 1 / 0.0254}
 FILE = "clouds.toml"
 LEAST_ON_SPHERE = 0.3  # of the points
 SPHERE_TRIES, SPHERE_BANDS = 400, (0.03, 0.02, 0.01, 0.006, 0.006)
@@ -217,7 +217,7 @@ def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad):
     for unit, factor in UNITS.items():
         for origin in (np.zeros(3), middle):
             scaled = (xyz_m - origin) / factor + origin
-            if _is_found(scaled, kind, ends_m, radius_m, azimuth_rad):
+            if shows_wall(scaled, kind, ends_m, radius_m, azimuth_rad):
                 return message(
                     "cloud_in_other_unit",
                     "no wall near the nominal radius {nominal_m:.3f} m, but one if the "
@@ -240,7 +240,7 @@ def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad):
                     radius_m=sphere.radius_m,
                 )
     for other, turns, code in _other_kinds(kind, azimuth_rad):
-        if any(_is_found(xyz_m, other, None, radius_m, turn) for turn in turns):
+        if any(shows_wall(xyz_m, other, None, radius_m, turn) for turn in turns):
             return code
     for factor in np.geomspace(0.4, 2.5, 33):
         other = radius_m * factor
@@ -273,7 +273,10 @@ def _other_kinds(kind, azimuth_rad):
     return []
 
 
-def _is_found(xyz_m, kind, ends_m, radius_m, azimuth_rad):
+def shows_wall(xyz_m, kind, ends_m, radius_m, azimuth_rad=0.0):
+    """Whether points show a wall; arguments as of `find_surface`."""
+    if len(xyz_m) < FEWEST:
+        return False
     try:
         _surface(xyz_m, kind, ends_m, radius_m, azimuth_rad)
     except SolutionError:

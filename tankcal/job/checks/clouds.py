@@ -6,6 +6,7 @@ import tankcal.clouds
 from tankcal.errors import InputError
 from tankcal.job.checking import has_rows, is_not_given, missing_beside, name_twice, tell
 from tankcal.job.checks.extent import has_clouds, has_hits, has_survey, has_tangents, tells_by_tape
+from tankcal.job.contract.bottom import OF_CLOUD
 from tankcal.job.contract.clouds import (
     DOCUMENTED,
     OF_FILE,
@@ -27,6 +28,8 @@ PLACE = 3  # coordinates
 def check_clouds(values, tables, registers, raw, log):
     """Files that are there and sound, poses that move and do not bend, and errors declared."""
     given, targets = registers.get("clouds", {}), tables["scan_targets"]
+    if values is not None and kind_of(raw) == "vertical":
+        _check_bottom(values, given, tables, raw, log)
     if not has_clouds(tables):
         if has_rows(targets):
             log.warning(targets.file, message("no_clouds", "without effect: the job has no cloud"))
@@ -48,6 +51,20 @@ def check_clouds(values, tables, registers, raw, log):
     _refuse_unlike(raw, file, given, log)
     if has_rows(targets):
         _warn_lonely(tables, targets, log)
+
+
+def _check_bottom(values, given, tables, raw, log):
+    """A bottom that scans are to show needs one from inside."""
+    if values["bottom"]["form"] != OF_CLOUD:
+        return
+    sides = {one["side"] or values["survey"]["side"] or "inside" for one in given.values()}
+    if not has_clouds(tables) or "inside" not in sides:
+        text = message(
+            "bottom_without_cloud",
+            "found cloud; expected a scan from inside in clouds.toml, or another form: scans from"
+            " outside do not see the bottom",
+        )
+        tell(log.problem, raw, "bottom", "form", text)
 
 
 def scans_of(name, header):

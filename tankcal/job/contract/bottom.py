@@ -8,11 +8,13 @@ from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.fields import Field
 from tankcal.messages import message
 
+OF_CLOUD = "cloud"  # the form that scans of the job show
 KEYS = (
     choice(
         "form",
-        "form of the bottom; blank: flat, or points or liquid when bottom.csv has their columns",
-        ("flat", "leaning", "cone", "dish", "points", "liquid"),
+        "form of the bottom; cloud: as scans from inside show it; blank: flat, or points or liquid"
+        " when bottom.csv has their columns",
+        ("flat", "leaning", "cone", "dish", "points", "liquid", OF_CLOUD),
         kinds=VERTICAL,
     ),
     number(

@@ -43,11 +43,11 @@ class Bottom:
     ----------
     form : str
         "flat", "leaning" (square to the shell's axis), "cone", "dish", "points" (a surveyed
-        surface) or "liquid" (measured volumes).
+        surface), "cloud" (the same, found in scans) or "liquid" (measured volumes).
     centre_z_m : float or None
         Cone and dish: z of the centre in the survey's frame; the edge is at bottom_z_m.
     xyz_m : ndarray, shape (n, 3)
-        Points: surveyed, in the survey's frame.
+        Points: surveyed, in the survey's frame; of a cloud None until its scans are read.
     sd_m : ndarray, shape (n,)
         Standard deviations of their z, or None: not given.
     level_m : ndarray, shape (n,)
@@ -58,6 +58,8 @@ class Bottom:
         Their standard uncertainties, or None: not given.
     rows : tuple
         Row of each point or level in its file, for messages.
+    shared : tuple of survey.results.Cause
+        Cloud: what the heights of its points have in common; each has (n,) m.
     """
 
     form: str = "flat"
@@ -68,6 +70,7 @@ class Bottom:
     volume_m3: np.ndarray | None = None
     u_m3: np.ndarray | None = None
     rows: tuple = ()
+    shared: tuple = ()
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import numpy as np
 from tankcal.geometry.field.components import COMPONENTS, KINDS
 from tankcal.geometry.field.estimate import gauss_heights
 from tankcal.geometry.outlines import FULL_TURN
+from tankcal.job.contract.bottom import OF_CLOUD
 from tankcal.pipeline.tanks.common import (
     deadwood_part,
     estimates_of,
@@ -14,9 +15,10 @@ from tankcal.pipeline.tanks.common import (
     thermal_scale,
     told_by,
 )
-from tankcal.tank.body import Body, Factor, ShellPart
+from tankcal.tank.body import Body, ShellPart
 from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
 from tankcal.tank.courses import DEPARTURES, CourseShape
+from tankcal.tank.factors import Factor, cause_factors
 from tankcal.tank.fittings import floating_roof
 from tankcal.tank.hydrostatics import liquid_head
 from tankcal.tank.liquid_zone import Above, measured_bottom
@@ -39,6 +41,11 @@ class Widened(Part):
     part: Part
     rates: dict
     kind = "bottom"
+
+    @property
+    def has_own_height(self):
+        """That of the part."""
+        return self.part.has_own_height
 
     @property
     def lowest_m(self):
@@ -186,9 +193,11 @@ def _bottom(job, wall, shell):
     footprint = _footprint(wall, shell)
     if bottom.form == "leaning":
         return leaning_bottom(footprint, wall.shell.slope)
-    if bottom.form == "points":
+    if bottom.xyz_m is not None:
         xyz = bottom.xyz_m - (0.0, 0.0, low)
-        return surveyed_bottom(footprint, xyz, bottom.sd_m, wall.shell.slope)
+        causes = bottom.shared if bottom.form == OF_CLOUD else None
+        shared = causes and cause_factors(causes, [one.column_m for one in causes])
+        return surveyed_bottom(footprint, xyz, bottom.sd_m, wall.shell.slope, shared)
     return shaped_bottom(bottom.form, footprint.area_m2, bottom.centre_z_m - low)
 
 

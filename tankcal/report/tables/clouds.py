@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from tankcal.report.tables import hits
 from tankcal.report.tables.table import Column, Table
+from tankcal.text.digits import LITRE_DECIMALS
 
 
 def _column(key, heading, unit="", decimals=None, **more):
@@ -182,6 +183,22 @@ WELDS = Table(
 )
 
 
+THINGS = Table(
+    "cloud_things",
+    (
+        Column("name", heading="item", sheet="item", width=26),
+        _column("kind", "kind", words="things", width=14),
+        Column("bottom_m", "m", decimals=3, sheet="bottom_m"),
+        Column("top_m", "m", decimals=3, sheet="top_m"),
+        Column("volume_m3", "m3", u="u_m3", decimals=LITRE_DECIMALS + 1, sheet="volume_m3"),
+        Column("u_m3", "m3", u="u_m3", decimals=LITRE_DECIMALS + 1, sheet="u_m3"),
+        _column("box_m3", "box", "m3", LITRE_DECIMALS),
+        _column("confirmed", "confirmed", width=12),
+    ),
+    rows=lambda record: (record["clouds"].get("inside") or {}).get("things", []),
+)  # fmt: skip
+
+
 def _share_of_U(record):
     part = record["clouds"]["shared_part"]
     return [
@@ -203,5 +220,5 @@ SHARE_OF_U = Table(
 
 TABLES = (
     *(FILES, SCANS, POINTS, SCANNERS, SHARED, TARGETS, OVERLAPS, COURSES, OBSTRUCTIONS),
-    *(JOINTS, WELDS, SHARE_OF_U),
+    *(JOINTS, WELDS, THINGS, SHARE_OF_U),
 )
