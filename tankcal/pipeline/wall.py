@@ -44,7 +44,7 @@ from tankcal.sections import (
     sample_of,
 )
 from tankcal.solver.threads import threads_for
-from tankcal.tank.body import survey_factors
+from tankcal.tank.body import Factor, survey_factors
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,9 @@ class Wall:
         {input of the budget: (n,) derivative of the field's readings}, of what points depend on.
     without_inputs : tuple of str
         Inputs that have no meaning for these points.
+    undecided_m : ndarray, shape (n, columns)
+        By how much the field's readings were moved towards the wall without each column of points
+        that may be of a fitting: half of what they depart from it.
     """
 
     shell: Shell
@@ -91,6 +94,7 @@ class Wall:
     read: ReadWall | None = None
     by_inputs: dict = field(default_factory=dict)
     without_inputs: tuple = ()
+    undecided_m: np.ndarray | None = None
 
     def lowest_outline(self, azimuth_rad):
         """(x, y) of the axis at the bottom, and (n,) radii of the lowest section, m."""
@@ -110,6 +114,7 @@ class Wall:
         index = coordinates_of(self.accepted)
         effects = [weights @ (by_points @ cause.column_m[index]) for cause in causes]
         found = survey_factors(covariance, self.noise_dof, causes, effects)
+        found = (*found, *_of_undecided(weights @ self.undecided_m))
         if self.read is None:
             return found
         outside = job.survey.side == "outside"  # a reading sees a plate that is not taken off it
@@ -177,7 +182,7 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None):
             message(
                 "fitting_sections",
                 "fitting sections through {count} points of the wall",
-                count=np.count_nonzero(shell.reason == ""),
+                count=np.count_nonzero(shell.on_wall),
             )
         )
         return fit_wall(job, shell, dof, amplitudes=amplitudes)
@@ -203,7 +208,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     InputError
         When a course is left with too few points.
     """
-    accepted = np.flatnonzero(shell.reason == "")
+    accepted = np.flatnonzero(shell.on_wall)
     joints = joints_of(job) / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
     groups = _groups(job, shell, accepted, joints)
     sds, estimated = radial_sds(job.points), noise_is_estimated(job)
@@ -214,7 +219,8 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     nominal = job.tank.nominal_diameter_m / 2
     samples = [sample_of(*one) for one in to_fit]
     sites, means = _sites(groups, samples, nominal, _welds(job))
-    radius = means @ np.concatenate([one.radius_m for one in samples])
+    undecided = means @ _undecided(shell, accepted, groups)
+    radius = means @ np.concatenate([one.radius_m for one in samples]) - undecided.sum(axis=1)
     noise = (means @ scipy.sparse.block_diag(_blocks(samples)) @ means.T).toarray()
     is_known = amplitudes is not None
     if not is_known:
@@ -245,6 +251,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         field, more = read.field, len(read.accepted)
         by_points = _padded(by_points, more)
         by_inputs = {name: np.pad(one, (0, more)) for name, one in by_inputs.items()}
+        undecided = np.pad(undecided, ((0, more), (0, 0)))
     return Wall(
         shell=shell,
         joints_m=joints,
@@ -257,8 +264,33 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         straps=straps,
         read=read,
         by_inputs=by_inputs,
+        undecided_m=undecided,
         without_inputs=("offset",) if job.hits or job.clouds else (),  # instruments have their own
     )
+
+
+def _undecided(shell, accepted, groups):
+    """(m, columns) half of what points in columns depart by that may be wall or a fitting, m.
+
+    In the order of the groups' members, indices of `accepted`.
+    """
+    order = accepted[np.concatenate([one.members for one in groups])]
+    columns = np.arange(shell.column.max(initial=-1) + 1)
+    return 0.5 * shell.residual_m[order, None] * np.equal.outer(shell.column[order], columns)
+
+
+def _of_undecided(halves):
+    """`Factor` of columns of points that may be wall or a fitting; () without any.
+
+    halves  (f, columns) half of what each would change of features
+
+    Each is wall with a probability of one half, which no survey tells: of a share that may as well
+    be any from 0 to 1 two columns are alike with the correlation 1/3.
+    """
+    if not halves.any():
+        return ()
+    own, common = np.sqrt(2 / 3) * halves, np.sqrt(1 / 3) * halves.sum(axis=1, keepdims=True)
+    return (Factor("undecided", np.hstack([own, common]), type="B"),)
 
 
 def _by_inputs(points, by_points, accepted):
