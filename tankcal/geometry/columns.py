@@ -18,7 +18,7 @@ FEWEST, SHORTEST_M = 2, 0.7  # points of a column, and its height
 SLENDER = 2.0  # it is so many times as tall as wide
 FARTHEST_M = 0.080  # from the wall: what is farther off is no form of a wall
 STEEPEST = 1.0  # slope of a plate
-SIGMA = 3.0  # of the scatter of the wall
+SIGMA, LEAST = 3.0, 5.0  # of the scatter of the wall: a doubt of it; what chance does not set aside
 DENIED = 0.1  # of the points of a column: so many on the wall beside or between them deny it
 NONE = -1
 
@@ -51,8 +51,8 @@ def find_columns(place_m, departure_m, rejected, noise_m, turn_m):
     >>> off = np.where((x == 0.6) | (x == 2.4), -0.04, 0.0).ravel()
     >>> place = np.column_stack([x.ravel(), z.ravel()])
     >>> found = find_columns(place, off, off < 0, 0.001, 40.0)
-    >>> [int(one) for one in np.unique(found)], [float(one) for one in np.unique(place[found == 0, 0])]
-    ([-1, 0], [0.6])
+    >>> int(found.max()), [float(one) for one in np.unique(place[found == 0, 0])]
+    (0, [0.6])
     """
     found, count = np.full(len(rejected), NONE), 0
     if np.count_nonzero(rejected) < FEWEST:
@@ -61,7 +61,7 @@ def find_columns(place_m, departure_m, rejected, noise_m, turn_m):
     for sign in (-1, 1):
         depth = sign * departure_m
         for column in _columns(place, np.flatnonzero(rejected & (depth > 0))):
-            if np.median(depth[column]) > FARTHEST_M:
+            if not LEAST * noise_m < np.median(depth[column]) <= FARTHEST_M:
                 continue
             if _denials(place, depth, column, ~rejected, noise_m) > DENIED * len(column):
                 continue

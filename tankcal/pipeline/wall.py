@@ -26,6 +26,7 @@ from tankcal.pipeline.survey_warnings import (
     warn_of_vague_vertical,
     weak_sections,
 )
+from tankcal.pipeline.undecided_columns import factors_of_undecided, undecided_halves
 from tankcal.pipeline.untied_setups import unbound_of
 from tankcal.pipeline.wall_readings import (
     factors_of_plates,
@@ -44,7 +45,7 @@ from tankcal.sections import (
     sample_of,
 )
 from tankcal.solver.threads import threads_for
-from tankcal.tank.body import Factor, survey_factors
+from tankcal.tank.body import survey_factors
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,9 @@ class Wall:
         The wall itself, between the points too: what the table is made of.
     radii_by_points : sparse array, shape (n, 3 m)
         Derivative of the field's readings, in their order, by x, y, z of the accepted points.
+    undecided_m : ndarray, shape (n, columns)
+        By how much the field's readings were moved towards the wall without each column of points
+        that may be of a fitting: half of what they depart from it.
     sections : tuple of Section
         Circles and outlines through the points, from the bottom up.
     straps : Straps or None
@@ -77,9 +81,6 @@ class Wall:
         {input of the budget: (n,) derivative of the field's readings}, of what points depend on.
     without_inputs : tuple of str
         Inputs that have no meaning for these points.
-    undecided_m : ndarray, shape (n, columns)
-        By how much the field's readings were moved towards the wall without each column of points
-        that may be of a fitting: half of what they depart from it.
     """
 
     shell: Shell
@@ -89,12 +90,12 @@ class Wall:
     noise_dof: float
     field: WallField
     radii_by_points: scipy.sparse.csr_array
+    undecided_m: np.ndarray
     sections: tuple[Section, ...]
     straps: Straps | None = None
     read: ReadWall | None = None
     by_inputs: dict = field(default_factory=dict)
     without_inputs: tuple = ()
-    undecided_m: np.ndarray | None = None
 
     def lowest_outline(self, azimuth_rad):
         """(x, y) of the axis at the bottom, and (n,) radii of the lowest section, m."""
@@ -114,7 +115,7 @@ class Wall:
         index = coordinates_of(self.accepted)
         effects = [weights @ (by_points @ cause.column_m[index]) for cause in causes]
         found = survey_factors(covariance, self.noise_dof, causes, effects)
-        found = (*found, *_of_undecided(weights @ self.undecided_m))
+        found = (*found, *factors_of_undecided(weights @ self.undecided_m))
         if self.read is None:
             return found
         outside = job.survey.side == "outside"  # a reading sees a plate that is not taken off it
@@ -219,7 +220,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     nominal = job.tank.nominal_diameter_m / 2
     samples = [sample_of(*one) for one in to_fit]
     sites, means = _sites(groups, samples, nominal, _welds(job))
-    undecided = means @ _undecided(shell, accepted, groups)
+    undecided = means @ undecided_halves(shell, accepted, groups)
     radius = means @ np.concatenate([one.radius_m for one in samples]) - undecided.sum(axis=1)
     noise = (means @ scipy.sparse.block_diag(_blocks(samples)) @ means.T).toarray()
     is_known = amplitudes is not None
@@ -260,37 +261,13 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         noise_dof=amplitudes.noise_dof if estimated else dof,
         field=field,
         radii_by_points=by_points,
+        undecided_m=undecided,
         sections=sections,
         straps=straps,
         read=read,
         by_inputs=by_inputs,
-        undecided_m=undecided,
         without_inputs=("offset",) if job.hits or job.clouds else (),  # instruments have their own
     )
-
-
-def _undecided(shell, accepted, groups):
-    """(m, columns) half of what points in columns depart by that may be wall or a fitting, m.
-
-    In the order of the groups' members, indices of `accepted`.
-    """
-    order = accepted[np.concatenate([one.members for one in groups])]
-    columns = np.arange(shell.column.max(initial=-1) + 1)
-    return 0.5 * shell.residual_m[order, None] * np.equal.outer(shell.column[order], columns)
-
-
-def _of_undecided(halves):
-    """`Factor` of columns of points that may be wall or a fitting; () without any.
-
-    halves  (f, columns) half of what each would change of features
-
-    Each is wall with a probability of one half, which no survey tells: of a share that may as well
-    be any from 0 to 1 two columns are alike with the correlation 1/3.
-    """
-    if not halves.any():
-        return ()
-    own, common = np.sqrt(2 / 3) * halves, np.sqrt(1 / 3) * halves.sum(axis=1, keepdims=True)
-    return (Factor("undecided", np.hstack([own, common]), type="B"),)
 
 
 def _by_inputs(points, by_points, accepted):
