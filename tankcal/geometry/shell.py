@@ -20,6 +20,7 @@ from tankcal.geometry.clutter import (
     find_rings,
     shell_problem,
 )
+from tankcal.geometry.columns import NONE, find_columns
 from tankcal.geometry.field.blunders import find_blunders
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.seams import find_seams
@@ -33,6 +34,7 @@ LEAST_PART = 0.5  # of the points between bottom and top that the wall must hold
 WIDEST_SLOPE = 0.05  # sd of the slope before anything is measured: tanks hardly lean by more
 NEAR_M = 0.3  # from the wall: what stands there may be told by its side alone
 VAGUE_TILT = 2e-3  # sd above which the tilt counts as not determined by the points
+UNDECIDED = "undecided"  # reason of a point that may be of the wall or of a fitting before it
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,8 @@ class Shell:
     slope_cofactor : ndarray, shape (2, 2)
         Covariance of the slope.
     reason : ndarray of str, shape (n,)
-        "" for points of the wall, else why the point was rejected.
+        "" for points of the wall, "undecided" for those that may be of a fitting as well, else why
+        the point was rejected.
     residual_m : ndarray, shape (n,)
         Distance outwards from the wall as all other points show it; of points far from the wall,
         from the leaning cylinder of their course, m.
@@ -63,6 +66,8 @@ class Shell:
         Its degrees of freedom.
     tilt_known : bool
         False: the points do not determine a tilt, and the shell is taken as upright.
+    column : ndarray of int, shape (n,)
+        Number of the column that an undecided point is of; -1 of all others.
     """
 
     axis_m: tuple[float, float]
@@ -75,6 +80,12 @@ class Shell:
     noise_m: float
     noise_dof: float
     tilt_known: bool
+    column: np.ndarray
+
+    @property
+    def on_wall(self):
+        """(n,) points of the wall, and those that may be."""
+        return (self.reason == "") | (self.reason == UNDECIDED)
 
     @property
     def tilt(self):
@@ -162,8 +173,8 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
     if not tilt_known:
         upright = np.array([*axis[:2], 0.0, 0.0])
         found = find_form(local, course, zeta, wall, upright, relative, 1e-9, least)
-    in_band, axis = wall, found.axis
-    w, residual, wall = found.w, found.residual, found.wall
+    in_band, axis, column = wall, found.axis, np.full(len(xyz_m), NONE)
+    w, residual, wall = found.w, found.residual.copy(), found.wall
     if snooping:
         seams = _seams(local, course, candidates, in_band, found, nominal_radius_m)
         wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
@@ -172,6 +183,9 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
         )
         wall[in_band], w[in_band], residual[in_band] = tested.accepted, tested.w, tested.departure_m
         wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
+        raw = np.where(wall, found.residual, residual)
+        column = _columns(local, in_band, axis, raw, wall, found.noise, nominal_radius_m)
+        reason[column != NONE] = UNDECIDED
     reason[(reason == "") & ~wall] = "snooping"
     if wall.sum() < LEAST_PART * candidates.sum():
         raise SolutionError(
@@ -197,6 +211,7 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
         noise_m=found.noise,
         noise_dof=found.noise_dof,
         tilt_known=bool(tilt_known),
+        column=column,
     )
 
 
@@ -218,6 +233,15 @@ def _buckles(local, in_band, axis, departure_m, wall, nominal_radius_m):
     for place in _unrolled(local[tested], axis, nominal_radius_m):
         back[tested] |= find_buckles(place, departure_m[tested], ~wall[tested])
     return back
+
+
+def _columns(local, in_band, axis, departure_m, wall, noise, nominal_radius_m):
+    """(n,) number of the column of each rejected point that may be wall or a fitting, else -1."""
+    tested, found = np.flatnonzero(in_band), np.full(len(local), NONE)
+    place = next(_unrolled(local[tested], axis, nominal_radius_m))
+    turn, rejected = 2 * np.pi * nominal_radius_m, ~wall[tested]
+    found[tested] = find_columns(place, departure_m[tested], rejected, noise, turn)
+    return found
 
 
 def _seams(local, course, candidates, in_band, form, nominal_radius_m):

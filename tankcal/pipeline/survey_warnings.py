@@ -8,6 +8,7 @@ from tankcal.errors import Problem, SolutionError
 from tankcal.geometry.shell import VAGUE_TILT
 from tankcal.job.plausibility import VOLUME_MISS
 from tankcal.messages import list_some, message
+from tankcal.pipeline.undecided_columns import tell_undecided
 from tankcal.tank.body import OWN_SCALE
 
 FEWEST_POINTS, ADVISED_POINTS = 5, 10  # of a section
@@ -249,6 +250,7 @@ def check_shell(job, shell, sections, given_sd_m):
                 tested=tested,
             )
         )
+    texts += tell_undecided(job.points.names, shell, SHOWN)
     for below, above in pairwise(sections):
         plates = [job.courses[section.group.course].thickness_m for section in (below, above)]
         jump = abs(above.circle.radius_m - below.circle.radius_m)

@@ -26,6 +26,7 @@ from tankcal.pipeline.survey_warnings import (
     warn_of_vague_vertical,
     weak_sections,
 )
+from tankcal.pipeline.undecided_columns import factors_of_undecided, undecided_halves
 from tankcal.pipeline.untied_setups import unbound_of
 from tankcal.pipeline.wall_readings import (
     factors_of_plates,
@@ -67,6 +68,9 @@ class Wall:
         The wall itself, between the points too: what the table is made of.
     radii_by_points : sparse array, shape (n, 3 m)
         Derivative of the field's readings, in their order, by x, y, z of the accepted points.
+    undecided_m : ndarray, shape (n, columns)
+        By how much the field's readings were moved towards the wall without each column of points
+        that may be of a fitting: half of what they depart from it.
     sections : tuple of Section
         Circles and outlines through the points, from the bottom up.
     straps : Straps or None
@@ -86,6 +90,7 @@ class Wall:
     noise_dof: float
     field: WallField
     radii_by_points: scipy.sparse.csr_array
+    undecided_m: np.ndarray
     sections: tuple[Section, ...]
     straps: Straps | None = None
     read: ReadWall | None = None
@@ -110,6 +115,7 @@ class Wall:
         index = coordinates_of(self.accepted)
         effects = [weights @ (by_points @ cause.column_m[index]) for cause in causes]
         found = survey_factors(covariance, self.noise_dof, causes, effects)
+        found = (*found, *factors_of_undecided(weights @ self.undecided_m))
         if self.read is None:
             return found
         outside = job.survey.side == "outside"  # a reading sees a plate that is not taken off it
@@ -177,7 +183,7 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None):
             message(
                 "fitting_sections",
                 "fitting sections through {count} points of the wall",
-                count=np.count_nonzero(shell.reason == ""),
+                count=np.count_nonzero(shell.on_wall),
             )
         )
         return fit_wall(job, shell, dof, amplitudes=amplitudes)
@@ -203,7 +209,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     InputError
         When a course is left with too few points.
     """
-    accepted = np.flatnonzero(shell.reason == "")
+    accepted = np.flatnonzero(shell.on_wall)
     joints = joints_of(job) / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
     groups = _groups(job, shell, accepted, joints)
     sds, estimated = radial_sds(job.points), noise_is_estimated(job)
@@ -214,7 +220,8 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     nominal = job.tank.nominal_diameter_m / 2
     samples = [sample_of(*one) for one in to_fit]
     sites, means = _sites(groups, samples, nominal, _welds(job))
-    radius = means @ np.concatenate([one.radius_m for one in samples])
+    undecided = means @ undecided_halves(shell, accepted, groups)
+    radius = means @ np.concatenate([one.radius_m for one in samples]) - undecided.sum(axis=1)
     noise = (means @ scipy.sparse.block_diag(_blocks(samples)) @ means.T).toarray()
     is_known = amplitudes is not None
     if not is_known:
@@ -245,6 +252,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         field, more = read.field, len(read.accepted)
         by_points = _padded(by_points, more)
         by_inputs = {name: np.pad(one, (0, more)) for name, one in by_inputs.items()}
+        undecided = np.pad(undecided, ((0, more), (0, 0)))
     return Wall(
         shell=shell,
         joints_m=joints,
@@ -253,6 +261,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         noise_dof=amplitudes.noise_dof if estimated else dof,
         field=field,
         radii_by_points=by_points,
+        undecided_m=undecided,
         sections=sections,
         straps=straps,
         read=read,

@@ -185,7 +185,7 @@ def _rings(result):
     job, wall = result.job, result.wall
     least, count = least_hits(job), np.count_nonzero(~job.hits.check)
     heights = np.array([section.group.height_m for section in wall.sections])
-    z = job.points.xyz_m[:count][wall.shell.reason[:count] != "", 2] - job.datum.bottom_z_m
+    z = job.points.xyz_m[:count][~wall.shell.on_wall[:count], 2] - job.datum.bottom_z_m
     nearest = np.argmin(np.abs(z[:, None] - heights), axis=1) if len(z) else np.zeros(0, dtype=int)
     rejected = np.bincount(nearest, minlength=len(heights))
     return [

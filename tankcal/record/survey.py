@@ -186,7 +186,7 @@ def _points_of_tank(result):
             }
     return [
         _surveyed(name, job.points.xyz_m[index], **place.get(index, {}),
-                  generatrix=job.points.generatrix[index], used=shell.reason[index] == "")
+                  generatrix=job.points.generatrix[index], used=bool(shell.on_wall[index]))
         for index, name in enumerate(job.points.names)
     ]  # fmt: skip
 

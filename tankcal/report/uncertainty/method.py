@@ -29,6 +29,7 @@ FROM_SURVEY = (
     "bulge",
     "ovality",
     "seams",
+    "undecided",
     "form",
     "own_form",
     "bottom_points",
