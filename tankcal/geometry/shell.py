@@ -63,6 +63,8 @@ class Shell:
         Its degrees of freedom.
     tilt_known : bool
         False: the points do not determine a tilt, and the shell is taken as upright.
+    sizes_m2 : ndarray, shape (components + 1,), optional
+        About the variances of the wall's components, and that of a point as `noise_m` has it.
     """
 
     axis_m: tuple[float, float]
@@ -75,6 +77,7 @@ class Shell:
     noise_m: float
     noise_dof: float
     tilt_known: bool
+    sizes_m2: np.ndarray | None = None
 
     @property
     def tilt(self):
@@ -163,7 +166,7 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
         upright = np.array([*axis[:2], 0.0, 0.0])
         found = find_form(local, course, zeta, wall, upright, relative, 1e-9, least)
     in_band, axis = wall, found.axis
-    w, residual, wall = found.w, found.residual, found.wall
+    w, residual, wall, sizes = found.w, found.residual, found.wall, None
     if snooping:
         seams = _seams(local, course, candidates, in_band, found, nominal_radius_m)
         wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
@@ -172,6 +175,7 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
         )
         wall[in_band], w[in_band], residual[in_band] = tested.accepted, tested.w, tested.departure_m
         wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
+        sizes = tested.sizes_m2
     reason[(reason == "") & ~wall] = "snooping"
     if wall.sum() < LEAST_PART * candidates.sum():
         raise SolutionError(
@@ -197,6 +201,7 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
         noise_m=found.noise,
         noise_dof=found.noise_dof,
         tilt_known=bool(tilt_known),
+        sizes_m2=sizes,
     )
 
 
