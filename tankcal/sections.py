@@ -303,7 +303,7 @@ def slide(xyz_m, slope, z_m):
     n = len(xyz_m)
     xy = xyz_m[:, :2] - (xyz_m[:, 2:] - z_m) * np.asarray(slope)
     rows = np.repeat(np.arange(2 * n), 2)
-    columns = np.array([[3 * i, 3 * i + 2, 3 * i + 1, 3 * i + 2] for i in range(n)]).ravel()
+    columns = np.add.outer(3 * np.arange(n), [0, 2, 1, 2]).ravel()
     values = np.tile([1.0, -slope[0], 1.0, -slope[1]], n)
     return xy, scipy.sparse.csr_array((values, (rows, columns)), shape=(2 * n, 3 * n))
 

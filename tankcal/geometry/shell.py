@@ -68,6 +68,8 @@ class Shell:
         False: the points do not determine a tilt, and the shell is taken as upright.
     column : ndarray of int, shape (n,)
         Number of the column that an undecided point is of; -1 of all others.
+    sizes_m2 : ndarray, shape (components + 1,), optional
+        About the variances of the wall's components, and that of a point as `noise_m` has it.
     """
 
     axis_m: tuple[float, float]
@@ -81,6 +83,7 @@ class Shell:
     noise_dof: float
     tilt_known: bool
     column: np.ndarray
+    sizes_m2: np.ndarray | None = None
 
     @property
     def on_wall(self):
@@ -174,7 +177,7 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
         upright = np.array([*axis[:2], 0.0, 0.0])
         found = find_form(local, course, zeta, wall, upright, relative, 1e-9, least)
     in_band, axis, column = wall, found.axis, np.full(len(xyz_m), NONE)
-    w, residual, wall = found.w, found.residual.copy(), found.wall
+    w, residual, wall, sizes = found.w, found.residual.copy(), found.wall, None
     if snooping:
         seams = _seams(local, course, candidates, in_band, found, nominal_radius_m)
         wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
@@ -186,6 +189,7 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
         raw = np.where(wall, found.residual, residual)
         column = _columns(local, in_band, axis, raw, wall, found.noise, nominal_radius_m)
         reason[column != NONE] = UNDECIDED
+        sizes = tested.sizes_m2
     reason[(reason == "") & ~wall] = "snooping"
     if wall.sum() < LEAST_PART * candidates.sum():
         raise SolutionError(
@@ -212,6 +216,7 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
         noise_dof=found.noise_dof,
         tilt_known=bool(tilt_known),
         column=column,
+        sizes_m2=sizes,
     )
 
 

@@ -226,7 +226,14 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     is_known = amplitudes is not None
     if not is_known:
         alone = sites.take(np.ones(len(sites), dtype=bool))  # without courses that have no point
-        amplitudes = estimate_amplitudes(alone, radius, noise, nominal, estimate_noise=estimated)
+        amplitudes = estimate_amplitudes(
+            alone,
+            radius,
+            noise,
+            nominal,
+            estimate_noise=estimated,
+            start_m2=_sizes_of(shell),
+        )
     if amplitudes.noise != 1.0:  # it may be half a gigabyte
         covariance, noise = covariance * amplitudes.noise, noise * amplitudes.noise
         to_fit = _to_fit(job, shell, accepted, groups, covariance)
@@ -268,6 +275,13 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
         by_inputs=by_inputs,
         without_inputs=("offset",) if job.hits or job.clouds else (),  # instruments have their own
     )
+
+
+def _sizes_of(shell):
+    """Sizes near which those of the wall are looked for, the noise as a factor; None: not known."""
+    if shell.sizes_m2 is None:
+        return None
+    return np.append(shell.sizes_m2[:-1], shell.sizes_m2[-1] / shell.noise_m**2)
 
 
 def _by_inputs(points, by_points, accepted):

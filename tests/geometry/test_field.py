@@ -18,6 +18,7 @@ from tankcal.geometry.field.components import (
 )
 from tankcal.geometry.field.estimate import LEVELS, WallField, gauss_heights
 from tankcal.geometry.field.evidence import likelihood_of
+from tankcal.geometry.field.misfit import Misfit
 from tankcal.geometry.field.sites import Sites
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall import find_wall
@@ -193,6 +194,24 @@ def test_the_slope_of_the_likelihood():
     slope = evidence.misfit(at)[1]
     assert_derivative(
         lambda x: np.array([evidence.misfit(x)[0]]), at, slope[None], step=1e-5, tolerance=1e-6
+    )
+
+
+def test_the_curvature_of_the_likelihood():
+    """Differences of the slope; a course of three points, which tells nothing, among others."""
+    rng = np.random.default_rng(2)
+    sites = sites_of(3, [-0.6, 0.6], 12, rng)
+    sites = sites.take((sites.course < 2) | ((sites.zeta < 0) & (np.arange(len(sites)) % 4 == 0)))
+    sites = replace(sites, welds_rad=3 * (np.array([0.5, 3.0]),))
+    radius = RADIUS_M + 0.004 * rng.normal(size=len(sites))
+    evidence = likelihood_of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, True)
+    at = evidence.middle + rng.normal(0, 0.5, len(evidence.middle))
+    assert_derivative(
+        lambda x: evidence.misfit(x)[1],
+        at,
+        Misfit(evidence, at).curvature,
+        step=1e-4,
+        tolerance=1e-6,
     )
 
 

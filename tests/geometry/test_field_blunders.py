@@ -9,7 +9,7 @@ import scipy.optimize
 from test_field import RADIUS_M, sites_of
 
 from tankcal.geometry.clutter import find_rings
-from tankcal.geometry.field.amplitudes import FINE, assumed_amplitudes
+from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.geometry.field.blunders import against_others, find_blunders, restricted_precision
 from tankcal.geometry.field.components import (
     COMPONENTS,
@@ -18,8 +18,10 @@ from tankcal.geometry.field.components import (
 )
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.evidence import likelihood_of
-from tankcal.geometry.field.likelihood import LEAST_NOISE_M, LOG_STEP, MIRRORED, invert
+from tankcal.geometry.field.likelihood import LEAST_NOISE_M, MIRRORED, invert
 from tankcal.geometry.field.sites import free_design
+
+STEP = 1e-4  # of a logarithm, in differences
 
 
 def written_out(sites, variances_m2):
@@ -122,7 +124,7 @@ def test_the_search_finds_the_very_top_and_its_curvature():
     sites = sites_of(3, [-0.6, 0.6], 12)
     radius = RADIUS_M + 0.004 * np.random.default_rng(2).normal(size=len(sites))
     evidence = likelihood_of(sites, radius, np.full(len(sites), 1e-6), RADIUS_M, True)
-    best, covariance = evidence.top(FINE)
+    best, covariance = evidence.top()
     options = {"method": "L-BFGS-B", "jac": True, "bounds": evidence.bounds}
     start = evidence.middle + 1.0
     other = scipy.optimize.minimize(evidence.misfit, start, options={"ftol": 1e-15}, **options)
@@ -130,10 +132,13 @@ def test_the_search_finds_the_very_top_and_its_curvature():
     assert best == pytest.approx(other.x, abs=2e-3)
     assert evidence.misfit(best)[1] == pytest.approx(np.zeros(len(best)), abs=1e-5)
     used = np.unique(np.concatenate([evidence.own, evidence.common]))
-    moved = best + LOG_STEP * np.eye(len(best))[used]
-    slopes = np.array([evidence.misfit(one)[1][used] for one in moved]) / (2 * LOG_STEP)
-    told = np.linalg.inv((slopes + slopes.T) / 2)
+    moves = STEP * np.eye(len(best))[used]
+    slopes = [[evidence.misfit(best + way * one)[1][used] for one in moves] for way in (-1, 1)]
+    told = np.linalg.inv(np.subtract(*slopes[::-1]) / (4 * STEP))
     assert covariance[np.ix_(used, used)] == pytest.approx(told, rel=1e-4, abs=1e-5)
+    near_by = evidence.top(best + 0.1)
+    assert near_by[0] == pytest.approx(best, abs=1e-6)
+    assert near_by[1] == pytest.approx(covariance, rel=1e-4, abs=1e-5)
 
 
 def test_a_matrix_that_is_larger_than_a_piece_is_inverted_whole():

@@ -13,8 +13,6 @@ from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.evidence import likelihood_of
 from tankcal.geometry.field.likelihood import LEAST_M
 
-ROUGH, FINE = 3e-6, 1e-12  # relative change of the likelihood that ends its search
-
 
 @dataclass(frozen=True)
 class Amplitudes:
@@ -86,7 +84,9 @@ def assumed_amplitudes(ovality_m=None, common_ovality_m=None):
     return Amplitudes(size, np.diag(log_sd**2), before)
 
 
-def estimate_amplitudes(sites, radius_m, noise_m2, nominal_m, *, estimate_noise=False):
+def estimate_amplitudes(
+    sites, radius_m, noise_m2, nominal_m, *, estimate_noise=False, start_m2=None
+):
     """`Amplitudes` of a wall from radii measured at sites.
 
     Parameters
@@ -100,26 +100,28 @@ def estimate_amplitudes(sites, radius_m, noise_m2, nominal_m, *, estimate_noise=
         Radius of the tank, for the length of seams, m.
     estimate_noise : bool
         Whether `noise_m2` is known up to a factor only.
+    start_m2 : ndarray, shape (components + 1,), optional
+        Variances of the components, and factor of those of the readings, where the search begins.
 
     Returns
     -------
     Amplitudes
     """
-    return most_likely(
-        likelihood_of(sites, radius_m, noise_m2, nominal_m, estimate_noise), len(COMPONENTS)
-    )
+    likelihood = likelihood_of(sites, radius_m, noise_m2, nominal_m, estimate_noise)
+    return most_likely(likelihood, len(COMPONENTS), start_m2)
 
 
-def most_likely(likelihood, count):
+def most_likely(likelihood, count, start_m2=None):
     """`Amplitudes` of so many components by their likelihood; a last variance is the noise's."""
-    best, covariance = likelihood.top(FINE)
+    start = None if start_m2 is None else np.log(start_m2[: len(likelihood.middle)])
+    best, covariance = likelihood.top(start)
     known = np.exp(best[:count]), covariance[:count, :count], likelihood.log_sd[:count]
     if len(best) == count:
         return Amplitudes(*known)
     return Amplitudes(*known, float(np.exp(best[-1])), float(np.sqrt(covariance[-1, -1])))
 
 
-def likely_variances(sites, radius_m, variance_m2, nominal_m):
+def likely_variances(sites, radius_m, variance_m2, nominal_m, start_m2=None):
     """Variances of the components, m2, and factor of those of the readings, near the most likely.
 
     Parameters
@@ -128,12 +130,13 @@ def likely_variances(sites, radius_m, variance_m2, nominal_m):
         As in `estimate_amplitudes`.
     variance_m2 : ndarray, shape (n,)
         Of the readings, known up to a factor.
+    start_m2 : ndarray, shape (components + 1,), optional
+        Where the search begins.
 
     Returns
     -------
-    variances_m2 : ndarray, shape (components,)
-    noise : float
+    ndarray, shape (components + 1,)
+        The factor last.
     """
     likelihood = likelihood_of(sites, radius_m, variance_m2, nominal_m, True)
-    best = np.exp(likelihood.near_top(ROUGH))
-    return best[:-1], float(best[-1])
+    return np.exp(likelihood.near_top(None if start_m2 is None else np.log(start_m2)))

@@ -14,7 +14,7 @@ wall is wall, however far both depart.
 Source: Cook & Weisberg 1982 (deletion residuals); Baarda 1968.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -47,12 +47,15 @@ class Tested:
         Departure over its standard deviation.
     sd_m : ndarray, shape (n,)
         That; vast of a reading that no other one controls.
+    sizes_m2 : ndarray, shape (components + 1,), optional
+        Variances of the components by which they were tested, and factor of that of the readings.
     """
 
     accepted: np.ndarray
     departure_m: np.ndarray
     w: np.ndarray
     sd_m: np.ndarray
+    sizes_m2: np.ndarray | None = None
 
 
 def nothing_tested(accepted):
@@ -82,12 +85,12 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted):
     Tested
     """
     pieces = [_Piece(sites, members, nominal_m) for members in _pieces(sites)]
-    left, found = radius_m - radius_m.mean(), nothing_tested(accepted)
+    left, found, sizes = radius_m - radius_m.mean(), nothing_tested(accepted), None
     for _ in range(MOST_ROUNDS):
         known = sites.take(accepted)
-        variances, noise = likely_variances(
-            known, radius_m[accepted], variance_m2[accepted], nominal_m
-        )
+        some = radius_m[accepted], variance_m2[accepted]
+        sizes = likely_variances(known, *some, nominal_m, sizes)
+        variances, noise = sizes[:-1], sizes[-1]
         for piece in pieces:
             own = piece.members
             precision = piece.precision(variances, noise * variance_m2[own] + LEAST_NOISE_M**2)
@@ -97,7 +100,7 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted):
         changed, accepted = np.mean(found.accepted != accepted), found.accepted.copy()
         if changed <= FEW:
             break
-    return found
+    return replace(found, sizes_m2=sizes)
 
 
 def _pieces(sites):

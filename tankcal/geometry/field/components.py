@@ -24,11 +24,10 @@ OVALITY_MODES = np.arange(2.0, 37.0)
 OVALITY_WEIGHTS = OVALITY_MODES**-3 / np.sum(OVALITY_MODES**-3)
 SEAM_LENGTH_M = 0.4  # along the arc, of a seam's flank
 WELD_LENGTH_M = 0.2  # the same of a peak at a weld, which is 0.8 m wide in all
-ORDERS = 6  # of the Legendre polynomials in the height of a course
 JOINT_LENGTH = 0.2  # of half a course: how far a joint draws the plate in
 LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
 
-_LEVEL = (1.0, 0, 0, 0, 0, 0, 0)
+_LEVEL = (1,)
 KINDS = ("bulge", "ovality", "seams")
 LARGEST_QUOTIENT = 110.0  # b of which exp(2 pi b) is still a number
 PIECE = 1 << 14  # correlations at once
@@ -51,7 +50,7 @@ class Component:
     common : bool
         The same in all courses.
     orders : tuple of float, str
-        Variances of the Legendre polynomials 0..6 in the height, up to a factor; "joints": the
+        Variances of the Legendre polynomials 0, 1, ... in the height, up to a factor; "joints": the
         profile exp(-(1 - |zeta|) / JOINT_LENGTH) less its mean; "local": the covariance
         exp(-|zeta - zeta'| / LOCAL_LENGTH).
     median_m, log_sd : float
@@ -75,7 +74,17 @@ class Component:
             return joint_profile(zeta)[:, None]
         weights = np.array(self.orders, dtype=float)
         weights = weights / np.sum(weights / (2 * np.arange(len(weights)) + 1))
-        return (legendre(zeta) * np.sqrt(weights))[:, weights > 0]
+        return (legendre(zeta, len(weights) - 1) * np.sqrt(weights))[:, weights > 0]
+
+    def columns(self, waves, zeta):
+        """(n, k) columns whose products are the covariance, of a mean or an oval.
+
+        waves  (n, 2 modes) `oval_columns`
+        """
+        up = self.height_columns(zeta)
+        if self.shape == "mean":
+            return up
+        return (waves[:, :, None] * up[:, None]).reshape(len(up), -1)
 
     @property
     def is_level(self):
@@ -91,7 +100,7 @@ class Component:
 
 _EVEN = (0, 0, 1, 0, 0.1, 0, 0.02)  # barrels and drawn-in joints share their sign
 _FREE = (0, 0, *(order**-2.0 for order in range(2, 7)))
-_LINEAR = (0, 1, 0, 0, 0, 0, 0)
+_LINEAR = (0, 1)
 COMPONENTS = (
     Component("common bulge", "bulge", "mean", True, _EVEN, 1.4e-3, 1.0, "barrel"),
     Component("drawn-in joints", "bulge", "mean", True, "joints", 0.8e-3, 1.2, "barrel"),
@@ -108,9 +117,9 @@ COMPONENTS = (
 )
 
 
-def legendre(zeta):
-    """(n, 7) Legendre polynomials of order 0 to 6."""
-    return np.polynomial.legendre.legvander(np.asarray(zeta, dtype=float), ORDERS)
+def legendre(zeta, highest):
+    """(n, highest + 1) Legendre polynomials of order 0 to the highest."""
+    return np.polynomial.legendre.legvander(np.asarray(zeta, dtype=float), highest)
 
 
 def joint_profile(zeta):
@@ -122,9 +131,13 @@ def joint_profile(zeta):
 
 
 def oval_columns(azimuth_rad):
-    """(n, 2 modes) columns whose products are c: mode k has the variance k^-3, k = 2..36."""
+    """(n, 2 modes) columns whose products are c: mode k has the variance k^-3, k = 2..36.
+
+    nan: the mean of a whole turn, which has none of them.
+    """
     angles = np.outer(azimuth_rad, OVALITY_MODES)
     waves = np.hstack([np.cos(angles), np.sin(angles)])
+    waves[~np.isfinite(azimuth_rad)] = 0.0
     return waves * np.tile(np.sqrt(OVALITY_WEIGHTS), 2)
 
 
@@ -232,17 +245,17 @@ def azimuth_correlations(azimuth_rad, other_rad, radius_m):
 
     The mean of a whole turn has none of the waves around it.
     """
-    seen = np.isfinite(azimuth_rad), np.isfinite(other_rad)
-    rows, columns = (np.nan_to_num(one) for one in (azimuth_rad, other_rad))
-    waves = [
-        oval_columns(one) * there[:, None] for one, there in zip((rows, columns), seen, strict=True)
-    ]
-    seams = _seams_between(rows, columns, radius_m)
-    for away, axis in zip(seen, (0, 1), strict=True):
-        if not away.all():
-            np.moveaxis(seams, axis, 0)[~away] = 0.0
+    seams = seam_correlations(azimuth_rad, other_rad, radius_m)
     return {
         "mean": np.broadcast_to(1.0, seams.shape),
-        "oval": waves[0] @ waves[1].T,
+        "oval": oval_columns(azimuth_rad) @ oval_columns(other_rad).T,
         "seam": seams,
     }
+
+
+def seam_correlations(azimuth_rad, other_rad, radius_m):
+    """(n, m) c of "seam", as `azimuth_correlations` gives it."""
+    found = _seams_between(np.nan_to_num(azimuth_rad), np.nan_to_num(other_rad), radius_m)
+    found[~np.isfinite(azimuth_rad)] = 0.0
+    found[:, ~np.isfinite(other_rad)] = 0.0
+    return found

@@ -1,10 +1,7 @@
 """Covariances of the components of a wall between the sites where it was measured.
 
-All components of one shape, common or own, are one product
-
-    c(a - a') * sum of variance * h(zeta, zeta'),
-
-so that the sum of all takes five products however many components there are.
+What follows a seam is a product c(a - a') h(zeta, zeta'). All else is a sum of products of columns:
+a few waves around the tank, or one mean radius, times polynomials in the height.
 """
 
 from functools import cached_property
@@ -12,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
-from tankcal.geometry.field.components import COMPONENTS, azimuth_correlations
+from tankcal.geometry.field.components import COMPONENTS, oval_columns, seam_correlations
 from tankcal.geometry.field.sites import distinct_azimuths
 
 
@@ -58,44 +55,38 @@ class Covariances:
         ----------
         variances_m2 : ndarray, shape (components,)
         """
-        found = np.zeros((len(self.place),) * 2)
-        for shape in self._along:
-            chosen = [i for i, one in enumerate(COMPONENTS) if one.shape == shape]
-            common = [i for i in chosen if COMPONENTS[i].common]
-            if common:
-                everywhere = slice(None)
-                found += self._between(shape, everywhere) * self._up(common, variances_m2)
-            own = [i for i in chosen if not COMPONENTS[i].common]
-            for members in self.members:
-                there = np.ix_(members, members)
-                found[there] += self._between(shape, members) * self._up(own, variances_m2, members)
+        everywhere = slice(None)
+        found = self._seams(everywhere) * self._up(True, variances_m2, everywhere)
+        common = [i for i in self._columns if COMPONENTS[i].common]
+        columns = [np.sqrt(variances_m2[i]) * self._columns[i] for i in common]
         if self.sites.welds_rad:
-            for index, columns in self.peaks.items():
-                found += variances_m2[index] * columns @ columns.T
+            columns += [np.sqrt(variances_m2[i]) * one for i, one in self.peaks.items()]
+        _add_products(found, np.hstack(columns))
+        for members in self.members:
+            block = self._seams(members) * self._up(False, variances_m2, members)
+            own = [
+                np.sqrt(variances_m2[i]) * columns[members]
+                for i, columns in self._columns.items()
+                if i not in common
+            ]
+            _add_products(block, np.hstack(own))
+            found[np.ix_(members, members)] += block
         return found
 
     def spread(self, weights, index):
         """(f, f) covariance of functionals (f, n) of the sites, by one component."""
-        one, zeta = COMPONENTS[index], self.sites.zeta
-        if index in self.peaks:
-            part = weights @ self.peaks[index]
-            return part @ part.T
-        if one.orders == "local":
-            found = 0.0
-            for members in self.members:
-                height = one.height_covariance(zeta[members], zeta[members])
-                part = weights[:, members]
-                found = found + part @ (self._between(one.shape, members) * height) @ part.T
-            return found
-        found, columns = 0.0, one.height_columns(zeta)
-        for members in [slice(None)] if one.common else self.members:
-            for column in columns.T:
-                part = weights[:, members] * column[members]
-                if one.shape == "mean":
-                    total = part.sum(axis=1)
-                    found = found + np.outer(total, total)
-                else:
-                    found = found + part @ self._between(one.shape, members) @ part.T
+        one, found = COMPONENTS[index], 0.0
+        common = one.common or index in self.peaks
+        for members in [slice(None)] if common else self.members:
+            part = weights[:, members]
+            if one.shape == "seam":
+                seams = self._seams(members)
+                seams = seams if one.is_level else seams * self._height(index, members)
+                found = found + part @ seams @ part.T
+            else:
+                columns = self.peaks if index in self.peaks else self._columns
+                by_columns = part @ columns[index][members]
+                found = found + by_columns @ by_columns.T
         return found
 
     @cached_property
@@ -109,32 +100,43 @@ class Covariances:
             if one.shape == "weld"
         }
 
-    def _up(self, chosen, variances_m2, members=slice(None)):
-        """Sum of the variances times h, between the heights of some sites; one number if level."""
-        if all(COMPONENTS[i].is_level for i in chosen):
-            return np.sum(variances_m2[chosen])
-        zeta = self.sites.zeta[members]
-        local = [i for i in chosen if COMPONENTS[i].orders == "local"]
-        columns = [
-            np.sqrt(variances_m2[i]) * COMPONENTS[i].height_columns(zeta)
-            for i in chosen
-            if i not in local
-        ]
-        found = sum(variances_m2[i] * COMPONENTS[i].height_covariance(zeta, zeta) for i in local)
-        if columns:
-            every = np.hstack(columns)
-            found = found + every @ every.T
-        return found
+    @cached_property
+    def _columns(self):
+        """{component: (n, k) columns whose products are it}, of mean radii and of waves."""
+        waves = oval_columns(self.sites.azimuth_rad)
+        return {
+            index: one.columns(waves, self.sites.zeta)
+            for index, one in enumerate(COMPONENTS)
+            if one.shape in ("mean", "oval")
+        }
 
-    def _between(self, shape, members):
-        """c between some sites."""
-        if shape == "mean":
-            return 1.0
+    def _up(self, common, variances_m2, members):
+        """Sum of the variances of seams times h between some sites; one number if all are level."""
+        return sum(
+            variances_m2[i] * self._height(i, members)
+            for i, one in enumerate(COMPONENTS)
+            if (one.shape, one.common) == ("seam", common)
+        )
+
+    def _height(self, index, members):
+        """h of one component between some sites; one number if it is level."""
+        one, zeta = COMPONENTS[index], self.sites.zeta[members]
+        return 1.0 if one.is_level else one.height_covariance(zeta, zeta)
+
+    def _seams(self, members):
+        """c of seams between some sites."""
         if len(self.azimuths_rad) == len(self.place) and isinstance(members, slice):
-            return self._along[shape]
+            return self._along
         place = self.place[members]
-        return self._along[shape][place[:, None], place]
+        return self._along[place[:, None], place]
 
     @cached_property
     def _along(self):
-        return azimuth_correlations(self.azimuths_rad, self.azimuths_rad, self.nominal_m)
+        return seam_correlations(self.azimuths_rad, self.azimuths_rad, self.nominal_m)
+
+
+def _add_products(matrix, columns):
+    """Add columns @ columns.T to a symmetric matrix, in its place."""
+    scipy.linalg.blas.dgemm(
+        1.0, columns, columns, beta=1.0, c=matrix.T, trans_b=True, overwrite_c=True
+    )

@@ -265,10 +265,11 @@ class Functionals:
             if shape != "mean"
         }
         self._along["mean"] = self._totals[:, :, None] * np.ones(len(field.sites))
+        self._across = [self._with_component(index) for index in range(len(COMPONENTS))]
         across = np.zeros((len(field._members) * LEVELS, len(field.sites)))
-        for index, one in enumerate(COMPONENTS):
+        for one, part in zip(COMPONENTS, self._across, strict=True):
             if one.shape in field.stated:
-                across += self._across(index)
+                across += part
         columns, radii = field._columns
         free = np.zeros((len(across), columns.shape[1]))
         courses = np.repeat(np.arange(len(radii)), LEVELS)
@@ -280,12 +281,12 @@ class Functionals:
 
     def unseen(self, index):
         """(f, f) covariance of the functionals by what was not seen of one component."""
-        seen = self.weights @ self._across(index).T
+        seen = self.weights @ self._across[index].T
         size = self._field.amplitudes.variances_m2[index]
         spread = size * self._field._covariances.spread(self.weights, index)
         return without_rounding(self._within(index) - seen - seen.T + spread)
 
-    def _across(self, index):
+    def _with_component(self, index):
         """(f, n) covariance of the functionals with one component at the sites."""
         field, one = self._field, COMPONENTS[index]
         count, sites = len(field._members), field.sites

@@ -13,6 +13,8 @@ from tankcal.geometry.field.components import (
     COMPONENTS,
     azimuth_correlations,
     mode_shares,
+    oval_columns,
+    seam_correlations,
     weld_columns,
 )
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, Likelihood, Part, prior_of
@@ -154,25 +156,27 @@ def _part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise)
         return left.T @ covariance @ left
 
     if np.ndim(noise_m2) == 2:
-        noise = noise_m2[np.ix_(members, members)]
+        noise = seen(noise_m2[np.ix_(members, members)])
     else:
-        noise = np.diag(noise_m2[members])
-    least = LEAST_NOISE_M**2 * np.eye(left.shape[1])
-    there = azimuth_correlations(azimuth, azimuth, nominal_m)
+        noise = (left.T * noise_m2[members]) @ left
+    waves, seams = oval_columns(azimuth), seam_correlations(azimuth, azimuth, nominal_m)
     welds = weld_columns(azimuth, sites.welds_of(sites.course[members[0]]), nominal_m)
-    there["weld"] = welds @ welds.T
-    own = [
-        seen(there[one.shape] * one.height_covariance(zeta, zeta))
-        for one in (COMPONENTS[i] for i in own_ones)
-    ]
+    own, level = [], seen(seams)
+    for one in (COMPONENTS[i] for i in own_ones):
+        if one.shape == "seam":
+            own.append(level if one.is_level else seen(seams * one.height_covariance(zeta, zeta)))
+        else:
+            there = left.T @ (welds if one.shape == "weld" else one.columns(waves, zeta))
+            own.append(there @ there.T)
+    values, smallest = left.T @ columns[members], SMALLEST * np.eye(left.shape[1])
     for i in missed:
-        followed = columns[members] @ spread[common_ones.index(i)] @ columns[members].T
-        rest = there[COMPONENTS[i].shape] - followed
-        own.append(seen(rest) + SMALLEST * np.eye(left.shape[1]))
-    own += [seen(noise)] * estimate_noise
+        followed = values @ spread[common_ones.index(i)] @ values.T
+        own.append(level - followed + smallest)
+    own += [noise] * estimate_noise
+    least = LEAST_NOISE_M**2 * np.eye(left.shape[1])
     return Part(
         left.T @ radius_m[members],
         np.array(own),
-        least + seen(noise) * (not estimate_noise),
-        left.T @ columns[members],
+        least + noise * (not estimate_noise),
+        values,
     )

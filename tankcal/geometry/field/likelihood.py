@@ -13,17 +13,19 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
+from tankcal.geometry.field.misfit import Misfit, rounded
 from tankcal.geometry.field.search import descend
 
 NOISE_MEDIAN_M, NOISE_LOG_SD = 2e-3, 3.0  # of readings without a given standard deviation
 LEAST_M, MOST_M = 1e-5, 0.3  # amplitudes that are tried
 MOST_OF_NOISE = 30.0  # logarithms from the middle
 LEAST_NOISE_M = 1e-6  # what is given as perfect is not quite
-ROUNDING = 1e-11  # of the largest variances, that keeps a covariance positive
-MOST_STEPS, SMALL_STEP = 12, 1e-7  # of a logarithm, to the very top
-LOG_STEP = 0.1  # of the differences that give the curvature
+ROUGH = 3e-6  # relative change of the misfit that ends a search for what is near the top
+FAR = 150.0  # descent that a place still promises, fourfold, that is not near the top
+MOST_STEPS, LOG_STEP = 60, 0.7  # on to the very top; of a logarithm at once
+SMALL_STEP, ROUGH_STEP = 1e-7, 0.03  # of a logarithm, that end a search
 MIRRORED = 64  # rows at once
-NEAR_TOP = 0.02  # of a logarithm: so near the top the curvature is that of the top
+NEAR_TOP = 1e-4  # of a logarithm: so near the top the curvature is that of the top
 
 
 @dataclass(frozen=True)
@@ -62,15 +64,12 @@ class Part:
         logarithm = 2 * np.sum(np.log(np.diag(root)))
         return logarithm, scipy.linalg.lapack.dpotri(root, lower=True, overwrite_c=True)[0]
 
-    def shares(self, inverse, less):
-        """(q,) traces of the covariances times (inverse - less less'), of `inverted`, used up."""
-        if not len(inverse):
+    def traces(self, precision):
+        """(q,) traces of the covariances times a symmetric matrix (m, m), lower half."""
+        if not len(precision):
             return np.zeros(len(self.own))
-        outer = scipy.linalg.blas.dsyrk(
-            -1.0, less, beta=1.0, c=inverse, lower=True, overwrite_c=True
-        )
         place, own, _, twice = self._halves
-        return own @ (twice * outer.T.ravel()[place])
+        return own @ (twice * precision.T.ravel()[place])
 
     @cached_property
     def both(self):
@@ -117,84 +116,51 @@ class Likelihood:
     bounds: np.ndarray
 
     def misfit(self, logs):
-        """Doubled negative logarithm of the density but for a constant, and its derivative.
+        """Doubled negative logarithm of the density but for a constant, and its derivative."""
+        there = Misfit(self, logs)
+        return there.value, there.slope
 
-        With B the covariance of a part's own, E its `values`, C that of the common values,
-        N = sum E' B^-1 E and r = sum E' B^-1 y,
-
-            S = (C^-1 + N)^-1,  y' V^-1 y = sum y' B^-1 y - r' S r,
-            log |V| = sum log |B| + log |I + N C|.
-        """
-        variances = np.exp(logs)
-        before = np.diag(self.wide) + np.tensordot(variances[self.common], self.spread, 1)
-        before = rounded(before)
-        told, value, solved = 0.0, 0.0, []
-        for part in self.parts:
-            logarithm, inverse = part.inverted(variances[self.own])
-            across = _times(inverse, part.both)
-            told = told + part.both.T @ across
-            value += logarithm
-            solved.append((inverse, across[:, :-1], across[:, -1]))
-        normal, right = told[:-1, :-1], told[:-1, -1]
-        half = np.linalg.cholesky(before)
-        root = np.linalg.cholesky(np.eye(len(half)) + half.T @ normal @ half)
-        spread_root = half
-        if len(half):
-            spread_root = scipy.linalg.solve_triangular(root, half.T, lower=True).T
-        common = spread_root @ (spread_root.T @ right)
-        value += told[-1, -1] - right @ common + 2 * np.sum(np.log(np.diag(root)))
-
-        slope, left = np.zeros(len(logs)), right - normal @ common
-        by_root = normal @ spread_root
-        outer = normal - by_root @ by_root.T - np.outer(left, left)
-        np.add.at(slope, self.common, np.tensordot(self.spread, outer, 2))
-        for part, (inverse, across, of_reading) in zip(self.parts, solved, strict=True):
-            left = of_reading - across @ common
-            shares = part.shares(inverse, np.column_stack([across @ spread_root, left]))
-            np.add.at(slope, self.own, shares)
-        away = (logs - self.middle) / self.log_sd
-        return value + away @ away, variances * slope + 2 * away / self.log_sd
-
-    def near_top(self, tolerance):
+    def near_top(self, start=None):
         """(variances,) logarithms near those of the highest density.
 
-        tolerance  relative change of the misfit that ends the search
+        start  (variances,) that may be near them, too
         """
-        return self._descend(tolerance)[0]
+        if start is not None:
+            return self.top(start, ROUGH_STEP)[0]
+        return descend(self.misfit, self.middle, self.log_sd, self.bounds, ROUGH)[0]
 
-    def top(self, tolerance):
-        """Logarithms of the highest density, to their rounding, and their covariance by it."""
-        best, slope = self._descend(tolerance)
-        for _ in range(2):  # to the very top, so that the order of the readings changes nothing
-            covariance = np.linalg.inv(self._curvature(best, slope))
-            moved, slope = self._climb(best, slope, covariance)
-            best, away = moved, np.abs(moved - best).max()
-            if away < NEAR_TOP:
+    def top(self, start=None, least_step=SMALL_STEP):
+        """Logarithms of the highest density, and their covariance by the curvature there.
+
+        start       (variances,) near them; None, or it is not near: they are looked for
+        least_step  that ends the search; the least: the order of the readings changes nothing
+        """
+        best = self.near_top() if start is None else start
+        there = Misfit(self, best)
+        covariance = self._covariance(there)
+        if start is not None and there.slope @ covariance @ there.slope > FAR:
+            return self.top(None, least_step)
+        taken_at, reach, longest = best, LOG_STEP, np.inf
+        for _ in range(MOST_STEPS):
+            step = np.clip(-covariance @ there.slope / 2, -reach, reach)
+            moved = np.clip(best + step, *self.bounds.T)
+            before, longest = longest, np.abs(moved - best).max()
+            if longest < least_step:
                 break
+            further = Misfit(self, moved)
+            if longest > NEAR_TOP and further.value > there.value:
+                reach = longest / 4
+                continue
+            best, there = moved, further
+            ends = longest < NEAR_TOP or longest > before / 2
+            if ends and np.abs(best - taken_at).max() > NEAR_TOP:
+                taken_at, covariance = best, self._covariance(there)
         return best, covariance
 
-    def _descend(self, tolerance):
-        return descend(self.misfit, self.middle, self.log_sd, self.bounds, tolerance)
-
-    def _climb(self, best, slope, covariance):
-        """Newton's steps with one curvature: where they lead, and the slope there."""
-        for _ in range(MOST_STEPS):
-            step = np.clip(-covariance @ slope / 2, -LOG_STEP, LOG_STEP)
-            best = np.clip(best + step, *self.bounds.T)
-            if np.abs(step).max() < SMALL_STEP:
-                break
-            slope = self.misfit(best)[1]
-        return best, slope
-
-    def _curvature(self, best, slope):
-        """Of the misfit's half, by differences of its derivative; never below the prior's."""
-        curvature = np.diag(self.log_sd**-2.0)  # all there is of what no reading shows
-        for one in np.unique(np.concatenate([self.own, self.common])):
-            moved = best.copy()
-            moved[one] += LOG_STEP
-            curvature[one] = (self.misfit(moved)[1] - slope) / (2 * LOG_STEP)
-        values, vectors = np.linalg.eigh((curvature + curvature.T) / 2)
-        return (vectors * np.maximum(values, 1 / self.log_sd.max() ** 2)) @ vectors.T
+    def _covariance(self, there):
+        """By the curvature of the misfit's half, that is never below the prior's."""
+        values, vectors = np.linalg.eigh(there.curvature / 2)
+        return (vectors / np.maximum(values, 1 / self.log_sd.max() ** 2)) @ vectors.T
 
 
 def prior_of(components, noise_m2=None):
@@ -215,19 +181,6 @@ def prior_of(components, noise_m2=None):
     noise = 2 * np.log(NOISE_MEDIAN_M) - np.log(np.median(noise_m2))
     bounds = np.vstack([bounds, noise + MOST_OF_NOISE * np.array([-1.0, 1.0])])
     return np.append(middle, noise), np.append(log_sd, NOISE_LOG_SD), bounds
-
-
-def rounded(covariance):
-    """The covariance, positive in spite of rounding."""
-    covariance.flat[:: len(covariance) + 1] *= 1 + ROUNDING
-    return covariance
-
-
-def _times(inverse, columns):
-    """Product with a symmetric matrix of which the lower half is filled."""
-    if not len(inverse):
-        return np.zeros(columns.shape)
-    return scipy.linalg.blas.dsymm(1.0, inverse, columns, lower=True)
 
 
 def invert(covariance):
