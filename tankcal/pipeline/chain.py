@@ -13,7 +13,7 @@ from tankcal.job import Job
 from tankcal.messages import message
 from tankcal.pipeline.cloud_passes import Reading
 from tankcal.pipeline.cloud_wall import Clouded
-from tankcal.pipeline.corrections import Correction, corrections_of
+from tankcal.pipeline.corrections import Correction, corrections_of, with_liquid
 from tankcal.pipeline.liquid import LiquidResult, measure_by_liquid
 from tankcal.pipeline.liquid_checks import check_liquid_result
 from tankcal.pipeline.liquid_geometry import filled_with
@@ -373,7 +373,9 @@ def _run(job, progress, part_progress, simulated, reading):
         table=table,
         straightness=made.straightness,
         proportional_parts=_parts(job, made, intervals.U_m3),
-        corrections=corrections_of(job, survey, made.over_m),
+        corrections=with_liquid(
+            corrections_of(job, survey, made.over_m), liquid, table.volume_m3[-1]
+        ),
         by_density=_by_density(job, survey, made.levels_m, zero, measured),
         stated=stated,
         simulation=simulation,

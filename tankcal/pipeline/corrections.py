@@ -13,6 +13,8 @@ from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 ISO_7507 = "ISO 7507-1:2003"
 INSIDE_PLATE = message("inside_plate", "r_inside = r − t")
 INSIDE_PAINT = message("inside_paint", "r_inside = r − t − paint")
+BY_LIQUID = message("by_liquid", "V_joint − V_geometry = K y, y the misclosures of the steps")
+BY_LIQUID_ALONE = message("by_liquid_alone", "V_liquid − V_geometry")
 NONE = Switches(**{field.name: field.name == "tilt" for field in fields(Switches)})
 
 
@@ -56,6 +58,27 @@ def corrections_of(job, survey, over_m=0.0):
             made, volume = replace(made, **{code: True}), with_it
         found.append(Correction(code, on, size, 100 * size / reference, formula, source))
     return tuple(found)
+
+
+def with_liquid(corrections, liquid, top_m3):
+    """The corrections of geometry and, last, what liquid adds to it.
+
+    Parameters
+    ----------
+    corrections : tuple of Correction
+    liquid : LiquidResult or None
+        None: nothing was metered.
+    top_m3 : float
+        Top row of the table that is printed.
+    """
+    if liquid is None:
+        return corrections
+    by_geometry, joint = (liquid.tables[one].volume_m3[-1] for one in ("geometry", "joint"))
+    size = float((top_m3 if liquid.certified == "liquid" else joint) - by_geometry)
+    formula = BY_LIQUID_ALONE if liquid.certified == "liquid" else BY_LIQUID
+    applied = liquid.certified != "geometry"
+    share = 100 * size / float(by_geometry)
+    return (*corrections, Correction("liquid", applied, size, share, formula, ""))
 
 
 def _at_top(job, survey, switches, over_m):

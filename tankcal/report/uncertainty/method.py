@@ -35,6 +35,13 @@ FROM_SURVEY = (
     "bottom_form",
     "bottom_liquid",
     "bottom_curve",
+    "meter_repeatability",
+    "dip_readings",
+    "liquid_temperatures",
+    "run_effect",
+    "bottom_volume",
+    "nominal_radius",
+    "nominal_radius_of_all",
 )
 OF_READING = ("interpolation", "rounding")
 

@@ -1,6 +1,6 @@
 """The working papers: courses, corrections, choices and provenance."""
 
-from tankcal.report.tables import clouds, hits, lines, strapping, tangents, tank
+from tankcal.report.tables import clouds, hits, lines, liquid, strapping, tangents, tank
 from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
@@ -84,6 +84,17 @@ def clouds_sheet(book, record):
     tables = [
         (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
         for table in clouds.TABLES
+        if table.rows(record)
+    ]
+    write_tables(book, sheet, _HEAD_ROW, tables)
+
+
+def liquid_sheet(book, record):
+    """Metered runs: meters, steps, dips, causes, and three tables of volumes beside each other."""
+    sheet = book.sheet("liquid", book.word("texts.liquid_subtitle"), landscape=True)
+    tables = [
+        (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
+        for table in (*liquid.TABLES, liquid.volumes_table(record))
         if table.rows(record)
     ]
     write_tables(book, sheet, _HEAD_ROW, tables)
