@@ -13,7 +13,7 @@ from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 ISO_7507 = "ISO 7507-1:2003"
 INSIDE_PLATE = message("inside_plate", "r_inside = r − t")
 INSIDE_PAINT = message("inside_paint", "r_inside = r − t − paint")
-BY_LIQUID = message("by_liquid", "V_joint − V_geometry = K y, y the misclosures of the steps")
+BY_LIQUID = message("by_liquid", "V_joint − V_geometry, by the misclosures of the steps")
 BY_LIQUID_ALONE = message("by_liquid_alone", "V_liquid − V_geometry")
 NONE = Switches(**{field.name: field.name == "tilt" for field in fields(Switches)})
 

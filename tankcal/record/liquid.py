@@ -95,7 +95,7 @@ class SizeByLiquid(Saved):
     """A declared size of the geometry that the liquid moved."""
 
     input: str = key("name")
-    unit: str = key('of the numbers: "m", or "1" of a ratio')
+    unit: str = key('of the numbers: "m", "m/m" of a slope, "1" of a scale')
     change: float = key("by how much it was moved")
     u_before: float = key("standard uncertainty before")
     u_after: float = key("the same after")
@@ -261,7 +261,7 @@ def _sizes(found):
     return [
         SizeByLiquid(
             input=one.name,
-            unit="1" if one.name in RATIOS else "m",
+            unit=RATIOS.get(one.name, "m"),
             change=one.after,
             u_before=one.u_before,
             u_after=one.u_after,
@@ -270,7 +270,7 @@ def _sizes(found):
     ]
 
 
-RATIOS = ("tilt", "scale")
+RATIOS = {"tilt": "m/m", "scale": "1"}
 
 
 def _causes(found):

@@ -3,7 +3,8 @@
 from tankcal.report import numbers
 from tankcal.report.tables.table import Column, Table
 
-_SHOWN = {"m": "mm", "1": "share ppm", "m3": "L", "m3/h": "L/h", "": ""}
+DIP_DECIMALS = 4  # of a dip as it was read, m
+_SHOWN = {"m": "mm", "m/m": "mm/m", "1": "share ppm", "m3": "L", "m3/h": "L/h", "": ""}
 
 
 def _named(key, heading, unit="", **more):
@@ -14,7 +15,7 @@ def _named(key, heading, unit="", **more):
 _ROW = _named("row", "row", decimals=0, width=8)
 _RUN = _named("run", "run", width=8)
 _METER = _named("meter", "meter", width=10)
-_TO = _named("to_dip_m", "to", "m", height=True)
+_TO = _named("to_dip_m", "to", "m", decimals=DIP_DECIMALS)
 
 
 def _of_step(paper, row):
@@ -25,11 +26,11 @@ def _dip(paper, dip_m):
     """The dip that a run or step began at; the tank may have been empty."""
     if dip_m is None:
         return paper.word("texts.liquid_dry")
-    return paper.height(dip_m, "")
+    return paper.number(dip_m, decimals=DIP_DECIMALS)
 
 
 _FROM = _named("from_dip_m", "from", "m", text=_of_step, align="right",
-               in_sheet={"text": None, "height": True})  # fmt: skip
+               in_sheet={"text": None, "decimals": DIP_DECIMALS})  # fmt: skip
 _W = Column("w", decimals=2, heading="liquid_w", sheet=True, width=8)
 _REDUNDANCY = _named("redundancy", "redundancy", decimals=2, width=10)
 
@@ -88,7 +89,13 @@ STEPS = Table(
         _named("geometry_m3", "geometry", "m3", u="sd_m3", on="liquid_misclosures"),
         _named("misclosure_m3", "misclosure", "L", u="misclosure_u_m3", on="liquid_misclosures"),
         _named("misclosure_U_m3", "U", "L", u="misclosure_u_m3", on="liquid_misclosures"),
-        _named("misclosure_w", "misclosure_w", decimals=2, on="liquid_misclosures"),
+        Column(
+            "misclosure_w",
+            decimals=2,
+            heading="liquid_misclosure_w",
+            sheet="liquid_of_misclosure",
+            on="liquid_misclosures",
+        ),
         _named("residual_m3", "residual", "L", u="sd_m3", on="liquid_residuals"),
         _named("sd_m3", "sd", "L", u="sd_m3", on="liquid_residuals"),
         _named("redundancy", "redundancy", decimals=3, width=10, on="liquid_residuals"),
@@ -103,7 +110,7 @@ DIPS = Table(
     (
         _ROW,
         _RUN,
-        _named("dip_m", "dip", "m", height=True),
+        _named("dip_m", "dip", "m", decimals=DIP_DECIMALS),
         _named("residual_m", "residual", "mm", u="sd_m"),
         _named("sd_m", "sd", "mm", u="sd_m"),
         _REDUNDANCY,
@@ -147,9 +154,9 @@ SIZES = Table(
 
 
 def _causes(record):
-    """Causes in small units; of one that is so or not the size says nothing."""
+    """Causes in small units, without the size of one that no tank could show."""
     rows = [
-        one if one["unit"] else one | dict.fromkeys(("size", "sd", "detectable"))
+        one if one["detectable"] is not None else one | dict.fromkeys(("size", "sd"))
         for one in record["liquid"]["causes"]
     ]
     return _in_small_units(rows, ("size", "sd", "detectable"))
@@ -199,7 +206,7 @@ def rows_beside(record):
     return found
 
 
-def volumes_table(record, rows=None):
+def volumes_table(record):
     """The Table of volumes beside each other, in the unit of the record's table."""
     unit = record["job"]["table"]["volume_unit"]
     least = numbers.unit(unit).least
@@ -208,9 +215,7 @@ def volumes_table(record, rows=None):
         U = f"{kind}_U_m3"
         columns += [
             _named(f"{kind}_volume_m3", f"by_{kind}", unit, u=U, least=least, width=16),
-            _named(U, f"U_{kind}", unit, u=U, width=14),
-        ]
+            Column(U, unit, u=U, heading=f"liquid_U_{kind}", sheet=f"liquid_U_{kind}",
+                   named={"unit": numbers.unit(unit).symbol}, width=14),
+        ]  # fmt: skip
     return Table("liquid_volumes", tuple(columns), rows=rows_beside)
-
-
-TABLES = (METERS, RUNS, STEPS, DIPS, SIZES, CAUSES)  # and `volumes_table`

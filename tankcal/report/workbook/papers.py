@@ -90,14 +90,19 @@ def clouds_sheet(book, record):
 
 
 def liquid_sheet(book, record):
-    """Metered runs: meters, steps, dips, causes, and three tables of volumes beside each other."""
-    sheet = book.sheet("liquid", book.word("texts.liquid_subtitle"), landscape=True)
-    tables = [
-        (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
-        for table in (*liquid.TABLES, liquid.volumes_table(record))
-        if table.rows(record)
-    ]
-    write_tables(book, sheet, _HEAD_ROW, tables)
+    """Metered runs: meters, runs, causes; each step and dip, and three tables of volumes."""
+    of_sheets = {
+        "liquid": (liquid.METERS, liquid.RUNS, liquid.SIZES, liquid.CAUSES),
+        "liquid_steps": (liquid.STEPS, liquid.DIPS, liquid.volumes_table(record)),
+    }
+    for name, declared in of_sheets.items():
+        sheet = book.sheet(name, book.word(f"texts.{name}_subtitle"), landscape=True)
+        tables = [
+            (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
+            for table in declared
+            if table.rows(record)
+        ]
+        write_tables(book, sheet, _HEAD_ROW, tables)
 
 
 def corrections_sheet(book, record):
