@@ -27,7 +27,9 @@ def first_row(sheet):
 def place_of(sheet, key):
     """The cell of a setting, "tank.id", in the sheet job, cameras or instruments."""
     columns, heading = headings_of(sheet)
-    owner = next(name for name in ("section", "camera", "instrument") if name in columns)
+    owner = next(
+        name for name in ("section", "camera", "instrument", "cloud", "meter") if name in columns
+    )
     for row in range(heading + 1, sheet.max_row + 1):
         names = (sheet.cell(row, columns[name]).value for name in (owner, "key"))
         if ".".join(str(name) for name in names) == key:

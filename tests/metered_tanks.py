@@ -4,16 +4,9 @@ import numpy as np
 from job_builder import SETTINGS, Parts, _courses, strapped_parts
 
 HEADINGS = [
-    "run",
-    "meter",
-    "volume_m3",
-    "dip_m",
-    "meter_temperature_c",
-    "tank_temperature_c",
-    "shell_temperature_c",
-    "flow_m3_h",
-    "time",
-    "use",
+    *("run", "meter", "volume_m3", "dip_m"),
+    *("meter_temperature_c", "tank_temperature_c", "shell_temperature_c"),
+    *("flow_m3_h", "time", "use"),
 ]
 METER = {
     "factor": 1.0005,

@@ -11,6 +11,8 @@ import numpy as np
 from scipy.special import gammaincc
 
 from tankcal.adjust import noncentrality
+from tankcal.errors import SolutionError
+from tankcal.messages import message
 from tankcal.pipeline.liquid_adjustment import (
     BOTTOM,
     FLEX,
@@ -21,7 +23,7 @@ from tankcal.pipeline.liquid_adjustment import (
 from tankcal.pipeline.liquid_alone import filled_range_m, geometry_alone, geometry_beside
 from tankcal.pipeline.liquid_body import join_body
 from tankcal.pipeline.liquid_geometry import filled_with
-from tankcal.pipeline.liquid_naming import alternatives_of
+from tankcal.pipeline.liquid_naming import alternatives_of, causes_in_words
 from tankcal.pipeline.liquid_tables import BesideTable, beside_table, or_none
 from tankcal.pipeline.tanks import body_of, zero_height
 from tankcal.tank.body import Body
@@ -213,11 +215,11 @@ def measure_by_liquid(job, survey):
     """
     if job.liquid is None:
         return None
-    joint = adjust_liquid(geometry_beside(job, survey))
+    joint = _settled(adjust_liquid(geometry_beside(job, survey)))
     certified = job.liquid.certified
 
     def adjust_alone():
-        return adjust_liquid(geometry_alone(job, survey))
+        return _settled(adjust_liquid(geometry_alone(job, survey)))
 
     alone = adjust_alone() if certified == "liquid" else or_none(adjust_alone)
     if certified == "geometry":
@@ -225,6 +227,29 @@ def measure_by_liquid(job, survey):
     else:
         body = join_body((alone if certified == "liquid" else joint).known)
     return Measured(job, survey, joint, alone, body)
+
+
+def _settled(found):
+    """What settled; SolutionError, with the likely cause, where liquid and sizes do not meet."""
+    if found.is_settled:
+        return found
+    named = [one for one in name_causes(found.adjusted, alternatives_of(found)) if one.is_named]
+    if not named:
+        raise SolutionError(
+            message(
+                "liquid_does_not_settle",
+                "the sizes of the tank do not settle with the runs by liquid: check the sizes in "
+                "job.toml, their uncertainty, and the units of volumes and dips",
+            )
+        )
+    raise SolutionError(
+        message(
+            "liquid_does_not_settle_because",
+            "the sizes of the tank do not settle with the runs by liquid; the likeliest cause is "
+            "{cause}",
+            cause=causes_in_words(named),
+        )
+    )
 
 
 def _result(measured, levels):

@@ -36,9 +36,11 @@ from tankcal.tank.liquid.reduction import load_densities
 from tankcal.uncertainty import Source
 
 MOST_ROUNDS, SETTLED = 30, 1e-3  # steps to the joint values; the last, in sds
+LEAST_GAIN, MOST_LEFT = 1e-7, 1e-2  # of a fit: by a step, and by all that could follow
 HALVINGS = 12  # of a step that leads to no tank, or to a worse fit
 RUN_ROUNDS, RUN_SETTLED = 4, 0.01  # of the run effect with the sizes; its last change, relative
 ROUNDING = 1e-9  # of a fit
+LOST = 1e-12  # of the largest effect of readings: less is none
 BOTTOM, FLEX, RUNS = "bottom_volume", "bottom_flex", "run_effect"
 OUTSIDE_M = 0.001  # that a dip may stand above or below the tank
 
@@ -61,6 +63,8 @@ class LiquidFound:
         Against the geometry as it was before; before_sd_m3 (n,) of its misclosures.
     misfit : float
         Chi-square with the sizes held where they are, and of the sizes.
+    is_settled : bool
+        Whether no step of the sizes would make a better fit.
     """
 
     known: Known
@@ -73,6 +77,7 @@ class LiquidFound:
     before: Reduced
     before_sd_m3: np.ndarray
     misfit: float
+    is_settled: bool = True
 
 
 def adjust_liquid(geometry):
@@ -83,7 +88,7 @@ def adjust_liquid(geometry):
     InputError
         For dips outside the tank, and for a run effect that nothing tells.
     SolutionError
-        When steps cannot be adjusted, or sizes do not settle.
+        When steps cannot be adjusted.
     """
     fill = fill_of(geometry.job.liquid)
     found = first = _adjusted_at(geometry, fill, _run_effect)
@@ -91,10 +96,13 @@ def adjust_liquid(geometry):
         for _ in range(RUN_ROUNDS):
             before = found.run_effect
             found = _settled(found, fill)
+            settled = found.is_settled
             found = _adjusted_at(found.known.geometry, fill, _run_effect)
+            found = replace(found, is_settled=settled)
             if abs(found.run_effect.sd - before.sd) <= RUN_SETTLED * before.sd:
                 break
-    _refuse_dips_outside(found.known.geometry, fill)
+    if found.is_settled:
+        _refuse_dips_outside(found.known.geometry, fill)
     return replace(found, before=first.before, before_sd_m3=first.before_sd_m3)
 
 
@@ -111,16 +119,16 @@ def _settled(found, fill):
         if max(abs(wanted[name] - at.get(name, 0.0)) / sd[name] for name in names) < SETTLED:
             return found
         better = _better(found, wanted, fill, same_run)
-        if better is None:
+        if better is None or found.misfit - better.misfit < LEAST_GAIN * _spread(found):
             break
         found = better
-    raise SolutionError(
-        message(
-            "liquid_does_not_settle",
-            "the sizes of the tank do not settle with the runs by liquid: check the sizes in "
-            "job.toml, their uncertainty, and the units of volumes and dips",
-        )
-    )
+    left = found.misfit - found.adjusted.chi2
+    return replace(found, is_settled=bool(left < MOST_LEFT * _spread(found)))
+
+
+def _spread(found):
+    """Chi-square over its degrees of freedom, 1 or more."""
+    return max(found.adjusted.chi2 / max(found.adjusted.dof, 1), 1.0)
 
 
 def _better(found, wanted, fill, run_effect):
@@ -258,7 +266,7 @@ def _known(geometry, of_geometry, adjusted, of_liquid):
 
 def _sources_of_liquid(adjusted, metering, fill, run):
     """Sources of what liquid itself leaves uncertain, columns by the misclosures."""
-    found = [Source(one.kind, one.columns) for one in adjusted.noise]
+    found = [Source(one.kind, _telling(adjusted, one.columns)) for one in adjusted.noise]
     for one in adjusted.effects:
         if one.kind == "meter_factor":
             found += _of_meters(one, metering, fill)
@@ -269,6 +277,15 @@ def _sources_of_liquid(adjusted, metering, fill, run):
             u, unit, value = COMMON[one.kind](metering)
             found.append(Source(one.kind, one.columns, u=u, unit=unit, type="B", estimate=value))
     return tuple(found)
+
+
+def _telling(adjusted, columns):
+    """(n, r) the same readings in as few columns as any estimate can tell apart."""
+    names = [one.kind for one in adjusted.effects]
+    used = [adjusted.place(kind) for kind in ("geometry", BOTTOM, FLEX) if kind in names]
+    seen = np.vstack([adjusted.gain[place] for place in used]) @ columns
+    _, size, turn = np.linalg.svd(seen, full_matrices=False)
+    return columns @ turn[size > LOST * np.max(size, initial=0.0)].T
 
 
 COMMON = {

@@ -97,10 +97,10 @@ class JointBody(Body):
     is_bent = False  # what `simulation` asks: volumes follow the causes as straight lines
 
     def volume_m3(self, levels_m):
-        """(rows,) volume below each level."""
+        """(rows,) volume below each level, never below 0."""
         levels = np.asarray(levels_m, dtype=float)
         volume = volumes_at(self.plain, levels, self.known.geometry.shift_m)
-        return volume + self._correction_m3(levels)
+        return np.maximum(volume + self._correction_m3(levels), 0.0)
 
     def area_m2(self, levels_m):
         """(rows,) derivative of the volume by the level."""
@@ -119,7 +119,7 @@ class JointBody(Body):
         levels = np.asarray(levels_m, dtype=float)
         moved = np.clip(levels + step_m, self.lowest_m, self.highest_m)
         plain = self.plain.moved_m3(levels, self.known.geometry.shift_m + step_m)
-        return plain + self._correction_m3(moved)
+        return np.maximum(plain + self._correction_m3(moved), 0.0)
 
     def undeclared(self):
         """Those of geometry, but for what liquid tells where nobody surveyed the wall."""

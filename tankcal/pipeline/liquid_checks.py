@@ -5,7 +5,8 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.job.tables import SETTINGS_FILE
-from tankcal.messages import join_with_or, message
+from tankcal.messages import message
+from tankcal.pipeline.liquid_naming import causes_in_words
 from tankcal.pipeline.survey_limits import limits_of
 
 TOLD = 3  # steps that are told one by one
@@ -40,7 +41,7 @@ def _disagreement(metering, found):
             "liquid and geometry disagree, at {w:.1f} times the standard deviation; the likeliest "
             "cause is {cause}",
             w=abs(named[0].w),
-            cause=join_with_or([_cause(one) for one in named]),
+            cause=causes_in_words(named),
         )
     else:
         text = message(
@@ -51,40 +52,6 @@ def _disagreement(metering, found):
             dof=found.dof,
         )
     yield Problem(metering.file, text)
-
-
-def _cause(one):
-    """A cause in words, with its size."""
-    size, of = one.size, one.cause.of
-    if one.cause.kind == "meter":
-        return message("cause_meter", "the factor of meter {name}, off by {size:+.3f} %",
-                       name=of, size=100 * size)  # fmt: skip
-    if one.cause.kind == "radii":
-        return message("cause_radii", "the radii of the geometry, off by {size:+.1f} mm",
-                       size=-1000 * size)  # fmt: skip
-    if one.cause.kind == "dip_zero":
-        return message("cause_dip_zero", "the zero of all dips, off by {size:+.1f} mm",
-                       size=-1000 * size)  # fmt: skip
-    if one.cause.kind == "dip":
-        return message("cause_dip", "the dip of row {row}, off by {size:+.1f} mm",
-                       row=of, size=-1000 * size)  # fmt: skip
-    if one.cause.kind == "batch":
-        return message("cause_batch", "the batch of row {row}, which lacks {size:+.3f} m3: is a "
-                       "batch missing, or counted twice?", row=of, size=size)  # fmt: skip
-    if one.cause.kind == "bottom":
-        return message("cause_bottom", "the volume of the bottom, off by {size:+.3f} m3",
-                       size=-size)  # fmt: skip
-    return _so_or_not(one, size, of)
-
-
-def _so_or_not(one, size, of):
-    if one.cause.kind == "leak":
-        unit = one.cause.unit if one.cause.unit != "m3" else message("m3_a_step", "m3 a step")
-        return message("cause_leak", "a valve that passes, {size:+.3f} {unit}", size=size,
-                       unit=unit)  # fmt: skip
-    if one.cause.kind == "fahrenheit":
-        return message("cause_fahrenheit", "temperatures in degrees Fahrenheit")
-    return message("cause_swapped", "temperatures at the meter and in the tank that changed places")
 
 
 def _single_readings(metering, found):

@@ -127,7 +127,7 @@ def load_geometry(geometry, densities_kg_m3, dips_m, shell_c):
     body = geometry.body(declared)
     dips = dips_m + geometry.zero_m
     levels = np.clip(dips + geometry.shift_m, body.lowest_m, body.highest_m)
-    volume = volumes_at(body, dips, geometry.shift_m)
+    volume = body.moved_m3(dips, geometry.shift_m)  # whole dips may stand above a declared top
     derivatives = body.derivatives(levels)
     nothing = np.zeros(len(levels))
     by_density = derivatives.get("liquid_density", nothing)

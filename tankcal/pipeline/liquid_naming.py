@@ -2,8 +2,11 @@
 
 import numpy as np
 
+from tankcal.messages import join_with_or, message
 from tankcal.tank.liquid import Alternative, reduce_steps
 from tankcal.tank.liquid.readings import as_fahrenheit, swapped
+
+MOST_TOLD = 3  # kinds of causes in a sentence
 
 
 def alternatives_of(found):
@@ -77,3 +80,51 @@ def _temperatures(metering, fill, loaded, reduced):
         column = reduced.misclosure_m3 - other.misclosure_m3
         told.append(Alternative(kind, column, unit="", is_whole=True))
     return told
+
+
+def causes_in_words(named):
+    """Named causes in one sentence: the likeliest of each kind.
+
+    Parameters
+    ----------
+    named : sequence of Verdict
+        The likeliest first.
+    """
+    first = {}
+    for one in named:
+        first.setdefault(one.cause.kind, one)
+    return join_with_or([_cause(one) for one in list(first.values())[:MOST_TOLD]])
+
+
+def _cause(one):
+    """A cause in words, with its size."""
+    size, of = one.size, one.cause.of
+    if one.cause.kind == "meter":
+        return message("cause_meter", "the factor of meter {name}, off by {size:+.3f} %",
+                       name=of, size=100 * size)  # fmt: skip
+    if one.cause.kind == "radii":
+        return message("cause_radii", "the radii of the geometry, off by {size:+.1f} mm",
+                       size=-1000 * size)  # fmt: skip
+    if one.cause.kind == "dip_zero":
+        return message("cause_dip_zero", "the zero of all dips, off by {size:+.1f} mm",
+                       size=-1000 * size)  # fmt: skip
+    if one.cause.kind == "dip":
+        return message("cause_dip", "the dip of row {row}, off by {size:+.1f} mm",
+                       row=of, size=-1000 * size)  # fmt: skip
+    if one.cause.kind == "batch":
+        return message("cause_batch", "the batch of row {row}, which lacks {size:+.3f} m3: is a "
+                       "batch missing, or counted twice?", row=of, size=size)  # fmt: skip
+    if one.cause.kind == "bottom":
+        return message("cause_bottom", "the volume of the bottom, off by {size:+.3f} m3",
+                       size=-size)  # fmt: skip
+    return _so_or_not(one, size, of)
+
+
+def _so_or_not(one, size, of):
+    if one.cause.kind == "leak":
+        unit = one.cause.unit if one.cause.unit != "m3" else message("m3_a_step", "m3 a step")
+        return message("cause_leak", "a valve that passes, {size:+.3f} {unit}", size=size,
+                       unit=unit)  # fmt: skip
+    if one.cause.kind == "fahrenheit":
+        return message("cause_fahrenheit", "temperatures in degrees Fahrenheit")
+    return message("cause_swapped", "temperatures at the meter and in the tank that changed places")

@@ -1,12 +1,13 @@
 """Field sheets of a starter job: its tables of readings as a crew fills them in by pen."""
 
 from tankcal.job.contract import COLUMNS, SURVEYS
-from tankcal.job.starter.form import OF_SHELLS
+from tankcal.job.starter.form import METERED, OF_SHELLS
 from tankcal.job.starter.texts import parted, texts_in
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
 
 FILE = "field-sheets.pdf"
+BY_PEN = (*OF_SHELLS, METERED)  # surveys that a crew writes down
 FORMS = (  # tables of each, read in one go, and the rows that a sheet has room for
     (("lines",), 12),
     (("offsets",), 30),
@@ -20,22 +21,28 @@ FORMS = (  # tables of each, read in one go, and the rows that a sheet has room 
     (("obstructions",), 9),
     (("thickness",), 8),
     (("tape_checks",), 4),
+    (("liquid",), 26),
 )
 ROWS_BESIDE = {("tangents", "directions"): 20}  # where another form stands on the same page
 HEIGHTS_OF = ("tangents", "wall-hits")  # surveys whose stations are told from the bottom
 ROWS_OF_HEIGHTS = 4
-IN_THE_OFFICE = ("use", "s_mm", "s_arcsec", "note")  # columns that nobody fills in on site
+IN_THE_OFFICE = (  # columns that nobody fills in on site
+    *("use", "s_mm", "s_arcsec", "note", "s_dip_mm", "s_volume_l"),
+    "flow_m3_h",  # by volume and time
+)
 UNIT_OF_CIRCLE = "_deg"  # of three columns of one angle the one that stands for all
 UNITS_OF_CIRCLES = "gon / ° / ° ′ ″"  # as the circle shows it: the others are struck out
 ANGLES = ("direction", "zenith", "angle")
 OTHER_UNITS = ("_gon", "_dms")
 WIDE = {"name": 1.5, "text": 2.0}  # shares of the width, beside one of a number
 FACTS = ("tank", "date", "crew", "weather", "shell_temperature", "instruments", "masters")
+FACTS_OF_LIQUID = ("tank", "date", "crew", "weather", "calibrating_liquid", "dipped_by")
+ROWS_OF_METERS, ROWS_OF_VALVES = 5, 8
 
 
 def is_filled_by_pen(survey):
     """Are there field sheets for that kind of survey?"""
-    return survey in OF_SHELLS
+    return survey in BY_PEN
 
 
 def write_field_sheets(path, survey, language):
@@ -46,7 +53,7 @@ def write_field_sheets(path, survey, language):
     path : Path
         Of the new file.
     survey : str
-        "strapping", "reference-line", "wall-hits" or "tangents".
+        "strapping", "reference-line", "wall-hits", "tangents" or "liquid".
     language : str
         One of `languages.LANGUAGES`.
     """
@@ -69,22 +76,63 @@ def sheets(survey, language):
             footer=texts.words["page"]["footer"],
         ),
         blocks.masthead(title, paper.word(f"forms.{_code(survey)}")),
-        blocks.key_values([(paper.word(f"forms.{fact}"), " ") for fact in FACTS]),
+        blocks.key_values([(paper.word(f"forms.{fact}"), " ") for fact in _facts(survey)]),
         blocks.paragraph(paper.word("forms.how")),
     ]
+    if survey == METERED:
+        found.append(blocks.paragraph(paper.word("forms.batches")))
+        found += [*_meters(paper, texts), *_valves(paper)]
     forms = [(names, rows) for names, rows in FORMS if set(names) <= set(SURVEYS[survey])]
     if any(_is_angle(field) for names, _ in forms for field in _columns(names)):
         found.append(blocks.paragraph(paper.word("forms.angles")))
     for names, rows in forms:
         titles = [texts.words["input"]["titles"][name] for name in names]
-        found += [
-            blocks.heading("; ".join(titles)),
-            blocks.form([_column(texts, field) for field in _columns(names)],
-                        ROWS_BESIDE.get((survey, names[0]), rows)),
-        ]  # fmt: skip
+        columns = [_column(texts, field) for field in _columns(names)]
+        found.append(blocks.heading("; ".join(titles)))
+        if names == ("liquid",):  # a meter shows a sum, of which the office takes differences
+            columns = [(heading, unit, 1.0) for heading, unit, _ in columns]
+            columns.insert(2, (paper.word("forms.meter_shows"), "", WIDE["name"]))
+        found.append(blocks.form(columns, ROWS_BESIDE.get((survey, names[0]), rows)))
         if names == ("setups",) and survey in HEIGHTS_OF:
             found += _heights(paper, texts)
     return [*found, blocks.signature([paper.word("forms.signed")])]
+
+
+def _facts(survey):
+    return FACTS_OF_LIQUID if survey == METERED else FACTS
+
+
+def _meters(paper, texts):
+    """A form of the meters: it becomes meters.toml."""
+    labels = texts.words["input"]["labels"]
+    columns = [
+        (labels["meter"], "", WIDE["name"]),
+        (paper.word("forms.serial_number"), "", WIDE["name"]),
+        (paper.word("forms.prover"), "", WIDE["name"]),
+        (paper.word("forms.factor_before"), "", 1.0),
+        (paper.word("forms.factor_after"), "", 1.0),
+        (paper.word("forms.flows"), "m³/h", WIDE["name"]),
+    ]
+    return [
+        blocks.heading(texts.words["input"]["titles"]["meters"]),
+        blocks.form(columns, ROWS_OF_METERS),
+    ]
+
+
+def _valves(paper):
+    """A form for the level with all valves shut, before the work and after it."""
+    columns = [
+        (paper.word("forms.time"), "", 1.0),
+        (paper.word("forms.dip"), "m", 1.0),
+        (paper.word("forms.later"), "", 1.0),
+        (paper.word("forms.dip"), "m", 1.0),
+        (paper.word("forms.valves_shut"), "", WIDE["text"]),
+    ]
+    return [
+        blocks.heading(paper.word("forms.tight")),
+        blocks.paragraph(paper.word("forms.tight_how")),
+        blocks.form(columns, ROWS_OF_VALVES),
+    ]
 
 
 def _heights(paper, texts):

@@ -35,6 +35,7 @@ from tankcal.text.words import load_words
 FORMS = [
     *((kind, None) for kind in KINDS),
     *(("vertical", survey) for survey in SURVEYS),
+    *((kind, "liquid") for kind in KINDS if kind != "vertical"),
 ]
 FORMS_IN_LANGUAGES = [  # as a study: each form in each language
     pytest.param(*form, language, marks=() if is_sampled else pytest.mark.study)
@@ -163,6 +164,8 @@ def test_empty_form_reports_only_what_is_missing(tmp_path, kind, survey, languag
         empty["sheet wall_hits"] = empty.pop("sheet points") and "no rows"
     if survey == "cloud":
         empty["sheet clouds"] = empty.pop("sheet points") and "nothing filled in"
+    if survey == "liquid" and kind == "vertical":
+        empty["sheet liquid"] = empty.pop("sheet points") and "no rows"
     assert others == empty
 
 

@@ -25,7 +25,7 @@ from tankcal.job.contract import (
 from tankcal.job.fields import Field
 from tankcal.job.rule_files import LIMITS, RULE, parse_rule, shipped_names
 from tankcal.job.starter import write_starter
-from tankcal.job.starter.form import STRAPPED
+from tankcal.job.starter.form import METERED, STRAPPED
 from tankcal.job.starter.page import filled_page
 from tankcal.job.tables import Log
 from tankcal.tank.rules import TANKS
@@ -68,7 +68,7 @@ def assert_written(starter, kind):
     assert f'\nkind = "{kind}"' in text
     settings = tomllib.loads(text)
     for section, fields in KEYS.items():
-        strapped = section in ("shell", "strapping")  # of a form for strapping alone
+        strapped = section in ("shell", "strapping", "liquid")  # of forms of surveys alone
         suiting = [
             field for field in fields if field.suits(kind) and not field.of_survey and not strapped
         ]
@@ -103,6 +103,9 @@ def test_a_starter_for_a_survey(tmp_path, survey):
     if survey in STRAPPED:
         assert "adjustment" not in settings
         assert settings["shell"] == {"shape_sd_mm": ""}
+    elif survey == METERED:
+        assert "adjustment" not in settings
+        assert list(settings["liquid"]) == [field.name for field in KEYS["liquid"]]
     else:
         assert {"datum", "datum_points", "refraction"} <= settings["adjustment"].keys()
         has_photos = survey == "photos"
@@ -129,7 +132,7 @@ def test_empty_survey_is_reported_as_missing(tmp_path, survey, name):
     with pytest.raises(InputError) as caught:
         load(tmp_path / "starter" / name)
     told = [problem for problem in caught.value.problems if problem.column not in BLANKS]
-    own = {"wall-hits": "wall_hits", "tangents": "tangents", "cloud": "clouds"}
+    own = {"wall-hits": "wall_hits", "tangents": "tangents", "cloud": "clouds", "liquid": "liquid"}
     measured = own.get(survey, "points")
     expected = ["courses", "circumferences" if survey in STRAPPED else measured]
     found = sorted(problem.file.split()[-1].partition(".")[0] for problem in told)

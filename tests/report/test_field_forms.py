@@ -7,9 +7,10 @@ import pytest
 
 from tankcal.cli import main
 from tankcal.job.contract import SURVEYS
-from tankcal.job.starter.form import OF_SHELLS
+from tankcal.job.starter.form import METERED, OF_SHELLS
 from tankcal.job.starter.texts import texts_in
 from tankcal.report.field_forms import (
+    BY_PEN,
     FILE,
     FORMS,
     IN_THE_OFFICE,
@@ -46,7 +47,7 @@ def test_every_table_of_readings_has_a_sheet(survey, language):
 
 
 @pytest.mark.slow(after=1)
-@pytest.mark.parametrize("survey", OF_SHELLS)
+@pytest.mark.parametrize("survey", BY_PEN)
 def test_new_writes_them(tmp_path, survey, capsys):
     assert main(["new", str(tmp_path / "mine"), "--survey", survey]) == 0
     assert (tmp_path / "mine" / FILE).read_bytes().startswith(b"%PDF")
@@ -56,7 +57,7 @@ def test_new_writes_them(tmp_path, survey, capsys):
 
 
 def test_a_sheet_has_room():
-    tables = {table for survey in OF_SHELLS for table in SURVEYS[survey]}
+    tables = {table for survey in BY_PEN for table in SURVEYS[survey]}
     assert {name for names, _ in FORMS for name in names} == tables - set(OF_THE_OFFICE)
 
 
@@ -83,8 +84,27 @@ def pages_of(path):
     return [page.split() for page in said.decode().split("\f")[:-1]]
 
 
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_crew_that_fills_a_tank_writes_meters_valves_and_batches(language):
+    """What the meter shows beside the batch: the office takes the difference."""
+    found = [block.data for block in sheets(METERED, language)]
+    words = texts_in(language).words
+    titles = [one["text"] for one in found if one["kind"] == "heading"]
+    of_tables = words["input"]["titles"]
+    assert titles == [of_tables["meters"], words["forms"]["tight"], of_tables["liquid"]]
+    *_, batches = (one for one in found if one["kind"] == "form")
+    labels = words["input"]["labels"]
+    headings = [column["heading"] for column in batches["columns"]]
+    names = ("run", "meter", "volume", "dip", *(f"{one}_temperature" for one in
+             ("meter", "tank", "shell")), "time")  # fmt: skip
+    expected = [labels[name] for name in names]
+    expected.insert(2, words["forms"]["meter_shows"])
+    assert headings == expected
+    assert (batches["rows"] + 3) * ROW_MM < HIGH_MM
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("survey", OF_SHELLS)
+@pytest.mark.parametrize("survey", BY_PEN)
 def test_no_page_is_nearly_empty(tmp_path, survey):
     """Each page of the PDF has a form, the last one more than the line to sign on."""
     write_field_sheets(tmp_path / FILE, survey, "pt-BR")

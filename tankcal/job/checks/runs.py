@@ -65,19 +65,20 @@ def check_runs(table, values, tables, extent, raw, log):
     """
     runs = place_runs(table)
     if not table.skipped:
-        _check_order(table, log)
+        broken = _check_order(table, log)
         for run, places in runs.items():
             _check_start(table, run, places, log)
             _check_batches(table, run, places, log)
             _check_times(table, places, log)
-        _check_signs(table, log)
+        _check_signs(table, broken, log)
     _check_temperatures(table, runs, log)
     if extent is not None and _check_levels(table, extent, log):
         _check_units(table, volume_by_sizes(values, tables, raw), extent, values, log)
 
 
 def _check_order(table, log):
-    last, seen = None, {}
+    """Problems of runs that are taken up again; the names of these."""
+    last, seen, broken = None, {}, []
     for row, run in zip(table.rows, table.of("run"), strict=True):
         if run is not None and run != last and run in seen:
             expected = message(
@@ -88,7 +89,9 @@ def _check_order(table, log):
                 last=seen[run],
             )
             log.problem(table.file, expected, row, "run")
+            broken.append(run)
         last, seen[run] = run, row
+    return broken
 
 
 def _check_start(table, run, places, log):
@@ -103,18 +106,18 @@ def _check_start(table, run, places, log):
             run=run,
         )
         log.problem(table.file, expected, row, "volume_m3")
-    if table.of("use")[first] == CHECK:
-        expected = message(
-            "start_not_used", "found check; expected adjust: the run counts from its first dip"
-        )
-        log.problem(table.file, expected, row, "use")
-    if len(places) == 1:
+    elif len(places) == 1:
         expected = message(
             "run_of_one_row",
             "run {run!r} has one row; expected its start and a batch at least",
             run=run,
         )
         log.problem(table.file, expected, row, "run")
+    if table.of("use")[first] == CHECK:
+        expected = message(
+            "start_not_used", "found check; expected adjust: the run counts from its first dip"
+        )
+        log.problem(table.file, expected, row, "use")
 
 
 def _check_batches(table, run, places, log):
@@ -153,8 +156,12 @@ def _check_times(table, places, log):
         last = times[place]
 
 
-def _check_signs(table, log):
+def _check_signs(table, broken, log):
+    """Problems of dips that do not follow the sign of the batch; runs in pieces are told."""
+    runs = table.of("run")
     for step in steps_of(table):
+        if runs[step.place] in broken:
+            continue
         rise = step.after_m - step.before_m
         shown = {"after": step.after_m, "before": step.before_m, "volume": step.volume_m3}
         if step.volume_m3 > 0 and rise <= 0:
@@ -256,7 +263,6 @@ def _unit_of_dip(dip, top):
     for scale, hint in (
         (3.3, message("dip_in_feet", ": is it in feet?")),
         (100.0, message("dip_in_centimetres", ": is it in centimetres?")),
-        (1000.0, message("dip_in_millimetres", ": is it in millimetres?")),
     ):
         if dip <= scale * top:
             return hint

@@ -16,8 +16,10 @@ from tankcal.job.fields import Field
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
 STRAPPED = ("strapping", "reference-line")  # surveys that are not adjusted as points
+METERED = "liquid"  # a survey of every kind of tank
 OF_SHELLS = (*STRAPPED, "wall-hits", "tangents")  # surveys of upright tanks alone
 STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
+STARTS_OF_LIQUID = {"survey.side": "inside", "datum.bottom_z_m": "0.0"}  # of upright tanks
 PLACEHOLDER = "NAME"  # of a camera or an instrument
 
 
@@ -37,9 +39,8 @@ class Form:
         _refuse_others(self.language, LANGUAGES)
         if self.survey is not None:
             _refuse_others(self.survey, SURVEYS)
-            if "points" not in TABLES_OF_KIND[self.kind] or (
-                self.survey in OF_SHELLS and self.kind != "vertical"
-            ):
+            has_none = "points" not in TABLES_OF_KIND[self.kind] and self.survey != METERED
+            if has_none or (self.survey in OF_SHELLS and self.kind != "vertical"):
                 raise ValueError(f"a tank of kind {self.kind} has no survey; expected another kind")
 
     @property
@@ -77,6 +78,8 @@ class Form:
             return self.language
         if self.survey == "tangents" and (section, field.name) == ("survey", "side"):
             return "outside"
+        if self.survey == METERED and self.kind == "vertical":
+            return STARTS_OF_LIQUID.get(f"{section}.{field.name}", field.start)
         if self.survey in STRAPPED:
             return STARTS_OF_STRAPPING.get(f"{section}.{field.name}", field.start)
         return field.start
@@ -111,9 +114,11 @@ class Form:
     def _has(self, section, field):
         if field.of_survey and self.survey is None:
             return False
-        of_straps = section in ("shell", "strapping")
-        of_points = section.startswith("adjustment")
-        if of_points if self.survey in STRAPPED else of_straps:
+        if section in ("shell", "strapping") and self.survey not in STRAPPED:
+            return False
+        if section.startswith("adjustment") and self.survey in (*STRAPPED, METERED):
+            return False
+        if section == METERED and self.survey != METERED:
             return False
         of_photos = section == "adjustment.camera" or field.name in OF_PHOTOS
         return field.suits(self.kind) and (self.survey == "photos" or not of_photos)

@@ -18,6 +18,8 @@ from tankcal.text.words import load_words, marks_of
 
 _UNITS = {
     "_mm_per_m": "mm/m",
+    "_m3_per_m": "m³/m",
+    "_m3_h": "m³/h",
     "_kg_m3": "kg/m³",
     "_per_k": "1/K",
     "_arcsec": "″",
@@ -71,6 +73,7 @@ SECTION_NOTES = {
     "material": "the shell's steel",
     "shell": "how far the wall is from a circle",
     "strapping": "how the tape lay",
+    "liquid": "the liquid that was metered into the tank, and how well its dips were read",
     "checks": "only compared, to tell a slip of the hand: nothing here changes a number",
     "adjustment": "how bad points are treated, and what holds the frame of a survey",
     "adjustment.camera": "what of the cameras is adjusted: off, camera free, camera weighted,"
@@ -114,6 +117,7 @@ TABLE_NOTES = {
     "offsets": "one row for each reading of the wall's offset; repeated readings are repeated rows",
     "stadia": "one row for each reading of a stadia bar from a set-up; may stay empty",
     "scan_targets": "one row for each target in each scan; may stay empty",
+    "liquid": "one row for the start of each run, and one for each batch with the dip after it",
     "tangents": "one row for each sight to a limb of the tank, from outside",
     "wall_hits": "one row for each sight to the bare wall, without a target",
     "control_readings": "one row for each reading of a control target: at the start, every half"
@@ -123,6 +127,7 @@ REGISTER_NOTES = {
     "cameras": "one section for each camera; put its name, as in photos.csv, in place of NAME",
     "instruments": "one section for each instrument; put its name in place of NAME; may stay empty",
     "clouds": "one section for each file of a scanner; put a name of your own in place of NAME",
+    "meters": "one section for each meter; put its name, as in liquid.csv, in place of NAME",
 }
 
 

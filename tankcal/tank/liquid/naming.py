@@ -1,8 +1,10 @@
 """Which cause misclosures of liquid and geometry have: each is tested, the likeliest named.
 
 An alternative of free size has w of its column; one of a known size (temperatures in Fahrenheit)
-the square root of what chi-square loses by it. Alternatives whose columns are nearly parallel in
-the metric of the weights cannot be told apart: they are named together.
+the square root of what chi-square loses by it. Alternatives that explain the misclosures nearly as
+well as the likeliest, as far as chi-square tells two of them apart, are named with it. Of a kind
+with many members (a dip, a batch) one is large by chance sooner: every kind is as likely as any
+other beforehand, and its members share that, which takes 2 ln(members) off their w^2.
 """
 
 from dataclasses import dataclass
@@ -11,7 +13,7 @@ import numpy as np
 
 from tankcal.adjust import noncentrality
 
-PARALLEL = 0.98  # correlation of two tests from which one cannot be told from the other
+ALIKE = 3.84  # of chi-square: two causes that differ by less cannot be told apart, at 5 %
 LEAST = 4.0  # |w| from which a cause is named
 
 
@@ -83,14 +85,12 @@ def name_causes(found, alternatives):
         if one.is_whole and np.isfinite(sd[place]):
             lost = (2 * size[place] - 1) / sd[place] ** 2
             w[place] = np.sqrt(max(lost, 0.0))
-    order = np.argsort(-np.abs(w), kind="stable")
-    named = np.zeros(len(w), dtype=bool)
-    best = order[0]
-    if abs(w[best]) > LEAST:
-        across = columns.T @ found.weight @ columns[:, best]
-        named = (np.abs(across) * sd * sd[best] > PARALLEL) & np.isfinite(sd)
-        named &= np.abs(w) > LEAST
-        named[best] = True
+    kinds = [one.kind for one in alternatives]
+    score = w**2 - 2 * np.log([kinds.count(kind) for kind in kinds])
+    order = np.argsort(-score, kind="stable")
+    large = np.abs(w) > LEAST
+    best = np.max(score[large], initial=-np.inf)
+    named = large & (best - score < ALIKE)
     delta = noncentrality()
     return tuple(
         Verdict(

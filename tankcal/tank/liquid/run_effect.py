@@ -40,13 +40,13 @@ def estimate_run_effect(weight, misclosure_m3, run_m3):
 
     The likelihood of few runs is flat, and its largest value is often 0, which is no proof that
     runs do not differ. So sd and dof are those of the variance averaged over the restricted
-    likelihood: with tau = theta + s, s the noise of a run's mean, the mean and the variance of
-    1/tau, for 1/tau of a chi-square over its dof:
+    likelihood: with tau = theta + s, s the (harmonic) mean noise of a run, the mean and the
+    variance of 1/tau, for 1/tau of a chi-square over its dof:
 
         1/tau = E[1/tau],   dof = 2 E[1/tau]^2 / Var[1/tau],   sd^2 = tau - s,
 
     under the prior 1/tau of a scale, and of theta alone the dof times ((tau - s) / tau)^2. Runs
-    that differ much more than their noise have the usual mean square, with runs - 1 dof.
+    that differ much more than their noise have the usual mean square, with its dof.
 
     Parameters
     ----------
@@ -61,28 +61,27 @@ def estimate_run_effect(weight, misclosure_m3, run_m3):
     RunEffect or None
     """
     differences, noise = run_differences(weight, misclosure_m3, run_m3)
-    if not len(noise):
+    if run_m3.shape[1] < 2 or len(noise) < 2:
         return None
     return averaged(differences, noise)
 
 
 def run_differences(weight, misclosure_m3, run_m3):
-    """(d, s): independent numbers of mean 0 and variances theta + s; the vaguest is left out.
+    """(d, s): independent numbers of mean 0 and variances theta + s.
 
-    All runs together move as the factor of the meter does: that direction says of the run effect
-    only what the certificate of the meter says, so it is left to it.
+    All runs together move as the factor of the meter does: that direction has a large s, by what
+    the certificate of the meter and the geometry leave open, and tells little.
     """
     seen = run_m3.T @ weight @ run_m3
     size, turn = np.linalg.eigh(seen)
     told = size > TOLD * size[-1]
-    told[0] = False
     d = turn.T @ (run_m3.T @ (weight @ misclosure_m3))
     return d[told] / size[told], 1 / size[told]
 
 
 def averaged(d, s):
     """`RunEffect` of independent numbers d of variances theta + s."""
-    least, most = np.mean(s), max(np.max(d**2), np.max(s))
+    least, most = 1 / np.mean(1 / s), max(np.max(d**2), np.max(s))
     theta = np.concatenate([[0.0], np.geomspace(1e-3 * least, 1e4 * most, GRID)])
     variance = theta[:, None] + s
     restricted = -0.5 * np.sum(np.log(variance) + d**2 / variance, axis=1)
