@@ -65,7 +65,7 @@ def _test(paper, liquid):
     chi2 = paper.number(liquid["chi2"], decimals=1)
     dof = paper.number(liquid["dof"], decimals=0)
     probability = paper.number(liquid["probability"], decimals=3)
-    return paper.word("texts.liquid_test", chi2=chi2, dof=dof, probability=probability)
+    return paper.word("texts.liquid_test", chi=chi2, dof=dof, probability=probability)
 
 
 # ---- tables
