@@ -153,6 +153,22 @@ def test_a_geometry_of_one_adjustment_is_linear():
     assert_allclose(volumes[0], volumes[1], atol=2e-3)
 
 
+def test_a_dip_that_is_only_compared(upright):
+    """A dip 20 mm off changes nothing, and its difference is told."""
+    metering, survey = upright.liquid, find_survey(upright, lambda text: None).survey
+    used = np.arange(len(metering)) != 5
+    results = []
+    for off in (0.0, 0.020):
+        dips = metering.dip_m + off * ~used
+        job = replace(upright, liquid=replace(metering, used=used, dip_m=dips))
+        results.append(measure_by_liquid(job, survey).result(np.array([2.0])))
+    first, second = results
+    assert_allclose(first.tables["joint"].volume_m3, second.tables["joint"].volume_m3, rtol=1e-12)
+    assert first.checks.row.tolist() == [metering.row[5]]
+    assert abs(first.checks.difference_m[0]) < 4 * first.checks.sd_m[0]
+    assert_allclose(second.checks.difference_m - first.checks.difference_m, 0.020, atol=1e-4)
+
+
 FAULTS = {
     "meter": Fault("meter", 0.002),
     "dip": Fault("dip", 0.010, 5),
@@ -164,7 +180,7 @@ FAULTS = {
 def named_causes(job):
     survey = find_survey(job, lambda text: None).survey
     result = measure_by_liquid(job, survey).result(np.array([1.0]))
-    return [one.cause for one in result.causes if one.is_named]
+    return [one for one in result.causes if one.is_named]
 
 
 @pytest.mark.parametrize("fault", ["dip", "batch"])
@@ -172,8 +188,11 @@ def test_a_planted_fault_is_named(tmp_path, fault):
     dips = [None, *np.round(np.arange(0.3, 2.2, 0.3), 2).tolist()]
     job = metered_job("vertical", tmp_path / "job", dips=dips, liquid__u_radius_mm=0.5)
     filled = fill(np.random.default_rng(2), job, NOMINAL["vertical"], 9.5, FAULTS[fault])
-    (cause,) = {(one.kind, one.of) for one in named_causes(filled)}
-    assert cause == (fault, int(filled.liquid.row[FAULTS[fault].place]))
+    (first, *others), place = named_causes(filled), FAULTS[fault].place
+    assert not others
+    assert (first.cause.kind, first.cause.of) == (fault, int(filled.liquid.row[place]))
+    lacking = {"dip": -0.010, "batch": filled.liquid.volume_m3[place]}[fault]  # true less read
+    assert abs(first.size - lacking) < 4 * first.sd
 
 
 def test_no_run_from_empty_is_told(tmp_path):
