@@ -5,6 +5,8 @@ import numpy as np
 from tankcal.gum.coverage import coverage_factor
 from tankcal.record.schema import Saved, filled_from, key
 
+CONTROLLED = 1e-6  # redundancy below which nothing controls a reading
+
 
 class MeterUsed(Saved):
     """A meter that the tank was filled or emptied through."""
@@ -61,8 +63,8 @@ class LiquidStep(Saved):
     residual_m3: float = key("to be added to the batch, by the adjustment with the geometry")
     sd_m3: float = key("of the batch, before")
     redundancy: float = key("share of an error of it that shows")
-    w: float = key("test quantity of the batch")
-    detectable_m3: float | None = key("smallest error of it that its test finds; null: none")
+    w: float | None = key("test quantity of the batch; null: nothing controls it")
+    detectable_m3: float | None = key("smallest error of it that shows; null: more than metered")
 
 
 class LiquidDip(Saved):
@@ -74,7 +76,7 @@ class LiquidDip(Saved):
     residual_m: float = key("to be added to it, by the adjustment with the geometry")
     sd_m: float = key("of the reading, before")
     redundancy: float = key("share of an error of it that shows")
-    w: float = key("test quantity of the reading")
+    w: float | None = key("test quantity of the reading; null: nothing controls it")
 
 
 class LiquidCause(Saved):
@@ -170,7 +172,12 @@ def liquid_of(result):
         meters=_meters(found, metering),
         runs=_runs(found),
         steps=_steps(found, result.job.table.coverage_probability),
-        dips=_rows_of(LiquidDip, found.dips, residual_m=_residual(found.dips, found.dips.sd_m)),
+        dips=_rows_of(
+            LiquidDip,
+            found.dips,
+            residual_m=_residual(found.dips, found.dips.sd_m),
+            w=_tests(found.dips),
+        ),
         bottom_flex_sd=flex and flex.u_before,
         bottom_flex=flex and flex.after,
         u_bottom_flex=flex and flex.u_after,
@@ -235,6 +242,7 @@ def _runs(found):
 
 def _steps(found, probability):
     steps, k = found.steps, float(coverage_factor(probability, np.inf))
+    filled = np.abs(steps.indicated_m3).sum()
     return _rows_of(
         LiquidStep,
         steps,
@@ -242,12 +250,19 @@ def _steps(found, probability):
         misclosure_u_m3=steps.misclosure_sd_m3,
         misclosure_U_m3=k * steps.misclosure_sd_m3,
         residual_m3=_residual(steps, steps.sd_m3),
+        w=_tests(steps),
+        detectable_m3=np.where(steps.detectable_m3 < filled, steps.detectable_m3, np.nan),
     )
 
 
 def _residual(tested, sd):
     """v = w sd sqrt(r): what is to be added to each reading."""
     return tested.w * sd * np.sqrt(np.maximum(tested.redundancy, 0.0))
+
+
+def _tests(tested):
+    """Test quantities; nan where only rounding errors are left of a reading."""
+    return np.where(tested.redundancy > CONTROLLED, tested.w, np.nan)
 
 
 def _rows_of(cls, columns, **more):

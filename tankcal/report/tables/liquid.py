@@ -1,5 +1,7 @@
 """Tables of metered runs: meters, runs, steps, dips, sizes, causes, volumes beside each other."""
 
+from dataclasses import replace
+
 from tankcal.report import numbers
 from tankcal.report.tables.table import Column, Table
 
@@ -71,39 +73,36 @@ RUNS = Table(
 )
 
 
-def _correction(name):
-    return _named(f"by_{name}_m3", name, "L", u="sd_m3", on="liquid_steps")
+def _tested(key, heading, unit="", **more):
+    """A column of the steps that stands in the CSV file by the name that the record has for it."""
+    return _named(key, heading, unit, csv=key, **more)
 
 
 STEPS = Table(
     "liquid_steps",
     (
-        _ROW,
-        _RUN,
-        Column("meter", heading="liquid_meter", sheet=True, width=10, on=""),
-        _FROM,
-        _TO,
-        _named("indicated_m3", "indicated", "m3", u="sd_m3", on="liquid_steps"),
-        *map(_correction, ("factor", "meter_temperature", "tank_temperature", "shell", "head")),
-        _named("reference_m3", "reference", "m3", u="sd_m3"),
-        _named("geometry_m3", "geometry", "m3", u="sd_m3", on="liquid_misclosures"),
-        _named("misclosure_m3", "misclosure", "L", u="misclosure_u_m3", on="liquid_misclosures"),
-        _named("misclosure_U_m3", "U", "L", u="misclosure_u_m3", on="liquid_misclosures"),
-        Column(
-            "misclosure_w",
-            decimals=2,
-            heading="liquid_misclosure_w",
-            sheet="liquid_of_misclosure",
-            on="liquid_misclosures",
-        ),
-        _named("residual_m3", "residual", "L", u="sd_m3", on="liquid_residuals"),
-        _named("sd_m3", "sd", "L", u="sd_m3", on="liquid_residuals"),
-        _named("redundancy", "redundancy", decimals=3, width=10, on="liquid_residuals"),
-        Column("w", decimals=2, heading="liquid_w", sheet=True, width=8, on="liquid_residuals"),
-        _named("detectable_m3", "detectable", "L", digits=2, on="liquid_residuals"),
+        _tested("row", "row", decimals=0, width=8),
+        _tested("run", "run", width=8),
+        _tested("meter", "meter", width=10, on=""),
+        replace(_FROM, csv="from_dip_m"),
+        replace(_TO, csv="to_dip_m"),
+        _tested("indicated_m3", "indicated", "m3", u="sd_m3", on="liquid_steps"),
+        *(_tested(f"by_{name}_m3", name, "L", u="sd_m3", on="liquid_steps")
+          for name in ("factor", "meter_temperature", "tank_temperature", "shell", "head")),
+        _tested("reference_m3", "reference", "m3", u="sd_m3"),
+        _tested("geometry_m3", "geometry", "m3", u="sd_m3", on="liquid_misclosures"),
+        _tested("misclosure_m3", "misclosure", "L", u="misclosure_u_m3", on="liquid_misclosures"),
+        _tested("misclosure_U_m3", "U", "L", u="misclosure_u_m3", on="liquid_misclosures"),
+        replace(_tested("misclosure_w", "misclosure_w", decimals=2, on="liquid_misclosures"),
+                sheet="liquid_of_misclosure"),
+        _tested("residual_m3", "residual", "L", u="sd_m3", on="liquid_residuals"),
+        _tested("sd_m3", "sd", "L", u="sd_m3", on="liquid_residuals"),
+        _tested("redundancy", "redundancy", decimals=3, width=10, on="liquid_residuals"),
+        _tested("w", "w", decimals=2, width=8, on="liquid_residuals"),
+        _tested("detectable_m3", "detectable", "L", digits=2, on="liquid_residuals"),
     ),
     rows=lambda record: record["liquid"]["steps"],
-)
+)  # fmt: skip
 
 DIPS = Table(
     "liquid_dips",
