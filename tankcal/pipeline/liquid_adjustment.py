@@ -273,7 +273,7 @@ def _known(geometry, of_geometry, adjusted, of_liquid):
 
 def _sources_of_liquid(adjusted, metering, fill, run):
     """Sources of what liquid itself leaves uncertain, columns by the misclosures."""
-    found = [Source(one.kind, _telling(adjusted, one.columns)) for one in adjusted.noise]
+    found = [Source(one.kind, _telling(adjusted, one.columns), type="B") for one in adjusted.noise]
     for one in adjusted.effects:
         if one.kind == "meter_factor":
             found += _of_meters(one, metering, fill)

@@ -6,9 +6,7 @@ from functools import partial
 import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
-from tankcal.pipeline.liquid_courses import joint_shell
-from tankcal.pipeline.nominal_wall import nominal_inside_m
-from tankcal.pipeline.tanks import body_of, insets_of
+from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall_straps import mean_radii
 from tankcal.record.schema import Saved, filled_from, key
 from tankcal.sections import coordinates_of
@@ -353,10 +351,13 @@ def _of_straps(result, index, shape):
 
 
 def _of_drawing(result, index, shape):
-    """A course that nothing was surveyed of: only liquid measured the tank."""
-    radius = nominal_inside_m(result.job, result.job.courses[index])
-    inset = insets_of(result.job, result.job.switches)[index]
-    return {"sections": [], "points": 0, "rejected": 0, "radius_m": radius + inset}
+    """Of a course that only liquid measured."""
+    return {
+        "sections": [],
+        "points": 0,
+        "rejected": 0,
+        "radius_m": result.nominal.radius_m[index],
+    }
 
 
 def surveyed_shell(result):
@@ -376,7 +377,7 @@ def radius_sd(shell, shape):
 
 def _partial(result, low_m, high_m):
     """Volume between two heights above the bottom and its standard uncertainty, exactly."""
-    shell = joint_shell(result.body)
+    shell = result.body.only_shell()
     volume = shell.volume_m3([low_m, high_m])
     sources = shell.sources([low_m, high_m])
     of_shell = [source for source in sources if source.kind != "datum"]  # joints know no zero

