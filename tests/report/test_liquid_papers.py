@@ -270,7 +270,7 @@ def test_the_certificate_says_what_was_filled(record, language):
 
 
 def test_method_is_printed_only_as_given(found):
-    assert not any("4269" in one or "2555" in one for one in texts(found))
+    assert not any("ISO 4269" in one or "Std 2555" in one for one in texts(found))
 
 
 @pytest.mark.slow
