@@ -11,10 +11,9 @@ from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 
 # Named by title and edition alone: the bodies of paid standards were not read, so no clause is.
 ISO_7507 = "ISO 7507-1:2003"
+ISO_4269 = "ISO 4269:2001"
 INSIDE_PLATE = message("inside_plate", "r_inside = r − t")
 INSIDE_PAINT = message("inside_paint", "r_inside = r − t − paint")
-BY_LIQUID = message("by_liquid", "V_joint − V_geometry, by the misclosures of the steps")
-BY_LIQUID_ALONE = message("by_liquid_alone", "V_liquid − V_geometry")
 NONE = Switches(**{field.name: field.name == "tilt" for field in fields(Switches)})
 
 
@@ -60,25 +59,24 @@ def corrections_of(job, survey, over_m=0.0):
     return tuple(found)
 
 
-def with_liquid(corrections, liquid, top_m3):
-    """The corrections of geometry and, last, what liquid adds to it.
+def correction_by_liquid(corrections, gross_m3, top_m3):
+    """The `Correction` that metered runs make at the top row: what is left of the others' sum.
 
     Parameters
     ----------
     corrections : tuple of Correction
-    liquid : LiquidResult or None
-        None: nothing was metered.
-    top_m3 : float
-        Top row of the table that is printed.
+    gross_m3, top_m3 : float
+        At the top row: without any correction, and of the table.
     """
-    if liquid is None:
-        return corrections
-    by_geometry, joint = (liquid.tables[one].volume_m3[-1] for one in ("geometry", "joint"))
-    size = float((top_m3 if liquid.certified == "liquid" else joint) - by_geometry)
-    formula = BY_LIQUID_ALONE if liquid.certified == "liquid" else BY_LIQUID
-    applied = liquid.certified != "geometry"
-    share = 100 * size / float(by_geometry)
-    return (*corrections, Correction("liquid", applied, size, share, formula, ""))
+    made = sum(one.size_m3 for one in corrections if one.applied and one.code != "tilt")
+    size = top_m3 - gross_m3 - made
+    formula = message("by_liquid", "adjusted together with the metered volumes")
+    return Correction("liquid", True, size, 100 * size / gross_m3, formula, ISO_4269)
+
+
+def gross_at_top(job, survey, over_m=0.0):
+    """Volume at the top row without any correction, m3."""
+    return _at_top(job, survey, NONE, over_m)
 
 
 def _at_top(job, survey, switches, over_m):

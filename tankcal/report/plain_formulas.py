@@ -19,7 +19,6 @@ _SET_AS = (  # pattern of the plain text, LaTeX; a longer pattern before its own
     ),
     (r"Δr = ρ g \(h − z\) r²/\(E t\)", r"\Delta r = \rho \, g \, (h - z) \, r^2 / (E \, t)"),
     (r"\bg(?= = \d)", "g"),
-    (r"\bV_([^\W\d_]+) − V_([^\W\d_]+)", r"V_\text{%s} - V_\text{%s}"),
     (r"√\(1 \+ m²\)", r"\sqrt{1 + m^2}"),
     (r"π r² H/3", r"\pi \, r^2 H / 3"),
     (r"π H \(3 r² \+ H²\)/6", r"\pi H \, (3 r^2 + H^2) / 6"),

@@ -8,7 +8,7 @@ import openpyxl
 import pytest
 from job_builder import write_folder
 from metered_tanks import metered_parts, metered_rows
-from paper_cells import paper_blocks, table_of, texts
+from paper_cells import paper_blocks, table_of
 from paper_pages import lone_headings, pages_of, sparse_pages
 from paper_words import assert_tables_have_words, instruments_said
 
@@ -22,6 +22,7 @@ from tankcal.report import liquid as drawn
 from tankcal.report.plain import PlainPaper
 from tankcal.report.tables import liquid
 from tankcal.report.tables.facts import CERTIFICATE, SURVEY
+from tankcal.report.web.tank_shape import tank_view
 from tankcal.text.languages import LANGUAGES
 from tankcal.text.words import load_words, translate_record
 
@@ -142,19 +143,13 @@ def test_three_tables_of_the_printed_rows(result, record):
         assert (volume is not None) == inside
 
 
-def test_liquid_is_the_last_correction(result, record):
+def test_liquid_is_the_last_correction(record):
     """Closed form: the corrections lead from the surveyed shell to the top row."""
-    last = record["corrections"][-1]
-    told = record["liquid"]
-    assert last["code"] == "liquid"
-    assert last["applied"]
-    assert last["size_m3"] == pytest.approx(
-        told["joint"]["volume_m3"][-1] - told["by_geometry"]["volume_m3"][-1]
-    )
+    assert record["corrections"][-1]["code"] == "liquid"
     if record["gross"]:
         sizes = sum(one["size_m3"] for one in record["corrections"] if one["applied"])
         top = record["capacity"]["volume_m3"][-1]
-        assert record["gross"]["volume_m3"] + sizes == pytest.approx(top, abs=5e-3)
+        assert record["gross"]["volume_m3"] + sizes == pytest.approx(top, abs=1e-6)
 
 
 def test_courses_are_those_of_the_joint_table(strapped):
@@ -177,6 +172,9 @@ def test_a_tank_of_the_drawing_has_its_courses(alone):
     assert [one["radius_m"] for one in record["courses"]] == [6.5] * 5
     assert record["courses"][0]["inside_radius_m"] == pytest.approx(6.505, abs=0.004)
     assert told["below_first_dip_m3"] == pytest.approx(0.5, abs=2.5 * told["u_below_first_dip_m3"])
+    assert (
+        tank_view(paper_of(record)).data["reason"] == load_words("en")["web"]["no_view_of_drawing"]
+    )
     said = {one["code"]: one["value"] for one in record["choices"]}
     assert said["thickness"] == "drawing"
     assert said["liquid_beside"] == "drawing"
@@ -267,10 +265,8 @@ def test_the_certificate_says_what_was_filled(record, language):
     assert told["meters"][0]["prover"] in facts["metered_with"]
     assert facts["metered_table"] == load_words(language)["liquid_tables"]["joint"]
     assert told["meters"][0]["certificate"] in instruments_said(record)
-
-
-def test_method_is_printed_only_as_given(found):
-    assert not any("ISO 4269" in one or "Std 2555" in one for one in texts(found))
+    said = [text for text in facts.values() if text]
+    assert not any("ISO" in text or "API" in text for text in said)  # a method is the job's to name
 
 
 @pytest.mark.slow

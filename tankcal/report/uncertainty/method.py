@@ -40,6 +40,7 @@ FROM_SURVEY = (
     "liquid_temperatures",
     "run_effect",
     "bottom_volume",
+    "below_first_dip",
     "nominal_radius",
     "nominal_radius_of_all",
 )
