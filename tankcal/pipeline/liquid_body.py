@@ -163,10 +163,6 @@ class JointBody(Body):
             slim=_silenced(self.slim),
         )
 
-    def surveyed_sources(self, levels_m):
-        """What geometry and liquid together leave uncertain of the shell."""
-        return self.only_shell().sources(levels_m)
-
     def _of_plain(self, levels_m):
         moved = np.asarray(levels_m, dtype=float) + self.known.geometry.shift_m
         return np.clip(moved, self.plain.lowest_m, self.plain.highest_m)

@@ -15,6 +15,7 @@ from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.clouds import CloudsRecord, clouds_of
 from tankcal.record.hits import HitsRecord, hits_of
 from tankcal.record.lines import LinesRecord, lines_of
+from tankcal.record.liquid import LiquidRecord, liquid_of
 from tankcal.record.plain_data import to_plain
 from tankcal.record.schema import Saved, filled_from, key
 from tankcal.record.strapping import StrappingRecord, strapping_of
@@ -72,6 +73,9 @@ class Record(Saved, kw_only=True):
     tangents: TangentsRecord | None = key(
         "tangents from outside; left out where there are none", default=None, optional=True
     )
+    liquid: LiquidRecord | None = key(
+        "metered runs; left out where there are none", default=None, optional=True
+    )
     courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
     capacity: table.CapacityTable | None = key("the table", default=None)
     interpolation: table.InterpolationError | None = key("between rows", default=None)
@@ -112,6 +116,7 @@ def record_of(result):
             hits=hits_of(result),
             clouds=clouds_of(result),
             tangents=tangents_of(result),
+            liquid=liquid_of(result),
             courses=survey.courses_of(result),
             capacity=table.capacity_of(result),
             interpolation=filled_from(table.InterpolationError, result.straightness),

@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.record.schema import Saved, key
-from tankcal.record.survey import radius_sd
+from tankcal.record.survey import radius_sd, surveyed_shell
 
 
 class StrapReading(Saved):
@@ -141,7 +141,9 @@ def _courses(result):
                 circumference_m=whole,
                 area_term_m=FULL_TURN * radius - whole,
                 radius_m=radius,
-                radius_sd_m=radius_sd(result, result.body.shell.volume.courses[index]),
+                radius_sd_m=radius_sd(
+                    surveyed_shell(result), result.body.shell.volume.courses[index]
+                ),
                 thickness_m=course.thickness_m,
                 plate_sd_m=straps.plate_sd_m.get(index),
                 paint_m=course.paint_m,

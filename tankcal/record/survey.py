@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
+from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall_straps import mean_radii
 from tankcal.record.schema import Saved, filled_from, key
 from tankcal.sections import coordinates_of
@@ -295,6 +296,7 @@ def courses_of(result):
     measured = _of_straps if result.strapped is not None else _of_drawing
     if result.wall is not None:
         measured = partial(_of_sections, _rejected_z_m(result))
+    surveyed = surveyed_shell(result)
     for index, (course, shape) in enumerate(
         zip(job.courses, result.body.shell.volume.courses, strict=True)
     ):
@@ -309,7 +311,7 @@ def courses_of(result):
                 bottom_m=shape.bottom_m,
                 top_m=top_m,
                 **measured(result, index, shape),
-                radius_sd_m=radius_sd(result, shape),
+                radius_sd_m=radius_sd(surveyed, shape),
                 inside_radius_m=np.sqrt(volume / height / np.pi),
                 area_m2=volume / height,
                 area_sd_m2=u / height,
@@ -366,14 +368,19 @@ def _of_drawing(result, index, shape):
     }
 
 
-def radius_sd(result, shape):
+def surveyed_shell(result):
+    """The shell as the survey alone has it, beside the radii that it found."""
+    liquid, survey = result.liquid, result.wall or result.strapped
+    if liquid is None or liquid.certified != "liquid" or survey is None:
+        return result.body.shell
+    return body_of(result.job, survey).shell
+
+
+def radius_sd(shell, shape):
     """Of the mean radius of a course, from points and form: their part of sd(V) / (2 pi r h)."""
-    sources = result.body.surveyed_sources(np.array([shape.bottom_m, shape.top_m]))
+    sources = shell.sources([shape.bottom_m, shape.top_m])
     variance = sum(np.sum(np.diff(source.columns_m3, axis=0) ** 2) for source in sources)
-    return (
-        np.sqrt(variance)
-        / np.diff(result.body.shell.volume.inset_m2([shape.bottom_m, shape.top_m]))[0]
-    )
+    return np.sqrt(variance) / np.diff(shell.volume.inset_m2([shape.bottom_m, shape.top_m]))[0]
 
 
 def _partial(result, low_m, high_m):

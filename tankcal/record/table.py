@@ -6,6 +6,7 @@ import numpy as np
 
 from tankcal.adjust import CRITICAL
 from tankcal.pipeline.chain import PARTS
+from tankcal.record.liquid import geometry_beside
 from tankcal.record.schema import Finite, Saved, filled_from, key
 from tankcal.record.statements import intervals_of
 from tankcal.tank.dips import ProportionalParts, dip_label
@@ -149,8 +150,9 @@ def choices_of(result):
         "zero": zero_of(result),
         **(_shell_choices(job, result) if result.wall is not None else {}),
         **(_strapped_choices(job) if result.strapped is not None else {}),
+        **_liquid_choices(result),
         **({"form": "learned"} if result.scan is not None and job.horizontal is not None else {}),
-        "thickness": _thickness_choice(job),
+        "thickness": _thickness_choice(job, result),
         "temperature": _temperature_choice(job),
         "height_expansion": "yes" if job.table.height_expansion else "no",
         "head": _head_choice(job),
@@ -241,6 +243,23 @@ def _strapped_choices(job):
     }
 
 
+def _liquid_choices(result):
+    """Whose table is printed where liquid was metered, and what stood beside the liquid."""
+    if result.liquid is None:
+        return {}
+    job, beside = result.job, geometry_beside(result)
+    found = {"liquid": result.liquid.certified, "liquid_beside": beside}
+    if beside == "drawing":
+        roof = job.roof and job.roof.weighing
+        found |= {
+            "bottom": _bottom_choice(job),
+            "tilt": "not_measured",
+            "course_heights": "along_axis",
+            "roof": _fitting_choice(job.switches.roof, roof, roof),
+        }
+    return found
+
+
 def _bottom_choice(job):
     return job.bottom.form if job.switches.bottom else "off"
 
@@ -279,7 +298,9 @@ def _covariance_choice(job):
     return given + "_scaled" if job.scale == "a_posteriori" else given
 
 
-def _thickness_choice(job):
+def _thickness_choice(job, result):
+    if result.liquid is not None and geometry_beside(result) == "drawing":
+        return "drawing"
     if job.survey.side == "inside":
         return "inside"
     solid = job.horizontal or job.sphere

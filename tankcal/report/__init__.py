@@ -20,6 +20,7 @@ _NOT_IN_ALL = (
     "hits",
     "tangents",
     "clouds",
+    "liquid",
 )
 _PARTS = (
     ("certificate.pdf", "certificate"),

@@ -101,6 +101,8 @@ def _instruments(paper):
             used[one["instrument"]] = one["certificate"]
     for one in (paper.record.get("clouds") or {}).get("scanners", ()):
         used[one["scanner"]] = one["certificate"]
+    for one in (paper.record.get("liquid") or {}).get("meters", ()):
+        used[one["meter"]] = one["certificate"]
     for one in strapping["tapes"] if strapping else ():
         used[one["tape"]] = one["certificate"]
         if one["master"]:

@@ -310,10 +310,6 @@ class Body:
         """The body of the shell of courses alone."""
         return replace(self, parts=(self.shell,))
 
-    def surveyed_sources(self, levels_m):
-        """What is left uncertain of the shell itself, declared inputs apart."""
-        return self.shell.sources(levels_m)
-
     def undeclared(self):
         """Names of the inputs that move some volume of the tank and have no declared u.
 

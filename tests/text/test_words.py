@@ -33,7 +33,7 @@ def promised_codes(beginning):
 
 def test_record_format_page_names_what_is_tested():
     assert {"zero", "coverage", "not_in_budget", "snooping"} <= {c for c, _ in promised_choices()}
-    codes = "plate paint temperature tilt head bottom deadwood roof"
+    codes = "plate paint temperature tilt head bottom deadwood roof liquid"
     assert promised_codes("Correction codes:") == codes.split()
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.job.covariance import MAX_POINTS
 from tankcal.report.outputs.csv_files import write_table
-from tankcal.report.tables import capacity, lines, readings, strapping, survey, tank
+from tankcal.report.tables import capacity, lines, liquid, readings, strapping, survey, tank
 from tankcal.text.digits import PROGRAM, decimals_of_rows, fixed
 
 LEAST_DECIMALS = 6  # micrometres, square millimetres, millilitres
@@ -14,6 +14,7 @@ FILES = (
     "sections.csv",
     "strapping.csv",
     "offsets.csv",
+    "liquid_steps.csv",
     "capacity.csv",
     "photos.csv",
     "cameras.csv",
@@ -29,6 +30,8 @@ def write_tables(record, directory):
         tables["strapping"] = strapping.STRAPS, None
     if record.get("lines"):
         tables["offsets"] = lines.OFFSETS, None
+    if record.get("liquid"):
+        tables["liquid_steps"] = liquid.STEPS, None
     if record["capacity"]:
         tables["capacity"] = capacity.capacity_table(record), _capacity(record)
     if record["adjustment"]:

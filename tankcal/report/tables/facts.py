@@ -5,6 +5,7 @@ Each set of facts is a `Table` of one row. `Column.key` is the label of the fact
 """
 
 from tankcal.report.dip_point import dip_point_text
+from tankcal.report.metered_liquid import metered_liquid_text
 from tankcal.report.tables.table import Column, Table
 from tankcal.text.words import method_line
 
@@ -35,6 +36,40 @@ def _scanned(paper, row):
         read=sum(one["delivered"] for one in scans),
         means=sum(one["readings"] for one in scans),
     )
+
+
+def _metered(paper, row):
+    """Runs and steps of a calibration by liquid, and the dips that they reach."""
+    liquid = paper.record.get("liquid")
+    if not liquid:
+        return None
+    low, high = (paper.height(liquid[f"{end}_dip_m"]) for end in ("lowest", "highest"))
+    counts = {"runs": len(liquid["runs"]), "steps": len(liquid["steps"])}
+    return paper.word("texts.liquid_metered", **counts, low=low, high=high)
+
+
+def _metered_liquid(paper, row):
+    liquid = paper.record.get("liquid")
+    return liquid and metered_liquid_text(paper, liquid)
+
+
+def _metered_with(paper, row):
+    """The meters with their factors, and what each was proved against."""
+    liquid = paper.record.get("liquid")
+    return liquid and "; ".join(_meter(paper, one) for one in liquid["meters"])
+
+
+def _meter(paper, one):
+    factor, u = (paper.number(one[key], u=one["u_factor"]) for key in ("factor", "u_factor"))
+    meter = paper.word("texts.liquid_meter", name=one["meter"], factor=factor, u=u)
+    if not one["prover"]:
+        return meter
+    return paper.word("texts.liquid_prover", meter=meter, prover=one["prover"])
+
+
+def _metered_table(paper, row):
+    liquid = paper.record.get("liquid")
+    return liquid and paper.word(f"liquid_tables.{liquid['certified']}")
 
 
 def _volume(paper, row):
@@ -124,6 +159,10 @@ SURVEY = Table(
     (
         Column("survey_method", text=_method, sheet=True),
         Column("scanned", text=_scanned, sheet=True),
+        Column("metered", text=_metered, sheet=True),
+        Column("metered_liquid", text=_metered_liquid, sheet=True),
+        Column("metered_with", text=_metered_with, sheet=True),
+        Column("metered_table", text=_metered_table, sheet=True),
         Column("survey_side", words="sides", sheet=True),
         Column("shell_temperature", "degC", digits=3, sheet=True,
                in_sheet={"digits": None, "decimals": 1}),

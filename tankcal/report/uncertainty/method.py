@@ -36,6 +36,14 @@ FROM_SURVEY = (
     "bottom_form",
     "bottom_liquid",
     "bottom_curve",
+    "meter_repeatability",
+    "dip_readings",
+    "liquid_temperatures",
+    "run_effect",
+    "bottom_volume",
+    "below_first_dip",
+    "nominal_radius",
+    "nominal_radius_of_all",
 )
 OF_READING = ("interpolation", "rounding")
 

@@ -28,7 +28,8 @@ def tank_view(paper):
     elif kind in _PROFILES and record["solid"]:
         found["solid"] = _PROFILES[kind]({one["code"]: one["value"] for one in record["solid"]})
     else:
-        code = "no_view_of_straps" if record.get("strapping") else "no_view"
+        drawing = "no_view_of_drawing" if kind == "vertical" else "no_view"
+        code = "no_view_of_straps" if record.get("strapping") else drawing
         found["reason"] = paper.word(f"web.{code}")
     return Block({"kind": "tank_view", "text": paper.word("web.view_here"), **found})
 

@@ -15,6 +15,7 @@ from tankcal.report.workbook.papers import (
     courses_sheet,
     hits_sheet,
     lines_sheet,
+    liquid_sheet,
     provenance_sheet,
     strapping_sheet,
     tangents_sheet,
@@ -54,6 +55,7 @@ _OF_SURVEYS = {  # sheets of what a wall was surveyed with, by the part of the r
     "hits": hits_sheet,
     "tangents": tangents_sheet,
     "clouds": clouds_sheet,
+    "liquid": liquid_sheet,
 }
 _SHOWN_OF_SURVEY = ("adjustment", "points", "provenance")
 

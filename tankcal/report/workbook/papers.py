@@ -1,6 +1,6 @@
 """The working papers: courses, corrections, choices and provenance."""
 
-from tankcal.report.tables import clouds, hits, lines, strapping, tangents, tank
+from tankcal.report.tables import clouds, hits, lines, liquid, strapping, tangents, tank
 from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
@@ -87,6 +87,22 @@ def clouds_sheet(book, record):
         if table.rows(record)
     ]
     write_tables(book, sheet, _HEAD_ROW, tables)
+
+
+def liquid_sheet(book, record):
+    """Metered runs: meters, runs, causes; each step and dip, and three tables of volumes."""
+    of_sheets = {
+        "liquid": (liquid.METERS, liquid.RUNS, liquid.SIZES, liquid.CAUSES),
+        "liquid_steps": (liquid.STEPS, liquid.DIPS, liquid.volumes_table(record)),
+    }
+    for name, declared in of_sheets.items():
+        sheet = book.sheet(name, book.word(f"texts.{name}_subtitle"), landscape=True)
+        tables = [
+            (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
+            for table in declared
+            if table.rows(record)
+        ]
+        write_tables(book, sheet, _HEAD_ROW, tables)
 
 
 def corrections_sheet(book, record):

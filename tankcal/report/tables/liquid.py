@@ -1,0 +1,220 @@
+"""Tables of metered runs: meters, runs, steps, dips, sizes, causes, volumes beside each other."""
+
+from dataclasses import replace
+
+from tankcal.report import numbers
+from tankcal.report.tables.table import Column, Table
+
+DIP_DECIMALS = 4  # of a dip as it was read, m
+_SHOWN = {"m": "mm", "m/m": "mm/m", "1": "share ppm", "m3": "L", "m3/h": "L/h", "": ""}
+
+
+def _named(key, heading, unit="", **more):
+    """A column whose heading in the workbook is that of the paper, with the unit."""
+    return Column(key, unit, heading=f"liquid_{heading}", sheet=True, **more)
+
+
+_ROW = _named("row", "row", decimals=0, width=8)
+_RUN = _named("run", "run", width=8)
+_METER = _named("meter", "meter", width=10)
+_TO = _named("to_dip_m", "to", "m", decimals=DIP_DECIMALS)
+
+
+def _of_step(paper, row):
+    return _dip(paper, row["from_dip_m"])
+
+
+def _dip(paper, dip_m):
+    """The dip that a run or step began at; the tank may have been empty."""
+    if dip_m is None:
+        return paper.word("texts.liquid_dry")
+    return paper.number(dip_m, decimals=DIP_DECIMALS)
+
+
+_FROM = _named("from_dip_m", "from", "m", text=_of_step, align="right",
+               in_sheet={"text": None, "decimals": DIP_DECIMALS})  # fmt: skip
+_W = Column("w", decimals=2, heading="liquid_w", sheet=True, width=8)
+_REDUNDANCY = _named("redundancy", "redundancy", decimals=2, width=10)
+
+METERS = Table(
+    "liquid_meters",
+    (
+        _METER,
+        _named("certificate", "certificate", width=14),
+        _named("prover", "prover", width=14),
+        _named("factor", "factor", u="u_factor", width=11),
+        _named("u_factor", "u", u="u_factor", width=11),
+        _named("factor_found", "factor_found", u="u_factor_found", width=11),
+        _named("u_factor_found", "u_found", u="u_factor_found", width=11),
+        _named("factor_after", "factor_after", u="u_factor", width=11),
+        _named("repeatability", "repeatability", "share ppm", digits=3),
+        _named("fixed_m3", "fixed", "L", digits=2),
+        *(_named(f"flow_{end}_m3_h", f"flow_{end}", "m3/h", digits=3, on="")
+          for end in ("lowest", "highest", "min", "max")),
+    ),
+    rows=lambda record: [
+        one | {key: one[key] or None for key in ("certificate", "prover")}
+        for one in record["liquid"]["meters"]
+    ],
+)  # fmt: skip
+
+RUNS = Table(
+    "liquid_runs",
+    (
+        _RUN,
+        _named("steps", "steps", decimals=0, width=8),
+        _FROM,
+        _TO,
+        _named("indicated_m3", "indicated", "m3", decimals=3),
+        _named("effect", "effect", "share ppm", decimals=0),
+        _named("u_effect", "u", "share ppm", decimals=0),
+    ),
+    rows=lambda record: record["liquid"]["runs"],
+)
+
+
+def _tested(key, heading, unit="", **more):
+    """A column of the steps that stands in the CSV file by the name that the record has for it."""
+    return _named(key, heading, unit, csv=key, **more)
+
+
+STEPS = Table(
+    "liquid_steps",
+    (
+        _tested("row", "row", decimals=0, width=8),
+        _tested("run", "run", width=8),
+        _tested("meter", "meter", width=10, on=""),
+        replace(_FROM, csv="from_dip_m"),
+        replace(_TO, csv="to_dip_m"),
+        _tested("indicated_m3", "indicated", "m3", u="sd_m3", on="liquid_steps"),
+        *(_tested(f"by_{name}_m3", name, "L", u="sd_m3", on="liquid_steps")
+          for name in ("factor", "meter_temperature", "tank_temperature", "shell", "head")),
+        _tested("reference_m3", "reference", "m3", u="sd_m3"),
+        _tested("geometry_m3", "geometry", "m3", u="sd_m3", on="liquid_misclosures"),
+        _tested("misclosure_m3", "misclosure", "L", u="misclosure_u_m3", on="liquid_misclosures"),
+        _tested("misclosure_U_m3", "U", "L", u="misclosure_u_m3", on="liquid_misclosures"),
+        replace(_tested("misclosure_w", "misclosure_w", decimals=2, on="liquid_misclosures"),
+                sheet="liquid_of_misclosure"),
+        _tested("residual_m3", "residual", "L", u="sd_m3", on="liquid_residuals"),
+        _tested("sd_m3", "sd", "L", u="sd_m3", on="liquid_residuals"),
+        _tested("redundancy", "redundancy", decimals=3, width=10, on="liquid_residuals"),
+        _tested("w", "w", decimals=2, width=8, on="liquid_residuals"),
+        _tested("detectable_m3", "detectable", "L", digits=2, on="liquid_residuals"),
+    ),
+    rows=lambda record: record["liquid"]["steps"],
+)  # fmt: skip
+
+DIPS = Table(
+    "liquid_dips",
+    (
+        _ROW,
+        _RUN,
+        _named("dip_m", "dip", "m", decimals=DIP_DECIMALS),
+        _named("residual_m", "residual", "mm", u="sd_m"),
+        _named("sd_m", "sd", "mm", u="sd_m"),
+        _REDUNDANCY,
+        _W,
+    ),
+    rows=lambda record: record["liquid"]["dips"],
+)
+
+
+# ---- numbers of several units: rows as they are shown
+
+
+def _in_small_units(rows, keys):
+    """Rows with these keys in the unit that they are shown in, which stands beside them."""
+    found = []
+    for row in rows:
+        unit = numbers.unit(_SHOWN[row["unit"]])
+        values = {key: None if row[key] is None else unit.factor * row[key] for key in keys}
+        found.append(row | values | {"shown_unit": unit.symbol})
+    return found
+
+
+def _sizes(record):
+    rows = record["liquid"]["sizes"]
+    return _in_small_units(rows, ("change", "u_before", "u_after"))
+
+
+_UNIT = _named("shown_unit", "unit", width=8)
+
+SIZES = Table(
+    "liquid_sizes",
+    (
+        Column("input", words="inputs", heading="liquid_input", sheet=True, width=30),
+        _named("change", "change", u="u_after"),
+        _named("u_after", "u_after", u="u_after"),
+        _named("u_before", "u_before", digits=2),
+        _UNIT,
+    ),
+    rows=_sizes,
+)
+
+
+def _causes(record):
+    """Causes in small units, without the size of one that no tank could show."""
+    rows = [
+        one if one["detectable"] is not None else one | dict.fromkeys(("size", "sd"))
+        for one in record["liquid"]["causes"]
+    ]
+    return _in_small_units(rows, ("size", "sd", "detectable"))
+
+
+def _cause(paper, row):
+    """What may be wrong, and where: "dip, row 12"."""
+    found = paper.word(f"liquid_causes.{row['kind']}")
+    if row["row"] is not None:
+        return paper.word("texts.liquid_cause_row", cause=found, row=row["row"])
+    if row["of"]:
+        return paper.word("texts.liquid_cause_of", cause=found, of=row["of"])
+    return found
+
+
+CAUSES = Table(
+    "liquid_causes",
+    (
+        Column("kind", text=_cause, heading="liquid_cause", sheet=True, width=44),
+        _named("size", "size", u="sd"),
+        _named("sd", "sd", u="sd"),
+        _W,
+        _named("detectable", "detectable", digits=2),
+        _UNIT,
+        Column("named", words="yes_no", heading="liquid_named", sheet=True, width=10),
+    ),
+    rows=_causes,
+)
+
+
+# ---- the three tables of volumes
+
+KINDS = ("geometry", "liquid", "joint")
+_KEYS = {"geometry": "by_geometry", "liquid": "by_liquid", "joint": "joint"}
+
+
+def rows_beside(record):
+    """The rows of the table with volumes and U by geometry, by liquid and by both."""
+    liquid, capacity = record["liquid"], record["capacity"]
+    found = [{"height_m": height} for height in capacity["height_m"]]
+    for kind in KINDS:
+        columns = liquid[_KEYS[kind]] or {}
+        for key in ("volume_m3", "U_m3"):
+            values = columns.get(key) or [None] * len(found)
+            for row, value in zip(found, values, strict=True):
+                row[f"{kind}_{key}"] = value
+    return found
+
+
+def volumes_table(record):
+    """The Table of volumes beside each other, in the unit of the record's table."""
+    unit = record["job"]["table"]["volume_unit"]
+    least = numbers.unit(unit).least
+    columns = [_named("height_m", "dip", "m", height=True)]
+    for kind in KINDS:
+        U = f"{kind}_U_m3"
+        columns += [
+            _named(f"{kind}_volume_m3", f"by_{kind}", unit, u=U, least=least, width=16),
+            Column(U, unit, u=U, heading=f"liquid_U_{kind}", sheet=f"liquid_U_{kind}",
+                   named={"unit": numbers.unit(unit).symbol}, width=14),
+        ]  # fmt: skip
+    return Table("liquid_volumes", tuple(columns), rows=rows_beside)
