@@ -49,17 +49,13 @@ def wall_summary(prediction):
 def _filling(found):
     """What runs of liquid would add to the geometry."""
     for one in found.dips:
-        before, U = one.U_geometry_m3, format_significant(one.U_m3, 2, marks())
-        values = {"dip": fixed(one.dip_m, 3, marks()), "uncertainty": U}
-        if before is None:
-            yield message("plan_dip", "V({dip} m): U = {uncertainty} m3", **values)
-        else:
-            yield message(
-                "plan_dip_beside",
-                "V({dip} m): U = {uncertainty} m3; by geometry alone {before} m3",
-                **values,
-                before=format_significant(before, 2, marks()),
-            )
+        yield message(
+            "plan_dip_beside",
+            "V({dip} m): U = {uncertainty} m3; by geometry alone {before} m3",
+            dip=fixed(one.dip_m, 3, marks()),
+            uncertainty=format_significant(one.U_m3, 2, marks()),
+            before=format_significant(one.U_geometry_m3, 2, marks()),
+        )
     for one in found.causes:
         if one.kind in SCALES:
             yield message(

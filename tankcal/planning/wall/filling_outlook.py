@@ -29,8 +29,8 @@ class DipOutlook:
         From the table's zero, m.
     volume_m3 : float
         Below it.
-    U_geometry_m3 : float or None
-        Expanded uncertainty by geometry alone, m3; None: nothing but liquid measures the tank.
+    U_geometry_m3 : float
+        Expanded uncertainty by geometry alone, as it is surveyed or declared, m3.
     U_liquid_m3 : float or None
         By liquid alone; None: beyond its dips, or liquid alone does not tell the tank.
     U_m3 : float
@@ -39,7 +39,7 @@ class DipOutlook:
 
     dip_m: float
     volume_m3: float
-    U_geometry_m3: float | None
+    U_geometry_m3: float
     U_liquid_m3: float | None
     U_m3: float
 
@@ -54,7 +54,7 @@ class DifferenceOutlook:
         Its dips, m.
     volume_m3 : float
         Between them.
-    U_geometry_m3 : float or None
+    U_geometry_m3 : float
         As of `DipOutlook`.
     U_m3 : float
         By geometry and liquid.
@@ -63,7 +63,7 @@ class DifferenceOutlook:
     low_m: float
     high_m: float
     volume_m3: float
-    U_geometry_m3: float | None
+    U_geometry_m3: float
     U_m3: float
 
 
@@ -164,14 +164,14 @@ def outlook_of_filling(plan, measured, result, made):
     made : ComputedTable
     """
     dips = _dips_of(plan, made)
-    bodies = _bodies(plan, measured, made, dips)
+    bodies = _bodies(measured)
     rows = _rows(plan, bodies, dips, made)
     dof = result.run_dof
     return FillingOutlook(
         runs=len(plan.design.runs),
         batches=len(result.steps.row),
         dips=rows,
-        differences=_differences(plan, bodies, dips, made),
+        differences=_differences(bodies, dips, made),
         causes=_causes(measured.joint),
         readings=_readings(result),
         redundancy=result.dof,
@@ -204,12 +204,11 @@ def refuse_other_dips(dips_m, made):
         raise InputError(Problem(PLAN_FILE, expected, None, "filling.dips_m"))
 
 
-def _bodies(plan, measured, made, dips):
-    """{"geometry", "liquid", "joint": Body or None}, and which dips liquid alone tells."""
-    alone = plan.design.is_metered_alone
+def _bodies(measured):
+    """{"geometry", "liquid", "joint": Body}; None: liquid alone does not tell the tank."""
     joint = measured.joint.known
     return {
-        "geometry": None if alone else joint.geometry.moved_to({}).body(),
+        "geometry": joint.geometry.moved_to({}).body(),
         "liquid": None if measured.alone is None else join_body(measured.alone.known),
         "joint": join_body(joint),
     }
@@ -238,24 +237,21 @@ def _rows(plan, bodies, dips, made):
     volumes = bodies["joint"].volume_m3(np.clip(levels, None, bodies["joint"].highest_m))
     columns = (dips, volumes, found["geometry"], liquid, found["joint"])
     return tuple(
-        DipOutlook(float(dip), float(volume), _or_none(by_geometry), _or_none(alone), float(U))
+        DipOutlook(float(dip), float(volume), float(by_geometry), _or_none(alone), float(U))
         for dip, volume, by_geometry, alone, U in zip(*columns, strict=True)
     )
 
 
-def _differences(plan, bodies, dips, made):
+def _differences(bodies, dips, made):
     if len(dips) < 2:
         return ()
     levels, over = dips + made.zero_m, np.diff(np.eye(len(dips)), axis=0)
     joint, geometry = bodies["joint"], bodies["geometry"]
     volumes = over @ joint.volume_m3(np.clip(levels, None, joint.highest_m))
-    expanded = _expanded(joint, levels, made, over)
-    before = np.full(len(over), np.nan)
-    if geometry is not None:
-        before = _expanded(geometry, levels, made, over)
+    before, expanded = (_expanded(body, levels, made, over) for body in (geometry, joint))
     columns = (pairwise(dips), volumes, before, expanded)
     return tuple(
-        DifferenceOutlook(float(low), float(high), float(volume), _or_none(by_geometry), float(U))
+        DifferenceOutlook(float(low), float(high), float(volume), float(by_geometry), float(U))
         for (low, high), volume, by_geometry, U in zip(*columns, strict=True)
     )
 

@@ -40,7 +40,7 @@ def uncertainty(paper):
 def _by_geometry(paper, some):
     """((dips, U), (dips, U over volume in percent)) without the runs of liquid; () of no such."""
     liquid = getattr(paper.prediction.tabled, "liquid", None)
-    if liquid is None or paper.plan.design.is_metered_alone:
+    if liquid is None:
         return ()
     before, dips = liquid.tables["geometry"], paper.prediction.table.height_m
     return (dips, before.U_m3), (dips[some], 100 * before.U_m3[some] / before.volume_m3[some])

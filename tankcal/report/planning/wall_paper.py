@@ -58,7 +58,9 @@ def _as_assumed(paper):
 
 def _courses(paper):
     rows = courses_of(paper.prediction)
-    return [paper.heading("courses"), paper.table("courses", rows, COURSES)] if rows else []
+    before = [paper.paragraph("courses_before_liquid")] if paper.plan.design.runs else []
+    table = paper.table("courses", rows, COURSES)
+    return [paper.heading("courses"), *before, table] if rows else []
 
 
 def _counts(paper):
