@@ -4,7 +4,7 @@ Nothing is drawn through the linear model: a tank of six courses has radii, a bo
 runs of its own; batches raise the level to where the true volumes have it, and dips are read there.
 
     truth = fill_tanks(rng, 500)
-    for job in range(500): u, volume = calibrated(truth, job)
+    held(truth, Calibrator())        the share of jobs whose intervals hold what is true
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from tankcal.tank.liquid import Effect, adjust_steps, estimate_run_effect
-from tankcal.uncertainty import Source, combine
+from tankcal.uncertainty import Source, combine, coverage_factor
 
 RADIUS_M, COURSES, HEIGHT_M = 6.5, 6, 1.6
 AREA_M2 = np.pi * RADIUS_M**2
@@ -30,7 +30,7 @@ class Survey:
     scale: float = 108e-6
     radius_m: float = 0.0003
     bottom_m3: float = 0.3
-    meter: float = 150e-6
+    meter: float = 300e-6
     run: float = 300e-6
     repeatability: float = 1e-4
     fixed_m3: float = 0.002
@@ -81,11 +81,8 @@ class Truth:
     dips_m: np.ndarray
 
 
-def fill_tanks(rng, jobs, survey=None, *, faults=None):
-    """`Truth` of jobs: true tanks, filled and read.
-
-    faults  function (metered_m3, dips_m) -> dips of a fault that was planted; None: none
-    """
+def fill_tanks(rng, jobs, survey=None):
+    """`Truth` of jobs: true tanks, filled and read."""
     survey = survey or Survey()
     scale = survey.scale * rng.normal(size=(jobs, 1))
     radii = RADIUS_M * (1 + scale) + survey.radius_m * rng.normal(size=(jobs, COURSES))
@@ -162,9 +159,12 @@ def held(truth, calibrator, probability=0.95):
     for line, (low, high) in zip(pairs, PAIRS, strict=True):
         line[low], line[high] = -1.0, 1.0
     weights = np.vstack([np.eye(len(ROWS_M)), pairs])
-    inside = np.zeros(len(weights))
+    off, u, dof = [], [], []
     for true, dips in zip(truth.rows_m3, truth.dips_m, strict=True):
         volume, sources = calibrator.calibrate(dips)
         stated = combine([one.weighted(weights) for one in sources], len(weights))
-        inside += np.abs(weights @ (volume - true)) <= stated.expanded(probability)
-    return inside / len(truth.rows_m3)
+        off.append(weights @ (volume - true))
+        u.append(stated.u)
+        dof.append(stated.effective_dof)
+    k = coverage_factor(probability, np.array(dof))
+    return np.mean(np.abs(off) <= k * np.array(u), axis=0)

@@ -40,7 +40,6 @@ LYING = {
     "horizontal.end_a": "flat",
     "horizontal.end_b": "flat",
 }
-KINDS = ("vertical", "horizontal", "sphere", "mesh")
 
 
 def metered_rows(dips, volumes, run="1"):

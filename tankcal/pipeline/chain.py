@@ -17,6 +17,7 @@ from tankcal.pipeline.corrections import Correction, corrections_of
 from tankcal.pipeline.liquid import LiquidResult, measure_by_liquid
 from tankcal.pipeline.liquid_checks import check_liquid_result
 from tankcal.pipeline.liquid_geometry import filled_with
+from tankcal.pipeline.nominal_wall import NominalWall
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.simulation import Intervals, TableSimulation, gum_intervals, simulate_table
@@ -84,6 +85,8 @@ class Result:
         Clouds as points of the wall: their scans, cells and what hides the wall.
     liquid : liquid.LiquidResult or None
         What metered runs say of the tank, beside its geometry.
+    nominal : nominal_wall.NominalWall or None
+        The wall of the drawing, of an upright tank that only liquid tells.
     body : body.Body
         The tank as the sum of its parts, with all corrections that are on.
     zero_m : float
@@ -140,6 +143,7 @@ class Result:
     touching: Touching | None = None
     clouded: Clouded | None = None
     liquid: LiquidResult | None = None
+    nominal: NominalWall | None = None
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]
@@ -200,7 +204,7 @@ class Result:
     @property
     def gross(self) -> ShellVolume | None:
         """The shell as surveyed, without any correction (`volumes.ShellVolume`); else None."""
-        wall = self.wall or self.strapped
+        wall = self.wall or self.strapped or self.nominal
         return None if wall is None else shell_volume(wall)
 
     @property
@@ -392,6 +396,7 @@ def _run(job, progress, part_progress, simulated, reading):
         touching=found.touching,
         clouded=found.clouded,
         liquid=liquid,
+        nominal=survey if isinstance(survey, NominalWall) else None,
     )
 
 

@@ -5,7 +5,7 @@ measured.body                                  the one that the table is made of
 result = measured.result(levels_m)             `LiquidResult`, beside the rows of the table
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import gammaincc
@@ -19,6 +19,7 @@ from tankcal.pipeline.liquid_adjustment import (
     RUNS,
     LiquidFound,
     adjust_liquid,
+    adjusted_at,
 )
 from tankcal.pipeline.liquid_alone import filled_range_m, geometry_alone, geometry_beside
 from tankcal.pipeline.liquid_body import join_body
@@ -27,8 +28,10 @@ from tankcal.pipeline.liquid_naming import alternatives_of, causes_in_words
 from tankcal.pipeline.liquid_tables import BesideTable, beside_table, or_none
 from tankcal.pipeline.tanks import body_of, zero_height
 from tankcal.tank.body import Body
-from tankcal.tank.liquid import Verdict, name_causes
+from tankcal.tank.liquid import Verdict, fill_of, name_causes
 from tankcal.tank.liquid.readings import batch_sd_m3
+
+OF_NO_WEIGHT_M = 1.0  # standard deviation of a dip that does not count
 
 
 @dataclass(frozen=True)
@@ -51,8 +54,8 @@ class LiquidSteps:
     misclosure_m3, misclosure_sd_m3, misclosure_w : ndarray
         Liquid less geometry before the adjustment, its standard deviation, and their ratio.
     residual_m3, sd_m3, redundancy, w : ndarray
-        Of the batch in the joint adjustment: what is left of it, its standard deviation before,
-        which part of an error shows, and the test of it.
+        Of the batch in the joint adjustment: what it lacks, its standard deviation before, which
+        part of an error shows, and the test of it.
     detectable_m3 : ndarray
         Smallest error of the batch that the test would show; inf: none.
     """
@@ -106,6 +109,28 @@ class LiquidDips:
 
 
 @dataclass(frozen=True)
+class LiquidChecks:
+    """Dips that are only compared, (c,) each.
+
+    Attributes
+    ----------
+    row : ndarray of int
+    run : tuple of str
+    dip_m : ndarray
+        As read.
+    difference_m, sd_m, w : ndarray
+        Read less what all that counts says; its standard deviation; their ratio.
+    """
+
+    row: np.ndarray
+    run: tuple
+    dip_m: np.ndarray
+    difference_m: np.ndarray
+    sd_m: np.ndarray
+    w: np.ndarray
+
+
+@dataclass(frozen=True)
 class Estimate:
     """A number with its standard uncertainty, before and after."""
 
@@ -126,6 +151,8 @@ class LiquidResult:
         Whose table is printed.
     steps : LiquidSteps
     dips : LiquidDips
+    checks : LiquidChecks or None
+        Dips that are only compared; None: there are none.
     runs : tuple of Estimate
         The effect of each run, relative.
     run_sd, run_dof : float
@@ -153,6 +180,7 @@ class LiquidResult:
     certified: str
     steps: LiquidSteps
     dips: LiquidDips
+    checks: LiquidChecks | None
     runs: tuple[Estimate, ...]
     run_sd: float
     run_dof: float
@@ -262,6 +290,7 @@ def _result(measured, levels):
         certified=job.liquid.certified,
         steps=_steps(found),
         dips=_dips(found),
+        checks=_checks(found),
         runs=_runs(found),
         run_sd=run.sd,
         run_dof=run.dof,
@@ -301,10 +330,8 @@ def _steps(found):
     rows = metering.row[fill.dip_row]
     dips = metering.dip_m[fill.dip_row]
     by_head = _by_head(found)
-    batch = next(one for one in found.adjusted.noise if one.kind == "meter_repeatability")
     sd = batch_sd_m3(metering, fill, before)
-    deviates, redundancy, w = found.adjusted.residuals(batch)
-    _, _, detectable = _tested(found.adjusted)
+    size, sd_of_size, w = found.adjusted.test(-np.eye(len(fill)))
     return LiquidSteps(
         row=rows[fill.end],
         run=tuple(fill.runs[i] for i in fill.run),
@@ -321,18 +348,12 @@ def _steps(found):
         misclosure_m3=before.misclosure_m3,
         misclosure_sd_m3=found.before_sd_m3,
         misclosure_w=before.misclosure_m3 / found.before_sd_m3,
-        residual_m3=-deviates * sd,
+        residual_m3=size * (sd / sd_of_size) ** 2,
         sd_m3=sd,
-        redundancy=redundancy,
+        redundancy=(sd / sd_of_size) ** 2,
         w=w,
-        detectable_m3=detectable,
+        detectable_m3=noncentrality() * sd_of_size,
     )
-
-
-def _tested(adjusted):
-    """(size, w, smallest detectable) of an error of each batch by itself."""
-    size, sd, w = adjusted.test(np.eye(len(adjusted.misclosure_m3)))
-    return size, w, noncentrality() * sd
 
 
 def _by_head(found):
@@ -359,6 +380,37 @@ def _dips(found):
         sd_m=sd,
         redundancy=redundancy,
         w=w,
+    )
+
+
+def _checks(found):
+    """What a dip that does not count would have been: one that counts, of no weight."""
+    geometry = found.known.geometry
+    metering = geometry.job.liquid
+    compared = ~metering.used & np.isfinite(metering.dip_m)
+    if not np.any(compared):
+        return None
+    loose = replace(
+        metering,
+        used=np.full(len(metering), True),
+        s_dip_m=np.where(compared, OF_NO_WEIGHT_M, metering.s_dip_m),
+    )
+    geometry = replace(geometry, job=replace(geometry.job, liquid=loose))
+    again = adjusted_at(geometry, fill_of(loose), lambda *_: found.run_effect)
+    effect = next(one for one in again.adjusted.noise if one.kind == "dip_readings")
+    deviates, redundancy, _ = again.adjusted.residuals(effect)
+    mine = compared[again.fill.dip_row]
+    places = again.fill.dip_row[mine]
+    left = OF_NO_WEIGHT_M * np.sqrt(np.maximum(1 - redundancy[mine], 0.0))
+    sd = np.hypot(left, metering.s_dip_m[places])
+    difference = -OF_NO_WEIGHT_M * deviates[mine]
+    return LiquidChecks(
+        row=metering.row[places],
+        run=tuple(metering.run[i] for i in places),
+        dip_m=metering.dip_m[places],
+        difference_m=difference,
+        sd_m=sd,
+        w=difference / sd,
     )
 
 

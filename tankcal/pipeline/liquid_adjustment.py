@@ -91,13 +91,20 @@ def adjust_liquid(geometry):
         When steps cannot be adjusted.
     """
     fill = fill_of(geometry.job.liquid)
-    found = first = _adjusted_at(geometry, fill, _run_effect)
+    if not len(fill):
+        expected = message(
+            "no_steps_by_liquid",
+            "fewer than two levels count: no step was measured; expected two dips or more, or an "
+            "empty start and a dip",
+        )
+        raise InputError(Problem(geometry.job.liquid.file, expected))
+    found = first = adjusted_at(geometry, fill, _run_effect)
     if geometry.movable:
         for _ in range(RUN_ROUNDS):
             before = found.run_effect
             found = _settled(found, fill)
             settled = found.is_settled
-            found = _adjusted_at(found.known.geometry, fill, _run_effect)
+            found = adjusted_at(found.known.geometry, fill, _run_effect)
             found = replace(found, is_settled=settled)
             if abs(found.run_effect.sd - before.sd) <= RUN_SETTLED * before.sd:
                 break
@@ -138,7 +145,7 @@ def _better(found, wanted, fill, run_effect):
     for share in (0.5**halving for halving in range(HALVINGS)):
         moves = {name: at[name] + share * (value - at[name]) for name, value in wanted.items()}
         try:
-            one = _adjusted_at(geometry.moved_to(moves), fill, run_effect)
+            one = adjusted_at(geometry.moved_to(moves), fill, run_effect)
         except SolutionError:  # no such tank
             continue
         if best is not None and one.misfit >= best.misfit:
@@ -148,7 +155,7 @@ def _better(found, wanted, fill, run_effect):
     return best
 
 
-def _adjusted_at(geometry, fill, run_effect):
+def adjusted_at(geometry, fill, run_effect):
     """`LiquidFound` with the geometry linear where it is now."""
     metering = geometry.job.liquid
     densities = np.append(metering.density_kg_m3, load_densities(metering, fill))
@@ -266,7 +273,7 @@ def _known(geometry, of_geometry, adjusted, of_liquid):
 
 def _sources_of_liquid(adjusted, metering, fill, run):
     """Sources of what liquid itself leaves uncertain, columns by the misclosures."""
-    found = [Source(one.kind, _telling(adjusted, one.columns)) for one in adjusted.noise]
+    found = [Source(one.kind, _telling(adjusted, one.columns), type="B") for one in adjusted.noise]
     for one in adjusted.effects:
         if one.kind == "meter_factor":
             found += _of_meters(one, metering, fill)

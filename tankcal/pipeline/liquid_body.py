@@ -16,6 +16,7 @@ import numpy as np
 
 from tankcal.pipeline.liquid_geometry import column_of, sources_at, stacked, volumes_at
 from tankcal.tank.body import Body, Factor, ShellPart, SolidPart
+from tankcal.tank.parts import Part
 from tankcal.uncertainty import Source
 
 AREA_STEP_M = 1e-4  # of the difference that the correction's part of the free surface is
@@ -97,10 +98,10 @@ class JointBody(Body):
     is_bent = False  # what `simulation` asks: volumes follow the causes as straight lines
 
     def volume_m3(self, levels_m):
-        """(rows,) volume below each level."""
+        """(rows,) volume below each level, never below 0."""
         levels = np.asarray(levels_m, dtype=float)
         volume = volumes_at(self.plain, levels, self.known.geometry.shift_m)
-        return volume + self._correction_m3(levels)
+        return np.maximum(volume + self._correction_m3(levels), 0.0)
 
     def area_m2(self, levels_m):
         """(rows,) derivative of the volume by the level."""
@@ -119,7 +120,7 @@ class JointBody(Body):
         levels = np.asarray(levels_m, dtype=float)
         moved = np.clip(levels + step_m, self.lowest_m, self.highest_m)
         plain = self.plain.moved_m3(levels, self.known.geometry.shift_m + step_m)
-        return plain + self._correction_m3(moved)
+        return np.maximum(plain + self._correction_m3(moved), 0.0)
 
     def undeclared(self):
         """Those of geometry, but for what liquid tells where nobody surveyed the wall."""
@@ -150,6 +151,22 @@ class JointBody(Body):
         """(volumes, areas, sources) of a table."""
         return self.volume_m3(levels_m), self.area_m2(levels_m), self.sources(levels_m)
 
+    def only_shell(self):
+        """The same of the shell alone; the other parts hold nothing, and what liquid says of them
+        is left out.
+        """
+        none = {"bottom_gain": None, "flex_gain": None, "flex": 0.0, "flex_sd": 0.0}
+        return replace(
+            self,
+            known=replace(self.known, first_m=None, bottom_m3=0.0, **none),
+            plain=_silenced(self.plain),
+            slim=_silenced(self.slim),
+        )
+
+    def surveyed_sources(self, levels_m):
+        """What geometry and liquid together leave uncertain of the shell."""
+        return self.only_shell().sources(levels_m)
+
     def _of_plain(self, levels_m):
         moved = np.asarray(levels_m, dtype=float) + self.known.geometry.shift_m
         return np.clip(moved, self.plain.lowest_m, self.plain.highest_m)
@@ -177,6 +194,34 @@ class JointBody(Body):
         half = abs(known.bottom_m3) * (1 - known.share(levels))
         columns = half[:, None] / np.sqrt(3)
         return (Source("bottom_curve", columns, type="B", distribution="rectangular"),)
+
+
+@dataclass(frozen=True)
+class Silent(Part):
+    """A part that holds nothing, with as many sources as another."""
+
+    part: Part
+
+    def volume_m3(self, levels_m):
+        """(rows,) zeros."""
+        return np.zeros(len(levels_m))
+
+    def area_m2(self, levels_m):
+        """(rows,) zeros."""
+        return np.zeros(len(levels_m))
+
+    def derivatives(self, levels_m):
+        """None."""
+        return {}
+
+    def sources(self, levels_m):
+        """Those of the part, of no size."""
+        return tuple(one.mapped(np.zeros_like) for one in self.part.sources(levels_m))
+
+
+def _silenced(body):
+    parts = tuple(one if one is body.shell else Silent(one) for one in body.parts)
+    return replace(body, parts=parts)
 
 
 def join_body(known, density_kg_m3=None):

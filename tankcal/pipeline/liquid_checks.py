@@ -25,6 +25,7 @@ def check_liquid_result(job, found):
     return (
         *_disagreement(job.liquid, found),
         *_single_readings(job.liquid, found),
+        *_compared(job.liquid, found),
         *_bottom(job, found),
         *_alone(job.liquid, found),
     )
@@ -66,12 +67,28 @@ def _single_readings(metering, found):
         if column == "dip_m":
             text = message("dip_disagrees", "the dip differs from what all other steps say by "
                            "{size:+.1f} mm, {w:.1f} standard deviations",
-                           size=1000 * size, w=w)  # fmt: skip
+                           size=-1000 * size, w=w)  # fmt: skip
         else:
-            text = message("batch_disagrees", "the batch differs from what all other steps say by "
-                           "{size:+.4f} m3, {w:.1f} standard deviations",
+            text = message("batch_disagrees", "the batch lacks {size:+.4f} m3 by all other "
+                           "steps, {w:.1f} standard deviations",
                            size=size, w=w)  # fmt: skip
         yield Problem(metering.file, text, int(row), column)
+
+
+def _compared(metering, found):
+    """Dips that are only compared, and differ."""
+    checks = found.checks
+    if checks is None:
+        return
+    for place in np.flatnonzero(np.abs(checks.w) > CRITICAL):
+        text = message(
+            "check_dip_differs",
+            "a dip to compare: {difference:+.1f} mm from what all that counts says, {w:.1f} "
+            "standard deviations",
+            difference=1000 * checks.difference_m[place],
+            w=abs(checks.w[place]),
+        )
+        yield Problem(metering.file, text, int(checks.row[place]), "dip_m")
 
 
 def _bottom(job, found):

@@ -5,7 +5,7 @@ is a cylinder whose radius departs from the nominal one by the sd that the job h
 course does besides (bulge, taper) is in the doubt, as of a strapped wall.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -46,7 +46,7 @@ class NominalWall(ReadWall):
 
     def factors(self, job, weights):
         """`Factor`s of what the drawing leaves uncertain: all courses together, and each."""
-        return factors_of_readings(self.accepted, weights)
+        return tuple(replace(one, type="B") for one in factors_of_readings(self.accepted, weights))
 
     def read_with(self, weights):
         """Nothing was read with anything."""

@@ -284,8 +284,8 @@ def courses_of(result):
     job, rows = result.job, []
     if job.tank.kind != "vertical":
         return []
-    measured = _of_straps
-    if result.strapped is None:
+    measured = _of_straps if result.strapped is not None else _of_drawing
+    if result.wall is not None:
         measured = partial(_of_sections, _rejected_z_m(result))
     for index, (course, shape) in enumerate(
         zip(job.courses, result.body.shell.volume.courses, strict=True)
@@ -348,9 +348,19 @@ def _of_straps(result, index, shape):
     }
 
 
+def _of_drawing(result, index, shape):
+    """Of a course that only liquid measured."""
+    return {
+        "sections": [],
+        "points": 0,
+        "rejected": 0,
+        "radius_m": result.nominal.radius_m[index],
+    }
+
+
 def radius_sd(result, shape):
     """Of the mean radius of a course, from points and form: their part of sd(V) / (2 pi r h)."""
-    sources = result.body.shell.sources([shape.bottom_m, shape.top_m])
+    sources = result.body.surveyed_sources(np.array([shape.bottom_m, shape.top_m]))
     variance = sum(np.sum(np.diff(source.columns_m3, axis=0) ** 2) for source in sources)
     return (
         np.sqrt(variance)
@@ -360,7 +370,7 @@ def radius_sd(result, shape):
 
 def _partial(result, low_m, high_m):
     """Volume between two heights above the bottom and its standard uncertainty, exactly."""
-    shell = replace(result.body, parts=(result.body.shell,))
+    shell = result.body.only_shell()
     volume = shell.volume_m3([low_m, high_m])
     sources = shell.sources([low_m, high_m])
     of_shell = [source for source in sources if source.kind != "datum"]  # joints know no zero

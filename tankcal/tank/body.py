@@ -5,7 +5,7 @@ input that several parts share (a scale, the table's zero) moves all of them at 
 column of the covariance, the sum of their derivatives times its standard uncertainty.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -397,6 +397,14 @@ class Body:
         levels = np.asarray(levels_m, dtype=float)
         ends = self.lowest_m, self.highest_m
         return sum(part.moved_m3(levels, step_m, *ends) for part in self.parts)
+
+    def only_shell(self):
+        """The body of the shell of courses alone."""
+        return replace(self, parts=(self.shell,))
+
+    def surveyed_sources(self, levels_m):
+        """What is left uncertain of the shell itself, declared inputs apart."""
+        return self.shell.sources(levels_m)
 
     def undeclared(self):
         """Names of the inputs that move some volume of the tank and have no declared u.

@@ -12,6 +12,7 @@ from conftest import EXAMPLE
 from draws import draws
 from fuzzing import spoilt_csv, spoilt_folder, spoilt_parts
 from job_builder import job_parts, write_book, write_folder
+from metered_tanks import metered_parts
 from survey_builder import survey_parts
 
 from tankcal.errors import InputError, SolutionError
@@ -33,6 +34,7 @@ FULL = {
     "sd_mm": 2.0,
 }
 COARSE = {"table.step_m": 0.5}
+METERED = {"table__step_m": 0.5}
 
 
 def bases():
@@ -51,6 +53,8 @@ def bases():
             job_parts(settings=COARSE, bottom_volumes=[(0, 0, 0), (0.1, 10, 0.1)], courses=2),
             True,
         ),
+        "metered": (metered_parts(strapped=True, **METERED), False),
+        "metered-lying": (metered_parts("horizontal", **METERED), False),
     }
 
 

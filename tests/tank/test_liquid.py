@@ -4,13 +4,14 @@ Kinds of truth: a published table (liquid.md 3, a calculation of its own), limit
 (dense least squares with every unknown written out), invariance.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tankcal.tank.liquid import Effect, adjust_steps
+from tankcal.tank.liquid import Effect, adjust_steps, fill_of, reading_effects, reduce_steps
+from tankcal.tank.liquid.run_effect import averaged
 
 RADIUS_M, COURSES, HEIGHT_M = 6.5, 6, 1.6
 AREA_M2 = np.pi * RADIUS_M**2
@@ -157,3 +158,121 @@ def test_without_geometry_the_liquid_alone():
     best = covariance @ design.T @ precision @ misclosure
     assert_allclose(joint[:2], free[:2] @ best, rtol=0, atol=1e-9)
     assert_allclose(u, np.sqrt(np.diag(free @ covariance @ free.T))[:2], rtol=0, atol=1e-9)
+
+
+def test_runs_of_no_noise_have_their_mean_square():
+    """Closed form: s = 0, the usual mean square with as many degrees of freedom as numbers."""
+    found = averaged(np.array([0.3, -0.4, 1.2]), np.full(3, 1e-12))
+    assert_allclose(found.sd**2, (0.09 + 0.16 + 1.44) / 3, rtol=1e-3)
+    assert_allclose(found.dof, 3.0, rtol=1e-2)
+    assert_allclose(found.restricted_sd, found.sd, rtol=0.03)
+
+
+def test_runs_that_agree_are_no_proof():
+    found = averaged(np.array([0.1, -0.1]), np.full(2, 1.0))
+    assert found.restricted_sd == 0
+    assert 0.2 < found.sd < 1.5
+    assert found.dof < 2.0
+
+
+@dataclass
+class Rows:
+    """Metered rows as `fill_of` and `reduce_steps` ask for them."""
+
+    run: tuple
+    volume_m3: np.ndarray
+    dip_m: np.ndarray
+    used: np.ndarray
+    meter_c: np.ndarray
+    tank_c: np.ndarray
+    s_dip_m: np.ndarray
+    s_volume_m3: np.ndarray
+    meters: dict
+    expansion_per_k: float = 8e-4
+    density_c: float = 15.0
+    u_temperature_c: float = 0.2
+    u_dip_zero_m: float = 0.0003
+    u_expansion_per_k: float = 4e-5
+
+    @property
+    def meter(self):
+        return ("M",) * len(self.run)
+
+
+@dataclass
+class Meter:
+    factor: float = 1.0004
+    u_factor: float = 2e-4
+    repeatability: float = 1e-4
+    fixed_m3: float = 0.002
+
+
+def rows_of(dips, *, unused=(), runs=("a",), tank_c=None):
+    """Noiseless rows of a tank of 10 m2, a metre of batches; levels by mass, temperatures vary."""
+    count, volume, meter_c = len(dips), [], []
+    rng = np.random.default_rng(4)
+    tank = 18 + 3 * rng.random(count) if tank_c is None else tank_c
+    warm = 30 + 5 * rng.random(count)
+    rho = lambda t: 1 - 8e-4 * (t - 15.0)  # noqa: E731
+    for i, dip in enumerate(dips):
+        before = 0.0 if i == 0 or np.isnan(dips[i - 1]) else rho(tank[i - 1]) * 10 * dips[i - 1]
+        mass = 0.0 if i == 0 else rho(tank[i]) * 10 * dip - before
+        volume.append(mass / rho(warm[i]) / 1.0004)
+        meter_c.append(warm[i])
+    used = np.array([i not in unused for i in range(count)])
+    nan = np.full(count, np.nan)
+    sds = np.where(np.isnan(dips), 0.0, 0.0005)
+    return Rows(
+        tuple(runs) * count, np.array(volume), np.array(dips), used, np.array(meter_c), tank, sds,
+        nan, {"M": Meter()},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("unused", [(), (2,), (2, 3), (4,)])
+def test_balance_of_mass(unused):
+    """Closed form: without errors nothing is left, also over dips that do not count."""
+    constant = np.full(5, 18.0) if unused else None  # a batch of many dips has one temperature
+    rows = rows_of([np.nan, 0.5, 1.1, 1.8, 2.0], unused=unused, tank_c=constant)
+    fill = fill_of(rows)
+    volume = 10 * rows.dip_m[fill.dip_row]
+    assert_allclose(reduce_steps(rows, fill, volume).misclosure_m3, 0.0, atol=1e-12)
+    assert np.sum(fill.batches) == 4 - (unused == (4,))
+
+
+def test_steps_of_two_runs():
+    rows = rows_of([np.nan, 0.5, 1.1, 0.4, 1.2, 2.0])
+    rows.run = ("a", "a", "a", "b", "b", "b")
+    fill = fill_of(rows)
+    assert fill.start.tolist() == [-1, 0, 2, 3]
+    assert fill.end.tolist() == [0, 1, 3, 4]
+    assert fill.run.tolist() == [0, 0, 1, 1]
+    assert fill.from_empty.tolist() == [True, False, False, False]
+
+
+def test_columns_of_the_readings_are_derivatives():
+    """Differences: each cause moved by its standard deviation, the misclosure as it comes out."""
+    rows = rows_of([np.nan, 0.5, 1.1, 1.8])
+    fill, volume = fill_of(rows), 10 * np.array([0.5, 1.1, 1.8])
+    reduced = reduce_steps(rows, fill, volume)
+    effects = reading_effects(rows, fill, reduced, volume, np.full(3, 10.0))
+    of = {one.kind: one.columns for one in (*effects.noise, *effects.common)}
+
+    def misclosure(**change):
+        moved = replace(rows, **change)
+        return reduce_steps(moved, fill, 10 * moved.dip_m[fill.dip_row]).misclosure_m3
+
+    base, u = misclosure(), 0.2
+    for column, place in zip(of["liquid_temperatures"].T, range(6), strict=True):
+        name, row = ("meter_c", place + 1) if place < 3 else ("tank_c", place - 2)
+        values = getattr(rows, name).copy()
+        values[row] -= u
+        assert_allclose(misclosure(**{name: values}) - base, column, rtol=0.02, atol=1e-6)
+    longer = misclosure(expansion_per_k=8e-4 + 4e-5)
+    assert_allclose(base - longer, of["liquid_expansion"][:, 0], rtol=0.05)
+    dips = rows.dip_m.copy()
+    dips[2] += 0.0005
+    assert_allclose(base - misclosure(dip_m=dips), of["dip_readings"][:, 1], rtol=1e-9)
+    larger = replace(rows, meters={"M": Meter(factor=1.0004 * (1 - 2e-4))})
+    assert_allclose(
+        reduce_steps(larger, fill, volume).misclosure_m3 - base, of["meter_factor"][:, 0], rtol=1e-9
+    )

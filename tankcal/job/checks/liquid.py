@@ -182,7 +182,10 @@ def _has_unreadable_survey(raw):
 
 
 def _check_beside(values, tables, kind, raw, log):
-    """Volumes of the bottom are observations of the same wall; of these there is one form."""
+    """Of a bottom measured by liquid there is one form; a roof does not lie in the liquid."""
+    lowest, table = values["roof"]["critical_bottom_m"], tables["liquid"]
+    if kind == "vertical" and lowest is not None:
+        _refuse_roof(table, lowest, log)
     if kind != "vertical" or bottom_form(values, tables["bottom"]) != "liquid":
         return
     expected = message(
@@ -196,3 +199,17 @@ def _check_beside(values, tables, kind, raw, log):
     else:
         file, row, name = settings_place(raw, "bottom", "form")
         log.problem(file, expected, row, name)
+
+
+def _refuse_roof(table, lowest_m, log):
+    for row, dip in zip(table.rows, table.of("dip_m"), strict=True):
+        if dip is not None and dip > lowest_m:
+            expected = message(
+                "dip_reaches_roof",
+                "found {dip:g}; expected dips below roof.critical_bottom_m = {lowest:g} m: above it"
+                " the roof takes part in the volume",
+                dip=dip,
+                lowest=lowest_m,
+            )
+            log.problem(table.file, expected, row, "dip_m")
+            return

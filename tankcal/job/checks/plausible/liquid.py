@@ -26,7 +26,7 @@ L_MIN_PER_M3_H = 1000 / 60
 
 def check_metering(values, tables, registers, raw, log):
     """Warnings of readings that can be, but hardly are; arguments as in `checks.check_all`."""
-    if not is_metered(tables):
+    if not is_metered(tables) or not tables["liquid"].rows:
         return
     table, meters = tables["liquid"], registers["meters"]
     _check_expansion(values, raw, log)
