@@ -13,10 +13,16 @@ from tankcal.job import Job
 from tankcal.messages import message
 from tankcal.pipeline.cloud_passes import Reading
 from tankcal.pipeline.cloud_wall import Clouded
-from tankcal.pipeline.corrections import Correction, corrections_of
-from tankcal.pipeline.liquid import LiquidResult, measure_by_liquid
+from tankcal.pipeline.corrections import (
+    Correction,
+    correction_by_liquid,
+    corrections_of,
+    gross_at_top,
+)
+from tankcal.pipeline.liquid import measure_by_liquid
 from tankcal.pipeline.liquid_checks import check_liquid_result
 from tankcal.pipeline.liquid_geometry import filled_with
+from tankcal.pipeline.liquid_result import LiquidResult
 from tankcal.pipeline.nominal_wall import NominalWall
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.scan import Scan
@@ -377,7 +383,7 @@ def _run(job, progress, part_progress, simulated, reading):
         table=table,
         straightness=made.straightness,
         proportional_parts=_parts(job, made, intervals.U_m3),
-        corrections=corrections_of(job, survey, made.over_m),
+        corrections=_corrections(job, survey, made, liquid),
         by_density=_by_density(job, survey, made.levels_m, zero, measured),
         stated=stated,
         simulation=simulation,
@@ -489,6 +495,14 @@ def _parts(job, made, U_m3):
         return np.interp(dips_m, made.table.height_m, allowed)
 
     return proportional_parts(made.volume_m3, edges, spec.step_m, PARTS, bound_m3)
+
+
+def _corrections(job, survey, made, liquid):
+    found = corrections_of(job, survey, made.over_m)
+    if liquid is None or liquid.certified == "geometry":
+        return found
+    gross = gross_at_top(job, survey, made.over_m)
+    return (*found, correction_by_liquid(found, gross, float(made.table.volume_m3[-1])))
 
 
 def _by_density(job, survey, levels, zero_m, measured):

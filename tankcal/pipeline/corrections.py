@@ -11,6 +11,7 @@ from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 
 # Named by title and edition alone: the bodies of paid standards were not read, so no clause is.
 ISO_7507 = "ISO 7507-1:2003"
+ISO_4269 = "ISO 4269:2001"
 INSIDE_PLATE = message("inside_plate", "r_inside = r − t")
 INSIDE_PAINT = message("inside_paint", "r_inside = r − t − paint")
 NONE = Switches(**{field.name: field.name == "tilt" for field in fields(Switches)})
@@ -56,6 +57,26 @@ def corrections_of(job, survey, over_m=0.0):
             made, volume = replace(made, **{code: True}), with_it
         found.append(Correction(code, on, size, 100 * size / reference, formula, source))
     return tuple(found)
+
+
+def correction_by_liquid(corrections, gross_m3, top_m3):
+    """The `Correction` that metered runs make at the top row: what is left of the others' sum.
+
+    Parameters
+    ----------
+    corrections : tuple of Correction
+    gross_m3, top_m3 : float
+        At the top row: without any correction, and of the table.
+    """
+    made = sum(one.size_m3 for one in corrections if one.applied and one.code != "tilt")
+    size = top_m3 - gross_m3 - made
+    formula = message("by_liquid", "adjusted together with the metered volumes")
+    return Correction("liquid", True, size, 100 * size / gross_m3, formula, ISO_4269)
+
+
+def gross_at_top(job, survey, over_m=0.0):
+    """Volume at the top row without any correction, m3."""
+    return _at_top(job, survey, NONE, over_m)
 
 
 def _at_top(job, survey, switches, over_m):

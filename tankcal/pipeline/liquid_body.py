@@ -193,7 +193,7 @@ class JointBody(Body):
             return ()
         half = abs(known.bottom_m3) * (1 - known.share(levels))
         columns = half[:, None] / np.sqrt(3)
-        return (Source("bottom_curve", columns, type="B", distribution="rectangular"),)
+        return (Source("below_first_dip", columns, type="B", distribution="rectangular"),)
 
 
 @dataclass(frozen=True)

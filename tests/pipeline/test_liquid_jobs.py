@@ -16,6 +16,7 @@ from metered_tanks import HEADINGS, metered_parts, metered_rows
 from numpy.testing import assert_allclose
 
 import tankcal
+from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.liquid import measure_by_liquid
 from tankcal.pipeline.liquid_adjustment import adjust_liquid
 from tankcal.pipeline.liquid_alone import geometry_alone, geometry_beside
@@ -87,6 +88,23 @@ def test_a_body_is_of_one_piece(tmp_path, kind):
     assert np.all(np.abs(volumes - NOMINAL[kind](levels)) < 4 * combine(sources, 7).u)
 
 
+def test_correlated_sizes(tmp_path):
+    """Closed form: the columns of inputs that are correlated make the variance of their parts."""
+    job = metered_job("horizontal", tmp_path / "job", dips=[0.2, 0.6, 1.0, 1.4, 1.8],
+                      horizontal__dip_from_a_m=1.5)  # fmt: skip
+    job = fill(np.random.default_rng(1), job, NOMINAL["horizontal"], 2.4)
+    sizes = (("diameter", 0.01), ("length", 0.03), ("datum", 0.003))
+    inputs = tuple(DeclaredInput(name, u, "mm", 1000 * u) for name, u in sizes)
+    job = replace(job, inputs=inputs, correlations=(("diameter", "length", 0.7),))
+    measured, levels = measure_by_liquid(job, None), np.array([0.5, 1.2, 2.0])
+    both = next(one for one in measured.body.sources(levels) if one.parts)
+    parts = np.stack([one.columns_m3[:, 0] for one in both.parts], axis=1)
+    variance = np.einsum("ri,ij,rj->r", parts, both.correlation, parts)
+    assert_allclose(np.sum(both.columns_m3**2, axis=1), variance, rtol=1e-9)
+    volumes = measured.body.volume_m3(levels)
+    assert np.all(np.abs(volumes - NOMINAL["horizontal"](levels)) < 0.05)
+
+
 def test_joint_body_of_a_shell(upright):
     survey = find_survey(upright, lambda text: None).survey
     measured = measure_by_liquid(upright, survey)
@@ -138,6 +156,15 @@ def test_the_table_that_is_printed(certified):
     known = np.isfinite(beside.volume_m3)
     assert_allclose(printed.volume_m3[known], beside.volume_m3[known], atol=1e-9)
     assert_allclose(printed.u_m3[known], beside.u_m3[known], rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_corrections_add_up_to_the_table():
+    result = run(tankcal.load(EXAMPLES / "liquid"))
+    made = sum(one.size_m3 for one in result.corrections if one.code != "tilt")
+    gross = result.gross.volume_m3(np.array([result.gross.height_m]))[0]
+    assert_allclose(gross + made, result.table.volume_m3[-1], atol=1e-6)
+    assert result.corrections[-1].code == "liquid"
 
 
 @pytest.mark.slow

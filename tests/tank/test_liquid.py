@@ -239,6 +239,14 @@ def test_balance_of_mass(unused):
     assert np.sum(fill.batches) == 4 - (unused == (4,))
 
 
+def test_balance_of_mass_when_emptied():
+    rows = rows_of([2.0, 1.4, 0.9, 0.2])
+    fill = fill_of(rows)
+    assert np.all(rows.volume_m3[1:] < 0)
+    volume = 10 * rows.dip_m[fill.dip_row]
+    assert_allclose(reduce_steps(rows, fill, volume).misclosure_m3, 0.0, atol=1e-12)
+
+
 def test_steps_of_two_runs():
     rows = rows_of([np.nan, 0.5, 1.1, 0.4, 1.2, 2.0])
     rows.run = ("a", "a", "a", "b", "b", "b")
