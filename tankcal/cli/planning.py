@@ -130,7 +130,7 @@ def _refuse_simulation(options):
     if options.simulate is not None:
         expected = message(
             "plan_wall_not_simulated",
-            "not for a plan of straps, lines, hits or tangents; expected a plan of targets",
+            "not for a plan of straps, lines, hits, tangents or liquid; expected a plan of targets",
         )
         raise InputError(Problem("--simulate", expected))
 

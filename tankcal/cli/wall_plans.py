@@ -1,8 +1,10 @@
-"""What the terminal says of a plan of straps, reference lines, wall hits or tangents."""
+"""What the terminal says of a plan of straps, reference lines, wall hits, tangents or liquid."""
 
 from tankcal.cli.showing import marks
 from tankcal.messages import message
-from tankcal.text.digits import format_significant
+from tankcal.text.digits import fixed, format_significant
+
+SCALES = ("meter_factor", "scale", "instrument_scale")  # that liquid tells something of
 
 
 def planned_setups(count):
@@ -29,6 +31,8 @@ def wall_summary(prediction):
         planned_setups(has.setups),
         message("plan_hits", "{count} hits of the wall", count=has.hits),
         message("plan_tangents", "{count} tangents", count=has.tangents),
+        message("plan_runs", "{count} runs of liquid", count=has.runs),
+        message("plan_batches", "{count} batches", count=has.batches),
     ]
     yield plan_holds(plan, parts)
     for one in prediction.courses:
@@ -37,6 +41,36 @@ def wall_summary(prediction):
             "course {course}: u of its mean radius {sd} mm",
             course=one.name,
             sd=format_significant(1000 * one.radius_sd_m, 2, marks()),
+        )
+    if prediction.filling is not None:
+        yield from _filling(prediction.filling)
+
+
+def _filling(found):
+    """What runs of liquid would add to the geometry."""
+    for one in found.dips:
+        yield message(
+            "plan_dip_beside",
+            "V({dip} m): U = {uncertainty} m3; by geometry alone {before} m3",
+            dip=fixed(one.dip_m, 3, marks()),
+            uncertainty=format_significant(one.U_m3, 2, marks()),
+            before=format_significant(one.U_geometry_m3, 2, marks()),
+        )
+    for one in found.causes:
+        if one.kind in SCALES:
+            yield message(
+                "plan_told_by_liquid",
+                "{name}: u {before} {unit} before the liquid, {after} {unit} after it",
+                name=one.name or message("plan_scale_of_all", "scale"),
+                unit=one.unit,
+                before=format_significant(one.u_before, 3, marks()),
+                after=format_significant(one.u_after, 3, marks()),
+            )
+    if found.detectable_radius_m is not None:
+        yield message(
+            "plan_radius_shown",
+            "an offset of all radii of the geometry would show from {radius} mm on",
+            radius=format_significant(1000 * found.detectable_radius_m, 2, marks()),
         )
 
 
@@ -61,7 +95,7 @@ def wall_item(change):
         "certificate": message(
             "plan_item_certificate", "the calibration of {name}, with half its u", name=name
         ),
-    }
+    } | _filling_items(name)
     if change.item == "setup" and isinstance(change.plan, WallPlan):
         return message("plan_item_ring_setup", "a set-up of ring {name}", name=name)
     if change.item == "reading" and name == "offsets":
@@ -70,4 +104,31 @@ def wall_item(change):
         return message("plan_item_tangents", "all tangents")
     if change.item == "accuracy" and name == "tangents":
         return message("plan_item_finer_tangents", "each tangent, with half its s_arcsec")
+    if change.item == "accuracy" and name == "dips":
+        return message("plan_item_finer_dips", "each dip, with half its s_dip_mm")
+    if change.item == "half_steps" and change.action == "drop":
+        return message("plan_item_every_second", "every second dip of run {name}", name=name)
     return told.get(change.item)
+
+
+def _filling_items(name):
+    """Items of the runs of a plan."""
+    return {
+        "step": message("plan_item_step", "a step at the end of run {name}", name=name),
+        "top_of_run": message(
+            "plan_item_top_of_run", "steps of run {name} up to the full tank", name=name
+        ),
+        "half_steps": message(
+            "plan_item_half_steps", "a dip in the middle of each step of run {name}", name=name
+        ),
+        "empty_start": message(
+            "plan_item_empty_start", "a start of run {name} in the empty tank", name=name
+        ),
+        "run": message("plan_item_run", "a run like run {name}", name=name),
+        "meter": message(
+            "plan_item_meter", "the proving of meter {name}, with half its u", name=name
+        ),
+        "batches": message(
+            "plan_item_batches", "each batch of meter {name}, with half its sd", name=name
+        ),
+    }

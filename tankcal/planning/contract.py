@@ -141,6 +141,8 @@ COSTS = tuple(
         "reading",
         "strap",
         "line",
+        "run",
+        "batch",
     )
 )
 SINGLE = {"pattern": PATTERN, "limits": LIMITS, "costs": COSTS} | wall.SINGLE

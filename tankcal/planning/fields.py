@@ -36,6 +36,13 @@ def no_such_name(found, file, hint=""):
     )
 
 
+def too_many_sections(count, most):
+    """What is said of more sections of a kind than anybody means."""
+    return message(
+        "plan_many_sections", "{count} of them; expected at most {most}", count=count, most=most
+    )
+
+
 def check_form(section, log):
     """That the ovality of the whole shell is a part of that of a course."""
     whole, common = section["form_mm"] or 0.0, section["common_form_mm"] or 0.0

@@ -49,9 +49,12 @@ from tankcal.planning.checks.placed import check_plan
 from tankcal.planning.contract import JOB_TABLES, REPEATED, SINGLE, TABLES
 from tankcal.planning.fields import Count
 from tankcal.planning.given import PLAN_FILE, Entry, Given
+from tankcal.planning.wall.contract import OF_WALL
 from tankcal.planning.wall.contract import TABLES as WALL_TABLES
 from tankcal.planning.wall.reading import check_sections, is_wall_plan, wall_plan_of
 from tankcal.text.numerals import NUMBER
+
+OF_LIQUID = ("horizontal", "sphere")  # kinds that runs of liquid alone may measure
 
 
 def load_plan(path):
@@ -76,11 +79,7 @@ def load_plan(path):
     log.stop_if_problems()
     raw, given = _read(folder, log)
     values = read_settings(raw, log)
-    if kind_of(raw) not in (None, "vertical"):
-        expected = message(
-            "plan_vertical_only", "only an upright tank can be planned so far; expected vertical"
-        )
-        log.problem(PLAN_FILE, expected, None, "tank.kind")
+    _check_kind(raw, given, log)
     registers = {name: read_register(raw, name, log) for name in REGISTERS}
     tables = _job_tables(raw, log)
     given = replace(given, control=tables["control"])
@@ -100,7 +99,7 @@ def _wall_plan(raw, values, tables, given, folder, log):
     """The WallPlan of a plan that says how its wall is strapped, read from lines, or hit."""
     courses = None if tables["courses"] is None else tuple(tables["courses"].of("course"))
     diameter = values["tank"]["nominal_diameter_m"]
-    check_sections(given, courses, None if diameter is None else diameter / 2, log)
+    check_sections(given, courses, None if diameter is None else diameter / 2, raw, log)
     log.stop_if_problems()
     told = tuple(log.warnings)
     raw = _with_points(raw)
@@ -109,6 +108,35 @@ def _wall_plan(raw, values, tables, given, folder, log):
     limits = limits_of(given.single["limits"])
     name = folder.resolve().name
     return replace(wall_plan_of(raw, values, tables, given, limits, name), warnings=told)
+
+
+def _check_kind(raw, given, log):
+    """An upright tank; runs of liquid alone measure a lying tank or a sphere as well."""
+    kind = kind_of(raw)
+    if kind in (None, "vertical"):
+        return
+    is_filled = bool(given.repeated["runs"])
+    others = [name for name in OF_WALL if given.repeated.get(name) or _is_filled(given, name)]
+    if is_filled and not others and kind in OF_LIQUID:
+        return
+    if is_filled and kind in OF_LIQUID:
+        expected = message(
+            "plan_wall_of_upright",
+            "given for a tank that lies or is a sphere; expected [[runs]] of liquid alone",
+        )
+        for name in others:
+            log.problem(PLAN_FILE, expected, None, name)
+        return
+    expected = message(
+        "plan_kinds",
+        "found {found}; expected vertical, or, of runs of liquid alone, horizontal or sphere",
+        found=kind,
+    )
+    log.problem(PLAN_FILE, expected, None, "tank.kind")
+
+
+def _is_filled(given, name):
+    return name in given.single and bool(given.single[name].filled)
 
 
 def _with_points(raw):
@@ -237,7 +265,7 @@ def _refuse_nothing_measured(own, log):
     expected = message(
         "plan_of_nothing",
         "nothing is measured; expected a [pattern] of targets, or [[straps]], [lines], [[hits]]"
-        " or [tangents] of the bare wall",
+        " or [tangents] of the bare wall, or [[runs]] of metered liquid",
     )
     log.problem(PLAN_FILE, expected)
     log.stop_if_problems()
@@ -350,7 +378,7 @@ def _job_tables(raw, log):
     for name in JOB_TABLES:
         if raw.tables.get(name) is not None:
             tables[name] = read_columns(name, raw.tables[name], log)
-    if "courses" not in raw.tables:
+    if "courses" not in raw.tables and kind_of(raw) in (None, "vertical"):
         log.problem(
             "courses.csv",
             message("plan_courses_missing", "missing file; expected the courses of the shell"),

@@ -1,6 +1,7 @@
-"""The prediction of a wall by tape, lines, hits or tangents as it is saved: plan.json."""
+"""The prediction of a wall by tape, lines, hits, tangents or liquid as it is saved: plan.json."""
 
 from tankcal.planning.wall.changes import wall_count
+from tankcal.planning.wall.filling_outlook import FillingOutlook
 from tankcal.planning.wall.prediction import CourseOutlook, ReadingsOutlook
 from tankcal.record.plain_data import to_plain
 from tankcal.record.plan import (
@@ -30,10 +31,12 @@ class PlannedWall(Saved):
     hits: int = key("of the bare wall")
     shared_targets: int = key("that neighbouring set-ups share")
     tangents: int = key("sights to the limbs of the tank")
+    runs: int = key("of metered liquid")
+    batches: int = key("of them")
 
 
 class WallPlanFile(Saved, kw_only=True):
-    """What a survey of a wall by tape, reference lines, hits or tangents would give, beforehand."""
+    """What a survey of a wall by tape, reference lines, hits, tangents or liquid would give."""
 
     format: str = key("see Versions", default=WALL_PLAN.format)
     tank: str = key("id", of="plan.job.tank.id")
@@ -45,6 +48,7 @@ class WallPlanFile(Saved, kw_only=True):
     worst_deliveries: list[PlannedDelivery] = key("of each minimum height")
     courses: list[CourseOutlook] = key("from the bottom up")
     reliability: list[ReadingsOutlook] = key("of straps, offsets and tangents")
+    filling: FillingOutlook | None = key("what runs of liquid would add; null: there are none")
     warnings: list[WarningRecord] = key("what should be read")
     job: list[Fingerprint] = key("files of the empty job", default=())
 
@@ -74,4 +78,6 @@ def survey_of(plan):
         hits=0 if job.hits is None else len(job.hits),
         shared_targets=0 if design.ties is None else design.ties[0],
         tangents=0 if job.tangents is None else len(job.tangents),
+        runs=count["run"],
+        batches=count["batch"],
     )

@@ -67,6 +67,10 @@ class FilledForm(Form):
         """The rows of a table."""
         return self.given.get(table, ())
 
+    def _has(self, section, field):
+        is_given = f"{section}.{field.name}" in self.settings and field.suits(self.kind)
+        return is_given or super()._has(section, field)
+
 
 # The starter job as text: job.toml, the CSV files, and the lists of cameras and instruments.
 

@@ -1,5 +1,5 @@
-"""Changes of a WallPlan by one item: strap, lines, level, hits, set-up, station, a better
-instrument.
+"""Changes of a WallPlan by one item: strap, lines, level, hits, set-up, station, run of liquid, a
+better instrument.
 """
 
 from dataclasses import replace
@@ -8,11 +8,15 @@ from itertools import pairwise
 import numpy as np
 
 from tankcal.job.checks.tangents import FEWEST_SETUPS
+from tankcal.planning.wall.filling_changes import changes_of_runs
 from tankcal.planning.wall.model import USUAL_AT, PlannedStrap, even_radius_m
 from tankcal.planning.wall.reading import changed, least_ring_m
 
-SEARCHED = ("strap", "line", "face", "level", "hit", "setup", "station", "reading")
-WALL_ITEMS = (*SEARCHED, "accuracy", "traverse", "certificate")  # the last are no part of a design
+OF_FILLING = ("step", "top_of_run", "half_steps", "empty_start", "run")
+SEARCHED = ("strap", "line", "face", "level", "hit", "setup", "station", "reading", *OF_FILLING)
+WALL_ITEMS = (  # the last are no part of a design
+    *(*SEARCHED, "accuracy", "traverse", "certificate", "meter", "batches"),
+)
 MORE_LINES = 4
 BETTER = ("u_scale_ppm", "u_offset_mm", "u_collimation_arcsec", "u_incidence_mm")
 MOST_FACES, MOST_READINGS, FEWEST_LINES, FEWEST_HITS = 2, 20, 4, 5
@@ -21,9 +25,16 @@ MOST_FACES, MOST_READINGS, FEWEST_LINES, FEWEST_HITS = 2, 20, 4, 5
 def wall_changes_of(plan):
     """(action, item, name, how) of every change; how() is the WallPlan after it."""
     found = []
-    for changes in (_straps, _lines, _hits, _tangents, _certificates):
+    for changes in (_straps, _lines, _hits, _tangents, _filling, _certificates):
         found += changes(plan)
     return found
+
+
+def _filling(plan):
+    def certified(*better):
+        return lambda: changed(plan, raw=plan.with_instrument(*better))
+
+    return changes_of_runs(plan, lambda **parts: _made(plan, **parts), certified)
 
 
 def wall_count(plan):
@@ -44,6 +55,8 @@ def wall_count(plan):
         "line": 0 if lines is None else lines.count,
         "setup": sum(one.setups for one in design.hits) + (0 if ring is None else ring.stations),
         "reading": read,
+        "run": len(design.runs),
+        "batch": sum(one.batches for one in design.runs),
     }
 
 
@@ -55,7 +68,7 @@ def _straps(plan):
     design = plan.design
     for one in design.straps:
         others = tuple(strap for strap in design.straps if strap is not one)
-        if others or design.hits or design.tangents is not None:
+        if others or design.hits or design.tangents is not None or design.runs:
             yield "drop", "strap", one.name, _made(plan, straps=others)
         if one.readings < MOST_READINGS:
             again = replace(one, readings=one.readings + 1)

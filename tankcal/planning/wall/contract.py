@@ -1,5 +1,5 @@
-"""The sections of plan.toml that say how a wall will be strapped, read from lines, hit, or
-sighted by its limbs.
+"""The sections of plan.toml that say how a wall will be strapped, read from lines, hit, sighted by
+its limbs, or measured by metered liquid.
 """
 
 from tankcal.job.contract.hits import RANGING
@@ -134,6 +134,47 @@ TRAVERSE = (
         True,
     ),
 )
+RUNS = (
+    Field("meter", "name", "as in meters.toml; blank: the only one there"),
+    Field("from_empty", "flag", "the run begins in the empty, dry tank; blank: false"),
+    number(
+        "first_dip_m",
+        message("plan_note_first_dip", "first dip that is read, from the table's zero, metres"),
+        -100,
+        200,
+        True,
+    ),
+    number(
+        "last_dip_m",
+        message("plan_note_last_dip", "last dip, metres; below the first: liquid is drawn off"),
+        -100,
+        200,
+        True,
+    ),
+    number("step_m", "from dip to dip, metres; or steps", 0, 100, above_low=True),
+    count("steps", "from the first dip to the last; or step_m", high=1000),
+    number(
+        "s_dip_mm", "standard deviation of a dip; blank: that of [liquid]", 0, 1000, False, True
+    ),
+    number("temperature_c", "of liquid and shell; blank: that of the table", -200, 300),
+    Field("temperatures", "flag", "read at the meter, in the tank, of the shell; blank: true"),
+)
+FILLING = (
+    numbers_list(
+        "dips_m",
+        "dips whose volumes and differences the prediction lists; blank: the lowest and the highest"
+        " of the runs, and the full tank",
+        -100,
+        200,
+    ),
+    number(
+        "expected_run_ppm",
+        "run effect that is expected, standard deviation, where the runs are to show it: [liquid]"
+        " has no run_ppm",
+        0,
+        1e5,
+    ),
+)
 WALL = (
     number("form_mm", "rms ovality of a course, as expected; blank: as walls have it", 0, 500),
     number("common_form_mm", "the part of it that runs up the whole shell; blank: 0", 0, 500),
@@ -144,8 +185,10 @@ SINGLE = {
     "control_targets": CONTROL_TARGETS,
     "tangents": TANGENTS,
     "traverse": TRAVERSE,
+    "filling": FILLING,
     "wall": WALL,
 }
-REPEATED = {"straps": STRAPS, "hits": HITS}
-MEASURING = ("straps", "lines", "hits", "tangents")
+REPEATED = {"straps": STRAPS, "hits": HITS, "runs": RUNS}
+OF_WALL = ("straps", "lines", "hits", "tangents")  # what is read of an upright wall
+MEASURING = (*OF_WALL, "runs")
 TABLES = ("obstructions", "thickness", "tape_checks")  # of a job, beside those of any plan

@@ -10,9 +10,11 @@ import numpy as np
 
 from tankcal.job.checks.hits import MOST_HITS
 from tankcal.job.checks.lines import MOST_OFFSETS
+from tankcal.job.checks.liquid import MOST_ROWS
 from tankcal.job.checks.strapping import MOST_STRAPS
 from tankcal.job.checks.tangents import MOST_TANGENTS
 from tankcal.job.tables import Table
+from tankcal.planning.wall.filling import rows_of_runs
 
 STEEPEST = np.radians(55.0)  # incidence in plan, of a set-up that says nothing of what it sees
 TIE_HEIGHTS_M = (0.4, 1.4, 2.4)  # above the instrument's foot: of targets that set-ups share
@@ -25,10 +27,11 @@ class Foreseen:
 
     design  Design              courses  ((name, height_m), ...) from the bottom up
     radius_m  nominal           bottom_m  z of the bottom     zero_m  of the table above it
+    holds     function of a dip that gives m3, roughly; None: nothing is filled in
     """
 
-    def __init__(self, design, courses, radius_m, bottom_m, zero_m):
-        self.design, self.radius_m = design, radius_m
+    def __init__(self, design, courses, radius_m, bottom_m, zero_m, holds=None):
+        self.design, self.radius_m, self.holds = design, radius_m, holds
         self.bottom_m, self.zero_m = bottom_m, zero_m
         self.foot, foot = {}, 0.0
         for name, height in courses:
@@ -53,6 +56,8 @@ class Foreseen:
         if self.design.tangents is not None:
             found["tangents"] = self._tangents(), MOST_TANGENTS
             found |= {name: (rows, MOST_TANGENTS) for name, rows in self._traverse().items()}
+        if self.design.runs:
+            found["liquid"] = rows_of_runs(self.design.runs, self.holds), MOST_ROWS
         return {name: _table(name, islice(rows, most + 1)) for name, (rows, most) in found.items()}
 
     def _height(self, course, percent):

@@ -1,5 +1,5 @@
-"""A wall to be strapped, read from reference lines, hit or sighted by its limbs: how, and the job
-that it will be.
+"""A wall to be strapped, read from reference lines, hit, sighted by its limbs or filled by meter:
+how, and the job that it will be.
 """
 
 from dataclasses import dataclass, field, replace
@@ -107,6 +107,28 @@ class PlannedTangents:
     instrument: str | None = None
 
 
+@dataclass(frozen=True)
+class PlannedRun:
+    """A run of metered liquid, from dip to dip.
+
+    dips_m      one after the other; falling ones: liquid is drawn off
+    from_empty  whether it begins in the empty, dry tank, before the first dip
+    sd_m        of a dip; None: that of the job's [liquid]
+    celsius     of liquid and shell; None: temperatures are not read
+    """
+
+    dips_m: tuple
+    from_empty: bool = False
+    meter: str | None = None
+    sd_m: float | None = None
+    celsius: float | None = None
+
+    @property
+    def batches(self):
+        """How many volumes are read."""
+        return len(self.dips_m) - (0 if self.from_empty else 1)
+
+
 def evenness_of_limbs(stations, radius_m, nominal_m):
     """How evenly the places that sights of a ring touch lie round the wall.
 
@@ -141,6 +163,7 @@ class Design:
 
     ties     (targets that neighbouring set-ups share, s_mm, s_arcsec); None: the wall alone ties
     control  targets that show whether a set-up moved
+    runs     of metered liquid
     """
 
     straps: tuple[PlannedStrap, ...] = ()
@@ -149,6 +172,13 @@ class Design:
     ties: tuple | None = None
     tangents: PlannedTangents | None = None
     control: PlannedControl = PlannedControl()
+    runs: tuple[PlannedRun, ...] = ()
+
+    @property
+    def is_metered_alone(self):
+        """Whether liquid is all that measures the tank."""
+        others = (self.straps, self.hits, self.lines, self.tangents)
+        return bool(self.runs) and not any(others)
 
 
 @dataclass(frozen=True)
@@ -164,7 +194,13 @@ class WallPlan:
     amplitudes : Amplitudes
         How far the wall departs from a cylinder, as it is expected.
     costs : dict
-        {item: cost of one}: "strap", "line", "setup", "reading".
+        {item: cost of one}: "strap", "line", "setup", "reading", "run", "batch".
+    dips_m : tuple of float
+        Whose volumes and differences are listed; (): those of the runs, and of the full tank.
+    expected_run : float or None
+        Relative standard deviation of the run effect that runs are to show.
+    holds : callable or None
+        Function of a dip, m, that gives m3, roughly: of a tank that will be filled.
     folder : str
     given : RawJob
         What stands in the folder, as it was read.
@@ -176,13 +212,16 @@ class WallPlan:
     limits: Limits
     amplitudes: Amplitudes = field(default_factory=assumed_amplitudes)
     costs: dict = field(default_factory=dict)
+    dips_m: tuple = ()
+    expected_run: float | None = None
+    holds: object = None
     folder: str = ""
     given: RawJob | None = None
     warnings: tuple = ()
 
-    def with_instrument(self, name, values):
-        """`given` with other values of an instrument: {key: value}."""
-        register = self.given.registers["instruments"]
+    def with_instrument(self, name, values, of="instruments"):
+        """`given` with other values of an instrument, or of a meter: {key: value}."""
+        register = self.given.registers[of]
         entry = register.entries[name] | {key: Value(one) for key, one in values.items()}
         register = replace(register, entries=register.entries | {name: entry})
-        return replace(self.given, registers=self.given.registers | {"instruments": register})
+        return replace(self.given, registers=self.given.registers | {of: register})

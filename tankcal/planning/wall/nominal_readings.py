@@ -14,6 +14,7 @@ from tankcal.geometry.girth import tangent_excess
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.wall_straps import area_term
 from tankcal.planning.wall.foreseen_tables import tangent_sight
+from tankcal.planning.wall.nominal_filling import with_nominal_batches
 from tankcal.survey.readings import read_distance_m
 from tankcal.survey.strapping import reduce_straps
 
@@ -21,14 +22,21 @@ OFFSET_M = 0.2  # of the lowest wall from a line
 CLOSE_M, ROUNDS = 1e-12, 20
 
 
-def with_nominal_readings(job, amplitudes):
-    """The job with the readings of circumferences, offsets, hits and tangents that its sizes give.
+def with_nominal_readings(job, amplitudes, expected_run=None):
+    """The job with the readings of circumferences, offsets, hits, tangents and meters that its
+    sizes give.
 
-    amplitudes  of the wall, for the area term of a shape that nobody declared, and for its hull
+    amplitudes    of the wall, for the area term of a shape that nobody declared, and for its hull
+    expected_run  relative sd of the run effect, where runs of liquid are to show it
     """
-    if job.tangents is not None:
-        amplitudes = _expected(_nominal(job, amplitudes), amplitudes)
-    return _nominal(job, amplitudes)
+    if job.tank.kind == "vertical":
+        if job.tangents is not None:
+            amplitudes = _expected(_nominal(job, amplitudes), amplitudes)
+        job = _nominal(job, amplitudes)
+    if job.liquid is None:
+        return job
+    survey = find_survey(job, lambda text: None, amplitudes).survey
+    return with_nominal_batches(job, survey, expected_run)
 
 
 def _expected(job, amplitudes):

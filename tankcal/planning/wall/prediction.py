@@ -10,12 +10,21 @@ from tankcal.geometry.field.estimate import LEVELS
 from tankcal.geometry.field.information import expect_amplitudes
 from tankcal.job.model import Job
 from tankcal.pipeline.cause_correlations import noise_of_wall
+from tankcal.pipeline.liquid import LiquidResult, Measured, measure_by_liquid
+from tankcal.pipeline.liquid_checks import check_liquid_result
+from tankcal.pipeline.nominal_wall import NominalWall
+from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.statements import statements
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import ComputedTable, check_table, compute_table
 from tankcal.pipeline.tangent_checks import judge_tangents
 from tankcal.planning.limits import OfTable, refuse_without_delivery
+from tankcal.planning.wall.filling_outlook import (
+    FillingOutlook,
+    outlook_of_filling,
+    refuse_other_dips,
+)
 from tankcal.planning.wall.model import WallPlan
 from tankcal.planning.wall.telling import told_of_plan
 from tankcal.quadrature import panels
@@ -77,16 +86,25 @@ class WallTable:
     Attributes
     ----------
     job : Job
-    wall : Wall or StrappedWall
+    wall : Wall, StrappedWall, NominalWall or None
+        None: declared sizes alone describe the tank.
     made : ComputedTable
     sighting : Sighting or Touching or None
         As `check_table` takes it.
+    measured : Measured or None
+        What runs of liquid would make of the tank.
     """
 
     job: Job
     wall: object
     made: ComputedTable
     sighting: object = None
+    measured: Measured | None = None
+
+    @cached_property
+    def liquid(self) -> LiquidResult | None:
+        """What runs of liquid would say, beside the rows of the table."""
+        return self.measured and self.measured.result(self.made.levels_m)
 
     @cached_property
     def stated(self):
@@ -118,10 +136,21 @@ class WallPrediction(OfTable):
         return readings_of(self.tabled)
 
     @cached_property
+    def filling(self) -> FillingOutlook | None:
+        """What runs of liquid would add to the geometry; None: there are none."""
+        tabled = self.tabled
+        if tabled.measured is None:
+            return None
+        return outlook_of_filling(self.plan, tabled.measured, tabled.liquid, tabled.made)
+
+    @cached_property
     def warnings(self):
         """A tuple of Problem: what the run of such a survey will warn of."""
         tabled = self.tabled
-        of_run = check_table(tabled.job, tabled.wall, tabled.made, tabled.sighting)
+        of_run = (
+            *check_table(tabled.job, tabled.wall, tabled.made, tabled.sighting),
+            *check_liquid_result(tabled.job, tabled.liquid),
+        )
         found = (
             *self.plan.warnings,
             *self.plan.job.warnings,
@@ -148,8 +177,9 @@ def predict_wall(plan):
         When they do not determine the wall.
     """
     tabled = foresee_table(plan.job, plan.amplitudes)
-    tall = sum(one.height_m for one in plan.job.courses)
+    tall = sum(one.height_m for one in plan.job.courses) or tabled.made.top_m
     refuse_without_delivery(plan, tabled, tall)
+    refuse_other_dips(plan.dips_m, tabled.made)
     return WallPrediction(plan, tabled)
 
 
@@ -159,18 +189,27 @@ def foresee_table(job, amplitudes):
     amplitudes  of the wall, as they are assumed
     """
     found = find_survey(job, lambda text: None, amplitudes)
+    if found.survey is None or isinstance(found.survey, NominalWall):
+        return _tabled(found, found.survey)  # nothing is read that could tell amplitudes
     field = found.survey.field  # how well sizes are known changes no weight of a reading
     expected = expect_amplitudes(field)
     if found.touching is not None:  # but how far a hull stands out
         found = find_survey(job, lambda text: None, expected)
         field = found.survey.field
-    wall = replace(found.survey, field=replace(field, amplitudes=expected))
-    made = compute_table(found.job, wall)
-    return WallTable(found.job, wall, made, found.sighting or found.touching)
+    return _tabled(found, replace(found.survey, field=replace(field, amplitudes=expected)))
+
+
+def _tabled(found, wall):
+    """`WallTable` of a `Surveyed` whose wall is known as well as it will be."""
+    measured = measure_by_liquid(found.job, wall)
+    made = compute_table(found.job, wall, body=measured and measured.body)
+    return WallTable(found.job, wall, made, found.sighting or found.touching, measured)
 
 
 def courses_of(tabled):
-    """A CourseOutlook of each course."""
+    """A CourseOutlook of each course; () where nothing but liquid measures them."""
+    if tabled.wall is None or isinstance(tabled.wall, NominalWall):
+        return ()
     job, field = tabled.job, tabled.wall.field
     courses = len(job.courses)
     mean = np.kron(np.eye(courses), panels([0.0, 1.0], LEVELS)[1])
@@ -200,8 +239,10 @@ def courses_of(tabled):
 
 def readings_of(tabled):
     """A ReadingsOutlook of the straps, of the offsets and of the tangents that a wall has."""
-    wall = tabled.wall if isinstance(tabled.wall, StrappedWall) else tabled.wall.read
-    kinds = () if wall is None else ("straps", "offsets")
+    wall = tabled.wall
+    if not isinstance(wall, ReadWall):
+        wall = wall and wall.read
+    kinds = () if wall is None or isinstance(wall, NominalWall) else ("straps", "offsets")
     found = [(kind, wall.tests_of(kind)[1]) for kind in kinds]
     if tabled.job.tangents is not None:
         tests = judge_tangents(tabled.job, tabled.wall, tabled.sighting)

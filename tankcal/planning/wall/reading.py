@@ -11,13 +11,15 @@ from tankcal.job.building import job_of
 from tankcal.job.checking import zero_z
 from tankcal.job.checks.hits import FEWEST_HITS, MOST_HITS, too_many_hits
 from tankcal.job.checks.lines import MOST_OFFSETS, too_many_offsets
+from tankcal.job.checks.sized_volumes import volume_by_sizes
 from tankcal.job.checks.strapping import MOST_STRAPS, too_many_straps
 from tankcal.job.checks.tangents import FEWEST_SETUPS, MOST_TANGENTS, too_many_tangents
 from tankcal.job.tables import Log, Value
 from tankcal.messages import message
-from tankcal.planning.fields import check_form, no_such_name
+from tankcal.planning.fields import check_form, no_such_name, too_many_sections
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.wall.contract import MEASURING
+from tankcal.planning.wall.filling import check_runs, runs_of
 from tankcal.planning.wall.foreseen_tables import Foreseen
 from tankcal.planning.wall.model import (
     USUAL_AT,
@@ -44,17 +46,19 @@ OF_POINTS = ("pattern", "photo_rings", "setup_rings", "tapes", "obstacles")
 
 
 def is_wall_plan(own):
-    """Does a plan say how its wall is strapped, read from lines, hit or sighted by its limbs?
+    """Does a plan say how its wall is strapped, read from lines, hit, sighted by its limbs, or
+    filled by meter?
 
     own  {section: what stands there}
     """
     return any(name in own for name in MEASURING)
 
 
-def check_sections(given, courses, nominal_m, log):
+def check_sections(given, courses, nominal_m, raw, log):
     """What the sections of a plan say that cannot be meant.
 
     courses  names, None: unreadable       nominal_m  radius of the tank, None: unreadable
+    raw      RawJob of the plan
     """
     for name in OF_POINTS:
         entries = given.repeated[name] if name in given.repeated else [given.single[name]]
@@ -62,8 +66,8 @@ def check_sections(given, courses, nominal_m, log):
             if one.filled:
                 expected = message(
                     "plan_points_and_wall",
-                    "given together with straps, lines, hits or tangents; expected only one of"
-                    " them: a plan is of targets or of the bare wall",
+                    "given together with straps, lines, hits, tangents or runs of liquid; expected"
+                    " only one of them: a plan is of targets or of the bare wall",
                 )
                 log.problem(PLAN_FILE, expected, one.row, one.name)
     for one in (*given.repeated["straps"], *given.repeated["hits"]):
@@ -76,6 +80,7 @@ def check_sections(given, courses, nominal_m, log):
     check_form(given.single["wall"], log)
     _check_lines_and_ties(given, log)
     _check_tangents(given, nominal_m, log)
+    check_runs(given, raw.settings.get("liquid", {}).get("run_ppm") is not None, log)
     if courses:
         _check_totals(given, courses, log)
 
@@ -84,12 +89,7 @@ def _check_rings(given, nominal_m, log):
     """Not too many sections; set-ups that stand clear of the wall."""
     for name in ("straps", "hits"):
         if len(given.repeated[name]) > MOST_SECTIONS:
-            expected = message(
-                "plan_many_sections",
-                "{count} of them; expected at most {most}",
-                count=len(given.repeated[name]),
-                most=MOST_SECTIONS,
-            )
+            expected = too_many_sections(len(given.repeated[name]), MOST_SECTIONS)
             log.problem(PLAN_FILE, expected, None, name)
     for one in given.repeated["hits"]:
         radius = one["radius_m"]
@@ -263,8 +263,11 @@ def _check_totals(given, courses, log):
         log.problem(PLAN_FILE, too_many_tangents(tangents), ring.row, "tangents")
 
 
-def design_of(given, courses):
-    """The `Design` of sound sections on a tank of these courses."""
+def design_of(given, courses, celsius=None):
+    """The `Design` of sound sections on a tank of these courses.
+
+    celsius  temperature of the table
+    """
     straps = (
         PlannedStrap(course, percent, one["s_mm"], int(one["readings"] or 1), _more(one))
         for one in given.repeated["straps"]
@@ -278,6 +281,7 @@ def design_of(given, courses):
         ties=_ties(given.single["setup_ties"]),
         control=_control(given.single["control_targets"]),
         tangents=_tangents(given.single["tangents"], given.single["traverse"]),
+        runs=runs_of(given.repeated["runs"], celsius),
     )
 
 
@@ -354,22 +358,31 @@ def wall_plan_of(raw, values, tables, given, limits, folder):
 
     Raises InputError: what the job says of its tables is told of the section that makes them.
     """
-    table = tables["courses"]
-    courses = tuple(zip(table.of("course"), table.of("height_m"), strict=True))
-    design = design_of(given, tuple(name for name, _ in courses))
-    wall = given.single["wall"]
+    table, holds = tables["courses"], volume_by_sizes(values, tables, raw)
+    courses = ()
+    if table is not None:
+        courses = tuple(zip(table.of("course"), table.of("height_m"), strict=True))
+    celsius = values["table"]["reference_temperature_c"]
+    design = design_of(given, tuple(name for name, _ in courses), celsius)
+    wall, filling = given.single["wall"], given.single["filling"]
     sizes = (
         None if wall[key] is None else wall[key] / 1000 for key in ("form_mm", "common_form_mm")
     )
     amplitudes = assumed_amplitudes(*sizes)
-    bottom = values["datum"]["bottom_z_m"]
-    tank = (courses, values["tank"]["nominal_diameter_m"] / 2, bottom, zero_z(values) - bottom)
+    bottom, diameter = values["datum"]["bottom_z_m"], values["tank"]["nominal_diameter_m"]
+    zero = 0.0 if bottom is None else zero_z(values) - bottom
+    tank = (courses, diameter and diameter / 2, bottom, zero, holds)
+    ppm = filling["expected_run_ppm"]
+    expected = None if ppm is None else ppm / 1e6
     return WallPlan(
-        job=job_of_design(raw, design, tank, amplitudes, _rows_of(given)),
+        job=job_of_design(raw, design, tank, (amplitudes, expected), _rows_of(given)),
         design=design,
         limits=limits,
         amplitudes=amplitudes,
         costs={key: value or 0.0 for key, value in given.single["costs"].values.items()},
+        dips_m=tuple(sorted(set(filling["dips_m"] or ()))),
+        expected_run=expected,
+        holds=holds,
         folder=folder,
         given=raw,
     )
@@ -384,27 +397,32 @@ def _rows_of(given):
 def changed(plan, design=None, raw=None):
     """The WallPlan with another Design, or with other instruments."""
     design, raw = design or plan.design, raw or plan.given
-    job = job_of_design(raw, design, _tank_of(plan.job), plan.amplitudes)
+    expected = plan.amplitudes, plan.expected_run
+    job = job_of_design(raw, design, _tank_of(plan), expected)
     return replace(plan, job=job, design=design, given=raw)
 
 
 def tables_of(plan):
     """{name: Table} of what will be read, whatever stands as its value."""
-    return Foreseen(plan.design, *_tank_of(plan.job)).tables()
+    return Foreseen(plan.design, *_tank_of(plan)).tables()
 
 
-def _tank_of(job):
-    """Of a job, as `Foreseen` takes it."""
+def _tank_of(plan):
+    """Of a WallPlan, as `Foreseen` takes it."""
+    job = plan.job
     courses = tuple((one.name, one.height_m) for one in job.courses)
-    datum = job.datum
-    return courses, job.tank.nominal_diameter_m / 2, datum.bottom_z_m, datum.plate_level_m
+    datum, diameter = job.datum, job.tank.nominal_diameter_m
+    radius, bottom = diameter and diameter / 2, datum.bottom_z_m
+    return courses, radius, bottom, 0.0 if bottom is None else datum.plate_level_m, plan.holds
 
 
-def job_of_design(raw, design, tank, amplitudes, rows=None):
+def job_of_design(raw, design, tank, expected, rows=None):
     """The Job of a RawJob and the tables that a `Design` makes, with the readings foreseen.
 
-    tank  courses, radius, z of the bottom, zero of the table above it: as `Foreseen` takes them
-    rows  {section: row of plan.toml}, for what is told
+    tank      courses, radius, z of the bottom, zero of the table above it, what it holds: as
+              `Foreseen` takes them
+    expected  amplitudes of the wall, and the run effect, as `with_nominal_readings` takes them
+    rows      {section: row of plan.toml}, for what is told
     """
     made = Foreseen(design, *tank).tables()
     settings = dict(raw.settings)
@@ -416,7 +434,7 @@ def job_of_design(raw, design, tank, amplitudes, rows=None):
         job = job_of(whole, Log())
     except InputError as error:
         raise InputError(told_of_plan(error.problems, design, rows)) from error
-    job = with_nominal_readings(job, amplitudes)
+    job = with_nominal_readings(job, *expected)
     return replace(job, warnings=told_of_plan(job.warnings, design, rows))
 
 

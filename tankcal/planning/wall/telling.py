@@ -17,6 +17,7 @@ MADE = {  # tables that a design makes, and the section that they are told of
     "zenith_angles.csv": "setup_ties",
     "slope_distances.csv": "setup_ties",
     "tangents.csv": "tangents",
+    "liquid.csv": "runs",
 }
 OF_TRAVERSE = {  # where limbs are sighted from its stations
     "setups.csv": "tangents",

@@ -17,6 +17,8 @@ def uncertainty(paper):
     some = table.volume_m3 > 0.02 * table.volume_m3[-1]
     figure = Figure(figsize=(WIDTH, 2.4))
     left, right = figure.subplots(1, 2)
+    for ax, values in zip((left, right), _by_geometry(paper, some), strict=False):
+        ax.plot(*values, color=GREY, linestyle="--", label=paper.word("legend.by_geometry"))
     left.plot(table.height_m, table.U_m3, color=INK)
     left.set_ylabel(paper.word("axes.U_m3"))
     share = 100 * table.U_m3[some] / table.volume_m3[some]
@@ -29,8 +31,19 @@ def uncertainty(paper):
         ax.set_xlim(0, table.height_m[-1])
         ax.set_ylim(bottom=0)
         ax.grid(True)
+    if left.get_legend_handles_labels()[0]:
+        left.legend(loc="best", frameon=False)
     set_margins(figure, left=0.6, right=0.12, bottom=0.42, top=0.08, wspace=0.3)
     return figure
+
+
+def _by_geometry(paper, some):
+    """((dips, U), (dips, U over volume in percent)) without the runs of liquid; () of no such."""
+    liquid = getattr(paper.prediction.tabled, "liquid", None)
+    if liquid is None:
+        return ()
+    before, dips = liquid.tables["geometry"], paper.prediction.table.height_m
+    return (dips, before.U_m3), (dips[some], 100 * before.U_m3[some] / before.volume_m3[some])
 
 
 @styled

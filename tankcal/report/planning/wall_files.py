@@ -9,6 +9,10 @@ from tankcal.report.planning.files import write_capacity, write_effects
 from tankcal.text.languages import DEFAULT
 
 GIVEN = (*AS_GIVEN, "obstructions", "thickness", "tape_checks")
+OF_BATCHES = (
+    *("volume_m3", "dip_m", "meter_temperature_c", "tank_temperature_c"),
+    "shell_temperature_c",
+)
 READ = ("reading_m", "offset_mm", "direction_deg", "zenith_deg", "distance_m", "time")  # left blank
 
 
@@ -37,12 +41,11 @@ def form_of_wall(plan):
     if datum is not None:
         settings.setdefault("adjustment.datum", datum)
     foreseen = {name: _without_values(table) for name, table in tables_of(plan).items()}
-    survey = "strapping" if design.lines is None else "reference-line"
-    if design.hits or design.tangents is not None:
-        survey = "wall-hits" if design.hits else "tangents"
+    if design.runs:
+        foreseen["liquid"] = _runs(plan)
     return FilledForm(
-        kind="vertical",
-        survey=survey,
+        kind=plan.job.tank.kind,
+        survey=_survey_of(design),
         language=plan.job.table.language or DEFAULT,
         settings={key: one for key, one in settings.items() if key not in MEASURED},
         given={name: as_given(raw.tables[name]) for name in GIVEN if name in raw.tables} | foreseen,
@@ -50,6 +53,29 @@ def form_of_wall(plan):
         to_fill=tuple(key for key in settings if key in MEASURED),
         more=tuple(foreseen),
     )
+
+
+def _survey_of(design):
+    """The kind of survey whose form a `Design` has."""
+    if design.is_metered_alone:
+        return "liquid"
+    if design.hits or design.tangents is not None:
+        return "wall-hits" if design.hits else "tangents"
+    return "strapping" if design.lines is None else "reference-line"
+
+
+def _runs(plan):
+    """Rows of liquid.csv without what will be read; the dip that is planned stands as a note.
+
+    The start of a run from a dip has no volume either: without its dip, it would be the dry tank.
+    """
+    rows = []
+    for row in as_given(tables_of(plan)["liquid"]):
+        dip = row.get("dip_m", "")
+        kept = {name: _tidy(cell) for name, cell in row.items() if name not in OF_BATCHES}
+        volume = {} if dip else {"volume_m3": "0"}
+        rows.append(kept | volume | {"note": f"{_tidy(dip)} m" if dip else ""})
+    return tuple(rows)
 
 
 def _without_values(table):

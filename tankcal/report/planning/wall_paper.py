@@ -6,12 +6,17 @@ from tankcal.planning.changes import cost_of
 from tankcal.record.wall_plan import survey_of
 from tankcal.report import blocks
 from tankcal.report.plain import Column
+from tankcal.report.planning.filling import filling, sheet_of_runs
 from tankcal.report.planning.improvements import changes, design
 from tankcal.report.planning.outlook import result, table
 from tankcal.report.planning.paper import PlanPaper
 from tankcal.report.planning.wall_rows import COURSES, courses_of, field_tables_of_wall
 
-COUNTED = ("circumferences", "strap_readings", "lines", "offsets", "setups", "hits", "tangents")
+COUNTED = (
+    *("circumferences", "strap_readings", "lines", "offsets", "setups", "hits", "tangents"),
+    *("runs", "batches"),
+)
+OF_ALL = ("tangents", "dips")  # what a change is of, where it has no name
 
 NARROW = ("sight_lines", "offsets", "shared_targets")  # tables of few columns: two side by side
 
@@ -24,8 +29,8 @@ class WallPaper(PlanPaper):
     def change(self, change):
         """A `planning.changes.Change` of a WallPlan in words."""
         code = f"{change.action}_wall_{change.item}"
-        if change.name == "tangents":  # of which there is no name
-            code += "_of_tangents"
+        if change.name in OF_ALL:
+            code += f"_of_{change.name}"
         return self.word(f"changes.{code}", name=change.name)
 
 
@@ -35,15 +40,27 @@ def wall_outlook(paper):
         *paper.head("prediction"),
         result(paper),
         paper.facts(_counts(paper)),
-        paper.paragraph("wall_as_assumed"),
+        *_as_assumed(paper),
         *paper.warnings(paper.prediction.warnings),
         *table(paper),
-        paper.heading("courses"),
-        paper.table("courses", courses_of(paper.prediction), COURSES),
+        *filling(paper),
+        *_courses(paper),
         *_reliability(paper),
         *changes(paper),
         *design(paper),
     ]
+
+
+def _as_assumed(paper):
+    """What is assumed of a wall of which something is read."""
+    return [] if paper.plan.design.is_metered_alone else [paper.paragraph("wall_as_assumed")]
+
+
+def _courses(paper):
+    rows = courses_of(paper.prediction)
+    before = [paper.paragraph("courses_before_liquid")] if paper.plan.design.runs else []
+    table = paper.table("courses", rows, COURSES)
+    return [paper.heading("courses"), *before, table] if rows else []
 
 
 def _counts(paper):
@@ -97,6 +114,7 @@ def wall_sheets(paper):
         found.append(paper.table(name, *one, across=2 if name in NARROW else None))
     return [
         *found,
+        *sheet_of_runs(paper),
         paper.heading("afterwards"),
         blocks.listing([paper.word(f"texts.after_{one}") for one in ("job", "names", "run")]),
         blocks.signature([paper.word("signatures.surveyed")]),

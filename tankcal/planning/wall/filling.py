@@ -1,0 +1,161 @@
+"""Runs of metered liquid in a plan: what is said of them, and the rows of liquid.csv that they are.
+
+What the meter will show does not stand in these rows as the tank of the plan would have it:
+`nominal_filling` says that.
+"""
+
+import numpy as np
+
+from tankcal.job.checks.liquid import MOST_ROWS
+from tankcal.messages import message
+from tankcal.planning.fields import too_many_sections
+from tankcal.planning.given import PLAN_FILE
+from tankcal.planning.wall.model import PlannedRun
+
+LEAST_STEP_M = 0.001  # between two dips
+LEAST_BATCH_M3 = 1e-3  # stands for one that the sizes of a drawing do not give
+MOST_RUNS = 50
+
+
+def check_runs(given, is_run_declared, log):
+    """What [[runs]] and [filling] say that cannot be meant.
+
+    is_run_declared  whether [liquid] has a run_ppm
+    """
+    runs, filling = given.repeated["runs"], given.single["filling"]
+    if filling.filled and not runs:
+        expected = message(
+            "plan_filling_alone",
+            "given without [[runs]]; expected runs of liquid from dip to dip",
+        )
+        log.problem(PLAN_FILE, expected, filling.row, "filling")
+    if len(runs) > MOST_RUNS:
+        log.problem(PLAN_FILE, too_many_sections(len(runs), MOST_RUNS), None, "runs")
+    for one in runs:
+        _check_steps(one, log)
+    _check_run_effect(given, is_run_declared, log)
+    rows = sum(len(run.dips_m) + 1 for run in map(_planned, runs) if run is not None)
+    if rows > MOST_ROWS:
+        expected = message(
+            "plan_many_batches",
+            "{count} dips; expected at most {most}",
+            count=rows,
+            most=MOST_ROWS,
+        )
+        log.problem(PLAN_FILE, expected, None, "runs")
+
+
+def _check_steps(one, log):
+    first, last, step, steps = (
+        one[key] for key in ("first_dip_m", "last_dip_m", "step_m", "steps")
+    )
+    if {"step_m", "steps"} <= one.filled or not {"step_m", "steps"} & one.filled:
+        expected = message(
+            "plan_step_or_steps",
+            "expected one of them: step_m, the way from dip to dip, or steps, how many",
+        )
+        one.tell(log.problem, "step_m", expected)
+        return
+    if None in (first, last):
+        return  # told already
+    if abs(last - first) < LEAST_STEP_M and not one["from_empty"]:
+        expected = message(
+            "plan_run_stands",
+            "found {last:g}, which is the first dip; expected a dip above it, or below it where"
+            " liquid is drawn off",
+            last=last,
+        )
+        one.tell(log.problem, "last_dip_m", expected)
+        return
+    way = abs(last - first) / steps if steps else step
+    if way is not None and way < LEAST_STEP_M and last != first:
+        expected = message(
+            "plan_small_step",
+            "steps of {step:g} mm; expected {least:g} mm or more",
+            step=1000 * way,
+            least=1000 * LEAST_STEP_M,
+        )
+        one.tell(log.problem, "steps" if steps else "step_m", expected)
+
+
+def _check_run_effect(given, is_declared, log):
+    """The run effect is declared, or expected of two runs or more."""
+    runs, filling = given.repeated["runs"], given.single["filling"]
+    expected_ppm = filling["expected_run_ppm"]
+    if expected_ppm is not None and is_declared:
+        expected = message(
+            "plan_run_effect_twice",
+            "given beside liquid.run_ppm; expected one of them: what is declared is not shown by"
+            " the runs",
+        )
+        filling.tell(log.problem, "expected_run_ppm", expected)
+    if len(runs) > 1 and expected_ppm is None and not is_declared:
+        expected = message(
+            "plan_run_effect_missing",
+            "missing; expected by how much whole runs will differ, ppm, or liquid.run_ppm where it"
+            " is declared: before they are made, the runs show nothing",
+        )
+        row = filling.row or runs[0].row
+        log.problem(PLAN_FILE, expected, row, "filling.expected_run_ppm")
+
+
+def runs_of(entries, celsius):
+    """A tuple of `PlannedRun`s of sound [[runs]]; celsius: temperature of the table."""
+    return tuple(_planned(one, celsius) for one in entries)
+
+
+def _planned(entry, celsius=None):
+    """The PlannedRun of an Entry; None: it is refused."""
+    first, last = entry["first_dip_m"], entry["last_dip_m"]
+    step, steps = entry["step_m"], entry["steps"]
+    if None in (first, last) or step is steps:
+        return None
+    warm = celsius if entry["temperature_c"] is None else entry["temperature_c"]
+    return PlannedRun(
+        dips_m=_dips(first, last, step, steps),
+        from_empty=bool(entry["from_empty"]),
+        meter=entry["meter"],
+        sd_m=None if entry["s_dip_mm"] is None else entry["s_dip_mm"] / 1000,
+        celsius=None if entry["temperatures"] is False else warm,
+    )
+
+
+def _dips(first, last, step, steps):
+    """Dips by the way from one to the next, or by their number; the last step may be shorter."""
+    if steps:
+        found = np.linspace(first, last, int(steps) + 1)
+    else:
+        whole = int(min((abs(last - first) + 1e-9) // max(step, LEAST_STEP_M), MOST_ROWS))
+        found = first + np.sign(last - first) * step * np.arange(whole + 1)
+        if abs(last - found[-1]) >= LEAST_STEP_M:
+            found = np.append(found, last)
+    return tuple(np.round(found, 4).tolist())
+
+
+def rows_of_runs(runs, holds):
+    """Rows of liquid.csv, {column: value} each.
+
+    holds  function of a dip, m, that gives m3, roughly
+    """
+    for number, run in enumerate(runs, 1):
+        common = {"run": str(number), "meter": run.meter}
+        warm = {"tank_temperature_c": run.celsius, "shell_temperature_c": run.celsius}
+        at_meter = warm | {"meter_temperature_c": run.celsius}
+        sd = {"s_dip_mm": None if run.sd_m is None else 1000 * run.sd_m}
+        before = None
+        if run.from_empty:
+            yield common | {"volume_m3": 0.0}
+            before = 0.0
+        for dip in run.dips_m:
+            below = holds(dip)
+            if before is None:
+                yield common | sd | warm | {"volume_m3": 0.0, "dip_m": dip}
+            else:
+                way = below - before
+                way = np.copysign(max(abs(way), LEAST_BATCH_M3), _sign(run))
+                yield common | sd | at_meter | {"volume_m3": float(way), "dip_m": dip}
+            before = below
+
+
+def _sign(run):
+    return run.dips_m[-1] - run.dips_m[0] if len(run.dips_m) > 1 else 1.0
