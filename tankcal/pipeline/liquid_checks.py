@@ -10,6 +10,7 @@ from tankcal.pipeline.liquid_naming import causes_in_words
 from tankcal.pipeline.survey_limits import limits_of
 
 TOLD = 3  # steps that are told one by one
+CONTROLLED = 1e-6  # redundancy of a reading below which nothing tests it
 
 
 def check_liquid_result(job, found):
@@ -58,10 +59,10 @@ def _disagreement(metering, found):
 def _single_readings(metering, found):
     """Batches and dips that the joint adjustment finds wrong, the worst first."""
     rows = [
-        (abs(w), row, w * sd / np.sqrt(max(redundancy, 1e-12)), column)
+        (abs(w), row, w * sd / np.sqrt(redundancy), column)
         for one, column in ((found.steps, "volume_m3"), (found.dips, "dip_m"))
         for row, w, sd, redundancy in zip(one.row, one.w, one.sd, one.redundancy, strict=True)
-        if abs(w) > CRITICAL
+        if abs(w) > CRITICAL and redundancy > CONTROLLED
     ]
     for w, row, size, column in sorted(rows, reverse=True)[:TOLD]:
         if column == "dip_m":

@@ -7,6 +7,7 @@ from tankcal.tank.liquid import Alternative, reduce_steps
 from tankcal.tank.liquid.readings import as_fahrenheit, swapped
 
 MOST_TOLD = 3  # kinds of causes in a sentence
+MOST_FACTOR, MOST_LENGTH_M = 0.1, 0.5  # of a meter; of a zero, a dip or a radius
 
 
 def alternatives_of(found):
@@ -22,18 +23,20 @@ def alternatives_of(found):
     rows = metering.row[fill.dip_row]
     area = over * loaded.area_m2
     told = [
-        Alternative("meter", column, name)
+        Alternative("meter", column, name, most=MOST_FACTOR)
         for name, column in zip(fill.meters, _by_meter(metering, fill, reduced), strict=True)
     ]
-    told.append(Alternative("radii", over @ loaded.by_offset, unit="m"))
-    told.append(Alternative("dip_zero", area.sum(axis=1), unit="m"))
-    told += [Alternative("dip", column, int(row), "m")
+    length = {"unit": "m", "most": MOST_LENGTH_M}
+    told.append(Alternative("radii", over @ loaded.by_offset, **length))
+    told.append(Alternative("dip_zero", area.sum(axis=1), **length))
+    told += [Alternative("dip", column, int(row), **length)
              for row, column in zip(rows, area.T, strict=True)]  # fmt: skip
-    told += [Alternative("batch", column, int(row), "m3")
+    filled = float(np.sum(np.abs(reduced.metered_m3)))
+    told += [Alternative("batch", column, int(row), "m3", most=filled)
              for row, column in zip(rows[fill.end], -np.eye(len(fill)), strict=True)]  # fmt: skip
     told += _leaks(metering, fill)
     empty = fill.from_empty.astype(float)
-    told.append(Alternative("bottom", empty, unit="m3"))
+    told.append(Alternative("bottom", empty, unit="m3", most=filled))
     told += _temperatures(metering, fill, loaded, reduced)
     return tuple(one for one in told if np.any(one.column) and np.all(np.isfinite(one.column)))
 
@@ -101,7 +104,7 @@ def _cause(one):
     size, of = one.size, one.cause.of
     if one.cause.kind == "meter":
         return message("cause_meter", "the factor of meter {name}, off by {size:+.3f} %",
-                       name=of, size=100 * size)  # fmt: skip
+                       name=of, size=-100 * size)  # fmt: skip
     if one.cause.kind == "radii":
         return message("cause_radii", "the radii of the geometry, off by {size:+.1f} mm",
                        size=-1000 * size)  # fmt: skip

@@ -3,9 +3,8 @@
 import numpy as np
 
 from tankcal.gum.coverage import coverage_factor
+from tankcal.pipeline.liquid_checks import CONTROLLED
 from tankcal.record.schema import Saved, filled_from, key
-
-CONTROLLED = 1e-6  # redundancy below which nothing controls a reading
 
 
 class MeterUsed(Saved):

@@ -33,6 +33,8 @@ class Alternative:
         Of its size: "1", "m", "m3"; "" of one that is so or not.
     is_whole : bool
         True: its size is one, or it is not so.
+    most : float
+        The largest size that it may have; a test that asks for a larger one does not name it.
     """
 
     kind: str
@@ -40,6 +42,7 @@ class Alternative:
     of: object = None
     unit: str = "1"
     is_whole: bool = False
+    most: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,7 @@ def name_causes(found, alternatives):
     kinds = [one.kind for one in alternatives]
     score = w**2 - 2 * np.log([kinds.count(kind) for kind in kinds])
     order = np.argsort(-score, kind="stable")
-    large = np.abs(w) > LEAST
+    large = (np.abs(w) > LEAST) & (np.abs(size) <= [one.most for one in alternatives])
     best = np.max(score[large], initial=-np.inf)
     named = large & (best - score < ALIKE)
     delta = noncentrality()
