@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 from scipy.special import erf
-from scipy.stats import binom, poisson
+from scipy.special import bdtrc, pdtrc
 
 from tankcal.errors import Problem
 from tankcal.messages import message
@@ -152,7 +152,7 @@ def _of_copies(straps):
             equal = [one for one in several[:place] if one.reading_m == strap.reading_m]
             again += [(equal[0], strap)] if equal else []
             chances.append(min(1.0, place * chance_of_equal(strap.sd_m, digit)))
-    if again and binom.sf(len(again) - 1, len(chances), np.mean(chances)) < BY_CHANCE:
+    if again and bdtrc(len(again) - 1, len(chances), np.mean(chances)) < BY_CHANCE:
         yield from (_copied(*pair) for pair in again)
     yield from _of_copied_circumferences(tuple(by_name.values()), digit)
 
@@ -173,7 +173,7 @@ def _of_copied_circumferences(read, digit_m):
         expected += near * np.prod([chance_of_equal(one.sd_m, digit_m) for one in first[1:]])
         if [one.reading_m for one in first] == [one.reading_m for one in second]:
             found.append(_copied(first[0], second[0]))
-    if found and poisson.sf(len(found) - 1, expected) < BY_CHANCE:
+    if found and pdtrc(len(found) - 1, expected) < BY_CHANCE:
         yield from found
 
 
