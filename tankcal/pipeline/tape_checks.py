@@ -3,8 +3,7 @@
 from itertools import combinations
 
 import numpy as np
-from scipy.special import erf
-from scipy.special import bdtrc, pdtrc
+from scipy.special import bdtrc, erf, pdtrc
 
 from tankcal.errors import Problem
 from tankcal.messages import message
