@@ -19,7 +19,8 @@ FILE = "circumferences.csv"
 NOMINAL_SHARE = 1 / 500  # of the radius: a course that departs by more from the nominal one
 FLUSH, LEAST_STEP_M = 0.5, 1e-3  # of a step of plates that the outside shows; that shows it
 SHORT_BY_PLATES = 0.5, 1.5  # of a plate: so short of the nominal radius
-EXCHANGED_ALPHA, EXCHANGED_M = 0.02, 1.5e-3  # of sound shells; steps that are saved, at least
+EXCHANGED_SHARE, EXCHANGED_M = 0.4, 1.5e-3  # of the steps between courses: left, and saved
+BY_CHANCE = 0.05  # of sound courses that scatter as much so many look so much better, at most
 DRAWS = 1000  # of sound shells
 APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
 
@@ -200,9 +201,9 @@ def exchanged_courses(outside_m, plates_m, both):
     Returns
     -------
     (int, int, float, float) or None
-        The pair, the sum of the steps with it exchanged, and as it is, m; None: courses whose
-        inside radii scatter as much by chance look so much better exchanged in over one of fifty
-        shells.
+        The pair, the sum of the steps with it exchanged, and as it is, m; None: too little is
+        saved, or courses whose inside radii scatter as much look so much better exchanged by
+        chance in over one of twenty shells.
 
     Examples
     --------
@@ -217,11 +218,11 @@ def exchanged_courses(outside_m, plates_m, both):
     steps = float(_steps(inside))
     left, pairs = _steps_exchanged(outside_m, plates_m, both)
     best = int(np.argmin(left))
-    if steps - left[best] <= EXCHANGED_M:
+    if left[best] >= EXCHANGED_SHARE * steps or steps - left[best] <= EXCHANGED_M:
         return None
     sound = np.random.default_rng(0).normal(size=(DRAWS, len(inside))) * np.std(inside, ddof=1)
     shares = np.min(_steps_exchanged(sound + plates_m, plates_m, both)[0], axis=-1) / _steps(sound)
-    if np.mean(shares <= left[best] / steps) >= EXCHANGED_ALPHA:
+    if np.mean(shares <= left[best] / steps) > BY_CHANCE:
         return None
     return *pairs[best], float(left[best]), steps
 
