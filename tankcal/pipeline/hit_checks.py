@@ -23,6 +23,7 @@ RULES, CONTROL = "wall_hits", "control_readings.csv"
 UNLIKE_SDS = 3.0  # of an offset or a scale from its certificate, of an angle from its repeat
 OVER_JOINT_M = 0.02  # a hit of a course may lie so far beyond it
 SUSPECT = 3.0  # test quantity of the worst set-up, from which it is tested by all others
+WAVE_M = 3e-3  # sd of each long wave of a wall, when a set-up is tested
 MOVED_M = 4e-3  # of its hits or its station: less looks like the form of the wall
 SHOWN = 5
 GON = FULL_TURN / 400
@@ -179,7 +180,8 @@ def _of_setups(job, wall, sighting):
     away = (sighting.points.xyz_m - sighting.poses.xyz_m[sighting.pose])[counted, :2]
     normal = sighting.normal[counted, :2]
     turn = normal[:, 0] * away[:, 1] - normal[:, 1] * away[:, 0]
-    tests = moved_setups(wall.field, whole, names[at], np.column_stack([turn, normal]), SUSPECT)
+    columns = np.column_stack([turn, normal])
+    tests = moved_setups(wall.field, whole, names[at], columns, SUSPECT, wave_m=WAVE_M)
     name = max(tests, key=lambda one: tests[one][0])
     w, turned, shift = tests[name]
     moved_m = max(float(np.hypot(*shift)), abs(turned) * float(np.median(np.hypot(*away.T))))

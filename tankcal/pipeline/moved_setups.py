@@ -5,6 +5,10 @@ together, and no single one departs from its neighbours. With P the precision of
 the wall, without what is free, and A their derivative by the turn and the shift of a set-up,
 
     s = (A' P A)^-1 A' P y,     w^2 = s' A' P A s,  a chi-square of three where nothing moved.
+
+A set-up that sees few places takes waves of the wall for a shift of its own: of six hits round a
+ring five or seven waves look like one. Where the others see enough to tell them, the waves that
+shells and foundations have are all but free, whatever the spectrum of the field says of them.
 """
 
 from dataclasses import replace
@@ -17,9 +21,10 @@ from tankcal.geometry.field.blunders import restricted_precision
 from tankcal.geometry.field.sites import free_design
 
 ALPHA = 0.001  # of the test of a set-up, over the number of set-ups
+WAVES = np.arange(2, 9)  # round a wall, of every course alike
 
 
-def moved_setups(field, whole, names, columns, suspect_from):
+def moved_setups(field, whole, names, columns, suspect_from, *, wave_m=0.0):
     """How much each set-up looks as if it had moved.
 
     Parameters
@@ -34,13 +39,15 @@ def moved_setups(field, whole, names, columns, suspect_from):
         Derivative of these by the turn of the set-up's circle, rad, and its shift in x and y, m.
     suspect_from : float
         Test quantity of the worst set-up, from which it is tested by all others alone.
+    wave_m : float
+        Standard deviation of each long wave of the wall, beside what the field has of it.
 
     Returns
     -------
     dict
         {set-up: (w, its turn alone rad, its shift alone (2,) m)}.
     """
-    count = len(names)
+    count, whole = len(names), whole + _waves(field.sites, wave_m)
     precision, pull = tested(field, whole, count)
     found = {
         name: _as_if_moved(columns, names == name, precision, pull)
@@ -62,11 +69,21 @@ def tested(field, whole, count):
     return precision[:count, :count], pull[:count]
 
 
+def _waves(sites, wave_m):
+    """(n, n) covariance of the radii by waves of that height; none of a whole turn."""
+    angles = np.outer(sites.azimuth_rad, WAVES)
+    columns = wave_m * np.nan_to_num(np.hstack([np.cos(angles), np.sin(angles)]))
+    columns[~np.isfinite(sites.azimuth_rad)] = 0.0
+    return columns @ columns.T
+
+
 def _without(field, more_m2, mine):
     """Covariance of the readings with amplitudes that those of a set-up do not tell; None: the
     others tell nothing.
 
     A set-up that was moved looks like a form of the wall, if it is asked itself how large that is.
+
+    more_m2  of the readings beside the field and its noise: what shares causes, and waves
     """
     keep = np.ones(len(field.radius_m), dtype=bool)
     keep[: len(mine)] = ~mine

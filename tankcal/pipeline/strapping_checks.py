@@ -4,7 +4,7 @@ Causes are named where one fits: courses exchanged, a reading of the inside, a s
 itself. What the tapes and their readings say of themselves: `tape_checks`.
 """
 
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import numpy as np
 
@@ -20,6 +20,8 @@ NOMINAL_SHARE = 1 / 500  # of the radius: a course that departs by more from the
 FLUSH, LEAST_STEP_M = 0.5, 1e-3  # of a step of plates that the outside shows; that shows it
 SHORT_BY_PLATES = 0.5, 1.5  # of a plate: so short of the nominal radius
 EXCHANGED_SHARE, EXCHANGED_M = 0.4, 1.5e-3  # of the steps between courses: left, and saved
+BY_CHANCE = 0.05  # of sound courses that scatter as much so many look so much better, at most
+DRAWS = 1000  # of sound shells
 APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826  # of differences within a course
 
 
@@ -168,28 +170,71 @@ def _of_courses(job, straps):
                 miss_mm=1000 * (radius - median),
             )
             yield _problem(text, column="course")
-    outside, saved = straps.radius_m, []
-    steps = _steps(inside)
     strapped = {one.strap.course for one in straps.reduced}
     both = [i for i, name in enumerate(names) if name in strapped]  # lines tell the others
-    for i, k in combinations(both, 2):
-        turned = outside.copy()
-        turned[[i, k]] = outside[[k, i]]
-        saved.append((_steps(turned - plates), i, k))
-    if saved:
-        left, i, k = min(saved)
-        if left < EXCHANGED_SHARE * steps and steps - left > EXCHANGED_M:
-            text = message(
-                "courses_exchanged",
-                "with the readings of courses {one!r} and {other!r} exchanged the steps between"
-                " courses would add up to {left_mm:.1f} mm in place of {steps_mm:.1f} mm: are"
-                " they mixed up?",
-                one=names[i],
-                other=names[k],
-                left_mm=1000 * left,
-                steps_mm=1000 * steps,
-            )
-            yield _problem(text, column="course")
+    exchanged = exchanged_courses(straps.radius_m, plates, both)
+    if exchanged is not None:
+        one, other, left, steps = exchanged
+        text = message(
+            "courses_exchanged",
+            "with the readings of courses {one!r} and {other!r} exchanged the steps between"
+            " courses would add up to {left_mm:.1f} mm in place of {steps_mm:.1f} mm: are"
+            " they mixed up?",
+            one=names[one],
+            other=names[other],
+            left_mm=1000 * left,
+            steps_mm=1000 * steps,
+        )
+        yield _problem(text, column="course")
+
+
+def exchanged_courses(outside_m, plates_m, both):
+    """The pair of courses that look exchanged, by the steps between neighbouring courses.
+
+    Parameters
+    ----------
+    outside_m, plates_m : ndarray, shape (courses,)
+        Radius of the outside, and plate with paint.
+    both : sequence of int
+        Courses that may be exchanged.
+
+    Returns
+    -------
+    (int, int, float, float) or None
+        The pair, the sum of the steps with it exchanged, and as it is, m; None: too little is
+        saved, or courses whose inside radii scatter as much look so much better exchanged by
+        chance in over one of twenty shells.
+
+    Examples
+    --------
+    >>> plates = np.array([10, 9, 8, 7, 6.3, 6.3]) / 1000
+    >>> inside = 6.5 + np.array([0.1, -0.2, 0.2, 0.0, -0.1, 0.1]) / 1000
+    >>> exchanged_courses((inside + plates)[[0, 4, 2, 3, 1, 5]], plates, range(6))[:2]
+    (1, 4)
+    """
+    if len(both) < 2:
+        return None
+    inside = outside_m - plates_m
+    steps = float(_steps(inside))
+    left, pairs = _steps_exchanged(outside_m, plates_m, both)
+    best = int(np.argmin(left))
+    if left[best] >= EXCHANGED_SHARE * steps or steps - left[best] <= EXCHANGED_M:
+        return None
+    sound = np.random.default_rng(0).normal(size=(DRAWS, len(inside))) * np.std(inside, ddof=1)
+    shares = np.min(_steps_exchanged(sound + plates_m, plates_m, both)[0], axis=-1) / _steps(sound)
+    if np.mean(shares <= left[best] / steps) > BY_CHANCE:
+        return None
+    return *pairs[best], float(left[best]), steps
+
+
+def _steps_exchanged(outside_m, plates_m, both):
+    """(..., k) steps between courses with each pair of them exchanged, and the pairs."""
+    pairs, left = list(combinations(both, 2)), []
+    for i, k in pairs:
+        turned = outside_m.copy()
+        turned[..., [i, k]] = outside_m[..., [k, i]]
+        left.append(_steps(turned - plates_m))
+    return np.stack(left, axis=-1), pairs
 
 
 def _steps_inside(job, straps, plates_m):
@@ -230,8 +275,8 @@ def _of_first_course(job, straps):
 
 
 def _steps(radii_m):
-    """Sum of the steps between neighbouring courses."""
-    return float(sum(abs(high - low) for low, high in pairwise(radii_m)))
+    """(...) sum of the steps between neighbouring courses, of radii (..., courses)."""
+    return np.abs(np.diff(radii_m, axis=-1)).sum(axis=-1)
 
 
 def _uncontrolled(job, wall):

@@ -24,6 +24,7 @@ SHOWN = 5
 SUSPECT = 2.0  # test quantity of the worst set-up, from which it is tested by all others
 MANY_LEVELS = 0.5  # of them, off: it is the heights as a whole
 LOST = 0.5  # of the tangents of a set-up, rejected: the set-up is to blame
+WAVES = np.arange(2, 9)  # round a wall: longer than a plate
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,7 @@ def check_tangents(job, wall, touching):
     tests = judge_tangents(job, wall, touching)
     return (
         *_of_levels(job, wall),
+        *_of_places(job, touching),
         *_of_heights(job, touching),
         *_of_setups(job, tests),
         *check_nominal(job, wall, job.tangents.file),
@@ -128,6 +130,55 @@ def _of_levels(job, wall):
             least=least,
         )
         yield Problem(job.tangents.file, text)
+
+
+def _of_places(job, touching):
+    """Limbs that fall on the same places of the wall: a wave round it looks like its radius."""
+    level, levels = job.tangents.levels
+    least, found = least_tangents(job), []
+    for one in range(len(levels)):
+        normals = touching.normal_rad[(level == one) & ~job.tangents.check]
+        if len(normals) >= least:  # of fewer another check tells
+            found.append(wave_in_radius(normals))
+    if not found:
+        return
+    wave, share = sorted(found, key=lambda each: each[1])[len(found) // 2]
+    if share > limits_of(RULES)["wave_in_radius"]:
+        text = message(
+            "limbs_coincide",
+            "the limbs of the set-ups fall on nearly the same places of the wall: of {wave} waves"
+            " round the tank {percent:.0f} % of their height may go into the radius, and how high"
+            " they are is assumed; stations nearer to the tank or farther off would spread them",
+            wave=wave,
+            percent=100 * share,
+        )
+        yield Problem("setups.csv", text, column="station")
+
+
+def wave_in_radius(normal_rad):
+    """The wave round a wall that looks most like its radius to tangents, and by how much.
+
+    Parameters
+    ----------
+    normal_rad : ndarray, shape (n,)
+        Azimuths of their normals.
+
+    Returns
+    -------
+    wave : int
+    share : float
+        Of its amplitude that may go into the mean of the tangents, |mean of exp(i k f)|.
+
+    Examples
+    --------
+    >>> pairs = np.radians([0, 0, 60, 60, 120, 120, 180, 180, 240, 240, 300, 300])
+    >>> wave_in_radius(pairs)
+    (6, 1.0)
+    >>> round(wave_in_radius(np.radians(30) * np.arange(12))[1], 6)
+    0.0
+    """
+    shares = np.abs(np.mean(np.exp(1j * np.outer(WAVES, normal_rad)), axis=1))
+    return int(WAVES[np.argmax(shares)]), round(float(np.max(shares)), 12)
 
 
 def _of_heights(job, touching):

@@ -264,6 +264,33 @@ def test_a_set_up_whose_circle_was_turned_before_its_hits_is_named(tmp_path, tur
     assert named == ([("setups.csv", "hits_of_moved_setup")] if turn_deg else [])
 
 
+def five_and_seven(azimuth, z):
+    """Radius: five waves round, and seven, which six hits round a ring take for one."""
+    return 6.5 + 0.003 * (np.cos(5 * azimuth - 1.0) + np.cos(7 * azimuth + 0.4)) + 0 * z
+
+
+@pytest.mark.slow
+def test_long_waves_of_a_wall_move_no_set_up(tmp_path):
+    """Exact geometry: three sound set-ups that see six places each, between those of the others."""
+    surface, tool, rng = Surface(five_and_seven, FOOT, SLOPE), NOISY, np.random.default_rng(4)
+    stations = 2.5 * np.array([[0, 1, 0.6], [0.87, -0.5, 0.64], [-0.87, -0.5, 0.68]])
+    targets, names = surface.at(np.arange(4) * 1.7, np.array([1.0, 2.0, 1.5, 5.0])), list("ABCD")
+    rows, readings = [], {}
+    for i, at in enumerate(stations):
+        readings[f"E{i}"] = (names, observe(at, targets, tool, rng, i))
+        aims = even_aims(surface, LEVELS, 6, turn=0.3 * i)
+        rows += rows_of(f"E{i}", take_hits(surface, at, aims, tool, rng, i))
+    parts = hit_parts(rows, adjustment__datum="inner")
+    parts.tables |= network_tables(readings)
+    setups = [[f"E{i}", f"SE{i}", "TS", 0.0] for i in range(3)]
+    parts.tables["setups"] = [["setup", "station", "instrument", "instrument_height_m"], *setups]
+    parts.tables["control"] = [
+        ["point", "x_m", "y_m", "z_m"],
+        *([f"SE{i}", *map(float, at)] for i, at in enumerate(stations)),
+    ]
+    assert "hits_of_moved_setup" not in told_codes(run(tmp_path, parts))
+
+
 @pytest.mark.slow
 def test_straps_tell_an_unknown_offset(tmp_path):
     parts = strapped(parts_of(tool=Tool(offset_m=0.002)))

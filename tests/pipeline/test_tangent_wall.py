@@ -56,10 +56,12 @@ def inside_of(radius):
     return np.trapezoid(areas, z)
 
 
-def sights(radius=oval, tool=LIMB, rng=None, levels=LEVELS, disturbed=None, steps=400):
+def sights(
+    radius=oval, tool=LIMB, rng=None, levels=LEVELS, disturbed=None, steps=400, stations=STATIONS
+):
     """Rows of tangents.csv of all set-ups; disturbed: {set-up: rad that its circle turned}."""
     surface, found = Surface(radius, FOOT, SLOPE), []
-    for i, (at, zero) in enumerate(zip(STATIONS, ZEROS, strict=True)):
+    for i, (at, zero) in enumerate(zip(stations, ZEROS[: len(stations)], strict=True)):
         name = f"I{i + 1}"
         turned = replace(tool, turned_rad=(disturbed or {}).get(name, 0.0))
         read = take_tangents(surface, at, levels, 6.5, turned, rng, zero, steps=steps)
@@ -119,6 +121,27 @@ def test_valleys_are_within_U(tmp_path):
     result = run(tmp_path, parts_of(sights(valley, rng=np.random.default_rng(2)), seed=2))
     error = result.table.volume_m3[-1] - inside_of(valley)
     assert 0 < error < result.table.U_m3[-1]  # no tangent sees it
+
+
+def waves(azimuth, z):
+    """Radius: six waves round, highest where six stations at twice the radius see the wall."""
+    return 6.5 + 0.003 * np.cos(6 * azimuth) + 0 * z
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("distance_m", "is_told"), [(13.0, True), (6.5 * 2**0.5, False)])
+def test_limbs_on_the_same_places_are_told(tmp_path, distance_m, is_told):
+    """Closed form: six waves go into the radius where the limbs of two and two coincide, and not
+    where these lie evenly.
+    """
+    stations = ring_of_stations(6, distance_m)
+    rows = sights(waves, Circle(), stations=stations, steps=2000)
+    parts = tangent_parts(rows, traverse_tables(stations, ZEROS[:6], Tool()))
+    result = run(tmp_path, parts)
+    told = {one.expected.code for one in result.warnings}
+    assert ("limbs_coincide" in told) == is_told
+    off = result.table.volume_m3[-1] / inside_of(waves) - 1
+    assert off == pytest.approx(2 * 0.003 / 6.5 * is_told, abs=1.5e-4)  # the foot is 0.36 m off
 
 
 @pytest.mark.slow
