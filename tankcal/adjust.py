@@ -24,6 +24,7 @@ from tankcal.messages import message
 
 ALPHA, POWER = 0.001, 0.80  # of every test of single readings, and of the blunder it can show
 CRITICAL = 3.29  # of a test statistic: ALPHA, two-sided normal, to the digits of the field
+WELL_PLACED = 1e-3  # pivot of those that loses three digits of sixteen: above it they will do
 SMALLEST_PIVOT = 1e-12  # of normal equations with ones in the diagonal: below it is rounding
 
 
@@ -157,7 +158,7 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
             minus_qb = -(q @ b.T)
             whiten, w_there = _whitener(-(b @ minus_qb)), w - b @ v
         aw, ww = whiten(a), whiten(w_there)
-        step, cofactor, basis = _solve(aw, ww)
+        step, inverse, basis = _solve(aw, ww)
         x = x + step
         normalised = ww + aw @ step
         v_before, v = v, minus_qb @ whiten(normalised, transposed=True)
@@ -167,9 +168,10 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
         limit = tolerance * len(w) ** 0.5
         only_rounding_left = size > before / 2 and size < 1e4 * limit
         if size <= limit or only_rounding_left:
+            basis = aw @ inverse if basis is None else basis
             return Adjustment(
                 unknowns=x,
-                cofactor=cofactor,
+                cofactor=inverse @ inverse.T,
                 normalised=normalised,
                 chi2=float(normalised @ normalised),
                 rows=len(w),
@@ -384,7 +386,11 @@ def _diagonal_whitener(diagonal):
 
 
 def _solve(a, w):
-    """Step, cofactor matrix and an orthonormal basis of the columns, by QR with scaled columns."""
+    """Step, R^-1 whose square is the cofactor matrix, and A R^-1, an orthonormal basis.
+
+    By the Cholesky factor of the normal equations where columns of length one are far from
+    depending on each other (the basis is None then: it is quickly had), else by QR.
+    """
     scale = np.linalg.norm(a, axis=0)
     if not np.all(np.isfinite(scale)):
         raise SolutionError(
@@ -394,7 +400,12 @@ def _solve(a, w):
             )
         )
     scale[scale == 0] = 1.0
-    basis, r, order = scipy.linalg.qr(a / scale, mode="economic", pivoting=True, check_finite=False)
+    scaled = a / scale
+    root, wrong = scipy.linalg.lapack.dpotrf(scaled.T @ scaled, lower=True)
+    if not wrong and np.diag(root).min(initial=1.0) ** 2 > WELL_PLACED:
+        inverse = scipy.linalg.lapack.dtrtri(root, lower=True)[0].T / scale[:, None]
+        return -inverse @ (inverse.T @ (a.T @ w)), inverse, None
+    basis, r, order = scipy.linalg.qr(scaled, mode="economic", pivoting=True, check_finite=False)
     rank = int(np.sum(find_determined(np.diag(r), len(a))))
     if rank < a.shape[1]:
         raise SolutionError(
@@ -404,4 +415,4 @@ def _solve(a, w):
     inverse = np.empty_like(r)
     inverse[order] = scipy.linalg.solve_triangular(r, np.eye(len(r)), check_finite=False)
     inverse /= scale[:, None]
-    return -inverse @ (basis.T @ w), inverse @ inverse.T, basis
+    return -inverse @ (basis.T @ w), inverse, basis

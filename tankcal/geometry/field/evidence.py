@@ -9,6 +9,7 @@ the heights of the bulge.
 import numpy as np
 import scipy.linalg
 
+from tankcal.adjust import find_determined
 from tankcal.geometry.field.components import (
     COMPONENTS,
     azimuth_correlations,
@@ -146,11 +147,17 @@ def _gathered(azimuth_rad, near_rad):
     return place, means % FULL_TURN
 
 
+def _left_free(columns):
+    """(n, m) orthonormal basis of what columns (n, p) leave free."""
+    basis, r, _ = scipy.linalg.qr(columns, pivoting=True, check_finite=False)
+    return basis[:, np.count_nonzero(find_determined(np.diag(r), len(columns))) :]
+
+
 def _part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise):
     columns, spread, missed = common
     common_ones, own_ones = _shown(sites)
     azimuth, zeta = sites.azimuth_rad[members], sites.zeta[members]
-    left = scipy.linalg.null_space(sites.free_columns(members).T)
+    left = _left_free(sites.free_columns(members))
 
     def seen(covariance):
         return left.T @ covariance @ left
