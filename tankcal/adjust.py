@@ -105,7 +105,8 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
         Start values.
     observations : (n,) array
     covariance : array or sparse matrix
-        (n,) variances, or (n, n) dense or sparse.
+        (n,) variances, or (n, n) dense or sparse; or (m, d, d) of points, n = m d, that nothing
+        has in common: then each condition is of one of them, and the last Jacobian is (m, d).
     max_iterations : int
     tolerance : float
         The largest last step of an unknown or residual, in standard deviations; a step that no
@@ -139,7 +140,8 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
     l = np.asarray(observations, dtype=float)
     v, size = np.zeros_like(l), np.inf
     q = scipy.sparse.diags_array(covariance) if np.ndim(covariance) == 1 else covariance
-    sd = np.sqrt(np.maximum(q.diagonal(), np.finfo(float).tiny))
+    variances = np.einsum("kii->ki", q).ravel() if np.ndim(q) == 3 else q.diagonal()
+    sd = np.sqrt(np.maximum(variances, np.finfo(float).tiny))
     by_weights = cache(lambda: _whitener(q))
     for iteration in range(1, max_iterations + 1):
         w, a, b = model(x, l + v)
@@ -155,8 +157,8 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
         if b is None:  # B = -I
             minus_qb, whiten, w_there = q, by_weights(), w + v
         else:
-            minus_qb = -(q @ b.T)
-            whiten, w_there = _whitener(-(b @ minus_qb)), w - b @ v
+            minus_qb, whiten, bv = _of_conditions(q, b, v)
+            w_there = w - bv
         aw, ww = whiten(a), whiten(w_there)
         step, inverse, basis = _solve(aw, ww)
         x = x + step
@@ -340,6 +342,29 @@ def find_determined(pivots, rows, of_normals=False):
         return pivots**2 >= SMALLEST_PIVOT
     limit = max(rows, len(pivots)) * np.finfo(float).eps
     return pivots > limit * pivots.max(initial=0.0)
+
+
+def _of_conditions(q, b, v):
+    """-Q B', the function that multiplies by L^-1 with L L' = B Q B', and B v."""
+    if np.ndim(q) == 3:
+        own = _OwnBlocks(-np.einsum("kij,kj->ki", q, b))
+        return (
+            own,
+            _diagonal_whitener(-np.sum(b * own.rows, axis=1)),
+            np.sum(b * v.reshape(b.shape), axis=1),
+        )
+    minus_qb = -(q @ b.T)
+    return minus_qb, _whitener(-(b @ minus_qb)), b @ v
+
+
+@dataclass(frozen=True)
+class _OwnBlocks:
+    """A matrix (k d, k) that is zero but for d rows of each column, as (k, d)."""
+
+    rows: np.ndarray
+
+    def __matmul__(self, vector):
+        return (self.rows * vector[:, None]).ravel()
 
 
 def _whitener(m):
