@@ -15,6 +15,7 @@ logarithm of the variance is normal: about that of `median_m`, with `log_sd`.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -72,9 +73,16 @@ class Component:
         """(n, r) columns whose products are h; not of a component that is local."""
         if self.orders == "joints":
             return joint_profile(zeta)[:, None]
+        used, scale = self._scales
+        return legendre(zeta, used[-1])[:, used] * scale
+
+    @cached_property
+    def _scales(self):
+        """Orders that have a variance, and its roots, so that the mean of h is one."""
         weights = np.array(self.orders, dtype=float)
         weights = weights / np.sum(weights / (2 * np.arange(len(weights)) + 1))
-        return (legendre(zeta, len(weights) - 1) * np.sqrt(weights))[:, weights > 0]
+        used = np.flatnonzero(weights)
+        return used, np.sqrt(weights[used])
 
     def columns(self, waves, zeta):
         """(n, k) columns whose products are the covariance, of a mean or an oval.
@@ -119,7 +127,12 @@ COMPONENTS = (
 
 def legendre(zeta, highest):
     """(n, highest + 1) Legendre polynomials of order 0 to the highest."""
-    return np.polynomial.legendre.legvander(np.asarray(zeta, dtype=float), highest)
+    zeta = np.asarray(zeta, dtype=float)
+    found = np.ones((len(zeta), highest + 1))
+    found[:, 1:2] = zeta[:, None]
+    for n in range(2, highest + 1):
+        found[:, n] = (2 - 1 / n) * zeta * found[:, n - 1] - (1 - 1 / n) * found[:, n - 2]
+    return found
 
 
 def joint_profile(zeta):
