@@ -174,7 +174,8 @@ def seam_correlation(difference_rad, radius_m, length_m=SEAM_LENGTH_M):
 def _seams_between(azimuth_rad, other_rad, radius_m):
     """(n, m) `seam_correlation` between azimuths, in pieces of rows that a processor keeps at hand.
 
-    exp(-b x) is a quotient of exp(b a), so that there are no more exponentials than azimuths.
+    exp(-b x) is a quotient of exp(b a), so that there are no more exponentials than azimuths. Of
+    azimuths with themselves one half is computed, and mirrored.
     """
     b = radius_m / SEAM_LENGTH_M
     first, second = azimuth_rad % FULL_TURN - np.pi, other_rad % FULL_TURN - np.pi
@@ -184,13 +185,16 @@ def _seams_between(azimuth_rad, other_rad, radius_m):
     scale, near_by, far_by = _of_modes(b, turn)
     scale /= _seam_sum(b)
     grows, falls = np.exp(b * second), np.exp(-b * second)
-    found = np.empty((len(first), len(second)))
+    low = [np.stack([np.ones(len(a)), np.cos(a), np.sin(a)], axis=1) for a in (first, second)]
+    low[0] *= np.array([b**-4, *2 * [2 / (1 + b**2) ** 2]]) / _seam_sum(b)
+    found, mirrored = np.empty((len(first), len(second))), azimuth_rad is other_rad
     for start in range(0, len(first), at_once):
-        here = first[start : start + at_once]
-        x = np.abs(np.subtract.outer(here, second))
+        rows, to = slice(start, start + at_once), slice(start if mirrored else 0, None)
+        here = first[rows]
+        x = np.abs(np.subtract.outer(here, second[to]))
         np.minimum(x, FULL_TURN - x, out=x)
-        one = np.multiply.outer(np.exp(b * here), falls)
-        other = np.multiply.outer(np.exp(-b * here), grows)
+        one = np.multiply.outer(np.exp(b * here), falls[to])
+        other = np.multiply.outer(np.exp(-b * here), grows[to])
         near, around = np.minimum(one, other), np.maximum(one, other, out=one)
         around *= turn  # the same along the other way
         np.maximum(near, around, out=near)
@@ -202,10 +206,10 @@ def _seams_between(azimuth_rad, other_rad, radius_m):
         x += near_by
         near *= x
         near += far
-        np.multiply(near, scale, out=found[start : start + at_once])
-    low = [np.stack([np.ones(len(a)), np.cos(a), np.sin(a)], axis=1) for a in (first, second)]
-    taken = np.array([b**-4, *2 * [2 / (1 + b**2) ** 2]]) / _seam_sum(b)
-    found -= (low[0] * taken) @ low[1].T
+        near *= scale
+        np.subtract(near, low[0][rows] @ low[1][to].T, out=found[rows, to])
+        if mirrored:
+            found[to, rows] = found[rows, to].T
     return found
 
 
@@ -268,7 +272,9 @@ def azimuth_correlations(azimuth_rad, other_rad, radius_m):
 
 def seam_correlations(azimuth_rad, other_rad, radius_m):
     """(n, m) c of "seam", as `azimuth_correlations` gives it."""
-    found = _seams_between(np.nan_to_num(azimuth_rad), np.nan_to_num(other_rad), radius_m)
+    known = np.nan_to_num(azimuth_rad)
+    other = known if other_rad is azimuth_rad else np.nan_to_num(other_rad)
+    found = _seams_between(known, other, radius_m)
     found[~np.isfinite(azimuth_rad)] = 0.0
     found[:, ~np.isfinite(other_rad)] = 0.0
     return found

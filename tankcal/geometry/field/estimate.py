@@ -198,7 +198,8 @@ class WallField:
     @property
     def covariance_m2(self):
         """(n, n) V: of the readings, by the wall and by their noise."""
-        whole = self._covariances.total(self.amplitudes.variances_m2) + self.noise_m2
+        whole = self._covariances.total(self.amplitudes.variances_m2)
+        whole += self.noise_m2
         whole.flat[:: len(whole) + 1] += LEAST_NOISE_M**2
         return whole
 
