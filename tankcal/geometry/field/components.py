@@ -19,6 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
+from tankcal.geometry.form import multiples
 from tankcal.geometry.outlines import FULL_TURN
 
 OVALITY_MODES = np.arange(2.0, 37.0)
@@ -148,8 +149,7 @@ def oval_columns(azimuth_rad):
 
     nan: the mean of a whole turn, which has none of them.
     """
-    angles = np.outer(azimuth_rad, OVALITY_MODES)
-    waves = np.hstack([np.cos(angles), np.sin(angles)])
+    waves = np.hstack([one[:, 1:] for one in multiples(azimuth_rad, int(OVALITY_MODES[-1]))])
     waves[~np.isfinite(azimuth_rad)] = 0.0
     return waves * np.tile(np.sqrt(OVALITY_WEIGHTS), 2)
 

@@ -20,6 +20,7 @@ from tankcal.geometry.field.components import (
 )
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, Likelihood, Part, prior_of
 from tankcal.geometry.field.sites import free_design
+from tankcal.geometry.form import multiples
 from tankcal.geometry.outlines import FULL_TURN
 
 SMALLEST = 1e-8  # of a variance: what is left of a covariance that is followed is not quite zero
@@ -109,8 +110,8 @@ def _common_values(sites, nominal_m):
         along = azimuth_correlations(azimuths, azimuths, nominal_m)
     else:
         modes = np.arange(2.0, MOST_FOLLOWED // 2 + 2)
-        angles = np.outer(sites.azimuth_rad, modes)
-        around = np.nan_to_num(np.hstack([np.cos(angles), np.sin(angles)]))
+        waves = multiples(sites.azimuth_rad, int(modes[-1]))
+        around = np.nan_to_num(np.hstack([one[:, 1:] for one in waves]))
         along = {
             shape: np.diag(np.tile(share, 2))
             for shape, share in mode_shares(modes, nominal_m).items()
