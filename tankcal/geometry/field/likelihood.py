@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.geometry.field.misfit import Misfit, rounded
-from tankcal.geometry.field.search import descend
+from tankcal.geometry.field.search import descend, improved
 
 NOISE_MEDIAN_M, NOISE_LOG_SD = 2e-3, 3.0  # of readings without a given standard deviation
 LEAST_M, MOST_M = 1e-5, 0.3  # amplitudes that are tried
@@ -26,6 +26,7 @@ MOST_STEPS, LOG_STEP = 60, 0.7  # on to the very top; of a logarithm at once
 SMALL_STEP, ROUGH_STEP = 1e-7, 0.03  # of a logarithm, that end a search
 MIRRORED = 64  # rows at once
 NEAR_TOP = 1e-4  # of a logarithm: so near the top the curvature is that of the top
+NEARLY = 3e-4  # a step that ends at a tenth of itself from the top, or nearer
 
 
 @dataclass(frozen=True)
@@ -49,23 +50,23 @@ class Part:
     values: np.ndarray
 
     def inverted(self, variances):
-        """Log of the determinant of the part's own covariance, and its inverse, lower half."""
+        """Log of the determinant of the part's own covariance, and its inverse, upper half."""
         if not len(self.fixed):  # of a course whose radius and centres leave nothing free
             return 0.0, self.fixed
         place, own, fixed, _ = self._halves
         covariance = np.zeros(self.fixed.shape)
         covariance.ravel()[place] = fixed + variances @ own
-        # the transpose of the upper half: the lower one, in columns, as LAPACK has it
+        # the transpose of the lower half: the upper one, in columns, as LAPACK has it
         root, wrong = scipy.linalg.lapack.dpotrf(
-            rounded(covariance).T, lower=True, clean=False, overwrite_a=True
+            rounded(covariance).T, clean=False, overwrite_a=True
         )
         if wrong:
             raise np.linalg.LinAlgError("Matrix is not positive definite")
         logarithm = 2 * np.sum(np.log(np.diag(root)))
-        return logarithm, scipy.linalg.lapack.dpotri(root, lower=True, overwrite_c=True)[0]
+        return logarithm, scipy.linalg.lapack.dpotri(root, overwrite_c=True)[0]
 
     def traces(self, precision):
-        """(q,) traces of the covariances times a symmetric matrix (m, m), lower half."""
+        """(q,) traces of the covariances times a symmetric matrix (m, m), upper half."""
         if not len(precision):
             return np.zeros(len(self.own))
         place, own, _, twice = self._halves
@@ -78,10 +79,10 @@ class Part:
 
     @cached_property
     def _halves(self):
-        """Places of the upper half in a matrix, own (q, h) and fixed (h,) there, and how often each
+        """Places of the lower half in a matrix, own (q, h) and fixed (h,) there, and how often each
         counts: in half the memory a search waits for them half as long.
         """
-        place = np.flatnonzero(np.triu(np.ones(self.fixed.shape)))
+        place = np.flatnonzero(np.tril(np.ones(self.fixed.shape)))
         twice = np.where(place % (len(self.fixed) + 1) == 0, 1.0, 2.0)
         own = self.own.reshape(len(self.own), -1).take(place, axis=1)
         return place, own, self.fixed.ravel()[place], twice
@@ -140,9 +141,9 @@ class Likelihood:
         covariance = self._covariance(there)
         if start is not None and there.slope @ covariance @ there.slope > FAR:
             return self.top(None, least_step)
-        taken_at, reach, longest = best, LOG_STEP, np.inf
+        taken_at, reach, longest, ahead = best, LOG_STEP, np.inf, covariance
         for _ in range(MOST_STEPS):
-            step = np.clip(-covariance @ there.slope / 2, -reach, reach)
+            step = np.clip(-ahead @ there.slope / 2, -reach, reach)
             moved = np.clip(best + step, *self.bounds.T)
             before, longest = longest, np.abs(moved - best).max()
             if longest < least_step:
@@ -151,10 +152,12 @@ class Likelihood:
             if longest > NEAR_TOP and further.value > there.value:
                 reach = longest / 4
                 continue
+            ahead = improved(ahead, moved - best, (further.slope - there.slope) / 2)
             best, there = moved, further
-            ends = longest < NEAR_TOP or longest > before / 2
+            ends = longest < NEARLY or longest > before / 2
             if ends and np.abs(best - taken_at).max() > NEAR_TOP:
                 taken_at, covariance = best, self._covariance(there)
+                ahead = covariance
         return best, covariance
 
     def _covariance(self, there):
