@@ -90,7 +90,7 @@ class WallField:
             if shape not in self.stated:
                 continue
             found += self._drawn(shape, zeta, slice(None), common=True)
-            for course, members in enumerate(self._members):
+            for course, members in enumerate(self._covariances.runs):
                 found[course] += self._drawn(shape, zeta, members, common=False)
         if "weld" in self.stated:
             for i, at_grid in self.peaks_at_grid.items():
@@ -108,7 +108,7 @@ class WallField:
         pull = height * self._explained[members]
         if shape == "mean":
             return pull.sum(axis=1, keepdims=True)
-        return pull @ self._to_grid[shape][:, self._covariances.place[members]].T
+        return pull @ self._covariances.at_sites(self._to_grid[shape], members).T
 
     def functionals(self, gradients_m):
         """`Functionals` of the wall: each the integral of a gradient times its radius.
@@ -283,7 +283,8 @@ class Functionals:
     def _along_sites(self, to_grid):
         """(courses, LEVELS, n) integrals of the gradients times a covariance (g, azimuths)."""
         flat = self._gradients.reshape(-1, len(to_grid)) @ to_grid  # in one product
-        return flat.reshape(*self._totals.shape, -1)[:, :, self._field._covariances.place]
+        flat = self._field._covariances.at_sites(flat)
+        return flat.reshape(*self._totals.shape, -1)
 
     def unseen(self, index):
         """(f, f) covariance of the functionals by what was not seen of one component."""
