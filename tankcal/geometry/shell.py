@@ -374,13 +374,13 @@ def _leaning_cylinder(local, course, candidates, circle, nominal_radius):
     wall = candidates & (np.abs(distance - circle[2]) < WIDE_BAND * nominal_radius)
     fitted = ~wall
     for band in np.repeat(np.geomspace(WIDE_BAND, WALL_BAND, 5), 3) * nominal_radius:
-        if np.any(fitted != wall):  # else the same points give the same axis
+        if np.any(fitted != wall):  # else the same points give the same axis, and the same radii
             rough, fitted = np.full(wall.sum(), 0.01), wall
             fit = adjust(*shell_problem(local[wall], course[wall], axis, rough, None, WIDEST_SLOPE))
             axis = fit.unknowns[:4]
             distance = distances_from_axis(local, axis)[1]
-        names, first = np.unique(course[wall], return_inverse=True)
-        radii = np.array([np.median(distance[wall][first == i]) for i in range(len(names))])
+            names, first = np.unique(course[wall], return_inverse=True)
+            radii = np.array([np.median(distance[wall][first == i]) for i in range(len(names))])
         # a course without a point so far is judged by its nearest neighbour
         nearest = np.abs(names[None, :] - course[:, None]).argmin(axis=1)
         wall = candidates & (np.abs(distance - radii[nearest]) < band)
