@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.geometry.field.misfit import Misfit, rounded
-from tankcal.geometry.field.search import descend, improved
+from tankcal.geometry.field.search import descend
 
 NOISE_MEDIAN_M, NOISE_LOG_SD = 2e-3, 3.0  # of readings without a given standard deviation
 LEAST_M, MOST_M = 1e-5, 0.3  # amplitudes that are tried
@@ -26,7 +26,6 @@ MOST_STEPS, LOG_STEP = 60, 0.7  # on to the very top; of a logarithm at once
 SMALL_STEP, ROUGH_STEP = 1e-7, 0.03  # of a logarithm, that end a search
 MIRRORED = 64  # rows at once
 NEAR_TOP = 1e-4  # of a logarithm: so near the top the curvature is that of the top
-NEARLY = 3e-4  # a step that ends at a tenth of itself from the top, or nearer
 
 
 @dataclass(frozen=True)
@@ -141,9 +140,9 @@ class Likelihood:
         covariance = self._covariance(there)
         if start is not None and there.slope @ covariance @ there.slope > FAR:
             return self.top(None, least_step)
-        taken_at, reach, longest, ahead = best, LOG_STEP, np.inf, covariance
+        taken_at, reach, longest = best, LOG_STEP, np.inf
         for _ in range(MOST_STEPS):
-            step = np.clip(-ahead @ there.slope / 2, -reach, reach)
+            step = np.clip(-covariance @ there.slope / 2, -reach, reach)
             moved = np.clip(best + step, *self.bounds.T)
             before, longest = longest, np.abs(moved - best).max()
             if longest < least_step:
@@ -152,12 +151,10 @@ class Likelihood:
             if longest > NEAR_TOP and further.value > there.value:
                 reach = longest / 4
                 continue
-            ahead = improved(ahead, moved - best, (further.slope - there.slope) / 2)
             best, there = moved, further
-            ends = longest < NEARLY or longest > before / 2
+            ends = longest < NEAR_TOP or longest > before / 2
             if ends and np.abs(best - taken_at).max() > NEAR_TOP:
                 taken_at, covariance = best, self._covariance(there)
-                ahead = covariance
         return best, covariance
 
     def _covariance(self, there):

@@ -56,31 +56,15 @@ def descend(function, start, reach, bounds, tolerance):
             part *= SHORTEN
         if not lower < value:
             break
-        inverse = improved(inverse, moved, its_slope - slope)
+        inverse = _improved(inverse, moved, its_slope - slope)
         gained, x, value, slope = value - lower, there, lower, its_slope
         if gained < tolerance * max(abs(value), 1.0):
             break
     return x, slope
 
 
-def improved(inverse, moved, turned):
-    """The inverse curvature after a step along which the slope turned by so much.
-
-    Parameters
-    ----------
-    inverse : ndarray, shape (n, n)
-    moved, turned : ndarray, shape (n,)
-
-    Returns
-    -------
-    ndarray, shape (n, n)
-
-    Examples
-    --------
-    >>> improved(np.eye(2), np.array([1.0, 0.0]), np.array([4.0, 0.0]))
-    array([[0.25, 0.  ],
-           [0.  , 1.  ]])
-    """
+def _improved(inverse, moved, turned):
+    """The inverse curvature after a step along which the slope turned by so much."""
     bend = moved @ turned
     if bend <= 0.0:
         return inverse
