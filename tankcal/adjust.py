@@ -6,8 +6,9 @@ each iteration at the adjusted observations:
     B v + A dx + w = 0,   M = B Q B',   dx = -(A' M^-1 A)^-1 A' M^-1 w,   v = -Q B' M^-1 (A dx + w)
 
 A model without B is a Gauss-Markov model, f = F(x) - l and B = -I. Everything is whitened with a
-Cholesky factor, and columns are scaled: well apart, they are solved by normal equations, else by QR,
-which judges the rank. Nothing is inverted but the covariance. Source: Mikhail & Ackermann 1976, Observations and Least Squares, ch. 9.
+Cholesky factor, and columns are scaled: those that are well apart are solved by normal equations,
+others by QR, which judges the rank. Nothing else is inverted but the covariance. Source: Mikhail &
+Ackermann 1976, Observations and Least Squares, ch. 9.
 """
 
 from dataclasses import dataclass
