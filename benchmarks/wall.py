@@ -6,7 +6,8 @@ Ten courses of 2 m, R 7.5 m, oval, bulging, with one seam and noise of 2 mm; poi
 wall. Each size runs in a process of its own with one BLAS thread, and the sizes take turns. Beside
 the seconds stands their ratio to those of the Cholesky factor of a matrix of 1600, the largest that
 the field of a wall takes. The goals: 1200 points in 0.5 s, 50 000 in 5 s and 1 GB. The first is
-not met: 0.75 to 0.8 s in November 2026, when 50 000 took 3.5 to 4.1 s and 0.38 GB.
+not met yet: 14 factors in November 2026, on a busy machine where the version before took 20, and
+0.75 to 0.8 s on a quiet one. Two fifths of it are the likelihood of the sizes of its components.
 """
 
 import os

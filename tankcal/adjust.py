@@ -6,8 +6,9 @@ each iteration at the adjusted observations:
     B v + A dx + w = 0,   M = B Q B',   dx = -(A' M^-1 A)^-1 A' M^-1 w,   v = -Q B' M^-1 (A dx + w)
 
 A model without B is a Gauss-Markov model, f = F(x) - l and B = -I. Everything is whitened with a
-Cholesky factor, columns are scaled before the rank is judged, and nothing is inverted but the
-covariance. Source: Mikhail & Ackermann 1976, Observations and Least Squares, ch. 9.
+Cholesky factor, and columns are scaled: those that are well apart are solved by normal equations,
+others by QR, which judges the rank. Nothing else is inverted but the covariance. Source: Mikhail &
+Ackermann 1976, Observations and Least Squares, ch. 9.
 """
 
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from tankcal.messages import message
 
 ALPHA, POWER = 0.001, 0.80  # of every test of single readings, and of the blunder it can show
 CRITICAL = 3.29  # of a test statistic: ALPHA, two-sided normal, to the digits of the field
+WELL_PLACED = 1e-3  # pivot of those that loses three digits of sixteen: above it they will do
 SMALLEST_PIVOT = 1e-12  # of normal equations with ones in the diagonal: below it is rounding
 
 
@@ -104,7 +106,8 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
         Start values.
     observations : (n,) array
     covariance : array or sparse matrix
-        (n,) variances, or (n, n) dense or sparse.
+        (n,) variances, or (n, n) dense or sparse; or (m, d, d) of points, n = m d, that nothing
+        has in common: then each condition is of one of them, and the last Jacobian is (m, d).
     max_iterations : int
     tolerance : float
         The largest last step of an unknown or residual, in standard deviations; a step that no
@@ -138,7 +141,8 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
     l = np.asarray(observations, dtype=float)
     v, size = np.zeros_like(l), np.inf
     q = scipy.sparse.diags_array(covariance) if np.ndim(covariance) == 1 else covariance
-    sd = np.sqrt(np.maximum(q.diagonal(), np.finfo(float).tiny))
+    variances = np.einsum("kii->ki", q).ravel() if np.ndim(q) == 3 else q.diagonal()
+    sd = np.sqrt(np.maximum(variances, np.finfo(float).tiny))
     by_weights = cache(lambda: _whitener(q))
     for iteration in range(1, max_iterations + 1):
         w, a, b = model(x, l + v)
@@ -154,10 +158,10 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
         if b is None:  # B = -I
             minus_qb, whiten, w_there = q, by_weights(), w + v
         else:
-            minus_qb = -(q @ b.T)
-            whiten, w_there = _whitener(-(b @ minus_qb)), w - b @ v
+            minus_qb, whiten, bv = _of_conditions(q, b, v)
+            w_there = w - bv
         aw, ww = whiten(a), whiten(w_there)
-        step, cofactor, basis = _solve(aw, ww)
+        step, inverse, basis = _solve(aw, ww)
         x = x + step
         normalised = ww + aw @ step
         v_before, v = v, minus_qb @ whiten(normalised, transposed=True)
@@ -167,9 +171,10 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
         limit = tolerance * len(w) ** 0.5
         only_rounding_left = size > before / 2 and size < 1e4 * limit
         if size <= limit or only_rounding_left:
+            basis = aw @ inverse if basis is None else basis
             return Adjustment(
                 unknowns=x,
-                cofactor=cofactor,
+                cofactor=inverse @ inverse.T,
                 normalised=normalised,
                 chi2=float(normalised @ normalised),
                 rows=len(w),
@@ -340,6 +345,29 @@ def find_determined(pivots, rows, of_normals=False):
     return pivots > limit * pivots.max(initial=0.0)
 
 
+def _of_conditions(q, b, v):
+    """-Q B', the function that multiplies by L^-1 with L L' = B Q B', and B v."""
+    if np.ndim(q) == 3:
+        own = _OwnBlocks(-np.einsum("kij,kj->ki", q, b))
+        return (
+            own,
+            _diagonal_whitener(-np.sum(b * own.rows, axis=1)),
+            np.sum(b * v.reshape(b.shape), axis=1),
+        )
+    minus_qb = -(q @ b.T)
+    return minus_qb, _whitener(-(b @ minus_qb)), b @ v
+
+
+@dataclass(frozen=True)
+class _OwnBlocks:
+    """A matrix (k d, k) that is zero but for d rows of each column, as (k, d)."""
+
+    rows: np.ndarray
+
+    def __matmul__(self, vector):
+        return (self.rows * vector[:, None]).ravel()
+
+
 def _whitener(m):
     """A function that multiplies by L^-1 (or L^-T), where L L' = m."""
     diagonal = m.diagonal()
@@ -384,7 +412,11 @@ def _diagonal_whitener(diagonal):
 
 
 def _solve(a, w):
-    """Step, cofactor matrix and an orthonormal basis of the columns, by QR with scaled columns."""
+    """Step, R^-1 whose square is the cofactor matrix, and A R^-1, an orthonormal basis.
+
+    By the Cholesky factor of the normal equations where columns of length one are far from
+    depending on each other (the basis is None then: it is quickly had), else by QR.
+    """
     scale = np.linalg.norm(a, axis=0)
     if not np.all(np.isfinite(scale)):
         raise SolutionError(
@@ -394,7 +426,12 @@ def _solve(a, w):
             )
         )
     scale[scale == 0] = 1.0
-    basis, r, order = scipy.linalg.qr(a / scale, mode="economic", pivoting=True, check_finite=False)
+    scaled = a / scale
+    root, wrong = scipy.linalg.lapack.dpotrf(scaled.T @ scaled, lower=True)
+    if not wrong and np.diag(root).min(initial=1.0) ** 2 > WELL_PLACED:
+        inverse = scipy.linalg.lapack.dtrtri(root, lower=True)[0].T / scale[:, None]
+        return -inverse @ (inverse.T @ (a.T @ w)), inverse, None
+    basis, r, order = scipy.linalg.qr(scaled, mode="economic", pivoting=True, check_finite=False)
     rank = int(np.sum(find_determined(np.diag(r), len(a))))
     if rank < a.shape[1]:
         raise SolutionError(
@@ -404,4 +441,4 @@ def _solve(a, w):
     inverse = np.empty_like(r)
     inverse[order] = scipy.linalg.solve_triangular(r, np.eye(len(r)), check_finite=False)
     inverse /= scale[:, None]
-    return -inverse @ (basis.T @ w), inverse @ inverse.T, basis
+    return -inverse @ (basis.T @ w), inverse, basis

@@ -9,7 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse
 
-from tankcal.geometry.circles import Circle, fit_circle, radial_covariance, taubin_circle
+from tankcal.geometry.circles import (
+    Circle,
+    fit_circle,
+    own_columns,
+    radial_covariance,
+    taubin_circle,
+)
 from tankcal.geometry.form import Sample, free_columns, harmonics
 from tankcal.geometry.outlines import (
     Outline,
@@ -272,6 +278,34 @@ def covariance_of(points, covariance_m2):
     return block
 
 
+def own_covariances(covariance_m2):
+    """Covariance of each point, where that of all is sparse and they are independent; else None.
+
+    Parameters
+    ----------
+    covariance_m2 : ndarray or sparse matrix, shape (3n, 3n)
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 3), or None
+        In m2.
+
+    Examples
+    --------
+    >>> own_covariances(scipy.sparse.diags_array([1.0, 2.0, 3.0])).diagonal(axis1=1, axis2=2)
+    array([[1., 2., 3.]])
+    """
+    if not scipy.sparse.issparse(covariance_m2):
+        return None
+    entries = covariance_m2.tocoo()
+    (point, row), (other, column) = (np.divmod(one, 3) for one in (entries.row, entries.col))
+    if np.any(point != other):
+        return None
+    found = np.zeros((covariance_m2.shape[0] // 3, 3, 3))
+    np.add.at(found, (point, row, column), entries.data)
+    return found
+
+
 def slide(xyz_m, slope, z_m):
     """Points slid parallel to the axis to height z, and the derivative.
 
@@ -299,13 +333,31 @@ def slide(xyz_m, slope, z_m):
     >>> xy.tolist(), by_xyz.toarray()[0].tolist()
     ([[0.98, 0.0]], [1.0, 0.0, -0.01])
     """
-    xyz_m = np.asarray(xyz_m, dtype=float)
     n = len(xyz_m)
-    xy = xyz_m[:, :2] - (xyz_m[:, 2:] - z_m) * np.asarray(slope)
     rows = np.repeat(np.arange(2 * n), 2)
     columns = np.add.outer(3 * np.arange(n), [0, 2, 1, 2]).ravel()
     values = np.tile([1.0, -slope[0], 1.0, -slope[1]], n)
-    return xy, scipy.sparse.csr_array((values, (rows, columns)), shape=(2 * n, 3 * n))
+    by_xyz = scipy.sparse.csr_array((values, (rows, columns)), shape=(2 * n, 3 * n))
+    return _slid(xyz_m, slope, z_m), by_xyz
+
+
+def _slid(xyz_m, slope, z_m):
+    xyz_m = np.asarray(xyz_m, dtype=float)
+    return xyz_m[:, :2] - (xyz_m[:, 2:] - z_m) * np.asarray(slope)
+
+
+def _by_own(slope):
+    """(2, 3) derivative of x and y of a point that is slid by its own x, y, z."""
+    return np.column_stack([np.eye(2), -np.asarray(slope, dtype=float)])
+
+
+def _in_plan(xyz_m, covariance_m2, slope, z_m):
+    """Points (n, 2) slid to height z, and their covariance, of each point where it was so given."""
+    if np.ndim(covariance_m2) == 3:
+        by_own = _by_own(slope)
+        return _slid(xyz_m, slope, z_m), by_own @ covariance_m2 @ by_own.T
+    xy, by_xyz = slide(xyz_m, slope, z_m)
+    return xy, by_xyz @ covariance_m2 @ by_xyz.T
 
 
 def sample_of(group, xyz_m, covariance_m2, slope, z_m):
@@ -322,10 +374,10 @@ def sample_of(group, xyz_m, covariance_m2, slope, z_m):
     -------
     form.Sample
     """
-    xy, by_xyz = slide(xyz_m, slope, z_m)
+    xy, covariance_xy = _in_plan(xyz_m, covariance_m2, slope, z_m)
     middle = xy.mean(axis=0)
     centre = taubin_circle(xy - middle)[:2] + middle
-    noise = radial_covariance(xy, centre, by_xyz @ covariance_m2 @ by_xyz.T)
+    noise = radial_covariance(xy, centre, covariance_xy)
     azimuth, radius = polar(xy, *centre)
     return Sample(azimuth, radius, noise, _zeta(group, xyz_m, z_m))
 
@@ -341,8 +393,8 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
     group : Group
     xyz_m : (n, 3) array
         The members of the group, in metres.
-    covariance_m2 : (3n, 3n) array or sparse matrix
-        In the order x1 y1 z1 x2 ...
+    covariance_m2 : (3n, 3n) array or sparse matrix, or (n, 3, 3) array
+        In the order x1 y1 z1 x2 ...; or that of each point, where they are independent.
     slope : (2,) array
         Of the axis: metres in x and y for a metre of height.
     z_m : float
@@ -372,8 +424,7 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
     >>> round(float(np.sqrt(section.circle.cofactor_m2[2, 2])) * 1000, 4)
     0.2887
     """
-    xy, by_xyz = slide(xyz_m, slope, z_m)
-    covariance_xy = by_xyz @ covariance_m2 @ by_xyz.T
+    xy, covariance_xy = _in_plan(xyz_m, covariance_m2, slope, z_m)
     circle = fit_circle(xy, covariance_xy)
     centre = circle.x_m, circle.y_m
     here, zeta = float(group.zeta(group.height_m)), _zeta(group, xyz_m, z_m)
@@ -383,7 +434,8 @@ def fit_section(group, xyz_m, covariance_m2, slope, z_m, form_m2):
         noise = radial_covariance(xy, centre, covariance_xy)
         away = zeta - here
         outline = smooth_outline(xy, *centre, noise, form_m2, away, group.degree)
-    return Section(group, circle, outline, radii_by_coordinates(outline, xy) @ by_xyz)
+    by_points = own_columns(radii_by_coordinates(outline, xy) @ _by_own(slope))
+    return Section(group, circle, outline, by_points)
 
 
 def _zeta(group, xyz_m, z_m):

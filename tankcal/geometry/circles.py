@@ -48,8 +48,9 @@ def fit_circle(xy_m, covariance_m2):
     ----------
     xy_m : array_like, shape (n, 2)
         Points, m.
-    covariance_m2 : ndarray or sparse array, shape (2n, 2n)
-        Their covariance, m2, in the order x1 y1 x2 y2 ...
+    covariance_m2 : ndarray or sparse array, shape (2n, 2n) or (n, 2, 2)
+        Their covariance, m2, in the order x1 y1 x2 y2 ...; or that of each, when the points are
+        independent of each other.
 
     Returns
     -------
@@ -76,7 +77,8 @@ def fit_circle(xy_m, covariance_m2):
         )
     centre = xy_m.mean(axis=0)
     local = xy_m - centre
-    adjusted = adjust(circle_conditions, taubin_circle(local), local.ravel(), covariance_m2)
+    model = _conditions_of_points if np.ndim(covariance_m2) == 3 else circle_conditions
+    adjusted = adjust(model, taubin_circle(local), local.ravel(), covariance_m2)
     x, y, radius = adjusted.unknowns
     return Circle(
         x_m=float(x + centre[0]),
@@ -105,15 +107,24 @@ def circle_conditions(unknowns, coordinates):
     by_unknowns : ndarray, shape (n, 3)
     by_coordinates : sparse array, shape (n, 2n)
     """
+    misclosures, by_unknowns, unit = _conditions_of_points(unknowns, coordinates)
+    return misclosures, by_unknowns, own_columns(unit)
+
+
+def _conditions_of_points(unknowns, coordinates):
+    """`circle_conditions`, the last Jacobian as (n, 2): that of each point by its own."""
     x, y, radius = unknowns
     d = coordinates.reshape(-1, 2) - (x, y)
     distance = np.hypot(d[:, 0], d[:, 1])
     unit = d / distance[:, None]
-    n = len(unit)
-    by_points = scipy.sparse.csr_array(
-        (unit.ravel(), np.arange(2 * n), np.arange(0, 2 * n + 1, 2)), shape=(n, 2 * n)
-    )
-    return distance - radius, np.column_stack([-unit, -np.ones(n)]), by_points
+    return distance - radius, np.column_stack([-unit, -np.ones(len(unit))]), unit
+
+
+def own_columns(rows):
+    """Sparse (n, n d) whose row i has the d entries of rows (n, d) in the columns of point i."""
+    n, d = rows.shape
+    entries = rows.ravel(), np.arange(n * d), np.arange(0, n * d + 1, d)
+    return scipy.sparse.csr_array(entries, shape=(n, n * d))
 
 
 def taubin_circle(local):
@@ -164,13 +175,14 @@ def radial_covariance(xy_m, centre_m, covariance_m2):
         Points, m.
     centre_m : array_like, shape (2,)
         Centre, m.
-    covariance_m2 : ndarray or sparse array, shape (2n, 2n)
-        Covariance of the coordinates, m2, in the order x1 y1 x2 y2 ...
+    covariance_m2 : ndarray or sparse array, shape (2n, 2n) or (n, 2, 2)
+        Covariance of the coordinates, m2, in the order x1 y1 x2 y2 ..., or that of each point.
 
     Returns
     -------
     ndarray, shape (n, n) or (n,)
-        m2; variances (n,) when the points are independent of each other (sparse covariance).
+        m2; variances (n,) when the points are independent of each other (a sparse covariance, or
+        one of each).
 
     Examples
     --------
@@ -180,9 +192,8 @@ def radial_covariance(xy_m, centre_m, covariance_m2):
     """
     d = np.asarray(xy_m) - centre_m
     unit = d / np.hypot(d[:, 0], d[:, 1])[:, None]
-    n = len(unit)
-    radial = scipy.sparse.csr_array(
-        (unit.ravel(), np.arange(2 * n), np.arange(0, 2 * n + 1, 2)), shape=(n, 2 * n)
-    )
+    if np.ndim(covariance_m2) == 3:
+        return np.einsum("ki,kij,kj->k", unit, covariance_m2, unit)
+    radial = own_columns(unit)
     covariance = radial @ covariance_m2 @ radial.T
     return covariance.diagonal() if scipy.sparse.issparse(covariance) else covariance

@@ -264,14 +264,11 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
 
     def model(x, observations):
         offset, distance = distances_from_axis(xyz, x[:4])
-        azimuth = np.arctan2(offset[:, 0], offset[:, 1])
         sin, cos = offset[:, 0] / distance, offset[:, 1] / distance
         turn, by_form = np.zeros(n), np.zeros((n, 2 * modes))
         if modes:
             by_form = _form_columns(offset, height)
-            slopes = harmonics(azimuth, MODES, derivative=1)[:, 3:]
-            by_azimuth = np.hstack([slopes, slopes * height[:, None]])
-            turn = by_azimuth @ x[first_mode:last_mode] / distance
+            turn = by_form @ _turned(x[first_mode:last_mode]) / distance
         by_xy = -np.column_stack([sin - turn * cos, cos + turn * sin])
         by_axis = np.hstack([by_xy, by_xy * xyz[:, 2:]])
         top = np.hstack([by_axis, by_radius, -by_form, -by_uneven])
@@ -296,6 +293,15 @@ def _form_columns(offset, height):
     """(n, columns) derivative of the radii by the form, and by its part that grows with height."""
     waves = harmonics(np.arctan2(offset[:, 0], offset[:, 1]), MODES)[:, 3:]
     return np.hstack([waves, waves * height[:, None]])
+
+
+def _turned(form):
+    """Coefficients of the derivative by the azimuth of a form, whose columns are `_form_columns`.
+
+    c cos k a + s sin k a becomes k s cos k a - k c sin k a.
+    """
+    order = np.tile(np.arange(2, MODES + 1), 2)
+    return np.column_stack([order * form[1::2], -order * form[::2]]).ravel()
 
 
 def _misclosure(distance, row_of, by_form, by_uneven, x):

@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 import scipy.interpolate
-import scipy.sparse
 
 from tankcal.errors import SolutionError
 from tankcal.geometry.form import (
@@ -292,16 +291,13 @@ def radii_by_coordinates(outline, xy_m):
 
     Returns
     -------
-    sparse array, shape (n, 2n)
+    ndarray, shape (n, 2)
+        Of each radius by its own point: no other one moves it.
     """
     azimuth, radius = polar(xy_m, outline.x_m, outline.y_m)
     slope = outline.radius_m(azimuth, derivative=1) / radius
     sin, cos = np.sin(azimuth), np.cos(azimuth)
-    n = len(azimuth)
-    normal = np.column_stack([sin - slope * cos, cos + slope * sin])
-    return scipy.sparse.csr_array(
-        (normal.ravel(), np.arange(2 * n), np.arange(0, 2 * n + 1, 2)), shape=(n, 2 * n)
-    )
+    return np.column_stack([sin - slope * cos, cos + slope * sin])
 
 
 def _into_turn(azimuth_rad, start):

@@ -30,6 +30,7 @@ WIDE_BAND, WALL_BAND = 0.03, 0.01  # of the nominal radius: start, and largest b
 END_TOLERANCE_M = 0.020  # a point this far above or below the shell still belongs to its edge
 SAMPLES = 1000  # three-point circles tried; with half the points clutter one in eight is sound
 BELIEVED_M = 0.013  # from the smooth form: what departs less is left to the field to judge
+AT_ONCE = 16  # circles
 LEAST_PART = 0.5  # of the points between bottom and top that the wall must hold
 WIDEST_SLOPE = 0.05  # sd of the slope before anything is measured: tanks hardly lean by more
 NEAR_M = 0.3  # from the wall: what stands there may be told by its side alone
@@ -344,9 +345,14 @@ def consensus_circle(xy, nominal_radius):
 
 def _shares_near(xy, circles, band):
     """(k,) share of the points (n, 2) within a band of each of k circles (x, y, radius)."""
-    x, y, r = circles.T[:, :, None]
-    squared = (xy[:, 0] - x) ** 2 + (xy[:, 1] - y) ** 2
-    return np.mean((squared > np.maximum(r - band, 0) ** 2) & (squared < (r + band) ** 2), axis=1)
+    found = np.empty(len(circles))
+    for start in range(0, len(circles), AT_ONCE):  # as many as a processor keeps at hand
+        some = slice(start, start + AT_ONCE)
+        x, y, r = circles[some].T[:, :, None]
+        squared = (xy[:, 0] - x) ** 2 + (xy[:, 1] - y) ** 2
+        near = (squared > np.maximum(r - band, 0) ** 2) & (squared < (r + band) ** 2)
+        found[some] = np.count_nonzero(near, axis=1)
+    return found / max(len(xy), 1)
 
 
 def _circles_through(triples):
@@ -368,13 +374,13 @@ def _leaning_cylinder(local, course, candidates, circle, nominal_radius):
     wall = candidates & (np.abs(distance - circle[2]) < WIDE_BAND * nominal_radius)
     fitted = ~wall
     for band in np.repeat(np.geomspace(WIDE_BAND, WALL_BAND, 5), 3) * nominal_radius:
-        if np.any(fitted != wall):  # else the same points give the same axis
+        if np.any(fitted != wall):  # else the same points give the same axis, and the same radii
             rough, fitted = np.full(wall.sum(), 0.01), wall
             fit = adjust(*shell_problem(local[wall], course[wall], axis, rough, None, WIDEST_SLOPE))
             axis = fit.unknowns[:4]
             distance = distances_from_axis(local, axis)[1]
-        names, first = np.unique(course[wall], return_inverse=True)
-        radii = np.array([np.median(distance[wall][first == i]) for i in range(len(names))])
+            names, first = np.unique(course[wall], return_inverse=True)
+            radii = np.array([np.median(distance[wall][first == i]) for i in range(len(names))])
         # a course without a point so far is judged by its nearest neighbour
         nearest = np.abs(names[None, :] - course[:, None]).argmin(axis=1)
         wall = candidates & (np.abs(distance - radii[nearest]) < band)

@@ -42,6 +42,7 @@ from tankcal.sections import (
     fit_section,
     group_by_height,
     group_by_name,
+    own_covariances,
     sample_of,
 )
 from tankcal.solver.threads import threads_for
@@ -584,12 +585,12 @@ def _given_covariance(points, wall):
 
 def _to_fit(job, shell, accepted, groups, covariance):
     """Arguments of `fit_section`, but for the form, of each group."""
-    xyz = job.points.xyz_m[accepted]
+    xyz, own = job.points.xyz_m[accepted], own_covariances(covariance)
     return [
         (
             group,
             xyz[group.members],
-            covariance_of(group.members, covariance),
+            covariance_of(group.members, covariance) if own is None else own[group.members],
             shell.slope,
             job.datum.bottom_z_m + group.height_m,
         )

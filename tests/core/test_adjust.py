@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.linalg
 import scipy.optimize
 import scipy.sparse
 from jacobians import assert_derivative
@@ -75,6 +76,26 @@ def test_full_covariance_agrees_with_a_general_minimiser():
     assert found.unknowns == pytest.approx(other.x[:3], abs=1e-7)
     assert found.chi2 == pytest.approx(2 * other.cost, rel=1e-8)
     assert np.abs(circle_conditions(found.unknowns, found.observations)[0]).max() < 1e-12
+
+
+def test_normal_equations_agree_with_qr(monkeypatch):
+    """Second method: the same by QR, which columns that nearly depend on each other take anyway."""
+    rng = np.random.default_rng(6)
+    rows = rng.normal(size=(40, 6)) * np.geomspace(1e-3, 1e3, 6)
+    rows[:, 5] += 300 * rows[:, 4]
+    l, sd = rng.normal(size=40), rng.uniform(0.1, 1, 40)
+    problem = lambda x, l: (rows @ x - l, rows, None), np.zeros(6), l, sd**2
+    by_qr = []
+    qr = scipy.linalg.qr
+    monkeypatch.setattr(scipy.linalg, "qr", lambda *a, **k: by_qr.append(1) or qr(*a, **k))
+    found = adjust(*problem)
+    assert not by_qr
+    monkeypatch.setattr("tankcal.adjust.WELL_PLACED", np.inf)
+    other = adjust(*problem)
+    assert by_qr
+    assert found.unknowns == pytest.approx(other.unknowns, rel=1e-11)
+    assert found.redundancy == pytest.approx(other.redundancy, rel=1e-12)
+    assert found.cofactor == pytest.approx(other.cofactor, rel=1e-11)
 
 
 def test_the_order_of_observations_changes_nothing():

@@ -8,7 +8,13 @@ import scipy.optimize
 import scipy.sparse
 from shapes import azimuths, modes, ring, section_of
 
-from tankcal.sections import fit_section, group_by_height, group_by_name, slide
+from tankcal.sections import (
+    fit_section,
+    group_by_height,
+    group_by_name,
+    own_covariances,
+    slide,
+)
 
 
 def ellipse(azimuth):
@@ -79,6 +85,32 @@ def test_sliding_along_axis_keeps_leaning_cylinder():
     assert np.hypot(*xy.T) == pytest.approx(6.5, abs=1e-12)
     moved = (by_xyz @ np.tile([0.0, 0.0, 1.0], 12)).reshape(12, 2)
     assert moved == pytest.approx(-np.tile(slope, (12, 1)))
+
+
+@pytest.mark.parametrize("heights", [None, lambda rng, azimuth: 0 * azimuth])
+def test_points_with_covariances_of_their_own_make_the_same_section(heights):
+    """Second method: the same blocks in the covariance of all."""
+    slope = (0.003, -0.001)
+    xyz = scan(lambda azimuth, zeta: 6.5 + 0.01 * np.cos(2 * azimuth), slope=slope, heights=heights)
+    roots = np.random.default_rng(9).normal(0, 0.002, (len(xyz), 3, 3))
+    each = roots @ roots.transpose(0, 2, 1) + 1e-6 * np.eye(3)
+    whole = scipy.sparse.block_diag(list(each), format="csr")
+    assert own_covariances(whole) == pytest.approx(each, abs=0)
+    group = course_group(xyz)
+    of_each, of_all = (
+        fit_section(group, xyz, one, slope, group.height_m, 1e-8) for one in (each, whole)
+    )
+    assert of_each.circle.radius_m == pytest.approx(of_all.circle.radius_m, rel=1e-13)
+    assert of_each.circle.cofactor_m2 == pytest.approx(of_all.circle.cofactor_m2, rel=1e-9)
+    assert of_each.outline.parameters == pytest.approx(of_all.outline.parameters, abs=1e-12)
+    apart = of_each.radii_by_points - of_all.radii_by_points
+    assert np.abs(apart.toarray()).max() < 1e-12
+
+
+def test_correlated_points_have_no_covariances_of_their_own():
+    together = scipy.sparse.csr_array(np.ones((6, 6)) + np.eye(6))
+    assert own_covariances(together) is None
+    assert own_covariances(np.eye(6)) is None
 
 
 def test_points_without_section_numbers_are_grouped_by_height():

@@ -5,11 +5,13 @@ import json
 
 import numpy as np
 import pytest
+import scipy.linalg
 import scipy.optimize
+import scipy.sparse
 from shapes import azimuths, ring
 
 from tankcal.errors import SolutionError
-from tankcal.geometry.circles import fit_circle
+from tankcal.geometry.circles import fit_circle, radial_covariance
 
 S_VARIANCE_M2 = 2.0e-4  # published: S table 11, coordinate variance
 
@@ -89,3 +91,20 @@ def test_a_circle_at_utm_coordinates_loses_nothing():
 def test_points_that_make_no_circle_are_refused(points, message):
     with pytest.raises(SolutionError, match=message):
         fit_circle(points, np.full(2 * len(points), 1e-4))
+
+
+def test_independent_points_are_fitted_as_with_their_whole_covariance():
+    """Second method: the same blocks in one matrix, written out and sparse."""
+    rng = np.random.default_rng(8)
+    points = ring(6.5, azimuths(20))[:, :2] + rng.normal(0, 0.002, (20, 2))
+    roots = rng.normal(0, 0.002, (20, 2, 2))
+    each = roots @ roots.transpose(0, 2, 1) + 1e-6 * np.eye(2)
+    whole = scipy.linalg.block_diag(*each)
+    found = fit_circle(points, each)
+    for covariance in (whole, scipy.sparse.csr_array(whole)):
+        other = fit_circle(points, covariance)
+        assert (found.x_m, found.radius_m) == pytest.approx((other.x_m, other.radius_m), rel=1e-12)
+        assert found.cofactor_m2 == pytest.approx(other.cofactor_m2, rel=1e-9)
+        assert found.variance_factor == pytest.approx(other.variance_factor, rel=1e-9)
+    radial = radial_covariance(points, (0.1, 0.2), whole)
+    assert radial_covariance(points, (0.1, 0.2), each) == pytest.approx(np.diag(radial), rel=1e-12)

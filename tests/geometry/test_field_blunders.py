@@ -19,6 +19,7 @@ from tankcal.geometry.field.components import (
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.evidence import likelihood_of
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, MIRRORED, invert
+from tankcal.geometry.field.precision import Precision
 from tankcal.geometry.field.sites import free_design
 
 STEP = 1e-4  # of a logarithm, in differences
@@ -158,6 +159,23 @@ def test_a_course_of_three_points_tells_nothing(capfd):
     value, slopes = likelihood.misfit(likelihood.middle)
     assert (value, *slopes) == pytest.approx(np.zeros(1 + len(slopes)), abs=1e-12)
     assert capfd.readouterr() == ("", "")
+
+
+def test_half_an_inverse_tests_as_the_whole_one():
+    """Second method: P written out; of readings that alone tell a centre, too."""
+    sites = some_sites()
+    design, size = free_design(sites)[0], len(sites)
+    whole = written_out(sites, assumed_amplitudes().variances_m2) + 1e-6 * np.eye(size)
+    radius = 0.004 * np.random.default_rng(2).normal(size=size)
+    other = restricted_precision(whole.copy(), design)
+    half = Precision(whole.copy(), design)
+    largest = np.abs(other).max()
+    for gone in ([3, 40], [40, 2, 3], np.arange(size // 2)):  # columns asked for before, and new
+        accepted = ~np.isin(np.arange(size), gone)
+        assert half[:, gone] == pytest.approx(other[:, gone], abs=1e-9 * largest)
+        assert half[np.ix_(gone, gone)] == pytest.approx(other[np.ix_(gone, gone)], rel=1e-6)
+        one, two = (against_others(each, each @ radius, accepted) for each in (half, other))
+        assert one.w == pytest.approx(two.w, rel=1e-6, abs=1e-9)
 
 
 def test_a_departure_is_from_the_wall_that_all_others_show():

@@ -24,6 +24,7 @@ from tankcal.geometry.field.amplitudes import likely_variances
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, invert
+from tankcal.geometry.field.precision import Precision
 from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.outlines import FULL_TURN
 
@@ -132,14 +133,14 @@ class _Piece:
         self._design = free_design(chosen)[0]
 
     def precision(self, variances_m2, noise_m2):
-        """P of the module's heading, with variances (n,) of the noise."""
+        """`Precision` with variances (n,) of the noise."""
         whole = self._covariances.total(variances_m2)
         whole.flat[:: len(whole) + 1] += noise_m2
-        return restricted_precision(whole, self._design)
+        return Precision(whole, self._design)
 
 
 def restricted_precision(covariance, design):
-    """P of the module's heading."""
+    """P of the module's heading, written out."""
     inverse = invert(covariance)[1]
     by_design = inverse @ design
     normal = scipy.linalg.pinvh(design.T @ by_design)  # some points may hardly bear on anything
@@ -166,7 +167,7 @@ def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf):
 def against_others(precision, pull, accepted):
     """`Tested` with P and P y of the module's heading."""
     aside = np.flatnonzero(~accepted)
-    departure, weight = pull.copy(), np.diag(precision).copy()
+    departure, weight = pull.copy(), precision.diagonal().copy()
     if len(aside):
         among = scipy.linalg.pinvh(precision[np.ix_(aside, aside)], rtol=NOTHING_LEFT)
         to = precision[:, aside] @ among

@@ -15,9 +15,11 @@ logarithm of the variance is normal: about that of `median_m`, with `log_sd`.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from tankcal.geometry.form import multiples
 from tankcal.geometry.outlines import FULL_TURN
 
 OVALITY_MODES = np.arange(2.0, 37.0)
@@ -72,9 +74,16 @@ class Component:
         """(n, r) columns whose products are h; not of a component that is local."""
         if self.orders == "joints":
             return joint_profile(zeta)[:, None]
+        used, scale = self._scales
+        return legendre(zeta, used[-1])[:, used] * scale
+
+    @cached_property
+    def _scales(self):
+        """Orders that have a variance, and its roots, so that the mean of h is one."""
         weights = np.array(self.orders, dtype=float)
         weights = weights / np.sum(weights / (2 * np.arange(len(weights)) + 1))
-        return (legendre(zeta, len(weights) - 1) * np.sqrt(weights))[:, weights > 0]
+        used = np.flatnonzero(weights)
+        return used, np.sqrt(weights[used])
 
     def columns(self, waves, zeta):
         """(n, k) columns whose products are the covariance, of a mean or an oval.
@@ -119,7 +128,12 @@ COMPONENTS = (
 
 def legendre(zeta, highest):
     """(n, highest + 1) Legendre polynomials of order 0 to the highest."""
-    return np.polynomial.legendre.legvander(np.asarray(zeta, dtype=float), highest)
+    zeta = np.asarray(zeta, dtype=float)
+    found = np.ones((len(zeta), highest + 1))
+    found[:, 1:2] = zeta[:, None]
+    for n in range(2, highest + 1):
+        found[:, n] = (2 - 1 / n) * zeta * found[:, n - 1] - (1 - 1 / n) * found[:, n - 2]
+    return found
 
 
 def joint_profile(zeta):
@@ -135,8 +149,7 @@ def oval_columns(azimuth_rad):
 
     nan: the mean of a whole turn, which has none of them.
     """
-    angles = np.outer(azimuth_rad, OVALITY_MODES)
-    waves = np.hstack([np.cos(angles), np.sin(angles)])
+    waves = np.hstack([one[:, 1:] for one in multiples(azimuth_rad, int(OVALITY_MODES[-1]))])
     waves[~np.isfinite(azimuth_rad)] = 0.0
     return waves * np.tile(np.sqrt(OVALITY_WEIGHTS), 2)
 
@@ -161,7 +174,8 @@ def seam_correlation(difference_rad, radius_m, length_m=SEAM_LENGTH_M):
 def _seams_between(azimuth_rad, other_rad, radius_m):
     """(n, m) `seam_correlation` between azimuths, in pieces of rows that a processor keeps at hand.
 
-    exp(-b x) is a quotient of exp(b a), so that there are no more exponentials than azimuths.
+    exp(-b x) is a quotient of exp(b a), so that there are no more exponentials than azimuths. Of
+    azimuths with themselves one half is computed, and mirrored.
     """
     b = radius_m / SEAM_LENGTH_M
     first, second = azimuth_rad % FULL_TURN - np.pi, other_rad % FULL_TURN - np.pi
@@ -171,13 +185,16 @@ def _seams_between(azimuth_rad, other_rad, radius_m):
     scale, near_by, far_by = _of_modes(b, turn)
     scale /= _seam_sum(b)
     grows, falls = np.exp(b * second), np.exp(-b * second)
-    found = np.empty((len(first), len(second)))
+    low = [np.stack([np.ones(len(a)), np.cos(a), np.sin(a)], axis=1) for a in (first, second)]
+    low[0] *= np.array([b**-4, *2 * [2 / (1 + b**2) ** 2]]) / _seam_sum(b)
+    found, mirrored = np.empty((len(first), len(second))), azimuth_rad is other_rad
     for start in range(0, len(first), at_once):
-        here = first[start : start + at_once]
-        x = np.abs(np.subtract.outer(here, second))
+        rows, to = slice(start, start + at_once), slice(start if mirrored else 0, None)
+        here = first[rows]
+        x = np.abs(np.subtract.outer(here, second[to]))
         np.minimum(x, FULL_TURN - x, out=x)
-        one = np.multiply.outer(np.exp(b * here), falls)
-        other = np.multiply.outer(np.exp(-b * here), grows)
+        one = np.multiply.outer(np.exp(b * here), falls[to])
+        other = np.multiply.outer(np.exp(-b * here), grows[to])
         near, around = np.minimum(one, other), np.maximum(one, other, out=one)
         around *= turn  # the same along the other way
         np.maximum(near, around, out=near)
@@ -189,10 +206,10 @@ def _seams_between(azimuth_rad, other_rad, radius_m):
         x += near_by
         near *= x
         near += far
-        np.multiply(near, scale, out=found[start : start + at_once])
-    low = [np.stack([np.ones(len(a)), np.cos(a), np.sin(a)], axis=1) for a in (first, second)]
-    taken = np.array([b**-4, *2 * [2 / (1 + b**2) ** 2]]) / _seam_sum(b)
-    found -= (low[0] * taken) @ low[1].T
+        near *= scale
+        np.subtract(near, low[0][rows] @ low[1][to].T, out=found[rows, to])
+        if mirrored:
+            found[to, rows] = found[rows, to].T
     return found
 
 
@@ -255,7 +272,9 @@ def azimuth_correlations(azimuth_rad, other_rad, radius_m):
 
 def seam_correlations(azimuth_rad, other_rad, radius_m):
     """(n, m) c of "seam", as `azimuth_correlations` gives it."""
-    found = _seams_between(np.nan_to_num(azimuth_rad), np.nan_to_num(other_rad), radius_m)
+    known = np.nan_to_num(azimuth_rad)
+    other = known if other_rad is azimuth_rad else np.nan_to_num(other_rad)
+    found = _seams_between(known, other, radius_m)
     found[~np.isfinite(azimuth_rad)] = 0.0
     found[:, ~np.isfinite(other_rad)] = 0.0
     return found

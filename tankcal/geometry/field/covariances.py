@@ -39,7 +39,8 @@ class Covariances:
     def __init__(self, sites, nominal_m):
         self.sites, self.nominal_m = sites, nominal_m
         self.place, self.azimuths_rad = distinct_azimuths(sites.azimuth_rad)
-        if len(self.azimuths_rad) == len(sites):  # in the order of the sites: nothing to gather
+        self._in_order = len(self.azimuths_rad) == len(sites)
+        if self._in_order:  # of the sites: nothing to gather
             self.azimuths_rad = self.azimuths_rad[self.place]
             self.place = np.arange(len(sites))
 
@@ -47,6 +48,20 @@ class Covariances:
     def members(self):
         """For each course the indices of its sites."""
         return self.sites.members
+
+    def at_sites(self, columns, members=slice(None)):
+        """Columns (k, a) of the distinct azimuths, as those of some sites."""
+        if self._in_order:
+            return columns[:, members]
+        return columns[:, self.place[members]]
+
+    @cached_property
+    def runs(self):
+        """The same as `members`: slices where the sites of a course follow each other."""
+        return [
+            slice(int(one[0]), int(one[-1]) + 1) if len(one) and np.all(np.diff(one) == 1) else one
+            for one in self.members
+        ]
 
     def total(self, variances_m2):
         """(n, n) covariance of the sum of all components, m2.
@@ -62,7 +77,7 @@ class Covariances:
         if self.sites.welds_rad:
             columns += [np.sqrt(variances_m2[i]) * one for i, one in self.peaks.items()]
         _add_products(found, np.hstack(columns))
-        for members in self.members:
+        for members in self.runs:
             block = self._seams(members) * self._up(False, variances_m2, members)
             own = [
                 np.sqrt(variances_m2[i]) * columns[members]
@@ -70,14 +85,15 @@ class Covariances:
                 if i not in common
             ]
             _add_products(block, np.hstack(own))
-            found[np.ix_(members, members)] += block
+            both = (members, members) if isinstance(members, slice) else np.ix_(members, members)
+            found[both] += block
         return found
 
     def spread(self, weights, index):
         """(f, f) covariance of functionals (f, n) of the sites, by one component."""
         one, found = COMPONENTS[index], 0.0
         common = one.common or index in self.peaks
-        for members in [slice(None)] if common else self.members:
+        for members in [slice(None)] if common else self.runs:
             part = weights[:, members]
             if one.shape == "seam":
                 seams = self._seams(members)
@@ -125,8 +141,8 @@ class Covariances:
 
     def _seams(self, members):
         """c of seams between some sites."""
-        if len(self.azimuths_rad) == len(self.place) and isinstance(members, slice):
-            return self._along
+        if self._in_order and isinstance(members, slice):
+            return self._along[members, members]
         place = self.place[members]
         return self._along[place[:, None], place]
 

@@ -90,7 +90,7 @@ class WallField:
             if shape not in self.stated:
                 continue
             found += self._drawn(shape, zeta, slice(None), common=True)
-            for course, members in enumerate(self._members):
+            for course, members in enumerate(self._covariances.runs):
                 found[course] += self._drawn(shape, zeta, members, common=False)
         if "weld" in self.stated:
             for i, at_grid in self.peaks_at_grid.items():
@@ -108,7 +108,7 @@ class WallField:
         pull = height * self._explained[members]
         if shape == "mean":
             return pull.sum(axis=1, keepdims=True)
-        return pull @ self._to_grid[shape][:, self._covariances.place[members]].T
+        return pull @ self._covariances.at_sites(self._to_grid[shape], members).T
 
     def functionals(self, gradients_m):
         """`Functionals` of the wall: each the integral of a gradient times its radius.
@@ -198,14 +198,15 @@ class WallField:
     @property
     def covariance_m2(self):
         """(n, n) V: of the readings, by the wall and by their noise."""
-        whole = self._covariances.total(self.amplitudes.variances_m2) + self.noise_m2
+        whole = self._covariances.total(self.amplitudes.variances_m2)
+        whole += self.noise_m2
         whole.flat[:: len(whole) + 1] += LEAST_NOISE_M**2
         return whole
 
     @cached_property
     def _factored(self):
         """Cholesky factor of V, V^-1 X, and that of X' V^-1 X."""
-        whole = self.covariance_m2
+        whole = self.covariance_m2.T  # the same, in columns, as LAPACK has it
         factor = scipy.linalg.cho_factor(whole, lower=True, overwrite_a=True, check_finite=False)
         columns = self._columns[0]
         by_columns = scipy.linalg.cho_solve(factor, columns, check_finite=False)
@@ -260,7 +261,7 @@ class Functionals:
         self._totals = gradients.sum(axis=2)
         factor, by_columns, normal = field._factored
         self._along = {
-            shape: (gradients @ to_grid)[:, :, field._covariances.place]
+            shape: self._along_sites(to_grid)
             for shape, to_grid in field._to_grid.items()
             if shape != "mean"
         }
@@ -278,6 +279,12 @@ class Functionals:
         self.with_free = scipy.linalg.cho_solve(normal, short.T).T
         across = across + self.with_free @ columns.T
         self.weights = scipy.linalg.cho_solve(factor, across.T, check_finite=False).T
+
+    def _along_sites(self, to_grid):
+        """(courses, LEVELS, n) integrals of the gradients times a covariance (g, azimuths)."""
+        flat = self._gradients.reshape(-1, len(to_grid)) @ to_grid  # in one product
+        flat = self._field._covariances.at_sites(flat)
+        return flat.reshape(*self._totals.shape, -1)
 
     def unseen(self, index):
         """(f, f) covariance of the functionals by what was not seen of one component."""
@@ -311,15 +318,20 @@ class Functionals:
         if one.shape == "weld":
             peaks = self._by_peaks(index)
             return field.amplitudes.variances_m2[index] * peaks @ peaks.T
-        gradients = self._gradients.reshape(-1, len(field.grid_rad))
         count = len(field._members)
-        if one.shape == "mean":
-            along = np.outer(self._totals, self._totals)
-        else:
-            kernel = azimuth_correlations(field.grid_rad, np.zeros(1), field.nominal_m)[one.shape]
-            spectrum = np.fft.rfft(kernel[:, 0] - kernel[:, 0].mean()).real
-            smooth = np.fft.irfft(np.fft.rfft(gradients) * spectrum, gradients.shape[1])
-            along = smooth @ gradients.T
+        along = self._along_each_other[one.shape]
         same = np.ones((count, count)) if one.common else np.eye(count)
         height = one.height_covariance(gauss_heights(), gauss_heights())
         return field.amplitudes.variances_m2[index] * along * np.kron(same, height)
+
+    @cached_property
+    def _along_each_other(self):
+        """{shape: (f, f) covariance of the functionals by the shape, of all heights the same}."""
+        field, gradients = self._field, self._gradients.reshape(self._totals.size, -1)
+        kernels = azimuth_correlations(field.grid_rad, np.zeros(1), field.nominal_m)
+        waves, found = np.fft.rfft(gradients), {"mean": np.outer(self._totals, self._totals)}
+        for shape in ("oval", "seam"):
+            kernel = kernels[shape][:, 0] - kernels[shape][:, 0].mean()
+            spectrum = np.fft.rfft(kernel).real
+            found[shape] = np.fft.irfft(waves * spectrum, gradients.shape[1]) @ gradients.T
+        return found

@@ -9,6 +9,7 @@ the heights of the bulge.
 import numpy as np
 import scipy.linalg
 
+from tankcal.adjust import find_determined
 from tankcal.geometry.field.components import (
     COMPONENTS,
     azimuth_correlations,
@@ -19,6 +20,7 @@ from tankcal.geometry.field.components import (
 )
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, Likelihood, Part, prior_of
 from tankcal.geometry.field.sites import free_design
+from tankcal.geometry.form import multiples
 from tankcal.geometry.outlines import FULL_TURN
 
 SMALLEST = 1e-8  # of a variance: what is left of a covariance that is followed is not quite zero
@@ -108,8 +110,8 @@ def _common_values(sites, nominal_m):
         along = azimuth_correlations(azimuths, azimuths, nominal_m)
     else:
         modes = np.arange(2.0, MOST_FOLLOWED // 2 + 2)
-        angles = np.outer(sites.azimuth_rad, modes)
-        around = np.nan_to_num(np.hstack([np.cos(angles), np.sin(angles)]))
+        waves = multiples(sites.azimuth_rad, int(modes[-1]))
+        around = np.nan_to_num(np.hstack([one[:, 1:] for one in waves]))
         along = {
             shape: np.diag(np.tile(share, 2))
             for shape, share in mode_shares(modes, nominal_m).items()
@@ -146,11 +148,17 @@ def _gathered(azimuth_rad, near_rad):
     return place, means % FULL_TURN
 
 
+def _left_free(columns):
+    """(n, m) orthonormal basis of what columns (n, p) leave free."""
+    basis, r, _ = scipy.linalg.qr(columns, pivoting=True, check_finite=False)
+    return basis[:, np.count_nonzero(find_determined(np.diag(r), len(columns))) :]
+
+
 def _part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise):
     columns, spread, missed = common
     common_ones, own_ones = _shown(sites)
     azimuth, zeta = sites.azimuth_rad[members], sites.zeta[members]
-    left = scipy.linalg.null_space(sites.free_columns(members).T)
+    left = _left_free(sites.free_columns(members))
 
     def seen(covariance):
         return left.T @ covariance @ left

@@ -49,23 +49,23 @@ class Part:
     values: np.ndarray
 
     def inverted(self, variances):
-        """Log of the determinant of the part's own covariance, and its inverse, lower half."""
+        """Log of the determinant of the part's own covariance, and its inverse, upper half."""
         if not len(self.fixed):  # of a course whose radius and centres leave nothing free
             return 0.0, self.fixed
         place, own, fixed, _ = self._halves
         covariance = np.zeros(self.fixed.shape)
         covariance.ravel()[place] = fixed + variances @ own
-        # the transpose of the upper half: the lower one, in columns, as LAPACK has it
+        # the transpose of the lower half: the upper one, in columns, as LAPACK has it
         root, wrong = scipy.linalg.lapack.dpotrf(
-            rounded(covariance).T, lower=True, clean=False, overwrite_a=True
+            rounded(covariance).T, clean=False, overwrite_a=True
         )
         if wrong:
             raise np.linalg.LinAlgError("Matrix is not positive definite")
         logarithm = 2 * np.sum(np.log(np.diag(root)))
-        return logarithm, scipy.linalg.lapack.dpotri(root, lower=True, overwrite_c=True)[0]
+        return logarithm, scipy.linalg.lapack.dpotri(root, overwrite_c=True)[0]
 
     def traces(self, precision):
-        """(q,) traces of the covariances times a symmetric matrix (m, m), lower half."""
+        """(q,) traces of the covariances times a symmetric matrix (m, m), upper half."""
         if not len(precision):
             return np.zeros(len(self.own))
         place, own, _, twice = self._halves
@@ -78,10 +78,10 @@ class Part:
 
     @cached_property
     def _halves(self):
-        """Places of the upper half in a matrix, own (q, h) and fixed (h,) there, and how often each
+        """Places of the lower half in a matrix, own (q, h) and fixed (h,) there, and how often each
         counts: in half the memory a search waits for them half as long.
         """
-        place = np.flatnonzero(np.triu(np.ones(self.fixed.shape)))
+        place = np.flatnonzero(np.tril(np.ones(self.fixed.shape)))
         twice = np.where(place % (len(self.fixed) + 1) == 0, 1.0, 2.0)
         own = self.own.reshape(len(self.own), -1).take(place, axis=1)
         return place, own, self.fixed.ravel()[place], twice

@@ -68,7 +68,7 @@ class Misfit:
 
     @cached_property
     def _parts(self):
-        """Of each part its block of P less P y y' P (m, m), lower half, U (m, k) and P y (m,)."""
+        """Of each part its block of P less P y y' P (m, m), upper half, U (m, k) and P y (m,)."""
         found = []
         for inverse, across in self._solved:
             known = across[:, :-1] @ np.column_stack([self._root, self._common])
@@ -108,7 +108,7 @@ class Misfit:
         for part, (precision, _, pull), (_, across) in zip(
             one.parts, self._parts, self._solved, strict=True
         ):
-            whole = np.tril(precision) + np.tril(precision, -1).T + np.outer(pull, pull)
+            whole = np.triu(precision) + np.triu(precision, 1).T + np.outer(pull, pull)
             by_values = np.tensordot(part.own, across[:, :-1], 1)
             by_values = np.tensordot(by_values, across[:, :-1], (1, 0))
             own += _products(part.own, whole) - _products(by_values, spread)
@@ -139,14 +139,14 @@ def rounded(covariance):
 
 
 def _times(half, columns):
-    """Product with a symmetric matrix of which the lower half is filled."""
+    """Product with a symmetric matrix of which the upper half is filled."""
     if not len(half):
         return np.zeros(columns.shape)
-    return scipy.linalg.blas.dsymm(1.0, half, columns, lower=True)
+    return scipy.linalg.blas.dsymm(1.0, half, columns)
 
 
 def _less(half, columns):
-    """A symmetric matrix, lower half, less the products of columns; it is used up."""
+    """A symmetric matrix, upper half, less the products of columns; it is used up."""
     if not len(half):
         return half
-    return scipy.linalg.blas.dsyrk(-1.0, columns, beta=1.0, c=half, lower=True, overwrite_c=True)
+    return scipy.linalg.blas.dsyrk(-1.0, columns, beta=1.0, c=half, overwrite_c=True)
