@@ -161,19 +161,30 @@ def _of_copied_circumferences(read, digit_m):
 
     Of a single reading only those of its own course are compared.
     """
-    girths = [each[0].reading_m for each in read]
-    near = chance_of_equal(max(np.std(girths), digit_m), digit_m)
+    near = {
+        alike: chance_of_equal(max(spread_m, digit_m), digit_m)
+        for alike, spread_m in _spreads_m([each[0] for each in read]).items()
+    }
     found, expected = [], 0.0
     for first, second in combinations(read, 2):
-        if len(first) != len(second):
+        alike = first[0].course == second[0].course
+        if len(first) != len(second) or (len(first) == 1 and not alike):
             continue
-        if len(first) == 1 and first[0].course != second[0].course:
-            continue
-        expected += near * np.prod([chance_of_equal(one.sd_m, digit_m) for one in first[1:]])
+        expected += near[alike] * np.prod([chance_of_equal(one.sd_m, digit_m) for one in first[1:]])
         if [one.reading_m for one in first] == [one.reading_m for one in second]:
             found.append(_copied(first[0], second[0]))
     if found and pdtrc(len(found) - 1, expected) < BY_CHANCE:
         yield from found
+
+
+def _spreads_m(straps):
+    """{True: standard deviation of circumferences within their courses, False: of all}, m."""
+    whole, by_course = float(np.std([one.reading_m for one in straps])), {}
+    for one in straps:
+        by_course.setdefault(one.course, []).append(one.reading_m)
+    free = len(straps) - len(by_course)
+    squares = sum(len(each) * np.var(each) for each in by_course.values())
+    return {True: float(np.sqrt(squares / free)) if free else whole, False: whole}
 
 
 def chance_of_equal(sd_m, digit_m):

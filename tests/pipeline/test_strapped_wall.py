@@ -227,7 +227,8 @@ def one_off(rows, place):
 
 
 def copied(rows, place):
-    rows[3][place["reading_m"]] = rows[2][place["reading_m"]]
+    for first in (0, 2, 4):
+        rows[first + 1][place["reading_m"]] = rows[first][place["reading_m"]]
 
 
 def repeat_apart(rows, place):

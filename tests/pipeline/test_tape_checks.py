@@ -69,3 +69,27 @@ def test_repeats_are_equal_by_chance_now_and_then(figure):
         figure(f"books told of copied repeats, {digits} decimals", f"{share:.3f}")
         assert share < 0.02 + 3 * np.sqrt(0.02 * 0.98 / 400)
         assert len(list(_of_copies(book(rng, copied=12, digits=digits)))) >= 12
+
+
+def courses_read_once(rng, digits, copied=False):
+    """Two circumferences a course, alike within 1.5 mm, each read once."""
+    found = []
+    for course in range(6):
+        girth = 40.8 + 0.02 * rng.normal() + 1.5e-3 * rng.normal(size=2)
+        read = np.round(girth[[0, 0]] if copied else girth, digits)
+        found += [
+            Strap(f"{course}{side}", str(course), course + 0.4 * place, float(one), 1e-3, "T")
+            for place, (side, one) in enumerate(zip("ab", read, strict=True))
+        ]
+    return found
+
+
+def test_circumferences_of_one_course_are_equal_by_chance_now_and_then(figure):
+    """Simulation: sound books of courses that are round alike are told in less than 2 %."""
+    rng = np.random.default_rng(4)
+    for digits in (4, 3):
+        books = [courses_read_once(rng, digits) for _ in range(400)]
+        share = np.mean([bool(list(_of_copies(one))) for one in books])
+        figure(f"books told of copied circumferences, {digits} decimals", f"{share:.3f}")
+        assert share < 0.02 + 3 * np.sqrt(0.02 * 0.98 / 400)
+        assert len(list(_of_copies(courses_read_once(rng, digits, copied=True)))) >= 6
