@@ -183,7 +183,7 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
         seams = _seams(local, course, candidates, in_band, found, nominal_radius_m)
         wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
         where, of_wall = (local, course, zeta), (axis, relative, nominal_radius_m, welds_rad)
-        tested, stands = _by_field(*where, in_band, wall, seams, *of_wall)
+        tested, stands = _by_field(*where, in_band, wall, (seams, found.noise), *of_wall)
         wall[in_band], w[in_band], residual[in_band] = tested.accepted, tested.w, tested.departure_m
         wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
         wall[np.flatnonzero(in_band)[stands]] = False
@@ -221,9 +221,11 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
     )
 
 
-def _by_field(local, course, zeta, in_band, wall, sure, axis, relative, nominal_m, welds_rad):
+def _by_field(local, course, zeta, in_band, wall, shown, axis, relative, nominal_m, welds_rad):
     """`Tested` of the points near the wall: each by the field that the accepted others show; and
     which of them are columns that no wall is likely to have.
+
+    shown  what the smooth form showed: (n,) points of seams, and the scatter about it
     """
     index = np.flatnonzero(in_band)
     offset, distance = distances_from_axis(local[index], axis)
@@ -234,7 +236,7 @@ def _by_field(local, course, zeta, in_band, wall, sure, axis, relative, nominal_
     sites = Sites(courses, ring, zeta[index], azimuth, leans, welds)
     given = sites, distance, relative[index] ** 2, nominal_m
     tested = find_blunders(*given, wall[index])
-    stands = find_uprights(*given, tested, sure[index])
+    stands = find_uprights(*given, tested, shown[0][index], shown[1])
     if stands.any():
         tested = find_blunders(*given, tested.accepted, stands)
     return tested, stands

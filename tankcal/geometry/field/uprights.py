@@ -25,13 +25,14 @@ from tankcal.geometry.outlines import FULL_TURN
 
 LINK_M, WIDEST_M = 0.2, 0.4  # along the arc: between points of a column, and over all of them
 LEAST_RINGS, LEAST_SHARE = 3, 0.5  # that have a point of a column: their number, and share of all
-LEAST_M, PART = 0.020, 0.5  # jump of a column, and share of it by which each of its points departs
+LEAST_M, PART = 0.020, 0.25  # jump of a column, and share of it by which each of its points departs
 LEAST_W = 5.0  # standard deviations of the jump
-MOST_SHARE = 0.25  # of all columns, that stand off so far: more are the form of the wall
+FEWEST = 16  # columns of a survey: of fewer the others do not tell what its wall has
+MOST_SHARE = 0.25  # of all columns, that are tested: the others tell what walls have
 MOST_ROUNDS = 4
 
 
-def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure):
+def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure, scatter_m):
     """Mark columns of accepted readings that are not likely to be of the wall.
 
     Parameters
@@ -44,15 +45,16 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure):
         What that found.
     sure : ndarray of bool, shape (n,)
         Readings that are known to be of the wall.
+    scatter_m : float
+        Of the wall about its smooth form (standard deviation): within LEAST_W of it nothing is far.
 
     Returns
     -------
     ndarray of bool, shape (n,)
-        Nothing where there are more than MOST_SITES readings, nor where so many columns stand off
-        the wall that they are its form.
+        None where there are more than MOST_SITES readings, or fewer than FEWEST columns.
     """
     found, every = np.zeros(len(sites), dtype=bool), _columns(sites, tested.accepted, nominal_m)
-    if len(sites) > MOST_SITES or not every:
+    if len(sites) > MOST_SITES or not _may_stand_off(sites, radius_m, every):
         return found
     piece, left = Piece(sites, np.arange(len(sites)), nominal_m), radius_m - radius_m.mean()
 
@@ -61,12 +63,12 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure):
         precision = piece.precision(sizes[:-1], noise)
         return _eliminated(precision, precision @ left, np.flatnonzero(~tested.accepted))
 
-    sizes = tested.sizes_m2
+    sizes, least = tested.sizes_m2, max(LEAST_M, LEAST_W * scatter_m)
     rest = without(sizes)
     jumps = [_jump(*rest, one) for one in every if not sure[one].any()]
-    columns = [one.members for one in jumps if one.is_far and _is_tall(sites, one.members)]
-    if len(columns) > MOST_SHARE * len(every):
-        return found
+    far = [one for one in jumps if abs(one.size_m) > least and _is_tall(sites, one.members)]
+    far.sort(key=lambda one: -abs(one.size_m))
+    columns = [one.members for one in far[: int(MOST_SHARE * len(every))]]
     for _ in range(MOST_ROUNDS):
         if not columns:
             return found
@@ -74,7 +76,7 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure):
         known[np.concatenate(columns)] = False
         some = radius_m[known], variance_m2[known]
         sizes = likely_variances(sites.take(known), *some, nominal_m, sizes)
-        count, columns = len(columns), _unlikely(*without(sizes), columns)
+        count, columns = len(columns), _unlikely(*without(sizes), columns, least)
         if len(columns) == count:
             break
     for one in columns:
@@ -82,15 +84,15 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure):
     return found
 
 
-def _unlikely(precision, pull, columns):
-    """Those of the columns that are not likely to be of the wall as all others have it."""
+def _unlikely(precision, pull, columns, least_m):
+    """Those of the columns, by so much off at least, that are not likely to be of the wall as all others have it."""
     together = np.concatenate(columns)
     block, own = precision[np.ix_(together, together)], pull[together]
     ends, found = np.cumsum([0, *map(len, columns)]), []
     for column, start, stop in zip(columns, ends, ends[1:], strict=False):
         mine = np.arange(start, stop)
         jump = _jump(*_eliminated(block, own, np.delete(np.arange(len(own)), mine)), mine)
-        if jump.is_far and abs(jump.w) > LEAST_W:
+        if abs(jump.size_m) > least_m and abs(jump.w) > LEAST_W:
             found.append(column)
     return found
 
@@ -102,10 +104,6 @@ class _Jump:
     size_m: float
     w: float
     members: np.ndarray
-
-    @property
-    def is_far(self):
-        return abs(self.size_m) > LEAST_M
 
 
 def _eliminated(precision, pull, aside):
@@ -137,6 +135,16 @@ def _columns(sites, accepted, nominal_m):
         return []
     parts = np.split(np.roll(chosen[order], -starts[0]), starts[1:] - starts[0])
     return [one for one in parts if _is_tall(sites, one) and _is_narrow(sites, one, nominal_m)]
+
+
+def _may_stand_off(sites, radius_m, columns):
+    """Whether a column departs from the mean of those beside it by half a jump, at least."""
+    if len(columns) < FEWEST:
+        return False
+    ring = np.unique(sites.ring, return_inverse=True)[1]
+    means = np.bincount(ring, radius_m) / np.bincount(ring)
+    off = np.array([np.mean(radius_m[one] - means[ring[one]]) for one in columns])
+    return np.any(np.abs(off - (np.roll(off, 1) + np.roll(off, -1)) / 2) > LEAST_M / 2)
 
 
 def _is_tall(sites, column):
