@@ -85,7 +85,7 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure, scatter
 
 
 def _unlikely(precision, pull, columns, least_m):
-    """Those of the columns, by so much off at least, that are not likely to be of the wall as all others have it."""
+    """Those of the columns that are so far off at least, and not likely to be of the wall."""
     together = np.concatenate(columns)
     block, own = precision[np.ix_(together, together)], pull[together]
     ends, found = np.cumsum([0, *map(len, columns)]), []
