@@ -23,6 +23,7 @@ from tankcal.geometry.clutter import (
 from tankcal.geometry.columns import NONE, find_columns
 from tankcal.geometry.field.blunders import find_blunders
 from tankcal.geometry.field.sites import Sites
+from tankcal.geometry.field.uprights import find_uprights
 from tankcal.geometry.seams import find_seams
 from tankcal.messages import message
 
@@ -182,11 +183,11 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
     if snooping:
         seams = _seams(local, course, candidates, in_band, found, nominal_radius_m)
         wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
-        tested = _by_field(
-            local, course, zeta, in_band, wall, axis, relative, nominal_radius_m, welds_rad
-        )
+        where, of_wall = (local, course, zeta), (axis, relative, nominal_radius_m, welds_rad)
+        tested, stands = _by_field(*where, in_band, wall, (seams, found.noise), *of_wall)
         wall[in_band], w[in_band], residual[in_band] = tested.accepted, tested.w, tested.departure_m
         wall = wall | seams | _buckles(local, in_band, axis, residual, wall, nominal_radius_m)
+        wall[np.flatnonzero(in_band)[stands]] = False
         raw = np.where(wall, found.residual, residual)
         column = _columns(local, in_band, axis, raw, wall, found.noise, nominal_radius_m)
         reason[column != NONE] = UNDECIDED
@@ -221,8 +222,12 @@ def find_shell(xyz_m, joints_m, nominal_radius_m, *, sd_m=None, snooping=True, w
     )
 
 
-def _by_field(local, course, zeta, in_band, wall, axis, relative, nominal_radius_m, welds_rad):
-    """`Tested` of the points near the wall: each by the field that the accepted others show."""
+def _by_field(local, course, zeta, in_band, wall, shown, axis, relative, nominal_m, welds_rad):
+    """`Tested` of the points near the wall: each by the field that the accepted others show; and
+    which of them are columns that no wall is likely to have.
+
+    shown  what the smooth form showed: (n,) points of seams, and the scatter about it
+    """
     index = np.flatnonzero(in_band)
     offset, distance = distances_from_axis(local[index], axis)
     azimuth = np.arctan2(offset[:, 0], offset[:, 1])
@@ -230,7 +235,12 @@ def _by_field(local, course, zeta, in_band, wall, axis, relative, nominal_radius
     welds = tuple(np.asarray(welds_rad[one]) for one in seen) if welds_rad else ()
     ring, leans = find_rings(courses, zeta[index], azimuth)
     sites = Sites(courses, ring, zeta[index], azimuth, leans, welds)
-    return find_blunders(sites, distance, relative[index] ** 2, nominal_radius_m, wall[index])
+    given = sites, distance, relative[index] ** 2, nominal_m
+    tested = find_blunders(*given, wall[index])
+    stands = find_uprights(*given, tested, shown[0][index], shown[1])
+    if stands.any():
+        tested = find_blunders(*given, tested.accepted, stands)
+    return tested, stands
 
 
 def _buckles(local, in_band, axis, departure_m, wall, nominal_radius_m):

@@ -65,7 +65,7 @@ def nothing_tested(accepted):
     return Tested(accepted.copy(), *nothing)
 
 
-def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted):
+def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted, barred=None):
     """Test every reading of a wall by all others, with amplitudes that the accepted ones tell.
 
     Parameters
@@ -80,12 +80,16 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted):
         Radius of the tank, m.
     accepted : ndarray of bool, shape (n,)
         What is believed at first.
+    barred : ndarray of bool, shape (n,), optional
+        Readings that stay aside, whatever the others say; None: none.
 
     Returns
     -------
     Tested
     """
-    pieces = [_Piece(sites, members, nominal_m) for members in _pieces(sites)]
+    barred = np.zeros(len(sites), dtype=bool) if barred is None else barred
+    accepted = accepted & ~barred
+    pieces = [Piece(sites, members, nominal_m) for members in _pieces(sites)]
     left, found, sizes = radius_m - radius_m.mean(), nothing_tested(accepted), None
     for _ in range(MOST_ROUNDS):
         known = sites.take(accepted)
@@ -95,7 +99,8 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted):
         for piece in pieces:
             own = piece.members
             precision = piece.precision(variances, noise * variance_m2[own] + LEAST_NOISE_M**2)
-            tested = snoop_wall(precision, precision @ left[own], accepted[own])
+            pull = precision @ left[own]
+            tested = snoop_wall(precision, pull, accepted[own], barred=barred[own])
             for name in ("accepted", "departure_m", "w", "sd_m"):
                 getattr(found, name)[own] = getattr(tested, name)
         changed, accepted = np.mean(found.accepted != accepted), found.accepted.copy()
@@ -124,7 +129,7 @@ def _belts(count, sites):
     return int(np.clip(round(np.sqrt(count)), 1, sites.course.max() + 1))
 
 
-class _Piece:
+class Piece:
     """Some of the readings, and their covariance by the wall."""
 
     def __init__(self, sites, members, nominal_m):
@@ -148,14 +153,16 @@ def restricted_precision(covariance, design):
     return inverse
 
 
-def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf):
+def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf, barred=False):
     """`Tested` after setting aside one reading after another, of those that may go.
 
     most_sd_m  of a departure, beyond which no other reading controls it: then it stays
+    barred     of readings that stay aside
     """
 
     def tests(found):
-        return found.accepted, np.abs(found.w) * may_go * (found.sd_m < most_sd_m), CRITICAL
+        statistic = np.abs(found.w) * may_go * (found.sd_m < most_sd_m)
+        return found.accepted, np.where(barred, np.nan, statistic), CRITICAL
 
     def again(before, goes, comes):
         return against_others(precision, pull, before.accepted & ~goes | comes)
