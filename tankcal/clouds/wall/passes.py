@@ -40,7 +40,7 @@ class Passes:
         return cells_of(self.points(), surface, grid, scans)
 
     def gather(self, taken_of, *sizes):
-        """What taken_of(points, *sizes) takes of all points; two of it have `merged`."""
+        """What `taken_of` takes of all points and these sizes; two of it have `merged`."""
         return taken_of(self.points(), *sizes)
 
 
