@@ -77,9 +77,7 @@ OVERSIZED = {
         b"<si><t>%d</t></si>" % (i * i % 99_991) for i in range(700_000)
     ),
     "long text": lambda: b"<si><t>" + b"x" * 3_000_000 + b"</t></si>",
-    "attributes": lambda: (
-        b'<row r="999" ' + b" ".join(b'a%d=""' % i for i in range(400_000)) + b"/>"
-    ),
+    "attributes": lambda: b'<row r="999" ' + b" ".join(b'a%d=""' % i for i in range(400_000)),
     "blanks": lambda: b" " * 20_000_000,
 }
 
