@@ -6,9 +6,9 @@ between its parts.
 """
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import Delaunay, cKDTree
+from scipy.spatial import Delaunay
+
+from tankcal.geometry.patches import find_patches
 
 LINK_M = 2.5  # along the wall, between points of one patch
 NARROWEST_M, SHORTEST_M = 0.4, 0.8  # of a patch, across and along it: smaller ones are no buckle
@@ -45,24 +45,13 @@ def find_buckles(place_m, departure_m, rejected):
     """
     found = np.zeros(len(rejected), dtype=bool)
     for sign in (-1, 1):
-        for patch in _patches(place_m, np.flatnonzero(rejected & (sign * departure_m > 0))):
+        chosen = np.flatnonzero(rejected & (sign * departure_m > 0))
+        for patch in find_patches(place_m, chosen, LINK_M, FEWEST):
             found[patch] = _is_buckle(place_m[patch], np.delete(place_m, patch, axis=0))
     return found
 
 
-def _patches(place_m, members):
-    """Arrays of members that hang together."""
-    if len(members) < FEWEST:
-        return []
-    pairs = cKDTree(place_m[members]).query_pairs(LINK_M, output_type="ndarray")
-    links = csr_array((np.ones(len(pairs)), pairs.T), shape=(len(members),) * 2)
-    count, label = connected_components(links, directed=False)
-    return [members[label == one] for one in range(count)]
-
-
 def _is_buckle(patch_m, others_m):
-    if len(patch_m) < FEWEST:
-        return False
     axes = np.linalg.svd(patch_m - patch_m.mean(axis=0), full_matrices=False)[2]
     long, wide = np.ptp(patch_m @ axes.T, axis=0)
     if wide < NARROWEST_M or long < SHORTEST_M:

@@ -9,9 +9,9 @@ worth is no better known.
 """
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
+
+from tankcal.geometry.patches import find_patches
 
 LINK_M = 0.2, 4.0  # along the arc and upwards, between points of a column
 FEWEST, SHORTEST_M = 2, 0.7  # points of a column, and its height
@@ -82,13 +82,8 @@ def _cut_where_nothing_is(place_m, rejected, turn_m):
 
 def _columns(place_m, members):
     """Arrays of members that hang together, tall and slender."""
-    if len(members) < FEWEST:
-        return []
-    pairs = cKDTree(place_m[members] / LINK_M).query_pairs(1.0, p=np.inf, output_type="ndarray")
-    links = csr_array((np.ones(len(pairs)), pairs.T), shape=(len(members),) * 2)
-    count, label = connected_components(links, directed=False)
-    patches = [members[label == one] for one in range(count)]
-    return [one for one in patches if len(one) >= FEWEST and _is_tall(*np.ptp(place_m[one], 0))]
+    patches = find_patches(place_m, members, LINK_M, FEWEST)
+    return [one for one in patches if _is_tall(*np.ptp(place_m[one], axis=0))]
 
 
 def _is_tall(width_m, height_m):

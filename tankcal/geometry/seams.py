@@ -7,9 +7,8 @@ or more. For the same reason a pipe is never wider than its crest is far off.
 """
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+
+from tankcal.geometry.patches import find_patches
 
 LINK_M = 0.1, 4.0  # across and along a strip, between its points
 FEWEST = 8  # points of a strip that say anything
@@ -74,13 +73,8 @@ def find_seams(place_m, departure_m, rejected, noise_m):
 
 def _strips(place_m, members):
     """Arrays of members that hang together, tall and slender."""
-    if len(members) < FEWEST:
-        return []
-    pairs = cKDTree(place_m[members] / LINK_M).query_pairs(1.0, p=np.inf, output_type="ndarray")
-    links = csr_array((np.ones(len(pairs)), pairs.T), shape=(len(members),) * 2)
-    count, label = connected_components(links, directed=False)
-    strips = [members[label == one] for one in range(count)]
-    return [one for one in strips if len(one) >= FEWEST and _is_slender(*np.ptp(place_m[one], 0))]
+    strips = find_patches(place_m, members, LINK_M, FEWEST)
+    return [one for one in strips if _is_slender(*np.ptp(place_m[one], axis=0))]
 
 
 def _is_slender(width_m, height_m):

@@ -390,11 +390,12 @@ def _run(job, progress, part_progress, simulated, reading):
         intervals=intervals,
         rule=verdict_of(job, body, table, intervals, simulation),
         warnings=_warnings(
-            (job, liquid),
+            job,
             adjustment,
             found.sighting or found.touching or found.clouded,
             survey,
             made,
+            liquid,
         ),
         adjustment=adjustment,
         strapped=survey if isinstance(survey, StrappedWall) else None,
@@ -406,8 +407,7 @@ def _run(job, progress, part_progress, simulated, reading):
     )
 
 
-def _warnings(asked, adjustment, sighting, survey, made):
-    job, liquid = asked
+def _warnings(job, adjustment, sighting, survey, made, liquid):
     of_survey = ()
     if adjustment is not None:
         left_open = open_questions(job, adjustment.datum, adjustment.causes)

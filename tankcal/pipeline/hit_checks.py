@@ -13,7 +13,7 @@ from tankcal.pipeline.level_checks import (
     girth_m,
     levels_with_few,
 )
-from tankcal.pipeline.moved_setups import critical_of_setup, moved_setups
+from tankcal.pipeline.moved_setups import moved_setups, worst_setup
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.control_drift import repeats_of
@@ -182,22 +182,21 @@ def _of_setups(job, wall, sighting):
     turn = normal[:, 0] * away[:, 1] - normal[:, 1] * away[:, 0]
     columns = np.column_stack([turn, normal])
     tests = moved_setups(wall.field, whole, names[at], columns, SUSPECT, wave_m=WAVE_M)
-    name = max(tests, key=lambda one: tests[one][0])
-    w, turned, shift = tests[name]
+    worst = worst_setup(tests)
+    if worst is None:
+        return
+    _, turned, shift = tests[worst["setup"]]
     moved_m = max(float(np.hypot(*shift)), abs(turned) * float(np.median(np.hypot(*away.T))))
-    if w > critical_of_setup(len(tests)) and moved_m > MOVED_M:
+    if moved_m > MOVED_M:
         text = message(
             "hits_of_moved_setup",
             "the hits from set-up {setup!r} contradict all others (w = {w:.1f}), as if its circle"
             " were turned by {turn_arcsec:+.0f} seconds of arc, or its station moved by"
             " {shift_mm:.1f} mm: was it disturbed, has it another zero, or are its hits those of"
             " another set-up?",
-            setup=name,
-            w=w,
-            turn_arcsec=float(np.degrees(turned) * 3600),
-            shift_mm=1000 * float(np.hypot(*shift)),
+            **worst,
         )
-        yield Problem("setups.csv", text, job.hits.setups[name].row, "setup")
+        yield Problem("setups.csv", text, job.hits.setups[worst["setup"]].row, "setup")
 
 
 def causes_unlike_certificates(wall, told, file="instruments.toml", *, taken_off_m):

@@ -7,9 +7,10 @@ readings of a line, or of all lines, hang together, and the test of single readi
 import numpy as np
 
 from tankcal.errors import Problem
+from tankcal.geometry.form import harmonics
 from tankcal.messages import message
 from tankcal.pipeline.survey_limits import limits_of
-from tankcal.survey.reference_line import level_names
+from tankcal.survey.reference_line import rises_of
 
 FILE, RULES = "offsets.csv", "reference_line"
 STEPS_IN, STEPS_IN_SDS = -0.4, 2.0  # of a plate's step that the wall steps in: no build does
@@ -73,24 +74,14 @@ def departures_of(given, collimations):
         {line: (levels,) radial departures over the reference level, m}.
     """
     used = [one for one in given.offsets if not one.check]
-    zeros, read = {}, {}
-    for one, level in zip(used, level_names(used), strict=True):
-        kappa = collimations.get(given.of(one)[0].instrument, 0.0)
-        radial = given.radial_m(one) - kappa * given.by_collimation_m(one)
-        if one.reference:
-            zeros.setdefault(one.line, []).append(radial)
-        else:
-            read.setdefault(int(level), {}).setdefault(one.line, []).append(radial)
     found = {}
-    for level in read.values():
-        lines = [line for line in level if line in zeros]
-        if len(lines) < FEWEST_LINES:
+    for level in rises_of(given, used, collimations):
+        if len(level) < FEWEST_LINES:
             continue
-        rise = np.array([np.mean(level[line]) - np.mean(zeros[line]) for line in lines])
-        turn = np.array([given.lines[line].azimuth_rad for line in lines])
-        design = np.column_stack([np.ones(len(turn)), np.sin(turn), np.cos(turn)])
-        for place, line in enumerate(lines):
-            others = np.arange(len(lines)) != place
+        rise = np.array([rise for _, rise, _ in level])
+        design = harmonics([given.lines[line].azimuth_rad for line, _, _ in level], 1)
+        for place, (line, _, _) in enumerate(level):
+            others = np.arange(len(level)) != place
             fit = np.linalg.lstsq(design[others], rise[others], rcond=None)[0]
             found.setdefault(line, []).append(rise[place] - design[place] @ fit)
     return {line: np.array(each) for line, each in found.items()}

@@ -6,6 +6,7 @@ result = measured.result(levels_m)             `LiquidResult`, beside the rows o
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import gammaincc
@@ -34,7 +35,6 @@ from tankcal.pipeline.liquid_result import (
 )
 from tankcal.pipeline.liquid_tables import beside_table, or_none
 from tankcal.pipeline.tanks import body_of, zero_height
-from tankcal.tank.body import Body
 from tankcal.tank.liquid import fill_of, name_causes
 from tankcal.tank.liquid.readings import batch_sd_m3
 
@@ -52,25 +52,38 @@ class Measured:
     joint : LiquidFound
     alone : LiquidFound or None
         None where liquid alone does not tell the tank.
-    body : Body
-        Of the table that is printed.
     """
 
     job: object
     survey: object
     joint: LiquidFound
     alone: LiquidFound | None
-    body: Body
+
+    @cached_property
+    def joint_body(self):
+        """`JointBody` of geometry and liquid."""
+        return join_body(self.joint.known)
+
+    @cached_property
+    def body_alone(self):
+        """`JointBody` of liquid alone; None where it does not tell the tank."""
+        return self.alone and join_body(self.alone.known)
+
+    @property
+    def body(self):
+        """`Body` of the table that is printed."""
+        certified = self.job.liquid.certified
+        if certified == "geometry":
+            return body_of(self.job, self.survey)
+        return self.body_alone if certified == "liquid" else self.joint_body
 
     def body_for(self, density_kg_m3):
         """The same for another liquid of the table."""
-        if self.job.liquid.certified == "geometry":
+        certified = self.job.liquid.certified
+        if certified == "geometry":
             return body_of(filled_with(self.job, density_kg_m3), self.survey)
-        return join_body(self._printed.known, density_kg_m3)
-
-    @property
-    def _printed(self):
-        return self.alone if self.job.liquid.certified == "liquid" else self.joint
+        printed = self.alone if certified == "liquid" else self.joint
+        return join_body(printed.known, density_kg_m3)
 
     def result(self, levels_m):
         """`LiquidResult` beside the rows of a table."""
@@ -88,17 +101,12 @@ def measure_by_liquid(job, survey):
     if job.liquid is None:
         return None
     joint = _settled(adjust_liquid(geometry_beside(job, survey)))
-    certified = job.liquid.certified
 
     def adjust_alone():
         return _settled(adjust_liquid(geometry_alone(job, survey)))
 
-    alone = adjust_alone() if certified == "liquid" else or_none(adjust_alone)
-    if certified == "geometry":
-        body = body_of(job, survey)
-    else:
-        body = join_body((alone if certified == "liquid" else joint).known)
-    return Measured(job, survey, joint, alone, body)
+    alone = adjust_alone() if job.liquid.certified == "liquid" else or_none(adjust_alone)
+    return Measured(job, survey, joint, alone)
 
 
 def _settled(found):
@@ -157,15 +165,14 @@ def _tables(measured, levels):
     low, high = filled_range_m(job.liquid)
     dips = levels - zero_height(job, measured.survey)
     inside = (dips >= low - 1e-9) & (dips <= high + 1e-9)
-    joint, alone = join_body(measured.joint.known), None
-    if measured.alone is not None:
-        body = join_body(measured.alone.known)
-        alone = beside_table("liquid", body, levels, probability, inside)
+    alone = measured.body_alone
+    if alone is not None:
+        alone = beside_table("liquid", alone, levels, probability, inside)
     geometry = measured.joint.known.geometry.moved_to({}).body()
     return {
         "geometry": beside_table("geometry", geometry, levels, probability),
         "liquid": alone,
-        "joint": beside_table("joint", joint, levels, probability),
+        "joint": beside_table("joint", measured.joint_body, levels, probability),
     }
 
 
@@ -174,7 +181,7 @@ def _steps(found):
     rows = metering.row[fill.dip_row]
     dips = metering.dip_m[fill.dip_row]
     by_head = _by_head(found)
-    sd = batch_sd_m3(metering, fill, before)
+    sd = batch_sd_m3(metering, fill)
     size, sd_of_size, w = found.adjusted.test(-np.eye(len(fill)))
     return LiquidSteps(
         row=rows[fill.end],

@@ -12,7 +12,6 @@ import numpy as np
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.simulation.curvature import vary_input
 from tankcal.pipeline.tanks import body_of, zero_height
-from tankcal.tank.body import Body
 from tankcal.tank.service import shell_factor
 from tankcal.uncertainty import triangular
 
@@ -138,8 +137,8 @@ def load_geometry(geometry, densities_kg_m3, dips_m, shell_c):
         volume_m3=volume,
         area_m2=area,
         by_density=by_density,
-        by_offset=_by_offset(geometry.job, body, derivatives, nothing),
-        growth=_growth(geometry.job, body, levels, volume, shell_c),
+        by_offset=_by_offset(body, derivatives, nothing),
+        growth=_growth(geometry.job, body, levels, shell_c),
         sources=sources_at(geometry, body, levels, without=("liquid_density",)),
     )
 
@@ -156,7 +155,7 @@ def sources_at(geometry, body, levels_m, without=()):
     return body.sources_by(levels_m, [one.name for one in geometry.job.inputs], without)
 
 
-def _by_offset(job, body, derivatives, nothing):
+def _by_offset(body, derivatives, nothing):
     """Derivative of volumes by a metre in all inside radii."""
     if body.shell is not None:
         return derivatives.get("offset", derivatives["scale"] / _mean_radius(body))
@@ -170,7 +169,7 @@ def _mean_radius(body):
     return float(np.sqrt(np.mean(areas) / np.pi)) / body.shell.scale
 
 
-def _growth(job, body, levels_m, volume_m3, shell_c):
+def _growth(job, body, levels_m, shell_c):
     """Factor of volumes by the shell's temperature at a fixed level.
 
     An upright shell widens, (1 + a dT)^2; a solid grows all over, (1 + a dT)^3 V(h / (1 + a dT)).
@@ -237,8 +236,3 @@ def wide_input(name, u, unit, as_read):
 def stacked(sources, rows):
     """(rows, c) columns of all sources."""
     return np.hstack([np.zeros((rows, 0)), *(one.columns_m3 for one in sources)])
-
-
-def is_solid(body):
-    """Whether a body has no shell of courses."""
-    return isinstance(body, Body) and body.shell is None

@@ -120,10 +120,10 @@ def _cause(one):
     if one.cause.kind == "bottom":
         return message("cause_bottom", "the volume of the bottom, off by {size:+.3f} m3",
                        size=-size)  # fmt: skip
-    return _so_or_not(one, size, of)
+    return _so_or_not(one, size)
 
 
-def _so_or_not(one, size, of):
+def _so_or_not(one, size):
     if one.cause.kind == "leak":
         unit = one.cause.unit if one.cause.unit != "m3" else message("m3_a_step", "m3 a step")
         return message("cause_leak", "a valve that passes, {size:+.3f} {unit}", size=size,

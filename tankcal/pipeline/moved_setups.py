@@ -110,6 +110,26 @@ def _as_if_moved(columns, mine, precision, pull):
     return np.sqrt(max(statistic, 0.0)), float(turn), tuple(shift.tolist())
 
 
+def worst_setup(tests):
+    """What `moved_setups` found of the set-up that looks most as if it had moved.
+
+    Returns
+    -------
+    dict or None
+        setup, w, turn_arcsec, shift_mm, as messages have them; None where no test is significant.
+    """
+    name = max(tests, key=lambda one: tests[one][0])
+    w, turn, shift = tests[name]
+    if w <= critical_of_setup(len(tests)):
+        return None
+    return {
+        "setup": name,
+        "w": w,
+        "turn_arcsec": float(np.degrees(turn) * 3600),
+        "shift_mm": 1000 * float(np.hypot(*shift)),
+    }
+
+
 def critical_of_setup(count):
     """Test quantity from which one of so many set-ups counts as disturbed."""
     return float(np.sqrt(chdtri(3, ALPHA / max(count, 1))))

@@ -15,7 +15,7 @@ from tankcal.pipeline.level_checks import (
     girth_m,
     levels_with_few,
 )
-from tankcal.pipeline.moved_setups import critical_of_setup, moved_setups, tested
+from tankcal.pipeline.moved_setups import moved_setups, tested, worst_setup
 from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.wall import joints_of
 
@@ -240,18 +240,15 @@ def _of_setups(job, tests):
             return
     if not tests.setups:
         return
-    name = max(tests.setups, key=lambda one: tests.setups[one][0])
-    w, turn, shift = tests.setups[name]
-    if w > critical_of_setup(len(tests.setups)):
+    worst = worst_setup(tests.setups)
+    if worst is not None:
         text = message(
             "setup_disturbed",
             "the tangents from set-up {setup!r} contradict all others (w = {w:.1f}), as if its"
             " circle were turned by {turn_arcsec:+.0f} seconds of arc, or its station moved by"
             " {shift_mm:.1f} mm: was it disturbed after the traverse, or has the wall a seam"
             " there?",
-            setup=name,
-            w=w,
-            turn_arcsec=float(np.degrees(turn) * 3600),
-            shift_mm=1000 * float(np.hypot(*shift)),
+            **worst,
         )
-        yield Problem("setups.csv", text, job.tangents.setups[name].row, "setup")
+        row = job.tangents.setups[worst["setup"]].row
+        yield Problem("setups.csv", text, row, "setup")

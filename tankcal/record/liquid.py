@@ -174,7 +174,6 @@ def liquid_of(result):
         dips=_rows_of(
             LiquidDip,
             found.dips,
-            residual_m=_residual(found.dips, found.dips.sd_m),
             w=_tests(found.dips),
         ),
         bottom_flex_sd=flex and flex.u_before,
@@ -248,15 +247,9 @@ def _steps(found, probability):
         geometry_m3=steps.reference_m3 - steps.misclosure_m3,
         misclosure_u_m3=steps.misclosure_sd_m3,
         misclosure_U_m3=k * steps.misclosure_sd_m3,
-        residual_m3=_residual(steps, steps.sd_m3),
         w=_tests(steps),
         detectable_m3=np.where(steps.detectable_m3 < filled, steps.detectable_m3, np.nan),
     )
-
-
-def _residual(tested, sd):
-    """v = w sd sqrt(r): what is to be added to each reading."""
-    return tested.w * sd * np.sqrt(np.maximum(tested.redundancy, 0.0))
 
 
 def _tests(tested):

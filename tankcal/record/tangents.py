@@ -3,7 +3,8 @@
 import numpy as np
 
 from tankcal.geometry.support import fit_support
-from tankcal.pipeline.tangent_checks import critical_of_setup, judge_tangents, least_tangents
+from tankcal.pipeline.moved_setups import critical_of_setup
+from tankcal.pipeline.tangent_checks import judge_tangents, least_tangents
 from tankcal.record.hits import departure_from_sections
 from tankcal.record.schema import Saved, key
 

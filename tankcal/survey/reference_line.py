@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tankcal.geometry.form import harmonics
 from tankcal.geometry.outlines import FULL_TURN
 
 ARCSEC = FULL_TURN / 1_296_000
@@ -225,6 +226,16 @@ def levels_of(given, offsets, collimations):
     collimations : dict
         {plummet: kappa, rad}.
     """
+    rises = rises_of(given, offsets, collimations)
+    levels = [_level(given, read) for read in rises if len(read) >= FEWEST_LINES - 1]
+    return tuple(sorted(levels, key=lambda one: one.level_m))
+
+
+def rises_of(given, offsets, collimations):
+    """Of each level but the reference [(line, rise over its reference, first offset there)], m.
+
+    given, offsets, collimations  as of `levels_of`
+    """
     by_line, values = {}, {}
     for one, number in zip(offsets, level_names(offsets), strict=True):
         kappa = collimations.get(given.of(one)[0].instrument, 0.0)
@@ -238,15 +249,13 @@ def levels_of(given, offsets, collimations):
         if line in by_line:
             rise = np.mean([radial for radial, _ in read]) - np.mean(by_line[line])
             found.setdefault(number, []).append((line, rise, read[0][1]))
-    levels = [_level(given, read) for read in found.values() if len(read) >= FEWEST_LINES - 1]
-    return tuple(sorted(levels, key=lambda one: one.level_m))
+    return tuple(found.values())
 
 
 def _level(given, read):
     azimuth = np.array([given.lines[line].azimuth_rad for line, _, _ in read])
     rises = np.array([rise for _, rise, _ in read])
-    design = np.column_stack([np.ones(len(rises)), np.sin(azimuth), np.cos(azimuth)])
-    mean, x, y = np.linalg.lstsq(design, rises, rcond=None)[0]
+    mean, y, x = np.linalg.lstsq(harmonics(azimuth, 1), rises, rcond=None)[0]
     level_m = float(np.mean([one.level_m for _, _, one in read]))
     return Level(read[0][2].course, level_m, len(read), float(mean), (float(x), float(y)))
 

@@ -171,13 +171,18 @@ def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf, barred=
     return snoop(start, tests, again, at_once=AT_ONCE, returns=1).adjustment
 
 
+def carried_over(precision, aside):
+    """(P_SS^-1, P_.S P_SS^-1) of readings S that are set aside: what takes them out of P."""
+    among = scipy.linalg.pinvh(precision[np.ix_(aside, aside)], rtol=NOTHING_LEFT)
+    return among, precision[:, aside] @ among
+
+
 def against_others(precision, pull, accepted):
     """`Tested` with P and P y of the module's heading."""
     aside = np.flatnonzero(~accepted)
     departure, weight = pull.copy(), precision.diagonal().copy()
     if len(aside):
-        among = scipy.linalg.pinvh(precision[np.ix_(aside, aside)], rtol=NOTHING_LEFT)
-        to = precision[:, aside] @ among
+        among, to = carried_over(precision, aside)
         departure -= to @ pull[aside]
         weight -= np.sum(to * precision[:, aside], axis=1)
         departure[aside], weight[aside] = among @ pull[aside], 1.0

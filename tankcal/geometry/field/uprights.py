@@ -18,7 +18,7 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.geometry.field.amplitudes import likely_variances
-from tankcal.geometry.field.blunders import NOTHING_LEFT, Piece
+from tankcal.geometry.field.blunders import NOTHING_LEFT, Piece, carried_over
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
 from tankcal.geometry.outlines import FULL_TURN
@@ -110,8 +110,7 @@ def _eliminated(precision, pull, aside):
     """P and P y of the heading without readings that are aside, whose rows mean nothing then."""
     if not len(aside):
         return precision, pull
-    among = scipy.linalg.pinvh(precision[np.ix_(aside, aside)], rtol=NOTHING_LEFT)
-    to = precision[:, aside] @ among
+    to = carried_over(precision, aside)[1]
     return precision - to @ precision[aside], pull - to @ pull[aside]
 
 

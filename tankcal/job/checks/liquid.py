@@ -40,7 +40,7 @@ def check_liquid(values, tables, registers, raw, log):
         extent = extent_of(values, tables, kind)
         _check_settings(values, tables, raw, log)
         _check_beside(values, tables, kind, raw, log)
-    check_runs(table, values, tables, extent, raw, log)
+    check_runs(table, values, extent, raw, log)
 
 
 def meters_read(table, meters):
@@ -99,8 +99,8 @@ def _check_meters(table, meters, raw, log):
         )
         log.problem(file, expected)
         return
-    rows = zip(table.rows, table.of("meter"), meters_read(table, meters), strict=True)
-    for row, given, name in rows:
+    read = meters_read(table, meters)
+    for row, given, name in zip(table.rows, table.of("meter"), read, strict=True):
         if name is None and not log.has(table.file, row, "meter"):
             expected = message("meter_not_named", "blank; expected a meter of {file}", file=file)
             log.problem(table.file, expected, row, "meter")
@@ -113,7 +113,7 @@ def _check_meters(table, meters, raw, log):
                 hint=nearest(given, meters),
             )
             log.problem(table.file, expected, row, "meter")
-    used, register = set(meters_read(table, meters)), raw.registers["meters"]
+    register = raw.registers["meters"]
     for name, one in meters.items():
         low, high = one["flow_min_m3_h"], one["flow_max_m3_h"]
         if None not in (low, high) and low >= high:
@@ -124,7 +124,7 @@ def _check_meters(table, meters, raw, log):
                 high=high,
             )
             _tell_of_meter(log.problem, register, name, "flow_min_m3_h", expected)
-        if name not in used:
+        if name not in read:
             expected = message("meter_not_read", "without effect: no row of {of} names it",
                                of=table.file)  # fmt: skip
             log.warning(file, expected, register.rows.get(name), name)

@@ -58,7 +58,7 @@ def steps_of(table):
     return found
 
 
-def check_runs(table, values, tables, extent, raw, log):
+def check_runs(table, values, extent, raw, log):
     """Problems of rows one by one, of each run, and of the dips against the tank's sizes.
 
     values, extent  None: the settings cannot be read
@@ -73,7 +73,7 @@ def check_runs(table, values, tables, extent, raw, log):
         _check_signs(table, broken, log)
     _check_temperatures(table, runs, log)
     if extent is not None and _check_levels(table, extent, log):
-        _check_units(table, volume_by_sizes(values, tables, raw), extent, values, log)
+        _check_units(table, volume_by_sizes(values, raw), extent, values, log)
 
 
 def _check_order(table, log):

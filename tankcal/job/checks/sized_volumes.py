@@ -6,7 +6,7 @@ from tankcal.job.checking import zero_z
 from tankcal.job.entries import kind_of
 
 
-def volume_by_sizes(values, tables, raw):
+def volume_by_sizes(values, raw):
     """Function of a dip (m) that gives m3 by nominal sizes, or None: they are not known."""
     kind = kind_of(raw)
     diameter = values["tank"]["nominal_diameter_m"]

@@ -358,7 +358,7 @@ def wall_plan_of(raw, values, tables, given, limits, folder):
 
     Raises InputError: what the job says of its tables is told of the section that makes them.
     """
-    table, holds = tables["courses"], volume_by_sizes(values, tables, raw)
+    table, holds = tables["courses"], volume_by_sizes(values, raw)
     courses = ()
     if table is not None:
         courses = tuple(zip(table.of("course"), table.of("height_m"), strict=True))

@@ -54,7 +54,7 @@ def reading_effects(metering, fill, reduced, volume_m3, area_m2, growth=None):
     """
     dips = fill.differences(reduced.carried) * np.asarray(area_m2)
     noise = [
-        Effect("meter_repeatability", np.diag(-batch_sd_m3(metering, fill, reduced))),
+        Effect("meter_repeatability", np.diag(-batch_sd_m3(metering, fill))),
         Effect("dip_readings", dips * metering.s_dip_m[fill.dip_row]),
         Effect(
             "liquid_temperatures",
@@ -70,7 +70,7 @@ def reading_effects(metering, fill, reduced, volume_m3, area_m2, growth=None):
     return ReadingEffects(tuple(_sized(noise)), tuple(_sized(common)), run_m3)
 
 
-def batch_sd_m3(metering, fill, reduced):
+def batch_sd_m3(metering, fill):
     """(n,) standard deviation of what was metered in each step, at the table's temperature."""
     meters = [metering.meters[name] for name in metering.meter]
     relative = np.array([one.repeatability for one in meters])
