@@ -230,6 +230,7 @@ SLIPS = [
     (cell(1, "volume_m3", 39.8), (ROWS, 2, "volume_m3"), "run_without_start"),
     (cell(1, "use", "check"), (ROWS, 2, "use"), "start_not_used"),
     (cell(3, "dip_m", None), (ROWS, 4, "dip_m"), "dip_missing_in_run"),
+    (lambda parts: drop(parts, "dip_m"), (ROWS, None, "dip_m"), "column_missing_or"),
     (cell(3, "volume_m3", 0.0), (ROWS, 4, "volume_m3"), "batch_of_nothing"),
     (cell(8, "dip_m", 1.3), (ROWS, 9, "dip_m"), "dip_does_not_rise"),
     (cell(8, "volume_m3", -26.5), (ROWS, 9, "dip_m"), "dip_does_not_fall"),

@@ -6,6 +6,7 @@ import numpy as np
 
 from tankcal.job.checking import UNIT_FACTOR
 from tankcal.job.checks.sized_volumes import volume_by_sizes
+from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.contract.liquid import TEMPERATURES
 from tankcal.messages import message
 
@@ -70,6 +71,7 @@ def check_runs(table, values, extent, raw, log):
             _check_start(table, run, places, log)
             _check_batches(table, run, places, log)
             _check_times(table, places, log)
+        _check_dips(table, runs, log)
         _check_signs(table, broken, log)
     _check_temperatures(table, runs, log)
     if extent is not None and _check_levels(table, extent, log):
@@ -121,16 +123,8 @@ def _check_start(table, run, places, log):
 
 
 def _check_batches(table, run, places, log):
-    volumes, dips = table.of("volume_m3"), table.of("dip_m")
+    volumes = table.of("volume_m3")
     for place in places[1:]:
-        row = table.rows[place]
-        if dips[place] is None and not log.has(table.file, row, "dip_m"):
-            expected = message(
-                "dip_missing_in_run",
-                "blank; expected the dip: only the first row of a run may have none, where the tank"
-                " was empty and dry",
-            )
-            log.problem(table.file, expected, row, "dip_m")
         if volumes[place] == 0:
             expected = message(
                 "batch_of_nothing",
@@ -138,7 +132,23 @@ def _check_batches(table, run, places, log):
                 " a dip that was read again give the mean, for a new run another name",
                 run=run,
             )
-            log.problem(table.file, expected, row, "volume_m3")
+            log.problem(table.file, expected, table.rows[place], "volume_m3")
+
+
+def _check_dips(table, runs, log):
+    """Problems of rows without a dip, but for the first of each run."""
+    dips = table.of("dip_m")
+    needed = {place for places in runs.values() for place in places[1:]}
+    is_blank = [
+        dips[place] is None and place in needed and not log.has(table.file, row, "dip_m")
+        for place, row in enumerate(table.rows)
+    ]
+    expected = message(
+        "dip_missing_in_run",
+        "blank; expected the dip: only the first row of a run may have none, where the tank was"
+        " empty and dry",
+    )
+    tell_rows(log.problem, table, is_blank, "dip_m", expected)
 
 
 def _check_times(table, places, log):
