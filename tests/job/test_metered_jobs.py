@@ -513,14 +513,14 @@ def test_volumes_by_sizes():
         "sphere": {"diameter_m": 10.0},
         "horizontal": none | {"diameter_m": 2.4, "length_m": 9.0},
     }
-    assert volume_by_sizes(values, {}, Raw("vertical"))(0.9) == pytest.approx(np.pi * 6.5**2)
+    assert volume_by_sizes(values, Raw("vertical"))(0.9) == pytest.approx(np.pi * 6.5**2)
     values["datum"]["dip_plate_z_m"] = 0.0
-    sphere = volume_by_sizes(values, {}, Raw("sphere"))
+    sphere = volume_by_sizes(values, Raw("sphere"))
     assert sphere(5.0) == pytest.approx(2 / 3 * np.pi * 125)
-    lying = volume_by_sizes(values, {}, Raw("horizontal"))
+    lying = volume_by_sizes(values, Raw("horizontal"))
     assert lying(1.2) == pytest.approx(np.pi * 1.2**2 * 9 / 2)
     assert lying(2.4) == pytest.approx(np.pi * 1.2**2 * 9)
-    assert volume_by_sizes(values, {}, Raw("mesh")) is None
+    assert volume_by_sizes(values, Raw("mesh")) is None
 
 
 @pytest.mark.parametrize("name", ["liquid", "liquid-lying"])
