@@ -1,0 +1,1 @@
+"""Tables for gauging and inventory systems: profiles, breakpoints, files that are read back."""
