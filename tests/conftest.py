@@ -4,6 +4,7 @@ import fcntl
 import os
 import shutil
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: two workers share two cores
@@ -73,6 +74,23 @@ def example_record(made_once):
         save(record_of(tankcal.run(tankcal.load(EXAMPLE))), folder / "record.json")
 
     return made_once("example", make) / "record.json"
+
+
+@pytest.fixture(scope="session")
+def short_result():
+    """The same with rows 0.25 m apart: 39, not 951, for files whose length is not looked at."""
+    job = tankcal.load(EXAMPLE)
+    return tankcal.run(replace(job, table=replace(job.table, step_m=0.25)))
+
+
+@pytest.fixture(scope="session")
+def short_record(made_once, request):
+    """Path of its record.json."""
+
+    def make(folder):
+        save(record_of(request.getfixturevalue("short_result")), folder / "record.json")
+
+    return made_once("short", make) / "record.json"
 
 
 @pytest.fixture(scope="session")

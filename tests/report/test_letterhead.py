@@ -187,7 +187,7 @@ def test_a_notebook_whose_logo_was_spoilt_is_refused(laboratory):
 
 
 @pytest.fixture(scope="module")
-def headed(example_record, tmp_path_factory):
+def headed(short_record, tmp_path_factory):
     """The folder of a report with a letterhead whose name could be read as markup."""
     folder = tmp_path_factory.mktemp("headed")
     (folder / "logo.png").write_bytes(png())
@@ -195,7 +195,7 @@ def headed(example_record, tmp_path_factory):
     (folder / "lab.toml").write_text(text + '\n[colours]\nink = "#7a1f3d"', encoding="utf-8")
     out = folder / "out"
     out.mkdir()
-    build(example_record, out, letterhead=load(folder / "lab.toml"))
+    build(short_record, out, letterhead=load(folder / "lab.toml"))
     return out
 
 

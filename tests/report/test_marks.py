@@ -80,10 +80,10 @@ def test_axes_use_the_decimal_mark_but_names_do_not(paper):
 
 
 @pytest.mark.slow
-def test_texts_of_the_workbook_with_portuguese_marks(example_record, words, monkeypatch, tmp_path):
+def test_texts_of_the_workbook_with_portuguese_marks(short_record, words, monkeypatch, tmp_path):
     """Its number formats know no language: a spreadsheet shows them with its own marks."""
     monkeypatch.setattr(workbook, "load_words", lambda language: words)
-    record = json.loads(example_record.read_text(encoding="utf-8"))
+    record = json.loads(short_record.read_text(encoding="utf-8"))
     workbook.write(record, tmp_path / "capacity.xlsx")
     book = openpyxl.load_workbook(tmp_path / "capacity.xlsx", data_only=True)
     top = f"{record['capacity']['height_m'][-1]:.3f}".replace(".", ",")

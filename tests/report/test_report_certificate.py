@@ -141,9 +141,9 @@ def test_a_date_is_written_in_the_language(form, month, written, example_record)
 
 
 @pytest.mark.slow
-def test_user_text_is_printed_literally(example_record, tmp_path):
+def test_user_text_is_printed_literally(short_record, tmp_path):
     """typst, LaTeX, HTML and spreadsheet markup in every text field of the job."""
-    record = json.loads(example_record.read_text(encoding="utf-8"))
+    record = json.loads(short_record.read_text(encoding="utf-8"))
     short = {"authorised_by": "#a *b* $c$", "authorised_role": "<i>"}  # in a narrow column
     names = {field.name for field in KEYS["certificate"]} - {"date_of_issue", *short}
     fields = {name: f"{name} {HARD}" for name in sorted(names - {"notice"})}

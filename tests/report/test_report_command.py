@@ -14,10 +14,10 @@ from tankcal.report.pdf import pdf
 
 
 @pytest.fixture(scope="module")
-def results(example_result, tmp_path_factory):
+def results(short_result, tmp_path_factory):
     """The folder of the shipped example's results, as `tankcal run` leaves it."""
     folder = tmp_path_factory.mktemp("run") / "results"
-    outputs.write(example_result, folder)
+    outputs.write(short_result, folder)
     return folder
 
 
