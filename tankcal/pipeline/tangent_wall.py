@@ -57,11 +57,17 @@ def touch_wall(job, poses, tools, progress, dof=np.inf, amplitudes=None):
     touching = touch(job.tangents, poses, **known)
     refuse_limbs(job.tangents, touching)
     refuse_misread_zeniths(job.tangents, poses, touching, known["zero_z_m"])
-    wall = find_wall(_with_points(job, touching), progress, dof, amplitudes)
-    excess = tangent_excess(wall.field.amplitudes, radius)
-    touching = touch(job.tangents, poses, **known, excess=excess)
+    sizes = amplitudes
+    if sizes is None:
+        sizes = find_wall(_with_points(job, touching), progress, dof).field.amplitudes
+        progress = _tell_nothing  # the same steps once more
+    touching = touch(job.tangents, poses, **known, excess=tangent_excess(sizes, radius))
     job = _with_points(job, touching)
-    return job, touching, find_wall(job, lambda text: None, dof, amplitudes)
+    return job, touching, find_wall(job, progress, dof, amplitudes)
+
+
+def _tell_nothing(text):
+    pass
 
 
 def _with_points(job, touching):
