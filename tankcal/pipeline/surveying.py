@@ -16,6 +16,7 @@ from tankcal.pipeline.cloud_wall import IN_PROCESS, Clouded, find_wall_in_clouds
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
 from tankcal.pipeline.hit_wall import find_hit_wall
 from tankcal.pipeline.nominal_wall import find_nominal_wall
+from tankcal.pipeline.radii_wall import find_radii_wall
 from tankcal.pipeline.scan import Scan, fit_scan
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.survey_warnings import refuse_undetermined
@@ -134,6 +135,8 @@ def _survey(job, progress, dof, amplitudes):
     """What was surveyed: a wall of courses, a mesh, the scan of another wall; None: sizes alone."""
     if job.strapping is not None and job.points is None:
         return find_strapped_wall(job, progress, amplitudes)
+    if job.radii is not None:
+        return find_radii_wall(job, progress)
     if job.tank.kind == "vertical" and job.points is None and job.liquid is not None:
         return find_nominal_wall(job, progress)
     if job.tank.kind == "vertical":

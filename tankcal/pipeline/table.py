@@ -14,6 +14,7 @@ from tankcal.pipeline.cloud_wall import Clouded
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
 from tankcal.pipeline.hit_checks import check_hits
 from tankcal.pipeline.line_checks import check_leans, check_lines
+from tankcal.pipeline.radii_wall import RadiiWall
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.strapping_checks import check_strapped, check_straps_beside_points
@@ -179,7 +180,8 @@ def _doubts_of_survey(job, survey, top_m):
         return (*check_strapped(job, survey), *check_lines(job, survey))
     if isinstance(survey, Scan):
         return check_scan(job, survey, top_m)
-    return () if survey is None else check_mesh(job, top_m)
+    is_mesh = survey is not None and not isinstance(survey, RadiiWall)
+    return check_mesh(job, top_m) if is_mesh else ()
 
 
 def _without_rounding(volumes, areas, sources):

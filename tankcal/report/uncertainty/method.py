@@ -44,6 +44,8 @@ FROM_SURVEY = (
     "below_first_dip",
     "nominal_radius",
     "nominal_radius_of_all",
+    "course_radii",
+    "course_radii_common",
 )
 OF_READING = ("interpolation", "rounding")
 
