@@ -360,7 +360,8 @@ def _run(job, progress, part_progress, simulated, reading):
         )
     found = find_survey(job, progress, reading=reading)
     job, survey, adjustment = found.job, found.survey, found.adjustment
-    wall = survey if isinstance(survey, Wall) else None
+    radii = survey if isinstance(survey, RadiiWall) else None
+    measured_wall = survey if radii is None else radii.surveyed
     measured = None
     if job.liquid is not None:
         progress(message("adjusting_liquid", "adjusting the runs by liquid with the geometry"))
@@ -380,7 +381,7 @@ def _run(job, progress, part_progress, simulated, reading):
     liquid = measured and measured.result(made.levels_m)
     return Result(
         job=job,
-        wall=wall,
+        wall=measured_wall if isinstance(measured_wall, Wall) else None,
         scan=survey if isinstance(survey, Scan) else None,
         body=body,
         zero_m=zero,
@@ -402,13 +403,13 @@ def _run(job, progress, part_progress, simulated, reading):
             liquid,
         ),
         adjustment=adjustment,
-        strapped=survey if isinstance(survey, StrappedWall) else None,
+        strapped=measured_wall if isinstance(measured_wall, StrappedWall) else None,
         sighting=found.sighting,
         touching=found.touching,
         clouded=found.clouded,
         liquid=liquid,
         nominal=survey if isinstance(survey, NominalWall) else None,
-        radii=survey if isinstance(survey, RadiiWall) else None,
+        radii=radii,
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from tankcal.geometry.field.mean_field import MeanField
 from tankcal.messages import message
+from tankcal.pipeline.radii_update import RadiiUpdate
 from tankcal.pipeline.strapped_wall import UprightAxis
 from tankcal.pipeline.tanks import shell_zero
 from tankcal.pipeline.wall import joints_of
@@ -19,6 +20,28 @@ from tankcal.tank.factors import Factor
 from tankcal.uncertainty import factor_of
 
 OWN, COMMON = "course_radii", "course_radii_common"  # their names in a budget
+
+
+@dataclass(frozen=True)
+class Updated:
+    """What brought former radii up to date.
+
+    Attributes
+    ----------
+    surveyed : Wall or StrappedWall
+        Of the survey of some courses.
+    update : RadiiUpdate
+    found_m, u_found_m : ndarray, shape (k,)
+        Radii of the measured courses by the survey alone, and their standard uncertainties.
+    u_before_m : ndarray, shape (courses,)
+        Of the former radii, with the change that was declared.
+    """
+
+    surveyed: object
+    update: RadiiUpdate
+    found_m: np.ndarray
+    u_found_m: np.ndarray
+    u_before_m: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -36,6 +59,8 @@ class RadiiWall:
         What is uncertain of these radii, (courses, c) m.
     by_inputs : dict
         {input of an uncertainty budget: (courses,) derivative of the radii}, of a survey.
+    updated : Updated or None
+        By a survey of some courses.
     """
 
     joints_m: np.ndarray
@@ -43,6 +68,7 @@ class RadiiWall:
     radius_m: np.ndarray
     causes: tuple[Factor, ...]
     by_inputs: dict
+    updated: Updated | None = None
     shell = UprightAxis()
     without_inputs = ("offset", "scale", "tilt")  # of surveyed lengths
     straps = None
@@ -53,9 +79,23 @@ class RadiiWall:
         return MeanField(self.radius_m)
 
     @property
+    def surveyed(self):
+        """The wall of the survey beside the radii; None: there was none."""
+        return None if self.updated is None else self.updated.surveyed
+
+    @property
     def covariance_m2(self):
         """(courses, courses) of the radii, without what declared inputs add."""
-        return sum(one.columns @ one.columns.T for one in self.causes)
+        nothing = np.zeros((len(self.radius_m), len(self.radius_m)))
+        return sum((one.columns @ one.columns.T for one in self.causes), start=nothing)
+
+    def covariance_with(self, inputs):
+        """(courses, courses) of the radii, with what declared inputs add, m2."""
+        known = {one.name: one.u for one in inputs}
+        found = self.covariance_m2
+        for name, column in self.by_inputs.items():
+            found = found + known.get(name, 0.0) ** 2 * np.outer(column, column)
+        return found
 
     def lowest_outline(self, azimuth_rad):
         """(x, y) of the axis, and (n,) radii of the first course, m."""

@@ -166,6 +166,8 @@ def _doubts_of_sights(job, survey, sighting):
 
 
 def _doubts_of_survey(job, survey, top_m):
+    if isinstance(survey, RadiiWall):
+        return () if survey.surveyed is None else _doubts_of_survey(job, survey.surveyed, top_m)
     if isinstance(survey, Wall):
         straps = survey.straps
         beside = () if straps is None else check_straps_beside_points(job, straps)
@@ -180,8 +182,7 @@ def _doubts_of_survey(job, survey, top_m):
         return (*check_strapped(job, survey), *check_lines(job, survey))
     if isinstance(survey, Scan):
         return check_scan(job, survey, top_m)
-    is_mesh = survey is not None and not isinstance(survey, RadiiWall)
-    return check_mesh(job, top_m) if is_mesh else ()
+    return () if survey is None else check_mesh(job, top_m)
 
 
 def _without_rounding(volumes, areas, sources):

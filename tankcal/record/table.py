@@ -270,6 +270,7 @@ def _radii_choices(result):
     return {
         "bottom": _bottom_choice(job),
         "radii": job.radii.source,
+        "radii_beside": "none" if result.radii.updated is None else "survey",
         "between_sections": "radii",
         "tilt": "not_known",
         "course_heights": "along_axis",

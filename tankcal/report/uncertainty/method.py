@@ -46,6 +46,10 @@ FROM_SURVEY = (
     "nominal_radius_of_all",
     "course_radii",
     "course_radii_common",
+    "course_radii_shared",
+    "radii_change",
+    "radii_change_common",
+    "measured_form",
 )
 OF_READING = ("interpolation", "rounding")
 
