@@ -1,13 +1,13 @@
 """Field sheets of a starter job: its tables of readings as a crew fills them in by pen."""
 
 from tankcal.job.contract import COLUMNS, SURVEYS
-from tankcal.job.starter.form import METERED, OF_SHELLS
+from tankcal.job.starter.form import DECLARED, METERED, OF_SHELLS
 from tankcal.job.starter.texts import parted, texts_in
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
 
 FILE = "field-sheets.pdf"
-BY_PEN = (*OF_SHELLS, METERED)  # surveys that a crew writes down
+BY_PEN = (*(one for one in OF_SHELLS if one != DECLARED), METERED)  # that a crew writes down
 FORMS = (  # tables of each, read in one go, and the rows that a sheet has room for
     (("lines",), 12),
     (("offsets",), 30),
