@@ -67,7 +67,7 @@ def _field(name, parts, appearance):
 
 
 def _table_of(pdf):
-    """Places of the objects by their numbers, and the trailer; None where it is written otherwise."""
+    """Places of the objects by their numbers, and the trailer; None for a file of another form."""
     found = _START.search(pdf[-64:])
     head = found and _TABLE.match(pdf, int(found[1]))
     if not head:

@@ -48,9 +48,9 @@ class Verification:
     problems: list[Problem] = field(default_factory=list)
     inputs_found: bool = False
 
-    def tell(self, file, code, template, **values):
+    def tell(self, name, code, template, /, **values):
         """Add a disagreement."""
-        self.problems.append(Problem(file, message(code, template, **values)))
+        self.problems.append(Problem(name, message(code, template, **values)))
 
 
 def verify(path, job=None):
