@@ -48,9 +48,9 @@ class Verification:
     problems: list[Problem] = field(default_factory=list)
     inputs_found: bool = False
 
-    def tell(self, name, code, template, /, **values):
-        """Add a disagreement."""
-        self.problems.append(Problem(name, message(code, template, **values)))
+    def tell(self, name, text):
+        """Add a disagreement: the file, and what is wrong with it."""
+        self.problems.append(Problem(name, text))
 
 
 def verify(path, job=None):
@@ -153,9 +153,11 @@ def _pdf(found, name, content, beside):
     except Exception as error:  # of a broken file pypdf raises whatever came of it
         found.tell(
             name,
-            "verify_no_pdf",
-            "cannot be read as a PDF ({what}); expected one that tankcal wrote",
-            what=type(error).__name__,
+            message(
+                "verify_no_pdf",
+                "cannot be read as a PDF ({what}); expected one that tankcal wrote",
+                what=type(error).__name__,
+            ),
         )
         return {}
     if found.digest is None and RECORD in held:
@@ -168,12 +170,14 @@ def _pdf(found, name, content, beside):
         if lies_beside is not None and lies_beside != bytes_held:
             found.tell(
                 name,
-                "verify_differs_inside",
-                "holds a {file} inside that differs from the one beside it (SHA-256 {inside} and "
-                "{outside}); expected the same file",
-                file=one,
-                inside=sha256(bytes_held)[:12],
-                outside=sha256(lies_beside)[:12],
+                message(
+                    "verify_differs_inside",
+                    "holds a {file} inside that differs from the one beside it (SHA-256 {inside} "
+                    "and {outside}); expected the same file",
+                    file=one,
+                    inside=sha256(bytes_held)[:12],
+                    outside=sha256(lies_beside)[:12],
+                ),
             )
     return held
 
@@ -184,16 +188,21 @@ def _same_record(found, name, said):
     if not named:
         found.tell(
             name,
-            "verify_names_none",
-            "names no record by its SHA-256; expected one that tankcal wrote, with its record",
+            message(
+                "verify_names_none",
+                "names no record by its SHA-256; expected one that tankcal wrote, with its record",
+            ),
         )
     elif found.digest not in (None, *named):
         found.tell(
             name,
-            "verify_other_record",
-            "was made of another record: it names {named}, and record.json is {digest} (SHA-256)",
-            named=named[0][:12],
-            digest=found.digest[:12],
+            message(
+                "verify_other_record",
+                "was made of another record: it names {named}, and record.json is {digest} "
+                "(SHA-256)",
+                named=named[0][:12],
+                digest=found.digest[:12],
+            ),
         )
 
 
@@ -218,9 +227,11 @@ def _certificate(found, name, content, record):
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         found.tell(
             name,
-            "verify_no_xml",
-            "cannot be read as XML ({what}); expected a digital calibration certificate",
-            what=str(error),
+            message(
+                "verify_no_xml",
+                "cannot be read as XML ({what}); expected a digital calibration certificate",
+                what=str(error),
+            ),
         )
         return
     files = {
@@ -236,9 +247,11 @@ def _certificate(found, name, content, record):
         if files.get(" ".join(one["file"].split()), expected) != expected:
             found.tell(
                 name,
-                "verify_other_input",
-                "names another SHA-256 of {file} than the record; expected the same",
-                file=one["file"],
+                message(
+                    "verify_other_input",
+                    "names another SHA-256 of {file} than the record; expected the same",
+                    file=one["file"],
+                ),
             )
     if record["tankcal"] == tankcal.__version__ and _written_by(root) == tankcal.__version__:
         _made_again(found, name, content, record, root)
@@ -260,8 +273,10 @@ def _made_again(found, name, content, record, root):
     if again != content:
         found.tell(
             name,
-            "verify_other_content",
-            "says something else than the record; expected what tankcal makes of it",
+            message(
+                "verify_other_content",
+                "says something else than the record; expected what tankcal makes of it",
+            ),
         )
 
 
@@ -292,8 +307,10 @@ def _tables(found, folder, record):
             if expected != (folder / name).read_bytes():
                 found.tell(
                     name,
-                    "verify_other_table",
-                    "says something else than the record; expected what tankcal makes of it",
+                    message(
+                        "verify_other_table",
+                        "says something else than the record; expected what tankcal makes of it",
+                    ),
                 )
 
 
@@ -307,8 +324,10 @@ def _inputs(found, record, job):
         if name not in there:
             found.tell(
                 name,
-                "verify_input_missing",
-                "is missing beside the other input files; expected the file of the record",
+                message(
+                    "verify_input_missing",
+                    "is missing beside the other input files; expected the file of the record",
+                ),
             )
             continue
         found.compared.append(name)
@@ -316,10 +335,12 @@ def _inputs(found, record, job):
         if digest != one["sha256"]:
             found.tell(
                 name,
-                "verify_input_changed",
-                "was changed after the run: its SHA-256 is {found}, in the record {recorded}",
-                found=digest[:12],
-                recorded=one["sha256"][:12],
+                message(
+                    "verify_input_changed",
+                    "was changed after the run: its SHA-256 is {found}, in the record {recorded}",
+                    found=digest[:12],
+                    recorded=one["sha256"][:12],
+                ),
             )
 
 
