@@ -14,9 +14,9 @@ from tankcal.report.tables.facts import (
 )
 
 TO_WRITE_ON = ""
-_ELSEWHERE = ("number", "notice", "country", "authorised_by", "authorised_role")
+_ELSEWHERE = ("number", "notice", "authorised_by", "authorised_role")
 _PARTIES = (
-    *("laboratory", "laboratory_address", "accreditation_number"),
+    *("laboratory", "laboratory_address", "country", "accreditation_number"),
     *("customer", "customer_address", "customer_contact", "place", "date_of_issue", "replaces"),
 )
 _WRITTEN_BY_HAND = ("laboratory", "laboratory_address", "customer", "customer_address", "place")
