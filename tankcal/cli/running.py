@@ -43,10 +43,10 @@ def _add_run(commands):
         "run",
         help="compute a job and write its results",
         description="Read and check a job, compute it, and write the results, all or nothing: "
-        "record.json, points.csv, sections.csv, capacity.csv, capacity.xlsx, report.ipynb, "
-        "certificate.pdf, working-papers.pdf, report.pdf (both), field-table.pdf and report.html. "
-        "An adjusted survey adds points_cov.npz, photos.csv, cameras.csv, groups.csv and "
-        "residuals.csv.",
+        "record.json, points.csv, sections.csv, capacity.csv, capacity.xlsx, certificate.xml, "
+        "report.ipynb, certificate.pdf, working-papers.pdf, report.pdf (both), field-table.pdf "
+        "and report.html. An adjusted survey adds points_cov.npz, photos.csv, cameras.csv, "
+        "groups.csv and residuals.csv.",
         epilog="exit status: 0 done; 2 the input must be mended; 3 no sound solution, or, with "
         "--strict, the adjustment is in doubt. Then nothing is written.",
     )

@@ -1,4 +1,4 @@
-"""Files that a PDF holds inside, byte for byte: the record, and the workbook made from it."""
+"""Files that a PDF holds inside, byte for byte: the record, and what was made from it."""
 
 import hashlib
 from dataclasses import asdict, dataclass
@@ -11,6 +11,7 @@ KINDS = {  # name of the file: MIME type, what it is to the paper (PDF 2.0, 7.11
     "record.json": ("application/json", "source"),
     "capacity.xlsx": (_WORKBOOK, "data"),
     "adjustment.xlsx": (_WORKBOOK, "data"),
+    "certificate.xml": ("text/xml", "alternative"),
 }
 LARGEST = 20_000_000  # bytes: a larger file stays beside the PDF, which names its digest
 

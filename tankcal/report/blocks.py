@@ -49,6 +49,7 @@ def document(**properties):
     running   [left, right] texts at the top of every page
     footer    text with {page} and {pages}
     letterhead   data of a letterhead.Letterhead, or None
+    record_sha256  hexadecimal digits, "" for none: a keyword of the PDF
     attachments  files beside the notebook that its PDF holds inside (attachments.Attachment.data)
     """
     known = {
@@ -62,6 +63,7 @@ def document(**properties):
         "footer": "{page} / {pages}",
         "letterhead": None,
         "attachments": [],
+        "record_sha256": "",
     }
     unknown = sorted(set(properties) - set(known))
     if unknown:
@@ -112,9 +114,31 @@ def result(label, text, note=""):
     )
 
 
-def signature(labels):
-    """Empty lines to sign on, side by side, each over its label."""
-    return Block({"kind": "signature", "labels": [_text(label) for label in labels]})
+def signature(labels, field=""):
+    """Empty lines to sign on, side by side, each over its label.
+
+    field   what the field for an electronic signature over the last line is called; "": none
+    """
+    made = {"kind": "signature", "labels": [_text(label) for label in labels]}
+    return Block(made | ({"field": _text(field)} if field else {}))
+
+
+def hash_code(digest, text, alt):
+    """The SHA-256 of a file as a QR code of "sha256:...", with the digits and what they are beside.
+
+    text   what the file is
+    alt    the description for readers who cannot see it; {text} in it is what the code says
+    """
+    said = f"sha256:{digest}"
+    return Block(
+        {
+            "kind": "hash_code",
+            "svg": _qr_svg(said),
+            "code": said,
+            "text": _text(text),
+            "alt": _text(alt.format(text=said)),
+        }
+    )
 
 
 def end_mark(text):
@@ -236,6 +260,16 @@ def _natural_alignment(rows, column, mark):
 
 def _text(value):
     return NOTHING if value is None else without_controls(str(value))
+
+
+def _qr_svg(text):
+    """The QR code of a text as SVG, a module being one unit, with its quiet zone."""
+    import segno
+
+    code = segno.make(text, error="m", micro=False, boost_error=False)
+    stream = io.BytesIO()
+    code.save(stream, kind="svg", xmldecl=False, svgns=True, nl=False, omitsize=True, border=2)
+    return stream.getvalue().decode("utf-8")
 
 
 def _svg_of(figure):

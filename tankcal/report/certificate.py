@@ -16,7 +16,7 @@ from tankcal.report.tables.facts import (
 TO_WRITE_ON = ""
 _ELSEWHERE = ("number", "notice", "authorised_by", "authorised_role")
 _PARTIES = (
-    *("laboratory", "laboratory_address", "accreditation_number"),
+    *("laboratory", "laboratory_address", "country", "accreditation_number"),
     *("customer", "customer_address", "customer_contact", "place", "date_of_issue", "replaces"),
 )
 _WRITTEN_BY_HAND = ("laboratory", "laboratory_address", "customer", "customer_address", "place")
@@ -86,10 +86,22 @@ def calibration(paper):
 
 
 def _instruments(paper):
-    """The instruments of an adjusted survey, or tapes, with their certificates, or None."""
-    adjustment = paper.record["adjustment"]
-    strapping, lines = (paper.record.get(key) for key in ("strapping", "lines"))
-    sighted = (paper.record.get("hits"), paper.record.get("tangents"))
+    """The instruments with their certificates in one text; "" where there are none."""
+    return "; ".join(
+        paper.word(
+            "certificate.instrument",
+            name=name,
+            certificate=certificate or paper.word("certificate.no_certificate"),
+        )
+        for name, certificate in instruments_of(paper.record).items()
+    )
+
+
+def instruments_of(record):
+    """{instrument: its certificate, or None} of an adjusted survey, of tapes, scanners, meters."""
+    adjustment = record["adjustment"]
+    strapping, lines = (record.get(key) for key in ("strapping", "lines"))
+    sighted = (record.get("hits"), record.get("tangents"))
     used = {}
     for one in adjustment["instruments"] if adjustment else ():
         used[one["instrument"]] = one["details"].get("certificate")
@@ -99,22 +111,15 @@ def _instruments(paper):
     for one in (setup for sights in sighted if sights for setup in sights["setups"]):
         if one["instrument"]:
             used[one["instrument"]] = one["certificate"]
-    for one in (paper.record.get("clouds") or {}).get("scanners", ()):
+    for one in (record.get("clouds") or {}).get("scanners", ()):
         used[one["scanner"]] = one["certificate"]
-    for one in (paper.record.get("liquid") or {}).get("meters", ()):
+    for one in (record.get("liquid") or {}).get("meters", ()):
         used[one["meter"]] = one["certificate"]
     for one in strapping["tapes"] if strapping else ():
         used[one["tape"]] = one["certificate"]
         if one["master"]:
             used[one["master"]] = one["master_certificate"]
-    return "; ".join(
-        paper.word(
-            "certificate.instrument",
-            name=name,
-            certificate=certificate or paper.word("certificate.no_certificate"),
-        )
-        for name, certificate in used.items()
-    )
+    return used
 
 
 def statements(paper):
@@ -134,7 +139,16 @@ def authorisation(paper):
     person = paper.label("authorised_by")
     if name:
         person = paper.word("certificate.authorised", name=name, role=role) if role else name
-    return blocks.signature([paper.label("place_and_date"), person, paper.label("signature")])
+    labels = [paper.label("place_and_date"), person, paper.label("signature")]
+    return blocks.signature(labels, paper.word("dcc.sign_here"))
+
+
+def hash_of_record(paper):
+    """The SHA-256 of the record that is printed, as a QR code; None without a file of it."""
+    digest = paper.digest
+    if digest is None:
+        return None
+    return blocks.hash_code(digest, paper.word("dcc.hash_of"), paper.words["dcc"]["code_alt"])
 
 
 def _facts(paper, given, keys, to_write_on):

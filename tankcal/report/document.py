@@ -106,6 +106,7 @@ _KEYS = {
     "notice": {"text"},
     "result": {"label", "text", "note"},
     "signature": {"labels"},
+    "hash_code": {"svg", "code", "text", "alt"},
     "end": {"text"},
     "code": {"text"},
     "key_values": {"caption", "items"},

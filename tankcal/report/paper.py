@@ -86,15 +86,21 @@ class Paper(PlainPaper):
             footer=self._footer(),
             letterhead=self.letterhead,
             attachments=self._attachments(part),
+            record_sha256=self.digest or "",
         )
 
     def _footer(self):
         """Page numbers, and the first digits of the SHA-256 of the record that is printed."""
         pages = self.words["page"]["footer"]
-        if self._path is None:
+        if self.digest is None:
             return pages
-        digest = attachments.sha256(self._path.read_bytes())[:_DIGITS_OF_DIGEST]
+        digest = self.digest[:_DIGITS_OF_DIGEST]
         return f"{pages} · {self.word('certificate.record', digest=digest)}"
+
+    @cached_property
+    def digest(self):
+        """The SHA-256 of the file of the record; None for a record that was handed over parsed."""
+        return attachments.sha256(self._path.read_bytes()) if self._path else None
 
     def _attachments(self, part):
         """The files to be held inside the part's PDF; they lie beside the record."""
@@ -134,9 +140,12 @@ class Paper(PlainPaper):
 
         A code that is a text is looked up in the words `parts`.
         """
-        return blocks.key_values([(self.label(one["code"]), self._part(one)) for one in described])
+        return blocks.key_values(
+            [(self.label(one["code"]), self.size_text(one)) for one in described]
+        )
 
-    def _part(self, one):
+    def size_text(self, one):
+        """What the record says of one size of a part: its value with its unit, or its words."""
         value, unit = one["value"], one["unit"]
         if unit is None:
             return self.words["parts"].get(value, str(value))

@@ -14,6 +14,7 @@ from tankcal.errors import TankcalError
 from tankcal.report import attachments
 from tankcal.report.blocks import WEB_ONLY
 from tankcal.report.plain_formulas import formula_nodes
+from tankcal.report.signature_field import with_signature_field
 from tankcal.text.shipped import shipped_folder
 
 STANDARDS = ["a-3a", "ua-1"]  # archival, and readable by a screen reader
@@ -36,7 +37,9 @@ def pdf(blocks, folder="."):
     files |= {f"attached-{name}": content for name, content in attached.items()}
     files["main.typ"] = (shipped_folder("report_templates") / "page.typ").read_bytes()
     files["blocks.json"] = json.dumps(blocks, ensure_ascii=False).encode("utf-8")
-    return _compile(files, _timestamp(blocks[0]["date"]))
+    made = _compile(files, _timestamp(blocks[0]["date"]))
+    field = next((block["field"] for block in blocks if block.get("field")), None)
+    return with_signature_field(made, field) if field else made
 
 
 def _compile(files, timestamp):

@@ -93,6 +93,7 @@ def test_a_run_writes_everything(done, capsys):
         "sections.csv",
         "capacity.csv",
         "capacity.xlsx",
+        "certificate.xml",
         "report.ipynb",
         "certificate.pdf",
         "working-papers.pdf",

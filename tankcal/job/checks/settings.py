@@ -176,6 +176,7 @@ def check_settings(values, tables, extent, kind, raw, log):
         )
         tell(log.problem, raw, "table", "other_densities_kg_m3", expected)
     _check_deliveries(table["minimum_delivery_m"] or (), extent, raw, log)
+    _check_country(values["certificate"].get("country"), raw, log)
     issued, surveyed = values["certificate"].get("date_of_issue"), values["survey"]["date"]
     if issued and surveyed and issued < surveyed:
         expected = message(
@@ -185,6 +186,17 @@ def check_settings(values, tables, extent, kind, raw, log):
             surveyed=surveyed,
         )
         tell(log.problem, raw, "certificate", "date_of_issue", expected)
+
+
+def _check_country(found, raw, log):
+    """The country of issue, which the digital certificate must have in two letters."""
+    if found and not (len(found) == 2 and found.isascii() and found.isalpha()):
+        expected = message(
+            "country_unknown",
+            "found {found!r}; expected the two letters of a country by ISO 3166-1, such as: BR",
+            found=found,
+        )
+        tell(log.problem, raw, "certificate", "country", expected)
 
 
 def _check_deliveries(heights, extent, raw, log):

@@ -252,6 +252,7 @@ CERTIFICATE = (
     _text("number", "number of the certificate"),
     _text("laboratory", "who issues the certificate"),
     _text("laboratory_address", "the issuer's address"),
+    _text("country", "where it is issued, two letters of ISO 3166-1, such as: BR"),
     _text("accreditation_number", "accreditation of the laboratory, such as: CAL 0123"),
     _text("customer", "who ordered the calibration"),
     _text("customer_address", "the customer's address"),

@@ -12,7 +12,8 @@ from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
 from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.messages import message
 from tankcal.record.plain_data import without_collection
-from tankcal.report import folders
+from tankcal.report import dcc, folders
+from tankcal.report.attachments import sha256
 from tankcal.report.outputs import tables
 from tankcal.text.languages import LANGUAGES
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 RECORD = "record.json"
 WORKBOOKS = ("capacity.xlsx", "adjustment.xlsx")
-FILES = (RECORD, *tables.FILES, *WORKBOOKS, *report.FILES, report.LETTERHEAD)
+FILES = (RECORD, *tables.FILES, *WORKBOOKS, dcc.FILE, *report.FILES, report.LETTERHEAD)
 
 
 def write(
@@ -32,7 +33,7 @@ def write(
     letterhead: "Letterhead | None" = None,
     papers: bool = True,
 ) -> list[Path]:
-    """Write record, CSV files, workbook, notebook, PDFs and HTML of a result.
+    """Write record, CSV files, workbook, certificate.xml, notebook, PDFs and HTML of a result.
 
     Parameters
     ----------
@@ -153,7 +154,7 @@ def _write(prepare, directory, progress, language=None, letterhead=None, papers=
 
 
 def _write_papers(record, folder, progress, language, letterhead):
-    """Workbook, notebook, PDFs and HTML beside the record."""
+    """Workbook, digital certificate, notebook, PDFs and HTML beside the record."""
     from tankcal.report import (
         workbook,  # a second to import, which record and tables need not wait for
     )
@@ -161,8 +162,11 @@ def _write_papers(record, folder, progress, language, letterhead):
     progress(message("writing_workbook", "writing the workbook"), 0, 1)
     of_tank, of_survey = WORKBOOKS
     name = of_tank if record["capacity"] else of_survey
+    digest = sha256((folder / RECORD).read_bytes())
     with without_collection():
-        workbook.write(record, folder / name, language)
+        workbook.write(record, folder / name, language, digest)
+        if record["capacity"]:
+            (folder / dcc.FILE).write_bytes(dcc.certificate_xml(record, digest, language))
     report.build(
         folder / RECORD,
         folder,

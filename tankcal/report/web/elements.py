@@ -78,6 +78,17 @@ def _signature(block):
     return f'<div class="signature">{lines}</div>'
 
 
+def _hash_code(block):
+    """The QR code, and its digits as text: to be copied, and to be found by `tankcal verify`."""
+    picture = (
+        f'<img class="svg" alt="{escape(block["alt"])}" src="{_data_url("svg", block["svg"])}">'
+    )
+    return (
+        f'<div class="hash-code">{picture}<p>{escape(block["text"])}<br>'
+        f"<code>{escape(block['code'])}</code></p></div>"
+    )
+
+
 def _key_values(block):
     rows = "".join(
         f'<tr><th scope="row">{escape(name)}</th><td>{escape(value)}</td></tr>'
@@ -167,6 +178,7 @@ _WRITERS = {
     "notice": _notice,
     "result": _result,
     "signature": _signature,
+    "hash_code": _hash_code,
     "end": lambda block: f'<p class="end">{escape(block["text"])}</p>',
     "code": lambda block: f"<pre>{escape(block['text'])}</pre>",
     "key_values": _key_values,

@@ -62,10 +62,11 @@ _OF_SURVEYS = {  # sheets of what a wall was surveyed with, by the part of the r
 _SHOWN_OF_SURVEY = ("adjustment", "points", "provenance")
 
 
-def write(record, path, language=None):
+def write(record, path, language=None, digest=None):
     """Write the workbook of `record` (record.json as parsed) to `path`; same record, same bytes.
 
     language  of the words; None: that of the job
+    digest    SHA-256 of the record.json, which the workbook then names
 
     Raises TankcalError when no words are shipped in the language of the job, OSError when the file
     cannot be written.
@@ -74,6 +75,8 @@ def write(record, path, language=None):
     record = translate_record(words, record)
     shown = _SHOWN_OF_TANK if record["capacity"] else _SHOWN_OF_SURVEY
     with Book(path, record, words, shown=shown) as book:
+        if digest:
+            book.name_record(digest)
         if record["capacity"]:
             _sheets_of_tank(book, record)
         else:

@@ -21,6 +21,7 @@ from tankcal.report.workbook.look import (
 )
 from tankcal.report.workbook.writer import Writer
 
+RECORD_PROPERTY = "record.json SHA-256"  # `tankcal verify` looks for it
 _A4 = 9
 _PAGE_PT = (750.0, 480.0)  # of A4 in landscape, within the margins
 _COLUMN_PT, _BESIDE_PT = 5.25, 3.75  # of a unit of width; beside it
@@ -77,6 +78,10 @@ class Book(Writer):
             }
         )
         self._file.set_custom_property("Language", self.words["language"]["code"], "text")
+
+    def name_record(self, digest):
+        """Say by its SHA-256 of which record.json the workbook was made: a property of the file."""
+        self._file.set_custom_property(RECORD_PROPERTY, digest, "text")
 
     @cached_property
     def paper(self):
