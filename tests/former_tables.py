@@ -30,7 +30,7 @@ def rings_m3(dips, radii, density=0.0, plates=PLATES, edges=EDGES, modulus=206e9
     dips = np.atleast_1d(np.asarray(dips, dtype=float))[:, None]
     soft = 9.80665 * radii**2 / (modulus * plates) * density
     low = np.minimum(edges[:-1], dips)
-    high = np.clip(dips, edges[:-1], edges[1:])
+    high = np.minimum(edges[1:], dips)
     below, above = dips - low, dips - high
     cubes = radii * soft * (below**2 - above**2) + soft**2 * (below**3 - above**3) / 3
     return np.pi * (radii**2 * (high - low) + cubes).sum(axis=1)

@@ -211,8 +211,10 @@ class ReadOut(Saved):
     """Something that was read out of a table because it was not declared."""
 
     table: str = key('"former" or "new"')
-    code: str = key('"head_with", "head_without", "head_undecided" (density of the head as its rows have it), '
-        '"zero", "rounding_volume"')
+    code: str = key(
+        '"head_with", "head_without", "head_undecided" (density of the head, by its rows), '
+        '"zero", "rounding_volume"'
+    )
     value: float | None = key("in `unit`")
     u: float | None = key("standard; null: not known")
     unit: str = key("kg/m3, m or m3")
