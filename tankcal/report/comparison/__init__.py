@@ -26,7 +26,7 @@ TABLES = {
 FILES = (FILE, *TABLES, WORKBOOK, PDF, PAGE)
 
 
-def write_comparison(found, folder, language=None, progress=None):
+def write_comparison(found, folder, language=None, progress=None, letterhead=None):
     """Write comparison.json, CSV files, workbook, PDF and web page, all or nothing.
 
     Parameters
@@ -40,6 +40,8 @@ def write_comparison(found, folder, language=None, progress=None):
         Of papers and workbook, one of languages.LANGUAGES; None: English.
     progress : callable, optional
         Called with a line of text as each step begins.
+    letterhead : report.letterhead.Letterhead, optional
+        Of who compares.
 
     Returns
     -------
@@ -52,15 +54,15 @@ def write_comparison(found, folder, language=None, progress=None):
     """
     refuse_foreign(folder)
     progress = progress or (lambda text: None)
-    paper = ComparisonPaper(found, language)
+    paper = ComparisonPaper(found, language, letterhead)
     with folders.replaced(folder) as temporary:
         _write(paper, temporary, progress)
     return [path for path in (Path(folder) / name for name in FILES) if path.exists()]
 
 
-def rebuild(source, folder, language=None, progress=None):
+def rebuild(source, folder, language=None, progress=None, letterhead=None):
     """Write the same from a comparison.json alone; arguments as of `write_comparison`."""
-    return write_comparison(load(source), folder, language, progress)
+    return write_comparison(load(source), folder, language, progress, letterhead)
 
 
 def load(path):

@@ -5,11 +5,12 @@ import textwrap
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plots import FAINT, GREY, INK, PALE, RED, WIDTH, set_margins, styled
+from tankcal.pipeline.plots import FAINT, GREY, INK, PALE, RED, WIDTH, set_margins
+from tankcal.report.camera.drawings import styled
 from tankcal.report.comparison.tables import FINE, steps_done
 from tankcal.text.digits import fixed
 
-LETTERS = 15  # in a line below a bar
+LETTERS = 18  # in a line below a bar
 ROOM = 0.14  # of the span of the bars: for the numbers over them
 HIGH = 2.3  # inches of a figure by dip
 
@@ -42,7 +43,8 @@ def waterfall(paper):
     ax.set_ylabel(paper.word("axes.step"))
     ax.grid(True, axis="y")
     ax.set_axisbelow(True)
-    set_margins(figure, left=0.65, right=0.1, bottom=0.5, top=0.08)
+    below = 0.28 if all("\n" not in line for line in lines) else 0.42
+    set_margins(figure, left=0.65, right=0.1, bottom=below, top=0.08)
     return figure
 
 
@@ -74,7 +76,12 @@ def normalised(paper):
     height_m, e_n = rows["height_m"], rows["E_n"]
     judged = height_m >= paper.found["judged_from_m"]
     figure, ax = _by_dip(paper, "axes.E_n")
-    ax.plot(height_m, np.where(judged, e_n, np.nan), color=INK, label=paper.word("legend.judged"))
+    ax.plot(
+        height_m,
+        np.where(judged, e_n, np.nan),
+        color=INK,
+        label=_mathematical(paper.word("legend.judged")),
+    )
     if (~judged & np.isfinite(e_n)).any():
         below = height_m <= height_m[judged].min(initial=np.inf)
         label = paper.word("legend.not_judged")
@@ -94,11 +101,16 @@ def _rows(paper):
     return {key: np.array(values, dtype=float) for key, values in paper.found["rows"].items()}
 
 
+def _mathematical(text):
+    """Words of ours for a figure, with the index of E set as one."""
+    return text.replace("E\N{LATIN SUBSCRIPT SMALL LETTER N}", r"$E_\mathrm{n}$")
+
+
 def _by_dip(paper, name):
     figure = Figure(figsize=(WIDTH, HIGH))
     ax = figure.subplots()
     ax.set_xlabel(paper.word("axes.dip"))
-    ax.set_ylabel(paper.word(name))
+    ax.set_ylabel(_mathematical(paper.word(name)))
     ax.set_xlim(paper.found["low_m"], paper.found["high_m"])
     ax.grid(True)
     set_margins(figure, left=0.65, right=0.12, bottom=0.42, top=0.28)

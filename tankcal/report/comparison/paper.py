@@ -10,7 +10,11 @@ from tankcal.text.words import load_words, message_sentence
 FILE = "comparison.json"
 WORKBOOK = "comparison.xlsx"
 DIGITS_OF_DIGEST = 12
-UNITS = {"C": "degC", "%": "percent"}  # units as the file calls them: those of report.numbers
+UNITS = {"C": "degC", "%": "percent", "mm": "image mm"}  # {of the file: of report.numbers}
+    "C": "degC",
+    "%": "percent",
+    "mm": "image mm",
+}  # units as the file calls them: those of report.numbers
 DECIMALS = {"C": 1, "kg/m3": 1, "mm": 2, "m": 4, "m3": 4, "%": 3}
 ENDINGS = {"_m3": "m3", "_mm": "mm", "_percent": "%", "_kg_m3": "kg/m3", "_c": "C"}
 
@@ -18,15 +22,17 @@ ENDINGS = {"_m3": "m3", "_mm": "mm", "_percent": "%", "_kg_m3": "kg/m3", "_c": "
 class ComparisonPaper(PlainPaper):
     """A `record.comparison.ComparisonFile` as plain data, with the words of a language.
 
-    found     as parsed; checked against its schema
-    language  one of languages.LANGUAGES; None: English
+    found       as parsed; checked against its schema
+    language    one of languages.LANGUAGES; None: English
+    letterhead  a `letterhead.Letterhead` of who compares, or None
 
     Words are looked up in the group's part under `comparison` first, then in the group itself.
     """
 
-    def __init__(self, found, language=None):
+    def __init__(self, found, language=None, letterhead=None):
         self.found = COMPARISON.migrated(found, COMPARISON.file)
         super().__init__(words_with_part(load_words(language or DEFAULT), "comparison"))
+        self.letterhead = letterhead.data() if letterhead else None
 
     def subject(self):
         """What the papers are about: the tank, or the file of the former table."""
@@ -39,18 +45,18 @@ class ComparisonPaper(PlainPaper):
         folder  of the files that the PDF holds inside; None: none
         """
         title = self.word("titles.comparison")
-        laboratory = self.found["new"]["laboratory"] or ""
         return [
             blocks.document(
                 title=f"{title}, {self.subject()}",
-                author=laboratory,
+                author=self.letterhead["name"] if self.letterhead else "",
                 date=self._date(),
                 language=self.words["language"]["code"],
                 running=[title, self.subject()],
                 footer=self._footer(folder),
+                letterhead=self.letterhead,
                 attachments=self._attachments(folder),
             ),
-            blocks.masthead(title, self.subject(), laboratory),
+            blocks.masthead(title, self.subject()),
         ]
 
     def _date(self):

@@ -1,6 +1,6 @@
 """The comparison as a workbook: every row, to sort and filter; numbers as numbers."""
 
-from tankcal.report.comparison import pages
+from tankcal.report.comparison import basis, verdict
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, waterfall_of
 from tankcal.report.tables import Table
 from tankcal.report.workbook.book import Book
@@ -48,9 +48,9 @@ def _verdict(book, paper):
         row += 1
     row += 1
     for name, columns, rows in (
-        ("sides", pages.SIDES, pages.side_rows(paper)),
-        ("legal", pages.LEGAL, [*pages.legal_rows(paper), *pages.age_rows(paper)]),
-        ("read", pages.READ, pages.read_rows(paper)),
+        ("sides", basis.SIDES, basis.side_rows(paper)),
+        ("legal", verdict.LEGAL, [*verdict.legal_rows(paper), *verdict.age_rows(paper)]),
+        ("read", basis.READ, basis.read_rows(paper)),
     ):
         if rows:
             row = _texts(book, sheet, row, name, columns, rows)
