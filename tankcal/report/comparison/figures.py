@@ -10,7 +10,7 @@ from tankcal.report.camera.drawings import styled
 from tankcal.report.comparison.tables import FINE, steps_done
 from tankcal.text.digits import fixed
 
-LETTERS = 18  # in a line below a bar
+LETTERS = 20  # in a line below a bar
 ROOM = 0.14  # of the span of the bars: for the numbers over them
 HIGH = 2.3  # inches of a figure by dip
 

@@ -11,10 +11,6 @@ FILE = "comparison.json"
 WORKBOOK = "comparison.xlsx"
 DIGITS_OF_DIGEST = 12
 UNITS = {"C": "degC", "%": "percent", "mm": "image mm"}  # {of the file: of report.numbers}
-    "C": "degC",
-    "%": "percent",
-    "mm": "image mm",
-}  # units as the file calls them: those of report.numbers
 DECIMALS = {"C": 1, "kg/m3": 1, "mm": 2, "m": 4, "m3": 4, "%": 3}
 ENDINGS = {"_m3": "m3", "_mm": "mm", "_percent": "%", "_kg_m3": "kg/m3", "_c": "C"}
 
