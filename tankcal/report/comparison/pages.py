@@ -3,8 +3,9 @@
 from tankcal.report import blocks
 from tankcal.report.comparison import figures
 from tankcal.report.comparison.basis import basis, read_out, sides
+from tankcal.report.comparison.paper import signed_text
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, selected, worst_row
-from tankcal.report.comparison.verdict import legal, signed, signed_text, verdict
+from tankcal.report.comparison.verdict import legal, signed, verdict
 from tankcal.report.markdown import nodes
 from tankcal.text.digits import NOTHING
 

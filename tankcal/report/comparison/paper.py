@@ -1,9 +1,11 @@
 """A comparison on paper: its values in the words of a language."""
 
+from collections import defaultdict
+
 from tankcal.record.comparison import COMPARISON
 from tankcal.report import attachments, blocks
 from tankcal.report.plain import PlainPaper, words_with_part
-from tankcal.text.digits import NOTHING
+from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 from tankcal.text.languages import DEFAULT
 from tankcal.text.words import load_words, message_sentence
 
@@ -12,7 +14,13 @@ WORKBOOK = "comparison.xlsx"
 DIGITS_OF_DIGEST = 12
 UNITS = {"C": "degC", "%": "percent", "mm": "image mm"}  # {of the file: of report.numbers}
 DECIMALS = {"C": 1, "kg/m3": 1, "mm": 2, "m": 4, "m3": 4, "%": 3}
-ENDINGS = {"_m3": "m3", "_mm": "mm", "_percent": "%", "_kg_m3": "kg/m3", "_c": "C"}
+CODES = {  # {value of a reason: group of words that it is looked up in}
+    "steps": "steps",
+    "step": "steps",
+    "limit": "numbers",
+    "limits": "numbers",
+    "of": "ages",
+}
 
 
 class ComparisonPaper(PlainPaper):
@@ -89,35 +97,54 @@ class ComparisonPaper(PlainPaper):
 
     def reason(self, one):
         """A reason {code, values} as a sentence; a code without words with its values."""
-        values = {key: self._shown(key, value) for key, value in one["values"].items()}
-        template = self.words["reasons"].get(one["code"])
+        values = {key: self._shown(one["values"], key) for key in one["values"]}
+        template = self.words["reasons"].get(one["code"] + _variant(one["values"]))
         if template is None:
             told = ", ".join(f"{key} {value}" for key, value in values.items())
             return f"{one['code']}: {told}" if told else one["code"]
-        return template.format(**values)
+        return template.format_map(defaultdict(lambda: NOTHING, values))
 
-    def _shown(self, key, value):
-        """A value of a reason, in the unit that the end of its key says."""
+    def _shown(self, values, key):
+        """A value of a reason: a code as its name, a number in the unit of its key or of `unit`."""
+        value = values[key]
         if value is None:
             return NOTHING
+        if key in CODES:
+            names = value if isinstance(value, list) else [value]
+            return ", ".join(self.words[CODES[key]].get(one, one) for one in names)
         if isinstance(value, list):
-            return ", ".join(self._shown(key, one) for one in value)
+            return ", ".join(map(str, value))
         if isinstance(value, str):
-            return self.words["codes"].get(value, value)
-        if isinstance(value, bool):
-            return self.words["yes_no"]["yes" if value else "no"]
+            return value
+        if key in ("value", "most"):
+            return self.measure(value, values["unit"])
         if key.endswith("_m"):
             return self.height(value)
-        unit = next((unit for end, unit in ENDINGS.items() if key.endswith(end)), None)
-        if unit:
-            return self.number(value, UNITS.get(unit, unit), digits=3)
-        return self.number(value, decimals=0 if float(value).is_integer() else 2)
+        if key.endswith("_m3"):
+            return signed_text(value, self.number(value, "m3", decimals=LITRE_DECIMALS))
+        if key in ("age", "years"):
+            return self.plain(round(value, 1))
+        return self.number(value, decimals=2)
 
     def warning(self, one):
         """A warning of the file in the language."""
         said = message_sentence(self.words, one["text"], one["code"], one["values"])
         place = f"{one['file']}: " if one["file"] else ""
         return f"{place}{said}"
+
+
+def signed_text(value, text):
+    """The text of a number with a plus before it where it is above 0."""
+    return f"+{text}" if value > 0 else text
+
+
+def _variant(values):
+    """The end of the word for a reason: of a delivery, with a limit of c, for what was lacking."""
+    if "low_m" in values:
+        return "_of_delivery"
+    if values.get("c_limit") is not None:
+        return "_with_limit"
+    return "_for_lack" if values.get("lacking") else ""
 
 
 ATTACHED = {FILE: "comparison", WORKBOOK: "comparison_workbook"}

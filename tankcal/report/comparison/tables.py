@@ -3,20 +3,33 @@
 from tankcal.report.tables import Column, Table
 from tankcal.text.digits import LITRE_DECIMALS
 
-STEPS = ("zero", "temperature", "head", "roof", "rounding")
+CODES = ("zero", "temperature", "head", "roof", "rounding")  # of the steps, in their order
 FINE = 4  # decimals of what adds up: a tenth of a litre
 MOST_ROWS = 40  # of the selection that a PDF shows
 NICE_M = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0)  # between the dips of a selection
 NEAR_M = 1e-6
 
 _LITRES = {"decimals": LITRE_DECIMALS}
-_OF_U = {"decimals": LITRE_DECIMALS}
 _SHOWN = {"sheet": True, "width": 11}
 
 
 def _volume(key, csv=True, **more):
     return Column(key, "m3", **_LITRES, **_SHOWN, csv=key if csv else None, **more)
 
+
+STEPS = Table(
+    "steps",
+    (
+        Column("step", words="steps", sheet=True, width=20),
+        Column("source", words="sources", sheet=True, width=24),
+        Column("former", decimals=4, sheet=True, width=12),
+        Column("new", decimals=4, sheet=True, width=12),
+        Column("unit", sheet=True, width=9),
+        Column("top_m3", "m3", decimals=FINE, heading="at_top", **_SHOWN),
+        Column("largest_m3", "m3", decimals=FINE, heading="largest", **_SHOWN),
+        Column("largest_at_m", "m", height=True, heading="at_dip", **_SHOWN),
+    ),
+)
 
 ROWS = Table(
     "compared_rows",
@@ -41,7 +54,7 @@ WATERFALL = Table(
         Column("height_m", "m", height=True, csv="height_m", **_SHOWN),
         *(
             Column(f"{key}_m3", "m3", decimals=FINE, csv=f"{key}_m3", **_SHOWN)
-            for key in ("former", *STEPS, "tank", "new")
+            for key in ("former", *CODES, "tank", "new")
         ),
     ),
     rows=lambda found: found["waterfall"],
@@ -83,6 +96,14 @@ COURSES = Table(
 )
 
 
+def step_rows(paper):
+    """Rows of STEPS; what was not made says why in place of where its values are from."""
+    return [
+        one | {"step": one["code"], "source": one["source"] or one["state"]}
+        for one in paper.found["steps"]
+    ]
+
+
 def rows_by_dip(columns):
     """The rows, a dict each, of what is saved column by column."""
     keys = [key for key, values in columns.items() if values]
@@ -100,7 +121,7 @@ def steps_done(found):
 def waterfall_of(found):
     """The table WATERFALL without the steps that move nothing."""
     kept = steps_done(found)
-    left_out = {f"{code}_m3" for code in STEPS if code not in kept}
+    left_out = {f"{code}_m3" for code in CODES if code not in kept}
     return WATERFALL.only(*(one.key for one in WATERFALL.columns if one.key not in left_out))
 
 

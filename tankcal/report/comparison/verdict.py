@@ -1,12 +1,14 @@
 """What a comparison decides: the verdict, why, by which rule, and the numbers that it limits."""
 
 from tankcal.report import blocks
+from tankcal.report.comparison.paper import signed_text
 from tankcal.report.plain import Column
 from tankcal.text.digits import NOTHING
 
 LEGAL = (
     Column("number"), Column("value"), Column("as_printed"), Column("limit"), Column("verdict"),
 )  # fmt: skip
+DECIMALS_OF_LIMITED = {"%": 3, "mm": 1, "m3": 3}
 
 
 def verdict(paper):
@@ -81,13 +83,9 @@ def legal_rows(paper):
 
 
 def _limited(paper, value, unit):
-    decimals = {"%": 3, "mm": 1}[unit]
-    return NOTHING if value is None else signed_text(value, paper.measure(value, unit, decimals))
-
-
-def signed_text(value, text):
-    """The text of a number with a plus before it where it is above 0."""
-    return f"+{text}" if value > 0 else text
+    if value is None:
+        return NOTHING
+    return signed_text(value, paper.measure(value, unit, DECIMALS_OF_LIMITED[unit]))
 
 
 def age_rows(paper):
