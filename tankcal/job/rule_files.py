@@ -29,7 +29,7 @@ from tankcal.tank.rules.model import (
 )
 from tankcal.text.shipped import shipped_folder
 
-# The keys of a decision rule's file: [rule] and the sections of LIMITS, [uncertainty.NAME] and so on.
+# The keys of a decision rule's file: [rule], and [PART.NAME] for the parts of LIMITS.
 
 RULE = (
     Field("name", "text", "name of the rule", required=True),
@@ -70,7 +70,6 @@ LIMITS = {
         *_SHARED,
     ),
 }
-_OF_A_TABLE = ("uncertainty", "deviation")  # the others compare two of them
 
 
 _FOLDER, _ENDING = "job/rule_tables", ".toml"
@@ -213,8 +212,6 @@ def _tell_contradictions(file, part, section, values, given, row, log):
                 hint=nearest(tank, TANKS),
             )
             tell("tanks", expected)
-    if part not in _OF_A_TABLE:
-        return
     if part == "deviation":
         if is_given("limit_percent") and is_given("limit_m3"):
             tell(
@@ -228,7 +225,12 @@ def _tell_contradictions(file, part, section, values, given, row, log):
                 "limit_percent",
                 message("neither_limit", "missing; expected limit_percent or limit_m3"),
             )
-        return
+    elif part == "uncertainty":
+        _tell_heights(values, is_given, tell)
+
+
+def _tell_heights(values, is_given, tell):
+    """A problem for a least height, or a percentage, that a limit of U lacks or must not have."""
     is_delivery = values["of"] == "deliveries"
     if is_delivery and not is_given("minimum_height_m"):
         tell(
@@ -281,9 +283,7 @@ def _rule(head, limits):
         for name, values in limits["reference_height"]
     )
     periods = tuple(
-        Period(
-            of=values["of"], years=values["years"], **_shared(name, values, rule_verified)
-        )
+        Period(of=values["of"], years=values["years"], **_shared(name, values, rule_verified))
         for name, values in limits["period"]
     )
     return Rule(

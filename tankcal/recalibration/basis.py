@@ -386,5 +386,3 @@ def _saved(name, step, dips):
         largest_m3=float(step.added_m3[most]),
         largest_at_m=float(dips[most]),
     )
-
-

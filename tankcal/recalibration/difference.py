@@ -5,8 +5,8 @@ On one basis the difference of an upright tank is, above the highest point of th
     D(h) = h0 A(h) + sum over courses of dA_c o_c(h),     o_c the wet height of course c
 
 A bottom that has changed adds the same to all of these rows, as h0 A does: the two cannot be told
-apart by volumes. Tanks that are one solid have, in place of the courses, D and V of their own shape:
-a lying cylinder V = L D^2 f(h / D) has dV/dL = V / L and dV/dD = (2 V - h A) / D, a sphere
+apart by volumes. Tanks that are one solid have their sizes in place of the courses: a lying
+cylinder V = L D^2 f(h / D) has dV/dL = V / L and dV/dD = (2 V - h A) / D, a sphere
 V = D^3 f(h / D) has dV/dD = (3 V - h A) / D.
 """
 

@@ -30,7 +30,7 @@ class ComparedTable(Saved):
 
     name: str = key("of the file, and sheet")
     sha256: str = key("of the file")
-    source: str = key('"record" or "table"')
+    origin: str = key('"record" or "table"')
     laboratory: str | None = key("as declared, or as the record has it; null: not known")
     number: str | None = key("of the certificate; null: not known")
     date: str | None = key("of the calibration; null: not known")
@@ -47,6 +47,19 @@ class ComparedTable(Saved):
     roof: RoofInTable | None = key("null: none is known")
     reference_height_m: float | None = key("dip plate to reference point; null: not known")
     k: float | None = key("coverage factor of its U as declared; null: no U is known")
+    U_top_m3: float | None = key("expanded, of the highest dip, as declared; null: not known")
+    U_of_deliveries: str | None = key(
+        '"record": by its covariance; "proportional": in percent of what is delivered; '
+        '"independent_rows": rows taken as independent; null: no U is known'
+    )
+
+
+class Material(Saved):
+    """The shell's steel."""
+
+    expansion_per_k: float = key("thermal expansion")
+    modulus_pa: float = key("Young's modulus")
+    source: str = key('"record" or "default"')
 
 
 class BasisStep(Saved):
@@ -153,9 +166,9 @@ class Correlation(Saved):
 class LegalNumber(Saved):
     """One of the three numbers that a rule limits."""
 
-    code: str = key('"top", "range" or "reference_height"')
+    code: str = key('"top", "range", "reference_height"; "row": the worst row')
     limit: float = key("in `unit`")
-    unit: str = key("% or mm")
+    unit: str = key("%, m3 or mm")
     value: float | None = key("on one basis; null: not known")
     as_printed: float | None = key("of the tables as printed; null: not known")
     at_m: list[Finite] = key("dips that it is of")
@@ -190,7 +203,7 @@ class ComparisonRule(Saved):
 class Reason(Saved):
     """Why the verdict is as it is."""
 
-    code: str = key("see docs/compare.md")
+    code: str = key("such as tank_differs: see docs/compare.md")
     values: dict = key("numbers and texts of the sentence")
 
 
@@ -198,7 +211,10 @@ class ReadOut(Saved):
     """Something that was read out of a table because it was not declared."""
 
     table: str = key('"former" or "new"')
-    code: str = key('"liquid_density", "head", "zero", "rounding_height", "rounding_volume"')
+    code: str = key(
+        '"head_with", "head_without", "head_undecided" (density of the head, by its rows), '
+        '"zero", "rounding_volume"'
+    )
     value: float | None = key("in `unit`")
     u: float | None = key("standard; null: not known")
     unit: str = key("kg/m3, m or m3")
@@ -214,6 +230,7 @@ class ComparisonFile(Saved, kw_only=True):
     tank: str | None = key("its id where a record has it")
     former: ComparedTable = key("the former table")
     new: ComparedTable = key("the new table")
+    material: Material = key("that the steps were made with")
     low_m: float = key("lowest dip that was compared")
     high_m: float = key("highest dip that was compared")
     interpolation_m3: float = key("largest error of what was interpolated in the former table")
