@@ -24,13 +24,13 @@ def pages(paper, folder=None, whole=False):
         *signed(paper),
         *sides(paper),
         *legal(paper),
+        *warnings(paper),
         *basis(paper),
         *differences(paper),
         *deliveries(paper),
         *courses(paper),
         *read_out(paper),
         *rows(paper, whole),
-        *warnings(paper),
     ]
 
 
@@ -83,7 +83,8 @@ def correlation(paper):
     said.append(paper.word("texts.c_at_half", **shown))
     said.append(paper.word("texts.c_never" if one["c_limit"] is None else "texts.c_limit", **shown))
     if one["coverage_k"] is not None:
-        said.append(paper.word("texts.same_coverage", k=paper.plain(one["coverage_k"])))
+        k = paper.number(one["coverage_k"], decimals=2)
+        said.append(paper.word("texts.same_coverage", k=k))
     return " ".join(said)
 
 
@@ -140,10 +141,9 @@ def rows(paper, whole):
 def warnings(paper):
     """Warnings, and what limits every comparison."""
     said = [paper.warning(one) for one in paper.found["warnings"]]
-    limits = paper.words["standing_limits"].values()
-    said += [paper.word("texts.interpolation", volume=_litres(paper))] + list(limits)
+    lost_m3 = paper.found["interpolation_m3"]
+    if lost_m3:
+        volume = paper.number(lost_m3, "L", digits=2)
+        said.append(paper.word("texts.interpolation", volume=volume))
+    said += paper.words["standing_limits"].values()
     return [paper.heading("limits"), blocks.listing(said)]
-
-
-def _litres(paper):
-    return paper.number(paper.found["interpolation_m3"], "L", digits=2)

@@ -4,6 +4,7 @@ from collections import defaultdict
 
 from tankcal.record.comparison import COMPARISON
 from tankcal.report import attachments, blocks
+from tankcal.report.comparison.tables import symbol_of
 from tankcal.report.plain import PlainPaper, words_with_part
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 from tankcal.text.languages import DEFAULT
@@ -92,8 +93,7 @@ class ComparisonPaper(PlainPaper):
 
     def chosen(self, value, unit):
         """A value that somebody chose or printed, without zeros at its end; None gives None."""
-        shown = {"C": "°C", "kg/m3": "kg/m³", "m3": "m³"}
-        return self.plain(value, shown.get(unit, unit))
+        return self.plain(value, symbol_of(unit))
 
     def reason(self, one):
         """A reason {code, values} as a sentence; a code without words with its values."""
@@ -122,8 +122,10 @@ class ComparisonPaper(PlainPaper):
             return self.height(value)
         if key.endswith("_m3"):
             return signed_text(value, self.number(value, "m3", decimals=LITRE_DECIMALS))
-        if key in ("age", "years"):
-            return self.plain(round(value, 1))
+        if key == "age":
+            return self.number(value, decimals=1)
+        if key == "years":
+            return self.plain(value)
         return self.number(value, decimals=2)
 
     def warning(self, one):
