@@ -5,7 +5,7 @@ import os
 import sys
 
 import tankcal
-from tankcal.cli import camera, importing, linting, planning, reporting, running, starting
+from tankcal.cli import camera, comparing, importing, linting, planning, reporting, running, starting
 from tankcal.cli.help_words import argparse_in, put_in_words
 from tankcal.cli.machine import failure, print_json
 from tankcal.cli.showing import complain, speak, words_of_run
@@ -25,6 +25,7 @@ a new tank, step by step:
   tankcal run my-tank/job.xlsx  the same, from the workbook
   tankcal report my-tank/results --language es   the papers again, in Spanish
   tankcal lint table.csv        look for mistakes in any capacity table
+  tankcal compare old.csv my-tank/results        has the tank changed since its former table?
 
 photographs, distances, angles and levels instead of surveyed points:
   tankcal new my-tank --survey photos          (or total-station) write such a job
@@ -97,7 +98,7 @@ def _parser():
     parser.set_defaults(command=None, shown=parser)
     commands = parser.add_subparsers(metavar="COMMAND")
 
-    for room in (running, reporting, starting, importing, planning, linting, camera):
+    for room in (running, reporting, starting, importing, planning, linting, comparing, camera):
         room.add(commands)
     if words_of_run():
         put_in_words(parser, words_of_run())

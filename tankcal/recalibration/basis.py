@@ -299,8 +299,9 @@ def _head(former, new, facts, densities, zero, dips, basis):
         return _none(dips, "not_declared", lacking=lacking, **values)
     if was.kg_m3 == is_now.kg_m3:
         return _none(dips, "same", **values)
-    if not facts.is_shell:
-        return _none(dips, "not_possible", lacking=("courses",), **values)
+    if not facts.has_plates:
+        lacking = ("courses.thickness_mm",) if facts.is_shell else ("courses",)
+        return _none(dips, "not_possible", lacking=lacking, **values)
     rings = Rings(facts.edges_m(), facts.thickness_m, facts.modulus_pa, is_first_order=False)
     radii = radii_of_rows(rings, dips, basis, was.kg_m3)
     added = rings.volume_m3(dips, radii, is_now.kg_m3) - rings.volume_m3(dips, radii, was.kg_m3)

@@ -1,8 +1,6 @@
 """`tankcal compare`: a former table and a new one of the same tank, on one basis and judged."""
 
 from dataclasses import dataclass
-from hashlib import sha256
-from pathlib import Path
 
 import numpy as np
 
@@ -146,11 +144,6 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
         read=_read(former, new, basis),
         warnings=warnings_of(_warnings(former, new, basis)),
     )
-
-
-def fingerprint_of(path):
-    """SHA-256 of a file."""
-    return sha256(Path(path).read_bytes()).hexdigest()
 
 
 # ---- what cannot be compared

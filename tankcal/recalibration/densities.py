@@ -42,7 +42,7 @@ def densities_of(former, new, facts):
 def _density_of(table, facts):
     if table.liquid_density_kg_m3 is not None:
         return Density(float(table.liquid_density_kg_m3), "declared")
-    if not facts.is_shell:
+    if not facts.has_plates:
         return Density()
     try:
         found = read_upright(

@@ -15,7 +15,8 @@ class TankFacts:
     ----------
     kind : {"vertical", "horizontal", "sphere", "mesh"} or None
     heights_m, thickness_m : (courses,) ndarray or None
-        Of its courses from the bottom up; None: not known.
+        Of its courses from the bottom up; None: not known. A plate of 0 is infinite here: its
+        head is not known.
     bottom_m : float
         Dip of the bottom of the first course in the new table.
     modulus_pa, expansion_per_k : float
@@ -41,6 +42,11 @@ class TankFacts:
     def is_shell(self):
         """Whether it stands upright, and its courses are known."""
         return self.kind == "vertical" and self.heights_m is not None
+
+    @property
+    def has_plates(self):
+        """Whether the plates of all courses are known, which a head needs."""
+        return self.is_shell and bool(np.isfinite(self.thickness_m).all())
 
     def edges_m(self, zero_m=0.0):
         """(courses + 1,) dips of the edges, `zero_m` being added to those of the new table."""
@@ -89,7 +95,8 @@ def _of_record(record, is_new):
 
 
 def _shell(heights_m, thickness_m):
+    thickness = np.asarray(thickness_m, dtype=float)
     return {
         "heights_m": np.asarray(heights_m, dtype=float),
-        "thickness_m": np.asarray(thickness_m, dtype=float),
+        "thickness_m": np.where(thickness > 0, thickness, np.inf),
     }

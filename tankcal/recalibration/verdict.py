@@ -54,8 +54,9 @@ class WorstError:
 
     @property
     def place(self):
-        """{name: value} of where it is, for a Reason; low_m: null for a row."""
-        return {"low_m": self.low_m, "high_m": self.high_m, "d_m3": self.d_m3}
+        """{name: value} of where it is, for a Reason; of a row without low_m."""
+        low = {} if self.low_m is None else {"low_m": self.low_m}
+        return low | {"high_m": self.high_m, "d_m3": self.d_m3}
 
 
 def tank_of_rules(facts, former, new):
