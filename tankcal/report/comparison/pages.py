@@ -125,7 +125,10 @@ def courses(paper):
 
 
 def rows(paper, whole):
-    """A selection of the rows, or every row where there is room."""
+    """A selection of the rows, or every row where there is room.
+
+    As a table in one column of the page: it never leaves a few rows alone on the last one.
+    """
     every = ROWS.rows(paper.found)
     if whole and len(every) <= FEW_ROWS:
         columns = ROWS.on_paper()
@@ -134,7 +137,7 @@ def rows(paper, whole):
     return [
         paper.heading("rows"),
         paper.paragraph("selected_rows", shown=len(some), all=len(every)),
-        paper.show(ROWS, some),
+        paper.show(ROWS, some, across=1),
     ]
 
 

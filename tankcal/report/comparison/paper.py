@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 
+from tankcal.job.rule_files import shipped_names, shipped_rule
 from tankcal.record.comparison import COMPARISON
 from tankcal.report import attachments, blocks
 from tankcal.report.comparison.tables import symbol_of
@@ -35,9 +36,19 @@ class ComparisonPaper(PlainPaper):
     """
 
     def __init__(self, found, language=None, letterhead=None):
-        self.found = COMPARISON.migrated(found, COMPARISON.file)
         super().__init__(words_with_part(load_words(language or DEFAULT), "comparison"))
+        found = COMPARISON.migrated(found, COMPARISON.file)
+        self.saved = found
+        self.found = found | {"rule": self._rule(found["rule"])}
         self.letterhead = letterhead.data() if letterhead else None
+
+    def _rule(self, rule):
+        """The rule with the texts of a shipped one; those of a laboratory's own file stay."""
+        name = (rule or {}).get("file", "").removesuffix(".toml")
+        texts = self.words.get("rule_texts", {}).get(name)
+        if texts is None or name not in shipped_names():
+            return rule
+        return rule | texts if shipped_rule(name).name == rule["name"] else rule
 
     def subject(self):
         """What the papers are about: the tank, or the file of the former table."""

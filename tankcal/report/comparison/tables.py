@@ -6,7 +6,7 @@ from tankcal.text.digits import LITRE_DECIMALS
 CODES = ("zero", "temperature", "head", "roof", "rounding")  # of the steps, in their order
 DECIMALS = {"C": 1, "kg/m3": 1}  # of units of steps; else FINE
 FINE = 4  # decimals of what adds up: a tenth of a litre
-MOST_ROWS = 40  # of the selection that a PDF shows
+MOST_ROWS = 50  # of the selection that a PDF shows
 NICE_M = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0)  # between the dips of a selection
 NEAR_M = 1e-6
 
