@@ -43,14 +43,14 @@ def normalized_error(d, U_new, U_former, c=0.0):
 def critical_correlation(d, U_new, U_former):
     """The correlation at which |E_n| is 1; nan where it is below 1 for every one, or a U unknown.
 
-    -1 where it is above 1 for every one.
+    -1 where it is above 1 for every one; without a difference there is none.
     """
     d, one, two = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (d, U_new, U_former)))
     product = 2 * one * two
     with np.errstate(divide="ignore", invalid="ignore"):
         found = (one**2 + two**2 - d**2) / product
     found = np.where(found > 1, np.nan, np.maximum(found, -1.0))
-    return np.where(product > 0, found, np.nan)
+    return np.where((product > 0) & (d != 0), found, np.nan)
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from tankcal.tank.fittings import floating_roof
 ROUNDS = 5  # of the zero: each leaves a hundredth of the last, or less
 SAME_ZERO_M = 1e-7
 FEWEST_ROWS = 2
-NOTICED = 2.0  # standard uncertainties: a zero that is less is none
+NOTICED, LEAST_ZERO_M = 2.0, 1e-4  # standard uncertainties, and size: a zero below either is none
 UNITS = {"zero": "m", "temperature": "C", "head": "kg/m3", "roof": "m3", "rounding": "m3"}
 
 
@@ -111,8 +111,9 @@ def bring_to_one_basis(former, new, facts):
     zero = _declared_zero(former, new)
     densities = densities_of(former, new, facts)
     fitted = _fitted_zero(former, new, facts, densities)
-    if zero is None and fitted is not None and abs(fitted[0]) > NOTICED * fitted[1]:
-        zero = fitted[0]
+    if zero is None and fitted is not None:
+        least = max(NOTICED * fitted[1], LEAST_ZERO_M)
+        zero = fitted[0] if abs(fitted[0]) > least else None
     rows = rows_in_both(former, new, zero or 0.0)
     steps, former_m3, basis = _steps(former, new, facts, densities, zero or 0.0, rows)
     shift = _zero_shift(former, new, zero, fitted, rows)

@@ -26,6 +26,7 @@ from tankcal.recalibration.verdict import (
     decide,
     legal_numbers,
     tank_of_rules,
+    zero_limit_of,
 )
 from tankcal.record.comparison import (
     ComparedDelivery,
@@ -115,7 +116,7 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
     of_rule = (chosen, tank, former, new)
     legal = legal_numbers(*of_rule, basis, agreement.former_U, agreement.new_U)
     ages = ages_of(*of_rule)
-    verdict = decide(legal, ages, basis.steps, worst, c)
+    verdict = decide(legal, ages, basis, worst, c, zero_limit_of(chosen, tank))
     is_default = rule is None
     return ComparisonFile(
         tank=_tank_id(former, new),

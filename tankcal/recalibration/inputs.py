@@ -113,7 +113,7 @@ def read_courses(path, log):
     found = read_columns("courses", table, log, COLUMNS)
     if found.is_empty:
         expected = message(
-            "no_courses", "no rows; expected one row for each course, from the bottom up"
+            "compare_no_courses", "no rows; expected one row for each course of the tank, upwards"
         )
         log.problem(path.name, expected)
     if len(log.problems) > told:

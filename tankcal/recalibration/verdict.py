@@ -1,7 +1,8 @@
 """Keep, recompute or recalibrate: what a rule and the agreement of two tables say.
 
-recalibrate  a number is beyond the limit of the rule, |E_n| is above 1, or the former table is
-             older than the rule lets it become
+recalibrate  a number is beyond the limit of the rule, |E_n| is above 1, the former table is older
+             than the rule lets it become, or all volumes differ as by a zero that nobody declared
+             and that is more than the rule lets a reference height differ
 recompute    the tank itself agrees; zero, temperature, head or roof are not those of the new table
 keep         nothing differs
 """
@@ -16,6 +17,7 @@ from tankcal.tank.capacity import Quantity
 from tankcal.tank.rules.deviation import StatedVolume, judge_volume
 
 DAYS_OF_YEAR = 365.25
+USUAL_LIMIT_M = 5e-3  # of a zero that nobody declared, where a rule has no limit
 ON_BASIS = ("zero", "temperature", "head", "roof")  # what a new computation mends
 FAILED = ("fails", "guard_band")
 
@@ -194,21 +196,33 @@ def _years_between(before, after):
 # ---- the verdict
 
 
-def decide(legal, ages, steps, worst, c):
+def zero_limit_of(rule, tank):
+    """Largest zero (m) that may be taken for one without being declared: of the rule, or usual."""
+    return min((one.limit_m for one in rule.reference_height if is_for(one, tank)),
+               default=USUAL_LIMIT_M)  # fmt: skip
+
+
+def decide(legal, ages, basis, worst, c, zero_limit_m):
     """The Verdict.
 
     Parameters
     ----------
     legal : sequence of LegalNumber
     ages : sequence of TableAge
-    steps : dict
-        {name: basis.Step}.
+    basis : OneBasis
     worst : WorstError or None
         None: a U is not known.
     c : float or None
         Declared correlation.
+    zero_limit_m : float
+        A zero that is fitted, not declared, may be no larger: else the bottom may have changed.
     """
-    grave = [*_broken(legal), *_too_old(ages), *_differing(worst, c)]
+    steps, zero = basis.steps, basis.zero
+    grave = [*_broken(legal), *_differing(worst, c)]
+    if zero.source == "fitted" and abs(zero.height_m) > zero_limit_m:
+        volumes = {"d_m3": zero.volume_m3, "zero_mm": 1000 * zero.height_m}
+        grave.append(Reason("zero_not_explained", volumes | {"most_mm": 1000 * zero_limit_m}))
+    grave += _too_old(ages)
     judged = [one for one in (*legal, *ages) if one.verdict != "not_judged"]
     differing = [name for name in ON_BASIS if steps[name].state == "done"]
     undone = {
