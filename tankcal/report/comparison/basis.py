@@ -2,7 +2,7 @@
 
 from tankcal.report import blocks
 from tankcal.report.comparison import figures
-from tankcal.report.comparison.paper import iso_day
+from tankcal.report.comparison.paper import bearable, iso_day
 from tankcal.report.comparison.tables import waterfall_of
 from tankcal.report.plain import Column
 from tankcal.text.digits import NOTHING
@@ -24,7 +24,7 @@ READ = (
 def sides(paper):
     """What each table is, beside each other."""
     files = [
-        {"file": paper.found[side]["name"], "sha256": paper.found[side]["sha256"]}
+        {"file": bearable(paper.found[side]["name"]), "sha256": paper.found[side]["sha256"]}
         for side in ("former", "new")
     ]
     return [
@@ -54,8 +54,8 @@ def side_rows(paper):
     return [
         {
             "what": paper.label(key),
-            "former": both[0][key] or open_,
-            "new": both[1][key] or open_,
+            "former": bearable(both[0][key] or open_),
+            "new": bearable(both[1][key] or open_),
         }
         for key in both[0]
         if both[0][key] or both[1][key]
@@ -247,7 +247,7 @@ def _read_value(paper, one):
     if one["value"] is None:
         return paper.word("texts.not_known")
     if one["code"].startswith("rounding"):
-        return paper.chosen(one["value"], one["unit"])
+        return _quantum(paper, one["value"], one["unit"])
     return paper.number(one["value"], _unit(one), u=one["u"], decimals=None if one["u"] else 2)
 
 

@@ -9,6 +9,7 @@ from tankcal.report.comparison.verdict import legal, signed, verdict
 from tankcal.report.markdown import nodes
 from tankcal.text.digits import NOTHING
 
+HALF = 0.5  # the other correlation that E_n is told for
 FEW_ROWS = 5000  # of the page: more are only in workbook and CSV
 
 
@@ -80,7 +81,8 @@ def correlation(paper):
         for key in ("c", "worst_E_n", "worst_E_n_at_half", "c_limit")
     }
     said = [paper.word(f"texts.c_{one['source']}", **shown)]
-    said.append(paper.word("texts.c_at_half", **shown))
+    if one["c"] != HALF:
+        said.append(paper.word("texts.c_at_half", **shown))
     said.append(paper.word("texts.c_never" if one["c_limit"] is None else "texts.c_limit", **shown))
     if one["coverage_k"] is not None:
         k = paper.number(one["coverage_k"], decimals=2)
@@ -134,10 +136,11 @@ def rows(paper, whole):
         columns = ROWS.on_paper()
         return [paper.heading("rows"), paper.table("every_row", every, columns, across=1)]
     some = selected(paper.found)
+    told = [paper.paragraph("selected_rows", shown=len(some), all=len(every))]
     return [
         paper.heading("rows"),
-        paper.paragraph("selected_rows", shown=len(some), all=len(every)),
         paper.show(ROWS, some, across=1),
+        *(told if len(some) < len(every) else []),
     ]
 
 

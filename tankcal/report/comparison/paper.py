@@ -14,6 +14,7 @@ from tankcal.text.words import load_words, message_sentence
 FILE = "comparison.json"
 WORKBOOK = "comparison.xlsx"
 DIGITS_OF_DIGEST = 12
+LONGEST_WORD = 30  # letters of a name in a column of a page
 UNITS = {"C": "degC", "%": "percent", "mm": "image mm"}  # {of the file: of report.numbers}
 DECIMALS = {"C": 1, "kg/m3": 1, "mm": 2, "m": 4, "m3": 4, "%": 3}
 CODES = {  # {value of a reason: group of words that it is looked up in}
@@ -53,7 +54,8 @@ class ComparisonPaper(PlainPaper):
     def subject(self):
         """What the papers are about: the tank, or the file of the former table."""
         tank = self.found["tank"]
-        return f"{self.word('page.tank')} {tank}" if tank else self.found["former"]["name"]
+        subject = f"{self.word('page.tank')} {tank}" if tank else self.found["former"]["name"]
+        return bearable(subject)
 
     def head(self, folder=None):
         """The start of the document, and the head of its first page.
@@ -119,7 +121,7 @@ class ComparisonPaper(PlainPaper):
         """A value of a reason: a code as its name, a number in the unit of its key or of `unit`."""
         value = values[key]
         if value is None:
-            return NOTHING
+            return "∞" if key == "E_n" else NOTHING
         if key in CODES:
             names = value if isinstance(value, list) else [value]
             return ", ".join(self.words[CODES[key]].get(one, one) for one in names)
@@ -127,8 +129,10 @@ class ComparisonPaper(PlainPaper):
             return ", ".join(map(str, value))
         if isinstance(value, str):
             return value
-        if key in ("value", "most"):
+        if key == "value":
             return self.measure(value, values["unit"])
+        if key == "most":
+            return self.chosen(value, values["unit"])
         if key.endswith("_m"):
             return self.height(value)
         if key.endswith("_m3"):
@@ -144,6 +148,13 @@ class ComparisonPaper(PlainPaper):
         said = message_sentence(self.words, one["text"], one["code"], one["values"])
         place = f"{one['file']}: " if one["file"] else ""
         return f"{place}{said}"
+
+
+def bearable(text):
+    """A text of a user without words that no column holds: their middle is left out."""
+    words = str(text).split(" ")
+    half = LONGEST_WORD // 2
+    return " ".join(w if len(w) <= LONGEST_WORD else f"{w[:half]}…{w[1 - half :]}" for w in words)
 
 
 def signed_text(value, text):
