@@ -104,10 +104,15 @@ def _columns(facts, dips, volume, area):
 
 
 def slopes_m2(dips_m, volume_m3, sd_m3=0.0):
-    """(rows,) areas of the cut, over windows in which a volume rises by many digits."""
+    """(rows,) areas of the cut, over windows in which a volume rises by many digits.
+
+    A window is as long below a row as above it: shorter near the ends, there of one step.
+    """
     usual = (volume_m3[-1] - volume_m3[0]) / (dips_m[-1] - dips_m[0])
     half = max(LEAST_WINDOW_M, LEVEL_PARTS * sd_m3 / max(usual, 1e-9)) / 2
     half = min(max(half, float(np.median(np.diff(dips_m)))), (dips_m[-1] - dips_m[0]) / 4)
+    room = np.minimum(dips_m - dips_m[0], dips_m[-1] - dips_m)
+    half = np.minimum(half, np.maximum(room, float(np.diff(dips_m).min())))
     low = np.maximum(dips_m - half, dips_m[0])
     high = np.minimum(dips_m + half, dips_m[-1])
     rise = np.interp(high, dips_m, volume_m3) - np.interp(low, dips_m, volume_m3)
