@@ -2,7 +2,7 @@
 
 from tankcal.report import blocks
 from tankcal.report.comparison import figures
-from tankcal.report.comparison.paper import bearable, iso_day
+from tankcal.report.comparison.paper import bearable, iso_day, shortened
 from tankcal.report.comparison.tables import waterfall_of
 from tankcal.report.plain import Column
 from tankcal.text.digits import NOTHING
@@ -24,7 +24,7 @@ READ = (
 def sides(paper):
     """What each table is, beside each other."""
     files = [
-        {"file": bearable(paper.found[side]["name"]), "sha256": paper.found[side]["sha256"]}
+        {"file": shortened(paper.found[side]["name"]), "sha256": paper.found[side]["sha256"]}
         for side in ("former", "new")
     ]
     return [

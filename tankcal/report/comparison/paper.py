@@ -152,9 +152,13 @@ class ComparisonPaper(PlainPaper):
 
 def bearable(text):
     """A text of a user without words that no column holds: their middle is left out."""
-    words = str(text).split(" ")
+    return " ".join(map(shortened, str(text).split(" ")))
+
+
+def shortened(name):
+    """A name of at most LONGEST_WORD letters, its middle left out."""
     half = LONGEST_WORD // 2
-    return " ".join(w if len(w) <= LONGEST_WORD else f"{w[:half]}…{w[1 - half :]}" for w in words)
+    return name if len(name) <= LONGEST_WORD else f"{name[:half]}…{name[1 - half :]}"
 
 
 def signed_text(value, text):

@@ -75,7 +75,7 @@ def legal_rows(paper):
             "number": paper.word(f"numbers.{one['code']}"),
             "value": _limited(paper, one["value"], one["unit"]),
             "as_printed": _limited(paper, one["as_printed"], one["unit"]),
-            "limit": f"± {paper.chosen(one['limit'], one['unit'])}",
+            "limit": f"±\N{NO-BREAK SPACE}{paper.chosen(one['limit'], one['unit'])}",
             "verdict": paper.word(f"limits.{one['verdict']}"),
         }
         for one in paper.found["legal"]

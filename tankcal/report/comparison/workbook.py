@@ -55,13 +55,15 @@ def _verdict(book, paper):
     for text, look in said:
         book.paragraph(sheet, row, text, WIDTHS, **look)
         row += 1
-    row += 1
+    row, starts = row + 1, []
     tables = {"sides": _sides(paper), "legal": _legal(paper), "read": _read(paper)}
     for name, columns in tables.items():
         if columns[0].cells:
+            starts.append(row)
             book.heading(sheet, row, paper.word(f"sheet_headings.{name}"), len(columns))
             widths = list(WIDTHS[: len(columns)])
             row = book.table(sheet, row + 1, name, columns, widths=widths) + 2
+    book.keep_together(sheet, starts, row, WIDTHS)
 
 
 def _sides(paper):
