@@ -6,7 +6,7 @@ Nothing here computes a number: all of it is made from comparison.json.
 import json
 from pathlib import Path
 
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
 from tankcal.messages import message
 from tankcal.record import save
 from tankcal.record.comparison import COMPARISON
@@ -14,7 +14,10 @@ from tankcal.report import folders
 from tankcal.report.comparison.paper import FILE, WORKBOOK, ComparisonPaper
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL
 
-__all__ = ["FILES", "ComparisonPaper", "rebuild", "refuse_foreign", "write_comparison"]
+__all__ = [
+    *("FILES", "ComparisonPaper", "comparison_file", "rebuild", "refuse_foreign"),
+    "write_comparison",
+]
 
 PDF, PAGE = "comparison.pdf", "comparison.html"
 TABLES = {
@@ -62,7 +65,28 @@ def write_comparison(found, folder, language=None, progress=None, letterhead=Non
 
 def rebuild(source, folder, language=None, progress=None, letterhead=None):
     """Write the same from a comparison.json alone; arguments as of `write_comparison`."""
-    return write_comparison(load(source), folder, language, progress, letterhead)
+    found = load(source)
+    try:
+        return write_comparison(found, folder, language, progress, letterhead)
+    except VocabularyError as error:
+        what = str(error)
+    except TankcalError:
+        raise
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        what = f"{type(error).__name__}: {error}"
+    expected = message(
+        "no_comparison", "does not have the content of a comparison ({what})", what=what
+    )
+    raise InputError(Problem(Path(source).name, expected))
+
+
+def comparison_file(path):
+    """The comparison that a path names, the file or its folder; None where it names none."""
+    path = Path(path)
+    if path.is_dir():
+        path = path / FILE
+        return path if path.is_file() else None
+    return path if path.name == FILE else None
 
 
 def load(path):
@@ -91,7 +115,7 @@ def _write(paper, folder, progress):
     from tankcal.report.web import page
 
     progress(message("comparison_tables", "writing the tables"))
-    save(paper.found, folder / FILE)
+    save(paper.saved, folder / FILE)
     for name, table in TABLES.items():
         if rows := table.rows(paper.found):
             write_table(table, folder / name, rows)

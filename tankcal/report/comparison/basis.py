@@ -2,7 +2,7 @@
 
 from tankcal.report import blocks
 from tankcal.report.comparison import figures
-from tankcal.report.comparison.paper import iso_day
+from tankcal.report.comparison.paper import bearable, iso_day, shortened
 from tankcal.report.comparison.tables import waterfall_of
 from tankcal.report.plain import Column
 from tankcal.text.digits import NOTHING
@@ -24,7 +24,7 @@ READ = (
 def sides(paper):
     """What each table is, beside each other."""
     files = [
-        {"file": paper.found[side]["name"], "sha256": paper.found[side]["sha256"]}
+        {"file": shortened(paper.found[side]["name"]), "sha256": paper.found[side]["sha256"]}
         for side in ("former", "new")
     ]
     return [
@@ -34,15 +34,28 @@ def sides(paper):
     ]
 
 
+def _material(paper):
+    """The steel that the steps were made with."""
+    one = paper.found["material"]
+    return paper.paragraph(
+        f"material_{one['source']}",
+        expansion=paper.number(one["expansion_per_k"], "1/K", digits=3),
+        modulus=paper.number(one["modulus_pa"], "GPa", digits=3),
+    )
+
+
 def side_rows(paper):
     """[{what, former, new}]: what is known of a table; a line that neither has is left out."""
-    both = [_side(paper, paper.found[name]) for name in ("former", "new")]
+    tables = [paper.found[name] for name in ("former", "new")]
+    both = [_side(paper, one) for one in tables]
+    if not any(one["height_quantum_m"] for one in tables):
+        both = [one | {"quantum_dip": None} for one in both]
     open_ = paper.word("texts.not_declared")
     return [
         {
             "what": paper.label(key),
-            "former": both[0][key] or open_,
-            "new": both[1][key] or open_,
+            "former": bearable(both[0][key] or open_),
+            "new": bearable(both[1][key] or open_),
         }
         for key in both[0]
         if both[0][key] or both[1][key]
@@ -56,7 +69,7 @@ def _side(paper, one):
     )  # fmt: skip
     return {
         "file": one["name"],
-        "origin": paper.word(f"origins_of_tables.{one['source']}"),
+        "origin": paper.word(f"origins_of_tables.{one['origin']}"),
         "laboratory": one["laboratory"],
         "number": one["number"],
         "date": _day(paper, one["date"]),
@@ -70,13 +83,23 @@ def _side(paper, one):
         "head_density": _density(paper, one["liquid_density_kg_m3"]),
         "roof": _roof(paper, one["roof"]),
         "reference_height": paper.height(one["reference_height_m"]),
-        "coverage": one["k"] and paper.word("texts.U_with_k", k=paper.plain(one["k"])),
+        "U_top": _stated_U(paper, one),
+        "U_of_deliveries": one["U_of_deliveries"]
+        and paper.word(f"U_of_deliveries.{one['U_of_deliveries']}"),
     }
 
 
 def _day(paper, text):
     """A date in words; what is none stays as it is."""
     return paper.day(iso_day(text)) if iso_day(text) == text else text
+
+
+def _stated_U(paper, one):
+    """U of the last row with its coverage factor."""
+    if one["U_top_m3"] is None or one["k"] is None:
+        return None
+    U = paper.number(one["U_top_m3"], "m3", u=one["U_top_m3"])
+    return paper.word("texts.U_with_k", U=U, k=paper.number(one["k"], decimals=2))
 
 
 def _quantum(paper, value, unit):
@@ -116,6 +139,7 @@ def basis(paper):
         paper.table("basis", basis_rows(paper), BASIS),
         *_lacking(paper),
         *_zero(paper),
+        _material(paper),
         paper.figure(
             figures.waterfall(paper), "waterfall_figure",
             dip=paper.height(paper.found["waterfall"][-1]["height_m"]),
@@ -180,11 +204,27 @@ def _mm(paper, value_m, u_m=None):
 
 
 def read_out(paper):
-    """What was read out of a table because nobody declared it."""
+    """What was read out of a table because nobody declared it, heads in sentences."""
     found = read_rows(paper)
     if not found:
         return []
-    return [paper.heading("read"), paper.table("read", found, READ), paper.paragraph("read")]
+    heads = [_head(paper, one) for one in paper.found["read"] if one["code"].startswith("head_")]
+    return [
+        paper.heading("read"),
+        paper.table("read", found, READ),
+        *([blocks.listing(heads)] if heads else []),
+        paper.paragraph("read"),
+    ]
+
+
+def _head(paper, one):
+    """Whether a table was made with the head of a liquid, and of which."""
+    return paper.word(
+        f"texts.{one['code']}",
+        table=paper.word(f"of_tables.{one['table']}"),
+        density=paper.measure(one["value"], one["unit"]),
+        u="" if one["u"] is None else paper.number(one["u"], one["unit"], digits=2),
+    )
 
 
 def read_rows(paper):
@@ -207,9 +247,7 @@ def _read_value(paper, one):
     if one["value"] is None:
         return paper.word("texts.not_known")
     if one["code"].startswith("rounding"):
-        return paper.chosen(one["value"], one["unit"])
-    if one["code"] in ("head", "liquid_density") and one["value"] == 0:
-        return paper.word("texts.without_head")
+        return _quantum(paper, one["value"], one["unit"])
     return paper.number(one["value"], _unit(one), u=one["u"], decimals=None if one["u"] else 2)
 
 

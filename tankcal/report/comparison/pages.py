@@ -9,6 +9,7 @@ from tankcal.report.comparison.verdict import legal, signed, verdict
 from tankcal.report.markdown import nodes
 from tankcal.text.digits import NOTHING
 
+HALF = 0.5  # the other correlation that E_n is told for
 FEW_ROWS = 5000  # of the page: more are only in workbook and CSV
 
 
@@ -24,13 +25,13 @@ def pages(paper, folder=None, whole=False):
         *signed(paper),
         *sides(paper),
         *legal(paper),
+        *warnings(paper),
         *basis(paper),
         *differences(paper),
         *deliveries(paper),
         *courses(paper),
         *read_out(paper),
         *rows(paper, whole),
-        *warnings(paper),
     ]
 
 
@@ -80,10 +81,12 @@ def correlation(paper):
         for key in ("c", "worst_E_n", "worst_E_n_at_half", "c_limit")
     }
     said = [paper.word(f"texts.c_{one['source']}", **shown)]
-    said.append(paper.word("texts.c_at_half", **shown))
+    if one["c"] != HALF:
+        said.append(paper.word("texts.c_at_half", **shown))
     said.append(paper.word("texts.c_never" if one["c_limit"] is None else "texts.c_limit", **shown))
     if one["coverage_k"] is not None:
-        said.append(paper.word("texts.same_coverage", k=paper.plain(one["coverage_k"])))
+        k = paper.number(one["coverage_k"], decimals=2)
+        said.append(paper.word("texts.same_coverage", k=k))
     return " ".join(said)
 
 
@@ -124,26 +127,29 @@ def courses(paper):
 
 
 def rows(paper, whole):
-    """A selection of the rows, or every row where there is room."""
+    """A selection of the rows, or every row where there is room.
+
+    As a table in one column of the page: it never leaves a few rows alone on the last one.
+    """
     every = ROWS.rows(paper.found)
     if whole and len(every) <= FEW_ROWS:
         columns = ROWS.on_paper()
         return [paper.heading("rows"), paper.table("every_row", every, columns, across=1)]
     some = selected(paper.found)
+    told = [paper.paragraph("selected_rows", shown=len(some), all=len(every))]
     return [
         paper.heading("rows"),
-        paper.paragraph("selected_rows", shown=len(some), all=len(every)),
-        paper.show(ROWS, some),
+        paper.show(ROWS, some, across=1),
+        *(told if len(some) < len(every) else []),
     ]
 
 
 def warnings(paper):
     """Warnings, and what limits every comparison."""
     said = [paper.warning(one) for one in paper.found["warnings"]]
-    limits = paper.words["standing_limits"].values()
-    said += [paper.word("texts.interpolation", volume=_litres(paper))] + list(limits)
+    lost_m3 = paper.found["interpolation_m3"]
+    if lost_m3:
+        volume = paper.number(lost_m3, "L", digits=2)
+        said.append(paper.word("texts.interpolation", volume=volume))
+    said += paper.words["standing_limits"].values()
     return [paper.heading("limits"), blocks.listing(said)]
-
-
-def _litres(paper):
-    return paper.number(paper.found["interpolation_m3"], "L", digits=2)

@@ -2,8 +2,10 @@
 
 from collections import defaultdict
 
+from tankcal.job.rule_files import shipped_names, shipped_rule
 from tankcal.record.comparison import COMPARISON
 from tankcal.report import attachments, blocks
+from tankcal.report.comparison.tables import symbol_of
 from tankcal.report.plain import PlainPaper, words_with_part
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 from tankcal.text.languages import DEFAULT
@@ -12,6 +14,7 @@ from tankcal.text.words import load_words, message_sentence
 FILE = "comparison.json"
 WORKBOOK = "comparison.xlsx"
 DIGITS_OF_DIGEST = 12
+LONGEST_WORD = 30  # letters of a name in a column of a page
 UNITS = {"C": "degC", "%": "percent", "mm": "image mm"}  # {of the file: of report.numbers}
 DECIMALS = {"C": 1, "kg/m3": 1, "mm": 2, "m": 4, "m3": 4, "%": 3}
 CODES = {  # {value of a reason: group of words that it is looked up in}
@@ -34,14 +37,25 @@ class ComparisonPaper(PlainPaper):
     """
 
     def __init__(self, found, language=None, letterhead=None):
-        self.found = COMPARISON.migrated(found, COMPARISON.file)
         super().__init__(words_with_part(load_words(language or DEFAULT), "comparison"))
+        found = COMPARISON.migrated(found, COMPARISON.file)
+        self.saved = found
+        self.found = found | {"rule": self._rule(found["rule"])}
         self.letterhead = letterhead.data() if letterhead else None
+
+    def _rule(self, rule):
+        """The rule with the texts of a shipped one; those of a laboratory's own file stay."""
+        name = (rule or {}).get("file", "").removesuffix(".toml")
+        texts = self.words.get("rule_texts", {}).get(name)
+        if texts is None or name not in shipped_names():
+            return rule
+        return rule | texts if shipped_rule(name).name == rule["name"] else rule
 
     def subject(self):
         """What the papers are about: the tank, or the file of the former table."""
         tank = self.found["tank"]
-        return f"{self.word('page.tank')} {tank}" if tank else self.found["former"]["name"]
+        subject = f"{self.word('page.tank')} {tank}" if tank else self.found["former"]["name"]
+        return bearable(subject)
 
     def head(self, folder=None):
         """The start of the document, and the head of its first page.
@@ -92,8 +106,7 @@ class ComparisonPaper(PlainPaper):
 
     def chosen(self, value, unit):
         """A value that somebody chose or printed, without zeros at its end; None gives None."""
-        shown = {"C": "°C", "kg/m3": "kg/m³", "m3": "m³"}
-        return self.plain(value, shown.get(unit, unit))
+        return self.plain(value, symbol_of(unit))
 
     def reason(self, one):
         """A reason {code, values} as a sentence; a code without words with its values."""
@@ -108,7 +121,7 @@ class ComparisonPaper(PlainPaper):
         """A value of a reason: a code as its name, a number in the unit of its key or of `unit`."""
         value = values[key]
         if value is None:
-            return NOTHING
+            return "∞" if key == "E_n" else NOTHING
         if key in CODES:
             names = value if isinstance(value, list) else [value]
             return ", ".join(self.words[CODES[key]].get(one, one) for one in names)
@@ -116,14 +129,18 @@ class ComparisonPaper(PlainPaper):
             return ", ".join(map(str, value))
         if isinstance(value, str):
             return value
-        if key in ("value", "most"):
+        if key == "value":
             return self.measure(value, values["unit"])
+        if key == "most":
+            return self.chosen(value, values["unit"])
         if key.endswith("_m"):
             return self.height(value)
         if key.endswith("_m3"):
             return signed_text(value, self.number(value, "m3", decimals=LITRE_DECIMALS))
-        if key in ("age", "years"):
-            return self.plain(round(value, 1))
+        if key == "age":
+            return self.number(value, decimals=1)
+        if key == "years":
+            return self.plain(value)
         return self.number(value, decimals=2)
 
     def warning(self, one):
@@ -131,6 +148,17 @@ class ComparisonPaper(PlainPaper):
         said = message_sentence(self.words, one["text"], one["code"], one["values"])
         place = f"{one['file']}: " if one["file"] else ""
         return f"{place}{said}"
+
+
+def bearable(text):
+    """A text of a user without words that no column holds: their middle is left out."""
+    return " ".join(map(shortened, str(text).split(" ")))
+
+
+def shortened(name):
+    """A name of at most LONGEST_WORD letters, its middle left out."""
+    half = LONGEST_WORD // 2
+    return name if len(name) <= LONGEST_WORD else f"{name[:half]}…{name[1 - half :]}"
 
 
 def signed_text(value, text):

@@ -4,8 +4,9 @@ from tankcal.report.tables import Column, Table
 from tankcal.text.digits import LITRE_DECIMALS
 
 CODES = ("zero", "temperature", "head", "roof", "rounding")  # of the steps, in their order
+DECIMALS = {"C": 1, "kg/m3": 1}  # of units of steps; else FINE
 FINE = 4  # decimals of what adds up: a tenth of a litre
-MOST_ROWS = 40  # of the selection that a PDF shows
+MOST_ROWS = 50  # of the selection that a PDF shows
 NICE_M = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0)  # between the dips of a selection
 NEAR_M = 1e-6
 
@@ -17,14 +18,23 @@ def _volume(key, csv=True, **more):
     return Column(key, "m3", **_LITRES, **_SHOWN, csv=key if csv else None, **more)
 
 
+def symbol_of(unit):
+    """A unit of the file as it is printed."""
+    return {"C": "°C", "m3": "m³", "kg/m3": "kg/m³"}.get(unit, unit)
+
+
+def _decimals(row):
+    return DECIMALS.get(row["unit"], FINE)
+
+
 STEPS = Table(
     "steps",
     (
         Column("step", words="steps", sheet=True, width=20),
         Column("source", words="sources", sheet=True, width=24),
-        Column("former", decimals=4, sheet=True, width=12),
-        Column("new", decimals=4, sheet=True, width=12),
-        Column("unit", sheet=True, width=9),
+        Column("former", decimals=_decimals, sheet=True, width=12),
+        Column("new", decimals=_decimals, sheet=True, width=12),
+        Column("unit", text=lambda paper, row: symbol_of(row["unit"]), sheet=True, width=9),
         Column("top_m3", "m3", decimals=FINE, heading="at_top", **_SHOWN),
         Column("largest_m3", "m3", decimals=FINE, heading="largest", **_SHOWN),
         Column("largest_at_m", "m", height=True, heading="at_dip", **_SHOWN),

@@ -75,7 +75,7 @@ def legal_rows(paper):
             "number": paper.word(f"numbers.{one['code']}"),
             "value": _limited(paper, one["value"], one["unit"]),
             "as_printed": _limited(paper, one["as_printed"], one["unit"]),
-            "limit": f"± {paper.chosen(one['limit'], one['unit'])}",
+            "limit": f"±\N{NO-BREAK SPACE}{paper.chosen(one['limit'], one['unit'])}",
             "verdict": paper.word(f"limits.{one['verdict']}"),
         }
         for one in paper.found["legal"]
@@ -93,7 +93,7 @@ def age_rows(paper):
     return [
         {
             "number": paper.word(f"ages.{one['of']}"),
-            "value": NOTHING if one["age_years"] is None else _years(paper, one["age_years"]),
+            "value": _age(paper, one["age_years"]),
             "as_printed": NOTHING,
             "limit": _years(paper, one["years"]),
             "verdict": paper.word(f"limits.{one['verdict']}"),
@@ -102,8 +102,14 @@ def age_rows(paper):
     ]
 
 
+def _age(paper, years):
+    if years is None:
+        return NOTHING
+    return paper.word("texts.years", years=paper.number(years, decimals=1))
+
+
 def _years(paper, years):
-    return paper.word("texts.years", years=paper.plain(round(years, 1)))
+    return paper.word("texts.years", years=paper.plain(years))
 
 
 def _clauses(paper):

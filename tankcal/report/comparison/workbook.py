@@ -3,10 +3,12 @@
 from tankcal.report.comparison.basis import side_rows
 from tankcal.report.comparison.tables import (
     COURSES,
+    DECIMALS,
     DELIVERIES,
     ROWS,
     STEPS,
     step_rows,
+    symbol_of,
     waterfall_of,
 )
 from tankcal.report.comparison.verdict import DECIMALS_OF_LIMITED
@@ -53,13 +55,15 @@ def _verdict(book, paper):
     for text, look in said:
         book.paragraph(sheet, row, text, WIDTHS, **look)
         row += 1
-    row += 1
+    row, starts = row + 1, []
     tables = {"sides": _sides(paper), "legal": _legal(paper), "read": _read(paper)}
     for name, columns in tables.items():
         if columns[0].cells:
+            starts.append(row)
             book.heading(sheet, row, paper.word(f"sheet_headings.{name}"), len(columns))
             widths = list(WIDTHS[: len(columns)])
             row = book.table(sheet, row + 1, name, columns, widths=widths) + 2
+    book.keep_together(sheet, starts, row, WIDTHS)
 
 
 def _sides(paper):
@@ -74,7 +78,7 @@ def _legal(paper):
     verdicts = [paper.word(f"limits.{one['verdict']}") for one in (*found, *ages)]
     years = [one["age_years"] for one in ages]
     names = [paper.word(f"numbers.{one['code']}") for one in found]
-    units = [{"m3": "m³"}.get(one["unit"], one["unit"]) for one in found]
+    units = [symbol_of(one["unit"]) for one in found]
     return [
         _column(paper, "number", names + [paper.word(f"ages.{one['of']}") for one in ages]),
         _column(paper, "value", [one["value"] for one in found] + years, digits),
@@ -91,13 +95,13 @@ def _legal(paper):
 
 def _read(paper):
     found = paper.found["read"]
-    digits = [0 if one["unit"] == "" else 6 for one in found]
+    digits = [DECIMALS.get(one["unit"], 6) for one in found]
     return [
         _column(paper, "table", [paper.word(f"sides_of_comparison.{o['table']}") for o in found]),
         _column(paper, "what", [paper.word(f"read.{one['code']}") for one in found]),
         _column(paper, "read_value", [one["value"] for one in found], digits),
         _column(paper, "u", [one["u"] for one in found], digits),
-        _column(paper, "unit", [one["unit"] for one in found]),
+        _column(paper, "unit", [symbol_of(one["unit"]) for one in found]),
         _column(paper, "sure", [paper.word(f"sure.{one['sure']}") for one in found]),
         _column(paper, "used", [one["used"] for one in found]),
     ]
