@@ -128,7 +128,7 @@ def _verdict(found, paper):
         "compare_verdict",
         "verdict: {verdict} ({rule})",
         verdict=paper.word(f"verdicts.{found['verdict'] or 'none'}"),
-        rule=found["rule"]["name"],
+        rule=paper.found["rule"]["name"],
     )
 
 

@@ -50,6 +50,7 @@ MOST_APART = 0.2  # of a volume, by which tables of one tank may differ
 PARTS_OF_HEIGHT = (0.2, 0.4, 0.6, 0.8, 1.0)  # of the waterfall
 ZERO_APART = 3.0  # standard uncertainties of a fitted zero that differs from a declared one
 LEAST_ZERO_M = 1e-3
+BEFORE_ZERO = ("temperature", "head", "roof")  # what is not taken off goes into a fitted zero
 
 
 @dataclass(frozen=True)
@@ -359,6 +360,7 @@ def _read(former, new, basis):
     zero = basis.zero
     if zero.fitted_m is not None:
         is_seen = abs(zero.fitted_m) > ZERO_APART * (zero.fitted_u_m or 0.0)
+        is_seen &= all(basis.steps[one].state in ("done", "same") for one in BEFORE_ZERO)
         found.append(
             ReadOut(
                 "former", "zero", zero.fitted_m, zero.fitted_u_m, "m",
