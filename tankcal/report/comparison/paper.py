@@ -129,6 +129,8 @@ class ComparisonPaper(PlainPaper):
             return ", ".join(map(str, value))
         if isinstance(value, str):
             return value
+        if isinstance(value, int):
+            return self.number(value, decimals=0)
         if key == "value":
             return self.measure(value, values["unit"])
         if key == "most":
