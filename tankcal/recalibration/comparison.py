@@ -157,8 +157,8 @@ def _common(former, new):
         expected = message(
             "compare_two_correlations",
             "common is {one:g} there and {two:g} for {other}; expected one correlation of both",
-            one=one,
-            two=two,
+            one=two,
+            two=one,
             other=former.name,
         )
         raise InputError(Problem(new.name, expected))

@@ -75,7 +75,7 @@ def test_a_table_with_itself_differs_nowhere():
 
 
 def test_there_and_back():
-    """From the former basis to the new and back: what a zero is worth in head, dH/dh h0, is left."""
+    """From the former basis to the new and back: what a zero is worth in head is left."""
     there = bring_to_one_basis(former_s1(), new_s1(), S1)
     moved = replace(new_s1(), height_m=there.height_m, volume_m3=there.on_basis_m3, U_m3=None)
     back = bring_to_one_basis(moved, former_s1(), S1)
