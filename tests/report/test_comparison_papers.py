@@ -183,6 +183,11 @@ def test_what_is_lacking_and_what_was_read_is_said():
     assert any("made without the head" in one for one in texts)
 
 
+def test_the_notice_of_a_record_stands_on_every_page():
+    paper = ComparisonPaper(plain() | {"notice": "EXAMPLE"})
+    assert paper.head()[0].data["notice"] == "EXAMPLE"
+
+
 def test_a_house_rule_keeps_its_own_texts():
     """Those of a shipped rule are translated; one of a laboratory with its file's name is not."""
     found = plain()

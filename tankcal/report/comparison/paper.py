@@ -69,6 +69,7 @@ class ComparisonPaper(PlainPaper):
                 author=self.letterhead["name"] if self.letterhead else "",
                 date=self._date(),
                 language=self.words["language"]["code"],
+                notice=self.found["notice"],
                 running=[title, self.subject()],
                 footer=self._footer(folder),
                 letterhead=self.letterhead,
