@@ -167,6 +167,7 @@ def test_a_reason_says_its_numbers():
     said = paper.reason({"code": "tank_differs", "values": infinite})
     assert "∞" in said
     assert "entrega" in said
+    assert "+1,200\N{NO-BREAK SPACE}m³" in said
 
 
 def test_what_nobody_declared_is_called_so():

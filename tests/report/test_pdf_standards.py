@@ -63,7 +63,7 @@ def test_the_papers_of_a_plan_conform(verapdf, prediction, tmp_path, language):
 
 
 @pytest.mark.study
-@pytest.mark.parametrize(("language", "kind"), zip(LANGUAGES, KINDS, strict=True))
+@pytest.mark.parametrize(("language", "kind"), [*zip(LANGUAGES, KINDS, strict=True)])
 def test_the_paper_of_a_comparison_conforms(verapdf, tmp_path, language, kind):
     write_comparison(KINDS[kind](), tmp_path / "out", language)
     assert_conform(verapdf, [str(tmp_path / "out" / "comparison.pdf")])

@@ -111,7 +111,9 @@ class ComparisonPaper(PlainPaper):
 
     def reason(self, one):
         """A reason {code, values} as a sentence; a code without words with its values."""
-        values = {key: self._shown(one["values"], key) for key in one["values"]}
+        values = {  # places in words are letters: {d} of d_m3
+            key.removesuffix("_m3"): self._shown(one["values"], key) for key in one["values"]
+        }
         template = self.words["reasons"].get(one["code"] + _variant(one["values"]))
         if template is None:
             told = ", ".join(f"{key} {value}" for key, value in values.items())
