@@ -121,6 +121,7 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
     is_default = rule is None
     return ComparisonFile(
         tank=_tank_id(former, new),
+        notice=_notice(former, new),
         former=_table(former, fingerprints[0], agreement.former_U),
         new=_table(new, fingerprints[1], agreement.new_U),
         material=Material(facts.expansion_per_k, facts.modulus_pa, facts.material_is),
@@ -347,6 +348,13 @@ def _tank_id(former, new):
         if table.record is not None:
             return table.record["job"]["tank"].get("id")
     return None
+
+
+def _notice(former, new):
+    """The notice on the papers of the new table, else of the former one; "" for none."""
+    records = [table.record for table in (new, former) if table.record is not None]
+    notices = [str(one["job"]["certificate"].get("notice") or "") for one in records]
+    return next(filter(None, notices), "")
 
 
 def _read(former, new, basis):

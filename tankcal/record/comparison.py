@@ -228,6 +228,7 @@ class ComparisonFile(Saved, kw_only=True):
     format: str = key("see Versions", default=COMPARISON.format)
     tankcal: str = key("version of tankcal", default=tankcal.__version__)
     tank: str | None = key("its id where a record has it")
+    notice: str = key("that stands on every page of a record's papers, such as EXAMPLE")
     former: ComparedTable = key("the former table")
     new: ComparedTable = key("the new table")
     material: Material = key("that the steps were made with")

@@ -9,7 +9,7 @@ from pathlib import Path
 from tankcal.errors import InputError, Problem, TankcalError, VocabularyError
 from tankcal.messages import message
 from tankcal.record import save
-from tankcal.record.comparison import COMPARISON
+from tankcal.record.comparison import COMPARISON, plain_of_comparison
 from tankcal.report import folders
 from tankcal.report.comparison.paper import FILE, WORKBOOK, ComparisonPaper
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL
@@ -34,8 +34,8 @@ def write_comparison(found, folder, language=None, progress=None, letterhead=Non
 
     Parameters
     ----------
-    found : dict
-        A `record.comparison.ComparisonFile` as plain data.
+    found : ComparisonFile or dict
+        Of `recalibration.comparison.compare`, or the same as plain data.
     folder : path
         Made when missing; an earlier comparison there is replaced, and a folder that holds
         anything else is refused.
@@ -57,7 +57,8 @@ def write_comparison(found, folder, language=None, progress=None, letterhead=Non
     """
     refuse_foreign(folder)
     progress = progress or (lambda text: None)
-    paper = ComparisonPaper(found, language, letterhead)
+    plain = found if isinstance(found, dict) else plain_of_comparison(found)
+    paper = ComparisonPaper(plain, language, letterhead)
     with folders.replaced(folder) as temporary:
         _write(paper, temporary, progress)
     return [path for path in (Path(folder) / name for name in FILES) if path.exists()]

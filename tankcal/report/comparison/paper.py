@@ -69,6 +69,7 @@ class ComparisonPaper(PlainPaper):
                 author=self.letterhead["name"] if self.letterhead else "",
                 date=self._date(),
                 language=self.words["language"]["code"],
+                notice=self.found["notice"],
                 running=[title, self.subject()],
                 footer=self._footer(folder),
                 letterhead=self.letterhead,
@@ -110,7 +111,9 @@ class ComparisonPaper(PlainPaper):
 
     def reason(self, one):
         """A reason {code, values} as a sentence; a code without words with its values."""
-        values = {key: self._shown(one["values"], key) for key in one["values"]}
+        values = {  # places in words are letters: {d} of d_m3
+            key.removesuffix("_m3"): self._shown(one["values"], key) for key in one["values"]
+        }
         template = self.words["reasons"].get(one["code"] + _variant(one["values"]))
         if template is None:
             told = ", ".join(f"{key} {value}" for key, value in values.items())
@@ -129,6 +132,8 @@ class ComparisonPaper(PlainPaper):
             return ", ".join(map(str, value))
         if isinstance(value, str):
             return value
+        if isinstance(value, int):
+            return self.number(value, decimals=0)
         if key == "value":
             return self.measure(value, values["unit"])
         if key == "most":

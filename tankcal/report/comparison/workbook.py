@@ -36,7 +36,7 @@ def _as_record(found):
         "tankcal": found["tankcal"],
         "capacity": None,
         "job": {
-            "certificate": {"laboratory": new["laboratory"]},
+            "certificate": {"laboratory": new["laboratory"], "notice": found["notice"]},
             "tank": {"id": found["tank"] or found["former"]["name"]},
             "survey": {"date": new["date"]},
         },
