@@ -173,6 +173,4 @@ def _joined(pages):
 def _headed(rows):
     """The rows without the columns that have no heading."""
     kept = [k for k, text in enumerate(rows[0][1]) if text]
-    return [
-        (row, tuple(cells[k] if k < len(cells) else None for k in kept)) for row, cells in rows
-    ]
+    return [(row, tuple(cells[k] if k < len(cells) else None for k in kept)) for row, cells in rows]
