@@ -152,7 +152,8 @@ def lint(
     Parameters
     ----------
     path : path
-        A CSV file, an Excel workbook (.xlsx), or a record.json of tankcal.
+        A CSV file, an Excel workbook (.xlsx), a PDF with the table as text (with the extra
+        `tankcal[pdf]`), or a record.json of tankcal.
     nominal : Nominal, optional
         Nominal tank to compare total and last row with.
     sheet : str, optional

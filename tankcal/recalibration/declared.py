@@ -6,6 +6,7 @@ from pathlib import Path
 from tankcal.job.checking import RELATIVE_DENSITY, missing_beside
 from tankcal.job.contract.kinds import KINDS
 from tankcal.job.contract.roof import KEYS as ROOF
+from tankcal.job.contract.roof import upside_down
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.entries import read_section, unknown_section
 from tankcal.job.fields import Field, is_blank
@@ -159,13 +160,7 @@ def _roof(file, given, row, log):
         if key not in filled and other is not None:
             tell(key, missing_beside("critical_top_m" if other is high else "critical_bottom_m"))
     if None not in (low, high) and low >= high:
-        expected = message(
-            "roof_upside_down",
-            "found {high:g}; expected above critical_bottom_m = {low:g}",
-            high=high,
-            low=low,
-        )
-        tell("critical_top_m", expected)
+        tell("critical_top_m", upside_down(low, high))
     if len(log.problems) != told:
         return None
     return FormerRoof(

@@ -83,9 +83,8 @@ def _named_file(declared, path, log):
     """The table's file that a former.toml names; InputError where it names none."""
     if declared["file"] is None:
         if not log.problems:
-            declared.tell(
-                log, "file", message("former_no_file", "missing; expected the table's file")
-            )
+            expected = message("former_no_file", "missing; expected the table's file")
+            declared.tell(log, "file", expected)
         log.stop_if_problems()
     named = Path(declared["file"])
     if named.name != declared["file"] or named.name in (".", ".."):
