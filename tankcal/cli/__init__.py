@@ -5,7 +5,16 @@ import os
 import sys
 
 import tankcal
-from tankcal.cli import camera, comparing, importing, linting, planning, reporting, running, starting
+from tankcal.cli import (
+    camera,
+    comparing,
+    importing,
+    linting,
+    planning,
+    reporting,
+    running,
+    starting,
+)
 from tankcal.cli.help_words import argparse_in, put_in_words
 from tankcal.cli.machine import failure, print_json
 from tankcal.cli.showing import complain, speak, words_of_run

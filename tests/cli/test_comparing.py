@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from former_tables import former_s1, new_s1
+from tables_of_s1 import former_s1, new_s1
 
 from tankcal.cli import main
 from tankcal.cli.showing import speak

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from former_tables import RADII, new_s1, rings_m3
+from tables_of_s1 import RADII, new_s1, rings_m3
 
 from tankcal.recalibration.agreement import (
     coverage_factor_of,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from former_tables import EDGES, HEIGHTS, PLATES, RADII, former_s1, new_s1, rings_m3
+from tables_of_s1 import EDGES, HEIGHTS, PLATES, RADII, former_s1, new_s1, rings_m3
 
 from tankcal.errors import InputError
 from tankcal.recalibration.basis import bring_to_one_basis, interpolation_error_m3

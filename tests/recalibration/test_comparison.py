@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import draws
-from former_tables import HEIGHTS, PLATES, RADII, former_s1, new_s1, rings_m3
+from tables_of_s1 import HEIGHTS, PLATES, RADII, former_s1, new_s1, rings_m3
 
 from tankcal.errors import InputError
 from tankcal.recalibration.comparison import compare

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from former_tables import HEIGHTS, PLATES, RADII, former_s1, new_s1
+from tables_of_s1 import HEIGHTS, PLATES, RADII, former_s1, new_s1
 
 from tankcal.job.rule_files import named_rule, parse_rule, shipped_rule
 from tankcal.job.tables import Log
