@@ -15,6 +15,7 @@ from tankcal.recalibration.upright_shell import Rings
 
 ZERO_SD_M, SEAM_SD_M, KINK_SD_M = 0.1, 0.05, 1.0  # so weak that a table decides; never singular
 DENSITY_SD_KG_M3 = 1e5
+MOST_ROUNDS, MOST_HALVINGS, SETTLED = 30, 12, 1e-4  # of chi2
 
 
 @dataclass(frozen=True)
@@ -169,6 +170,8 @@ class Fit:
         Covariance of its unknowns, of rounding alone.
     left_m3 : ndarray, shape (rows,)
         Table less state.
+    sd_m3 : ndarray, shape (rows,)
+        By rounding.
     design : ndarray, shape (rows, u)
     chi2 : float
         Of the rows.
@@ -177,6 +180,7 @@ class Fit:
     state: State
     cofactor: np.ndarray
     left_m3: np.ndarray
+    sd_m3: np.ndarray
     design: np.ndarray
     chi2: float
 
@@ -209,33 +213,40 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     SolutionError
         When the rows do not determine the unknowns.
     """
-    start = state.unknowns
     held, known, about, sds = _priors(state)
-    moving = np.setdiff1d(np.arange(len(start)), held)
-    rows = np.eye(len(start))[known][:, moving]
+    moving = np.setdiff1d(np.arange(len(state.unknowns)), held)
+    observed = np.concatenate([volumes_m3, about])
+    variances = np.concatenate([sd_m3**2, sds**2])
+    rows = np.eye(len(state.unknowns))[known][:, moving]
 
-    def model(x, l):
-        unknowns = start.copy()
-        unknowns[moving] = x
-        now = state.with_unknowns(unknowns)
-        w = np.concatenate([now.volume_m3(dips_m), unknowns[known]]) - l
-        return w, np.vstack([now.design(dips_m)[:, moving], rows]), None
+    def misclosure(now):
+        return np.concatenate([now.volume_m3(dips_m), now.unknowns[known]]) - observed
 
-    found = adjust(
-        model,
-        start[moving],
-        np.concatenate([volumes_m3, about]),
-        np.concatenate([sd_m3**2, sds**2]),
-        max_iterations=30,
-        tolerance=1e-4,
-    )
-    unknowns = start.copy()
-    unknowns[moving] = found.unknowns
-    cofactor = np.zeros((len(start), len(start)))
+    now, w = state, misclosure(state)
+    for _ in range(MOST_ROUNDS):
+        design = np.vstack([now.design(dips_m)[:, moving], rows])
+        found = adjust(_tangent(w, design), np.zeros(len(moving)), np.zeros(len(w)), variances)
+        before, cost = now, w @ (w / variances)
+        step = np.zeros(len(now.unknowns))
+        step[moving] = found.unknowns
+        for _ in range(MOST_HALVINGS):
+            now = before.with_unknowns(before.unknowns + step)
+            w = misclosure(now)
+            if w @ (w / variances) <= cost + SETTLED:
+                break
+            step /= 2
+        if abs(cost - w @ (w / variances)) < SETTLED:
+            break
+    cofactor = np.zeros((len(state.unknowns), len(state.unknowns)))
     cofactor[np.ix_(moving, moving)] = found.cofactor
-    now = state.with_unknowns(unknowns)
     left = volumes_m3 - now.volume_m3(dips_m)
-    return Fit(now, cofactor, left, now.design(dips_m), float(np.sum((left / sd_m3) ** 2)))
+    chi2 = float(np.sum((left / sd_m3) ** 2))
+    return Fit(now, cofactor, left, sd_m3, now.design(dips_m), chi2)
+
+
+def _tangent(w, design):
+    """The linear model of a step, for `adjust`."""
+    return lambda x, l: (w + design @ x - l, design, None)
 
 
 def _priors(state):

@@ -2,7 +2,7 @@
 
 Rows below the highest point of the bottom, and those of a roof's critical zone, are left out; the
 others are adjusted (`table_fit.fit`). What stands in the tank is looked for as pairs of kinks
-(`fittings.find_fitting`), one after the other, until none explains more than rounding does by
+(`fittings.find_fittings`), one after the other, until none explains more than rounding does by
 chance. Then the table is asked whether it has a head, where its zero is, and whether the seams are
 where they were declared to be.
 """
@@ -14,21 +14,27 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.recalibration.fittings import Fitting, find_fitting
+from tankcal.recalibration.fittings import Fitting, find_fittings, in_other_pairs
 from tankcal.recalibration.table_fit import State, fit, held_kinks
+from tankcal.recalibration.zero import FARTHEST_M, find_zeros
 
 STEEL_PA = 206e9
 LEAST_GAIN = 25.0  # of chi2 by a thing: less is what the best of all pairs gains by chance
-MOST_FITTINGS = 12
-ZEROS_M = np.arange(-0.3, 0.31, 0.05)
+MOST_FITTINGS, FEW_FITTINGS = 12, 3
+SAME_COST = 1.0
+LENGTHS_M = 1.0, 3.0, np.inf  # of things, in the order in which they are looked for
 START_DENSITY_KG_M3 = 500.0
 LIQUID_KG_M3 = 500.0  # a head that a table could not have shown of any liquid is undecided
-BY_ORDER = 9.0  # of chi2, by which a head of second order has to fit better
 ROUGH = 1.15  # rms over what rounding leaves: above it, rows have more in them than rounding
+USUAL_ZEROS_M = 0.0, -0.04, 0.04  # that are tried, too, where things are many
+NEAR_M = 0.025  # that the zero may go from where it was looked for
 FEWEST_ROWS = 3  # of a ring
 SAME_ZERO = 3.0  # standard deviations
-BOTTOM_SHARE = 0.6  # of the first ring, that a bottom may reach up to
-BOTTOM_TRIES = 40
+BY_ORDER = 1.0  # of chi2, by which the head of second order has to fit better
+ORDER_IS_CLEAR = 9.0
+CUT_M, CUT_ROWS = 0.4, 9  # of the rows that have to be of one cut, so that the bottom is below
+BOTTOM_TRIES = 60
+LOW_M, LOW_SHARE = 0.15, 0.2  # things lower than this take no more of the cut: that is the bottom
 EDGE_M = 0.1  # below the first seam: where rows of the first ring end, the zero being unknown
 
 
@@ -178,6 +184,9 @@ def read_upright(
     used = np.ones(len(volume), dtype=bool)
     if zone is not None:
         used = (rows.dip_m < zone[0]) | (rows.dip_m > zone[1])
+    empty = rows.volume_m3 <= 0
+    if np.count_nonzero(empty) > 1:  # dips below the bottom
+        used &= ~empty
     usable = rows._of(used)
     state = _start(usable, heights, plates, modulus_pa, zone)
     found = _search(usable, state, lowest_m)
@@ -250,7 +259,7 @@ def _search(rows, state, lowest_m):
             whole = _with_fittings(rows, more, at_most=len(found.state.fittings) + 1)
         except SolutionError:
             return found
-        if _is_by_rounding(rows, whole) and _is_enough(rows, found, whole):
+        if _is_by_rounding(whole) and _is_enough(rows, found, whole):
             return whole
     return found
 
@@ -262,28 +271,28 @@ def _is_enough(rows, found, whole):
     )
 
 
-def _is_by_rounding(rows, found):
+def _is_by_rounding(found):
     """Whether nothing is left but rounding: as a whole, and at the worst row."""
-    worst = np.abs(found.left_m3 / rows.sd_m3).max()
+    worst = np.abs(found.left_m3 / found.sd_m3).max()
     return found.chi2 < ROUGH**2 * max(found.dof, 1) and worst < np.sqrt(3) * 1.25
 
 
 def _lowest_row(rows, state):
-    """Dip from which on the first ring's rows are those of one cut: above the bottom's highest.
+    """Dip from which on rows are those of one cut: above the highest point of the bottom.
 
-    A parabola through the upper rows of the ring is taken downwards as far as it leaves rounding.
+    The lowest row of the first ring above which a parabola leaves nothing but rounding.
     """
     first = rows.dip_m <= state.seams_m[0] - EDGE_M if len(state.seams_m) else rows.dip_m >= 0
     ring = rows._of(first)
-    most = BOTTOM_SHARE * ring.dip_m[-1]
-    tries = np.flatnonzero(ring.dip_m <= most)
-    if len(ring.dip_m) < 8 or len(tries) == 0:
+    length = max(CUT_M, CUT_ROWS * float(np.median(np.diff(rows.dip_m))))
+    tries = np.flatnonzero(ring.dip_m <= ring.dip_m[-1] - length) if len(ring.dip_m) else ()
+    if len(tries) == 0:
         return float(rows.dip_m[0])
-    if _is_one_cut(ring):
-        return float(ring.dip_m[0])
-    for place in _halving(tries):
-        if _is_one_cut(ring.above(ring.dip_m[place])):
-            return float(ring.dip_m[place])
+    for place in [int(tries[0]), *_halving(tries)]:
+        dip = ring.dip_m[place]
+        window = ring._of((ring.dip_m >= dip) & (ring.dip_m <= dip + length + 1e-9))
+        if _is_one_cut(window):
+            return float(dip)
     return float(rows.dip_m[0])
 
 
@@ -313,88 +322,161 @@ def _is_one_cut(ring):
 
 
 def _with_fittings(rows, state, at_most=MOST_FITTINGS):
-    """The Fit with the things that the rows show, one looked for after the other."""
-    found = _with_zero(rows, state)
-    while len(found.state.fittings) < at_most:
-        thing, gain = find_fitting(rows.dip_m, found.left_m3, found.design, rows.sd_m3)
-        rough = max(found.chi2 / max(found.dof, 1), 1.0) if found.dof else 1.0
-        if gain < LEAST_GAIN or found.dof < 6 or gain < 0.02 * rough * found.dof:
+    """The Fit with the things that the rows show, from the zero that needs the fewest of them.
+
+    A zero that is far off lets seams look like things, so that others are tried where things are
+    many, or do not explain the rows.
+    """
+    zeros = find_zeros(rows.dip_m, rows.volume_m3, rows.sd_m3, state.seams_m)
+    best = None
+    for zero in (state.zero_m,) if state.fittings else (*zeros, *USUAL_ZEROS_M):
+        chosen = rows.above(zero + NEAR_M) if zero > 0 else rows
+        other = _from_zero(chosen, replace(state, zero_m=zero), at_most)
+        if other and (best is None or _cost(other) < _cost(best) - SAME_COST):
+            best = other
+        if best and len(best.state.fittings) <= FEW_FITTINGS and _is_by_rounding(best):
             break
-        again = _with_thing(rows, found, thing)
-        if again is None or found.chi2 - again.chi2 < LEAST_GAIN:
-            break
-        found = again
-    return found
+    if best is None:
+        raise SolutionError(
+            message("former_undetermined", "the rows of the table do not determine the radii")
+        )
+    return best
 
 
-def _with_thing(rows, found, thing):
-    """The Fit with one thing more: where it is found to be, or else where it was looked for."""
-    state = replace(found.state, fittings=(*found.state.fittings, thing))
-    free = state.free | {"kinks"}
-    for kinds in (free, free - {"kinks"}):
-        try:
-            again = rows.adjust(replace(state, free=kinds))
-        except SolutionError:
-            continue
-        if all(one.bottom_m < one.top_m for one in again.state.fittings):
+def _cost(found):
+    return found.chi2 + LEAST_GAIN * len(found.state.fittings)
+
+
+def _from_zero(rows, start, at_most):
+    """The Fit with things, the zero free about where it starts; None where rows do not do.
+
+    Short things first: two kinks of two things, one above the other, look like one thing.
+    """
+    about = start.zero_m
+    found = _with_free_zero(rows, start, about)
+    for longest in LENGTHS_M if found else ():
+        while len(found.state.fittings) < at_most and found.dof > 6:
+            again = _with_one_more(rows, found, longest, about)
+            if again is None:
+                break
+            found = again
+    return _tidied(rows, found, about) if found else None
+
+
+def _with_one_more(rows, found, longest, about):
+    """The Fit with the thing that explains most; None where none explains enough."""
+    candidates = find_fittings(rows.dip_m, found.left_m3, found.design, rows.sd_m3, longest)
+    for thing, gain in candidates:
+        if gain < LEAST_GAIN:
+            break
+        more = replace(found.state, fittings=(*found.state.fittings, thing))
+        again = _with_free_zero(rows, more, about)
+        if again and found.chi2 - again.chi2 > LEAST_GAIN:
             return again
     return None
 
 
-def _with_zero(rows, state):
-    """The Fit from the best of some zeros; free from there on, where that can be found."""
-    held = replace(state, free=state.free - {"zero", "kinks"})
-    zeros = ZEROS_M if len(state.seams_m) else [0.0]
-    tried = []
-    for zero in [state.zero_m, *zeros]:
-        try:
-            tried.append(rows.adjust(replace(held, zero_m=float(zero))))
-        except SolutionError:
-            continue
-    if not tried:
-        return rows.adjust(held)
-    best = min(tried, key=lambda one: one.chi2)
-    kinks = {"kinks"} if state.fittings else set()
-    if not len(state.seams_m):
-        return best
+def _tidied(rows, found, about):
+    """The Fit with fewer things, where fewer explain the rows as well."""
+    if len(found.state.fittings) > 1:
+        near = 1.6 * float(np.median(np.diff(rows.dip_m)))
+        pairs = in_other_pairs(found.state.fittings, near)
+        found = _cheaper(rows, found, pairs, about)
+    for one in sorted(found.state.fittings, key=lambda one: abs(one.volume_m3)):
+        rest = tuple(f for f in found.state.fittings if f.volume_m3 != one.volume_m3)
+        found = _cheaper(rows, found, rest, about)
+    return found
+
+
+def _cheaper(rows, found, fittings, about):
+    if len(fittings) > len(found.state.fittings):
+        return found
+    other = _with_free_zero(rows, replace(found.state, fittings=fittings), about)
+    return other if other and _cost(other) < _cost(found) else found
+
+
+def _is_possible(found):
+    state = found.state
+    largest = LOW_SHARE * np.pi * state.radii_m[0] ** 2
+    return abs(state.zero_m) <= FARTHEST_M and all(
+        one.bottom_m < one.top_m
+        and (
+            one.bottom_m > state.lowest_m + LOW_M
+            or abs(one.volume_m3) < largest * (one.top_m - one.bottom_m)
+        )
+        for one in state.fittings
+    )
+
+
+def _with_free_zero(rows, state, about):
+    """The Fit with the zero free where it stays near, and with things where they are found to be.
+
+    Where that fails, the zero is held, or things where they were looked for; None: all fails.
+    """
+    things = {"kinks"} if state.fittings else set()
+    zero = {"zero"} if len(state.seams_m) else set()
+    held = state.free - {"zero", "kinks"}
+    for free in dict.fromkeys(map(frozenset, (held | things | zero, held | things, held | zero, held))):
+        start = state if "zero" in free else replace(state, zero_m=about)
+        again = _tried(rows, replace(start, free=free))
+        if again and _is_possible(again) and abs(again.state.zero_m - about) <= NEAR_M:
+            return again
+    return None
+
+
+def _tried(rows, state):
+    """The Fit, or None where the rows do not determine it."""
     try:
-        return rows.adjust(replace(best.state, free=best.state.free | {"zero"} | kinks))
+        return rows.adjust(state)
     except SolutionError:
-        return best
+        return None
 
 
 def _geometry(former, found, rows, used, seams_known):
     chosen = rows._of(used)
-    found = _with_order(chosen, found)
     found = _with_known_zero(chosen, former, found)
+    found, other = _with_order(chosen, found)
     seams = _free_seams(chosen, found)
     seams_are = "declared"
     if seams is not None and (not seams_known or _are_elsewhere(found, seams)):
         found, seams_are = seams, "found"
     roughness = _roughness(chosen, found)
-    u_density = float(found.sd("density")[0]) * roughness
+    u_density = float(np.hypot(found.sd("density")[0] * roughness, _by_order(found, other)[0]))
     t = found.state.density_kg_m3 / u_density
     head, without = _decide_head(t, u_density), None
-    dry = _without_head(chosen, found)
-    if head != "without":
-        without = _remainders(dry.left_m3) + (dry.state.radii_m,)
     density = Reading(found.state.density_kg_m3, u_density)
+    dry = _without_head(chosen, found)
     if head == "without":
-        found, roughness = dry, _roughness(chosen, dry)
+        found, other, roughness = dry, None, _roughness(chosen, dry)
+    else:
+        without = (*_remainders(dry.left_m3), dry.state.radii_m)
     return _as_geometry(
         former, found, rows, used,
         roughness=roughness, density=density, head=head, t=t, without=without, seams=seams,
-        seams_are=seams_are,
+        seams_are=seams_are, by_order=_by_order(found, other)[1],
     )  # fmt: skip
 
 
 def _with_order(rows, found):
-    """The Fit with the head of the order that the table was made with; the first, when it is mum."""
+    """The Fit with the head of the order that leaves less, and that of the other one.
+
+    The first order where both do as well; the other is None where it is clearly worse.
+    """
     try:
-        other = rows.adjust(replace(found.state, is_first_order=False))
+        second = rows.adjust(replace(found.state, is_first_order=False))
     except SolutionError:
-        return found
-    return other if found.chi2 - other.chi2 > BY_ORDER else found
+        return found, None
+    better = found.chi2 - second.chi2
+    first, last = (second, found) if better > BY_ORDER else (found, second)
+    return first, last if abs(better) < ORDER_IS_CLEAR else None
+
+
+def _by_order(found, other):
+    """(sd of density, (n,) of radii) because the order of the head is not known."""
+    if other is None:
+        return 0.0, np.zeros(len(found.state.radii_m))
+    density = abs(found.state.density_kg_m3 - other.state.density_kg_m3)
+    return density / np.sqrt(3), (found.state.radii_m - other.state.radii_m) / np.sqrt(3)
 
 
 def _with_known_zero(rows, former, found):
@@ -433,7 +515,9 @@ def _are_elsewhere(found, seams):
 def _without_head(rows, found):
     """The Fit of the same with the head left out."""
     free = found.state.free - {"density"}
-    return rows.adjust(replace(found.state, density_kg_m3=0.0, free=free))
+    dry = replace(found.state, density_kg_m3=0.0, free=free)
+    tried = _tried(rows, dry) or _tried(rows, replace(dry, free=free - {"kinks"}))
+    return tried or rows.adjust(replace(dry, free=free - {"kinks", "zero"}))
 
 
 def _decide_head(t, u_density):
@@ -461,9 +545,10 @@ def _roughness(rows, found):
 
 
 def _as_geometry(former, found, rows, used, *, roughness, density, head, t, without, seams,
-                 seams_are):  # fmt: skip
+                 seams_are, by_order):  # fmt: skip
     state, layout = found.state, found.state.layout
     covariance = found.cofactor[layout["radii"], layout["radii"]] * roughness**2
+    covariance = covariance + np.outer(by_order, by_order)
     sd = {name: found.sd(name) * roughness for name in layout}
     rms, largest = _remainders(found.left_m3)
     chosen = rows._of(used)
