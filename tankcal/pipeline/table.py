@@ -14,6 +14,7 @@ from tankcal.pipeline.cloud_wall import Clouded
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
 from tankcal.pipeline.hit_checks import check_hits
 from tankcal.pipeline.line_checks import check_leans, check_lines
+from tankcal.pipeline.radii_wall import RadiiWall
 from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.strapping_checks import check_strapped, check_straps_beside_points
@@ -165,6 +166,8 @@ def _doubts_of_sights(job, survey, sighting):
 
 
 def _doubts_of_survey(job, survey, top_m):
+    if isinstance(survey, RadiiWall):
+        return () if survey.surveyed is None else _doubts_of_survey(job, survey.surveyed, top_m)
     if isinstance(survey, Wall):
         straps = survey.straps
         beside = () if straps is None else check_straps_beside_points(job, straps)
