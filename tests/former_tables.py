@@ -62,7 +62,9 @@ def table_of(tank, step_m=0.01, quantum_m3=0.001, first_m=0.0, last_m=None, **de
     last = np.floor(tank.top_m / step_m + 1e-6) * step_m if last_m is None else last_m
     dips = first_m + step_m * np.arange(round((last - first_m) / step_m) + 1)
     volumes = np.round(tank.volume_m3(dips) / quantum_m3) * quantum_m3
-    quantum = 10.0 ** -next(n for n in range(9) if abs(step_m * 10**n - round(step_m * 10**n)) < 1e-9)
+    quantum = 10.0 ** -next(
+        n for n in range(9) if abs(step_m * 10**n - round(step_m * 10**n)) < 1e-9
+    )
     return FormerTable("old.csv", dips, volumes, quantum, quantum_m3, **declared)
 
 
@@ -89,5 +91,7 @@ def draw_tank(random, *, density=None, shift=True, deadwood=True, bottom=True):
         float(random.uniform(600, 1000)) if density is None else density,
         zero_m=zero,
         deadwood=tuple(things),
-        cone_m=float(random.uniform(0, 0.012) * radius) if bottom and random.random() < 0.5 else 0.0,
+        cone_m=float(random.uniform(0, 0.012) * radius)
+        if bottom and random.random() < 0.5
+        else 0.0,
     )

@@ -95,7 +95,10 @@ def find_fittings(dips_m, left_m3, design, sd_m3, longest_m=np.inf, most=4):
         if likely[low, high] <= 0:
             break
         best = float(gain[low, high])
-        near = slice(max(low - APART, 0), low + APART + 1), slice(max(high - APART, 0), high + APART + 1)
+        near = (
+            slice(max(low - APART, 0), low + APART + 1),
+            slice(max(high - APART, 0), high + APART + 1),
+        )
         likely[near] = 0.0
         low, high = _standing(gain, low, high, slopes[low, high])
         volume = float(slopes[low, high] * height[low, high])

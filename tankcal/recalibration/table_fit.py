@@ -67,9 +67,7 @@ class State:
     def rings(self):
         """The Rings, in dips."""
         heights = np.concatenate([[0.0], self.seams_m, [self.rings_top_m]])
-        return Rings(
-            self.zero_m + heights, self.thickness_m, self.modulus_pa, self.is_first_order
-        )
+        return Rings(self.zero_m + heights, self.thickness_m, self.modulus_pa, self.is_first_order)
 
     def volume_m3(self, dips_m):
         """(rows,) volume below each dip."""

@@ -14,7 +14,7 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.recalibration.fittings import Fitting, find_fittings, in_other_pairs
+from tankcal.recalibration.fittings import find_fittings, in_other_pairs
 from tankcal.recalibration.table_fit import State, fit, held_kinks
 from tankcal.recalibration.zero import FARTHEST_M, find_zeros
 
@@ -151,7 +151,14 @@ class _Rows:
 
 
 def read_upright(
-    former, heights_m, thickness_m, *, modulus_pa=STEEL_PA, known=(), lowest_m=None, seams_known=True
+    former,
+    heights_m,
+    thickness_m,
+    *,
+    modulus_pa=STEEL_PA,
+    known=(),
+    lowest_m=None,
+    seams_known=True,
 ):
     """Radii, density of the head, zero, things in the tank: out of a table.
 
@@ -197,19 +204,14 @@ def read_upright(
 def sd_of_rows(former):
     """(rows,) standard deviations of a table's volumes by its last digits.
 
-    Dips on a regular step are what the table was made for; others were rounded, too.
+    Dips of an even step are what the table was made for; others were rounded, too.
     """
     dips, volumes = former.height_m, former.volume_m3
     finest = 1e-7 + 1e-12 * float(np.abs(volumes).max())
     own = max(former.volume_quantum_m3, finest) / np.sqrt(12)
-    step = np.diff(dips)
-    usual = np.median(step)
-    count = np.round(step / usual)
-    is_even = np.abs(step - count * usual) < 0.01 * max(former.height_quantum_m, 1e-7)
-    if is_even.mean() > 0.9:
+    if former.height_rounding_m is None:
         return np.full(len(dips), own)
-    slope = np.gradient(volumes, dips)
-    return np.hypot(own, slope * former.height_quantum_m / np.sqrt(12))
+    return np.hypot(own, np.gradient(volumes, dips) * former.height_rounding_m / np.sqrt(3))
 
 
 def _start(rows, heights, plates, modulus, zone):
@@ -416,7 +418,9 @@ def _with_free_zero(rows, state, about):
     things = {"kinks"} if state.fittings else set()
     zero = {"zero"} if len(state.seams_m) else set()
     held = state.free - {"zero", "kinks"}
-    for free in dict.fromkeys(map(frozenset, (held | things | zero, held | things, held | zero, held))):
+    for free in dict.fromkeys(
+        map(frozenset, (held | things | zero, held | things, held | zero, held))
+    ):
         start = state if "zero" in free else replace(state, zero_m=about)
         again = _tried(rows, replace(start, free=free))
         if again and _is_possible(again) and abs(again.state.zero_m - about) <= NEAR_M:
@@ -560,7 +564,9 @@ def _as_geometry(former, found, rows, used, *, roughness, density, head, t, with
         covariance_m2=covariance,
         heights_m=np.diff(edges),
         thickness_m=state.thickness_m,
-        zero_m=Reading(state.zero_m, *sd["zero"]) if len(sd["zero"]) else Reading(state.zero_m, 0.0),
+        zero_m=Reading(state.zero_m, *sd["zero"])
+        if len(sd["zero"])
+        else Reading(state.zero_m, 0.0),
         seams_m=_seam_readings(state if seams is None else seams.state, seams, roughness),
         seams_are=seams_are,
         density_kg_m3=density,

@@ -1,0 +1,200 @@
+"""A job that can be run, made of what a former table says of its upright tank."""
+
+import datetime
+import json
+from dataclasses import dataclass
+
+import numpy as np
+
+USUAL_TEMPERATURE_C = 20.0
+SURE = 3.0  # standard uncertainties, within which a bottom is flat and a zero is at the bottom
+
+
+@dataclass(frozen=True)
+class JobOfTable:
+    """The files of a job.
+
+    Attributes
+    ----------
+    texts : dict of {str: str}
+        job.toml and CSV files.
+    covariance_m2 : ndarray, shape (n, n)
+        Of the radii, for radii_cov.npz.
+    courses : tuple of str
+        What it is of.
+    """
+
+    texts: dict
+    covariance_m2: np.ndarray
+    courses: tuple[str, ...]
+
+
+def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
+    """The `JobOfTable` of an `UprightGeometry`.
+
+    Parameters
+    ----------
+    former : FormerTable
+    found : UprightGeometry
+    names : sequence of str
+        Of the courses.
+    u_common_m : float
+        Standard uncertainty that all radii have in common, as the former table was made.
+    e_pa : float
+    tank_id : str
+    """
+    density = 0.0 if found.head == "without" else found.density_kg_m3.value
+    zero = 0.0 if abs(found.zero_m.value) < 5e-5 else found.zero_m.value
+    bottom = _bottom_rows(former, found)
+    settings = _settings(
+        former,
+        tank_id=tank_id,
+        diameter=2 * float(found.radii_m[0]),
+        height=float(np.sum(found.heights_m)),
+        zero=zero,
+        density=max(round(density, 1), 0.0),
+        source="table",
+        u_common_m=u_common_m,
+        e_pa=e_pa,
+        note=f"read from {former.name}",
+    )
+    texts = {
+        "job.toml": settings + _roof(former),
+        **_wall(names, found.heights_m, found.thickness_m, found.radii_m),
+    }
+    if bottom is not None:
+        texts["bottom.csv"] = _csv(("level_m", "volume_m3"), bottom, (5, 6))
+    things = [
+        (f"thing-{k}", f"{max(one.bottom_m.value, 0):.4f}", f"{one.top_m.value:.4f}",
+         f"{one.volume_m3.value:.5f}", f"{one.volume_m3.u:.5f}")
+        for k, one in enumerate(found.fittings, 1)
+    ]  # fmt: skip
+    if things:
+        heading = ("name", "bottom_m", "top_m", "volume_m3", "u_m3")
+        texts["deadwood.csv"] = "\n".join(map(",".join, [heading, *things])) + "\n"
+    return JobOfTable(texts, found.covariance_m2, tuple(names))
+
+
+def job_of_record(former, radii, *, tank_id):
+    """The `JobOfTable` of `RecordedRadii`."""
+    job = former.record["job"]
+    settings = _settings(
+        former,
+        tank_id=tank_id,
+        diameter=2 * float(radii.radii_m[0]),
+        height=float(np.sum(radii.heights_m)),
+        zero=-(former.record["capacity"].get("zero_m") or 0.0),
+        density=former.liquid_density_kg_m3 or 0.0,
+        source="record",
+        u_common_m=0.0,
+        e_pa=job["material"]["e_pa"],
+        note=f"radii of {former.name}",
+    )
+    wall = _wall(radii.names, radii.heights_m, radii.thickness_m, radii.radii_m)
+    return JobOfTable(
+        {"job.toml": settings + _roof(former), **wall}, radii.covariance_m2, radii.names
+    )
+
+
+def _settings(former, *, tank_id, diameter, height, zero, density, source, u_common_m, e_pa, note):
+    temperature = former.reference_temperature_c
+    temperature = USUAL_TEMPERATURE_C if temperature is None else temperature
+    step = float(np.median(np.diff(former.height_m)))
+    lines = [
+        "[tank]",
+        f"id = {_text(tank_id)}",
+        'kind = "vertical"',
+        f"nominal_diameter_m = {diameter:.3f}",
+        f"nominal_height_m = {height:.4f}",
+        "",
+        "[survey]",
+        'side = "inside"',
+        f"date = {former.date if _is_date(former.date) else datetime.date.today().isoformat()}",
+        "",
+        "[datum]",
+        f"bottom_z_m = {zero:.5f}",
+        "dip_plate_z_m = 0.0",
+        *(
+            [f"reference_height_m = {former.reference_height_m:.4f}"]
+            if former.reference_height_m is not None
+            else []
+        ),
+        "",
+        "[table]",
+        f"step_m = {step:.6g}",
+        f"reference_temperature_c = {temperature:g}",
+        f"liquid_density_kg_m3 = {density:.1f}",
+        "",
+        "[material]",
+        f"e_gpa = {e_pa / 1e9:g}",
+        "",
+        "[radii]",
+        f'source = "{source}"',
+        f"u_common_mm = {1000 * u_common_m:.4g}",
+        f"reference_temperature_c = {temperature:g}",
+        f"note = {_text(note)}",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _is_date(text):
+    return isinstance(text, str) and len(text) == 10 and text[4] == text[7] == "-"
+
+
+def _text(text):
+    return json.dumps(str(text), ensure_ascii=False)
+
+
+def _roof(former):
+    roof = former.roof
+    if roof is None or roof.critical_m is None:
+        return ""
+    low, high = roof.critical_m
+    return (
+        f"\n[roof]\nmass_kg = {roof.mass_kg:g}\ncritical_bottom_m = {low:g}\n"
+        f"critical_top_m = {high:g}\nreference_density_kg_m3 = {roof.density_kg_m3:g}\n"
+        f'weighing = "{roof.weighing}"\n'
+    )
+
+
+def _wall(names, heights, plates, radii):
+    names = [_cell(name) for name in names]
+    courses = ["course,height_m,thickness_mm"]
+    courses += [
+        f"{name},{height:.5f},{1000 * plate:.6g}"
+        for name, height, plate in zip(names, heights, plates, strict=True)
+    ]
+    rows = ["course,radius_m"]
+    rows += [f"{name},{radius:.7f}" for name, radius in zip(names, radii, strict=True)]
+    return {"courses.csv": "\n".join(courses) + "\n", "radii.csv": "\n".join(rows) + "\n"}
+
+
+def _cell(name):
+    return f'"{name}"' if "," in name else name
+
+
+def _csv(heading, rows, decimals):
+    lines = [",".join(heading)]
+    for row in rows:
+        lines.append(",".join(f"{v:.{d}f}" for v, d in zip(row, decimals, strict=True)))
+    return "\n".join(lines) + "\n"
+
+
+def _bottom_rows(former, found):
+    """(rows, 2) dips and volumes up to the lowest row that was used; None: the bottom is flat."""
+    base, lowest, zero = found.base_m3, found.lowest_m, found.zero_m
+    state = found.state
+    shell = state.rings.volume_m3(np.array([lowest]), state.radii_m, state.density_kg_m3)[0]
+    area = np.pi * state.radii_m[0] ** 2
+    u = SURE * np.hypot(base.u + found.expected_m3, area * zero.u)
+    below = former.height_m < lowest - 1e-9
+    dry = former.volume_m3[below] <= 0
+    if abs(base.value - shell) <= u and np.all(dry | (former.height_m[below] < zero.value)):
+        return None
+    rows = [*zip(former.height_m[below], former.volume_m3[below], strict=True)]
+    rows.append((lowest, base.value))
+    if len(rows) == 1:
+        start = max(base.value - shell, 0.0)
+        rows.insert(0, (min(zero.value, lowest - 0.001), start))
+    return np.array(rows)
