@@ -4,7 +4,7 @@ The head is integrated numerically for each dip: at every node of every ring the
 looked up, squared, and summed. A dished bottom and things in the tank are summed in the same way.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 

@@ -162,8 +162,9 @@ def _head(found):
         )
     return message(
         "read_undecided_head",
-        "head or none cannot be told from this table: {density} kg/m3, u {u}",
-        density=density,
+        "head or none cannot be told from this table (its density has u {u} kg/m3): radii and job "
+        "are for {density} kg/m3",
+        density=fixed(found.state.density_kg_m3, 0, marks()),
         u=u,
     )
 

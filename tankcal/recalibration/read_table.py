@@ -201,7 +201,7 @@ def _read(former, courses, warnings, e_pa, bottom_m, seams_known):
     job = job_of_geometry(
         former, found, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_of(former)
     )
-    told = (*warnings, *_of_geometry(former, found), *_of_job(former, u_common))
+    told = (*warnings, *_of_geometry(former, found, seams_known), *_of_job(former, u_common))
     return TableRead(former, found, courses.names, job, told)
 
 
@@ -220,7 +220,7 @@ def _tank_of(former):
     return str(former.name).partition(",")[0].rpartition(".")[0] or "tank"
 
 
-def _of_geometry(former, found):
+def _of_geometry(former, found, seams_known):
     """What has to be known before the radii are used."""
     if found.roughness > 1:
         yield message(
@@ -244,7 +244,7 @@ def _of_geometry(former, found):
             found=value,
             u=density.u,
         )
-    if found.seams_are == "found":
+    if found.seams_are == "found" and seams_known:
         yield message(
             "read_other_seams",
             "the seams are not where courses.csv has them; the radii are for the seams that were "

@@ -45,6 +45,8 @@ class State:
         Of "base", "density", "zero", "seams", "kinks": what else than radii and volumes is unknown.
     is_first_order : bool
         Of the head.
+    density_sd_kg_m3 : float
+        Of the density that an adjustment starts with, as an observation of it.
     """
 
     base_m3: float
@@ -62,6 +64,7 @@ class State:
     roof_zone_m: tuple[float, float] | None = None
     free: frozenset = frozenset({"base", "density"})
     is_first_order: bool = True
+    density_sd_kg_m3: float = DENSITY_SD_KG_M3
 
     @property
     def rings(self):
@@ -251,7 +254,8 @@ def _priors(state):
     """Unknowns that are held; those that are weakly known, where about, and their sds."""
     layout = state.layout
     sds, held = {}, []
-    for name, sd in (("zero", ZERO_SD_M), ("seams", SEAM_SD_M), ("density", DENSITY_SD_KG_M3)):
+    density_sd = state.density_sd_kg_m3
+    for name, sd in (("zero", ZERO_SD_M), ("seams", SEAM_SD_M), ("density", density_sd)):
         sds |= dict.fromkeys(range(layout[name].start, layout[name].stop), sd)
     for k, one in enumerate(state.fittings):
         place = layout["fittings"].start + 3 * k

@@ -43,7 +43,7 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
     e_pa : float
     tank_id : str
     """
-    density = 0.0 if found.head == "without" else found.density_kg_m3.value
+    density = 0.0 if found.head == "without" else found.state.density_kg_m3
     zero = 0.0 if abs(found.zero_m.value) < 5e-5 else found.zero_m.value
     bottom = _bottom_rows(former, found)
     settings = _settings(

@@ -24,6 +24,8 @@ MOST_FITTINGS, FEW_FITTINGS = 12, 3
 SAME_COST = 1.0
 LENGTHS_M = 1.0, 3.0, np.inf  # of things, in the order in which they are looked for
 START_DENSITY_KG_M3 = 500.0
+USUAL_KG_M3 = 450.0, 450.0  # of a head that a table cannot tell: about this, with this sd
+DECLARED_SD_KG_M3 = 10.0
 LIQUID_KG_M3 = 500.0  # a head that a table could not have shown of any liquid is undecided
 ROUGH = 1.15  # rms over what rounding leaves: above it, rows have more in them than rounding
 USUAL_ZEROS_M = 0.0, -0.04, 0.04  # that are tried, too, where things are many
@@ -387,6 +389,11 @@ def _tidied(rows, found, about):
     for one in sorted(found.state.fittings, key=lambda one: abs(one.volume_m3)):
         rest = tuple(f for f in found.state.fittings if f.volume_m3 != one.volume_m3)
         found = _cheaper(rows, found, rest, about)
+    part, things = found.state.layout["fittings"], found.state.fittings
+    sds = np.sqrt(np.diag(found.cofactor)[part])[2::3]
+    sure = tuple(f for f, sd in zip(things, sds, strict=True) if abs(f.volume_m3) > CRITICAL * sd)
+    if len(sure) < len(things):
+        found = _with_free_zero(rows, replace(found.state, fittings=sure), about) or found
     return found
 
 
@@ -450,6 +457,8 @@ def _geometry(former, found, rows, used, seams_known):
     head, without = _decide_head(t, u_density), None
     density = Reading(found.state.density_kg_m3, u_density)
     dry = _without_head(chosen, found)
+    if head == "undecided":
+        found, other = _with_usual_density(chosen, former, found), None
     if head == "without":
         found, other, roughness = dry, None, _roughness(chosen, dry)
     else:
@@ -522,6 +531,15 @@ def _without_head(rows, found):
     dry = replace(found.state, density_kg_m3=0.0, free=free)
     tried = _tried(rows, dry) or _tried(rows, replace(dry, free=free - {"kinks"}))
     return tried or rows.adjust(replace(dry, free=free - {"kinks", "zero"}))
+
+
+def _with_usual_density(rows, former, found):
+    """The Fit with the declared density, or that of some liquid or none: the table cannot tell."""
+    usual, sd = USUAL_KG_M3
+    if former.liquid_density_kg_m3 is not None:
+        usual, sd = former.liquid_density_kg_m3, DECLARED_SD_KG_M3
+    state = replace(found.state, density_kg_m3=usual, density_sd_kg_m3=sd)
+    return _tried(rows, state) or found
 
 
 def _decide_head(t, u_density):
