@@ -15,9 +15,10 @@ def add(commands):
     parser = commands.add_parser(
         "read-table",
         help="read radii, head and zero out of a former capacity table",
-        description="Read the geometry of an upright tank out of a capacity table of any origin: "
-        "radii of the courses, density of the head, zero, seams, things in the tank, each with "
-        "what rounding leaves uncertain. With --out a job is written that gives the table again, "
+        description="Read the geometry of a tank out of a capacity table of any origin: of an "
+        "upright one radii of the courses, density of the head, zero, seams, things in the tank, "
+        "of a lying one or a sphere its sizes, each with what rounding leaves uncertain. "
+        "With --out a job is written that gives the table again, "
         "for another density or temperature, too. docs/read-table.md says how it is found.",
         epilog="exit status: 0 done; 2 table or courses must be mended (one line per problem); "
         "3 the table does not determine its tank.",
@@ -33,6 +34,11 @@ def add(commands):
         metavar="FILE",
         help="courses.csv: course, height_m (blank: seams are found), thickness_mm, from the "
         "bottom up",
+    )
+    parser.add_argument(
+        "--kind",
+        choices=("vertical", "horizontal", "sphere"),
+        help="kind of tank (default: as former.toml says, else vertical)",
     )
     parser.add_argument("--former", metavar="FILE", help="former.toml: what else is known of it")
     parser.add_argument("--out", metavar="DIR", help="write a job there, all or nothing")
@@ -60,6 +66,7 @@ def _read_table(options):
         options.file,
         options.courses,
         options.former,
+        kind=options.kind,
         e_pa=1e9 * options.e_gpa,
         bottom_m=options.bottom,
     )
@@ -94,6 +101,40 @@ def _summary(read):
         )
     if hasattr(found, "head"):
         yield from _of_table(found)
+    elif not read.names:
+        yield from _of_solid(found)
+
+
+def _of_solid(found):
+    """Sizes of a lying tank or a sphere."""
+    fit = getattr(found, "best", found)
+    values = dict(zip(fit.names, zip(fit.values, fit.u, strict=True), strict=True))
+    yield _size(message("read_diameter", "diameter"), values["diameter"])
+    if "length" in values:
+        yield _size(message("read_length", "length of the cylinder"), values["length"])
+        ends = fit.ends.replace("_", " ")
+        yield message("read_ends", "ends: {ends}", ends=ends)
+    if "end_depth" in values:
+        yield _size(message("read_depth", "depth of the ends"), values["end_depth"])
+    yield _size(message("read_zero_of_solid", "dips are less than the depth by"), values["zero"])
+    tilted = getattr(found, "tilted", None)
+    if tilted is not None:
+        tilt, u = (1000 * one for one in tilted["tilt"])
+        yield message(
+            "read_tilt",
+            "a tilt as one more unknown: {tilt} mm/m, u {u} mm/m; it lowers chi2 by {gain}",
+            tilt=fixed(tilt, 2, marks()),
+            u=fixed(u, 2, marks()),
+            gain=fixed(found.tilt_gain, 1, marks()),
+        )
+    yield message(
+        "read_left_solid", "left: {rms} L (rms)", rms=fixed(1000 * fit.rms_m3, 2, marks())
+    )
+
+
+def _size(name, size):
+    value, u = _with_u(*map(float, size))
+    return message("read_size", "{name}: {value} m, u {u} m", name=name, value=value, u=u)
 
 
 def _with_u(value, u):

@@ -11,10 +11,12 @@ from tankcal.recalibration.read_courses import read_courses
 from tankcal.recalibration.reading import read_former
 from tankcal.recalibration.recorded_radii import read_recorded
 from tankcal.recalibration.seams import find_seams
-from tankcal.recalibration.table_job import job_of_geometry, job_of_record
+from tankcal.recalibration.solid_geometry import fit_lying, fit_sphere
+from tankcal.recalibration.table_job import job_of_geometry, job_of_record, job_of_solid
 from tankcal.recalibration.upright_geometry import STEEL_PA, read_upright, sd_of_rows
 
 FEWEST_ROWS = 8
+SOLIDS = "horizontal", "sphere"
 ABOVE_M = 0.02  # that a table may go beyond its courses
 LARGE_SHARE = 2e-3  # of the table, that a thing which may be a roof takes
 
@@ -26,7 +28,7 @@ class TableRead:
     Attributes
     ----------
     former : FormerTable
-    geometry : UprightGeometry or RecordedRadii
+    geometry : UprightGeometry, RecordedRadii, LyingGeometry or SolidFit
     names : tuple of str
         Of the courses.
     job : JobOfTable
@@ -40,18 +42,22 @@ class TableRead:
     warnings: tuple
 
 
-def read_table(path, courses_path=None, former_toml=None, *, e_pa=STEEL_PA, bottom_m=None):
-    """Read the geometry of an upright tank out of a former table.
+def read_table(
+    path, courses_path=None, former_toml=None, *, kind=None, e_pa=STEEL_PA, bottom_m=None
+):
+    """Read the geometry of a tank out of a former table.
 
     Parameters
     ----------
     path : path
         The table; a record.json gives the radii that it has.
     courses_path : path or None
-        courses.csv: course, height_m (blank: the seams are found), thickness_mm; None only for a
-        record.
+        courses.csv: course, height_m (blank: the seams are found), thickness_mm; None for a
+        record, a lying tank and a sphere.
     former_toml : path or None
         What else is known of the table.
+    kind : {"vertical", "horizontal", "sphere"} or None
+        None: as former.toml or the record says, else upright.
     e_pa : float
         Young's modulus of the shell.
     bottom_m : float or None
@@ -85,6 +91,10 @@ def read_table(path, courses_path=None, former_toml=None, *, e_pa=STEEL_PA, bott
     """
     log = Log()
     former = _former(path, former_toml, log)
+    kind = kind or (former.kind if former else None) or "vertical"
+    if former is not None and kind in SOLIDS:
+        log.stop_if_problems()
+        return _read_solid(former, kind)
     if former is not None and former.record is not None:
         log.stop_if_problems()
         radii = read_recorded(former)
@@ -97,7 +107,7 @@ def read_table(path, courses_path=None, former_toml=None, *, e_pa=STEEL_PA, bott
     else:
         courses = read_courses(courses_path, log)
     if former is not None:
-        _check_kind(former, log)
+        _check_kind(former, kind, log)
     log.stop_if_problems()
     courses, warnings, seams_known = _fitting(former, courses)
     return _read(former, courses, warnings, e_pa, bottom_m, seams_known)
@@ -111,12 +121,37 @@ def _former(path, former_toml, log):
         return None
 
 
-def _check_kind(former, log):
-    if former.kind not in (None, "vertical"):
+def _read_solid(former, kind):
+    found = fit_sphere(former) if kind == "sphere" else fit_lying(former)
+    fit = found if kind == "sphere" else found.best
+    job = job_of_solid(former, fit, tank_id=_tank_of(former))
+    return TableRead(former, found, (), job, (*_of_solid(found), *_of_job(former, 0.0)))
+
+
+def _of_solid(found):
+    fit = getattr(found, "best", found)
+    if fit.variance_factor > 1:
+        yield message(
+            "read_rough_solid",
+            "the rows depart by {rms:.3g} L (rms) from such a tank, more than rounding leaves; u "
+            "is by what they leave",
+            rms=1000 * fit.rms_m3,
+        )
+    others = getattr(found, "not_told_apart", ())
+    if others:
+        yield message(
+            "read_other_ends",
+            "these ends fit as well: {ends}",
+            ends=[one.replace("_", " ") for one in others],
+        )
+
+
+def _check_kind(former, kind, log):
+    if kind != "vertical":
         expected = message(
             "read_other_kind",
-            "of a tank of kind {kind}; expected an upright one, of courses",
-            kind=former.kind,
+            "of a tank of kind {kind}; expected an upright or lying one, or a sphere",
+            kind=kind,
         )
         log.problem(former.name, expected)
     if len(former.height_m) < FEWEST_ROWS:

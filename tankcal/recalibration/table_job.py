@@ -1,10 +1,12 @@
-"""A job that can be run, made of what a former table says of its upright tank."""
+"""A job that can be run, made of what a former table says of its tank."""
 
 import datetime
 import json
 from dataclasses import dataclass
 
 import numpy as np
+
+from tankcal.recalibration.solid_geometry import declared_sizes, declared_uncertainties
 
 USUAL_TEMPERATURE_C = 20.0
 SURE = 3.0  # standard uncertainties, within which a bottom is flat and a zero is at the bottom
@@ -18,7 +20,7 @@ class JobOfTable:
     ----------
     texts : dict of {str: str}
         job.toml and CSV files.
-    covariance_m2 : ndarray, shape (n, n)
+    covariance_m2 : ndarray, shape (n, n), or None
         Of the radii, for radii_cov.npz.
     courses : tuple of str
         What it is of.
@@ -96,9 +98,47 @@ def job_of_record(former, radii, *, tank_id):
     )
 
 
+def job_of_solid(former, fit, *, tank_id):
+    """The `JobOfTable` of a `SolidFit`: a job of declared sizes."""
+    diameter = fit["diameter"][0]
+    tank = {
+        "id": tank_id,
+        "kind": fit.kind,
+        "nominal_diameter_m": round(diameter, 3),
+        "nominal_height_m": round(diameter, 3),
+    }
+    table = {
+        "step_m": float(f"{np.median(np.diff(former.height_m)):.6g}"),
+        "reference_temperature_c": _temperature(former),
+    }
+    lines = []
+    for name, keys in ({"tank": tank} | declared_sizes(fit) | {"table": table}).items():
+        lines.append(f"[{name}]")
+        for key, value in keys.items():
+            lines.append(f"{key} = {_text(value) if isinstance(value, str) else value}")
+        lines.append("")
+    lines += ["[survey]", 'side = "inside"', f"date = {_day(former)}", ""]
+    texts = {"job.toml": "\n".join(lines)}
+    rows = [
+        ",".join(str(row[key]) for key in ("input", "u", "unit"))
+        for row in declared_uncertainties(fit, former)
+    ]
+    if rows:
+        texts["uncertainty.csv"] = "\n".join(["input,u,unit", *rows]) + "\n"
+    return JobOfTable(texts, None, ())
+
+
+def _temperature(former):
+    known = former.reference_temperature_c
+    return USUAL_TEMPERATURE_C if known is None else known
+
+
+def _day(former):
+    return former.date if _is_date(former.date) else datetime.date.today().isoformat()
+
+
 def _settings(former, *, tank_id, diameter, height, zero, density, source, u_common_m, e_pa, note):
-    temperature = former.reference_temperature_c
-    temperature = USUAL_TEMPERATURE_C if temperature is None else temperature
+    temperature = _temperature(former)
     step = float(np.median(np.diff(former.height_m)))
     lines = [
         "[tank]",
@@ -109,7 +149,7 @@ def _settings(former, *, tank_id, diameter, height, zero, density, source, u_com
         "",
         "[survey]",
         'side = "inside"',
-        f"date = {former.date if _is_date(former.date) else datetime.date.today().isoformat()}",
+        f"date = {_day(former)}",
         "",
         "[datum]",
         f"bottom_z_m = {zero:.5f}",

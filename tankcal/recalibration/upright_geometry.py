@@ -389,11 +389,22 @@ def _tidied(rows, found, about):
     for one in sorted(found.state.fittings, key=lambda one: abs(one.volume_m3)):
         rest = tuple(f for f in found.state.fittings if f.volume_m3 != one.volume_m3)
         found = _cheaper(rows, found, rest, about)
-    part, things = found.state.layout["fittings"], found.state.fittings
-    sds = np.sqrt(np.diag(found.cofactor)[part])[2::3]
-    sure = tuple(f for f, sd in zip(things, sds, strict=True) if abs(f.volume_m3) > CRITICAL * sd)
-    if len(sure) < len(things):
-        found = _with_free_zero(rows, replace(found.state, fittings=sure), about) or found
+    return found
+
+
+def _with_sure_fittings(rows, found):
+    """The Fit without things whose volume is no more than its uncertainty, the least sure first."""
+    while found.state.fittings:
+        things = found.state.fittings
+        sizes = np.abs([one.volume_m3 for one in things]) / found.sd("fittings")[2::3]
+        worst = int(np.argmin(sizes))
+        if sizes[worst] > CRITICAL:
+            break
+        rest = things[:worst] + things[worst + 1 :]
+        again = _tried(rows, replace(found.state, fittings=rest))
+        if again is None:
+            break
+        found = again
     return found
 
 
@@ -445,7 +456,7 @@ def _tried(rows, state):
 
 def _geometry(former, found, rows, used, seams_known):
     chosen = rows._of(used)
-    found = _with_known_zero(chosen, former, found)
+    found = _with_sure_fittings(chosen, _with_known_zero(chosen, former, found))
     found, other = _with_order(chosen, found)
     seams = _free_seams(chosen, found)
     seams_are = "declared"
