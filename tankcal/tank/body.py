@@ -102,13 +102,12 @@ class ShellPart(Part):
             **{name: self.volume.by_missed_m2(wet, name) for name in self.volume.departures},
             "course_heights": self.volume.by_course_heights_m2(wet),
             "tilt": volume * self.tilt / (1 + self.tilt**2),
-            **{name: of_corrections[name] for name in self.bearing if name in of_corrections},
+            **{name: of_corrections[name] for name in self.bearing},
         }
         found = {name: one for name, one in found.items() if name not in self.unused}
         for name, column in self.read_with.items():
-            if name in self.bearing:
-                by_readings = self.volume.integrated(wet, column[:, None])[:, 0]
-                found[name] = found.get(name, 0.0) + by_readings
+            by_readings = self.volume.integrated(wet, column[:, None])[:, 0]
+            found[name] = found.get(name, 0.0) + by_readings
         return found
 
     def sources(self, levels_m):

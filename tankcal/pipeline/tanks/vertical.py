@@ -256,10 +256,10 @@ def _shell(job, wall, switches, uncertain):
         departures=_declared(job),
     )
     features = _functionals(wall, volume) if uncertain else None
-    read_with = wall.read_with(features.weights) if uncertain else {}
     bearing = _bearing(job, switches)
-    if job.radii is not None:  # all that a survey beside them depends on is in the radii
-        bearing = tuple(dict.fromkeys((*bearing, *read_with)))
+    read_with = wall.read_with(features.weights) if uncertain else {}
+    if job.radii is None:  # else all that a survey beside them depends on is in the radii
+        read_with = {name: column for name, column in read_with.items() if name in bearing}
     return ShellPart(
         volume,
         _factors(job, wall, volume, features) if uncertain else (),
