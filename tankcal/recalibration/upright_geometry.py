@@ -20,7 +20,7 @@ from tankcal.recalibration.zero import FARTHEST_M, find_zeros
 
 STEEL_PA = 206e9
 LEAST_GAIN = 25.0  # of chi2 by a thing: less is what the best of all pairs gains by chance
-MOST_FITTINGS, FEW_FITTINGS = 12, 3
+MOST_FITTINGS, FEW_FITTINGS = 12, 4
 SAME_COST = 1.0
 LENGTHS_M = 1.0, 3.0, np.inf  # of things, in the order in which they are looked for
 START_DENSITY_KG_M3 = 500.0
@@ -334,17 +334,41 @@ def _with_fittings(rows, state, at_most=MOST_FITTINGS):
     zeros = find_zeros(rows.dip_m, rows.volume_m3, rows.sd_m3, state.seams_m)
     best = None
     for zero in (state.zero_m,) if state.fittings else (*zeros, *USUAL_ZEROS_M):
-        chosen = rows.above(zero + NEAR_M) if zero > 0 else rows
-        other = _from_zero(chosen, replace(state, zero_m=zero), at_most)
+        other = _from_zero(rows.above(zero + NEAR_M), replace(state, zero_m=zero), at_most)
         if other and (best is None or _cost(other) < _cost(best) - SAME_COST):
             best = other
-        if best and len(best.state.fittings) <= FEW_FITTINGS and _is_by_rounding(best):
+        if best and _is_plain(best) and _is_by_rounding(best):
             break
     if best is None:
         raise SolutionError(
             message("former_undetermined", "the rows of the table do not determine the radii")
         )
-    return best
+    return _with_lower_rows(rows, best)
+
+
+def _with_lower_rows(rows, found):
+    """The Fit with rows that were left out because the first ring might have begun among them."""
+    more = len(rows.dip_m) - len(found.left_m3)
+    for lowest in rows.dip_m[:more]:
+        chosen = rows.above(lowest)
+        again = _tried(chosen, replace(found.state, base_m3=float(chosen.volume_m3[0])))
+        if again and _is_possible(again):
+            gain = again.chi2 - found.chi2
+            if gain < len(chosen.dip_m) - len(found.left_m3) + SAME_ZERO**2:
+                return again
+    return found
+
+
+def _is_plain(found):
+    """Whether its things are few, and none of them what seams look like from a wrong zero."""
+    seams = found.state.rings.edges_m[1:-1]
+    return len(found.state.fittings) <= FEW_FITTINGS and all(
+        one.volume_m3 < 0
+        and one.top_m - one.bottom_m < LENGTHS_M[0]
+        and not np.any(np.abs(seams - one.bottom_m) < NEAR_M)
+        and not np.any(np.abs(seams - one.top_m) < NEAR_M)
+        for one in found.state.fittings
+    )
 
 
 def _cost(found):
