@@ -147,6 +147,8 @@ def check_table(job, survey, made, sighting=None):
     -------
     tuple of Problem
     """
+    if isinstance(survey, RadiiWall):
+        survey = survey.surveyed
     return (
         *_doubts_of_survey(job, survey, made.top_m),
         *_doubts_of_sights(job, survey, sighting),
@@ -166,8 +168,6 @@ def _doubts_of_sights(job, survey, sighting):
 
 
 def _doubts_of_survey(job, survey, top_m):
-    if isinstance(survey, RadiiWall):
-        return () if survey.surveyed is None else _doubts_of_survey(job, survey.surveyed, top_m)
     if isinstance(survey, Wall):
         straps = survey.straps
         beside = () if straps is None else check_straps_beside_points(job, straps)

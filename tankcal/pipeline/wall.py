@@ -242,7 +242,10 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None):
     sections = tuple(fit_section(*one, form_m2) for one in to_fit)
     by_points = means @ _radii_by_points(sections, len(accepted))
     by_inputs = _by_inputs(job.points, by_points, accepted)
-    is_read = any(one is not None for one in (job.strapping, job.lines, job.radii))
+    is_read = job.strapping is not None or job.lines is not None
+    is_read = is_read or (
+        job.radii is not None and len({one.course for one in groups}) < len(job.courses)
+    )
     if is_read or job.points.unbound or by_inputs:
         unbound = unbound_of(job.points, by_points, accepted)
         noise = by_points @ (covariance @ by_points.T)  # between sections, too

@@ -4,6 +4,9 @@ Truth: the examples of recalibration.md, section 4, to the printed digit; genera
 as a second method; the model itself, drawn (intervals); limits that must be reached.
 """
 
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 from draws import draws
@@ -15,6 +18,7 @@ import tankcal
 from tankcal.errors import SolutionError
 from tankcal.pipeline.radii_update import update_radii
 
+EXAMPLES_AT = Path(__file__).resolve().parents[2] / "examples"
 # The page prints +0.028 % for the first: 0.02746 % rounded twice.
 EXAMPLES = (  # u_co, u_io, s_c, s_i, u_cn, u_in, found; w, course 1, others, U before, after, V
     ((0.7, 0.3, 0.8, 0.3, 0.4, 0.3, 1.2), (0.96, 1.01, 0.87, 0.066, 0.034, 0.027)),
@@ -220,3 +224,36 @@ def test_intervals_hold_in_the_declared_model_study(tmp_path, figure):
 
 def test_radii_alone_need_no_change(tmp_path):
     assert tankcal.load(write_folder(tmp_path / "job", radii_parts())).change is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["wall-hits", "tangents", "reference-line"])
+def test_other_surveys_of_two_courses_agree_with_those_of_all(tmp_path, name):
+    """An example whose own radii stand beside the readings of its first two courses."""
+    source, folder = EXAMPLES_AT / name, tmp_path / name
+    whole = tankcal.run(tankcal.load(source), simulated=False)
+    shutil.copytree(source, folder)
+    found = tankcal.record.record_of(whole)["courses"]
+    names = [one.name for one in whole.job.courses]
+    rows = [f"{n},{one['inside_radius_m']}" for n, one in zip(names, found, strict=True)]
+    (folder / "radii.csv").write_text("\n".join(["course,radius_m", *rows]))
+    with (folder / "job.toml").open("a") as settings:
+        settings.write("\n[radii]\nsource = 'record'\nu_common_mm = 2\n")
+        settings.write("[change]\ncommon_mm = 2\nown_mm = 1\n")
+    for table in ("wall_hits", "tangents", "circumferences", "offsets"):
+        keep_courses(folder / f"{table}.csv", names[:2])
+    again = tankcal.run(tankcal.load(folder), simulated=False)
+    update = again.radii.updated.update
+    assert list(update.measured) == [0, 1]
+    assert np.max(np.abs(update.w)) < 0.5
+    assert_allclose(again.table.volume_m3[-1], whole.table.volume_m3[-1], rtol=1e-4)
+    assert tankcal.record.record_of(again)["radii"]["change"]["own_m"] == 1e-3
+
+
+def keep_courses(path, names):
+    """Leave the rows of some courses in a CSV file, if it is there."""
+    if path.exists():
+        lines = [line for line in path.read_text().splitlines() if line and line[0] != "#"]
+        place = lines[0].split(",").index("course")
+        kept = [line for line in lines[1:] if line.split(",")[place] in names]
+        path.write_text("\n".join([lines[0], *kept]))
